@@ -1,0 +1,176 @@
+//! What a STEP file holds, as plain values: no CAD-kernel type leaves this crate.
+//!
+//! Lengths are millimetres whatever the file's unit, angles radians, frames right-handed and
+//! orthonormal. A [`Shape`] lives in its own frame; a [`Part`] places it in the assembly.
+
+use glam::{DAffine3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// A STEP file: distinct shapes, and the parts that place them.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct CadModel {
+    /// Name of the length unit in the file ("millimetre", "inch", …); lengths here are already mm.
+    pub unit: String,
+    /// Shapes, each once, however often it is placed.
+    pub shapes: Vec<Shape>,
+    /// Placed parts in file order: leaves of the assembly tree.
+    pub parts: Vec<Part>,
+    /// What the import noticed or lost, in words.
+    pub warnings: Vec<String>,
+}
+
+/// One placed part: a leaf of the assembly.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Part {
+    /// Product name, made unique within the file by the reader where it has to.
+    pub name: String,
+    /// Names of the subassemblies above, outermost first.
+    pub path: Vec<String>,
+    /// Index into [`CadModel::shapes`].
+    pub shape: usize,
+    /// Shape frame to assembly frame: a rigid motion (a mirrored placement gets a shape of its own).
+    pub placement: DAffine3,
+    /// Linear RGB in 0..1 where the file gives one.
+    pub color: Option<[f32; 3]>,
+}
+
+/// Geometry of one shape, in its own frame.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Shape {
+    /// B-rep faces; a face id is an index here.
+    pub faces: Vec<Face>,
+    /// B-rep edges.
+    pub edges: Vec<Edge>,
+    /// Tessellation, welded by topology.
+    pub mesh: Mesh,
+    /// Volume from the exact B-rep, mm³.
+    pub volume_mm3: f64,
+    /// Surface area from the exact B-rep, mm².
+    pub area_mm2: f64,
+    /// Centre of mass, mm.
+    pub center_of_mass: DVec3,
+    /// Inertia tensor about the centre of mass at unit density, mm⁵, row by row.
+    pub inertia_mm5: [[f64; 3]; 3],
+    /// Every mesh edge is used exactly twice, once each way.
+    pub closed: bool,
+    /// Mesh edges not used exactly twice (0 when closed).
+    pub open_edges: usize,
+}
+
+/// A B-rep face.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Face {
+    /// The exact surface it lies on.
+    pub surface: Surface,
+    /// The face's outward normal is the surface's natural normal turned round.
+    pub reversed: bool,
+    /// Area, mm².
+    pub area_mm2: f64,
+    /// Bounding edges: indices into [`Shape::edges`].
+    pub edges: Vec<u32>,
+    /// Linear RGB in 0..1 where the file colours this face.
+    pub color: Option<[f32; 3]>,
+}
+
+/// A right-handed orthonormal frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// Origin, mm.
+    pub origin: DVec3,
+    /// Unit x axis.
+    pub x: DVec3,
+    /// Unit y axis (= z × x).
+    pub y: DVec3,
+    /// Unit z axis: the axis of a surface of revolution, the normal of a plane.
+    pub z: DVec3,
+}
+
+/// The surface under a face. Natural normals point along +z (plane), away from the axis (cylinder, cone),
+/// away from the centre (sphere) or from the tube's centre circle (torus).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Surface {
+    /// z = 0 of `frame`.
+    Plane {
+        /// Where.
+        frame: Frame,
+    },
+    /// Distance `radius` from the z axis.
+    Cylinder {
+        /// Axis along z.
+        frame: Frame,
+        /// mm.
+        radius: f64,
+    },
+    /// Distance `radius + z·tan(half_angle)` from the z axis.
+    Cone {
+        /// Axis along z.
+        frame: Frame,
+        /// Radius at z = 0, mm.
+        radius: f64,
+        /// Radians, either sign.
+        half_angle: f64,
+    },
+    /// Distance `radius` from the origin.
+    Sphere {
+        /// Centre at the origin.
+        frame: Frame,
+        /// mm.
+        radius: f64,
+    },
+    /// A tube of radius `minor` about the circle of radius `major` in z = 0.
+    Torus {
+        /// Axis along z.
+        frame: Frame,
+        /// mm.
+        major: f64,
+        /// mm.
+        minor: f64,
+    },
+    /// Anything else: Bézier, B-spline, extrusion, revolution, offset.
+    Spline,
+}
+
+/// A B-rep edge.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Edge {
+    /// The exact curve it lies on.
+    pub curve: Curve,
+    /// mm.
+    pub length_mm: f64,
+    /// Faces that meet here (a seam names its face twice).
+    pub faces: Vec<u32>,
+    /// Points along it, within the tessellation's tolerance, first to last.
+    pub polyline: Vec<DVec3>,
+}
+
+/// The curve under an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Curve {
+    /// Through `origin` along the unit vector `direction`.
+    Line {
+        /// mm.
+        origin: DVec3,
+        /// Unit vector.
+        direction: DVec3,
+    },
+    /// In z = 0 of `frame`.
+    Circle {
+        /// Axis along z.
+        frame: Frame,
+        /// mm.
+        radius: f64,
+    },
+    /// Anything else.
+    Other,
+}
+
+/// A triangle mesh whose vertices are shared wherever the B-rep shares them.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Mesh {
+    /// mm.
+    pub vertices: Vec<DVec3>,
+    /// Counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Face id of each triangle.
+    pub triangle_face: Vec<u32>,
+}
