@@ -1,0 +1,1 @@
+//! The force law: a pure function of state, scene, settings and inputs

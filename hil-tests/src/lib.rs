@@ -1,0 +1,1 @@
+//! Scenarios as data, run against every rig

@@ -1,0 +1,1 @@
+//! CAD model to scene image: exact signed distance, bricks, pointshell

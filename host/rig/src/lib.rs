@@ -1,0 +1,1 @@
+//! One client for every rig: in-process simulation, emulated board, serial port

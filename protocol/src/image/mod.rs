@@ -1,0 +1,22 @@
+//! The scene image: everything the board needs of a scene, read in place from flash.
+//!
+//! Little-endian, SI units, every array aligned to 4 bytes, no pointers: offsets count from the
+//! image's first byte. [`SceneImage::open`] checks every offset, index and number once; after that the accessors
+//! cannot go out of bounds, whatever bytes came in. `docs/scene-image.md` is the written form.
+//!
+//! ```text
+//! header | parts | shapes | fields | nodes | points | faces | bricks | palette | grid | blob
+//! ```
+//!
+//! A **shape** is geometry in its own frame: a signed-distance **field** (dense grid of bricks, sparse brick
+//! data), a **pointshell** (points under a preorder sphere tree of nodes) and its B-rep **faces**. A **part** places a shape.
+
+mod error;
+mod field;
+mod open;
+mod records;
+
+pub use error::ImageError;
+pub use field::{Field, FieldSample, Lookup};
+pub use open::{CRC, SceneImage, Shape};
+pub use records::*;

@@ -1,0 +1,277 @@
+//! Opening a scene image: every check once, then access without checks that could fail.
+
+use bytemuck::{Pod, try_cast_slice};
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+use super::error::ImageError;
+use super::field::Field;
+use super::records::*;
+
+/// The checksum of images and frames.
+pub const CRC: Crc<u32, crc::Table<1>> = Crc::<u32, crc::Table<1>>::new(&CRC_32_ISO_HDLC);
+
+const SECTION_PARTS: u8 = 0;
+const SECTION_SHAPES: u8 = 1;
+const SECTION_FIELDS: u8 = 2;
+const SECTION_NODES: u8 = 3;
+const SECTION_POINTS: u8 = 4;
+const SECTION_FACES: u8 = 5;
+const SECTION_BRICKS: u8 = 6;
+const SECTION_PALETTE: u8 = 7;
+const SECTION_GRID: u8 = 8;
+const SECTION_BLOB: u8 = 9;
+
+/// A scene image, read where it lies.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneImage<'a> {
+    header: &'a Header,
+    parts: &'a [PartRecord],
+    shapes: &'a [ShapeRecord],
+    fields: &'a [FieldRecord],
+    nodes: &'a [NodeRecord],
+    points: &'a [PointRecord],
+    faces: &'a [FaceRecord],
+    bricks: &'a [BrickRecord],
+    palette: &'a [u16],
+    grid: &'a [u16],
+    blob: &'a [u8],
+}
+
+/// One shape of an image with its arrays.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape<'a> {
+    /// Numbers of the whole.
+    pub record: &'a ShapeRecord,
+    /// Pointshell tree, preorder.
+    pub nodes: &'a [NodeRecord],
+    /// Pointshell.
+    pub points: &'a [PointRecord],
+    /// B-rep faces.
+    pub faces: &'a [FaceRecord],
+    /// Signed distance.
+    pub field: Field<'a>,
+}
+
+impl<'a> SceneImage<'a> {
+    /// Checks `bytes` (which may be longer than the image) and opens the image in place.
+    ///
+    /// Time grows with the image: the checksum reads every byte once. Not for the tick.
+    pub fn open(bytes: &'a [u8]) -> Result<Self, ImageError> {
+        let got = bytes.len() as u32;
+        let head = bytes.get(..size_of::<Header>()).ok_or(ImageError::TooShort {
+            needed: size_of::<Header>() as u32,
+            got,
+        })?;
+        let header: &'a Header = bytemuck::try_from_bytes(head).map_err(|_| ImageError::Misaligned)?;
+        if header.magic != MAGIC {
+            return Err(ImageError::BadMagic);
+        }
+        if header.layout != LAYOUT_VERSION {
+            return Err(ImageError::Layout {
+                expected: LAYOUT_VERSION,
+                found: header.layout,
+            });
+        }
+        let bytes = bytes
+            .get(..header.length as usize)
+            .filter(|b| b.len() >= size_of::<Header>())
+            .ok_or(ImageError::TooShort {
+                needed: header.length.max(size_of::<Header>() as u32),
+                got,
+            })?;
+        let found = CRC.checksum(&bytes[20..]);
+        if found != header.crc {
+            return Err(ImageError::Crc {
+                expected: header.crc,
+                found,
+            });
+        }
+        let image = Self {
+            header,
+            parts: section(bytes, header.parts, SECTION_PARTS)?,
+            shapes: section(bytes, header.shapes, SECTION_SHAPES)?,
+            fields: section(bytes, header.fields, SECTION_FIELDS)?,
+            nodes: section(bytes, header.nodes, SECTION_NODES)?,
+            points: section(bytes, header.points, SECTION_POINTS)?,
+            faces: section(bytes, header.faces, SECTION_FACES)?,
+            bricks: section(bytes, header.bricks, SECTION_BRICKS)?,
+            palette: section(bytes, header.palette, SECTION_PALETTE)?,
+            grid: section(bytes, header.grid, SECTION_GRID)?,
+            blob: section(bytes, header.blob, SECTION_BLOB)?,
+        };
+        image.check()?;
+        Ok(image)
+    }
+
+    /// The header.
+    pub fn header(&self) -> &'a Header {
+        self.header
+    }
+
+    /// The placed parts.
+    pub fn parts(&self) -> &'a [PartRecord] {
+        self.parts
+    }
+
+    /// Number of shapes.
+    pub fn shape_count(&self) -> usize {
+        self.shapes.len()
+    }
+
+    /// Shape `index`; panics when `index >= shape_count()`.
+    pub fn shape(&self, index: usize) -> Shape<'a> {
+        let record = &self.shapes[index];
+        let field = &self.fields[record.field as usize];
+        let entries = grid_len(field) as usize;
+        Shape {
+            record,
+            nodes: run(self.nodes, record.first_node, record.node_count),
+            points: run(self.points, record.first_point, record.point_count),
+            faces: run(self.faces, record.first_face, record.face_count),
+            field: Field {
+                record: field,
+                grid: &self.grid[field.first_grid as usize..][..entries],
+                bricks: run(self.bricks, field.first_brick, field.brick_count),
+                palette: self.palette,
+                blob: self.blob,
+                inverse_cell: 1.0 / field.cell,
+            },
+        }
+    }
+
+    /// The shape that part `index` places; panics when there is no such part.
+    pub fn shape_of_part(&self, index: usize) -> Shape<'a> {
+        self.shape(self.parts[index].shape as usize)
+    }
+
+    fn check(&self) -> Result<(), ImageError> {
+        each(self.parts, SECTION_PARTS, |part| {
+            let q = part.orientation;
+            let norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+            (part.shape as usize) < self.shapes.len()
+                && finite(&part.position)
+                && finite(&q)
+                && (norm2 - 1.0).abs() < 1e-3
+        })?;
+        each(self.shapes, SECTION_SHAPES, |shape| {
+            (shape.field as usize) < self.fields.len()
+                && fits(shape.first_node, shape.node_count, self.nodes.len())
+                && fits(shape.first_point, shape.point_count, self.points.len())
+                && fits(shape.first_face, shape.face_count, self.faces.len())
+                && shape.face_count <= u32::from(NO_FACE)
+                && finite(&shape.center)
+                && finite(&shape.center_of_mass)
+                && finite(&shape.inertia)
+                && shape.radius.is_finite()
+                && shape.radius >= 0.0
+                && shape.volume.is_finite()
+        })?;
+        each(self.fields, SECTION_FIELDS, |field| {
+            finite(&field.origin)
+                && field.cell.is_finite()
+                && field.cell > 0.0
+                && (1.0 / field.cell).is_finite()
+                && field.scale.is_finite()
+                && field.scale > 0.0
+                && field.band.is_finite()
+                && field.band >= 0.0
+                && (field.format == FORMAT_I8 || field.format == FORMAT_I16)
+                && field.brick_count as usize <= GridEntry::MAX_BRICKS
+                && fits(field.first_brick, field.brick_count, self.bricks.len())
+                && u32::try_from(grid_len(field)).is_ok_and(|n| fits(field.first_grid, n, self.grid.len()))
+                && self.grid[field.first_grid as usize..][..grid_len(field) as usize]
+                    .iter()
+                    .all(|&bits| match GridEntry::from_bits(bits) {
+                        GridEntry::Brick(number) => u32::from(number) < field.brick_count,
+                        GridEntry::Empty { .. } => true,
+                    })
+                && run(self.bricks, field.first_brick, field.brick_count)
+                    .iter()
+                    .all(|b| {
+                        let wide = if field.format == FORMAT_I8 { 1 } else { 2 };
+                        b.samples % 4 == 0
+                            && fits(b.samples, (wide * SAMPLES_PER_BRICK) as u32, self.blob.len())
+                    })
+        })?;
+        each(self.bricks, SECTION_BRICKS, |brick| {
+            let indices_fit = match brick.index_bits {
+                0 => true,
+                4 => fits(brick.indices, (CELLS_PER_BRICK / 2) as u32, self.blob.len()),
+                8 => fits(brick.indices, CELLS_PER_BRICK as u32, self.blob.len()),
+                _ => false,
+            };
+            // Indices are not looked at one by one: the palette run must cover every value they can take.
+            indices_fit
+                && fits(brick.palette, 1 << brick.index_bits, self.palette.len())
+                && brick.palette_len >= 1
+                && u32::from(brick.palette_len) <= 1 << brick.index_bits
+        })?;
+        for (index, shape) in self.shapes.iter().enumerate() {
+            let nodes = run(self.nodes, shape.first_node, shape.node_count);
+            let good = nodes.iter().enumerate().all(|(i, node)| {
+                finite(&node.center)
+                    && node.radius.is_finite()
+                    && node.radius >= 0.0
+                    && fits(node.first_point, node.point_count, shape.point_count as usize)
+                    && node.skip as usize > i
+                    && node.skip <= shape.node_count
+            });
+            let points = run(self.points, shape.first_point, shape.point_count);
+            let good = good
+                && points.iter().all(|p| {
+                    finite(&p.position)
+                        && u32::from(p.face) < shape.face_count
+                        && (p.edge_face == NO_FACE || u32::from(p.edge_face) < shape.face_count)
+                });
+            if !good {
+                return Err(ImageError::Record {
+                    section: SECTION_SHAPES,
+                    index: index as u32,
+                });
+            }
+        }
+        each(self.faces, SECTION_FACES, |face| {
+            face.kind <= surface_kind::TORUS
+                && finite(&face.origin)
+                && finite(&face.axis)
+                && finite(&[face.sense, face.radius, face.second])
+        })
+    }
+}
+
+fn grid_len(field: &FieldRecord) -> u64 {
+    field.brick_dims.iter().map(|&d| u64::from(d)).product()
+}
+
+fn section<T: Pod>(bytes: &[u8], section: Section, number: u8) -> Result<&[T], ImageError> {
+    let bad = ImageError::Section { section: number };
+    let offset = section.offset as usize;
+    let length = (section.count as usize).checked_mul(size_of::<T>()).ok_or(bad)?;
+    let end = offset.checked_add(length).ok_or(bad)?;
+    if section.offset % 4 != 0 || offset < size_of::<Header>() || end > bytes.len() {
+        return Err(bad);
+    }
+    try_cast_slice(&bytes[offset..end]).map_err(|_| ImageError::Misaligned)
+}
+
+fn fits(first: u32, count: u32, len: usize) -> bool {
+    u64::from(first) + u64::from(count) <= len as u64
+}
+
+fn run<T>(all: &[T], first: u32, count: u32) -> &[T] {
+    &all[first as usize..][..count as usize]
+}
+
+fn finite(values: &[f32]) -> bool {
+    values.iter().all(|v| v.is_finite())
+}
+
+fn each<T>(records: &[T], section: u8, good: impl Fn(&T) -> bool) -> Result<(), ImageError> {
+    match records.iter().position(|r| !good(r)) {
+        None => Ok(()),
+        Some(index) => Err(ImageError::Record {
+            section,
+            index: index as u32,
+        }),
+    }
+}

@@ -1,0 +1,359 @@
+//! The records a scene image is made of, as they lie in flash.
+
+use bytemuck::{Pod, Zeroable};
+
+/// First eight bytes of every scene image.
+pub const MAGIC: [u8; 8] = *b"MORTISE\0";
+/// Version of this layout. Any change to a record or its meaning counts it up.
+pub const LAYOUT_VERSION: u32 = 1;
+/// Cells along a brick's edge.
+pub const BRICK_CELLS: usize = 8;
+/// Samples along a brick's edge: the last layer repeats the neighbour's first (shared apron).
+pub const BRICK_SAMPLES: usize = BRICK_CELLS + 1;
+/// Samples in a brick, x fastest.
+pub const SAMPLES_PER_BRICK: usize = BRICK_SAMPLES * BRICK_SAMPLES * BRICK_SAMPLES;
+/// Cells in a brick, x fastest.
+pub const CELLS_PER_BRICK: usize = BRICK_CELLS * BRICK_CELLS * BRICK_CELLS;
+/// No face: an interior point's second face, or a palette entry nobody owns.
+pub const NO_FACE: u16 = u16::MAX;
+
+/// `count` records from byte `offset`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Section {
+    /// Bytes from the image's start; a multiple of 4.
+    pub offset: u32,
+    /// Records (not bytes).
+    pub count: u32,
+}
+
+/// First bytes of an image.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Header {
+    /// [`MAGIC`].
+    pub magic: [u8; 8],
+    /// [`LAYOUT_VERSION`].
+    pub layout: u32,
+    /// Bytes in the whole image.
+    pub length: u32,
+    /// CRC-32/ISO-HDLC over bytes `20..length` (all that follows this field).
+    pub crc: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// [`PartRecord`]s.
+    pub parts: Section,
+    /// [`ShapeRecord`]s.
+    pub shapes: Section,
+    /// [`FieldRecord`]s.
+    pub fields: Section,
+    /// [`NodeRecord`]s.
+    pub nodes: Section,
+    /// [`PointRecord`]s.
+    pub points: Section,
+    /// [`FaceRecord`]s.
+    pub faces: Section,
+    /// [`BrickRecord`]s.
+    pub bricks: Section,
+    /// `u16` face ids that bricks refer to.
+    pub palette: Section,
+    /// `u16` grid entries (see [`GridEntry`]).
+    pub grid: Section,
+    /// Bytes: field samples and cell-to-palette indices.
+    pub blob: Section,
+}
+
+/// The part may be grabbed and moved.
+pub const PART_GRABBABLE: u32 = 1;
+
+/// A placed part.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PartRecord {
+    /// Index of its shape.
+    pub shape: u32,
+    /// [`PART_GRABBABLE`] or 0 (fixed).
+    pub flags: u32,
+    /// Shape origin in the world, m.
+    pub position: [f32; 3],
+    /// Shape to world, unit quaternion x, y, z, w.
+    pub orientation: [f32; 4],
+}
+
+/// The mesh the field came from was not closed: its sign is a best estimate.
+pub const SHAPE_LEAKY: u32 = 1;
+
+/// Geometry shared by every part that places it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ShapeRecord {
+    /// Index of its field.
+    pub field: u32,
+    /// [`SHAPE_LEAKY`] or 0.
+    pub flags: u32,
+    /// Its nodes, in preorder.
+    pub first_node: u32,
+    /// Number of nodes.
+    pub node_count: u32,
+    /// Its points.
+    pub first_point: u32,
+    /// Number of points.
+    pub point_count: u32,
+    /// Its faces; face ids in points and palettes count from here.
+    pub first_face: u32,
+    /// Number of faces.
+    pub face_count: u32,
+    /// Centre of a sphere about the whole shape, m.
+    pub center: [f32; 3],
+    /// Its radius, m.
+    pub radius: f32,
+    /// m³.
+    pub volume: f32,
+    /// Centre of mass, m.
+    pub center_of_mass: [f32; 3],
+    /// Inertia about the centre of mass at unit density, m⁵: xx, yy, zz, xy, xz, yz.
+    pub inertia: [f32; 6],
+}
+
+/// Samples are `i8`.
+pub const FORMAT_I8: u16 = 1;
+/// Samples are `i16`.
+pub const FORMAT_I16: u16 = 2;
+
+/// A signed-distance field on bricks of 8³ cells, in its shape's frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FieldRecord {
+    /// Position of sample (0,0,0), m.
+    pub origin: [f32; 3],
+    /// Cell edge, m.
+    pub cell: f32,
+    /// Metres for each unit of a sample.
+    pub scale: f32,
+    /// Samples are exact distances up to this far from the surface, and clamped beyond, m.
+    pub band: f32,
+    /// Bricks along x, y, z.
+    pub brick_dims: [u16; 3],
+    /// [`FORMAT_I8`] or [`FORMAT_I16`].
+    pub format: u16,
+    /// Its grid entries: `dims.x·dims.y·dims.z` of them, x fastest.
+    pub first_grid: u32,
+    /// Its bricks.
+    pub first_brick: u32,
+    /// Number of bricks.
+    pub brick_count: u32,
+}
+
+/// One entry of a field's brick grid, as stored in 16 bits.
+///
+/// Bit 15 clear: the number of a brick (from `first_brick`). Bit 15 set: no brick; bit 14 tells inside (1) from outside (0), bits 0–13
+/// are a lower bound of the distance to the surface from anywhere in the brick's volume, in cells, rounded down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GridEntry {
+    /// Samples are stored.
+    Brick(u16),
+    /// No surface near.
+    Empty {
+        /// Whether this volume is inside the solid.
+        inside: bool,
+        /// Lower bound of the distance, in cells.
+        cells: u16,
+    },
+}
+
+impl GridEntry {
+    /// Most bricks a field can number.
+    pub const MAX_BRICKS: usize = 0x8000;
+    /// Largest bound an entry can hold; larger distances are stored as this.
+    pub const MAX_CELLS: u16 = 0x3fff;
+
+    /// From its 16 bits: every pattern has a meaning.
+    #[inline]
+    pub const fn from_bits(bits: u16) -> Self {
+        if bits & 0x8000 == 0 {
+            Self::Brick(bits)
+        } else {
+            Self::Empty {
+                inside: bits & 0x4000 != 0,
+                cells: bits & Self::MAX_CELLS,
+            }
+        }
+    }
+
+    /// To its 16 bits. A bound too large is stored as [`Self::MAX_CELLS`]; a brick number must be below [`Self::MAX_BRICKS`].
+    pub const fn to_bits(self) -> u16 {
+        match self {
+            Self::Brick(number) => number & 0x7fff,
+            Self::Empty { inside, cells } => {
+                let cells = if cells > Self::MAX_CELLS {
+                    Self::MAX_CELLS
+                } else {
+                    cells
+                };
+                0x8000 | if inside { 0x4000 } else { 0 } | cells
+            }
+        }
+    }
+}
+
+/// One brick of a field.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct BrickRecord {
+    /// Byte offset in the blob of its 9³ samples; a multiple of 4.
+    pub samples: u32,
+    /// Byte offset in the blob of its 8³ palette indices (`index_bits` each, low nibble first); unused when `index_bits` is 0.
+    pub indices: u32,
+    /// First entry in the palette section.
+    pub palette: u32,
+    /// Entries in its palette, at least 1.
+    pub palette_len: u16,
+    /// 0 (whole brick is palette entry 0), 4 or 8.
+    pub index_bits: u16,
+}
+
+/// A sphere about a run of points: one node of the pointshell's tree.
+///
+/// Preorder: children follow their parent; `skip` is the next node to look at when this one is culled. A leaf has `skip == own index + 1`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct NodeRecord {
+    /// m, shape frame.
+    pub center: [f32; 3],
+    /// m.
+    pub radius: f32,
+    /// First point below it, counted from the shape's first point.
+    pub first_point: u32,
+    /// Points below it.
+    pub point_count: u32,
+    /// Next node when culled, counted from the shape's first node; larger than own index.
+    pub skip: u32,
+}
+
+/// A sample of the exact surface.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PointRecord {
+    /// m, shape frame.
+    pub position: [f32; 3],
+    /// Outward unit normal, octahedral (see [`oct_decode`]).
+    pub normal: [i16; 2],
+    /// Face it lies on, counted from the shape's first face.
+    pub face: u16,
+    /// The other face when it lies on an edge, else [`NO_FACE`].
+    pub edge_face: u16,
+}
+
+/// Kinds of surface in [`FaceRecord::kind`].
+pub mod surface_kind {
+    /// No closed form.
+    pub const OTHER: u32 = 0;
+    /// Through `origin`, normal `axis`.
+    pub const PLANE: u32 = 1;
+    /// Axis through `origin` along `axis`, `radius`.
+    pub const CYLINDER: u32 = 2;
+    /// `radius` at `origin`, growing along `axis` by tan(`second`).
+    pub const CONE: u32 = 3;
+    /// Centre `origin`, `radius`.
+    pub const SPHERE: u32 = 4;
+    /// Centre `origin`, major `radius`, minor `second`.
+    pub const TORUS: u32 = 5;
+}
+
+/// The exact surface under a B-rep face, in its shape's frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FaceRecord {
+    /// One of [`surface_kind`].
+    pub kind: u32,
+    /// +1 when the outward normal is the surface's natural one, −1 when turned round.
+    pub sense: f32,
+    /// m.
+    pub origin: [f32; 3],
+    /// Unit vector.
+    pub axis: [f32; 3],
+    /// m.
+    pub radius: f32,
+    /// Half angle (cone, rad) or minor radius (torus, m).
+    pub second: f32,
+}
+
+/// Unit vector from its octahedral code (Cigolla et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors"):
+/// error at most about 4·10⁻⁵ rad. Any pattern decodes to a finite, non-zero vector; the result is not normalised.
+#[inline]
+pub fn oct_decode(code: [i16; 2]) -> [f32; 3] {
+    let x = f32::from(code[0]) * (1.0 / 32767.0);
+    let y = f32::from(code[1]) * (1.0 / 32767.0);
+    let z = 1.0 - x.abs() - y.abs();
+    if z >= 0.0 {
+        [x, y, z]
+    } else {
+        [(1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y), z]
+    }
+}
+
+/// Octahedral code of a unit vector; zero or non-finite input gives +z.
+pub fn oct_encode(v: [f32; 3]) -> [i16; 2] {
+    let norm = v[0].abs() + v[1].abs() + v[2].abs();
+    if norm.is_nan() || norm.is_infinite() || norm < 1e-30 {
+        return [0, 0];
+    }
+    let (mut x, mut y) = (v[0] / norm, v[1] / norm);
+    if v[2] < 0.0 {
+        (x, y) = ((1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y));
+    }
+    [round(x * 32767.0), round(y * 32767.0)]
+}
+
+#[inline]
+fn sign(x: f32) -> f32 {
+    if x < 0.0 { -1.0 } else { 1.0 }
+}
+
+fn round(x: f32) -> i16 {
+    (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_have_the_documented_sizes() {
+        assert_eq!(size_of::<Header>(), 104);
+        assert_eq!(size_of::<PartRecord>(), 36);
+        assert_eq!(size_of::<ShapeRecord>(), 88);
+        assert_eq!(size_of::<FieldRecord>(), 44);
+        assert_eq!(size_of::<BrickRecord>(), 16);
+        assert_eq!(size_of::<NodeRecord>(), 28);
+        assert_eq!(size_of::<PointRecord>(), 20);
+        assert_eq!(size_of::<FaceRecord>(), 40);
+    }
+
+    #[test]
+    fn octahedral_code_is_close_everywhere() {
+        let mut worst = 0.0f32;
+        for i in 0..200 {
+            for j in 0..200 {
+                let z = -1.0 + 2.0 * (i as f32 + 0.5) / 200.0;
+                let r = (1.0 - z * z).max(0.0);
+                let r = r.powf(0.5);
+                let a = j as f32 * 0.031_415_93;
+                let v = [r * a.cos(), r * a.sin(), z];
+                let d = oct_decode(oct_encode(v));
+                let n = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).powf(0.5);
+                let dot = (d[0] * v[0] + d[1] * v[1] + d[2] * v[2]) / n;
+                let cross = [
+                    d[1] * v[2] - d[2] * v[1],
+                    d[2] * v[0] - d[0] * v[2],
+                    d[0] * v[1] - d[1] * v[0],
+                ];
+                let sin = (cross[0].powi(2) + cross[1].powi(2) + cross[2].powi(2)).powf(0.5) / n;
+                assert!(dot > 0.0);
+                worst = worst.max(sin);
+            }
+        }
+        // One code step is 1/32767 of a unit octahedron edge; its face is at most √3 from the sphere's scale: ½·√2·√3/32767.
+        assert!(worst < 4.0e-5, "{worst}");
+    }
+}
