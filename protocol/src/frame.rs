@@ -1,1 +1,114 @@
+//! Frames: `COBS( sequence: u16 LE | message: postcard | CRC-32/ISO-HDLC: u32 LE ) 0x00`.
+//!
+//! The checksum covers sequence and message. The delimiter never occurs inside a frame, so a reader that
+//! has lost its place finds it again at the next zero: at most one good frame is lost to garbage before it.
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::image::CRC;
+use crate::limits::MAX_FRAME;
+
+const SEQUENCE: usize = 2;
+const CHECKSUM: usize = 4;
+
+/// Why bytes between two delimiters are no frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// Longer than [`MAX_FRAME`].
+    TooLong,
+    /// Not COBS, or shorter than a sequence number and a checksum.
+    Malformed,
+    /// The checksum does not match.
+    Crc,
+    /// Sound, but no message of this version. Carries the sequence number so that it can be refused.
+    Undecodable(u16),
+}
+
+/// A message did not fit into [`crate::limits::MAX_MESSAGE`] bytes or the buffer given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooLarge;
+
+/// Writes one frame with delimiter into `out`, which is best [`MAX_FRAME`] long; returns the used part.
+pub fn encode<'o, M: Serialize>(sequence: u16, message: &M, out: &'o mut [u8]) -> Result<&'o [u8], TooLarge> {
+    let mut raw = [0u8; crate::limits::MAX_MESSAGE + SEQUENCE + CHECKSUM];
+    raw[..SEQUENCE].copy_from_slice(&sequence.to_le_bytes());
+    let room = SEQUENCE + crate::limits::MAX_MESSAGE;
+    let body = postcard::to_slice(message, &mut raw[SEQUENCE..room])
+        .map_err(|_| TooLarge)?
+        .len();
+    let end = SEQUENCE + body;
+    let crc = CRC.checksum(&raw[..end]);
+    raw[end..end + CHECKSUM].copy_from_slice(&crc.to_le_bytes());
+    if out.len() < cobs::max_encoding_length(end + CHECKSUM) + 1 {
+        return Err(TooLarge);
+    }
+    let used = cobs::encode(&raw[..end + CHECKSUM], out);
+    out[used] = 0;
+    Ok(&out[..=used])
+}
+
+/// Collects bytes into frames. Holds no more than [`MAX_FRAME`] bytes whatever comes.
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    buffer: [u8; MAX_FRAME],
+    used: usize,
+    overflow: bool,
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Decoder {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            buffer: [0; MAX_FRAME],
+            used: 0,
+            overflow: false,
+        }
+    }
+
+    /// Takes one byte; at a delimiter says what came before it. Empty frames (repeated delimiters) are passed over, so a sender may start
+    /// with a delimiter to flush garbage.
+    pub fn push<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<(u16, M), FrameError>> {
+        if byte != 0 {
+            if let Some(place) = self.buffer.get_mut(self.used) {
+                *place = byte;
+                self.used += 1;
+            } else {
+                self.overflow = true;
+            }
+            return None;
+        }
+        let used = core::mem::take(&mut self.used);
+        if core::mem::take(&mut self.overflow) {
+            return Some(Err(FrameError::TooLong));
+        }
+        if used == 0 {
+            return None;
+        }
+        Some(decode(&mut self.buffer[..used]))
+    }
+}
+
+fn decode<M: DeserializeOwned>(cobs_bytes: &mut [u8]) -> Result<(u16, M), FrameError> {
+    let length = cobs::decode_in_place(cobs_bytes).map_err(|_| FrameError::Malformed)?;
+    let raw = &cobs_bytes[..length];
+    let body_end = length
+        .checked_sub(CHECKSUM)
+        .filter(|&n| n > SEQUENCE)
+        .ok_or(FrameError::Malformed)?;
+    let (covered, crc) = raw.split_at(body_end);
+    if CRC.checksum(covered).to_le_bytes() != crc {
+        return Err(FrameError::Crc);
+    }
+    let sequence = u16::from_le_bytes([covered[0], covered[1]]);
+    match postcard::take_from_bytes(&covered[SEQUENCE..]) {
+        Ok((message, [])) => Ok((sequence, message)),
+        _ => Err(FrameError::Undecodable(sequence)),
+    }
+}

@@ -1,1 +1,576 @@
+//! The message table: all that crosses the link, in one file.
+//!
+//! Every host message is answered by [`FromDevice::Ack`] or [`FromDevice::Refused`] carrying its sequence number, or by the
+//! value it asks for. [`ToDevice::Hello`] and [`FromDevice::Hello`] keep their place (variant 0) and layout in every version, so that two sides
+//! that share nothing else can still name each other. SI units and radians; quaternions x, y, z, w; poses are frame-to-world.
 
+use heapless::{String, Vec};
+use postcard_schema::Schema;
+use postcard_schema::key::Key;
+use serde::{Deserialize, Serialize};
+
+use crate::image::ImageError;
+use crate::limits::*;
+use crate::parameter::ParameterId;
+
+/// Hash of both message enums' schema: any change to a message changes it.
+pub const SCHEMA_HASH: u64 = schema_hash();
+
+const fn schema_hash() -> u64 {
+    let to = u64::from_le_bytes(Key::for_path::<ToDevice>("to").to_bytes());
+    let from = u64::from_le_bytes(Key::for_path::<FromDevice>("from").to_bytes());
+    to ^ from.rotate_left(32)
+}
+
+/// Who speaks. Frozen layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Version {
+    /// [`SCHEMA_HASH`] of the speaker.
+    pub schema: u64,
+    /// Major, minor, patch of the speaker's release.
+    pub release: [u16; 3],
+}
+
+impl Version {
+    /// This build's version.
+    pub const fn own() -> Self {
+        Self {
+            schema: SCHEMA_HASH,
+            release: release(),
+        }
+    }
+}
+
+const fn release() -> [u16; 3] {
+    const fn number(digits: &str) -> u16 {
+        let bytes = digits.as_bytes();
+        let (mut value, mut i) = (0u16, 0);
+        while i < bytes.len() {
+            value = value * 10 + (bytes[i] - b'0') as u16;
+            i += 1;
+        }
+        value
+    }
+    [
+        number(env!("CARGO_PKG_VERSION_MAJOR")),
+        number(env!("CARGO_PKG_VERSION_MINOR")),
+        number(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}
+
+/// Host to board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum ToDevice {
+    /// First message, always answered by [`FromDevice::Hello`]. When the schemas differ both sides stop there, able to name each other.
+    Hello(Version),
+    /// Ask for [`FromDevice::Capabilities`].
+    GetCapabilities,
+    /// Motors may be driven from here on. Refused without a scene, in a fault, or with stop pressed.
+    Arm,
+    /// Motors off, object released.
+    Disarm,
+    /// Motors off now; stays so until [`ToDevice::ClearFault`].
+    Stop,
+    /// Leave the stopped or faulted state when its cause is gone.
+    ClearFault,
+    /// Keeps the link alive; anything else does too.
+    Heartbeat,
+    /// Change a parameter; refused outside its range.
+    SetParameter {
+        /// Which.
+        id: ParameterId,
+        /// In its unit.
+        value: f32,
+    },
+    /// Ask for a parameter; answered by [`FromDevice::Parameter`].
+    GetParameter(ParameterId),
+    /// Couple the handle to a part.
+    Grab {
+        /// Index in the scene.
+        part: u16,
+    },
+    /// Let go; the part stays where it is.
+    Release,
+    /// Put every part back where the scene has it, nothing grabbed. Only while disarmed.
+    ResetScene,
+    /// Start sending a scene. Only while disarmed. The scene in use stays until commit.
+    SceneBegin {
+        /// Bytes to come.
+        length: u32,
+        /// CRC-32/ISO-HDLC of all of them.
+        crc: u32,
+        /// Layout version of the image.
+        layout: u32,
+    },
+    /// The next bytes. `offset` must continue where the last one ended; the last accepted one again is acknowledged again.
+    SceneChunk {
+        /// Bytes from the image's start.
+        offset: u32,
+        /// At most [`MAX_CHUNK`].
+        data: Vec<u8, MAX_CHUNK>,
+    },
+    /// Check all that came and put it in use, atomically.
+    SceneCommit,
+    /// Forget what came.
+    SceneAbort,
+    /// Set, refresh or replace a constraint target.
+    SetTarget(ConstraintTarget),
+    /// Take a constraint target away.
+    ClearTarget {
+        /// Its id.
+        id: u16,
+    },
+    /// Telemetry every so many ticks; 0 stops it.
+    SetTelemetry {
+        /// Ticks between messages.
+        every_ticks: u16,
+    },
+    /// Ask for [`FromDevice::Statistics`].
+    GetStatistics {
+        /// Start counting anew after answering.
+        reset: bool,
+    },
+    /// Script for the simulated hand (simulated mechanisms only); its time starts at the tick that takes it.
+    SimulatedHand(HandScript),
+    /// Lockstep on or off (simulated mechanisms only): on, a tick runs only when released by [`ToDevice::Run`].
+    Lockstep(bool),
+    /// Release ticks in lockstep; answered by [`FromDevice::Ran`] after the last.
+    Run {
+        /// How many.
+        ticks: u32,
+    },
+    /// Restart the board. Refused while armed.
+    Restart,
+}
+
+/// Board to host.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum FromDevice {
+    /// Answer to Hello: the board's version.
+    Hello(Version),
+    /// What the board can do.
+    Capabilities(Capabilities),
+    /// Done.
+    Ack {
+        /// Sequence number of the message.
+        seq: u16,
+    },
+    /// Not done.
+    Refused {
+        /// Sequence number of the message.
+        seq: u16,
+        /// Why.
+        reason: Refusal,
+    },
+    /// A parameter's value.
+    Parameter {
+        /// Which.
+        id: ParameterId,
+        /// In its unit.
+        value: f32,
+    },
+    /// The state changed.
+    State {
+        /// Tick of the change.
+        tick: u32,
+        /// The new state.
+        state: DeviceState,
+    },
+    /// One sample of the loop.
+    Telemetry(Telemetry),
+    /// Counters.
+    Statistics(Statistics),
+    /// Something went wrong; motors are off or going off.
+    Fault {
+        /// Tick it was seen.
+        tick: u32,
+        /// What.
+        fault: Fault,
+    },
+    /// Bytes of defmt log.
+    Log(Vec<u8, MAX_LOG>),
+    /// Lockstep ticks are done.
+    Ran {
+        /// Ticks since start.
+        tick: u32,
+        /// See [`Statistics::state_hash`].
+        state_hash: u64,
+    },
+}
+
+/// What a board can do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Capabilities {
+    /// Board name.
+    pub board: String<MAX_NAME>,
+    /// Largest scene image it can hold, bytes.
+    pub scene_capacity: u32,
+    /// Layout version it reads.
+    pub scene_layout: u32,
+    /// CRC of the scene in use; `None` without one.
+    pub scene: Option<u32>,
+    /// Ticks in a second.
+    pub tick_hz: u16,
+    /// Handle axes it can drive with force, and with torque.
+    pub force_axes: u8,
+    /// See above.
+    pub torque_axes: u8,
+    /// The mechanism and hand are simulated on the board.
+    pub simulated: bool,
+    /// What tick costs are counted in.
+    pub cost_unit: CostUnit,
+    /// A tick must cost less than this, in `cost_unit`; 0 when there is no deadline.
+    pub cost_budget: u32,
+    /// Constraint targets it evaluates at once; 0: none.
+    pub max_targets: u8,
+    /// Why it started.
+    pub reset: ResetReason,
+    /// Its state.
+    pub state: DeviceState,
+}
+
+/// What tick costs are counted in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum CostUnit {
+    /// Instructions (emulated board in counted mode; host time otherwise).
+    Instructions,
+    /// Processor cycles.
+    Cycles,
+    /// Nanoseconds.
+    Nanoseconds,
+}
+
+/// Why the board started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum ResetReason {
+    /// Power or reset button.
+    PowerOn,
+    /// [`ToDevice::Restart`].
+    Requested,
+    /// The watchdog was not fed.
+    Watchdog,
+    /// The firmware panicked; the line is in the panicking file.
+    Panic {
+        /// Source line.
+        line: u32,
+    },
+    /// Supply too low.
+    BrownOut,
+    /// The board cannot tell.
+    Unknown,
+}
+
+/// The safety state machine's state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum DeviceState {
+    /// Starting; motors off.
+    Boot,
+    /// Motors off, waiting.
+    Idle,
+    /// Motors on, nothing grabbed: zero wrench.
+    Armed,
+    /// A part is grabbed and felt.
+    Active,
+    /// Going to zero wrench under damping, then off.
+    SoftStop,
+    /// Motors off until cleared.
+    Stopped,
+    /// Motors off until the cause is gone and cleared.
+    Fault(Fault),
+}
+
+/// What went wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Fault {
+    /// The stop input is open.
+    StopInput,
+    /// Nothing was heard from the host for too long while armed.
+    HostSilent {
+        /// Milliseconds.
+        silent_ms: u16,
+    },
+    /// An encoder reading jumped further than the mechanism can move in a tick.
+    EncoderJump {
+        /// Axis.
+        axis: u8,
+    },
+    /// The handle moves faster than allowed.
+    OverSpeed,
+    /// A motor driver reports over-current or over-temperature.
+    Driver {
+        /// Axis.
+        axis: u8,
+    },
+    /// A tick took longer than its period.
+    TickOverrun,
+    /// The scene does not pass its checks any more.
+    SceneDamaged,
+    /// A number in the loop is not finite.
+    NonFinite,
+}
+
+/// Why a message was not carried out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum Refusal {
+    /// A Hello with this schema must come first.
+    NotGreeted,
+    /// Not possible in this state.
+    State(DeviceState),
+    /// No scene on the board: upload one.
+    NoScene,
+    /// No such part in the scene.
+    NoSuchPart {
+        /// Parts in the scene.
+        parts: u16,
+    },
+    /// The part is fixed.
+    NotGrabbable,
+    /// Outside its range, or not a number.
+    OutOfRange {
+        /// Which.
+        id: ParameterId,
+        /// Smallest accepted.
+        min: f32,
+        /// Largest accepted.
+        max: f32,
+    },
+    /// A chunk that does not continue the last.
+    ChunkOrder {
+        /// Offset expected.
+        expected: u32,
+    },
+    /// No upload under way.
+    NoUpload,
+    /// More bytes than the slot holds.
+    SceneTooLarge {
+        /// Bytes that fit.
+        capacity: u32,
+    },
+    /// More parts than the board holds.
+    TooManyParts {
+        /// Parts that fit.
+        capacity: u16,
+    },
+    /// The upload is not complete.
+    SceneIncomplete {
+        /// Bytes there.
+        received: u32,
+    },
+    /// What arrived is not what was announced.
+    SceneCrc {
+        /// As announced.
+        expected: u32,
+        /// As stored.
+        found: u32,
+    },
+    /// Not a scene image.
+    SceneImage(ImageError),
+    /// Flash could not be erased or written.
+    Flash,
+    /// Only for simulated mechanisms.
+    NotSimulated,
+    /// Not in lockstep, or ticks still to run.
+    Lockstep,
+    /// A number that is not finite or not possible.
+    BadNumber,
+    /// This firmware has no such function (see [`Capabilities`]).
+    Unsupported,
+    /// The board's queue is full: try again.
+    Busy,
+    /// The frame was sound but no message of this version.
+    Undecodable,
+}
+
+/// A rigid pose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct WirePose {
+    /// m.
+    pub position: [f32; 3],
+    /// Unit quaternion x, y, z, w.
+    pub orientation: [f32; 4],
+}
+
+/// Force and torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct WireWrench {
+    /// N.
+    pub force: [f32; 3],
+    /// N·m.
+    pub torque: [f32; 3],
+}
+
+/// Two faces that touch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct TouchingPair {
+    /// Face of the grabbed part, [`crate::image::NO_FACE`] when unknown.
+    pub moving_face: u16,
+    /// The other part.
+    pub static_part: u16,
+    /// Its face.
+    pub static_face: u16,
+    /// Points in contact.
+    pub count: u16,
+    /// Deepest penetration, m.
+    pub depth: f32,
+    /// Where, world, m.
+    pub point: [f32; 3],
+}
+
+/// One sample of the loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Telemetry {
+    /// Ticks since start.
+    pub tick: u32,
+    /// Handle pose.
+    pub handle: WirePose,
+    /// Grabbed part: its index and its shape's pose.
+    pub object: Option<(u16, WirePose)>,
+    /// Wrench commanded to the handle.
+    pub wrench: WireWrench,
+    /// Contact wrench on the object about its centre of mass.
+    pub contact: WireWrench,
+    /// Wrench of the simulated hand on the handle, where the hand is simulated.
+    pub hand: Option<WireWrench>,
+    /// Cost of this tick, see [`Capabilities::cost_unit`].
+    pub cost: u32,
+    /// Points looked at.
+    pub points: u16,
+    /// See [`flag`].
+    pub flags: u16,
+    /// Ticks missed since start.
+    pub missed: u32,
+    /// Telemetry messages dropped since start because the link was slower.
+    pub dropped: u32,
+    /// Touching face pairs, deepest first.
+    pub pairs: Vec<TouchingPair, MAX_PAIRS>,
+}
+
+/// Bits of [`Telemetry::flags`].
+pub mod flag {
+    /// The point budget was reached: some points were not looked at this tick.
+    pub const BUDGET: u16 = 1;
+    /// The force limit acted.
+    pub const FORCE_LIMIT: u16 = 1 << 1;
+    /// The torque limit acted.
+    pub const TORQUE_LIMIT: u16 = 1 << 2;
+    /// The slew limit acted.
+    pub const SLEW_LIMIT: u16 = 1 << 3;
+    /// A number was not finite and was replaced.
+    pub const NON_FINITE: u16 = 1 << 4;
+    /// More face pairs touch than the message holds.
+    pub const PAIRS: u16 = 1 << 5;
+    /// More contacts than the board stores.
+    pub const CONTACTS: u16 = 1 << 6;
+    /// The coupling's own force limit acted.
+    pub const COUPLING_LIMIT: u16 = 1 << 7;
+}
+
+/// Counters since start or the last reset of the counters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Statistics {
+    /// Ticks run.
+    pub ticks: u32,
+    /// Ticks missed.
+    pub missed_ticks: u32,
+    /// Largest cost of a tick.
+    pub cost_max: u32,
+    /// Sum of costs.
+    pub cost_sum: u64,
+    /// Largest force commanded, N.
+    pub peak_force: f32,
+    /// Largest torque commanded, N·m.
+    pub peak_torque: f32,
+    /// Most points looked at in a tick.
+    pub points_max: u32,
+    /// FNV-1a over the bits of handle pose, object pose and twist, and wrench of every tick since the scene was loaded or reset.
+    pub state_hash: u64,
+    /// Frames received whole.
+    pub frames: u32,
+    /// Frames thrown away: damaged, too long, or undecodable.
+    pub bad_frames: u32,
+    /// Telemetry messages dropped.
+    pub dropped: u32,
+    /// Largest stack depth seen, bytes; 0 where not measured.
+    pub stack_max: u32,
+}
+
+/// Kinds of constraint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum ConstraintKind {
+    /// Axis on axis (cylinder in cylinder).
+    Concentric,
+    /// Plane on plane.
+    Coplanar,
+    /// Axis on axis and apex on apex (cone in cone).
+    Conical,
+    /// Centre on centre.
+    Spherical,
+    /// Centre on axis (sphere in cylinder).
+    Annular,
+}
+
+/// A point and a direction fixed to a part.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Feature {
+    /// m, shape frame.
+    pub point: [f32; 3],
+    /// Unit vector, shape frame.
+    pub direction: [f32; 3],
+}
+
+/// What the desktop recognised and the board is to guide towards.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct ConstraintTarget {
+    /// Names the target; the same id replaces or refreshes it.
+    pub id: u16,
+    /// Counts up with every message about this id; an older one is stale.
+    pub sequence: u16,
+    /// Kind.
+    pub kind: ConstraintKind,
+    /// Feature of the moving part.
+    pub moving: Feature,
+    /// The part it mates with.
+    pub static_part: u16,
+    /// Feature of that part.
+    pub fixed: Feature,
+    /// N/m.
+    pub stiffness: f32,
+    /// The guidance never pulls harder, N.
+    pub force_cap: f32,
+    /// N·m.
+    pub torque_cap: f32,
+    /// Fades out unless refreshed within this many ticks.
+    pub expiry_ticks: u16,
+    /// Moving and static faces whose contact it replaces.
+    pub faces: Vec<(u16, u16), MAX_TARGET_PAIRS>,
+}
+
+/// A simulated hand: a spring-damper that pulls the handle after a moving target, plus a push.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct HandScript {
+    /// N/m.
+    pub stiffness: f32,
+    /// N·s/m.
+    pub damping: f32,
+    /// N·m/rad.
+    pub angular_stiffness: f32,
+    /// N·m·s/rad.
+    pub angular_damping: f32,
+    /// Tremor's amplitude, m.
+    pub tremor: f32,
+    /// Tremor's frequency, Hz.
+    pub tremor_hz: f32,
+    /// Where the hand wants to be, times ascending; before the first the first holds, after the last the last, between them linear (orientation: shortest arc).
+    pub keyframes: Vec<Keyframe, MAX_KEYFRAMES>,
+}
+
+/// One point of a hand's script.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Keyframe {
+    /// Ticks (ms) since the script was taken.
+    pub tick: u32,
+    /// Target of the handle.
+    pub pose: WirePose,
+    /// Added to the spring's force, N, world.
+    pub push: [f32; 3],
+}

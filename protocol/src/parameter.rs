@@ -1,1 +1,98 @@
+//! Every adjustable number of the board: unit, range, default, meaning.
 
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+macro_rules! parameters {
+    ($($(#[doc = $doc:literal])+ $name:ident = $unit:literal, $min:expr, $max:expr, $default:expr;)+) => {
+        /// Names a parameter.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
+        pub enum ParameterId { $($(#[doc = $doc])+ $name,)+ }
+
+        /// All parameters, in the order of [`ParameterId`].
+        pub const PARAMETERS: &[Parameter] = &[$(Parameter {
+            id: ParameterId::$name,
+            name: stringify!($name),
+            description: concat!($($doc),+),
+            unit: $unit, min: $min, max: $max, default: $default,
+        },)+];
+    };
+}
+
+/// One parameter's row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Which.
+    pub id: ParameterId,
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub description: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Smallest accepted.
+    pub min: f32,
+    /// Largest accepted.
+    pub max: f32,
+    /// Value at start.
+    pub default: f32,
+}
+
+parameters! {
+    /// Virtual coupling, translational stiffness k_T.
+    CouplingStiffness = "N/m", 0.0, 5_000.0, 1_000.0;
+    /// Virtual coupling, translational damping b_T.
+    CouplingDamping = "N·s/m", 0.0, 50.0, 5.0;
+    /// Virtual coupling, rotational stiffness k_R.
+    CouplingAngularStiffness = "N·m/rad", 0.0, 20.0, 2.0;
+    /// Virtual coupling, rotational damping b_R.
+    CouplingAngularDamping = "N·m·s/rad", 0.0, 0.1, 0.01;
+    /// Force at which the virtual coupling saturates.
+    CouplingForce = "N", 0.1, 50.0, 20.0;
+    /// Torque at which the virtual coupling saturates.
+    CouplingTorque = "N·m", 0.01, 2.0, 1.0;
+    /// Contact stiffness of one point.
+    ContactStiffness = "N/m", 1e3, 5e6, 5e5;
+    /// Contact damping over stiffness.
+    ContactDamping = "s", 0.0, 0.01, 0.0005;
+    /// Mass of the dynamic object.
+    ObjectMass = "kg", 0.01, 5.0, 0.1;
+    /// Largest force commanded to the handle.
+    ForceLimit = "N", 0.0, 20.0, 8.0;
+    /// Largest torque commanded to the handle.
+    TorqueLimit = "N·m", 0.0, 1.0, 0.5;
+    /// Largest change of force in a second.
+    ForceSlew = "N/s", 10.0, 20_000.0, 4_000.0;
+    /// Largest change of torque in a second.
+    TorqueSlew = "N·m/s", 0.1, 1_000.0, 200.0;
+    /// Handle speed that counts as a fault.
+    SpeedLimit = "m/s", 0.1, 5.0, 2.0;
+    /// Host silence while armed that counts as a fault.
+    HostTimeout = "s", 0.05, 5.0, 0.5;
+    /// Points looked at in a tick at the most.
+    PointBudget = "points", 16.0, 65_535.0, 2_000.0;
+}
+
+impl ParameterId {
+    /// The row of this parameter.
+    pub const fn row(self) -> &'static Parameter {
+        &PARAMETERS[self as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_default_lies_in_its_range() {
+        for (i, p) in PARAMETERS.iter().enumerate() {
+            assert_eq!(p.id as usize, i);
+            assert!(
+                p.min < p.max && p.min <= p.default && p.default <= p.max,
+                "{}",
+                p.name
+            );
+        }
+    }
+}

@@ -81,9 +81,10 @@ impl<'a> Field<'a> {
         for axis in 0..3 {
             let cells = (self.record.brick_dims[axis] as usize * BRICK_CELLS) as f32;
             let g = (p[axis] - self.record.origin[axis]) * self.inverse_cell;
-            if !(g >= 0.0) {
-                // Also where NaN ends: it compares false and counts as distance 0.
-                outside2 += if g < 0.0 { g * g } else { f32::MIN_POSITIVE };
+            if g < 0.0 {
+                outside2 += g * g + f32::MIN_POSITIVE;
+            } else if g.is_nan() {
+                outside2 += f32::MIN_POSITIVE;
             } else if g >= cells {
                 outside2 += (g - cells) * (g - cells) + f32::MIN_POSITIVE;
             } else {

@@ -189,7 +189,7 @@ impl<'a> SceneImage<'a> {
                     .iter()
                     .all(|b| {
                         let wide = if field.format == FORMAT_I8 { 1 } else { 2 };
-                        b.samples % 4 == 0
+                        b.samples.is_multiple_of(4)
                             && fits(b.samples, (wide * SAMPLES_PER_BRICK) as u32, self.blob.len())
                     })
         })?;
@@ -248,7 +248,7 @@ fn section<T: Pod>(bytes: &[u8], section: Section, number: u8) -> Result<&[T], I
     let offset = section.offset as usize;
     let length = (section.count as usize).checked_mul(size_of::<T>()).ok_or(bad)?;
     let end = offset.checked_add(length).ok_or(bad)?;
-    if section.offset % 4 != 0 || offset < size_of::<Header>() || end > bytes.len() {
+    if !section.offset.is_multiple_of(4) || offset < size_of::<Header>() || end > bytes.len() {
         return Err(bad);
     }
     try_cast_slice(&bytes[offset..end]).map_err(|_| ImageError::Misaligned)
