@@ -44,7 +44,9 @@ fn run(arguments: &[String]) -> Result<ExitCode> {
         Some((first, rest)) => (first.as_str(), rest),
     };
     // `demo` hands unknown arguments on to the program, but `--help` before any of them is ours.
-    if rest.first().is_some_and(|argument| argument == "--help" || argument == "-h")
+    if rest
+        .first()
+        .is_some_and(|argument| argument == "--help" || argument == "-h")
         && let Some(text) = usage::of(command)
     {
         print!("{text}");

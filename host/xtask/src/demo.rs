@@ -1,0 +1,146 @@
+//! `cargo xtask demo`: from nothing to the sample insertion, on the best rig this machine has.
+
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result};
+
+use crate::setup::{self, Consent, Group};
+use crate::{firmware, program, shell};
+
+/// Builds what is needed and runs `mortise demo` with the caller's arguments.
+pub fn command(arguments: &[String]) -> Result<ExitCode> {
+    let root = shell::root()?;
+    let mut arguments = arguments.to_vec();
+    let consent = Consent::take(&mut arguments);
+    let mut headless = arguments.iter().any(|argument| argument == "--headless");
+    if !headless && !display_is_there() {
+        eprintln!("There is no display here: running with --headless.");
+        arguments.push("--headless".to_owned());
+        headless = true;
+    }
+    let needed: &[Group] = if headless {
+        &[Group::Build]
+    } else {
+        &[Group::Build, Group::Window]
+    };
+    if !setup::ensure(needed, consent)? {
+        return Ok(ExitCode::FAILURE);
+    }
+    let asked_rig = rig_of(&arguments);
+    if asked_rig.as_deref().is_none_or(|rig| rig == "emulated") {
+        let there = setup::ensure(&[Group::Board], consent)?;
+        if there {
+            firmware::build(&root, firmware::EMULATED)?;
+        }
+        match (there, asked_rig) {
+            (false, Some(_)) => {
+                eprintln!("The emulated board was asked for and cannot run without what is missing.");
+                return Ok(ExitCode::FAILURE);
+            }
+            (false, None) => {
+                eprintln!("Without the emulated board: running in this process.");
+                arguments.extend(["--rig".to_owned(), "sim".to_owned()]);
+            }
+            (true, Some(_)) => {}
+            (true, None) => arguments.extend(["--rig".to_owned(), "emulated".to_owned()]),
+        }
+    }
+    run(&program::build_mortise(&root)?, &arguments)
+}
+
+fn run(program: &Path, arguments: &[String]) -> Result<ExitCode> {
+    eprintln!("$ mortise demo {}", arguments.join(" "));
+    // In the caller's directory, so that relative paths among the arguments mean what was meant.
+    let status = Command::new(program)
+        .arg("demo")
+        .args(arguments)
+        .status()
+        .with_context(|| format!("{} cannot be started", program.display()))?;
+    Ok(status
+        .code()
+        .and_then(|code| u8::try_from(code).ok())
+        .map_or(ExitCode::FAILURE, ExitCode::from))
+}
+
+/// Value of `--rig VALUE` or `--rig=VALUE`.
+fn rig_of(arguments: &[String]) -> Option<String> {
+    let mut words = arguments.iter();
+    while let Some(word) = words.next() {
+        if word == "--rig" {
+            return words.next().cloned();
+        }
+        if let Some(value) = word.strip_prefix("--rig=") {
+            return Some(value.to_owned());
+        }
+    }
+    None
+}
+
+/// True if a window can be opened: macOS and Windows always say so, Linux by its variables.
+fn display_is_there() -> bool {
+    if !cfg!(target_os = "linux") {
+        return true;
+    }
+    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    if let Some(name) = set("WAYLAND_DISPLAY") {
+        // Relative to the session's directory, unless absolute.
+        let socket = Path::new(&set("XDG_RUNTIME_DIR").unwrap_or_default()).join(name);
+        if socket.exists() {
+            return true;
+        }
+    }
+    set("DISPLAY").is_some_and(|display| x_server_answers(&display))
+}
+
+/// A variable left behind by a session that is gone must not pass for a display. Remote displays
+/// (`host:0`) are believed.
+fn x_server_answers(display: &str) -> bool {
+    #[cfg(target_os = "linux")]
+    if let Some(number) = local_display_number(display) {
+        use std::os::linux::net::SocketAddrExt;
+        use std::os::unix::net::{SocketAddr, UnixStream};
+        let path = format!("/tmp/.X11-unix/X{number}");
+        let abstract_socket = SocketAddr::from_abstract_name(path.as_bytes())
+            .and_then(|address| UnixStream::connect_addr(&address));
+        return UnixStream::connect(&path).is_ok() || abstract_socket.is_ok();
+    }
+    !display.is_empty()
+}
+
+/// `:1.0` and `unix:1` are display 1 of this machine.
+#[cfg(target_os = "linux")]
+fn local_display_number(display: &str) -> Option<u32> {
+    let (host, rest) = display.rsplit_once(':')?;
+    if !matches!(host, "" | "unix") {
+        return None;
+    }
+    rest.split('.').next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rig_is_read_in_both_spellings() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(
+            rig_of(&words("--headless --rig sim --json")).as_deref(),
+            Some("sim")
+        );
+        assert_eq!(rig_of(&words("--rig=COM3")).as_deref(), Some("COM3"));
+        assert_eq!(rig_of(&words("--headless")), None);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn displays_of_this_machine_are_told_from_remote_ones() {
+        assert_eq!(local_display_number(":1.0"), Some(1));
+        assert_eq!(local_display_number("unix:12"), Some(12));
+        assert_eq!(local_display_number("localhost:10.0"), None);
+        assert_eq!(local_display_number(""), None);
+        // No X server has this number: 65535 is beyond the ports they would use.
+        assert!(!x_server_answers(":65535"));
+    }
+}

@@ -1,0 +1,95 @@
+//! Building with cargo and learning where the result lies.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+use tinyjson::JsonValue;
+
+use crate::shell;
+
+/// Package and program name of the desktop program.
+pub const MORTISE: &str = "mortise";
+
+/// Runs `build` (a `cargo build …`) and returns the executables it made, as (target's name, path).
+///
+/// # Errors
+/// When the build fails, with its line; compiler messages have gone to standard error.
+pub fn build(build: &mut Command) -> Result<Vec<(String, PathBuf)>> {
+    let mut made = Vec::new();
+    build.arg("--message-format=json-render-diagnostics");
+    shell::run_lines(build, |line| made.extend(executable_of(line)))?;
+    Ok(made)
+}
+
+/// Builds the desktop program in the release profile and returns its path.
+///
+/// # Errors
+/// When the package is missing or does not compile.
+pub fn build_mortise(root: &Path) -> Result<PathBuf> {
+    let mut command = shell::cargo(root);
+    command.args(["build", "--release", "--package", MORTISE, "--bin", MORTISE]);
+    pick(
+        build(&mut command).context("the program `mortise` (host/app) does not build")?,
+        MORTISE,
+    )
+}
+
+/// The executable called `name` among `made`.
+///
+/// # Errors
+/// When the build made none of that name.
+pub fn pick(made: Vec<(String, PathBuf)>, name: &str) -> Result<PathBuf> {
+    match made.into_iter().find(|(target, _)| target == name) {
+        Some((_, path)) => Ok(path),
+        None => bail!("the build made no program called `{name}`"),
+    }
+}
+
+/// Reads one line of cargo's JSON messages; `None` unless it names the executable of a `bin` target.
+fn executable_of(line: &str) -> Option<(String, PathBuf)> {
+    let message: JsonValue = line.parse().ok()?;
+    let text = |value: &JsonValue| value.get::<String>().cloned();
+    let object = message.get::<std::collections::HashMap<String, JsonValue>>()?;
+    if text(object.get("reason")?)? != "compiler-artifact" {
+        return None;
+    }
+    let path = text(object.get("executable")?)?;
+    let target = object
+        .get("target")?
+        .get::<std::collections::HashMap<String, JsonValue>>()?;
+    // A test harness is an executable too, under the name of the crate it tests.
+    let profile = object
+        .get("profile")?
+        .get::<std::collections::HashMap<String, JsonValue>>()?;
+    let is_bin = target
+        .get("kind")?
+        .get::<Vec<JsonValue>>()?
+        .iter()
+        .any(|kind| text(kind).as_deref() == Some("bin"));
+    let is_test = profile.get("test")?.get::<bool>().copied()?;
+    (is_bin && !is_test).then_some((text(target.get("name")?)?, PathBuf::from(path)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn executables_are_read_from_cargo_messages() {
+        let bin = r#"{"reason":"compiler-artifact","target":{"kind":["bin"],"name":"mortise"},"profile":{"test":false},"executable":"/t/mortise"}"#;
+        let test = bin.replace("\"test\":false", "\"test\":true");
+        let lib = r#"{"reason":"compiler-artifact","target":{"kind":["lib"],"name":"x"},"profile":{"test":false},"executable":null}"#;
+        assert_eq!(
+            executable_of(bin),
+            Some(("mortise".into(), PathBuf::from("/t/mortise")))
+        );
+        assert_eq!(executable_of(&test), None);
+        assert_eq!(executable_of(lib), None);
+        assert_eq!(
+            executable_of(r#"{"reason":"build-finished","success":true}"#),
+            None
+        );
+        assert_eq!(executable_of("warning: not JSON"), None);
+    }
+}

@@ -1,0 +1,176 @@
+//! Finds out what this machine lacks, and installs that and nothing else.
+//!
+//! Looking needs no rights: it reads dpkg's status file, looks for programs, headers and libraries
+//! and asks rustc for its sysroot. Only what is missing is installed, after a question, by
+//! [`apt`] on Debian and Ubuntu and by rustup anywhere; elsewhere the commands are printed.
+
+mod advice;
+mod apt;
+mod machine;
+mod packages;
+mod rust;
+mod sources;
+
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+use self::machine::Machine;
+pub use self::packages::Group;
+pub use self::rust::BOARD_TARGET;
+use crate::shell;
+
+/// What is asked of the user before something is installed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Consent {
+    /// Install without asking.
+    Given,
+    /// Ask at the terminal; without a terminal, do not install.
+    Ask,
+}
+
+impl Consent {
+    /// Takes `--yes` out of `arguments`; `CI=true` says yes as well.
+    pub fn take(arguments: &mut Vec<String>) -> Self {
+        let before = arguments.len();
+        arguments.retain(|argument| argument != "--yes" && argument != "-y");
+        if arguments.len() < before || shell::is_ci() {
+            Self::Given
+        } else {
+            Self::Ask
+        }
+    }
+}
+
+/// What is missing for some groups.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Missing {
+    packages: Vec<&'static packages::Package>,
+    rust: Vec<rust::Part>,
+}
+
+impl Missing {
+    fn find(groups: &[Group], machine: &Machine, root: &Path) -> Result<Self> {
+        Ok(Self {
+            packages: packages::PACKAGES
+                .iter()
+                .filter(|package| package.group.applies() && groups.contains(&package.group))
+                .filter(|package| !machine.has(package))
+                .collect(),
+            rust: rust::missing(groups, root)?,
+        })
+    }
+
+    fn is_empty(&self) -> bool {
+        self.packages.is_empty() && self.rust.is_empty()
+    }
+
+    fn names(&self) -> Vec<&'static str> {
+        self.packages
+            .iter()
+            .map(|package| package.apt)
+            .chain(self.rust.iter().map(|part| part.name()))
+            .collect()
+    }
+}
+
+/// `cargo xtask setup`: everything that any command needs.
+pub fn command(arguments: &[String]) -> Result<ExitCode> {
+    let mut arguments = arguments.to_vec();
+    let consent = Consent::take(&mut arguments);
+    if let Some(unknown) = arguments.first() {
+        bail!("`setup` does not know `{unknown}`; see `cargo xtask setup --help`");
+    }
+    let done = ensure(&Group::ALL, consent)?;
+    if done {
+        eprintln!("Nothing is missing.");
+    }
+    Ok(if done {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+/// Sees to it that everything in `groups` is there. Says what it does.
+///
+/// Returns false when something is still missing because the user declined, nobody could be asked,
+/// or this system has no installer known here; the reason has been printed.
+///
+/// # Errors
+/// When an installer ran and failed.
+pub fn ensure(groups: &[Group], consent: Consent) -> Result<bool> {
+    let root = shell::root()?;
+    let missing = Missing::find(groups, &Machine::this()?, &root)?;
+    if missing.is_empty() {
+        return Ok(true);
+    }
+    eprintln!("Missing on this machine: {}", missing.names().join(" "));
+    for group in groups {
+        if missing.packages.iter().any(|package| package.group == *group)
+            || missing.rust.iter().any(|part| part.group() == *group)
+        {
+            eprintln!("  {}", group.purpose());
+        }
+    }
+    let system = advice::System::this();
+    if !missing.packages.is_empty() && system != advice::System::Apt {
+        eprintln!("\nInstall it with:\n");
+        for line in advice::commands(system, &missing.packages, &missing.rust) {
+            eprintln!("  {line}");
+        }
+        eprintln!("\nand run the same command again.");
+        return Ok(false);
+    }
+    let names: Vec<&str> = missing.packages.iter().map(|package| package.apt).collect();
+    if consent == Consent::Ask && !agreed(&names, &missing.rust)? {
+        return Ok(false);
+    }
+    if !names.is_empty() {
+        apt::install(&names)?;
+    }
+    rust::add(&missing.rust, &root)?;
+
+    let still = Missing::find(groups, &Machine::this()?, &root)?;
+    if !still.is_empty() {
+        bail!("installed, yet still not found: {}", still.names().join(" "));
+    }
+    Ok(true)
+}
+
+/// Asks at the terminal. Without one, prints the commands and returns false.
+fn agreed(names: &[&str], rust: &[rust::Part]) -> Result<bool> {
+    let mut commands = Vec::new();
+    if !names.is_empty() {
+        commands.push(apt::install_line(names));
+    }
+    commands.extend(rust.iter().map(|part| part.add_line()));
+    eprintln!("\nThis would run:");
+    for line in &commands {
+        eprintln!("  {line}");
+    }
+    if !std::io::stdin().is_terminal() {
+        eprintln!("\nNobody can be asked here (standard input is not a terminal): add --yes to agree.");
+        return Ok(false);
+    }
+    eprint!("Go ahead? [Y/n] ");
+    std::io::stderr().flush()?;
+    let mut answer = String::new();
+    // End of input, unlike an empty line, is not an answer.
+    let answered = std::io::stdin().lock().read_line(&mut answer)? > 0;
+    Ok(answered && matches!(answer.trim().to_lowercase().as_str(), "" | "y" | "yes"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn yes_is_taken_out_of_the_arguments() {
+        let mut arguments = vec!["--headless".to_owned(), "--yes".to_owned(), "--json".to_owned()];
+        assert_eq!(Consent::take(&mut arguments), Consent::Given);
+        assert_eq!(arguments, ["--headless", "--json"]);
+    }
+}

@@ -1,0 +1,105 @@
+//! What the product needs from the system, and how to see that it is there.
+
+/// What a package is needed for. A command asks only for the groups it cannot do without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// Compiling the desktop program.
+    Build,
+    /// Formatting and lint checks.
+    Checks,
+    /// Building firmware and running the emulated board.
+    Board,
+    /// Opening a window.
+    Window,
+    /// Opening a window where there is no display, and looking at it.
+    Screen,
+}
+
+impl Group {
+    /// Every group, in the order they are reported.
+    pub const ALL: [Self; 5] = [Self::Build, Self::Checks, Self::Board, Self::Window, Self::Screen];
+
+    /// True if this kind of system has the group at all: only Linux gets its window libraries one by one.
+    pub fn applies(self) -> bool {
+        cfg!(target_os = "linux") || !matches!(self, Self::Window | Self::Screen)
+    }
+
+    /// One line for the user.
+    pub fn purpose(self) -> &'static str {
+        match self {
+            Self::Build => "to compile the program: a C++ compiler and OpenCASCADE, which reads STEP files",
+            Self::Checks => "to check sources: rustfmt and clippy",
+            Self::Board => "for the emulated board: QEMU, and Rust's target for the microcontroller",
+            Self::Window => "to open a window: graphics drivers and input libraries",
+            Self::Screen => "to test the window without a display: Xvfb, xdotool, ImageMagick",
+        }
+    }
+}
+
+/// A sign that something is there, whoever installed it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// A program in `PATH`.
+    Program(&'static str),
+    /// A header below one of the include directories.
+    Header(&'static str),
+    /// A file in one of the library directories.
+    Library(&'static str),
+    /// A Vulkan driver's description (`*.json`) in the loader's directories.
+    VulkanDriver,
+}
+
+/// One package of Debian and Ubuntu with its counterparts elsewhere.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Package {
+    /// What it is needed for.
+    pub group: Group,
+    /// Its name for apt.
+    pub apt: &'static str,
+    /// What shows that it, or the same thing from another source, is there.
+    pub sign: Sign,
+    /// Its name for dnf (Fedora).
+    pub dnf: &'static str,
+    /// Its name for pacman (Arch).
+    pub pacman: &'static str,
+}
+
+const fn package(
+    group: Group,
+    apt: &'static str,
+    sign: Sign,
+    dnf: &'static str,
+    pacman: &'static str,
+) -> Package {
+    Package {
+        group,
+        apt,
+        sign,
+        dnf,
+        pacman,
+    }
+}
+
+/// Everything needed from the system. `serialport` without udev, and a window system that loads
+/// its libraries when it runs, need no development packages.
+#[rustfmt::skip]
+pub const PACKAGES: &[Package] = &[
+    package(Group::Build, "g++", Sign::Program("c++"), "gcc-c++", "gcc"),
+    package(Group::Build, "libocct-data-exchange-dev", Sign::Header("opencascade/STEPCAFControl_Reader.hxx"), "opencascade-devel", "opencascade"),
+    package(Group::Build, "libocct-ocaf-dev", Sign::Header("opencascade/TDocStd_Document.hxx"), "opencascade-devel", "opencascade"),
+    package(Group::Build, "libocct-modeling-algorithms-dev", Sign::Header("opencascade/BRepMesh_IncrementalMesh.hxx"), "opencascade-devel", "opencascade"),
+    package(Group::Board, "qemu-system-arm", Sign::Program("qemu-system-arm"), "qemu-system-arm", "qemu-system-arm"),
+    package(Group::Window, "libgl1-mesa-dri", Sign::Library("libGLX_mesa.so.0"), "mesa-dri-drivers", "mesa"),
+    package(Group::Window, "mesa-vulkan-drivers", Sign::VulkanDriver, "mesa-vulkan-drivers", "vulkan-swrast"),
+    package(Group::Window, "libvulkan1", Sign::Library("libvulkan.so.1"), "vulkan-loader", "vulkan-icd-loader"),
+    package(Group::Window, "libegl1", Sign::Library("libEGL.so.1"), "libglvnd-egl", "libglvnd"),
+    package(Group::Window, "libgl1", Sign::Library("libGL.so.1"), "libglvnd-glx", "libglvnd"),
+    package(Group::Window, "libxkbcommon-x11-0", Sign::Library("libxkbcommon-x11.so.0"), "libxkbcommon-x11", "libxkbcommon-x11"),
+    package(Group::Window, "libxcursor1", Sign::Library("libXcursor.so.1"), "libXcursor", "libxcursor"),
+    package(Group::Window, "libxi6", Sign::Library("libXi.so.6"), "libXi", "libxi"),
+    package(Group::Window, "libxrandr2", Sign::Library("libXrandr.so.2"), "libXrandr", "libxrandr"),
+    package(Group::Window, "libx11-xcb1", Sign::Library("libX11-xcb.so.1"), "libX11-xcb", "libx11"),
+    package(Group::Screen, "xvfb", Sign::Program("Xvfb"), "xorg-x11-server-Xvfb", "xorg-server-xvfb"),
+    package(Group::Screen, "xdotool", Sign::Program("xdotool"), "xdotool", "xdotool"),
+    package(Group::Screen, "imagemagick", Sign::Program("import"), "ImageMagick", "imagemagick"),
+];

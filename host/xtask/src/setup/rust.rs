@@ -1,0 +1,141 @@
+//! Parts of the Rust toolchain: the microcontroller's target, rustfmt and clippy.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Result, bail};
+
+use super::Group;
+use crate::shell;
+
+/// Target of the boards' Cortex-M7 with its double-precision FPU, hard-float calls.
+pub const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
+
+/// Something rustup adds to a toolchain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The standard library for [`BOARD_TARGET`].
+    Target,
+    /// `cargo fmt`.
+    Rustfmt,
+    /// `cargo clippy`.
+    Clippy,
+}
+
+impl Part {
+    const ALL: [Self; 3] = [Self::Target, Self::Rustfmt, Self::Clippy];
+
+    /// rustup's name for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Target => BOARD_TARGET,
+            Self::Rustfmt => "rustfmt",
+            Self::Clippy => "clippy",
+        }
+    }
+
+    /// What it is needed for.
+    pub fn group(self) -> Group {
+        match self {
+            Self::Target => Group::Board,
+            Self::Rustfmt | Self::Clippy => Group::Checks,
+        }
+    }
+
+    /// The command that adds it, as a person would type it in the repository.
+    pub fn add_line(self) -> String {
+        format!("rustup {} add {}", self.kind(), self.name())
+    }
+
+    fn kind(self) -> &'static str {
+        match self {
+            Self::Target => "target",
+            Self::Rustfmt | Self::Clippy => "component",
+        }
+    }
+
+    fn is_in(self, sysroot: &Path) -> bool {
+        let program = |name: &str| {
+            sysroot
+                .join("bin")
+                .join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+        };
+        match self {
+            Self::Target => sysroot
+                .join("lib/rustlib")
+                .join(BOARD_TARGET)
+                .join("lib")
+                .is_dir(),
+            Self::Rustfmt => program("rustfmt").is_file() && program("cargo-fmt").is_file(),
+            Self::Clippy => program("clippy-driver").is_file() && program("cargo-clippy").is_file(),
+        }
+    }
+}
+
+/// Parts of `groups` which the toolchain of the repository lacks.
+///
+/// # Errors
+/// When rustc cannot be asked where its sysroot is.
+pub fn missing(groups: &[Group], root: &Path) -> Result<Vec<Part>> {
+    let wanted: Vec<Part> = Part::ALL
+        .into_iter()
+        .filter(|part| groups.contains(&part.group()))
+        .collect();
+    if wanted.is_empty() {
+        return Ok(wanted);
+    }
+    let printed = shell::read(
+        Command::new("rustc")
+            .args(["--print", "sysroot"])
+            .current_dir(root),
+    )?;
+    let sysroot = PathBuf::from(printed.trim());
+    Ok(wanted.into_iter().filter(|part| !part.is_in(&sysroot)).collect())
+}
+
+/// Adds `parts` to the toolchain of the repository.
+///
+/// # Errors
+/// When there is no rustup, or it fails.
+pub fn add(parts: &[Part], root: &Path) -> Result<()> {
+    for part in parts {
+        if shell::find_program("rustup").is_none() {
+            bail!(
+                "this Rust was not installed by rustup, so `{}` must come from where it did: {}",
+                part.name(),
+                part.add_line()
+            );
+        }
+        shell::run(
+            Command::new("rustup")
+                .args([part.kind(), "add", part.name()])
+                .current_dir(root),
+        )?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_seen_by_their_files() {
+        let place = tempfile::tempdir().unwrap();
+        let sysroot = place.path();
+        assert!(Part::ALL.iter().all(|part| !part.is_in(sysroot)));
+        std::fs::create_dir_all(sysroot.join("lib/rustlib/thumbv7em-none-eabihf/lib")).unwrap();
+        std::fs::create_dir_all(sysroot.join("bin")).unwrap();
+        for name in ["rustfmt", "cargo-fmt", "cargo-clippy"] {
+            std::fs::write(
+                sysroot.join(format!("bin/{name}{}", std::env::consts::EXE_SUFFIX)),
+                "",
+            )
+            .unwrap();
+        }
+        assert!(Part::Target.is_in(sysroot));
+        assert!(Part::Rustfmt.is_in(sysroot));
+        // Half of a component is no component.
+        assert!(!Part::Clippy.is_in(sysroot));
+    }
+}

@@ -1,0 +1,143 @@
+//! The steps, one function each. `window` has a file of its own.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use super::Bench;
+use crate::{figures, firmware as boards, program, setup, shell, tidy};
+
+const HIL_TESTS: &str = "mortise-hil-tests";
+const BOARD_SIDE: [&str; 3] = ["mortise-protocol", "mortise-haptics", "mortise-firmware"];
+
+pub fn format(bench: &mut Bench) -> Result<String> {
+    shell::run(shell::cargo(&bench.root).args(["fmt", "--all", "--check"]))?;
+    for board in boards::boards(&bench.root)? {
+        shell::run(boards::cargo(&bench.root, &board).args(["fmt", "--check"]))?;
+    }
+    Ok(String::new())
+}
+
+pub fn tidy(bench: &mut Bench) -> Result<String> {
+    tidy::report(&tidy::check(&bench.root)?)?;
+    Ok(String::new())
+}
+
+pub fn lint(bench: &mut Bench) -> Result<String> {
+    let mut command = shell::cargo(&bench.root);
+    shell::run(command.args([
+        "clippy",
+        "--release",
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ]))?;
+    Ok(String::new())
+}
+
+/// Tests run with the standard library: without this, a crate that needs it would go unseen.
+pub fn no_std(bench: &mut Bench) -> Result<String> {
+    let mut command = shell::cargo(&bench.root);
+    command.args(["check", "--release", "--target", setup::BOARD_TARGET]);
+    for package in BOARD_SIDE {
+        command.args(["--package", package]);
+    }
+    shell::run(&mut command)?;
+    Ok(String::new())
+}
+
+pub fn lint_boards(bench: &mut Bench) -> Result<String> {
+    for board in boards::boards(&bench.root)? {
+        shell::run(boards::cargo(&bench.root, &board).args(["clippy", "--release", "--", "-D", "warnings"]))?;
+    }
+    Ok(String::new())
+}
+
+pub fn firmware(bench: &mut Bench) -> Result<String> {
+    let names = boards::boards(&bench.root)?;
+    for board in &names {
+        boards::build(&bench.root, board)?;
+    }
+    Ok(format!("{} boards", names.len()))
+}
+
+/// All targets of all packages at once, so that the tests that follow find the same features and
+/// compile nothing again.
+pub fn build(bench: &mut Bench) -> Result<String> {
+    let mut command = shell::cargo(&bench.root);
+    command.args(["build", "--release", "--workspace", "--all-targets"]);
+    bench.program = Some(program::pick(program::build(&mut command)?, program::MORTISE)?);
+    Ok(String::new())
+}
+
+pub fn unit(bench: &mut Bench) -> Result<String> {
+    let mut command = shell::cargo(&bench.root);
+    command.args([
+        "test",
+        "--release",
+        "--workspace",
+        "--exclude",
+        HIL_TESTS,
+        "--no-fail-fast",
+    ]);
+    counted(bench, &mut command)
+}
+
+pub fn hil(bench: &mut Bench) -> Result<String> {
+    boards::build(&bench.root, boards::EMULATED)?;
+    let mut command = shell::cargo(&bench.root);
+    command.args(["test", "--release", "--package", HIL_TESTS, "--no-fail-fast"]);
+    counted(bench, &mut command)
+}
+
+pub fn docs(bench: &mut Bench) -> Result<String> {
+    let mut command = shell::cargo(&bench.root);
+    command
+        .env("RUSTDOCFLAGS", "-D warnings")
+        .args(["doc", "--release", "--workspace", "--no-deps"]);
+    shell::run(&mut command)?;
+    let program = bench.program()?;
+    tidy::report(&tidy::check_commands(&bench.root, &program)?)?;
+    Ok(String::new())
+}
+
+pub fn figures(bench: &mut Bench) -> Result<String> {
+    let program = bench.program()?;
+    let measured = figures::measure(&bench.root, &program, "end-to-end", true)?;
+    let broken: Vec<_> = measured.rows.iter().filter(|row| !row.holds).collect();
+    if !broken.is_empty() {
+        bail!("{} of {} bounds do not hold", broken.len(), measured.rows.len());
+    }
+    if !measured.success {
+        bail!("every row holds, yet the program says by its exit code that one does not");
+    }
+    Ok(format!("{} bounds hold", measured.rows.len()))
+}
+
+impl Bench {
+    /// The desktop program: from the step `build`, or built now when that step was not asked for.
+    pub fn program(&mut self) -> Result<PathBuf> {
+        match &self.program {
+            Some(path) => Ok(path.clone()),
+            None => {
+                build(self)?;
+                self.program.clone().context("the step `build` left no program")
+            }
+        }
+    }
+}
+
+/// Runs tests and counts them, failed ones too; none at all is a failure, as it says nothing.
+fn counted(bench: &mut Bench, command: &mut Command) -> Result<String> {
+    shell::run_lines(command, |line| {
+        println!("{line}");
+        bench.counts.add_line(line);
+    })?;
+    if bench.counts.passed == 0 {
+        bail!("no test was run");
+    }
+    Ok(String::new())
+}
