@@ -1,0 +1,88 @@
+//! Virtual coupling between handle and object, eqs. 1–2 of Faas 2010.
+//!
+//! F = k_T·d − b_T·v and τ = k_R·θ − b_R·ω on the object: d and θ lead from the object to where the handle holds it (handle ∘ G), v and ω
+//! are the object's motion relative to that place. Both act at the held part's centre of mass, so translation and rotation do not mix.
+//! Beyond its largest force or torque the coupling slips: its stiffness and damping are scaled down together, which keeps the implicit step's matrix
+//! positive definite and the force's direction.
+
+use glam::Vec3;
+
+use crate::body::Grabbed;
+use crate::limits::length;
+use crate::pose::{Pose, Twist, Wrench};
+use crate::rotation::log_continuous;
+use crate::settings::CouplingSettings;
+
+/// The coupling at the tick's start, world axes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coupling {
+    /// d: from the object's centre of mass to its place in the hand, m.
+    pub stretch: Vec3,
+    /// θ: rotation vector from the object to its place in the hand, rad.
+    pub angle: Vec3,
+    /// Motion of the place in the hand, at the held centre of mass.
+    pub target: Twist,
+    /// From the handle's origin to the held centre of mass, m.
+    lever: Vec3,
+}
+
+/// Fractions (0 to 1) of stiffness and damping left once the coupling slips.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Slip {
+    pub translation: f32,
+    pub rotation: f32,
+}
+
+impl Slip {
+    pub const NONE: Self = Self {
+        translation: 1.0,
+        rotation: 1.0,
+    };
+}
+
+impl Coupling {
+    /// Measures stretch and angle.
+    pub fn measure(handle: Pose, handle_twist: Twist, grabbed: &Grabbed) -> Self {
+        let place = handle.compose(grabbed.offset);
+        let center = place.transform_point(grabbed.body.center_of_mass);
+        let lever = center - handle.position;
+        Self {
+            stretch: center - grabbed.center,
+            angle: log_continuous(place.orientation * grabbed.orientation.conjugate(), grabbed.angle),
+            target: handle_twist.moved_by(lever),
+            lever,
+        }
+    }
+
+    /// Wrench on the object at its centre of mass when it has moved with `twist` for `period_s`, before slipping.
+    pub fn pull(&self, settings: &CouplingSettings, period_s: f32, twist: Twist) -> Wrench {
+        Wrench {
+            force: (self.stretch - twist.linear * period_s) * settings.k_t_n_per_m
+                + (self.target.linear - twist.linear) * settings.b_t,
+            torque: (self.angle - twist.angular * period_s) * settings.k_r
+                + (self.target.angular - twist.angular) * settings.b_r,
+        }
+    }
+
+    /// How far the coupling slips under `pull`.
+    pub fn slip(pull: Wrench, settings: &CouplingSettings) -> Slip {
+        Slip {
+            translation: fraction(pull.force, settings.force_max_n),
+            rotation: fraction(pull.torque, settings.torque_max_nm),
+        }
+    }
+
+    /// What the handle feels at its origin when the object is pulled with `wrench`: the reaction, applied where the hand holds the part.
+    pub fn reaction(&self, wrench: Wrench) -> Wrench {
+        (-wrench).moved_by(-self.lever)
+    }
+}
+
+/// 1 within `most`, else `most / |v|`.
+fn fraction(v: Vec3, most: f32) -> f32 {
+    if v.length_squared() > most * most {
+        most / length(v)
+    } else {
+        1.0
+    }
+}

@@ -1,0 +1,67 @@
+//! Limits on the handle's wrench, the last thing before the mechanism.
+
+use glam::Vec3;
+
+use crate::io::Flags;
+use crate::pose::Wrench;
+use crate::settings::LimitSettings;
+
+/// A hair less than 1, so that a vector cut to its limit is not above it by a rounding.
+const WITHIN: f32 = 0.999_999;
+
+/// Length of `v` by `libm`: the same bits everywhere.
+#[inline]
+pub(crate) fn length(v: Vec3) -> f32 {
+    libm::sqrtf(v.length_squared())
+}
+
+/// `v` cut to length `most`, and whether it had to be. The direction stays.
+#[inline]
+pub(crate) fn cut(v: Vec3, most: f32) -> (Vec3, bool) {
+    let squared = v.length_squared();
+    if squared > most * most {
+        (v * (WITHIN * most / libm::sqrtf(squared)), true)
+    } else {
+        (v, false)
+    }
+}
+
+/// The wrench that may reach the mechanism: `wanted` cut to the limits, changed from `previous` no faster than the slew limits allow.
+///
+/// The limits are applied once more after the slew: they may have been lowered since `previous` was allowed. A non-finite result
+/// becomes zero and is flagged.
+pub(crate) fn limit(
+    wanted: Wrench,
+    previous: Wrench,
+    settings: &LimitSettings,
+    period_s: f32,
+    flags: &mut Flags,
+) -> Wrench {
+    let (force, cut_force) = cut(wanted.force, settings.force_n);
+    let (torque, cut_torque) = cut(wanted.torque, settings.torque_nm);
+    let (force_step, slow_force) = cut(force - previous.force, settings.force_slew_n_per_s * period_s);
+    let (torque_step, slow_torque) = cut(torque - previous.torque, settings.torque_slew_nm_per_s * period_s);
+    // Where nothing was cut the value itself is used: previous + (wanted − previous) may differ by a rounding.
+    let force = if slow_force {
+        previous.force + force_step
+    } else {
+        force
+    };
+    let torque = if slow_torque {
+        previous.torque + torque_step
+    } else {
+        torque
+    };
+    let out = Wrench {
+        force: cut(force, settings.force_n).0,
+        torque: cut(torque, settings.torque_nm).0,
+    };
+    flags.insert_if(cut_force || cut_torque, Flags::LIMITED);
+    flags.insert_if(slow_force || slow_torque, Flags::SLEW_LIMITED);
+    if out.is_finite() {
+        out
+    } else {
+        flags.insert(Flags::NON_FINITE);
+        Wrench::ZERO
+    }
+}

@@ -1,0 +1,299 @@
+//! Settings of the force law, their defaults and ranges.
+//!
+//! Made and checked at low priority, handed to the tick as finished values. The defaults suit a hand-held part and a handle of about
+//! 0.15 kg: an object of 0.1 kg on a coupling of 1 kN/m is critically damped at b = 2·√(k·m) = 20 N s/m.
+
+use core::fmt;
+
+/// All of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Between handle and object.
+    pub coupling: CouplingSettings,
+    /// Between object and the other parts.
+    pub contact: ContactSettings,
+    /// The simulated object.
+    pub object: ObjectSettings,
+    /// What may reach the motors.
+    pub limits: LimitSettings,
+    /// Time from tick to tick (h in the notation), s. Default 1 ms.
+    pub period_s: f32,
+}
+
+/// Virtual coupling, eqs. 1–2 of Faas 2010: F = k_T·d − b_T·v, τ = k_R·θ − b_R·ω, with v and ω of the object relative to the handle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CouplingSettings {
+    /// k_T, N/m. Stiffer feels crisper and asks more damping of the handle (Colgate–Schenkel: b > k_T·h/2). Default 1000.
+    pub k_t_n_per_m: f32,
+    /// b_T, N s/m. Default 20.
+    pub b_t: f32,
+    /// k_R, N m/rad. Default 0.5.
+    pub k_r: f32,
+    /// b_R, N m s/rad. Default 0.01.
+    pub b_r: f32,
+    /// The coupling slips beyond this force, N: the object lags and the handle feels no more. Default 10.
+    pub force_max_n: f32,
+    /// The coupling slips beyond this torque, N m. Default 0.3.
+    pub torque_max_nm: f32,
+}
+
+/// Contact between points of one part and the field of another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSettings {
+    /// k of one point, N/m. The implicit step carries 20 kN/m to 2 MN/m and more. Default 200 kN/m.
+    pub stiffness_n_per_m: f32,
+    /// Cap on the sum of k over all points that touch, N/m: with more points each gets less. It bounds the condition number of the step's
+    /// matrix (h²·cap/mass) and is better left high, since a part that lies on many points shares it with the one point at its side.
+    /// Default 100 MN/m.
+    pub total_stiffness_n_per_m: f32,
+    /// Damping on approach as a ratio of stiffness, s: λ = k·(depth + damping_s · approach speed). Default 0.5 ms.
+    pub damping_s: f32,
+    /// Points this near are taken into the step beyond what the motion of one tick can reach, m. Default 50 µm.
+    pub margin_m: f32,
+    /// Most field look-ups a tick, tree nodes and points alike. Default 1500.
+    pub point_budget: u32,
+}
+
+/// The simulated object: its mass is chosen for the feel, not taken from the CAD part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectSettings {
+    /// kg. Default 0.1.
+    pub mass_kg: f32,
+    /// Lower bound of its radius of gyration, m: keeps slivers from spinning. Default 3 mm.
+    pub gyration_min_m: f32,
+    /// Upper bound of its largest radius of gyration, m: the inertia of a larger part is scaled down as a whole, so that the rotational
+    /// coupling stays as well damped as with a part that fits the hand. Default 20 mm.
+    pub gyration_max_m: f32,
+    /// No point of the object moves faster, m/s: the object lags a faster handle instead of outrunning the look-ahead. Default 1.
+    pub speed_max_m_per_s: f32,
+}
+
+/// Last limits before the mechanism.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitSettings {
+    /// Length of the force vector, N. Default 12.
+    pub force_n: f32,
+    /// Length of the torque vector about the handle's origin, N m. Default 0.5.
+    pub torque_nm: f32,
+    /// Change of force, N/s. Default 5000 (5 N a tick at 1 kHz).
+    pub force_slew_n_per_s: f32,
+    /// Change of torque, N m/s. Default 200.
+    pub torque_slew_nm_per_s: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            coupling: CouplingSettings {
+                k_t_n_per_m: 1000.0,
+                b_t: 20.0,
+                k_r: 0.5,
+                b_r: 0.01,
+                force_max_n: 10.0,
+                torque_max_nm: 0.3,
+            },
+            contact: ContactSettings {
+                stiffness_n_per_m: 200e3,
+                total_stiffness_n_per_m: 100e6,
+                damping_s: 0.5e-3,
+                margin_m: 50e-6,
+                point_budget: 1500,
+            },
+            object: ObjectSettings {
+                mass_kg: 0.1,
+                gyration_min_m: 3e-3,
+                gyration_max_m: 20e-3,
+                speed_max_m_per_s: 1.0,
+            },
+            limits: LimitSettings {
+                force_n: 12.0,
+                torque_nm: 0.5,
+                force_slew_n_per_s: 5000.0,
+                torque_slew_nm_per_s: 200.0,
+            },
+            period_s: 1e-3,
+        }
+    }
+}
+
+/// Inclusive range of a setting, in the setting's unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Smallest value accepted.
+    pub min: f32,
+    /// Largest value accepted.
+    pub max: f32,
+}
+
+/// Range of each setting: where the law was tried, not where it would break.
+pub mod ranges {
+    use super::Range;
+
+    /// [`super::CouplingSettings::k_t_n_per_m`].
+    pub const K_T_N_PER_M: Range = Range { min: 0.0, max: 20e3 };
+    /// [`super::CouplingSettings::b_t`].
+    pub const B_T: Range = Range { min: 0.0, max: 500.0 };
+    /// [`super::CouplingSettings::k_r`].
+    pub const K_R: Range = Range { min: 0.0, max: 50.0 };
+    /// [`super::CouplingSettings::b_r`].
+    pub const B_R: Range = Range { min: 0.0, max: 5.0 };
+    /// [`super::CouplingSettings::force_max_n`].
+    pub const COUPLING_FORCE_MAX_N: Range = Range { min: 0.1, max: 100.0 };
+    /// [`super::CouplingSettings::torque_max_nm`].
+    pub const COUPLING_TORQUE_MAX_NM: Range = Range {
+        min: 0.001,
+        max: 10.0,
+    };
+    /// [`super::ContactSettings::stiffness_n_per_m`].
+    pub const STIFFNESS_N_PER_M: Range = Range {
+        min: 100.0,
+        max: 10e6,
+    };
+    /// [`super::ContactSettings::total_stiffness_n_per_m`].
+    pub const TOTAL_STIFFNESS_N_PER_M: Range = Range {
+        min: 1000.0,
+        max: 1e9,
+    };
+    /// [`super::ContactSettings::damping_s`].
+    pub const DAMPING_S: Range = Range { min: 0.0, max: 0.01 };
+    /// [`super::ContactSettings::margin_m`].
+    pub const MARGIN_M: Range = Range { min: 1e-6, max: 1e-3 };
+    /// [`super::ContactSettings::point_budget`].
+    pub const POINT_BUDGET: Range = Range {
+        min: 16.0,
+        max: 100_000.0,
+    };
+    /// [`super::ObjectSettings::mass_kg`].
+    pub const MASS_KG: Range = Range { min: 0.01, max: 10.0 };
+    /// [`super::ObjectSettings::gyration_min_m`] and [`super::ObjectSettings::gyration_max_m`]; the first must not exceed the second.
+    pub const GYRATION_M: Range = Range { min: 1e-3, max: 1.0 };
+    /// [`super::ObjectSettings::speed_max_m_per_s`].
+    pub const SPEED_MAX_M_PER_S: Range = Range { min: 0.01, max: 10.0 };
+    /// [`super::LimitSettings::force_n`].
+    pub const FORCE_N: Range = Range { min: 0.0, max: 100.0 };
+    /// [`super::LimitSettings::torque_nm`].
+    pub const TORQUE_NM: Range = Range { min: 0.0, max: 10.0 };
+    /// [`super::LimitSettings::force_slew_n_per_s`].
+    pub const FORCE_SLEW_N_PER_S: Range = Range { min: 1.0, max: 1e6 };
+    /// [`super::LimitSettings::torque_slew_nm_per_s`].
+    pub const TORQUE_SLEW_NM_PER_S: Range = Range { min: 0.01, max: 1e5 };
+    /// [`super::Settings::period_s`].
+    pub const PERIOD_S: Range = Range { min: 1e-4, max: 0.02 };
+}
+
+/// A setting that was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettingsError {
+    /// Its path in [`Settings`], e.g. `coupling.k_t_n_per_m`.
+    pub name: &'static str,
+    /// The value refused.
+    pub value: f32,
+    /// What would be accepted.
+    pub range: Range,
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} is {}: choose a value from {} to {}",
+            self.name, self.value, self.range.min, self.range.max
+        )
+    }
+}
+
+impl core::error::Error for SettingsError {}
+
+impl Settings {
+    /// Checks every number against its range; the first that is outside (or not a number) is named.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        let Self {
+            coupling,
+            contact,
+            object,
+            limits,
+            period_s,
+        } = self;
+        let gyration_max = Range {
+            min: object.gyration_min_m,
+            ..ranges::GYRATION_M
+        };
+        let checks = [
+            ("coupling.k_t_n_per_m", coupling.k_t_n_per_m, ranges::K_T_N_PER_M),
+            ("coupling.b_t", coupling.b_t, ranges::B_T),
+            ("coupling.k_r", coupling.k_r, ranges::K_R),
+            ("coupling.b_r", coupling.b_r, ranges::B_R),
+            (
+                "coupling.force_max_n",
+                coupling.force_max_n,
+                ranges::COUPLING_FORCE_MAX_N,
+            ),
+            (
+                "coupling.torque_max_nm",
+                coupling.torque_max_nm,
+                ranges::COUPLING_TORQUE_MAX_NM,
+            ),
+            (
+                "contact.stiffness_n_per_m",
+                contact.stiffness_n_per_m,
+                ranges::STIFFNESS_N_PER_M,
+            ),
+            (
+                "contact.total_stiffness_n_per_m",
+                contact.total_stiffness_n_per_m,
+                ranges::TOTAL_STIFFNESS_N_PER_M,
+            ),
+            ("contact.damping_s", contact.damping_s, ranges::DAMPING_S),
+            ("contact.margin_m", contact.margin_m, ranges::MARGIN_M),
+            (
+                "contact.point_budget",
+                contact.point_budget as f32,
+                ranges::POINT_BUDGET,
+            ),
+            ("object.mass_kg", object.mass_kg, ranges::MASS_KG),
+            ("object.gyration_min_m", object.gyration_min_m, ranges::GYRATION_M),
+            ("object.gyration_max_m", object.gyration_max_m, gyration_max),
+            (
+                "object.speed_max_m_per_s",
+                object.speed_max_m_per_s,
+                ranges::SPEED_MAX_M_PER_S,
+            ),
+            ("limits.force_n", limits.force_n, ranges::FORCE_N),
+            ("limits.torque_nm", limits.torque_nm, ranges::TORQUE_NM),
+            (
+                "limits.force_slew_n_per_s",
+                limits.force_slew_n_per_s,
+                ranges::FORCE_SLEW_N_PER_S,
+            ),
+            (
+                "limits.torque_slew_nm_per_s",
+                limits.torque_slew_nm_per_s,
+                ranges::TORQUE_SLEW_NM_PER_S,
+            ),
+            ("period_s", *period_s, ranges::PERIOD_S),
+        ];
+        for (name, value, range) in checks {
+            // NaN compares false and is refused with the rest.
+            if !(value >= range.min && value <= range.max) {
+                return Err(SettingsError { name, value, range });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_nan_is_not() {
+        assert_eq!(Settings::default().validate(), Ok(()));
+        let mut s = Settings::default();
+        s.coupling.b_t = f32::NAN;
+        assert_eq!(s.validate().map_err(|e| e.name), Err("coupling.b_t"));
+        let mut s = Settings::default();
+        s.object.gyration_max_m = 0.5 * s.object.gyration_min_m;
+        assert_eq!(s.validate().map_err(|e| e.name), Err("object.gyration_max_m"));
+    }
+}

@@ -1,0 +1,217 @@
+//! What the force law remembers from tick to tick.
+
+use core::fmt;
+
+use glam::Vec3;
+use heapless::Vec;
+use mortise_protocol::image::{PART_GRABBABLE, SceneImage};
+use mortise_protocol::limits::MAX_PARTS;
+
+use crate::body::{Body, Grabbed};
+use crate::contact::Contacts;
+use crate::pose::{Pose, Twist, Wrench};
+use crate::proximity::Leaf;
+use crate::tick::usable_pose;
+
+/// Leaves remembered for the next tick, should the look-up budget run out.
+pub(crate) const MAX_LEAVES: usize = 64;
+
+/// Placements, the grabbed object, and what carries over. About 25 KiB; lives in a static on a board.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Every part's placement.
+    pub(crate) parts: Vec<Placed, MAX_PARTS>,
+    pub(crate) grabbed: Option<Grabbed>,
+    pub(crate) last_object: Pose,
+    /// Handle wrench of the last tick, for the slew limit.
+    pub(crate) previous_wrench: Wrench,
+    /// Points touching, rising at once and falling by a twentieth a tick: divides the total contact stiffness.
+    pub(crate) sharing: f32,
+    /// Where to go on after a tick whose budget ran out.
+    pub(crate) resume: Option<Leaf>,
+    /// Leaves that had candidates in the last tick, in the order they were looked at.
+    pub(crate) leaves: Vec<Leaf, MAX_LEAVES>,
+    /// Scratch of one tick; kept here because a board's stack is small.
+    pub(crate) contacts: Contacts,
+}
+
+/// A part where it stands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    pub pose: Pose,
+    /// Sphere about it, world.
+    pub center: Vec3,
+    pub radius: f32,
+    /// Sphere centre in the shape frame.
+    pub local_center: Vec3,
+}
+
+/// Why a part could not be grabbed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GrabError {
+    /// The scene has no part of this index.
+    NoSuchPart {
+        /// Asked for.
+        part: u16,
+        /// Parts there are.
+        parts: u16,
+    },
+    /// The part is fixed.
+    Fixed {
+        /// Asked for.
+        part: u16,
+    },
+    /// Another part is in hand: release it first.
+    Busy {
+        /// The one in hand.
+        part: u16,
+    },
+    /// The handle's pose is not usable.
+    BadHandle,
+}
+
+impl fmt::Display for GrabError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoSuchPart { part, parts } => write!(f, "no part {part}: the scene has {parts}"),
+            Self::Fixed { part } => write!(f, "part {part} is fixed: choose one that may be moved"),
+            Self::Busy { part } => write!(f, "part {part} is in hand: release it first"),
+            Self::BadHandle => write!(f, "the handle's pose is not known: check the encoders"),
+        }
+    }
+}
+
+impl core::error::Error for GrabError {}
+
+impl Default for State {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl State {
+    /// No scene, nothing grabbed.
+    pub const fn new() -> Self {
+        Self {
+            parts: Vec::new(),
+            grabbed: None,
+            last_object: Pose::IDENTITY,
+            previous_wrench: Wrench::ZERO,
+            sharing: 0.0,
+            resume: None,
+            leaves: Vec::new(),
+            contacts: Contacts::new(),
+        }
+    }
+
+    /// Takes over a scene's placements; whatever was grabbed is let go. Parts beyond [`MAX_PARTS`] are left out.
+    ///
+    /// Cost grows with the number of parts; not for the tick.
+    pub fn load_scene(&mut self, scene: &SceneImage<'_>) {
+        self.release();
+        self.last_object = Pose::IDENTITY;
+        self.parts.clear();
+        for (index, record) in scene.parts().iter().enumerate().take(MAX_PARTS) {
+            let shape = scene.shape_of_part(index).record;
+            let pose = Pose::from_arrays(record.position, record.orientation);
+            let local_center = Vec3::from_array(shape.center);
+            // The loop is no longer than the vector.
+            let _ = self.parts.push(Placed {
+                pose,
+                center: pose.transform_point(local_center),
+                radius: shape.radius,
+                local_center,
+            });
+        }
+    }
+
+    /// Takes part `part` in hand where it stands: the offset between handle and part is kept, so no force arises.
+    pub fn grab(&mut self, scene: &SceneImage<'_>, part: u16, handle: &Pose) -> Result<(), GrabError> {
+        if let Some(grabbed) = &self.grabbed {
+            return Err(GrabError::Busy { part: grabbed.part });
+        }
+        let parts = self.parts.len().min(scene.parts().len());
+        let no_such_part = GrabError::NoSuchPart {
+            part,
+            parts: parts as u16,
+        };
+        let index = usize::from(part);
+        if index >= parts {
+            return Err(no_such_part);
+        }
+        let placed = *self.parts.get(index).ok_or(no_such_part)?;
+        if scene.parts()[index].flags & PART_GRABBABLE == 0 {
+            return Err(GrabError::Fixed { part });
+        }
+        let handle = usable_pose(handle).ok_or(GrabError::BadHandle)?;
+        let body = Body::of(&scene.shape_of_part(index));
+        self.grabbed = Some(Grabbed {
+            part,
+            offset: handle.inverse().compose(placed.pose),
+            center: placed.pose.transform_point(body.center_of_mass),
+            orientation: placed.pose.orientation,
+            twist: Twist::ZERO,
+            angle: Vec3::ZERO,
+            fresh: true,
+            body,
+        });
+        self.last_object = placed.pose;
+        self.forget_contacts();
+        Ok(())
+    }
+
+    /// Lets go: the part stays where it is. The handle's force falls to zero within the slew limit.
+    pub fn release(&mut self) {
+        self.grabbed = None;
+        self.forget_contacts();
+    }
+
+    /// Index of the part in hand.
+    pub fn grabbed(&self) -> Option<u16> {
+        self.grabbed.as_ref().map(|g| g.part)
+    }
+
+    /// Number of placed parts.
+    pub fn part_count(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// Where part `part` stands (shape frame in the world).
+    pub fn placement(&self, part: u16) -> Option<Pose> {
+        self.parts.get(usize::from(part)).map(|p| p.pose)
+    }
+
+    /// The part in hand: placement, and twist at its centre of mass.
+    pub fn object(&self) -> Option<(Pose, Twist)> {
+        self.grabbed.as_ref().map(|g| (g.pose(), g.twist))
+    }
+
+    /// World position of the held part's centre of mass, m.
+    pub fn object_center(&self) -> Option<Vec3> {
+        self.grabbed.as_ref().map(|g| g.center)
+    }
+
+    /// Forgets the last handle wrench, so that the next one builds up from zero under the slew limit.
+    pub fn restart_slew(&mut self) {
+        self.previous_wrench = Wrench::ZERO;
+    }
+
+    fn forget_contacts(&mut self) {
+        self.sharing = 0.0;
+        self.resume = None;
+        self.leaves.clear();
+        self.contacts.clear();
+    }
+
+    /// Writes the held part's placement back to the list of parts.
+    pub(crate) fn settle(&mut self) {
+        if let Some(g) = &self.grabbed {
+            let pose = g.pose();
+            self.last_object = pose;
+            if let Some(placed) = self.parts.get_mut(usize::from(g.part)) {
+                placed.pose = pose;
+                placed.center = pose.transform_point(placed.local_center);
+            }
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! One tick of the force law.
+
+use mortise_protocol::image::SceneImage;
+
+use crate::body::Grabbed;
+use crate::coupling::Coupling;
+use crate::io::{FacePairs, Flags, Input, Output, Work};
+use crate::limits::{length, limit};
+use crate::pose::{Pose, Twist, Wrench, renormalize};
+use crate::proximity::Search;
+use crate::rotation;
+use crate::settings::Settings;
+use crate::state::State;
+use crate::step::{Solution, Step};
+use crate::touching::touching_faces;
+
+/// Positions beyond this are an encoder's fault, not a place, m.
+const FARTHEST_M: f32 = 100.0;
+/// Speeds beyond this likewise, m/s.
+const FASTEST_M_PER_S: f32 = 100.0;
+/// Angular speeds beyond this likewise, rad/s.
+const FASTEST_RAD_PER_S: f32 = 1000.0;
+/// How fast the number of points that share the total stiffness may fall, a tick: stiffness of points still touching then rises
+/// slowly, and little energy is made of it.
+const SHARING_DECAY: f32 = 0.95;
+
+/// Moves the held object by one period and gives the wrench the handle must feel.
+///
+/// Order: input check; coupling; step without contacts, which tells how far anything can move; search within that; step with contacts;
+/// motion; reaction; limits.
+///
+/// **Contract.** Called every [`Settings::period_s`]. Work is bounded: [`crate::ContactSettings::point_budget`] look-ups, 256 contacts, 8
+/// solves. Past a bound the tick degrades in the order the flag's documentation states and says so in [`Work::flags`]; it never panics and never
+/// returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and leaves the object
+/// where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
+pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
+    let mut work = Work::default();
+    let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
+        work.flags.insert(Flags::BAD_INPUT);
+        if let Some(g) = &mut state.grabbed {
+            g.twist = Twist::ZERO;
+        }
+        return state.still(work);
+    };
+    let Some(grabbed) = state
+        .grabbed
+        .filter(|g| usize::from(g.part) < scene.parts().len())
+    else {
+        let mut out = state.still(work);
+        out.handle = state.hand_over(Wrench::ZERO, input.enabled, settings, &mut out.work.flags);
+        return out;
+    };
+    let (mut grabbed, coupling) = take_hold(grabbed, handle, input.handle_twist);
+    let (gyration2, scale) = grabbed
+        .body
+        .gyration2_in_world(grabbed.orientation, &settings.object);
+    let step = Step {
+        coupling: &coupling,
+        settings: &settings.coupling,
+        period_s: settings.period_s,
+        mass_kg: settings.object.mass_kg,
+        gyration2,
+        length: scale,
+        twist: grabbed.twist,
+    };
+    let mut free = step.free();
+    let reach = grabbed.body.reach;
+    let capped = slow_down(&mut free.twist, reach, settings.object.speed_max_m_per_s);
+    let margin = settings.contact.margin_m + settings.period_s * point_speed(free.twist, reach);
+    let solution = state.meet(scene, settings, &grabbed, &step, &free, margin, &mut work);
+
+    let mut twist = solution.twist;
+    // Nothing beyond the margin was looked at, so nothing may move farther.
+    let slowed = slow_down(
+        &mut twist,
+        reach,
+        smaller(margin / settings.period_s, settings.object.speed_max_m_per_s),
+    );
+    work.flags.insert_if(capped || slowed, Flags::SPEED_LIMITED);
+    grabbed.advance(twist, settings.period_s);
+    if !(grabbed.twist.is_finite() && grabbed.pose().is_finite() && solution.contact.is_finite()) {
+        work.flags.insert(Flags::NON_FINITE);
+        if let Some(g) = &mut state.grabbed {
+            g.twist = Twist::ZERO;
+        }
+        return state.still(work);
+    }
+    let pull = slipping(
+        coupling.pull(&settings.coupling, settings.period_s, twist),
+        settings,
+        &mut work.flags,
+    );
+    let wanted = coupling.reaction(pull);
+    let pairs = touching_faces(state.contacts.as_slice(), grabbed.center, settings.period_s);
+    state.grabbed = Some(grabbed);
+    state.settle();
+    let handle = state.hand_over(wanted, input.enabled, settings, &mut work.flags);
+    Output {
+        handle,
+        contact: solution.contact,
+        object: state.last_object,
+        object_twist: twist,
+        pairs,
+        work,
+    }
+}
+
+impl State {
+    /// The step with whatever is within `margin`.
+    #[expect(clippy::too_many_arguments, reason = "one call; the parts of a tick")]
+    fn meet(
+        &mut self,
+        scene: &SceneImage<'_>,
+        settings: &Settings,
+        grabbed: &Grabbed,
+        step: &Step<'_>,
+        free: &Solution,
+        margin: f32,
+        work: &mut Work,
+    ) -> Solution {
+        let search = Search {
+            scene,
+            parts: &self.parts,
+            held: grabbed.part,
+            pose: grabbed.pose(),
+            center: grabbed.center,
+            margin,
+            inverse_length: 1.0 / step.length,
+            budget: settings.contact.point_budget,
+        };
+        self.resume = search.run(self.resume, &mut self.leaves, &mut self.contacts, work);
+        work.flags
+            .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
+        let contact = &settings.contact;
+        let touching_now = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as f32;
+        self.sharing = larger(larger(touching_now, 1.0), self.sharing * SHARING_DECAY);
+        let k = smaller(
+            contact.stiffness_n_per_m,
+            contact.total_stiffness_n_per_m / self.sharing,
+        );
+        let solution = step.with_contacts(free, self.contacts.as_mut_slice(), k, contact.damping_s);
+        work.contacts = self.contacts.pushing() as u16;
+        work.solves = solution.solves;
+        work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
+        solution
+    }
+
+    /// The wrench for the mechanism; remembered for the slew limit.
+    fn hand_over(&mut self, wanted: Wrench, enabled: bool, settings: &Settings, flags: &mut Flags) -> Wrench {
+        let out = if enabled {
+            limit(
+                wanted,
+                self.previous_wrench,
+                &settings.limits,
+                settings.period_s,
+                flags,
+            )
+        } else {
+            Wrench::ZERO
+        };
+        self.previous_wrench = out;
+        out
+    }
+
+    /// Output of a tick in which nothing moves and nothing pushes.
+    fn still(&mut self, work: Work) -> Output {
+        if work.flags != Flags::empty() {
+            self.previous_wrench = Wrench::ZERO;
+        }
+        Output {
+            handle: Wrench::ZERO,
+            contact: Wrench::ZERO,
+            object: self.last_object,
+            object_twist: Twist::ZERO,
+            pairs: FacePairs::new(),
+            work,
+        }
+    }
+}
+
+/// The coupling at the tick's start. In the first tick after a grab the object takes over the hand's motion, or the damper would be felt.
+fn take_hold(mut grabbed: Grabbed, handle: Pose, handle_twist: Twist) -> (Grabbed, Coupling) {
+    let coupling = Coupling::measure(handle, handle_twist, &grabbed);
+    grabbed.angle = coupling.angle;
+    if grabbed.fresh {
+        grabbed.twist = coupling.target;
+        grabbed.fresh = false;
+    }
+    (grabbed, coupling)
+}
+
+/// `pull` cut to what the coupling can transmit.
+fn slipping(pull: Wrench, settings: &Settings, flags: &mut Flags) -> Wrench {
+    let slip = Coupling::slip(pull, &settings.coupling);
+    flags.insert_if(slip.translation < 1.0, Flags::SATURATED_FORCE);
+    flags.insert_if(slip.rotation < 1.0, Flags::SATURATED_TORQUE);
+    Wrench {
+        force: pull.force * slip.translation,
+        torque: pull.torque * slip.rotation,
+    }
+}
+
+impl Grabbed {
+    /// Moves with `twist` for `period_s`.
+    fn advance(&mut self, twist: Twist, period_s: f32) {
+        self.twist = twist;
+        self.center += twist.linear * period_s;
+        let turn = twist.angular * period_s;
+        let turn = crate::limits::cut(turn, rotation::EXP_MAX).0;
+        self.orientation = renormalize(rotation::exp(turn) * self.orientation);
+    }
+}
+
+/// Upper bound of the speed of any point within `reach` of the centre of mass, m/s.
+fn point_speed(twist: Twist, reach: f32) -> f32 {
+    length(twist.linear) + length(twist.angular) * reach
+}
+
+/// Scales `twist` so that no point within `reach` is faster than `most`; whether it had to.
+///
+/// A scaled motion keeps every linearised gap that the full one keeps: it stops part of the way.
+fn slow_down(twist: &mut Twist, reach: f32, most: f32) -> bool {
+    let speed = point_speed(*twist, reach);
+    if speed > most {
+        let scale = most / speed;
+        twist.linear *= scale;
+        twist.angular *= scale;
+        true
+    } else {
+        false
+    }
+}
+
+/// The pose with its quaternion at unit length, unless it is not finite, too far off, or not a rotation.
+pub(crate) fn usable_pose(pose: &Pose) -> Option<Pose> {
+    let near = pose.position.abs().max_element() <= FARTHEST_M;
+    let norm2 = pose.orientation.length_squared();
+    let rotation = norm2 > 0.81 && norm2 < 1.21;
+    if !(pose.is_finite() && near && rotation) {
+        return None;
+    }
+    Some(Pose {
+        position: pose.position,
+        orientation: pose.orientation * (1.0 / libm::sqrtf(norm2)),
+    })
+}
+
+fn usable_twist(twist: &Twist) -> bool {
+    twist.is_finite()
+        && twist.linear.abs().max_element() <= FASTEST_M_PER_S
+        && twist.angular.abs().max_element() <= FASTEST_RAD_PER_S
+}
+
+/// The smaller of two numbers; unlike `f32::min` it does not depend on the platform's choice between zeros.
+fn smaller(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The larger of two numbers.
+fn larger(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
