@@ -1,1 +1,57 @@
-mod model; pub use model::*;
+//! STEP files to parts, faces, edges and tessellation: the only crate that knows the CAD kernel.
+//!
+//! [`load_step`] gives a [`CadModel`] of plain values in millimetres and radians. The text is checked and
+//! rewritten here first (`part21`), then read by OpenCASCADE behind one thin bridge (`kernel`), in a process of
+//! its own (`child`), so that neither a crash, a hang nor a memory blow-up of the kernel reaches the program.
+//! What the import loses is said: an error when a solid is missing, a warning otherwise.
+//!
+//! Programs call [`child::init`] first thing in `main`.
+
+mod assemble;
+pub mod child;
+mod error;
+mod kernel;
+mod model;
+mod options;
+mod part21;
+mod shape;
+mod topology;
+
+pub use error::BrepError;
+pub use model::*;
+pub use options::LoadOptions;
+
+use std::path::Path;
+
+/// Reads a STEP file (AP203, AP214, AP242) with the default [`LoadOptions`].
+///
+/// # Errors
+/// One line that says what is wrong, where, and what to do; see [`BrepError`].
+pub fn load_step(path: impl AsRef<Path>) -> Result<CadModel, BrepError> {
+    load_step_with(path, &LoadOptions::default())
+}
+
+/// Reads a STEP file.
+///
+/// The reading runs in a child process once [`child::init`] was called; without it (unit tests of other crates)
+/// it runs in this process, where the time and memory limits do not hold and a crash of the kernel is fatal.
+///
+/// # Errors
+/// One line that says what is wrong, where, and what to do; see [`BrepError`].
+pub fn load_step_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<CadModel, BrepError> {
+    let path = path.as_ref();
+    if child::is_ready() {
+        child::load(path, options)
+    } else {
+        load_in_process(path, options)
+    }
+}
+
+fn load_in_process(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
+    let name = || path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| BrepError::Unreadable {
+        path: name(),
+        reason: e.to_string(),
+    })?;
+    assemble::assemble(&name(), &bytes, options)
+}

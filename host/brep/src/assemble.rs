@@ -1,0 +1,280 @@
+//! From a file's bytes to a [`CadModel`]: check the text, let the kernel read it, name the parts, account for
+//! every solid.
+
+use crate::kernel::{self, RawPart, RawResult};
+use crate::part21::check::{self, Content};
+use crate::part21::{self, Exchange, Part21Error, render, text, units};
+use crate::{BrepError, CadModel, LoadOptions, Part, shape};
+use glam::{DAffine3, DMat3, DVec3};
+use std::collections::{HashMap, HashSet};
+
+/// Names that say nothing: what writers put where a body or occurrence has no name of its own.
+const MEANINGLESS: &[&str] = &["", "NONE", "SOLID", "COMPOUND", "COMPSOLID", "SHELL", "SHAPE"];
+
+/// Reads a STEP text. `path` is for messages only.
+pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadModel, BrepError> {
+    if bytes.is_empty() {
+        return Err(BrepError::Empty { path: path.into() });
+    }
+    let file = part21::parse(bytes).map_err(|e| text_error(path, e))?;
+    let content = check::check(&file).map_err(|e| text_error(path, e))?;
+    if content.solids.is_empty() && content.surfaces.is_empty() {
+        return Err(BrepError::NoShape {
+            path: path.into(),
+            found: found_instead(&file),
+        });
+    }
+    let rendered = render::render(&file);
+    let kernel_error = |e: cxx::Exception| {
+        let reason = match e.what() {
+            "std::bad_alloc" => "out of the memory it may use",
+            what => what,
+        };
+        BrepError::Kernel {
+            path: path.into(),
+            reason: one_line(reason),
+        }
+    };
+    let _kernel = kernel::lock();
+    let document = kernel::read_document(&rendered, options.max_parts).map_err(kernel_error)?;
+    drop(rendered);
+
+    let mut warnings = file.warnings.clone();
+    warnings.extend(content.warnings.iter().cloned());
+    let unit = unit(&file, &mut warnings);
+    let raw_parts = document.parts();
+    let results: HashMap<usize, RawResult> = document
+        .results()
+        .into_iter()
+        .map(|r| (r.entity.wrapping_sub(1), r))
+        .collect();
+    account(path, &file, &content, &results, options, &mut warnings)?;
+    if raw_parts.is_empty() {
+        let reason = "it transferred no shape from a text that is sound".into();
+        return Err(BrepError::Kernel {
+            path: path.into(),
+            reason,
+        });
+    }
+
+    let parts = name_parts(&file, &raw_parts);
+    let mut shapes = Vec::with_capacity(document.shape_count());
+    for index in 0..document.shape_count() {
+        let linear = options.linear_deflection_mm.unwrap_or(0.0);
+        let raw = document
+            .shape(
+                index,
+                linear,
+                options.relative_deflection,
+                options.angular_deflection_rad,
+            )
+            .map_err(kernel_error)?;
+        let mut notes = Vec::new();
+        shapes.push(shape::convert(raw, &mut notes));
+        let owner = parts.iter().find(|p| p.shape == index).map_or("?", |p| &p.name);
+        warnings.extend(notes.into_iter().map(|note| format!("{owner}: {note}")));
+    }
+    for (part, raw) in parts
+        .iter()
+        .zip(&raw_parts)
+        .filter(|(_, raw)| raw.loose_faces > 0)
+    {
+        let product = part.path.last().unwrap_or(&part.name);
+        warnings.push(format!(
+            "{product}: {} faces outside its solids are left out",
+            raw.loose_faces
+        ));
+    }
+    Ok(CadModel {
+        unit,
+        shapes,
+        parts,
+        warnings,
+    })
+}
+
+fn text_error(path: &str, error: Part21Error) -> BrepError {
+    let path = path.into();
+    match error {
+        Part21Error::NotStep(found) => BrepError::NotStep { path, found },
+        Part21Error::Truncated { line, missing } => BrepError::Truncated { path, line, missing },
+        Part21Error::Invalid { line, what } => BrepError::Invalid { path, line, what },
+    }
+}
+
+fn found_instead(file: &Exchange) -> String {
+    match file.entities.len() {
+        0 => "no entities".into(),
+        n => {
+            let mut counts: HashMap<&str, usize> = HashMap::new();
+            (0..n)
+                .flat_map(|e| file.kinds(e))
+                .filter(|k| k.ends_with("REPRESENTATION"))
+                .for_each(|k| {
+                    *counts.entry(k).or_default() += 1;
+                });
+            let most = counts.into_iter().max_by_key(|&(kind, count)| (count, kind));
+            most.map_or(format!("{n} entities"), |(kind, count)| {
+                format!("{n} entities, {count} {kind}")
+            })
+        }
+    }
+}
+
+fn unit(file: &Exchange, warnings: &mut Vec<String>) -> String {
+    let units = units::length_units(file);
+    if units.len() > 1 {
+        warnings.push(format!(
+            "length units differ within the file: {}; each is converted",
+            units.join(", ")
+        ));
+    }
+    units.into_iter().next().unwrap_or_else(|| {
+        warnings.push("the file names no length unit; millimetre is assumed".into());
+        "millimetre".into()
+    })
+}
+
+/// Every solid of the text must have become a placed solid of the kernel.
+fn account(
+    path: &str,
+    file: &Exchange,
+    content: &Content,
+    results: &HashMap<usize, RawResult>,
+    options: &LoadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<(), BrepError> {
+    let label = |entity: usize| {
+        let name = file
+            .arguments(entity)
+            .first()
+            .and_then(|a| text::decode(a))
+            .unwrap_or_default();
+        let line = file.entities[entity].line;
+        if name.trim().is_empty() {
+            format!("{} at line {line}", file.label(entity))
+        } else {
+            format!("{} {name:?} at line {line}", file.label(entity))
+        }
+    };
+    let mut lost = Vec::new();
+    for &entity in content.solids.iter().chain(&content.surfaces) {
+        let is_solid = content.solids.contains(&entity);
+        let listed = check::faces_listed(file, entity);
+        match results.get(&entity) {
+            Some(result) if result.placed && (result.solids > 0 || !is_solid) => {
+                if let Some(listed) = listed.filter(|&listed| result.faces < listed) {
+                    let missing = listed - result.faces;
+                    warnings.push(format!(
+                        "{}: the kernel dropped {missing} of {listed} faces",
+                        label(entity)
+                    ));
+                }
+            }
+            Some(result) if result.placed => {
+                warnings.push(format!(
+                    "{}: the kernel made {} open faces of it",
+                    label(entity),
+                    result.faces
+                ));
+            }
+            result => {
+                let why = result.map(|r| one_line(&r.message)).filter(|m| !m.is_empty());
+                lost.push(why.map_or(label(entity), |why| format!("{} ({why})", label(entity))));
+            }
+        }
+    }
+    let Some(first) = lost.first() else { return Ok(()) };
+    if options.allow_lost_solids {
+        warnings.extend(lost.iter().map(|which| format!("the kernel lost {which}")));
+        return Ok(());
+    }
+    let total = content.solids.len() + content.surfaces.len();
+    Err(BrepError::SolidsLost {
+        path: path.into(),
+        lost: lost.len(),
+        total,
+        which: first.clone(),
+    })
+}
+
+/// The kernel's messages may have several lines.
+fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn name_parts(file: &Exchange, raw: &[RawPart]) -> Vec<Part> {
+    let mut taken = HashSet::new();
+    raw.iter()
+        .map(|raw| {
+            let mut names = Vec::with_capacity(raw.path.len());
+            for link in &raw.path {
+                let above = names.last();
+                names.push(link_name(file, &link.instance, &link.product, above));
+            }
+            let mut name = names.pop().unwrap_or_else(|| "part".into());
+            if raw.solids > 1 {
+                name = format!("{name}.{}", raw.solid + 1);
+            }
+            // The root is the file's own product: it is above every part and tells them nothing apart.
+            let path = names.into_iter().skip(1).collect();
+            Part {
+                name: unique(name, &mut taken),
+                path,
+                shape: raw.shape,
+                placement: placement(&raw.placement),
+                color: raw.has_color.then_some(raw.color),
+            }
+        })
+        .collect()
+}
+
+/// The occurrence's name, else the product's, else its identifier, else the name above.
+fn link_name(file: &Exchange, instance: &str, product: &str, above: Option<&String>) -> String {
+    let candidates = [
+        render::name(file, instance),
+        render::name(file, product),
+        render::product_id(file, product).unwrap_or_default(),
+    ];
+    let says_something =
+        |name: &&String| !MEANINGLESS.contains(&name.to_uppercase().as_str()) && !name.starts_with("=>[");
+    let found = candidates.iter().find(says_something);
+    found.or(above).cloned().unwrap_or_else(|| "part".into())
+}
+
+fn unique(name: String, taken: &mut HashSet<String>) -> String {
+    let mut candidate = name.clone();
+    let mut number = 1;
+    while !taken.insert(candidate.clone()) {
+        number += 1;
+        candidate = format!("{name} ({number})");
+    }
+    candidate
+}
+
+fn placement(rows: &[f64; 12]) -> DAffine3 {
+    let column = |i: usize| DVec3::new(rows[i], rows[4 + i], rows[8 + i]);
+    DAffine3 {
+        matrix3: DMat3::from_cols(column(0), column(1), column(2)),
+        translation: column(3),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_names_are_numbered() {
+        let mut taken = HashSet::new();
+        let names = ["nut", "nut", "nut (2)", "nut"].map(|n| unique(n.into(), &mut taken));
+        assert_eq!(names, ["nut", "nut (2)", "nut (2) (2)", "nut (3)"]);
+    }
+
+    #[test]
+    fn a_placement_maps_points_as_its_rows_say() {
+        let rows = [0.0, -1.0, 0.0, 5.0, 1.0, 0.0, 0.0, 6.0, 0.0, 0.0, 1.0, 7.0];
+        let moved = placement(&rows).transform_point3(DVec3::new(1.0, 2.0, 3.0));
+        assert_eq!(moved, DVec3::new(3.0, 7.0, 10.0));
+    }
+}

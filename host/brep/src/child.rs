@@ -1,0 +1,244 @@
+//! Reading in a process of its own.
+//!
+//! The program starts itself again with a request in its environment; the copy sees it in [`init`], reads the
+//! file, writes a framed [`postcard`] result to standard output and exits. A frame is eight bytes of magic, the
+//! payload's length (64 bits, little-endian) and the payload: whatever the kernel prints around it is skipped.
+
+use crate::{BrepError, CadModel, LoadOptions, kernel, load_in_process};
+use std::ffi::OsStr;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+const PATH_VARIABLE: &str = "MORTISE_BREP_CHILD_PATH";
+const OPTIONS_VARIABLE: &str = "MORTISE_BREP_CHILD_OPTIONS";
+const MAGIC: &[u8; 8] = b"\x93MTBREP1";
+/// How much of the child's standard error is kept for the message.
+const STDERR_TAIL: usize = 4096;
+/// How often the parent looks whether the child has ended.
+const POLL: Duration = Duration::from_millis(2);
+
+static READY: AtomicBool = AtomicBool::new(false);
+
+/// To be called first thing in `main` of every program that reads STEP files.
+///
+/// In the reading process this reads the file and exits; in any other it notes that the program can be started
+/// again as a reading process.
+pub fn init() {
+    match (
+        std::env::var_os(PATH_VARIABLE),
+        std::env::var_os(OPTIONS_VARIABLE),
+    ) {
+        (Some(path), Some(options)) => serve(Path::new(&path), &options),
+        _ => READY.store(true, Ordering::Release),
+    }
+}
+
+/// [`init`] was called, so reading goes to a child process.
+pub fn is_ready() -> bool {
+    READY.load(Ordering::Acquire)
+}
+
+/// The reading process: never returns.
+fn serve(path: &Path, options: &OsStr) -> ! {
+    let result = match options
+        .to_str()
+        .and_then(from_hex)
+        .and_then(|b| postcard::from_bytes(&b).ok())
+    {
+        Some::<LoadOptions>(options) => {
+            // The parent's clock decides; this one only ends a process whose parent is gone. Sixteen threads' worth.
+            kernel::limit_process(
+                options.memory_limit_bytes,
+                options.time_limit_s.saturating_mul(16),
+            );
+            load_in_process(path, &options)
+        }
+        None => Err(process_error(path, "the request is damaged")),
+    };
+    kernel::flush_output();
+    let written = postcard::to_allocvec(&result).is_ok_and(|payload| {
+        let mut out = std::io::stdout().lock();
+        out.write_all(MAGIC)
+            .and_then(|()| out.write_all(&(payload.len() as u64).to_le_bytes()))
+            .and_then(|()| out.write_all(&payload))
+            .and_then(|()| out.flush())
+            .is_ok()
+    });
+    std::process::exit(if written { 0 } else { 3 })
+}
+
+/// Reads `path` in a child process.
+pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
+    let mut child = spawn(path, options).map_err(|e| process_error(path, &e.to_string()))?;
+    let output = child
+        .stdout
+        .take()
+        .map(|pipe| thread::spawn(move || read_all(pipe)));
+    let errors = child
+        .stderr
+        .take()
+        .map(|pipe| thread::spawn(move || read_tail(pipe)));
+    let limit = Duration::from_secs(options.time_limit_s);
+    let status = match wait(&mut child, limit) {
+        Ok(Some(status)) => status,
+        Ok(None) => {
+            // Both fail only when the child is already gone.
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(BrepError::TimedOut {
+                path: path.display().to_string(),
+                seconds: options.time_limit_s,
+            });
+        }
+        Err(e) => return Err(process_error(path, &e.to_string())),
+    };
+    let output = output.and_then(|t| t.join().ok()).unwrap_or_default();
+    let errors = errors.and_then(|t| t.join().ok()).unwrap_or_default();
+    match payload(&output) {
+        Some(payload) => postcard::from_bytes(payload)
+            .unwrap_or_else(|e| Err(process_error(path, &format!("its answer is damaged: {e}")))),
+        None => Err(BrepError::Crashed {
+            path: path.display().to_string(),
+            how: ending(status, &errors),
+        }),
+    }
+}
+
+fn spawn(path: &Path, options: &LoadOptions) -> std::io::Result<Child> {
+    let options = postcard::to_allocvec(options).map_err(std::io::Error::other)?;
+    Command::new(std::env::current_exe()?)
+        .env(PATH_VARIABLE, path)
+        .env(OPTIONS_VARIABLE, to_hex(&options))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+}
+
+/// `None` when the child is still running after `limit`.
+fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if start.elapsed() >= limit {
+            return Ok(None);
+        }
+        thread::sleep(POLL);
+    }
+}
+
+fn read_all(mut pipe: impl Read) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // A broken pipe leaves a frame without its end, which is then no frame.
+    let _ = pipe.read_to_end(&mut bytes);
+    bytes
+}
+
+fn read_tail(mut pipe: impl Read) -> Vec<u8> {
+    let mut tail = Vec::new();
+    let mut chunk = [0; STDERR_TAIL];
+    while let Ok(n @ 1..) = pipe.read(&mut chunk) {
+        tail.extend_from_slice(&chunk[..n]);
+        let surplus = tail.len().saturating_sub(STDERR_TAIL);
+        tail.drain(..surplus);
+    }
+    tail
+}
+
+fn payload(output: &[u8]) -> Option<&[u8]> {
+    let start = output.windows(MAGIC.len()).position(|w| w == MAGIC)? + MAGIC.len();
+    let length = output.get(start..start + 8)?;
+    let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
+    output.get(start + 8..)?.get(..length)
+}
+
+/// How the child ended, with the last line it wrote.
+fn ending(status: ExitStatus, errors: &[u8]) -> String {
+    let how = how(status);
+    let errors = String::from_utf8_lossy(errors);
+    match errors.lines().rev().map(str::trim).find(|line| !line.is_empty()) {
+        Some(line) => format!("{how}: {line}"),
+        None => how,
+    }
+}
+
+#[cfg(unix)]
+fn how(status: ExitStatus) -> String {
+    use std::os::unix::process::ExitStatusExt;
+    match status.signal() {
+        Some(4) => "illegal instruction".into(),
+        Some(6) => "aborted".into(),
+        Some(8) => "arithmetic fault".into(),
+        Some(9) => "killed, perhaps for want of memory".into(),
+        Some(7 | 11) => "memory access fault".into(),
+        Some(24) => "processor time used up".into(),
+        Some(signal) => format!("signal {signal}"),
+        None => status.to_string(),
+    }
+}
+
+#[cfg(not(unix))]
+fn how(status: ExitStatus) -> String {
+    status.to_string()
+}
+
+fn process_error(path: &Path, reason: &str) -> BrepError {
+    BrepError::Process {
+        path: path.display().to_string(),
+        reason: reason.into(),
+    }
+}
+
+fn to_hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+fn from_hex(text: &str) -> Option<Vec<u8>> {
+    let digits = text.as_bytes().chunks(2);
+    digits
+        .map(|d| u8::from_str_radix(std::str::from_utf8(d).ok()?, 16).ok())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_found_amid_what_the_kernel_prints() {
+        let mut output = b"*** ERR ***\n".to_vec();
+        output.extend_from_slice(MAGIC);
+        output.extend_from_slice(&3u64.to_le_bytes());
+        output.extend_from_slice(b"abc");
+        assert_eq!(payload(&output), Some(&b"abc"[..]));
+        output.extend_from_slice(b"bye\n");
+        assert_eq!(payload(&output), Some(&b"abc"[..]));
+        assert_eq!(payload(&output[..output.len() - 5]), None);
+        assert_eq!(payload(b"nothing"), None);
+    }
+
+    #[test]
+    fn options_survive_the_environment() {
+        let options = LoadOptions {
+            linear_deflection_mm: Some(0.125),
+            max_parts: 7,
+            ..LoadOptions::default()
+        };
+        let bytes = from_hex(&to_hex(&postcard::to_allocvec(&options).unwrap())).unwrap();
+        assert_eq!(postcard::from_bytes::<LoadOptions>(&bytes).unwrap(), options);
+    }
+
+    #[test]
+    fn only_the_end_of_a_flood_is_kept() {
+        let flood = [vec![b'x'; 100_000], b"last".to_vec()].concat();
+        let tail = read_tail(&flood[..]);
+        assert_eq!(tail.len(), STDERR_TAIL);
+        assert!(tail.ends_with(b"last"));
+    }
+}

@@ -1,0 +1,369 @@
+// One shape as flat values: exact surfaces and curves, mass properties, tessellation welded by topology.
+#include "kernel_content.h"
+
+#include <BRepAdaptor_Curve.hxx>
+#include <BRepAdaptor_Surface.hxx>
+#include <BRepBndLib.hxx>
+#include <BRepGProp.hxx>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepTools.hxx>
+#include <BRep_Tool.hxx>
+#include <Bnd_Box.hxx>
+#include <GCPnts_AbscissaPoint.hxx>
+#include <GCPnts_TangentialDeflection.hxx>
+#include <GProp_GProps.hxx>
+#include <Poly_PolygonOnTriangulation.hxx>
+#include <Poly_Triangulation.hxx>
+#include <Standard_Version.hxx>
+#include <TColStd_Array1OfInteger.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopTools_IndexedDataMapOfShapeListOfShape.hxx>
+#include <TopTools_IndexedMapOfShape.hxx>
+#include <TopTools_ListOfShape.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Face.hxx>
+#include <TopoDS_Vertex.hxx>
+#include <gp_Ax3.hxx>
+#include <gp_Circ.hxx>
+#include <gp_Cone.hxx>
+#include <gp_Cylinder.hxx>
+#include <gp_Lin.hxx>
+#include <gp_Pln.hxx>
+#include <gp_Sphere.hxx>
+#include <gp_Torus.hxx>
+
+#include <cmath>
+#include <cstdint>
+
+namespace mortise {
+namespace brep {
+namespace {
+
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+std::array<double, 3> numbers(const gp_XYZ& v) { return {v.X(), v.Y(), v.Z()}; }
+
+gp_Pnt node(const Handle(Poly_Triangulation) & mesh, int index) {
+#if OCC_VERSION_HEX >= 0x070600
+  return mesh->Node(index);
+#else
+  return mesh->Nodes().Value(index);
+#endif
+}
+
+gp_Pnt2d uv_node(const Handle(Poly_Triangulation) & mesh, int index) {
+#if OCC_VERSION_HEX >= 0x070600
+  return mesh->UVNode(index);
+#else
+  return mesh->UVNodes().Value(index);
+#endif
+}
+
+void triangle(const Handle(Poly_Triangulation) & mesh, int index, int corners[3]) {
+#if OCC_VERSION_HEX >= 0x070600
+  mesh->Triangle(index).Get(corners[0], corners[1], corners[2]);
+#else
+  mesh->Triangles().Value(index).Get(corners[0], corners[1], corners[2]);
+#endif
+}
+
+bool has_uv(const Handle(Poly_Triangulation) & mesh) {
+#if OCC_VERSION_HEX >= 0x070600
+  return mesh->HasUVNodes();
+#else
+  return mesh->HasUVNodes() == Standard_True;
+#endif
+}
+
+class Describer {
+ public:
+  Describer(const TopoDS_Shape& shape, const std::unordered_map<const void*, Color>& colors, double linear,
+            double angular)
+      : shape_(shape), colors_(colors), linear_(linear), angular_(angular) {
+    TopExp::MapShapes(shape, TopAbs_FACE, face_index_);
+    TopExp::MapShapes(shape, TopAbs_EDGE, all_edges_);
+    TopExp::MapShapes(shape, TopAbs_VERTEX, vertex_index_);
+    corner_.assign(std::size_t(vertex_index_.Extent()), kNone);
+    edge_number_.assign(std::size_t(all_edges_.Extent()), kNone);
+    edge_nodes_.resize(std::size_t(all_edges_.Extent()));
+  }
+
+  RawShape run() {
+    mass();
+    number_edges();
+    // Faces carry the orientation with which they are met first in the shape.
+    out_.faces.reserve(std::size_t(face_index_.Extent()));
+    for (int i = 1; i <= face_index_.Extent(); ++i) face(TopoDS::Face(face_index_(i)), std::uint32_t(i - 1));
+    for (int i = 1; i <= all_edges_.Extent(); ++i) finish_edge(i);
+    return std::move(out_);
+  }
+
+ private:
+  void mass() {
+    GProp_GProps volume, area;
+    BRepGProp::VolumeProperties(shape_, volume);
+    BRepGProp::SurfaceProperties(shape_, area);
+    out_.volume = volume.Mass();
+    out_.area = area.Mass();
+    out_.center = numbers(volume.CentreOfMass().XYZ());
+    const gp_Mat inertia = volume.MatrixOfInertia();
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column) out_.inertia[3 * row + column] = inertia(row + 1, column + 1);
+  }
+
+  // Edges shrunk to a point (the apex of a cone, the pole of a sphere) are no edges to the reader of the model.
+  void number_edges() {
+    std::uint32_t next = 0;
+    for (int i = 1; i <= all_edges_.Extent(); ++i) {
+      const TopoDS_Edge edge = TopoDS::Edge(all_edges_(i));
+      if (BRep_Tool::Degenerated(edge)) continue;
+      edge_number_[std::size_t(i - 1)] = next++;
+      out_.edges.push_back(curve(TopoDS::Edge(edge.Oriented(TopAbs_FORWARD))));
+    }
+  }
+
+  static RawEdge curve(const TopoDS_Edge& edge) {
+    RawEdge raw{};
+    raw.kind = 2;
+    double first = 0, last = 0;
+    if (BRep_Tool::Curve(edge, first, last).IsNull()) return raw;
+    const BRepAdaptor_Curve adaptor(edge);
+    if (adaptor.GetType() == GeomAbs_Line) {
+      raw.kind = 0;
+      raw.origin = numbers(adaptor.Line().Location().XYZ());
+      raw.z = numbers(adaptor.Line().Direction().XYZ());
+    } else if (adaptor.GetType() == GeomAbs_Circle) {
+      raw.kind = 1;
+      const gp_Circ circle = adaptor.Circle();
+      raw.origin = numbers(circle.Location().XYZ());
+      raw.x = numbers(circle.XAxis().Direction().XYZ());
+      raw.z = numbers(circle.Axis().Direction().XYZ());
+      raw.radius = circle.Radius();
+    }
+    raw.length = GCPnts_AbscissaPoint::Length(adaptor);
+    return raw;
+  }
+
+  static void surface(const TopoDS_Face& face, const BRepAdaptor_Surface& adaptor, RawFace& raw) {
+    gp_Ax3 frame;
+    raw.kind = 5;
+    switch (adaptor.GetType()) {
+      case GeomAbs_Plane:
+        raw.kind = 0;
+        frame = adaptor.Plane().Position();
+        break;
+      case GeomAbs_Cylinder:
+        raw.kind = 1;
+        frame = adaptor.Cylinder().Position();
+        raw.parameters[0] = adaptor.Cylinder().Radius();
+        break;
+      case GeomAbs_Cone:
+        raw.kind = 2;
+        frame = adaptor.Cone().Position();
+        raw.parameters = {adaptor.Cone().RefRadius(), adaptor.Cone().SemiAngle()};
+        break;
+      case GeomAbs_Sphere:
+        raw.kind = 3;
+        frame = adaptor.Sphere().Position();
+        raw.parameters[0] = adaptor.Sphere().Radius();
+        break;
+      case GeomAbs_Torus:
+        raw.kind = 4;
+        frame = adaptor.Torus().Position();
+        raw.parameters = {adaptor.Torus().MajorRadius(), adaptor.Torus().MinorRadius()};
+        break;
+      default:
+        break;
+    }
+    raw.origin = numbers(frame.Location().XYZ());
+    raw.x = numbers(frame.XDirection().XYZ());
+    raw.z = numbers(frame.Direction().XYZ());
+  }
+
+  // Outward normal at (u, v): the kernel's natural normal, turned with the face.
+  static void sample(const TopoDS_Face& face, const BRepAdaptor_Surface& adaptor, double u, double v, RawFace& raw) {
+    gp_Pnt point;
+    gp_Vec du, dv;
+    adaptor.D1(u, v, point, du, dv);
+    gp_Vec normal = du.Crossed(dv);
+    if (normal.Magnitude() > 0) normal.Normalize();
+    if (face.Orientation() == TopAbs_REVERSED) normal.Reverse();
+    raw.point = numbers(point.XYZ());
+    raw.normal = numbers(normal.XYZ());
+  }
+
+  void face(const TopoDS_Face& face, std::uint32_t number) {
+    RawFace raw{};
+    const BRepAdaptor_Surface adaptor(face, false);
+    surface(face, adaptor, raw);
+    GProp_GProps area;
+    BRepGProp::SurfaceProperties(face, area);
+    raw.area = std::abs(area.Mass());
+    const auto color = colors_.find(face.TShape().get());
+    raw.has_color = color != colors_.end();
+    if (raw.has_color) raw.color = color->second;
+
+    TopLoc_Location place;
+    const Handle(Poly_Triangulation) mesh = BRep_Tool::Triangulation(face, place);
+    const bool meshed = !mesh.IsNull() && mesh->NbTriangles() > 0;
+    std::vector<std::uint32_t> vertex_of_node;
+    if (meshed) vertex_of_node.assign(std::size_t(mesh->NbNodes()), kNone);
+
+    std::vector<bool> listed(edge_number_.size(), false);
+    for (TopExp_Explorer it(face.Oriented(TopAbs_FORWARD), TopAbs_EDGE); it.More(); it.Next()) {
+      const TopoDS_Edge edge = TopoDS::Edge(it.Current());
+      const std::size_t index = std::size_t(all_edges_.FindIndex(edge) - 1);
+      const std::uint32_t id = edge_number_[index];
+      if (id != kNone) {
+        // A seam is met twice in its face, once each way.
+        out_.edges[id].faces.push_back(number);
+        if (!listed[index]) raw.edges.push_back(id);
+        listed[index] = true;
+      }
+      if (meshed) weld(edge, index, mesh, place, vertex_of_node);
+    }
+
+    double u0, u1, v0, v1;
+    BRepTools::UVBounds(face, u0, u1, v0, v1);
+    double u = 0.5 * (u0 + u1), v = 0.5 * (v0 + v1);
+    if (!meshed) {
+      out_.faces_without_mesh.push_back(number);
+    } else {
+      // The middle of the first triangle lies on the face itself, whatever its outline.
+      if (has_uv(mesh)) {
+        int corners[3];
+        triangle(mesh, 1, corners);
+        const gp_XY sum = uv_node(mesh, corners[0]).XY() + uv_node(mesh, corners[1]).XY() + uv_node(mesh, corners[2]).XY();
+        u = sum.X() / 3;
+        v = sum.Y() / 3;
+      }
+      triangles(face, number, mesh, place, vertex_of_node);
+    }
+    sample(face, adaptor, u, v, raw);
+    out_.faces.push_back(std::move(raw));
+  }
+
+  std::uint32_t add(const gp_Pnt& local, const TopLoc_Location& place) {
+    const gp_Pnt point = local.Transformed(place.Transformation());
+    const auto id = std::uint32_t(out_.vertices.size() / 3);
+    for (int i = 1; i <= 3; ++i) out_.vertices.push_back(point.Coord(i));
+    return id;
+  }
+
+  std::uint32_t corner(const TopoDS_Vertex& vertex, const gp_Pnt& local, const TopLoc_Location& place) {
+    const int index = vertex.IsNull() ? 0 : vertex_index_.FindIndex(vertex);
+    if (index == 0) return add(local, place);
+    std::uint32_t& id = corner_[std::size_t(index - 1)];
+    if (id == kNone) id = add(local, place);
+    return id;
+  }
+
+  // Nodes of the face along one of its edges are those the edge got from the first face that had it: the mesher
+  // divides an edge once for all its faces, in the order of its parameter.
+  void weld(const TopoDS_Edge& edge, std::size_t index, const Handle(Poly_Triangulation) & mesh,
+            const TopLoc_Location& place, std::vector<std::uint32_t>& vertex_of_node) {
+    const Handle(Poly_PolygonOnTriangulation) polygon = BRep_Tool::PolygonOnTriangulation(edge, mesh, place);
+    if (polygon.IsNull()) return;
+    const TColStd_Array1OfInteger& nodes = polygon->Nodes();
+    const int count = nodes.Length();
+    if (count < 1) return;
+    const TopoDS_Edge forward = TopoDS::Edge(edge.Oriented(TopAbs_FORWARD));
+    TopoDS_Vertex first, last;
+    TopExp::Vertices(forward, first, last);
+    const auto at = [&](int i) { return nodes.Value(nodes.Lower() + i); };
+    if (BRep_Tool::Degenerated(edge)) {
+      for (int i = 0; i < count; ++i)
+        vertex_of_node[std::size_t(at(i) - 1)] = corner(first.IsNull() ? last : first, node(mesh, at(i)), place);
+      return;
+    }
+    std::vector<std::uint32_t>& shared = edge_nodes_[index];
+    if (shared.empty()) {
+      for (int i = 0; i < count; ++i) {
+        const gp_Pnt point = node(mesh, at(i));
+        if (i == 0) shared.push_back(corner(first, point, place));
+        else if (i == count - 1) shared.push_back(corner(last, point, place));
+        else shared.push_back(add(point, place));
+      }
+    }
+    const bool same = std::size_t(count) == shared.size();
+    for (int i = 0; i < count; ++i) {
+      std::uint32_t& id = vertex_of_node[std::size_t(at(i) - 1)];
+      if (id != kNone) continue;
+      if (same) id = shared[std::size_t(i)];
+      else if (i == 0) id = shared.front();
+      else if (i == count - 1) id = shared.back();
+      // A face that divided the edge otherwise stays open along it; the count of open edges tells.
+    }
+  }
+
+  void triangles(const TopoDS_Face& face, std::uint32_t number, const Handle(Poly_Triangulation) & mesh,
+                 const TopLoc_Location& place, std::vector<std::uint32_t>& vertex_of_node) {
+    // A mirrored location turns the triangles as well as the face.
+    const bool turned = (face.Orientation() == TopAbs_REVERSED) != place.Transformation().IsNegative();
+    for (int i = 1; i <= mesh->NbTriangles(); ++i) {
+      int corners[3];
+      triangle(mesh, i, corners);
+      if (turned) std::swap(corners[1], corners[2]);
+      std::uint32_t ids[3];
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& id = vertex_of_node[std::size_t(corners[k] - 1)];
+        if (id == kNone) id = add(node(mesh, corners[k]), place);
+        ids[k] = id;
+      }
+      // Two corners welded into one: nothing is left of it, and its two other sides close on each other.
+      if (ids[0] == ids[1] || ids[1] == ids[2] || ids[2] == ids[0]) continue;
+      for (std::uint32_t id : ids) out_.triangles.push_back(id);
+      out_.triangle_face.push_back(number);
+    }
+  }
+
+  void finish_edge(int index) {
+    const std::uint32_t id = edge_number_[std::size_t(index - 1)];
+    if (id == kNone) return;
+    RawEdge& raw = out_.edges[id];
+    const auto& shared = edge_nodes_[std::size_t(index - 1)];
+    if (!shared.empty()) {
+      for (std::uint32_t vertex : shared)
+        for (std::size_t k = 0; k < 3; ++k) raw.polyline.push_back(out_.vertices[3 * std::size_t(vertex) + k]);
+      return;
+    }
+    const TopoDS_Edge edge = TopoDS::Edge(all_edges_(index).Oriented(TopAbs_FORWARD));
+    double first = 0, last = 0;
+    if (BRep_Tool::Curve(edge, first, last).IsNull()) return;
+    const BRepAdaptor_Curve adaptor(edge);
+    const GCPnts_TangentialDeflection points(adaptor, angular_, linear_);
+    for (int i = 1; i <= points.NbPoints(); ++i)
+      for (int k = 1; k <= 3; ++k) raw.polyline.push_back(points.Value(i).Coord(k));
+  }
+
+  const TopoDS_Shape& shape_;
+  const std::unordered_map<const void*, Color>& colors_;
+  const double linear_, angular_;
+  TopTools_IndexedMapOfShape face_index_, all_edges_, vertex_index_;
+  std::vector<std::uint32_t> corner_;                    // mesh vertex of each B-rep vertex
+  std::vector<std::uint32_t> edge_number_;               // number in the output, by index in all_edges_
+  std::vector<std::vector<std::uint32_t>> edge_nodes_;   // mesh vertices along each edge
+  RawShape out_{};
+};
+
+}  // namespace
+
+RawShape describe(const TopoDS_Shape& given, const std::unordered_map<const void*, Color>& colors, double linear_mm,
+                  double relative, double angular_rad) {
+  // Meshes left from an earlier call, or read from the file, are not ours.
+  BRepTools::Clean(given);
+  Bnd_Box box;
+  BRepBndLib::Add(given, box, false);
+  double linear = linear_mm;
+  if (!(linear > 0)) {
+    linear = box.IsVoid() ? 0.1 : relative * std::sqrt(box.SquareExtent());
+    if (!(linear > 1e-6)) linear = 1e-6;
+  }
+  BRepMesh_IncrementalMesh mesher(given, linear, false, angular_rad, false);
+  return Describer(given, colors, linear, angular_rad).run();
+}
+
+}  // namespace brep
+}  // namespace mortise

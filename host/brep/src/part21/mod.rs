@@ -1,0 +1,219 @@
+//! The text of a STEP file (ISO 10303-21, "Part 21"), before the CAD kernel sees it.
+//!
+//! The kernel is lenient where it must not be: it drops a solid that refers to nothing, crashes on a number
+//! that is none, and reads nothing at all from some legal texts. So the text is scanned here first: errors are
+//! named with their line ([`check`]), and the kernel gets a plain rendering ([`render`]) without comments, one
+//! entity a line, entities numbered 1, 2, …, and products and occurrences named by tokens whose text is decoded
+//! here ([`text`]).
+
+pub mod check;
+mod lexer;
+pub mod render;
+pub mod text;
+pub mod units;
+
+pub use lexer::parse;
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// A text error: line and what is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Part21Error {
+    /// The text does not begin with `ISO-10303-21;`.
+    NotStep(String),
+    /// The text ends before `END-ISO-10303-21;`.
+    Truncated {
+        /// Last line.
+        line: u32,
+        /// What is missing.
+        missing: String,
+    },
+    /// Anything else.
+    Invalid {
+        /// Line, from 1.
+        line: u32,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+/// One entity instance: `#id = body;`.
+#[derive(Clone, Debug)]
+pub struct Entity {
+    /// Its number in the file.
+    pub id: u64,
+    /// Its line in the file.
+    pub line: u32,
+    /// Its body in [`Exchange::bodies`].
+    pub body: Range<usize>,
+    /// Its references in [`Exchange::references`].
+    pub references: Range<usize>,
+}
+
+/// The DATA of a STEP file, scanned.
+#[derive(Clone, Debug, Default)]
+pub struct Exchange {
+    /// Text between `HEADER;` and its `ENDSEC;`, without comments.
+    pub header: Vec<u8>,
+    /// Bodies of all entities, without comments and without space outside strings.
+    pub bodies: Vec<u8>,
+    /// Entities in file order.
+    pub entities: Vec<Entity>,
+    /// All references, entity after entity.
+    pub references: Vec<u64>,
+    /// Index in `entities` by number.
+    pub index: HashMap<u64, u32>,
+    /// Entities with a number that is no finite double, and the number.
+    pub bad_numbers: Vec<(u32, String)>,
+    /// What was left out, in words.
+    pub warnings: Vec<String>,
+}
+
+impl Exchange {
+    /// Body of an entity: `TYPE(…)`, or `(A(…)B(…))` for a complex one.
+    pub fn body(&self, entity: usize) -> &[u8] {
+        &self.bodies[self.entities[entity].body.clone()]
+    }
+
+    /// Numbers an entity refers to.
+    pub fn references_of(&self, entity: usize) -> &[u64] {
+        &self.references[self.entities[entity].references.clone()]
+    }
+
+    /// Index of the entity with this number.
+    pub fn find(&self, id: u64) -> Option<usize> {
+        self.index.get(&id).map(|&i| i as usize)
+    }
+
+    /// Type of a simple entity; empty for a complex one.
+    pub fn kind(&self, entity: usize) -> &str {
+        keyword(self.body(entity))
+    }
+
+    /// Types of an entity: one, or all of a complex one.
+    pub fn kinds(&self, entity: usize) -> Vec<&str> {
+        let body = self.body(entity);
+        match body.first() {
+            Some(b'(') => split(&body[1..body.len() - 1], Cut::AfterGroup)
+                .into_iter()
+                .map(keyword)
+                .collect(),
+            _ => vec![keyword(body)],
+        }
+    }
+
+    /// Arguments of a simple entity.
+    pub fn arguments(&self, entity: usize) -> Vec<&[u8]> {
+        arguments(self.body(entity))
+    }
+
+    /// Arguments of one of the types of a complex (or simple) entity.
+    pub fn arguments_as(&self, entity: usize, kind: &str) -> Option<Vec<&[u8]>> {
+        let body = self.body(entity);
+        let parts = match body.first() {
+            Some(b'(') => split(&body[1..body.len() - 1], Cut::AfterGroup),
+            _ => vec![body],
+        };
+        parts
+            .into_iter()
+            .find(|part| keyword(part) == kind)
+            .map(arguments)
+    }
+
+    /// "#12 CYLINDRICAL_SURFACE": an entity for a message.
+    pub fn label(&self, entity: usize) -> String {
+        format!("#{} {}", self.entities[entity].id, self.kinds(entity).join("+"))
+    }
+}
+
+/// The number in `#12`.
+pub fn reference(argument: &[u8]) -> Option<u64> {
+    std::str::from_utf8(argument.strip_prefix(b"#")?)
+        .ok()?
+        .parse()
+        .ok()
+}
+
+/// All numbers in `(#1,#2)`.
+pub fn references(argument: &[u8]) -> Vec<u64> {
+    let inner = argument
+        .strip_prefix(b"(")
+        .and_then(|a| a.strip_suffix(b")"))
+        .unwrap_or(argument);
+    split(inner, Cut::AtComma)
+        .into_iter()
+        .filter_map(reference)
+        .collect()
+}
+
+fn keyword(body: &[u8]) -> &str {
+    let end = body.iter().position(|&b| b == b'(').unwrap_or(body.len());
+    std::str::from_utf8(&body[..end]).unwrap_or_default()
+}
+
+fn arguments(body: &[u8]) -> Vec<&[u8]> {
+    let start = body.iter().position(|&b| b == b'(').map_or(body.len(), |i| i + 1);
+    let inner = &body[start..body.len().saturating_sub(1).max(start)];
+    if inner.is_empty() {
+        Vec::new()
+    } else {
+        split(inner, Cut::AtComma)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cut {
+    AtComma,
+    AfterGroup,
+}
+
+/// Cuts at depth 0 and outside strings.
+fn split(text: &[u8], cut: Cut) -> Vec<&[u8]> {
+    let (mut parts, mut start, mut depth, mut quoted) = (Vec::new(), 0, 0usize, false);
+    for (i, &byte) in text.iter().enumerate() {
+        match byte {
+            // A doubled quote closes and opens again, which comes to the same.
+            b'\'' => quoted = !quoted,
+            _ if quoted => {}
+            b'(' => depth += 1,
+            b')' => {
+                depth = depth.saturating_sub(1);
+                if depth == 0 && cut == Cut::AfterGroup {
+                    parts.push(&text[start..=i]);
+                    start = i + 1;
+                }
+            }
+            b',' if depth == 0 && cut == Cut::AtComma => {
+                parts.push(&text[start..i]);
+                start = i + 1;
+            }
+            _ => {}
+        }
+    }
+    if cut == Cut::AtComma {
+        parts.push(&text[start..]);
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_complex_entity_gives_its_types_and_arguments() {
+        let text =
+            b"ISO-10303-21;HEADER;ENDSEC;DATA;#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\
+            #2=A('x,(''y',(1.,#1),$);ENDSEC;END-ISO-10303-21;";
+        let file = parse(text).unwrap();
+        assert_eq!(file.kinds(0), ["LENGTH_UNIT", "NAMED_UNIT", "SI_UNIT"]);
+        assert_eq!(
+            file.arguments_as(0, "SI_UNIT").unwrap(),
+            [&b".MILLI."[..], b".METRE."]
+        );
+        assert_eq!(file.kind(1), "A");
+        assert_eq!(file.arguments(1), [&b"'x,(''y'"[..], b"(1.,#1)", b"$"]);
+        assert_eq!(file.references_of(1), [1]);
+    }
+}
