@@ -1,1 +1,50 @@
-//! One client for every rig: in-process simulation, emulated board, serial port
+//! One client for every rig: the board's own code in this process, the emulated board in QEMU, a board on a serial port.
+//!
+//! ```no_run
+//! use mortise_protocol::message::ToDevice;
+//! use mortise_rig::{Client, Event, RigSpec};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let rig: RigSpec = "emulated".parse()?;
+//! let client = Client::connect(&rig)?;
+//! client.upload(&std::fs::read("pair.image")?, &mut |_| {})?;
+//! client.request(ToDevice::Arm)?;
+//! client.request(ToDevice::Grab { part: 1 })?;
+//! client.request(ToDevice::SetTelemetry { every_ticks: 20 })?;
+//! if let Event::Telemetry(sample) = client.events().recv_timeout(std::time::Duration::from_secs(1))? {
+//!     println!("{:?}", sample.handle);
+//! }
+//! client.stop()?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A thread of its own reads and sorts what the board says: answers go to whoever waits for them, everything else into a
+//! bounded queue of [`Event`]s. Another keeps the link alive and notices when it is not. The protocol is in `docs/protocol.md`.
+
+mod client;
+mod emulator;
+mod error;
+mod event;
+mod link;
+mod list;
+mod log;
+mod pipe;
+mod serial;
+mod simulated;
+mod spec;
+mod transport;
+mod upload;
+mod words;
+
+pub use client::{ATTEMPTS, Client, LinkCounts, Patience, Ran};
+pub use emulator::{FIRMWARE_VARIABLE, QEMU_VARIABLE, SERIAL_VARIABLE};
+pub use error::{RigError, version_words};
+pub use event::{Event, Events, MAX_EVENTS};
+pub use list::{RigEntry, list};
+pub use pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};
+pub use simulated::Flash;
+pub use spec::{EmulatedMode, RigSpec, SpecError};
+pub use transport::{READ_WAIT, Transport};
+pub use upload::{UPLOAD_WINDOW, UploadProgress, begin_message, chunk_message};
+pub use words::{Words, describe};

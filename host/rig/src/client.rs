@@ -1,0 +1,564 @@
+//! The client: what a program does with a rig, whichever it is.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mortise_protocol::message::{
+    Capabilities, DeviceState, FromDevice, Refusal, Statistics, ToDevice, Version,
+};
+use mortise_protocol::parameter::ParameterId;
+
+use crate::error::RigError;
+use crate::event::Events;
+use crate::link::{Answer, Link, Reader};
+use crate::spec::{EmulatedMode, RigSpec};
+use crate::transport::Transport;
+use crate::words::Words;
+use crate::{emulator, serial, simulated};
+
+/// How patient a client is.
+#[derive(Clone, Debug)]
+pub struct Patience {
+    /// Handshake, whole.
+    pub greeting: Duration,
+    /// One answer. A message that may be sent twice without harm is sent [`ATTEMPTS`] times.
+    pub answer: Duration,
+    /// No sound frame for so long, though asked: the link is lost.
+    pub silence: Duration,
+}
+
+impl Default for Patience {
+    /// For a real board: a pseudo-terminal may hold its first bytes for a second, so the greeting waits well over two.
+    fn default() -> Self {
+        Self {
+            greeting: Duration::from_secs(4),
+            answer: Duration::from_secs(1),
+            silence: Duration::from_secs(3),
+        }
+    }
+}
+
+impl Patience {
+    /// For rigs that share this computer: nothing gets lost, but a loaded computer makes them slow.
+    pub fn long() -> Self {
+        Self {
+            greeting: Duration::from_secs(30),
+            answer: Duration::from_secs(20),
+            silence: Duration::from_secs(20),
+        }
+    }
+}
+
+/// Sendings of a message that may be repeated.
+pub const ATTEMPTS: u32 = 3;
+/// Sendings after "the queue is full", which changes nothing on the board.
+const BUSY_ATTEMPTS: u32 = 200;
+const BUSY_PAUSE: Duration = Duration::from_millis(5);
+/// Between two greetings.
+const GREETING_PAUSE: Duration = Duration::from_millis(250);
+/// Between two heartbeats: a fifth of the default silence the board bears while armed.
+const HEARTBEAT: Duration = Duration::from_millis(100);
+/// The same for a counted board, whose virtual time runs ahead of the wall clock.
+const HEARTBEAT_COUNTED: Duration = Duration::from_millis(5);
+/// Erasing and checking a slot of flash takes seconds on a real board.
+const FLASH_WAIT: Duration = Duration::from_secs(15);
+/// Wall time a lockstep tick may take: an emulated board under load on a slow machine.
+const TICK_WAIT: Duration = Duration::from_millis(20);
+
+/// Answer to [`ToDevice::Run`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ran {
+    /// Ticks since start.
+    pub tick: u32,
+    /// See [`Statistics::state_hash`].
+    pub state_hash: u64,
+}
+
+/// What this end of the link counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkCounts {
+    /// Sound frames from the board.
+    pub frames: u64,
+    /// Frames thrown away: damaged, too long, undecodable.
+    pub bad_frames: u64,
+    /// Telemetry thrown away because this program did not take it in time.
+    pub dropped_events: u64,
+}
+
+/// A connected rig. `Send` and `Sync`: one thread may upload while another stops.
+///
+/// Dropping it while the motors may be on sends [`ToDevice::Stop`] first.
+pub struct Client {
+    link: Arc<Link>,
+    name: String,
+    patience: Patience,
+    capabilities: Capabilities,
+    lockstep: Arc<AtomicBool>,
+    /// Only one message of a kind whose answer carries no number may be under way.
+    asking: Mutex<()>,
+    heartbeat: Option<Heartbeat>,
+    reader: Option<Reader>,
+}
+
+impl Client {
+    /// Connects: opens the rig, greets it until it answers, and asks what it can do. Rigs whose ticks are released by the host are put in lockstep.
+    ///
+    /// # Errors
+    /// Everything [`RigError`] lists up to and with `VersionMismatch`.
+    pub fn connect(spec: &RigSpec) -> Result<Self, RigError> {
+        let name = spec.to_string();
+        match spec {
+            RigSpec::Simulated { realtime } => {
+                let transport = simulated::start(simulated::Flash::default(), *realtime)?;
+                let client = Self::over(transport, &name, Patience::long(), None)?;
+                client.in_lockstep(!realtime)
+            }
+            RigSpec::Emulated { mode, firmware } => {
+                let elf = emulator::firmware_path(firmware.as_deref())?;
+                let transport = emulator::start(*mode, &elf)?;
+                let client = Self::over_paced(transport, &name, Patience::long(), Some(elf), *mode)?;
+                client.in_lockstep(*mode == EmulatedMode::Lockstep)
+            }
+            RigSpec::Serial { port } => {
+                let transport = serial::open(port)?;
+                Self::over(transport, &name, Patience::default(), None)
+            }
+        }
+    }
+
+    fn in_lockstep(self, wanted: bool) -> Result<Self, RigError> {
+        if wanted {
+            self.set_lockstep(true)?;
+        }
+        Ok(self)
+    }
+
+    /// Connects over a transport of the caller's. `name` is for messages, `elf` the firmware where known (for its log).
+    pub fn over(
+        transport: Transport,
+        name: &str,
+        patience: Patience,
+        elf: Option<PathBuf>,
+    ) -> Result<Self, RigError> {
+        Self::over_paced(transport, name, patience, elf, EmulatedMode::Interactive)
+    }
+
+    fn over_paced(
+        transport: Transport,
+        name: &str,
+        patience: Patience,
+        elf: Option<PathBuf>,
+        mode: EmulatedMode,
+    ) -> Result<Self, RigError> {
+        let (link, reader) = Link::start(transport, elf)?;
+        // From here on an early return must end the reader: `reader` is held by a guard that does.
+        let guard = Ending {
+            link: link.clone(),
+            reader: Some(reader),
+        };
+        let capabilities = greet(&link, name, &patience)?;
+        let lockstep = Arc::new(AtomicBool::new(false));
+        let period = match mode {
+            EmulatedMode::Interactive => HEARTBEAT,
+            EmulatedMode::Counted | EmulatedMode::Lockstep => HEARTBEAT_COUNTED,
+        };
+        let heartbeat = Heartbeat::start(link.clone(), lockstep.clone(), period, patience.silence)?;
+        Ok(Self {
+            link,
+            name: name.to_owned(),
+            patience,
+            capabilities,
+            lockstep,
+            asking: Mutex::new(()),
+            heartbeat: Some(heartbeat),
+            reader: guard.disarm(),
+        })
+    }
+
+    /// What the board can do, as told when the connection was made.
+    pub fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    /// What was connected to, as written.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the board says unasked.
+    pub fn events(&self) -> &Events {
+        &self.link.events
+    }
+
+    /// The state the board last told.
+    pub fn state(&self) -> DeviceState {
+        self.link.state().unwrap_or(self.capabilities.state)
+    }
+
+    /// Counters of this end.
+    pub fn link_counts(&self) -> LinkCounts {
+        LinkCounts {
+            frames: self.link.frames.load(Ordering::Relaxed),
+            bad_frames: self.link.bad_frames.load(Ordering::Relaxed),
+            dropped_events: self.link.events.dropped(),
+        }
+    }
+
+    /// Sends without waiting for the answer; returns the sequence number.
+    ///
+    /// # Errors
+    /// `LinkLost`, `TooLarge`.
+    pub fn send(&self, message: ToDevice) -> Result<u16, RigError> {
+        self.link.send(&message)
+    }
+
+    /// Sends and waits until the board has done it or said why not.
+    ///
+    /// # Errors
+    /// `Refused`, `Timeout`, `LinkLost`, `TooLarge`.
+    pub fn request(&self, message: ToDevice) -> Result<(), RigError> {
+        match &message {
+            ToDevice::Hello(_)
+            | ToDevice::GetCapabilities
+            | ToDevice::GetParameter(_)
+            | ToDevice::GetStatistics { .. }
+            | ToDevice::Run { .. } => self.ask(&message).map(|_| ()),
+            ToDevice::Lockstep(on) => {
+                let on = *on;
+                self.obtain(&message)?;
+                self.lockstep.store(on, Ordering::Relaxed);
+                self.link.forgive_silence();
+                Ok(())
+            }
+            _ => self.obtain(&message).map(|_| ()),
+        }
+    }
+
+    /// A parameter's value, in the unit of its row.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn parameter(&self, id: ParameterId) -> Result<f32, RigError> {
+        match *self.ask(&ToDevice::GetParameter(id))? {
+            FromDevice::Parameter { value, .. } => Ok(value),
+            _ => Err(self.no_answer(&ToDevice::GetParameter(id), self.patience.answer)),
+        }
+    }
+
+    /// The board's counters; `reset`: it counts anew after answering.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn statistics(&self, reset: bool) -> Result<Statistics, RigError> {
+        let message = ToDevice::GetStatistics { reset };
+        match *self.ask(&message)? {
+            FromDevice::Statistics(statistics) => Ok(statistics),
+            _ => Err(self.no_answer(&message, self.patience.answer)),
+        }
+    }
+
+    /// Asks again what the board can do: the scene in use and the state change.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn refresh_capabilities(&self) -> Result<Capabilities, RigError> {
+        match *self.ask(&ToDevice::GetCapabilities)? {
+            FromDevice::Capabilities(capabilities) => Ok(capabilities),
+            _ => Err(self.no_answer(&ToDevice::GetCapabilities, self.patience.answer)),
+        }
+    }
+
+    /// Switches lockstep on or off (simulated mechanisms only).
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn set_lockstep(&self, on: bool) -> Result<(), RigError> {
+        self.request(ToDevice::Lockstep(on))
+    }
+
+    /// Lets `ticks` ticks run in lockstep and waits until they are done.
+    ///
+    /// # Errors
+    /// As [`Client::request`]; `Refused(Lockstep)` when not in lockstep.
+    pub fn run(&self, ticks: u32) -> Result<Ran, RigError> {
+        let message = ToDevice::Run { ticks };
+        match *self.ask(&message)? {
+            FromDevice::Ran { tick, state_hash } => Ok(Ran { tick, state_hash }),
+            _ => Err(self.no_answer(&message, self.patience.answer)),
+        }
+    }
+
+    /// Motors off, at once. Returns when the message has been written; the answer shows as [`crate::Event::State`].
+    ///
+    /// # Errors
+    /// `LinkLost`: the board then stops by itself.
+    pub fn stop(&self) -> Result<(), RigError> {
+        self.link.send(&ToDevice::Stop).map(|_| ())
+    }
+
+    /// Restarts the board and greets it anew over the same link.
+    ///
+    /// # Errors
+    /// As [`Client::request`] and [`Client::connect`].
+    pub fn restart(mut self) -> Result<Self, RigError> {
+        self.request(ToDevice::Restart)?;
+        let lockstep = self.lockstep.swap(false, Ordering::Relaxed);
+        self.link.forgive_silence();
+        self.capabilities = greet(&self.link, &self.name, &self.patience)?;
+        self.link.set_state(self.capabilities.state);
+        if lockstep {
+            self.set_lockstep(true)?;
+        }
+        Ok(self)
+    }
+
+    pub(crate) fn link(&self) -> &Link {
+        &self.link
+    }
+
+    pub(crate) fn patience_for(&self, message: &ToDevice) -> Duration {
+        patience_for(message, &self.patience)
+    }
+
+    fn ask(&self, message: &ToDevice) -> Result<Box<FromDevice>, RigError> {
+        let _one = self.asking.lock().unwrap_or_else(PoisonError::into_inner);
+        match self.obtain(message)? {
+            Answer::Value(value) => Ok(value),
+            _ => Err(self.no_answer(message, self.patience.answer)),
+        }
+    }
+
+    fn obtain(&self, message: &ToDevice) -> Result<Answer, RigError> {
+        obtain(&self.link, message, &self.patience)
+    }
+
+    pub(crate) fn no_answer(&self, message: &ToDevice, after: Duration) -> RigError {
+        no_answer(message, after)
+    }
+}
+
+/// Sending it twice does what sending it once does.
+fn repeatable(message: &ToDevice) -> bool {
+    match message {
+        ToDevice::Hello(_)
+        | ToDevice::GetCapabilities
+        | ToDevice::Disarm
+        | ToDevice::Stop
+        | ToDevice::Heartbeat
+        | ToDevice::SetParameter { .. }
+        | ToDevice::GetParameter(_)
+        | ToDevice::Release
+        | ToDevice::ResetScene
+        | ToDevice::SceneBegin { .. }
+        | ToDevice::SceneChunk { .. }
+        | ToDevice::SceneAbort
+        | ToDevice::ClearTarget { .. }
+        | ToDevice::SetTelemetry { .. }
+        | ToDevice::GetStatistics { reset: false }
+        | ToDevice::Lockstep(_) => true,
+        ToDevice::Arm
+        | ToDevice::ClearFault
+        | ToDevice::Grab { .. }
+        | ToDevice::SceneCommit
+        | ToDevice::SetTarget(_)
+        | ToDevice::GetStatistics { reset: true }
+        | ToDevice::SimulatedHand(_)
+        | ToDevice::Run { .. }
+        | ToDevice::Restart => false,
+    }
+}
+
+fn patience_for(message: &ToDevice, patience: &Patience) -> Duration {
+    match message {
+        ToDevice::SceneBegin { .. } | ToDevice::SceneCommit => patience.answer.max(FLASH_WAIT),
+        ToDevice::Run { ticks } => patience.answer + TICK_WAIT.saturating_mul(*ticks),
+        _ => patience.answer,
+    }
+}
+
+fn no_answer(message: &ToDevice, after: Duration) -> RigError {
+    RigError::Timeout {
+        what: message.words(),
+        after_ms: after.as_millis() as u64,
+    }
+}
+
+/// Sends until answered, as often as the message allows.
+fn obtain(link: &Link, message: &ToDevice, patience: &Patience) -> Result<Answer, RigError> {
+    let wait = patience_for(message, patience);
+    let attempts = if repeatable(message) { ATTEMPTS } else { 1 };
+    let mut busy = 0;
+    'anew: loop {
+        let ticket = link.post(message)?;
+        for attempt in 0..attempts {
+            if attempt > 0 {
+                ticket.resend(message)?;
+            }
+            match ticket.wait(wait)? {
+                Some(Answer::Refused(Refusal::Busy)) if busy < BUSY_ATTEMPTS => {
+                    busy += 1;
+                    std::thread::sleep(BUSY_PAUSE);
+                    continue 'anew;
+                }
+                Some(Answer::Refused(reason)) => {
+                    return Err(RigError::Refused {
+                        what: message.words(),
+                        reason,
+                    });
+                }
+                Some(answer) => return Ok(answer),
+                None => {}
+            }
+        }
+        return Err(no_answer(message, wait * attempts));
+    }
+}
+
+/// Says hello until the board does, then asks what it can do.
+fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capabilities, RigError> {
+    let begun = Instant::now();
+    let hello = ToDevice::Hello(Version::own());
+    let silent = || {
+        RigError::NoAnswer {
+        rig: name.to_owned(),
+        waited_s: begun.elapsed().as_secs_f64(),
+        hint: "check that the board runs Mortise's firmware, that its cable carries data, and that this is the right port".into(),
+    }
+    };
+    loop {
+        // Ends whatever half a frame lies on the wire.
+        link.write_delimiter()?;
+        let ticket = link.post(&hello)?;
+        if let Some(Answer::Value(value)) = ticket.wait(GREETING_PAUSE)?
+            && let FromDevice::Hello(device) = *value
+        {
+            let host = Version::own();
+            if device.schema != host.schema {
+                return Err(RigError::VersionMismatch { host, device });
+            }
+            drop(ticket);
+            match obtain(link, &ToDevice::GetCapabilities, patience) {
+                Ok(Answer::Value(value)) => {
+                    if let FromDevice::Capabilities(capabilities) = *value {
+                        return Ok(capabilities);
+                    }
+                }
+                // The answer came from before a restart: greet once more.
+                Err(RigError::Refused {
+                    reason: Refusal::NotGreeted,
+                    ..
+                }) => {}
+                Err(error) => return Err(error),
+                Ok(_) => {}
+            }
+        }
+        if begun.elapsed() > patience.greeting {
+            return Err(silent());
+        }
+    }
+}
+
+/// Ends the reader when the connection does not come about.
+struct Ending {
+    link: Arc<Link>,
+    reader: Option<Reader>,
+}
+
+impl Ending {
+    fn disarm(mut self) -> Option<Reader> {
+        self.reader.take()
+    }
+}
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        if let Some(mut reader) = self.reader.take() {
+            self.link.closing.store(true, Ordering::Relaxed);
+            reader.join();
+        }
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        let motors_may_be_on = !matches!(
+            self.state(),
+            DeviceState::Idle | DeviceState::Stopped | DeviceState::Fault(_) | DeviceState::Boot
+        );
+        if motors_may_be_on {
+            // A lost link cannot carry it; the board then stops by itself.
+            let _ = self.link.send(&ToDevice::Stop);
+        }
+        drop(self.heartbeat.take());
+        self.link.closing.store(true, Ordering::Relaxed);
+        if let Some(mut reader) = self.reader.take() {
+            reader.join();
+        }
+        self.link.events.close();
+    }
+}
+
+/// Keeps the link alive and notices when it is not.
+struct Heartbeat {
+    ending: Arc<(Mutex<bool>, std::sync::Condvar)>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Heartbeat {
+    fn start(
+        link: Arc<Link>,
+        lockstep: Arc<AtomicBool>,
+        period: Duration,
+        silence: Duration,
+    ) -> Result<Self, RigError> {
+        let ending = Arc::new((Mutex::new(false), std::sync::Condvar::new()));
+        let thread = std::thread::Builder::new()
+            .name("mortise-heartbeat".into())
+            .spawn({
+                let ending = ending.clone();
+                move || loop {
+                    let ended = ending.0.lock().unwrap_or_else(PoisonError::into_inner);
+                    let (ended, _) = ending
+                        .1
+                        .wait_timeout_while(ended, period, |ended| !*ended)
+                        .unwrap_or_else(PoisonError::into_inner);
+                    if *ended {
+                        return;
+                    }
+                    drop(ended);
+                    // In lockstep the board waits for the host, however long that takes.
+                    if lockstep.load(Ordering::Relaxed) {
+                        link.forgive_silence();
+                        continue;
+                    }
+                    if link.silent_for() >= period && link.send(&ToDevice::Heartbeat).is_err() {
+                        return;
+                    }
+                    let unheard = link.unheard_for();
+                    if unheard > silence {
+                        link.lose(&format!("nothing was heard for {:.1} s", unheard.as_secs_f64()));
+                        return;
+                    }
+                }
+            })
+            .map_err(RigError::Thread)?;
+        Ok(Self {
+            ending,
+            thread: Some(thread),
+        })
+    }
+}
+
+impl Drop for Heartbeat {
+    fn drop(&mut self) {
+        *self.ending.0.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.ending.1.notify_all();
+        if let Some(thread) = self.thread.take() {
+            // A panic there has no more to say here.
+            let _ = thread.join();
+        }
+    }
+}

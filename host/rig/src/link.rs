@@ -1,0 +1,360 @@
+//! The link: numbers what goes out, reads what comes in on a thread of its own, and brings the two together.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mortise_protocol::frame::{self, Decoder};
+use mortise_protocol::limits::MAX_FRAME;
+use mortise_protocol::message::{DeviceState, FromDevice, Refusal, ToDevice};
+use mortise_protocol::parameter::ParameterId;
+
+use crate::error::RigError;
+use crate::event::{Event, Events};
+use crate::log::{self, LogReader};
+use crate::transport::{Transport, is_quiet, write_whole};
+use crate::words::Words;
+
+/// What answers a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Expect {
+    Ack,
+    Hello,
+    Capabilities,
+    Parameter(ParameterId),
+    Statistics,
+    Ran,
+}
+
+impl Expect {
+    pub(crate) fn of(message: &ToDevice) -> Self {
+        match message {
+            ToDevice::Hello(_) => Self::Hello,
+            ToDevice::GetCapabilities => Self::Capabilities,
+            ToDevice::GetParameter(id) => Self::Parameter(*id),
+            ToDevice::GetStatistics { .. } => Self::Statistics,
+            ToDevice::Run { .. } => Self::Ran,
+            _ => Self::Ack,
+        }
+    }
+
+    fn met_by(self, message: &FromDevice) -> bool {
+        match (self, message) {
+            (Self::Hello, FromDevice::Hello(_))
+            | (Self::Capabilities, FromDevice::Capabilities(_))
+            | (Self::Statistics, FromDevice::Statistics(_))
+            | (Self::Ran, FromDevice::Ran { .. }) => true,
+            (Self::Parameter(wanted), FromDevice::Parameter { id, .. }) => wanted == *id,
+            _ => false,
+        }
+    }
+}
+
+/// What came back.
+#[derive(Debug)]
+pub(crate) enum Answer {
+    Done,
+    Refused(Refusal),
+    Value(Box<FromDevice>),
+}
+
+/// A message under way. Forgotten by the link when dropped.
+pub(crate) struct Ticket<'l> {
+    link: &'l Link,
+    seq: u16,
+}
+
+struct Slot {
+    seq: u16,
+    expect: Expect,
+    answer: Option<Answer>,
+}
+
+#[derive(Default)]
+struct Desk {
+    slots: Vec<Slot>,
+    lost: Option<String>,
+}
+
+struct Writer {
+    port: Box<dyn std::io::Write + Send>,
+    sequence: u16,
+    last: Instant,
+}
+
+/// Shared by the client, the reader thread and the heartbeat.
+pub(crate) struct Link {
+    writer: Mutex<Writer>,
+    desk: Mutex<Desk>,
+    answered: Condvar,
+    pub(crate) events: Events,
+    pub(crate) closing: AtomicBool,
+    state: Mutex<Option<DeviceState>>,
+    heard: Mutex<Instant>,
+    pub(crate) frames: AtomicU64,
+    pub(crate) bad_frames: AtomicU64,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A reader thread and whatever the transport keeps alive.
+pub(crate) struct Reader {
+    thread: Option<JoinHandle<()>>,
+    _keep: Option<Box<dyn Send>>,
+}
+
+impl Reader {
+    pub(crate) fn join(&mut self) {
+        if let Some(thread) = self.thread.take() {
+            // A panic in the reader has already shown as a lost link.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Link {
+    /// Starts reading. `elf`: the firmware, for its log strings.
+    pub(crate) fn start(transport: Transport, elf: Option<PathBuf>) -> Result<(Arc<Self>, Reader), RigError> {
+        let Transport { reader, writer, keep } = transport;
+        let link = Arc::new(Self {
+            writer: Mutex::new(Writer {
+                port: writer,
+                sequence: 0,
+                last: Instant::now(),
+            }),
+            desk: Mutex::default(),
+            answered: Condvar::new(),
+            events: Events::default(),
+            closing: AtomicBool::new(false),
+            state: Mutex::new(None),
+            heard: Mutex::new(Instant::now()),
+            frames: AtomicU64::new(0),
+            bad_frames: AtomicU64::new(0),
+        });
+        let thread = std::thread::Builder::new()
+            .name("mortise-link".into())
+            .spawn({
+                let link = link.clone();
+                move || link.read(reader, elf)
+            })
+            .map_err(RigError::Thread)?;
+        let reader = Reader {
+            thread: Some(thread),
+            _keep: keep,
+        };
+        Ok((link, reader))
+    }
+
+    fn read(&self, mut reader: Box<dyn std::io::Read + Send>, elf: Option<PathBuf>) {
+        let table = elf.as_deref().and_then(log::table);
+        let mut lines = LogReader::new(table.as_ref());
+        let mut decoder = Decoder::new();
+        let mut bytes = [0u8; 4096];
+        while !self.closing.load(Ordering::Relaxed) {
+            let count = match reader.read(&mut bytes) {
+                Ok(0) => return self.lose("the other end has closed it"),
+                Ok(count) => count,
+                Err(error) if is_quiet(&error) => continue,
+                Err(error) => return self.lose(&error.to_string()),
+            };
+            for &byte in &bytes[..count] {
+                match decoder.push::<FromDevice>(byte) {
+                    None => {}
+                    Some(Ok((_, message))) => {
+                        self.frames.fetch_add(1, Ordering::Relaxed);
+                        *lock(&self.heard) = Instant::now();
+                        self.deal(message, &mut lines);
+                    }
+                    Some(Err(_)) => {
+                        self.bad_frames.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+            }
+        }
+    }
+
+    fn deal(&self, message: FromDevice, lines: &mut LogReader<'_>) {
+        match message {
+            FromDevice::Ack { seq } => {
+                self.answer(|slot| slot.seq == seq && slot.expect == Expect::Ack, Answer::Done)
+            }
+            FromDevice::Refused { seq, reason } => {
+                self.answer(|slot| slot.seq == seq, Answer::Refused(reason))
+            }
+            FromDevice::Telemetry(sample) => self.events.push(Event::Telemetry(Box::new(sample))),
+            FromDevice::State { tick, state } => {
+                *lock(&self.state) = Some(state);
+                self.events.push(Event::State { tick, state });
+            }
+            FromDevice::Fault { tick, fault } => self.events.push(Event::Fault { tick, fault }),
+            FromDevice::Log(bytes) => lines.take(&bytes, |line| self.events.push(Event::Log(line))),
+            value => {
+                let value = Box::new(value);
+                let met = |slot: &Slot| slot.expect.met_by(&value);
+                let mut desk = lock(&self.desk);
+                if let Some(slot) = desk
+                    .slots
+                    .iter_mut()
+                    .find(|slot| slot.answer.is_none() && met(slot))
+                {
+                    slot.answer = Some(Answer::Value(value));
+                    self.answered.notify_all();
+                }
+            }
+        }
+    }
+
+    fn answer(&self, fits: impl Fn(&Slot) -> bool, answer: Answer) {
+        let mut desk = lock(&self.desk);
+        if let Some(slot) = desk
+            .slots
+            .iter_mut()
+            .find(|slot| slot.answer.is_none() && fits(slot))
+        {
+            slot.answer = Some(answer);
+            self.answered.notify_all();
+        }
+    }
+
+    /// Marks the link as lost; the first reason stays.
+    pub(crate) fn lose(&self, why: &str) {
+        {
+            let mut desk = lock(&self.desk);
+            if desk.lost.is_some() {
+                return;
+            }
+            desk.lost = Some(why.to_owned());
+            self.answered.notify_all();
+        }
+        if !self.closing.load(Ordering::Relaxed) {
+            self.events.push(Event::LinkLost(why.to_owned()));
+        }
+        self.events.close();
+    }
+
+    fn check(&self) -> Result<(), RigError> {
+        match &lock(&self.desk).lost {
+            Some(why) => Err(RigError::LinkLost { why: why.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Sends without waiting; returns the sequence number.
+    pub(crate) fn send(&self, message: &ToDevice) -> Result<u16, RigError> {
+        let mut writer = lock(&self.writer);
+        writer.sequence = writer.sequence.wrapping_add(1);
+        let seq = writer.sequence;
+        self.write(&mut writer, seq, message)?;
+        Ok(seq)
+    }
+
+    /// Sends and remembers that an answer is due.
+    pub(crate) fn post(&self, message: &ToDevice) -> Result<Ticket<'_>, RigError> {
+        let mut writer = lock(&self.writer);
+        writer.sequence = writer.sequence.wrapping_add(1);
+        let seq = writer.sequence;
+        // Before it is written: the answer may be faster than this thread.
+        lock(&self.desk).slots.push(Slot {
+            seq,
+            expect: Expect::of(message),
+            answer: None,
+        });
+        let ticket = Ticket { link: self, seq };
+        self.write(&mut writer, seq, message)?;
+        Ok(ticket)
+    }
+
+    fn write(&self, writer: &mut Writer, seq: u16, message: &ToDevice) -> Result<(), RigError> {
+        self.check()?;
+        let mut out = [0u8; MAX_FRAME];
+        let bytes = frame::encode(seq, message, &mut out).map_err(|_| RigError::TooLarge {
+            what: message.words(),
+        })?;
+        writer.last = Instant::now();
+        write_whole(&mut *writer.port, bytes).map_err(|error| {
+            self.lose(&error.to_string());
+            RigError::LinkLost {
+                why: error.to_string(),
+            }
+        })
+    }
+
+    /// Writes a lone delimiter: whatever garbage lies on the wire ends there.
+    pub(crate) fn write_delimiter(&self) -> Result<(), RigError> {
+        self.check()?;
+        write_whole(&mut *lock(&self.writer).port, &[0]).map_err(|error| {
+            self.lose(&error.to_string());
+            RigError::LinkLost {
+                why: error.to_string(),
+            }
+        })
+    }
+
+    /// Time since a frame went out.
+    pub(crate) fn silent_for(&self) -> Duration {
+        lock(&self.writer).last.elapsed()
+    }
+
+    /// Time since a sound frame came in.
+    pub(crate) fn unheard_for(&self) -> Duration {
+        lock(&self.heard).elapsed()
+    }
+
+    /// Starts counting silence anew, after a pause in which none was to be expected.
+    pub(crate) fn forgive_silence(&self) {
+        *lock(&self.heard) = Instant::now();
+    }
+
+    /// The state the board last told.
+    pub(crate) fn state(&self) -> Option<DeviceState> {
+        *lock(&self.state)
+    }
+
+    pub(crate) fn set_state(&self, state: DeviceState) {
+        *lock(&self.state) = Some(state);
+    }
+}
+
+impl Ticket<'_> {
+    /// Waits for the answer; `None` when none came in time (it may still come: the ticket stays valid).
+    pub(crate) fn wait(&self, timeout: Duration) -> Result<Option<Answer>, RigError> {
+        let deadline = Instant::now() + timeout;
+        let mut desk = lock(&self.link.desk);
+        loop {
+            if let Some(slot) = desk.slots.iter_mut().find(|slot| slot.seq == self.seq)
+                && let Some(answer) = slot.answer.take()
+            {
+                return Ok(Some(answer));
+            }
+            if let Some(why) = &desk.lost {
+                return Err(RigError::LinkLost { why: why.clone() });
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            desk = self
+                .link
+                .answered
+                .wait_timeout(desk, left)
+                .map(|(desk, _)| desk)
+                .unwrap_or_else(|poisoned| poisoned.into_inner().0);
+        }
+    }
+
+    /// Sends `message`, which must be the one the ticket is for, under the same number again.
+    pub(crate) fn resend(&self, message: &ToDevice) -> Result<(), RigError> {
+        let mut writer = lock(&self.link.writer);
+        self.link.write(&mut writer, self.seq, message)
+    }
+}
+
+impl Drop for Ticket<'_> {
+    fn drop(&mut self) {
+        lock(&self.link.desk).slots.retain(|slot| slot.seq != self.seq);
+    }
+}

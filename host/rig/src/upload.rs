@@ -1,0 +1,153 @@
+//! Sending a scene: begin, chunks with a few under way at once, commit. A lost or repeated chunk is sent again from
+//! where the board says it stands; the scene in use stays until the commit.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use heapless::Vec as Bounded;
+use mortise_protocol::image::{CRC, Header, MAGIC};
+use mortise_protocol::limits::MAX_CHUNK;
+use mortise_protocol::message::{Refusal, ToDevice};
+
+use crate::client::Client;
+use crate::error::RigError;
+use crate::link::Answer;
+use crate::words::Words;
+
+/// Chunks under way at once: hides the round trip, and stays far below the 64 KiB buffers on the way.
+pub const UPLOAD_WINDOW: usize = 4;
+/// Times the sending may fall back without the board having taken anything new.
+const MAX_SETBACKS: u32 = 8;
+const BUSY_PAUSE: Duration = Duration::from_millis(5);
+
+/// How far the sending is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UploadProgress {
+    /// Bytes the board has acknowledged.
+    pub sent: usize,
+    /// Bytes in all.
+    pub total: usize,
+}
+
+/// The message that starts sending `image`.
+///
+/// # Errors
+/// `NotAScene` when the bytes do not even start like a scene image. Everything else is for the board to judge.
+pub fn begin_message(image: &[u8]) -> Result<ToDevice, RigError> {
+    let not = |what: &str| RigError::NotAScene {
+        what: what.to_owned(),
+    };
+    if image.len() < size_of::<Header>() {
+        return Err(not(&format!("{} bytes are no scene image", image.len())));
+    }
+    if image[..8] != MAGIC {
+        return Err(not("the file is not a scene image"));
+    }
+    let length = u32::try_from(image.len()).map_err(|_| not("the file is larger than 4 GB"))?;
+    Ok(ToDevice::SceneBegin {
+        length,
+        crc: CRC.checksum(image),
+        layout: u32::from_le_bytes([image[8], image[9], image[10], image[11]]),
+    })
+}
+
+/// The chunk of `image` that starts at `offset`; empty behind its end.
+pub fn chunk_message(image: &[u8], offset: usize) -> ToDevice {
+    let start = offset.min(image.len());
+    let end = (start + MAX_CHUNK).min(image.len());
+    ToDevice::SceneChunk {
+        offset: start as u32,
+        // The range is never longer than the vector, so nothing is lost here.
+        data: Bounded::from_slice(&image[start..end]).unwrap_or_default(),
+    }
+}
+
+impl Client {
+    /// Sends a scene image and puts it in use. `progress` is called after each acknowledged chunk.
+    ///
+    /// # Errors
+    /// `NotAScene`; `Refused` with the board's reason (armed, too large, other layout, damaged); `Timeout`, `LinkLost`. The scene that
+    /// was in use stays in use after any of them.
+    pub fn upload(&self, image: &[u8], progress: &mut dyn FnMut(UploadProgress)) -> Result<(), RigError> {
+        self.request(begin_message(image)?)?;
+        let sent = self.send_chunks(image, progress);
+        if sent.is_err() {
+            // Frees the board's buffer; what went wrong is said by the error itself.
+            let _ = self.send(ToDevice::SceneAbort);
+        }
+        sent?;
+        self.request(ToDevice::SceneCommit)
+    }
+
+    fn send_chunks(&self, image: &[u8], progress: &mut dyn FnMut(UploadProgress)) -> Result<(), RigError> {
+        let total = image.len();
+        let mut taken = 0;
+        let mut setbacks = 0;
+        while taken < total {
+            match self.send_run(image, taken, &mut |sent| progress(UploadProgress { sent, total }))? {
+                Run::Done => return Ok(()),
+                Run::StandsAt { offset, why } => {
+                    setbacks = if offset > taken { 0 } else { setbacks + 1 };
+                    if setbacks > MAX_SETBACKS || offset > total {
+                        return Err(why);
+                    }
+                    taken = offset;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends from `start` to the end with a window; stops at the first chunk that was not taken.
+    fn send_run(&self, image: &[u8], start: usize, taken: &mut dyn FnMut(usize)) -> Result<Run, RigError> {
+        let mut position = start;
+        let mut next = start;
+        let mut window = VecDeque::with_capacity(UPLOAD_WINDOW);
+        while position < image.len() {
+            while window.len() < UPLOAD_WINDOW && next < image.len() {
+                let message = chunk_message(image, next);
+                let ticket = self.link().post(&message)?;
+                next = (next + MAX_CHUNK).min(image.len());
+                window.push_back((next, message, ticket));
+            }
+            let Some((end, message, ticket)) = window.pop_front() else {
+                break;
+            };
+            let wait = self.patience_for(&message);
+            let refused = |reason| RigError::Refused {
+                what: message.words(),
+                reason,
+            };
+            match ticket.wait(wait)? {
+                Some(Answer::Done | Answer::Value(_)) => {
+                    position = end;
+                    taken(position);
+                }
+                Some(Answer::Refused(reason @ Refusal::ChunkOrder { expected })) => {
+                    let (offset, why) = (expected as usize, refused(reason));
+                    return Ok(Run::StandsAt { offset, why });
+                }
+                Some(Answer::Refused(reason @ Refusal::Busy)) => {
+                    std::thread::sleep(BUSY_PAUSE);
+                    let (offset, why) = (position, refused(reason));
+                    return Ok(Run::StandsAt { offset, why });
+                }
+                Some(Answer::Refused(reason)) => return Err(refused(reason)),
+                None => {
+                    let (offset, why) = (position, self.no_answer(&message, wait));
+                    return Ok(Run::StandsAt { offset, why });
+                }
+            }
+        }
+        Ok(Run::Done)
+    }
+}
+
+enum Run {
+    Done,
+    /// The board has taken all before `offset`; `why` it went no further.
+    StandsAt {
+        offset: usize,
+        why: RigError,
+    },
+}

@@ -1,0 +1,142 @@
+//! What the board says, in words for the operator: what happened, and what to do.
+
+use mortise_protocol::message::{DeviceState, Fault, Refusal, ToDevice};
+
+/// Something of the protocol that can be said in words.
+pub trait Words {
+    /// One sentence without a full stop: what it is and, where there is a choice, what to do.
+    fn words(&self) -> String;
+}
+
+/// A refusal, fault or state in words; see [`Words`].
+pub fn describe<W: Words>(what: W) -> String {
+    what.words()
+}
+
+impl<W: Words> Words for &W {
+    fn words(&self) -> String {
+        (**self).words()
+    }
+}
+
+impl Words for DeviceState {
+    fn words(&self) -> String {
+        match self {
+            Self::Boot => "starting, motors off".into(),
+            Self::Idle => "idle, motors off".into(),
+            Self::Armed => "armed, nothing grabbed".into(),
+            Self::Active => "active, a part is grabbed".into(),
+            Self::SoftStop => "stopping softly".into(),
+            Self::Stopped => "stopped, motors off until cleared".into(),
+            Self::Fault(fault) => format!("fault: {}", fault.words()),
+        }
+    }
+}
+
+impl Words for Fault {
+    fn words(&self) -> String {
+        match self {
+            Self::StopInput => "the stop input is open: release the stop button or check its wire, then clear the fault".into(),
+            Self::HostSilent { silent_ms } => {
+                format!("the board heard nothing from this computer for {silent_ms} ms: check the cable and the load of this computer, then clear the fault")
+            }
+            Self::EncoderJump { axis } => {
+                format!("the encoder of axis {axis} jumped further than the mechanism can move: check its plug and cable, then clear the fault")
+            }
+            Self::OverSpeed => "the handle moved faster than allowed: hold it still, then clear the fault".into(),
+            Self::Driver { axis } => {
+                format!("the motor driver of axis {axis} reports too much current or heat: let it cool and look for a jam, then clear the fault")
+            }
+            Self::TickOverrun => {
+                "a tick took longer than its millisecond: use a smaller point budget or a coarser scene, then clear the fault".into()
+            }
+            Self::SceneDamaged => "the scene in the board's flash no longer passes its checks: upload it again".into(),
+            Self::NonFinite => "a number in the force loop is not finite: reset the scene, then clear the fault".into(),
+        }
+    }
+}
+
+impl Words for Refusal {
+    fn words(&self) -> String {
+        match self {
+            Self::NotGreeted => "the board has not been greeted by a program of its own version: connect again".into(),
+            Self::State(state) => format!("not possible while the board is {}{}", state.words(), hint(state)),
+            Self::NoScene => "there is no scene on the board: upload one".into(),
+            Self::NoSuchPart { parts: 0 } => "the scene on the board has no parts: upload another".into(),
+            Self::NoSuchPart { parts } => format!("the scene has no such part, only 0 to {}", parts - 1),
+            Self::NotGrabbable => "this part is fixed: bake the scene with it grabbable, or choose another".into(),
+            Self::OutOfRange { id, min, max } => {
+                let row = id.row();
+                format!("{} must be a number from {min} to {max} {}", row.name, row.unit)
+            }
+            Self::ChunkOrder { expected } => {
+                format!("a piece of the scene is out of order, byte {expected} was expected: send the scene again")
+            }
+            Self::NoUpload => "no scene is being sent (a restart may have forgotten it): send it again".into(),
+            Self::SceneTooLarge { capacity } => {
+                format!("the scene is larger than the {capacity} bytes the board can hold: bake it coarser or with fewer parts")
+            }
+            Self::TooManyParts { capacity } => {
+                format!("the scene has more parts than the {capacity} the board can hold: bake fewer parts")
+            }
+            Self::SceneIncomplete { received } => {
+                format!("only {received} bytes of the scene have arrived: send it again")
+            }
+            Self::SceneCrc { expected, found } => format!(
+                "the scene arrived damaged (checksum {found:08x} instead of {expected:08x}): check the cable and send it again"
+            ),
+            Self::SceneImage(error) => error.to_string(),
+            Self::Flash => "the board's flash could not be erased or written: send the scene again; if it repeats, the flash is worn out".into(),
+            Self::NotSimulated => "only a simulated mechanism can do this, this one is real".into(),
+            Self::Lockstep => "the board is not in lockstep, or still has ticks to run: switch lockstep on and wait for the last run".into(),
+            Self::BadNumber => "a number is not finite or not possible".into(),
+            Self::Unsupported => "this firmware has no such function: flash a newer one".into(),
+            Self::Busy => "the board's queue is full: try again".into(),
+            Self::Undecodable => "the board did not understand the message: flash the firmware of this release".into(),
+        }
+    }
+}
+
+fn hint(state: &DeviceState) -> &'static str {
+    match state {
+        DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop => " (disarm first)",
+        DeviceState::Stopped => " (clear the stop first)",
+        DeviceState::Idle => " (arm first)",
+        DeviceState::Boot => " (wait a moment)",
+        DeviceState::Fault(_) => "",
+    }
+}
+
+impl Words for ToDevice {
+    fn words(&self) -> String {
+        match self {
+            Self::Hello(_) => "the greeting".into(),
+            Self::GetCapabilities => "asking what the board can do".into(),
+            Self::Arm => "arming".into(),
+            Self::Disarm => "disarming".into(),
+            Self::Stop => "stopping".into(),
+            Self::ClearFault => "clearing the stop or fault".into(),
+            Self::Heartbeat => "the heartbeat".into(),
+            Self::SetParameter { id, value } => {
+                format!("setting {} to {value} {}", id.row().name, id.row().unit)
+            }
+            Self::GetParameter(id) => format!("reading {}", id.row().name),
+            Self::Grab { part } => format!("grabbing part {part}"),
+            Self::Release => "releasing the part".into(),
+            Self::ResetScene => "putting the parts back".into(),
+            Self::SceneBegin { length, .. } => format!("sending a scene of {length} bytes"),
+            Self::SceneChunk { offset, .. } => format!("sending the scene from byte {offset}"),
+            Self::SceneCommit => "putting the new scene in use".into(),
+            Self::SceneAbort => "giving up sending the scene".into(),
+            Self::SetTarget(target) => format!("setting constraint target {}", target.id),
+            Self::ClearTarget { id } => format!("clearing constraint target {id}"),
+            Self::SetTelemetry { every_ticks } => format!("asking for telemetry every {every_ticks} ticks"),
+            Self::GetStatistics { .. } => "reading the counters".into(),
+            Self::SimulatedHand(_) => "giving the simulated hand its script".into(),
+            Self::Lockstep(true) => "switching lockstep on".into(),
+            Self::Lockstep(false) => "switching lockstep off".into(),
+            Self::Run { ticks } => format!("running {ticks} ticks"),
+            Self::Restart => "restarting the board".into(),
+        }
+    }
+}
