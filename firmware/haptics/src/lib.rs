@@ -28,7 +28,7 @@ mod limits;
 mod linear;
 mod pose;
 mod proximity;
-mod rotation;
+pub mod rotation;
 mod settings;
 mod state;
 mod step;

@@ -8,16 +8,16 @@ use glam::{Quat, Vec3};
 use crate::pose::renormalize;
 
 /// Longest rotation vector [`exp`] is made for, rad.
-pub(crate) const EXP_MAX: f32 = core::f32::consts::PI;
+pub const EXP_MAX: f32 = core::f32::consts::PI;
 
 /// How far past half a turn [`log_continuous`] keeps the branch it was on, rad.
-pub(crate) const BRANCH_HYSTERESIS: f32 = 0.3;
+pub const BRANCH_HYSTERESIS: f32 = 0.3;
 
 /// Unit quaternion of rotation vector `phi` (rad), `|phi| ≤ EXP_MAX`.
 ///
 /// With x = |φ|/2 ≤ π/2 the first term left out of sin(x)/x is x¹²/13! < 4·10⁻⁸, of cos(x) x¹⁴/14! < 7·10⁻⁹.
 #[inline]
-pub(crate) fn exp(phi: Vec3) -> Quat {
+pub fn exp(phi: Vec3) -> Quat {
     let x2 = 0.25 * phi.length_squared();
     let sinc = 1.0
         - x2 * (1.0 / 6.0)
@@ -42,7 +42,7 @@ pub(crate) fn exp(phi: Vec3) -> Quat {
 /// The shorter of the two ways round is taken, except within [`BRANCH_HYSTERESIS`] past half a turn from `previous`: there the
 /// vector keeps its direction, so that noise about half a turn cannot flip the torque back and forth. Relative error < 10⁻⁶.
 #[inline]
-pub(crate) fn log_continuous(q: Quat, previous: Vec3) -> Vec3 {
+pub fn log_continuous(q: Quat, previous: Vec3) -> Vec3 {
     let q = if q.w < 0.0 { -q } else { q };
     let v = Vec3::new(q.x, q.y, q.z);
     let n2 = v.length_squared();
