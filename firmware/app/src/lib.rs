@@ -1,1 +1,34 @@
-//! The application every board shares: control plane, link plane, scene store, safety, simulated mechanism
+//! The application every board shares: all that lies between bytes on the link and the motors, without any hardware.
+//!
+//! Two planes. The **control plane** ([`control`]) is one call each millisecond at the highest priority: sensors, safety state machine, force law,
+//! motors. The **link plane** ([`link`]) decodes and checks messages at low priority, keeps scenes in flash ([`store`]) and hands finished values
+//! over through bounded queues ([`channel`]). [`device::start`] puts them together; the same code runs on each board and, on one thread, in the
+//! simulated rig of the host.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`board`] | what a board must provide |
+//! | [`channel`] | queues and words between the planes |
+//! | [`control`], [`safety`], [`statistics`] | the tick; its state machine; counters and state hash |
+//! | [`link`], [`parameters`], [`wire`] | messages; values and settings; conversions |
+//! | [`store`], [`ram_flash`] | A/B scene slots; flash in RAM |
+//! | [`simulated`], [`hand`], [`encoder`] | simulated mechanism and hand; encoder counts |
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod board;
+pub mod channel;
+pub mod control;
+pub mod device;
+pub mod encoder;
+pub mod hand;
+pub mod link;
+pub mod parameters;
+pub mod ram_flash;
+pub mod safety;
+pub mod simulated;
+pub mod statistics;
+pub mod store;
+pub mod wire;

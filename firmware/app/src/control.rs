@@ -1,0 +1,651 @@
+//! The control plane: one call each millisecond, and everything the motors do.
+//!
+//! Contract of [`ControlPlane::tick`]: bounded work (commands, look-ups, contacts all have limits), no waiting, no panics. The order
+//! in a tick is stop, session, commands, sensors, safety, force law, limits, motors, bookkeeping. A tick that starts late is counted; so many
+//! in a row as the board says ([`Identity::overrun_ticks`]) are a fault.
+//!
+//! In **lockstep** (simulated mechanisms only) a tick runs only when released by `Run`, and commands behind a `Run` wait until its ticks are
+//! done: what came before `Run` in the stream has taken effect before its first tick, whatever the timing of bytes and interrupts. That makes
+//! the in-process rig and the emulated board compute the same bits. The host's silence is not counted there, since time waits for the host.
+
+use mortise_haptics::{self as haptics, GrabError, Input, Output, Pose, State as LawState, Twist, Wrench};
+use mortise_protocol::image::SceneImage;
+use mortise_protocol::message::{Fault, HandScript, Refusal, Statistics, Telemetry, flag};
+use mortise_protocol::parameter::ParameterId;
+
+use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
+use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Event, Reply};
+use crate::parameters::{ControlSettings, Parameters};
+use crate::safety::{Action, Event as SafetyEvent, Motors, Safety};
+use crate::statistics::{StateHash, count_tick};
+use crate::wire::{flags_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire};
+
+/// Ticks from zero to whole wrench after arming or grabbing.
+pub const RAMP_TICKS: u16 = 200;
+/// Ticks in which a soft stop takes the last wrench to zero.
+pub const FADE_TICKS: u16 = 50;
+/// Ticks of a soft stop: the fade, then damping alone, then motors off.
+pub const SOFT_STOP_TICKS: u16 = 100;
+/// Damping of a soft stop, N·s/m. On a handle of 0.15 kg a tick takes b·h/m = 1.3 % of the speed: far from the 200 % where it would ring.
+const SOFT_STOP_DAMPING: f32 = 2.0;
+/// Damping of a soft stop, N·m·s/rad; for a handle of 10⁻⁴ kg·m² 2 % a tick.
+const SOFT_STOP_ANGULAR_DAMPING: f32 = 0.002;
+/// Largest damping force of a soft stop, N.
+const SOFT_STOP_FORCE: f32 = 2.0;
+/// Largest damping torque of a soft stop, N·m.
+const SOFT_STOP_TORQUE: f32 = 0.02;
+
+/// What a call of [`ControlPlane::tick`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ticked {
+    /// A tick ran.
+    Ran,
+    /// Lockstep: commands were taken, no time passed.
+    Waiting,
+}
+
+/// Everything the 1 kHz task owns. About 30 kB: keep it in a static or on the heap.
+pub struct ControlPlane<'c, 's, M, C> {
+    ends: ControlEnds<'c, 's>,
+    mechanism: M,
+    clock: C,
+    overrun_ticks: u8,
+    safety: Safety,
+    settings: ControlSettings,
+    scene: Option<SceneImage<'s>>,
+    law: LawState,
+    sensed: Sensed,
+    /// A reading of this tick was not finite and was replaced.
+    replaced: bool,
+    output: Option<Output>,
+    commanded: Wrench,
+    /// Ticks since the wrench began to ramp up.
+    ramp: u16,
+    /// Ticks since the soft stop began, and the wrench it began with.
+    fade: (u16, Wrench),
+    tick: u32,
+    lockstep: bool,
+    /// Lockstep ticks still to run, and the sequence number of the message that released them.
+    credit: u32,
+    run_seq: u16,
+    telemetry_every: u16,
+    telemetry_left: u16,
+    statistics: Statistics,
+    hash: StateHash,
+    missed_total: u32,
+    missed_in_row: u32,
+    heard: u32,
+    silent_ticks: u32,
+    stops: u32,
+    session: u32,
+    reported: Safety,
+    unreported_fault: Option<(u32, Fault)>,
+}
+
+impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
+    /// Booting, motors off. The scene comes as the link plane's first command.
+    pub fn new(
+        ends: ControlEnds<'c, 's>,
+        mut mechanism: M,
+        clock: C,
+        identity: &Identity,
+        settings: ControlSettings,
+    ) -> Self {
+        mechanism.drive(Drive::Off);
+        Self {
+            ends,
+            mechanism,
+            clock,
+            overrun_ticks: identity.overrun_ticks,
+            safety: Safety::Boot,
+            settings,
+            scene: None,
+            law: LawState::new(),
+            sensed: Sensed {
+                handle: Pose::IDENTITY,
+                twist: Twist::ZERO,
+                stop_open: false,
+                driver_fault: None,
+                encoder_jump: None,
+            },
+            replaced: false,
+            output: None,
+            commanded: Wrench::ZERO,
+            ramp: 0,
+            fade: (0, Wrench::ZERO),
+            tick: 0,
+            lockstep: false,
+            credit: 0,
+            run_seq: 0,
+            telemetry_every: 0,
+            telemetry_left: 0,
+            statistics: Statistics::default(),
+            hash: StateHash::new(),
+            missed_total: 0,
+            missed_in_row: 0,
+            heard: 0,
+            silent_ticks: 0,
+            stops: 0,
+            session: 0,
+            reported: Safety::Boot,
+            unreported_fault: None,
+        }
+    }
+
+    /// The safety state.
+    pub fn safety(&self) -> Safety {
+        self.safety
+    }
+
+    /// Ticks run since start.
+    pub fn ticks(&self) -> u32 {
+        self.tick
+    }
+
+    /// The mechanism, for a test that presses its stop input.
+    pub fn mechanism_mut(&mut self) -> &mut M {
+        &mut self.mechanism
+    }
+
+    /// One millisecond. Call from the timer, at the highest priority.
+    pub fn tick(&mut self) -> Ticked {
+        self.take_stop_and_session();
+        // The first tick reads the sensors and belongs to no host.
+        if self.safety != Safety::Boot {
+            self.take_commands();
+            if self.lockstep && (self.credit == 0 || !self.lockstep_has_room()) {
+                self.report();
+                // Nothing was due, so nothing was missed.
+                let _ = self.clock.missed();
+                return Ticked::Waiting;
+            }
+        }
+        self.run();
+        Ticked::Ran
+    }
+
+    fn run(&mut self) {
+        self.sense();
+        self.watch();
+        self.render();
+        self.hash
+            .tick(&self.sensed.handle, self.law.object().as_ref(), &self.commanded);
+        self.tick = self.tick.wrapping_add(1);
+        self.report();
+        self.sample();
+        let points = self.output.as_ref().map_or(0, |o| o.work.points);
+        count_tick(&mut self.statistics, self.clock.cost(), points, &self.commanded);
+        if self.credit > 0 {
+            self.credit -= 1;
+            if self.credit == 0 {
+                self.ran();
+            }
+        }
+    }
+
+    fn take_stop_and_session(&mut self) {
+        let stops = self.ends.shared.stops();
+        if stops != self.stops {
+            self.stops = stops;
+            self.apply(SafetyEvent::Stop);
+        }
+        let session = self.ends.shared.sessions();
+        if session != self.session {
+            self.session = session;
+            self.telemetry_every = 0;
+            self.lockstep = false;
+            self.credit = 0;
+            self.apply(SafetyEvent::Disarm);
+        }
+    }
+
+    fn take_commands(&mut self) {
+        // No more than the queue held when the tick began.
+        for _ in 0..self.ends.commands.len() {
+            let full = self.ends.events.capacity() - self.ends.events.len() < EVENTS_AT_ONCE;
+            if self.credit > 0 || full {
+                return;
+            }
+            let Some(command) = self.ends.commands.dequeue() else {
+                return;
+            };
+            let current = command.session == self.session;
+            if current || matches!(command.kind, CommandKind::UseScene(_) | CommandKind::SceneDamaged) {
+                self.carry_out(command);
+            }
+        }
+    }
+
+    fn carry_out(&mut self, command: Command<'s>) {
+        let Command { seq, stops, kind, .. } = command;
+        let outdated = stops != self.stops;
+        let result = match kind {
+            CommandKind::Arm | CommandKind::ClearFault if outdated => {
+                Err(Refusal::State(self.safety.reported()))
+            }
+            CommandKind::Arm => {
+                let scene = self.scene.is_some();
+                self.request(SafetyEvent::Arm { scene })
+            }
+            CommandKind::Disarm => self.request(SafetyEvent::Disarm),
+            CommandKind::ClearFault => {
+                let cause_gone = self.persistent_cause().is_none();
+                self.request(SafetyEvent::Clear { cause_gone })
+            }
+            CommandKind::Settings(settings) => {
+                self.settings = settings;
+                Ok(())
+            }
+            CommandKind::Grab(part) => self.grab(part),
+            CommandKind::Release => self.request(SafetyEvent::Release),
+            CommandKind::ResetScene => self.reset_scene(),
+            CommandKind::UseScene(scene) => {
+                let taken = self.use_scene(scene);
+                self.send(Event::SceneTaken(taken));
+                return;
+            }
+            CommandKind::SceneDamaged => {
+                self.apply(SafetyEvent::Fault(Fault::SceneDamaged));
+                return;
+            }
+            CommandKind::Telemetry(every) => {
+                self.telemetry_every = every;
+                self.telemetry_left = every;
+                Ok(())
+            }
+            CommandKind::Statistics { reset } => {
+                self.send_statistics(seq, reset);
+                return;
+            }
+            CommandKind::Hand(script) => self.set_hand(&script),
+            CommandKind::Lockstep(on) => self.set_lockstep(on),
+            CommandKind::Run(_) if !self.lockstep => Err(Refusal::Lockstep),
+            CommandKind::Run(ticks) => {
+                self.run_seq = seq;
+                self.credit = ticks;
+                if ticks == 0 {
+                    self.ran();
+                }
+                return;
+            }
+            CommandKind::Restart if self.safety.live() => Err(Refusal::State(self.safety.reported())),
+            CommandKind::Restart => Ok(()),
+        };
+        self.report();
+        self.reply(
+            seq,
+            match result {
+                Ok(()) => Reply::Done,
+                Err(reason) => Reply::Refused(reason),
+            },
+        );
+    }
+
+    fn grab(&mut self, part: u16) -> Result<(), Refusal> {
+        let Some(scene) = &self.scene else {
+            return Err(Refusal::NoScene);
+        };
+        if let (_, Action::Refuse(reason)) = self.safety.step(SafetyEvent::Grab) {
+            return Err(reason);
+        }
+        self.law
+            .grab(scene, part, &self.sensed.handle)
+            .map_err(|error| match error {
+                GrabError::NoSuchPart { parts, .. } => Refusal::NoSuchPart { parts },
+                GrabError::Fixed { .. } => Refusal::NotGrabbable,
+                GrabError::Busy { .. } => Refusal::State(self.safety.reported()),
+                GrabError::BadHandle => Refusal::BadNumber,
+            })?;
+        self.request(SafetyEvent::Grab)
+    }
+
+    fn reset_scene(&mut self) -> Result<(), Refusal> {
+        if self.safety.live() {
+            return Err(Refusal::State(self.safety.reported()));
+        }
+        if let Some(scene) = &self.scene {
+            self.law.load_scene(scene);
+        }
+        self.start_anew();
+        Ok(())
+    }
+
+    fn use_scene(&mut self, scene: SceneImage<'s>) -> Result<(), Refusal> {
+        if self.safety.live() {
+            return Err(Refusal::State(self.safety.reported()));
+        }
+        self.law.load_scene(&scene);
+        self.scene = Some(scene);
+        self.start_anew();
+        Ok(())
+    }
+
+    fn start_anew(&mut self) {
+        self.law.restart_slew();
+        if let Some(handle) = self.mechanism.reset() {
+            self.sensed.handle = handle;
+            self.sensed.twist = Twist::ZERO;
+        }
+        self.output = None;
+        self.commanded = Wrench::ZERO;
+        self.hash = StateHash::new();
+    }
+
+    fn set_lockstep(&mut self, on: bool) -> Result<(), Refusal> {
+        if !M::SIMULATED {
+            return Err(Refusal::NotSimulated);
+        }
+        self.lockstep = on;
+        self.silent_ticks = 0;
+        Ok(())
+    }
+
+    fn set_hand(&mut self, script: &HandScript) -> Result<(), Refusal> {
+        if !M::SIMULATED {
+            return Err(Refusal::NotSimulated);
+        }
+        self.mechanism.set_hand(Some(script));
+        Ok(())
+    }
+
+    /// Reads the sensors; numbers that are not finite keep their last value, and [`Self::watch`] sees it.
+    fn sense(&mut self) {
+        let last = self.sensed;
+        self.sensed = self.mechanism.sense();
+        self.replaced = !(self.sensed.handle.is_finite() && self.sensed.twist.is_finite());
+        if self.replaced {
+            self.sensed.handle = last.handle;
+            self.sensed.twist = last.twist;
+        }
+    }
+
+    /// What in the last readings forbids motors for as long as it lasts.
+    fn persistent_cause(&self) -> Option<Fault> {
+        if self.sensed.stop_open {
+            return Some(Fault::StopInput);
+        }
+        if let Some(axis) = self.sensed.driver_fault {
+            return Some(Fault::Driver { axis });
+        }
+        self.replaced.then_some(Fault::NonFinite)
+    }
+
+    /// Looks for faults, worst first, and runs the safety state machine.
+    fn watch(&mut self) {
+        let missed = self.clock.missed();
+        self.missed_total = self.missed_total.saturating_add(missed);
+        self.statistics.missed_ticks = self.statistics.missed_ticks.saturating_add(missed);
+        self.missed_in_row = if missed == 0 {
+            0
+        } else {
+            self.missed_in_row.saturating_add(missed)
+        };
+        self.listen();
+        if self.safety == Safety::Boot {
+            self.apply(SafetyEvent::Ready);
+        }
+        if let Some(fault) = self.persistent_cause().or_else(|| self.live_cause()) {
+            self.apply(SafetyEvent::Fault(fault));
+        }
+    }
+
+    /// What is a fault only while motors are driven.
+    fn live_cause(&self) -> Option<Fault> {
+        if !self.safety.live() {
+            return None;
+        }
+        if let Some(axis) = self.sensed.encoder_jump {
+            return Some(Fault::EncoderJump { axis });
+        }
+        let limit = self.settings.speed_limit_m_per_s;
+        if self.sensed.twist.linear.length_squared() > limit * limit {
+            return Some(Fault::OverSpeed);
+        }
+        let overrun = u32::from(self.overrun_ticks);
+        if overrun > 0 && self.missed_in_row >= overrun {
+            return Some(Fault::TickOverrun);
+        }
+        // A host that disarmed may leave before the fade is over.
+        let silent =
+            self.silent_ticks > self.settings.host_timeout_ticks && self.safety.motors() != Motors::Fading;
+        silent.then_some(Fault::HostSilent {
+            silent_ms: self.silent_ticks.min(u32::from(u16::MAX)) as u16,
+        })
+    }
+
+    fn listen(&mut self) {
+        let heard = self.ends.shared.heard();
+        if heard != self.heard || self.lockstep || !self.safety.live() {
+            self.heard = heard;
+            self.silent_ticks = 0;
+        } else {
+            self.silent_ticks = self.silent_ticks.saturating_add(1);
+        }
+    }
+
+    /// Computes this tick's wrench and drives the motors with it.
+    fn render(&mut self) {
+        self.output = None;
+        let motors = self.safety.motors();
+        if let (Motors::Zero | Motors::Rendered, Some(scene)) = (motors, &self.scene) {
+            let input = Input {
+                handle: self.sensed.handle,
+                handle_twist: self.sensed.twist,
+                enabled: true,
+            };
+            let output = haptics::tick(&mut self.law, scene, &self.settings.law, &input);
+            let bad = haptics::Flags::NON_FINITE;
+            if output.work.flags.intersects(bad) || !output.handle.is_finite() {
+                self.apply(SafetyEvent::Fault(Fault::NonFinite));
+            }
+            self.output = Some(output);
+        }
+        // The state may have changed just now.
+        let drive = match (self.safety.motors(), &self.output) {
+            (Motors::Off, _) => Drive::Off,
+            (Motors::Fading, _) => Drive::Wrench(self.fading()),
+            (Motors::Zero | Motors::Rendered, Some(output)) => {
+                self.ramp = self.ramp.saturating_add(1).min(RAMP_TICKS);
+                Drive::Wrench(below_ceiling(scaled(
+                    output.handle,
+                    f32::from(self.ramp) / f32::from(RAMP_TICKS),
+                )))
+            }
+            (Motors::Zero | Motors::Rendered, None) => Drive::Wrench(Wrench::ZERO),
+        };
+        self.commanded = match drive {
+            Drive::Off => Wrench::ZERO,
+            Drive::Wrench(wrench) => wrench,
+        };
+        self.mechanism.drive(drive);
+        if self.safety.motors() == Motors::Fading && self.fade.0 >= SOFT_STOP_TICKS {
+            self.apply(SafetyEvent::SoftStopOver);
+        }
+    }
+
+    fn fading(&mut self) -> Wrench {
+        let (ticks, start) = &mut self.fade;
+        *ticks = ticks.saturating_add(1);
+        let left = FADE_TICKS.saturating_sub(*ticks);
+        let fade = scaled(*start, f32::from(left) / f32::from(FADE_TICKS));
+        let damping = Wrench {
+            force: (self.sensed.twist.linear * -SOFT_STOP_DAMPING).clamp_length_max(SOFT_STOP_FORCE),
+            torque: (self.sensed.twist.angular * -SOFT_STOP_ANGULAR_DAMPING)
+                .clamp_length_max(SOFT_STOP_TORQUE),
+        };
+        below_ceiling(fade + damping)
+    }
+
+    /// Asks the state machine; a refusal changes nothing.
+    fn request(&mut self, event: SafetyEvent) -> Result<(), Refusal> {
+        match self.safety.step(event) {
+            (_, Action::Refuse(reason)) => Err(reason),
+            _ => {
+                self.apply(event);
+                Ok(())
+            }
+        }
+    }
+
+    fn apply(&mut self, event: SafetyEvent) {
+        let (next, action) = self.safety.step(event);
+        if let SafetyEvent::Fault(fault) = event
+            && next != self.safety
+            && self.unreported_fault.is_none()
+        {
+            self.unreported_fault = Some((self.tick, fault));
+        }
+        self.safety = next;
+        match action {
+            Action::None | Action::Refuse(_) => {}
+            Action::Enable => {
+                self.law.restart_slew();
+                self.ramp = 0;
+                self.silent_ticks = 0;
+                self.missed_in_row = 0;
+            }
+            Action::Couple => self.ramp = 0,
+            Action::Uncouple => self.law.release(),
+            Action::Fade => {
+                self.law.release();
+                self.fade = (0, self.commanded);
+            }
+            Action::Off => {
+                // At once, not at the next tick: in lockstep that may be far away.
+                self.mechanism.drive(Drive::Off);
+                self.commanded = Wrench::ZERO;
+                self.law.release();
+                self.law.restart_slew();
+            }
+        }
+    }
+
+    fn lockstep_has_room(&self) -> bool {
+        let events = self.ends.events.capacity() - self.ends.events.len() >= EVENTS_AT_ONCE;
+        events && (self.telemetry_every == 0 || self.ends.samples.ready())
+    }
+
+    fn send(&mut self, event: Event) {
+        // Commands are taken only when there is room, and `report` looks first.
+        let _ = self.ends.events.enqueue(event);
+    }
+
+    /// Tells the link of a fault and a changed state, when there is room; else at the next tick.
+    fn report(&mut self) {
+        if let Some((tick, fault)) = self.unreported_fault
+            && self.ends.events.ready()
+        {
+            self.unreported_fault = None;
+            self.send(Event::Fault { tick, fault });
+        }
+        if self.reported != self.safety && self.ends.events.ready() {
+            self.reported = self.safety;
+            self.send(Event::State {
+                tick: self.tick,
+                state: self.safety.reported(),
+            });
+        }
+    }
+
+    fn reply(&mut self, seq: u16, reply: Reply) {
+        let session = self.session;
+        self.send(Event::Reply { seq, session, reply });
+    }
+
+    fn ran(&mut self) {
+        let ran = Reply::Ran {
+            tick: self.tick,
+            state_hash: self.hash.value(),
+        };
+        self.reply(self.run_seq, ran);
+    }
+
+    fn send_statistics(&mut self, seq: u16, reset: bool) {
+        let statistics = Statistics {
+            state_hash: self.hash.value(),
+            ..self.statistics
+        };
+        self.reply(seq, Reply::Statistics(statistics));
+        if reset {
+            self.statistics = Statistics::default();
+        }
+    }
+
+    /// Queues a telemetry sample when one is due.
+    fn sample(&mut self) {
+        if self.telemetry_every == 0 {
+            return;
+        }
+        self.telemetry_left = self.telemetry_left.saturating_sub(1);
+        if self.telemetry_left > 0 {
+            return;
+        }
+        self.telemetry_left = self.telemetry_every;
+        if !self.ends.samples.ready() {
+            self.ends.shared.drop_sample();
+            return;
+        }
+        let sample = self.telemetry();
+        let _ = self.ends.samples.enqueue(sample);
+    }
+
+    fn telemetry(&mut self) -> Telemetry {
+        let output = self.output.as_ref();
+        let mut flags = output.map_or(0, |o| {
+            flags_to_wire(o.work.flags, &o.handle, &self.settings.law.limits)
+        });
+        if self.replaced {
+            flags |= flag::NON_FINITE;
+        }
+        if output.is_some_and(|o| o.pairs.is_full()) {
+            flags |= flag::PAIRS;
+        }
+        Telemetry {
+            tick: self.tick,
+            handle: pose_to_wire(&self.sensed.handle),
+            object: self
+                .law
+                .grabbed()
+                .zip(self.law.object())
+                .map(|(part, (pose, _))| (part, pose_to_wire(&pose))),
+            wrench: wrench_to_wire(&self.commanded),
+            contact: wrench_to_wire(&output.map_or(Wrench::ZERO, |o| o.contact)),
+            hand: self.mechanism.hand().as_ref().map(wrench_to_wire),
+            points: output.map_or(0, |o| o.work.points.min(u32::from(u16::MAX)) as u16),
+            flags,
+            missed: self.missed_total,
+            dropped: self.ends.shared.dropped(),
+            pairs: output.map(|o| pairs_to_wire(&o.pairs)).unwrap_or_default(),
+            // Last, so that it covers what comes before it.
+            cost: self.clock.cost(),
+        }
+    }
+}
+
+fn scaled(wrench: Wrench, factor: f32) -> Wrench {
+    Wrench {
+        force: wrench.force * factor,
+        torque: wrench.torque * factor,
+    }
+}
+
+/// The largest force and torque any parameter allows, whatever the settings and the law say.
+fn below_ceiling(wrench: Wrench) -> Wrench {
+    Wrench {
+        force: wrench.force.clamp_length_max(ParameterId::ForceLimit.row().max),
+        torque: wrench.torque.clamp_length_max(ParameterId::TorqueLimit.row().max),
+    }
+}
+
+impl ControlSettings {
+    /// The defaults of every parameter.
+    pub fn at_start() -> Self {
+        let parameters = Parameters::default();
+        // The defaults pass their own checks (tested), so the second arm is never taken; with its speed limit of 0 nothing could stay armed.
+        parameters.settings().unwrap_or_else(|_| Self {
+            law: haptics::Settings::default(),
+            speed_limit_m_per_s: 0.0,
+            host_timeout_ticks: 0,
+        })
+    }
+}

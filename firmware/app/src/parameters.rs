@@ -1,0 +1,125 @@
+//! The parameters' values, and the settings the tick uses, made from them at low priority.
+
+use mortise_haptics::Settings;
+use mortise_protocol::message::Refusal;
+use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+
+use crate::board::{TICK_HZ, TICK_S};
+
+/// What the control plane needs, finished: swapped in between two ticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControlSettings {
+    /// Of the force law.
+    pub law: Settings,
+    /// Handle speed that is a fault, m/s.
+    pub speed_limit_m_per_s: f32,
+    /// Ticks without a word from the host, motors live, that are a fault.
+    pub host_timeout_ticks: u32,
+}
+
+/// The value of every parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    values: [f32; PARAMETERS.len()],
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        let mut values = [0.0; PARAMETERS.len()];
+        for (value, row) in values.iter_mut().zip(PARAMETERS) {
+            *value = row.default;
+        }
+        Self { values }
+    }
+}
+
+impl Parameters {
+    /// A parameter's value, in its unit.
+    pub fn get(&self, id: ParameterId) -> f32 {
+        self.values[id as usize]
+    }
+
+    /// This set with one value changed; refused outside its range or when it is not a number.
+    pub fn with(mut self, id: ParameterId, value: f32) -> Result<Self, Refusal> {
+        let row = id.row();
+        // A comparison with NaN is false, so NaN is refused too.
+        if !(value >= row.min && value <= row.max) {
+            return Err(Refusal::OutOfRange {
+                id,
+                min: row.min,
+                max: row.max,
+            });
+        }
+        self.values[id as usize] = value;
+        Ok(self)
+    }
+
+    /// The settings these values stand for; what no parameter names keeps the force law's default.
+    pub fn settings(&self) -> Result<ControlSettings, Refusal> {
+        use ParameterId as P;
+        let mut law = Settings::default();
+        law.coupling.k_t_n_per_m = self.get(P::CouplingStiffness);
+        law.coupling.b_t = self.get(P::CouplingDamping);
+        law.coupling.k_r = self.get(P::CouplingAngularStiffness);
+        law.coupling.b_r = self.get(P::CouplingAngularDamping);
+        law.coupling.force_max_n = self.get(P::CouplingForce);
+        law.coupling.torque_max_nm = self.get(P::CouplingTorque);
+        law.contact.stiffness_n_per_m = self.get(P::ContactStiffness);
+        law.contact.damping_s = self.get(P::ContactDamping);
+        law.contact.point_budget = self.get(P::PointBudget) as u32;
+        law.object.mass_kg = self.get(P::ObjectMass);
+        law.limits.force_n = self.get(P::ForceLimit);
+        law.limits.torque_nm = self.get(P::TorqueLimit);
+        law.limits.force_slew_n_per_s = self.get(P::ForceSlew);
+        law.limits.torque_slew_nm_per_s = self.get(P::TorqueSlew);
+        law.period_s = TICK_S;
+        law.validate().map_err(|_| Refusal::BadNumber)?;
+        Ok(ControlSettings {
+            law,
+            speed_limit_m_per_s: self.get(P::SpeedLimit),
+            host_timeout_ticks: (self.get(P::HostTimeout) * f32::from(TICK_HZ)) as u32,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_corner_of_every_range_makes_valid_settings() {
+        for row in PARAMETERS {
+            for value in [row.min, row.default, row.max] {
+                let settings = Parameters::default()
+                    .with(row.id, value)
+                    .and_then(|p| p.settings());
+                assert!(settings.is_ok(), "{} = {value}: {settings:?}", row.name);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_outside_is_refused_with_the_range_and_changes_nothing() {
+        for row in PARAMETERS {
+            let outside = [
+                row.min - row.min.abs() * 1e-3 - 1e-3,
+                row.max * 1.001,
+                f32::NAN,
+                f32::INFINITY,
+                f32::NEG_INFINITY,
+            ];
+            for value in outside {
+                assert_eq!(
+                    Parameters::default().with(row.id, value),
+                    Err(Refusal::OutOfRange {
+                        id: row.id,
+                        min: row.min,
+                        max: row.max
+                    }),
+                    "{} = {value}",
+                    row.name
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! The simulated mechanism: a handle with mass and friction, encoders with a resolution, motors that saturate, and a scripted hand.
+//!
+//! Per axis m·dv/dt = F_motor + F_hand − c·v − f_c·sign(v), F_hand = k·(x_wish − x) + b·(v_wish − v) + push, and the same in rotation about the
+//! handle's origin with an isotropic inertia. Integrated with [`SUBSTEPS`] backward-Euler steps a tick: springs and viscous damping are implicit,
+//! Coulomb friction is solved exactly (it takes speed away until there is none), so any script is stable. Single precision and a
+//! fixed order of operations: a PC and a Cortex-M7 compute the same bits.
+
+use glam::{Quat, Vec3};
+use mortise_haptics::{Pose, Twist, Wrench, rotation};
+use mortise_protocol::message::HandScript;
+
+use crate::board::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
+use crate::encoder::{Counter, Velocity};
+use crate::hand::{Grip, Hand, Wish, small_turn};
+
+/// Steps in a tick.
+pub const SUBSTEPS: u32 = 4;
+/// Handle's mass, kg.
+pub const MASS: f32 = 0.15;
+/// Handle's inertia about its origin, kg·m².
+pub const INERTIA: f32 = 1e-4;
+/// Viscous friction, N·s/m. Above k_T·h/2 = 0.5 for the default coupling (Colgate–Schenkel).
+pub const VISCOUS: f32 = 1.0;
+/// Viscous friction in rotation, N·m·s/rad. Above k_R·h/2 = 0.001.
+pub const ANGULAR_VISCOUS: f32 = 0.002;
+/// Coulomb friction, N: 1 % of a push of 1 N.
+pub const COULOMB: f32 = 0.01;
+/// Coulomb friction in rotation, N·m.
+pub const ANGULAR_COULOMB: f32 = 1e-4;
+/// Position's resolution, m.
+pub const RESOLUTION: f32 = 5e-6;
+/// Angle's resolution, rad: 16 bits a turn.
+pub const ANGULAR_RESOLUTION: f32 = core::f32::consts::TAU / 65_536.0;
+/// Motors saturate at this force along each axis, N.
+pub const MOTOR_FORCE: f32 = 12.0;
+/// Motors saturate at this torque about each axis, N·m.
+pub const MOTOR_TORQUE: f32 = 0.6;
+/// Speed beyond which a reading is taken for a jump, m/s and rad/s: above any speed limit that can be set.
+const JUMP_SPEED: f32 = 20.0;
+const JUMP_ANGULAR_SPEED: f32 = 200.0;
+
+/// What a test can do to the simulated wiring.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wiring {
+    /// The stop input is open.
+    pub stop_open: bool,
+    /// A motor driver reports a fault.
+    pub driver_fault: Option<u8>,
+    /// Counts added to position axis x in the next reading, once.
+    pub glitch_counts: i32,
+    /// The position reads as not a number.
+    pub not_a_number: bool,
+}
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// Faults put in by tests.
+    pub wiring: Wiring,
+    body: Body,
+    encoders: Encoders,
+    hand: Option<Hand>,
+    hand_wrench: Wrench,
+    motors: Wrench,
+}
+
+/// The true handle.
+#[derive(Clone, Copy, Debug)]
+struct Body {
+    pose: Pose,
+    twist: Twist,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Encoders {
+    position: [Counter; 3],
+    offset: i32,
+    linear: [Velocity; 3],
+    angular: [Velocity; 3],
+    /// Orientation as counted: follows the true one in whole counts about its own axes.
+    orientation: Quat,
+}
+
+impl Default for Simulated {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Simulated {
+    /// At the world's origin, at rest, nobody holding it, motors off.
+    pub const fn new() -> Self {
+        Self {
+            wiring: Wiring {
+                stop_open: false,
+                driver_fault: None,
+                glitch_counts: 0,
+                not_a_number: false,
+            },
+            body: Body {
+                pose: Pose::IDENTITY,
+                twist: Twist::ZERO,
+            },
+            encoders: Encoders::new(),
+            hand: None,
+            hand_wrench: Wrench::ZERO,
+            motors: Wrench::ZERO,
+        }
+    }
+
+    /// Where the handle truly is, for tests: encoders round it.
+    pub fn true_pose(&self) -> Pose {
+        self.body.pose
+    }
+
+    /// What the motors do after saturation; zero when off.
+    pub fn motors(&self) -> Wrench {
+        self.motors
+    }
+
+    fn advance(&mut self) {
+        let held = self.hand.as_mut().map(|hand| (hand.grip, hand.advance()));
+        let mut sum = Wrench::ZERO;
+        for _ in 0..SUBSTEPS {
+            let hand = self.body.step(&self.motors, held.as_ref());
+            sum = sum + hand;
+        }
+        let share = 1.0 / SUBSTEPS as f32;
+        self.hand_wrench = Wrench {
+            force: sum.force * share,
+            torque: sum.torque * share,
+        };
+    }
+}
+
+impl Body {
+    /// One backward-Euler step; returns the hand's wrench in it.
+    fn step(&mut self, motors: &Wrench, held: Option<&(Grip, Wish)>) -> Wrench {
+        const H: f32 = TICK_S / SUBSTEPS as f32;
+        // Nobody holding is a grip of no stiffness.
+        let free = Grip {
+            stiffness: 0.0,
+            damping: 0.0,
+            angular_stiffness: 0.0,
+            angular_damping: 0.0,
+        };
+        let (grip, wish) = held.map_or((free, None), |(grip, wish)| (*grip, Some(wish)));
+        let rest = Wish {
+            pose: self.pose,
+            twist: Twist::ZERO,
+            push: Vec3::ZERO,
+        };
+        let wish = wish.copied().unwrap_or(rest);
+
+        let apart = wish.pose.position - self.pose.position;
+        let pull = apart * grip.stiffness + wish.twist.linear * grip.damping + wish.push;
+        let linear = implicit_velocity(
+            self.twist.linear,
+            motors.force + pull,
+            Axis {
+                inertia: MASS,
+                viscous: VISCOUS,
+                coulomb: COULOMB,
+                damping: grip.damping,
+                stiffness: grip.stiffness,
+            },
+            H,
+        );
+        let turn = rotation::log_continuous(
+            wish.pose.orientation * self.pose.orientation.conjugate(),
+            Vec3::ZERO,
+        );
+        let twisting = turn * grip.angular_stiffness + wish.twist.angular * grip.angular_damping;
+        let angular = implicit_velocity(
+            self.twist.angular,
+            motors.torque + twisting,
+            Axis {
+                inertia: INERTIA,
+                viscous: ANGULAR_VISCOUS,
+                coulomb: ANGULAR_COULOMB,
+                damping: grip.angular_damping,
+                stiffness: grip.angular_stiffness,
+            },
+            H,
+        );
+        self.twist = Twist { linear, angular };
+        self.pose = Pose {
+            position: self.pose.position + linear * H,
+            orientation: unit(
+                rotation::exp((angular * H).clamp_length_max(rotation::EXP_MAX)) * self.pose.orientation,
+            ),
+        };
+        Wrench {
+            force: pull - linear * (grip.damping + H * grip.stiffness),
+            torque: twisting - angular * (grip.angular_damping + H * grip.angular_stiffness),
+        }
+    }
+}
+
+struct Axis {
+    inertia: f32,
+    viscous: f32,
+    coulomb: f32,
+    damping: f32,
+    stiffness: f32,
+}
+
+/// v' of m·(v' − v)/h = load − (c + b + h·k)·v' − f_c·v'/|v'|, `load` with the spring's force at the old position.
+fn implicit_velocity(v: Vec3, load: Vec3, axis: Axis, h: f32) -> Vec3 {
+    let mass = axis.inertia + h * (axis.viscous + axis.damping + h * axis.stiffness);
+    let momentum = v * axis.inertia + load * h;
+    let size2 = momentum.length_squared();
+    let friction = h * axis.coulomb;
+    if size2 <= friction * friction {
+        return Vec3::ZERO;
+    }
+    momentum * ((1.0 - friction / libm::sqrtf(size2)) / mass)
+}
+
+fn unit(q: Quat) -> Quat {
+    q * (1.5 - 0.5 * q.length_squared())
+}
+
+impl Encoders {
+    const fn new() -> Self {
+        let farthest = (JUMP_SPEED * TICK_S / RESOLUTION) as u32;
+        Self {
+            position: [Counter::new(farthest); 3],
+            offset: 0,
+            linear: [Velocity::new(); 3],
+            angular: [Velocity::new(); 3],
+            orientation: Quat::IDENTITY,
+        }
+    }
+
+    /// Reads the true pose: position, twist, and the axis that jumped.
+    fn read(&mut self, pose: &Pose) -> (Pose, Twist, Option<u8>) {
+        let mut jump = None;
+        let (mut position, mut linear) = ([0.0; 3], [0.0; 3]);
+        for (axis, x) in pose.position.to_array().into_iter().enumerate() {
+            // A float too large for the counter saturates.
+            let offset = if axis == 0 { self.offset } else { 0 };
+            let count = (rounded(x / RESOLUTION) as i32).saturating_add(offset);
+            let step = self.position[axis].update(count);
+            if step.jumped && jump.is_none() {
+                jump = Some(axis as u8);
+            }
+            position[axis] = count as f32 * RESOLUTION;
+            linear[axis] = self.linear[axis].update(step.counts as f32 * RESOLUTION);
+        }
+        let counted = Pose {
+            position: Vec3::ZERO,
+            orientation: self.orientation,
+        };
+        let turned = small_turn(counted, *pose);
+        let mut moved = [0.0; 3];
+        let mut angular = [0.0; 3];
+        for (axis, angle) in turned.to_array().into_iter().enumerate() {
+            moved[axis] = rounded(angle / ANGULAR_RESOLUTION) * ANGULAR_RESOLUTION;
+            if moved[axis].abs() > JUMP_ANGULAR_SPEED * TICK_S && jump.is_none() {
+                jump = Some(3 + axis as u8);
+            }
+            angular[axis] = self.angular[axis].update(moved[axis]);
+        }
+        self.orientation = unit(rotation::exp(Vec3::from_array(moved)) * self.orientation);
+        let seen = Pose {
+            position: Vec3::from_array(position),
+            orientation: self.orientation,
+        };
+        let twist = Twist {
+            linear: Vec3::from_array(linear),
+            angular: Vec3::from_array(angular),
+        };
+        (seen, twist, jump)
+    }
+}
+
+/// To the nearest whole number, halves away from zero, without a library call; larger than 2²³ comes out as it is.
+fn rounded(x: f32) -> f32 {
+    if x.abs() >= 8_388_608.0 || x.is_nan() {
+        return x;
+    }
+    (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32 as f32
+}
+
+impl Mechanism for Simulated {
+    const SIMULATED: bool = true;
+
+    fn sense(&mut self) -> Sensed {
+        self.advance();
+        self.encoders.offset = self.encoders.offset.saturating_add(self.wiring.glitch_counts);
+        self.wiring.glitch_counts = 0;
+        let (mut handle, twist, encoder_jump) = self.encoders.read(&self.body.pose);
+        if self.wiring.not_a_number {
+            handle.position.x = f32::NAN;
+        }
+        Sensed {
+            handle,
+            twist,
+            stop_open: self.wiring.stop_open,
+            driver_fault: self.wiring.driver_fault,
+            encoder_jump,
+        }
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        let (force, torque) = (Vec3::splat(MOTOR_FORCE), Vec3::splat(MOTOR_TORQUE));
+        self.motors = match drive {
+            Drive::Off => Wrench::ZERO,
+            Drive::Wrench(w) => Wrench {
+                force: w.force.clamp(-force, force),
+                torque: w.torque.clamp(-torque, torque),
+            },
+        };
+    }
+
+    fn hand(&self) -> Option<Wrench> {
+        Some(self.hand_wrench)
+    }
+
+    fn set_hand(&mut self, script: Option<&HandScript>) {
+        self.hand = script.and_then(Hand::new);
+    }
+
+    fn reset(&mut self) -> Option<Pose> {
+        *self = Self {
+            wiring: self.wiring,
+            ..Self::new()
+        };
+        Some(self.body.pose)
+    }
+}
+
+// Speeds are counted per tick.
+const _: () = assert!(TICK_HZ == 1000);
