@@ -13,13 +13,35 @@ use crate::image::ImageError;
 use crate::limits::*;
 use crate::parameter::ParameterId;
 
-/// Hash of both message enums' schema: any change to a message changes it.
+/// Hash of both message enums' schema and of the bounds they are read with: any change to a message changes it.
 pub const SCHEMA_HASH: u64 = schema_hash();
 
 const fn schema_hash() -> u64 {
     let to = u64::from_le_bytes(Key::for_path::<ToDevice>("to").to_bytes());
     let from = u64::from_le_bytes(Key::for_path::<FromDevice>("from").to_bytes());
-    to ^ from.rotate_left(32)
+    // A list's schema does not tell how long it may be, but a longer one cannot be read by the other side.
+    hash_bounds(to ^ from.rotate_left(32), &WIRE_BOUNDS)
+}
+
+/// Every bound that decides whether a message can be read.
+const WIRE_BOUNDS: [usize; 7] = [
+    MAX_MESSAGE,
+    MAX_CHUNK,
+    MAX_PAIRS,
+    MAX_TARGET_PAIRS,
+    MAX_KEYFRAMES,
+    MAX_LOG,
+    MAX_NAME,
+];
+
+/// FNV-1a, 64 bit, one step for each number.
+const fn hash_bounds(start: u64, bounds: &[usize]) -> u64 {
+    let (mut hash, mut i) = (start, 0);
+    while i < bounds.len() {
+        hash = (hash ^ bounds[i] as u64).wrapping_mul(0x0000_0100_0000_01b3);
+        i += 1;
+    }
+    hash
 }
 
 /// Who speaks. Frozen layout.
@@ -573,4 +595,19 @@ pub struct Keyframe {
     pub pose: WirePose,
     /// Added to the spring's force, N, world.
     pub push: [f32; 3],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bound_counts_in_the_schema_hash() {
+        let own = hash_bounds(1, &WIRE_BOUNDS);
+        for i in 0..WIRE_BOUNDS.len() {
+            let mut changed = WIRE_BOUNDS;
+            changed[i] += 1;
+            assert_ne!(hash_bounds(1, &changed), own, "bound {i}");
+        }
+    }
 }
