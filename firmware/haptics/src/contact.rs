@@ -3,6 +3,8 @@
 use glam::Vec3;
 use heapless::Vec;
 
+use crate::proximity::Leaf;
+
 /// Contacts one tick can carry.
 pub(crate) const MAX_CONTACTS: usize = 256;
 
@@ -21,10 +23,10 @@ pub(crate) struct Contact {
     pub phase: Phase,
     /// Face of the held part.
     pub moving_face: u16,
-    /// The other part.
-    pub static_part: u16,
-    /// Its face.
+    /// Face of the other part.
     pub static_face: u16,
+    /// Where it was found; tells the other part.
+    pub leaf: Leaf,
 }
 
 /// Branch of a contact's piecewise linear force.
@@ -145,8 +147,8 @@ mod tests {
             rate: 0.0,
             phase: Phase::Free,
             moving_face: 0,
-            static_part: 0,
             static_face: 0,
+            leaf: Leaf::FIRST,
         }
     }
 

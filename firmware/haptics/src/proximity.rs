@@ -4,20 +4,19 @@
 //! held part's field, or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every
 //! sphere that the field's distance at its centre puts farther off than the margin.
 //!
-//! When the look-up budget runs out, the next tick first looks at the leaves that had candidates, then goes on where this one stopped,
+//! When the look-up budget runs out, the next tick first looks at the leaves whose points pushed, then goes on where this one stopped,
 //! round and round: what touches stays felt, and everything is looked at again within a few ticks.
 //!
 //! Cost on a Cortex-M7: about 135 instructions a look-up in the band and 15 outside (see [`Field`]), 30 to place the point, 80 more for a
 //! candidate.
 
 use glam::{Mat3, Vec3};
-use heapless::Vec;
 use mortise_protocol::image::{Field, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage};
 
 use crate::contact::{Contact, Contacts, Phase};
 use crate::io::{Flags, Work};
 use crate::pose::Pose;
-use crate::state::{MAX_LEAVES, Placed};
+use crate::state::Placed;
 
 /// Trilinear interpolation can overstate the distance next to a sharp edge; measured at 0.2 cells for a right angle, taken as this many.
 const EDGE_ERROR_CELLS: f32 = 0.25;
@@ -32,6 +31,16 @@ pub(crate) struct Leaf {
     /// Twice the part's index, plus one for backward.
     job: u16,
     node: u32,
+}
+
+impl Leaf {
+    /// The beginning.
+    pub const FIRST: Self = Self { job: 0, node: 0 };
+
+    /// Index of the other part.
+    pub fn part(self) -> u16 {
+        self.job / 2
+    }
 }
 
 /// One search.
@@ -80,32 +89,30 @@ impl Affine {
 }
 
 impl<'i> Search<'_, 'i> {
-    /// Fills `contacts` and `leaves`; returns where to go on when the budget ran out.
+    /// Fills `contacts`; returns where to go on when the budget ran out. After such a tick (`resume`), `first` are the leaves to begin with.
     pub fn run(
         &self,
         resume: Option<Leaf>,
-        leaves: &mut Vec<Leaf, MAX_LEAVES>,
+        first: &[Leaf],
         contacts: &mut Contacts,
         work: &mut Work,
     ) -> Option<Leaf> {
         contacts.clear();
-        let before = if resume.is_some() {
-            leaves.clone()
-        } else {
-            Vec::new()
-        };
-        leaves.clear();
         let mut walk = Walk {
             search: self,
-            leaves,
             contacts,
             work,
             passed_over: 0,
         };
-        // Normally one pass from the beginning to the end.
-        let start = resume.unwrap_or(Leaf { job: 0, node: 0 });
+        let Some(start) = resume else {
+            let stopped = walk.jobs(Leaf::FIRST, None, &[]);
+            walk.work
+                .flags
+                .insert_if(stopped.is_some(), Flags::BUDGET_EXCEEDED);
+            return stopped;
+        };
         let mut job = None;
-        for leaf in &before {
+        for leaf in first {
             if job.as_ref().is_none_or(|j: &Job<'_>| j.index != leaf.job) {
                 job = self.job(leaf.job);
             }
@@ -118,11 +125,11 @@ impl<'i> Search<'_, 'i> {
             }
         }
         let stopped = walk
-            .jobs(start, None, &before)
-            .or_else(|| walk.jobs(Leaf { job: 0, node: 0 }, resume, &before));
-        if stopped.is_some() {
-            walk.work.flags.insert(Flags::BUDGET_EXCEEDED);
-        }
+            .jobs(start, None, first)
+            .or_else(|| walk.jobs(Leaf::FIRST, Some(start), first));
+        walk.work
+            .flags
+            .insert_if(stopped.is_some(), Flags::BUDGET_EXCEEDED);
         stopped
     }
 
@@ -188,7 +195,6 @@ impl<'i> Search<'_, 'i> {
 /// A search under way.
 struct Walk<'w, 's, 'i> {
     search: &'w Search<'s, 'i>,
-    leaves: &'w mut Vec<Leaf, MAX_LEAVES>,
     contacts: &'w mut Contacts,
     work: &'w mut Work,
     /// Points that were no edge points.
@@ -247,13 +253,7 @@ impl Walk<'_, '_, '_> {
                     .points
                     .get(first..first + node.point_count as usize)
                     .unwrap_or(&[]);
-                let before = self.work.candidates;
-                let finished = self.points(job, points);
-                if self.work.candidates != before {
-                    // Further leaves lose their place in the queue, not their force.
-                    let _ = self.leaves.push(here);
-                }
-                if !finished {
+                if !self.points(job, here, points) {
                     return Some(here);
                 }
             }
@@ -262,7 +262,7 @@ impl Walk<'_, '_, '_> {
     }
 
     /// All points of a leaf; false when the budget ran out.
-    fn points(&mut self, job: &Job<'_>, points: &[PointRecord]) -> bool {
+    fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> bool {
         let mut left = self.left();
         for point in points {
             if job.backward && point.edge_face == NO_FACE {
@@ -277,13 +277,13 @@ impl Walk<'_, '_, '_> {
             }
             left -= 1;
             self.work.points += 1;
-            self.point(job, point);
+            self.point(job, leaf, point);
         }
         true
     }
 
     #[inline]
-    fn point(&mut self, job: &Job<'_>, point: &PointRecord) {
+    fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) {
         let in_field = job.to_field.apply(point.position);
         let sample = match job.field.lookup(in_field.to_array()) {
             Lookup::Near(sample) => sample,
@@ -317,8 +317,8 @@ impl Walk<'_, '_, '_> {
             rate: 0.0,
             phase: Phase::Free,
             moving_face,
-            static_part: job.index / 2,
             static_face,
+            leaf,
         });
     }
 

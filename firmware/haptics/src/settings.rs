@@ -44,11 +44,11 @@ pub struct ContactSettings {
     pub stiffness_n_per_m: f32,
     /// Cap on the sum of k over all points that touch, N/m: with more points each gets less. It bounds the condition number of the step's
     /// matrix (h²·cap/mass) and is better left high, since a part that lies on many points shares it with the one point at its side.
-    /// Default 100 MN/m.
+    /// Default 20 MN/m: a hundred points at the default stiffness.
     pub total_stiffness_n_per_m: f32,
     /// Damping on approach as a ratio of stiffness, s: λ = k·(depth + damping_s · approach speed). Default 0.5 ms.
     pub damping_s: f32,
-    /// Points this near are taken into the step beyond what the motion of one tick can reach, m. Default 50 µm.
+    /// Points this near are taken into the step beyond what the motion of one tick can reach, m. Default 20 µm.
     pub margin_m: f32,
     /// Most field look-ups a tick, tree nodes and points alike. Default 1500.
     pub point_budget: u32,
@@ -94,9 +94,9 @@ impl Default for Settings {
             },
             contact: ContactSettings {
                 stiffness_n_per_m: 200e3,
-                total_stiffness_n_per_m: 100e6,
+                total_stiffness_n_per_m: 20e6,
                 damping_s: 0.5e-3,
-                margin_m: 50e-6,
+                margin_m: 20e-6,
                 point_budget: 1500,
             },
             object: ObjectSettings {

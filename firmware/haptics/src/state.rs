@@ -29,7 +29,7 @@ pub struct State {
     pub(crate) sharing: f32,
     /// Where to go on after a tick whose budget ran out.
     pub(crate) resume: Option<Leaf>,
-    /// Leaves that had candidates in the last tick, in the order they were looked at.
+    /// After such a tick: leaves whose points pushed, each once.
     pub(crate) leaves: Vec<Leaf, MAX_LEAVES>,
     /// Scratch of one tick; kept here because a board's stack is small.
     pub(crate) contacts: Contacts,

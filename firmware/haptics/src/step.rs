@@ -26,8 +26,9 @@ use crate::settings::CouplingSettings;
 pub(crate) const MAX_SOLVES: u8 = 8;
 /// Solves allowed without contacts: one, and two more while the coupling slips.
 const MAX_FREE_SOLVES: u8 = 3;
-/// A touching point is let go once its gap at the step's end is above this, m. Its pull until then is k · 1 nm: 0.2 mN at 200 kN/m.
-const RELEASE_GAP_M: f32 = 1e-9;
+/// A point that the last solution lets push or pull by less than this where it should not, N, does not ask for another solve: at 200 kN/m
+/// it is 2.5 nm, the rounding of a position of 40 mm.
+const FORCE_BAND_N: f32 = 0.5e-3;
 /// Rates within this of zero do not change between parting and closing, m/s: k·τ times this is 0.1 mN at 200 kN/m and 0.5 ms.
 const RATE_BAND_M_PER_S: f32 = 1e-6;
 /// A slip that changes by less than this is settled.
@@ -85,7 +86,8 @@ impl Step<'_> {
         }
     }
 
-    /// The step with `contacts` of stiffness `k` (N/m) and approach damping `damping_s` (τ), starting from the `free` solution.
+    /// The step with `contacts` of stiffness `k` (N/m) and approach damping `damping_s` (τ), starting from the motion so far, or from the
+    /// `free` solution when that touches nothing.
     ///
     /// On return each contact's rate and phase are those of the solution.
     pub fn with_contacts(
@@ -101,7 +103,11 @@ impl Step<'_> {
             Phase::Parting => h * k * h,
             Phase::Closing => h * k * (h + damping_s),
         };
-        let mut x = self.scale(free.twist);
+        let band = FORCE_BAND_N / k;
+        // Where the object rests or slides, its motion up to now already tells which points touch.
+        let mut x = self.scale(self.twist);
+        // Whether `x` solves the step with some set of touching points.
+        let mut solved = false;
         let mut slip = free.slip;
         let mut stiffness = Symmetric6::ZERO;
         let mut push = [0.0f32; 6];
@@ -110,7 +116,7 @@ impl Step<'_> {
             let mut changed = false;
             for c in contacts.iter_mut() {
                 c.rate = dot(&c.row, &x);
-                let phase = next_phase(c, h, damping_s);
+                let phase = next_phase(c, h, damping_s, band);
                 if phase != c.phase {
                     changed = true;
                     stiffness.add_outer(weight(phase) - weight(c.phase), &c.row);
@@ -122,8 +128,13 @@ impl Step<'_> {
                     c.phase = phase;
                 }
             }
+            if !solved && !changed {
+                x = self.scale(free.twist);
+                solved = true;
+                continue;
+            }
             let next = self.slip(self.unscale(&x));
-            if !changed && settled(slip, next) {
+            if solved && !changed && settled(slip, next) {
                 break true;
             }
             if solves == MAX_SOLVES {
@@ -136,6 +147,7 @@ impl Step<'_> {
                 *r += p;
             }
             x = matrix.solve(&right);
+            solved = true;
             solves += 1;
         };
         let mut contact = Wrench::ZERO;
@@ -213,18 +225,14 @@ pub(crate) fn force(c: &Contact, k: f32, period_s: f32, damping_s: f32) -> f32 {
 }
 
 #[inline]
-fn next_phase(c: &Contact, h: f32, damping_s: f32) -> Phase {
+fn next_phase(c: &Contact, h: f32, damping_s: f32, band: f32) -> Phase {
     let closing = match c.phase {
         Phase::Closing => c.rate < RATE_BAND_M_PER_S,
         Phase::Parting => c.rate < -RATE_BAND_M_PER_S,
         Phase::Free => c.rate < 0.0,
     };
     let end = c.gap + h * c.rate + if closing { damping_s * c.rate } else { 0.0 };
-    let most = if c.phase == Phase::Free {
-        0.0
-    } else {
-        RELEASE_GAP_M
-    };
+    let most = if c.phase == Phase::Free { -band } else { band };
     if end >= most {
         Phase::Free
     } else if closing {

@@ -3,6 +3,7 @@
 use mortise_protocol::image::SceneImage;
 
 use crate::body::Grabbed;
+use crate::contact::Phase;
 use crate::coupling::Coupling;
 use crate::io::{FacePairs, Flags, Input, Output, Work};
 use crate::limits::{length, limit};
@@ -128,7 +129,7 @@ impl State {
             inverse_length: 1.0 / step.length,
             budget: settings.contact.point_budget,
         };
-        self.resume = search.run(self.resume, &mut self.leaves, &mut self.contacts, work);
+        self.resume = search.run(self.resume, &self.leaves, &mut self.contacts, work);
         work.flags
             .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
         let contact = &settings.contact;
@@ -140,9 +141,27 @@ impl State {
         );
         let solution = step.with_contacts(free, self.contacts.as_mut_slice(), k, contact.damping_s);
         work.contacts = self.contacts.pushing() as u16;
+        self.remember_leaves();
         work.solves = solution.solves;
         work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
         solution
+    }
+
+    /// After a tick whose budget ran out: the leaves whose points pushed, to be looked at first next time. Further ones lose their place in
+    /// the queue, not their force.
+    fn remember_leaves(&mut self) {
+        self.leaves.clear();
+        if self.resume.is_none() {
+            return;
+        }
+        for contact in self.contacts.as_slice() {
+            if contact.phase != Phase::Free
+                && !self.leaves.contains(&contact.leaf)
+                && self.leaves.push(contact.leaf).is_err()
+            {
+                return;
+            }
+        }
     }
 
     /// The wrench for the mechanism; remembered for the slew limit.

@@ -19,7 +19,7 @@ pub(crate) fn touching_faces(contacts: &[Contact], center: Vec3, period_s: f32) 
     let mut last = 0;
     for c in contacts.iter().filter(|c| c.phase != Phase::Free) {
         let same = |p: &FacePair| {
-            p.moving_face == c.moving_face && p.static_part == c.static_part && p.static_face == c.static_face
+            p.moving_face == c.moving_face && p.static_part == c.leaf.part() && p.static_face == c.static_face
         };
         let depth_m = -(c.gap + period_s * c.rate);
         let found = match gathered.get(last) {
@@ -40,7 +40,7 @@ pub(crate) fn touching_faces(contacts: &[Contact], center: Vec3, period_s: f32) 
             None => {
                 let new = FacePair {
                     moving_face: c.moving_face,
-                    static_part: c.static_part,
+                    static_part: c.leaf.part(),
                     static_face: c.static_face,
                     count: 1,
                     depth_m,

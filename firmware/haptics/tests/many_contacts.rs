@@ -1,0 +1,60 @@
+//! Thousands of points touching at once.
+
+mod support;
+
+use mortise_haptics::{Flags, Settings, State};
+use support::hand::{Hand, run};
+
+/// A face with 2,025 points pressed flat; deepest penetration, felt force.
+fn press(settings: &Settings) -> (f32, f32, support::hand::Seen) {
+    let image = support::slab_and_box(0.05e-3, 45);
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let mut hand = Hand::at([0.0, 0.0, 5.05e-3]);
+    hand.spring_n_per_m = 0.0;
+    state.grab(&scene, 1, &hand.pose()).unwrap();
+    hand.push = [0.0, 0.0, -9.0];
+    let mut late = 0.0f32;
+    let (out, seen) = run(&mut state, &scene, settings, &mut hand, 2000, |t, hand, out| {
+        if let Some(out) = out
+            && t > 1000
+        {
+            late = late.max((out.handle.force.z - 9.0).abs());
+            late = late.max(100.0 * hand.velocity[2].abs() as f32);
+        }
+    });
+    println!("{seen:?}, last {:?}, unrest {late}", out.work);
+    // Once settled the force stands still within a thousandth.
+    assert!(late < 9e-3, "{late}");
+    (seen.deepest_m, out.handle.force.z, seen)
+}
+
+#[test]
+fn all_looked_up_the_deepest_kept() {
+    let mut settings = Settings::default();
+    settings.contact.point_budget = 20_000;
+    let (deepest, felt, seen) = press(&settings);
+    assert!((felt - 9.0).abs() < 0.01);
+    assert!(deepest < 20e-6);
+    assert!(seen.flags.contains(Flags::CONTACTS_DROPPED));
+}
+
+#[test]
+fn a_million_newton_per_metre_in_all() {
+    let mut settings = Settings::default();
+    settings.contact.point_budget = 20_000;
+    settings.contact.total_stiffness_n_per_m = 1e6;
+    let (deepest, felt, _) = press(&settings);
+    assert!((felt - 9.0).abs() < 0.01);
+    // 9 N on 1 MN/m is 9 µm; as much again on impact.
+    assert!(deepest < 20e-6);
+}
+
+#[test]
+fn on_the_usual_budget() {
+    let (deepest, felt, seen) = press(&Settings::default());
+    assert!((felt - 9.0).abs() < 0.01);
+    assert!(deepest < 20e-6);
+    assert!(seen.flags.contains(Flags::BUDGET_EXCEEDED));
+}

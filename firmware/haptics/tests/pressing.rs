@@ -1,0 +1,54 @@
+//! A part pressed against a wall: the hand feels its own force, the part stays outside.
+
+mod support;
+
+use mortise_haptics::{Settings, State};
+use support::hand::{Hand, run};
+
+fn pressed(image: &support::image::Image, from: [f64; 3], direction: [f64; 3], force: f64) -> (f64, f64) {
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let mut hand = Hand::at(from);
+    hand.spring_n_per_m = 0.0;
+    state.grab(&scene, 1, &hand.pose()).unwrap();
+    hand.push = direction.map(|d| d * force);
+    let (out, seen) = run(
+        &mut state,
+        &scene,
+        &Settings::default(),
+        &mut hand,
+        3000,
+        |_, _, _| {},
+    );
+    let felt: f64 = (0..3)
+        .map(|a| -direction[a] * f64::from(out.handle.force[a]))
+        .sum();
+    println!(
+        "{force} N: felt {felt:.4} N, depth {:.2} um settled, {:.2} um at most, {:?}",
+        1e6 * out.pairs[0].depth_m,
+        1e6 * seen.deepest_m,
+        seen
+    );
+    (felt, f64::from(seen.deepest_m))
+}
+
+#[test]
+fn on_a_flat_face() {
+    let image = support::slab_and_box(0.5e-3, 7);
+    for force in [1.0, 3.0, 5.0] {
+        let (felt, deepest) = pressed(&image, [0.0, 0.0, 0.03], [0.0, 0.0, -1.0], force);
+        assert!((felt - force).abs() < 0.02 * force, "{felt} of {force} N");
+        assert!(deepest < 50e-6);
+    }
+}
+
+#[test]
+fn on_the_wall_of_a_hole() {
+    let image = support::hole_and_peg(1e-3, 25e-3);
+    for force in [1.0, 3.0, 5.0] {
+        let (felt, deepest) = pressed(&image, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], force);
+        assert!((felt - force).abs() < 0.02 * force, "{felt} of {force} N");
+        assert!(deepest < 50e-6);
+    }
+}

@@ -1,0 +1,252 @@
+//! A compact scene-image writer for analytic solids: exact distances sampled into 16-bit bricks, points under a median-split tree.
+
+use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
+use mortise_protocol::image::*;
+
+use super::solids::{Solid, SurfacePoint};
+
+/// Cell edge, m.
+pub const CELL: f64 = 0.5e-3;
+/// Distances are stored this far from the surface, m.
+pub const BAND: f64 = 2e-3;
+const LEAF_POINTS: usize = 8;
+
+/// An image under construction.
+#[derive(Default)]
+pub struct Writer {
+    parts: Vec<PartRecord>,
+    shapes: Vec<ShapeRecord>,
+    fields: Vec<FieldRecord>,
+    nodes: Vec<NodeRecord>,
+    points: Vec<PointRecord>,
+    faces: Vec<FaceRecord>,
+    bricks: Vec<BrickRecord>,
+    palette: Vec<u16>,
+    grid: Vec<u16>,
+    blob: Vec<u8>,
+}
+
+/// Finished bytes, aligned to 4.
+pub struct Image(Vec<u32>);
+
+impl Image {
+    pub fn open(&self) -> SceneImage<'_> {
+        SceneImage::open(cast_slice(&self.0)).expect("the writer makes valid images")
+    }
+}
+
+impl Writer {
+    /// Adds a shape; its index.
+    pub fn shape(&mut self, solid: &dyn Solid) -> u32 {
+        let field = self.field(solid);
+        let mut points = solid.points();
+        let first_node = self.nodes.len() as u32;
+        let first_point = self.points.len() as u32;
+        let mut nodes = Vec::new();
+        tree(&mut points, 0, &mut nodes);
+        self.nodes.extend(&nodes);
+        self.points.extend(points.iter().map(|p| PointRecord {
+            position: p.position.map(|x| x as f32),
+            normal: oct_encode(p.normal.map(|x| x as f32)),
+            face: p.face,
+            edge_face: p.edge_face.unwrap_or(NO_FACE),
+        }));
+        let first_face = self.faces.len() as u32;
+        self.faces
+            .extend((0..solid.face_count()).map(|_| FaceRecord::zeroed()));
+        let half = solid.half_size();
+        let mass = solid.mass_properties();
+        self.shapes.push(ShapeRecord {
+            field,
+            flags: 0,
+            first_node,
+            node_count: nodes.len() as u32,
+            first_point,
+            point_count: points.len() as u32,
+            first_face,
+            face_count: solid.face_count(),
+            center: [0.0; 3],
+            radius: norm(half) as f32,
+            volume: mass.0 as f32,
+            center_of_mass: [0.0; 3],
+            inertia: [
+                mass.1[0] as f32,
+                mass.1[1] as f32,
+                mass.1[2] as f32,
+                0.0,
+                0.0,
+                0.0,
+            ],
+        });
+        self.shapes.len() as u32 - 1
+    }
+
+    /// Places a shape; the part's index.
+    pub fn part(&mut self, shape: u32, grabbable: bool, position: [f32; 3], orientation: [f32; 4]) -> u16 {
+        self.parts.push(PartRecord {
+            shape,
+            flags: if grabbable { PART_GRABBABLE } else { 0 },
+            position,
+            orientation,
+        });
+        self.parts.len() as u16 - 1
+    }
+
+    fn field(&mut self, solid: &dyn Solid) -> u32 {
+        let half = solid.half_size();
+        let brick = CELL * BRICK_CELLS as f64;
+        let dims = half.map(|h| (2.0 * (h + BAND) / brick).ceil() as usize);
+        let origin = core::array::from_fn::<_, 3, _>(|a| -0.5 * brick * dims[a] as f64);
+        let scale = BAND / 32767.0;
+        let first_brick = self.bricks.len() as u32;
+        let first_grid = self.grid.len() as u32;
+        for index in 0..dims[0] * dims[1] * dims[2] {
+            let b = [
+                index % dims[0],
+                index / dims[0] % dims[1],
+                index / dims[0] / dims[1],
+            ];
+            let at = |c: [f64; 3]| -> [f64; 3] {
+                core::array::from_fn(|a| origin[a] + CELL * (c[a] + (b[a] * BRICK_CELLS) as f64))
+            };
+            let samples: Vec<f64> = (0..SAMPLES_PER_BRICK)
+                .map(|i| {
+                    let (n, n2) = (BRICK_SAMPLES, BRICK_SAMPLES * BRICK_SAMPLES);
+                    solid.distance(at([(i % n) as f64, (i / n % n) as f64, (i / n2) as f64]))
+                })
+                .collect();
+            let nearest = samples.iter().fold(f64::MAX, |m, d| m.min(d.abs()));
+            let entry = if nearest <= BAND {
+                self.brick(solid, &samples, scale, at);
+                GridEntry::Brick((self.bricks.len() as u32 - 1 - first_brick) as u16)
+            } else {
+                // Any place in the brick is within half a cell's diagonal of a sample.
+                GridEntry::Empty {
+                    inside: samples[0] < 0.0,
+                    cells: (nearest / CELL - 0.87).floor().max(0.0) as u16,
+                }
+            };
+            self.grid.push(entry.to_bits());
+        }
+        self.fields.push(FieldRecord {
+            origin: origin.map(|x| x as f32),
+            cell: CELL as f32,
+            scale: scale as f32,
+            band: BAND as f32,
+            brick_dims: dims.map(|d| d as u16),
+            format: FORMAT_I16,
+            first_grid,
+            first_brick,
+            brick_count: self.bricks.len() as u32 - first_brick,
+        });
+        self.fields.len() as u32 - 1
+    }
+
+    fn brick(&mut self, solid: &dyn Solid, samples: &[f64], scale: f64, at: impl Fn([f64; 3]) -> [f64; 3]) {
+        pad(&mut self.blob);
+        let offset = self.blob.len() as u32;
+        for d in samples {
+            let q = (d / scale).round().clamp(-32767.0, 32767.0) as i16;
+            self.blob.extend(q.to_le_bytes());
+        }
+        pad(&mut self.blob);
+        let indices = self.blob.len() as u32;
+        for i in 0..CELLS_PER_BRICK {
+            let (n, n2) = (BRICK_CELLS, BRICK_CELLS * BRICK_CELLS);
+            let center = [(i % n) as f64, (i / n % n) as f64, (i / n2) as f64].map(|c| c + 0.5);
+            self.blob.push(solid.face(at(center)) as u8);
+        }
+        let palette = self.palette.len() as u32;
+        self.palette.extend(0..256u16);
+        self.bricks.push(BrickRecord {
+            samples: offset,
+            indices,
+            palette,
+            palette_len: 256,
+            index_bits: 8,
+        });
+    }
+
+    pub fn finish(self) -> Image {
+        let mut bytes = vec![0u8; size_of::<Header>()];
+        let mut header = Header {
+            magic: MAGIC,
+            layout: LAYOUT_VERSION,
+            ..Header::zeroed()
+        };
+        header.parts = section(&mut bytes, &self.parts);
+        header.shapes = section(&mut bytes, &self.shapes);
+        header.fields = section(&mut bytes, &self.fields);
+        header.nodes = section(&mut bytes, &self.nodes);
+        header.points = section(&mut bytes, &self.points);
+        header.faces = section(&mut bytes, &self.faces);
+        header.bricks = section(&mut bytes, &self.bricks);
+        header.palette = section(&mut bytes, &self.palette);
+        header.grid = section(&mut bytes, &self.grid);
+        header.blob = section(&mut bytes, &self.blob);
+        pad(&mut bytes);
+        header.length = bytes.len() as u32;
+        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+        header.crc = CRC.checksum(&bytes[20..]);
+        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+        Image(
+            bytes
+                .chunks_exact(4)
+                .map(|b| u32::from_le_bytes(b.try_into().unwrap()))
+                .collect(),
+        )
+    }
+}
+
+fn section<T: Pod>(bytes: &mut Vec<u8>, records: &[T]) -> Section {
+    pad(bytes);
+    let offset = bytes.len() as u32;
+    bytes.extend_from_slice(cast_slice(records));
+    Section {
+        offset,
+        count: records.len() as u32,
+    }
+}
+
+fn pad(bytes: &mut Vec<u8>) {
+    while !bytes.len().is_multiple_of(4) {
+        bytes.push(0);
+    }
+}
+
+/// Appends the preorder tree of `points` (whose first has index `first` in the shape), reordering them.
+fn tree(points: &mut [SurfacePoint], first: usize, nodes: &mut Vec<NodeRecord>) {
+    let low: [f64; 3] =
+        core::array::from_fn(|a| points.iter().map(|p| p.position[a]).fold(f64::MAX, f64::min));
+    let high: [f64; 3] =
+        core::array::from_fn(|a| points.iter().map(|p| p.position[a]).fold(f64::MIN, f64::max));
+    let center: [f64; 3] = core::array::from_fn(|a| 0.5 * (low[a] + high[a]));
+    let radius = points
+        .iter()
+        .map(|p| norm(core::array::from_fn(|a| p.position[a] - center[a])))
+        .fold(0.0, f64::max);
+    let own = nodes.len();
+    nodes.push(NodeRecord {
+        center: center.map(|x| x as f32),
+        // Covers the rounding of centre and points to single precision.
+        radius: (radius * (1.0 + 1e-6) + 1e-8) as f32,
+        first_point: first as u32,
+        point_count: points.len() as u32,
+        skip: 0,
+    });
+    if points.len() > LEAF_POINTS {
+        let axis = (0..3)
+            .max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b])))
+            .unwrap();
+        points.sort_by(|p, q| p.position[axis].total_cmp(&q.position[axis]));
+        let (left, right) = points.split_at_mut(points.len() / 2);
+        let middle = first + left.len();
+        tree(left, first, nodes);
+        tree(right, middle, nodes);
+    }
+    nodes[own].skip = nodes.len() as u32;
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}

@@ -1,0 +1,64 @@
+//! Scenes and hands for the tests.
+#![allow(dead_code, reason = "each test file uses its share")]
+
+pub mod hand;
+pub mod image;
+pub mod solids;
+
+use image::{Image, Writer};
+use solids::{Block, Peg};
+
+pub const UPRIGHT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+/// Radius of the thesis' hole, m.
+pub const HOLE: f64 = 9.375e-3;
+/// Half the height of the block with the hole, m.
+pub const BLOCK_HALF: f64 = 10e-3;
+/// Half the length of the peg, m.
+pub const PEG_HALF: f64 = 15e-3;
+
+/// Fixed block (part 0) with the thesis' 18.75 mm hole and a peg (part 1) of the given diametral clearance, its lower end `engaged`
+/// below the block's top.
+pub fn hole_and_peg(clearance: f64, engaged: f64) -> Image {
+    let mut w = Writer::default();
+    let block = w.shape(&Block {
+        half: [15e-3, 15e-3, BLOCK_HALF],
+        hole: HOLE,
+        around: 128,
+        across: 7,
+    });
+    let peg = w.shape(&Peg {
+        radius: HOLE - 0.5 * clearance,
+        half_length: PEG_HALF,
+        around: 128,
+        rings: 2,
+    });
+    w.part(block, false, [0.0; 3], UPRIGHT);
+    w.part(
+        peg,
+        true,
+        [0.0, 0.0, (BLOCK_HALF + PEG_HALF - engaged) as f32],
+        UPRIGHT,
+    );
+    w.finish()
+}
+
+/// Fixed slab (part 0) with its top at z = 0 and a box of 20 × 20 × 10 mm (part 1) that hovers `height` above it; `across` squared
+/// points on each of the box's large faces.
+pub fn slab_and_box(height: f64, across: usize) -> Image {
+    let mut w = Writer::default();
+    let slab = w.shape(&Block {
+        half: [20e-3, 20e-3, 4e-3],
+        hole: 0.0,
+        around: 0,
+        across: 5,
+    });
+    let moving = w.shape(&Block {
+        half: [10e-3, 10e-3, 5e-3],
+        hole: 0.0,
+        around: 0,
+        across,
+    });
+    w.part(slab, false, [0.0, 0.0, -4e-3], UPRIGHT);
+    w.part(moving, true, [0.0, 0.0, (5e-3 + height) as f32], UPRIGHT);
+    w.finish()
+}
