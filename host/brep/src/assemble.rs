@@ -24,6 +24,7 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
             found: found_instead(&file),
         });
     }
+    let units = units::length_units(&file).map_err(|e| text_error(path, e))?;
     let rendered = render::render(&file);
     let kernel_error = |e: cxx::Exception| {
         let reason = match e.what() {
@@ -41,7 +42,7 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
 
     let mut warnings = file.warnings.clone();
     warnings.extend(content.warnings.iter().cloned());
-    let unit = unit(&file, &mut warnings);
+    let unit = unit(units, &mut warnings);
     let raw_parts = document.parts();
     let results: HashMap<usize, RawResult> = document
         .results()
@@ -121,15 +122,12 @@ fn found_instead(file: &Exchange) -> String {
     }
 }
 
-fn unit(file: &Exchange, warnings: &mut Vec<String>) -> String {
-    let units = units::length_units(file);
-    if units.len() > 1 {
-        warnings.push(format!(
-            "length units differ within the file: {}; each is converted",
-            units.join(", ")
-        ));
+/// The file's length unit for people to read; every length is already in millimetres.
+fn unit(names: Vec<String>, warnings: &mut Vec<String>) -> String {
+    if names.len() > 1 {
+        warnings.push(format!("length units differ within the file: {}", names.join(", ")));
     }
-    units.into_iter().next().unwrap_or_else(|| {
+    names.into_iter().next().unwrap_or_else(|| {
         warnings.push("the file names no length unit; millimetre is assumed".into());
         "millimetre".into()
     })

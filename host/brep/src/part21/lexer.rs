@@ -140,6 +140,15 @@ impl Lexer<'_> {
     fn entity(&mut self) -> Result<(), Part21Error> {
         let line = self.line;
         let id = self.number_of_reference()?;
+        self.body(id, line).map_err(|error| match error {
+            Part21Error::Truncated { line, .. } => {
+                Part21Error::Truncated { line, missing: format!("it ends within entity #{id}") }
+            }
+            other => other,
+        })
+    }
+
+    fn body(&mut self, id: u64, line: u32) -> Result<(), Part21Error> {
         let number = self.out.entities.len() as u32;
         self.expect(b'=', &format!("after #{id}"))?;
         self.space()?;
@@ -160,12 +169,7 @@ impl Lexer<'_> {
         }
         let body = start..self.out.bodies.len();
         let references = first..self.out.references.len();
-        self.out.entities.push(Entity {
-            id,
-            line,
-            body,
-            references,
-        });
+        self.out.entities.push(Entity { id, line, body, references });
         Ok(())
     }
 
@@ -230,7 +234,8 @@ impl Lexer<'_> {
             self.at += 1;
         }
         let number = &self.text[start..self.at];
-        out.extend_from_slice(number);
+        // Upper case: the kernel (7.6) takes 6.1e-17, which some writers give for 6.1E-17, for 6.1.
+        out.extend(number.iter().map(u8::to_ascii_uppercase));
         let value = std::str::from_utf8(number)
             .ok()
             .and_then(|n| n.parse::<f64>().ok());
@@ -294,7 +299,7 @@ impl Lexer<'_> {
         self.at += 1;
         while let Some(byte) = self.peek() {
             self.at += 1;
-            out.push(byte);
+            out.push(byte.to_ascii_uppercase());
             if byte == end {
                 return Ok(());
             }
@@ -378,8 +383,11 @@ impl Lexer<'_> {
 
     fn unexpected(&self, place: &str) -> Part21Error {
         match self.peek() {
-            Some(byte) => self.invalid(format!("unexpected {:?} {place}", char::from(byte))),
-            None => self.truncated(format!("the text ends {place}")),
+            // The last byte may be the first half of a comment mark.
+            Some(byte) if byte != b'/' || self.at + 1 < self.text.len() => {
+                self.invalid(format!("unexpected {:?} {place}", char::from(byte)))
+            }
+            _ => self.truncated(format!("it ends {place}")),
         }
     }
 
@@ -445,6 +453,12 @@ mod tests {
         assert_eq!(file.body(0), b"A('it''s',#2,(1.E5,-.5),.T.)");
         assert_eq!(file.body(1), b"B(*,$,\"0F\")");
         assert_eq!(file.entities[1].line, 7);
+    }
+
+    #[test]
+    fn a_lower_case_exponent_is_an_exponent() {
+        let text = b"ISO-10303-21;HEADER;ENDSEC;DATA;#1=P((0.25,-6.1e-17,.t.));ENDSEC;END-ISO-10303-21;";
+        assert_eq!(parse(text).unwrap().body(0), b"P((0.25,-6.1E-17,.T.))");
     }
 
     #[test]
