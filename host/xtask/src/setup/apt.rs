@@ -17,6 +17,10 @@ const FROM_BACKPORTS_IF_REFUSED: &str = "qemu-system-arm";
 /// The file this program may add. One of its own, so that nothing of the user's is edited.
 const BACKPORTS_FILE: &str = "/etc/apt/sources.list.d/mortise-backports.list";
 
+/// Install what was asked for and what it needs, and never take away a package of the user's: apt-get
+/// would remove a newer `qemu-utils` to make room for an older emulator.
+const SPARING: [&str; 2] = ["--no-install-recommends", "--no-remove"];
+
 /// Installs `packages`, of which none is there.
 ///
 /// # Errors
@@ -49,11 +53,12 @@ pub fn install(packages: &[&str]) -> Result<()> {
 
 /// The command for a person.
 pub fn install_line(packages: &[&str]) -> String {
-    format!("apt-get install --no-install-recommends {}", packages.join(" "))
+    format!("apt-get install {} {}", SPARING.join(" "), packages.join(" "))
 }
 
 fn install_from(rights: &Rights, suite: Option<&str>, packages: &[&str]) -> Result<()> {
-    let mut arguments = vec!["install", "--yes", "--no-install-recommends"];
+    let mut arguments = vec!["install", "--yes"];
+    arguments.extend(SPARING);
     if let Some(suite) = suite {
         arguments.extend(["--target-release", suite]);
     }
@@ -70,7 +75,8 @@ fn install_from(rights: &Rights, suite: Option<&str>, packages: &[&str]) -> Resu
 /// True if apt-get finds a way to install `packages`, by a simulation that needs no rights.
 fn would_install(packages: &[&str]) -> Result<bool> {
     let output = Command::new("apt-get")
-        .args(["--simulate", "--no-install-recommends", "install"])
+        .args(["--simulate", "install"])
+        .args(SPARING)
         .args(packages)
         .stdin(Stdio::null())
         .output()

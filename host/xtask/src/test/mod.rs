@@ -43,6 +43,7 @@ const STEPS: &[Step] = &[
     Step { name: "firmware", what: "every board links; flash and RAM use", run: steps::firmware },
     Step { name: "build", what: "the program, and every test", run: steps::build },
     Step { name: "unit", what: "unit, property and integration tests", run: steps::unit },
+    Step { name: "unit-boards", what: "parts of boards that need no chip, tested here", run: steps::unit_boards },
     Step { name: "hil", what: "scenarios on the simulated and the emulated rig", run: steps::hil },
     Step { name: "docs", what: "every public item's documentation builds; commands named in pages exist", run: steps::docs },
     Step { name: "figures", what: "end-to-end figures, the quick form", run: steps::figures },

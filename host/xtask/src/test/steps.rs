@@ -1,6 +1,6 @@
 //! The steps, one function each. `window` has a file of its own.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
@@ -51,7 +51,9 @@ pub fn no_std(bench: &mut Bench) -> Result<String> {
 
 pub fn lint_boards(bench: &mut Bench) -> Result<String> {
     for board in boards::boards(&bench.root)? {
-        shell::run(boards::cargo(&bench.root, &board).args(["clippy", "--release", "--", "-D", "warnings"]))?;
+        let mut command = boards::cargo(&bench.root, &board);
+        command.args(["clippy", "--release", "--target", setup::BOARD_TARGET]);
+        shell::run(command.args(["--", "-D", "warnings"]))?;
     }
     Ok(String::new())
 }
@@ -84,6 +86,21 @@ pub fn unit(bench: &mut Bench) -> Result<String> {
         "--no-fail-fast",
     ]);
     counted(bench, &mut command)
+}
+
+/// Parts of boards that need no chip are libraries, tested here on the PC.
+pub fn unit_boards(bench: &mut Bench) -> Result<String> {
+    let host = host_triple(&bench.root)?;
+    let boards = bench.root.join("firmware/boards");
+    for board in boards::boards(&bench.root)? {
+        if !boards.join(&board).join("src/lib.rs").is_file() {
+            continue;
+        }
+        let mut command = boards::cargo(&bench.root, &board);
+        command.args(["test", "--lib", "--target", &host]);
+        counted(bench, &mut command)?;
+    }
+    Ok(String::new())
 }
 
 pub fn hil(bench: &mut Bench) -> Result<String> {
@@ -128,6 +145,13 @@ impl Bench {
             }
         }
     }
+}
+
+/// The system tests run on. Asked for, because a board's own configuration may name another.
+fn host_triple(root: &Path) -> Result<String> {
+    let text = shell::read(Command::new("rustc").arg("-vV").current_dir(root))?;
+    let host = text.lines().find_map(|line| line.strip_prefix("host: "));
+    Ok(host.context("`rustc -vV` names no host")?.to_owned())
 }
 
 /// Runs tests and counts them, failed ones too; none at all is a failure, as it says nothing.
