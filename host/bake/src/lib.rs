@@ -1,1 +1,41 @@
-//! CAD model to scene image: exact signed distance, bricks, pointshell
+//! CAD model to scene image: exact signed distance, sparse bricks, pointshell.
+//!
+//! [`bake`] turns a [`CadModel`](mortise_brep::CadModel) (mm) into the bytes that
+//! [`SceneImage`](mortise_protocol::image::SceneImage) reads in place (m). On the way each shape gets
+//!
+//! 1. an [`ExactSurface`]: signed distance to the B-rep itself, not to its facets,
+//! 2. a field: that distance sampled on bricks of 8³ cells, stored only near the surface,
+//! 3. a pointshell on the exact surface, as dense as an error bound asks, under a tree of spheres.
+//!
+//! Work and bytes grow with the surface, not the volume. The bytes do not depend on the number of threads.
+
+mod bake;
+mod bounds;
+mod bricks;
+mod distance;
+mod edge_samples;
+mod error;
+mod face_samples;
+mod field;
+mod grid;
+mod image;
+mod options;
+mod piece;
+mod pointshell;
+mod report;
+mod surface;
+mod topology;
+mod tree;
+mod triangles;
+mod trim;
+mod winding;
+
+pub use bake::{Baked, bake};
+pub use distance::{ExactSurface, Nearest};
+pub use error::BakeError;
+pub use field::{BakedField, FieldOptions, SampleFormat, bake_field};
+pub use image::{ImageBuilder, PartPlacement};
+pub use options::{BakeOptions, Grabbable, Progress, Stage};
+pub use pointshell::{Pointshell, PointshellOptions, ShellPoint, sample_pointshell};
+pub use report::{BakeReport, ByteCount, PartReport, ShapeReport};
+pub use tree::{SphereTree, build_tree};

@@ -1,0 +1,317 @@
+//! Sampling the exact distance into sparse bricks.
+//!
+//! Only bricks with a point within the band of the surface are stored. Trilinear interpolation of exact samples errs by about cell²/(8R) on
+//! a cylinder of radius R and is exact on planes; samples are rounded to `scale`, which adds at most scale/2. Cost: one exact query for
+//! each of 729 samples of a stored brick, in parallel; a few queries for each empty one.
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+
+use mortise_protocol::image::{
+    BRICK_CELLS, BrickRecord, FORMAT_I8, FORMAT_I16, FieldRecord, GridEntry, SAMPLES_PER_BRICK,
+};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::bounds::{Class, classify};
+use crate::bricks::{Brick, bake_brick};
+use crate::distance::ExactSurface;
+use crate::error::BakeError;
+use crate::grid::Grid;
+
+/// Number format of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SampleFormat {
+    /// One byte: half the size, steps of about a twentieth of a cell at a band of one cell.
+    Int8,
+    /// Two bytes: steps of about a two-thousandth of a cell, and exact over the whole of every stored brick.
+    #[default]
+    Int16,
+}
+
+impl SampleFormat {
+    /// Largest sample.
+    pub fn max(self) -> f64 {
+        match self {
+            Self::Int8 => 127.0,
+            Self::Int16 => 32767.0,
+        }
+    }
+
+    /// Its number in a [`FieldRecord`].
+    pub fn code(self) -> u16 {
+        match self {
+            Self::Int8 => FORMAT_I8,
+            Self::Int16 => FORMAT_I16,
+        }
+    }
+
+    /// Bytes of one sample.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Int8 => 1,
+            Self::Int16 => 2,
+        }
+    }
+}
+
+/// How to sample a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldOptions {
+    /// Cell edge, mm.
+    pub cell_mm: f64,
+    /// Every point within this many cells of the surface lies in a stored brick, and interpolation there uses no clamped sample.
+    pub band_cells: f64,
+    /// Number format.
+    pub format: SampleFormat,
+}
+
+impl FieldOptions {
+    /// Units of a sample in one cell: a whole number, so that planes and repeated features at whole-cell offsets give equal bricks.
+    pub(crate) fn units_per_cell(&self) -> f64 {
+        let range = match self.format {
+            // The corners of a cell the band touches are at most its diagonal farther.
+            SampleFormat::Int8 => self.band_cells + 3f64.sqrt(),
+            // The far corner of a brick the band touches: nothing is ever clamped.
+            SampleFormat::Int16 => self.band_cells + 3f64.sqrt() * (BRICK_CELLS as f64 + 1.0),
+        };
+        (self.format.max() / range).floor().max(1.0)
+    }
+}
+
+/// A field on its own: record offsets count from its own arrays.
+#[derive(Clone, Debug)]
+pub struct BakedField {
+    /// As it will be stored, `first_grid` and `first_brick` 0.
+    pub record: FieldRecord,
+    /// Grid entries in 16 bits.
+    pub grid: Vec<u16>,
+    /// Bricks; offsets count from `blob` and `palette`.
+    pub bricks: Vec<BrickRecord>,
+    /// Palette entries.
+    pub palette: Vec<u16>,
+    /// Samples and palette indices.
+    pub blob: Vec<u8>,
+    /// Bytes of `blob` that are samples; the rest are palette indices and padding.
+    pub sample_bytes: usize,
+    /// Grid entries with samples; equal bricks are stored once, so this may be more than there are bricks.
+    pub stored_entries: usize,
+    /// Brick centres at which the sign disagreed with the winding number, of those tested.
+    pub sign_disagreements: usize,
+    /// Brick centres tested.
+    pub sign_tests: usize,
+}
+
+/// Most grid entries a field may have (2 bytes each; beyond, nothing would fit a board anyway).
+const MAX_ENTRIES: u64 = 4 << 20;
+/// Most entries with samples a field may have: about 400 MB while baking.
+const MAX_STORED: usize = 200_000;
+
+/// Samples `surface`. `part` names it in errors. `progress` is called from any thread with (bricks done, bricks in all) and may stop the
+/// work. The result does not depend on the number of threads.
+pub fn bake_field(
+    surface: &mut ExactSurface,
+    options: &FieldOptions,
+    part: &str,
+    progress: &(dyn Fn(usize, usize) -> ControlFlow<()> + Sync),
+) -> Result<BakedField, BakeError> {
+    let grid = Grid::over(
+        surface.shape(),
+        options.cell_mm,
+        (options.band_cells + 1.0) * options.cell_mm,
+        surface.chord,
+    );
+    let reach = options.band_cells * grid.cell();
+    let too_small = |what: String, ratio: f64| BakeError::CellTooSmall {
+        part: part.to_owned(),
+        cell_mm: options.cell_mm,
+        what,
+        enough_mm: options.cell_mm * ratio,
+    };
+    if grid.entries() > MAX_ENTRIES || grid.dims.iter().any(|&d| d > u32::from(u16::MAX)) {
+        let ratio = (grid.entries() as f64 / MAX_ENTRIES as f64).cbrt().max(1.1);
+        return Err(too_small(
+            format!("{} grid entries, at most {MAX_ENTRIES}", grid.entries()),
+            ratio * 1.1,
+        ));
+    }
+    let alive = || progress(0, 0).is_continue();
+    let classes = classify(surface, &grid, reach, &alive);
+    if !alive() {
+        return Err(BakeError::Cancelled);
+    }
+    let stored: Vec<[u32; 3]> = positions(&grid)
+        .filter(|&b| classes[grid.index(b)] == Class::Stored)
+        .collect();
+    if stored.len() > MAX_STORED {
+        let ratio = (stored.len() as f64 / MAX_STORED as f64).sqrt() * 1.1;
+        return Err(too_small(
+            format!("{} bricks near its surface, at most {MAX_STORED}", stored.len()),
+            ratio,
+        ));
+    }
+    let (sign_tests, sign_disagreements) = compare_signs(surface, &grid, &stored, &classes);
+    // A shell that is closed by count of sides but not by meaning (overlapping, inside-out or doubled solids): the winding number decides.
+    let classes = if sign_disagreements > 0 && !surface.sign_by_winding() {
+        surface.set_sign_by_winding();
+        classify(surface, &grid, reach, &alive)
+    } else {
+        classes
+    };
+    let surface = &*surface;
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let bricks: Option<Vec<Brick>> = stored
+        .par_iter()
+        .map(|&at| {
+            let brick = bake_brick(surface, &grid, options, at);
+            let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+            progress(n, stored.len()).is_continue().then_some(brick)
+        })
+        .collect();
+    let bricks = bricks.ok_or(BakeError::Cancelled)?;
+    let packed = pack(&grid, options, &classes, &stored, bricks);
+    if packed.bricks.len() > GridEntry::MAX_BRICKS {
+        let ratio = (packed.bricks.len() as f64 / GridEntry::MAX_BRICKS as f64).sqrt() * 1.1;
+        return Err(too_small(
+            format!(
+                "{} different bricks, at most {}",
+                packed.bricks.len(),
+                GridEntry::MAX_BRICKS
+            ),
+            ratio,
+        ));
+    }
+    Ok(BakedField {
+        sign_tests,
+        sign_disagreements,
+        ..packed
+    })
+}
+
+fn positions(grid: &Grid) -> impl Iterator<Item = [u32; 3]> {
+    let [w, h, d] = grid.dims;
+    (0..d).flat_map(move |z| (0..h).flat_map(move |y| (0..w).map(move |x| [x, y, z])))
+}
+
+/// Compares the sign with the winding number at the centres of stored bricks that are clear of the surface.
+fn compare_signs(
+    surface: &ExactSurface,
+    grid: &Grid,
+    stored: &[[u32; 3]],
+    classes: &[Class],
+) -> (usize, usize) {
+    let half = BRICK_CELLS / 2;
+    let near = stored.par_iter().map(|&brick| {
+        let p = grid.sample(brick, [half; 3]);
+        let nearest = surface.nearest(p)?;
+        // Within two chord errors the tessellation, and so its winding number, may be on the other side.
+        (nearest.distance.abs() > 2.0 * surface.chord + 1e-6).then_some((p, nearest.distance < 0.0))
+    });
+    let far =
+        positions(grid)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|brick| match classes[grid.index(brick)] {
+                Class::Empty { inside, .. } => Some((grid.sample(brick, [half; 3]), inside)),
+                Class::Stored => None,
+            });
+    near.chain(far)
+        .flatten()
+        .map(|(p, inside)| (1, usize::from((surface.winding_number(p) > 0.5) != inside)))
+        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
+}
+
+/// Puts bricks into arrays, equal ones once: grid entries share bricks, bricks share samples, indices and palettes.
+fn pack(
+    grid: &Grid,
+    options: &FieldOptions,
+    classes: &[Class],
+    stored: &[[u32; 3]],
+    bricks: Vec<Brick>,
+) -> BakedField {
+    let mut entries: Vec<u16> = classes
+        .iter()
+        .map(|class| match *class {
+            Class::Empty { inside, cells } => GridEntry::Empty { inside, cells }.to_bits(),
+            Class::Stored => GridEntry::Brick(0).to_bits(),
+        })
+        .collect();
+    let mut records: Vec<BrickRecord> = Vec::new();
+    let mut palette: Vec<u16> = Vec::new();
+    let mut blob: Vec<u8> = Vec::new();
+    let mut by_record: HashMap<BrickRecord2, u16> = HashMap::new();
+    let mut by_bytes: HashMap<Vec<u8>, u32> = HashMap::new();
+    let mut by_palette: HashMap<Vec<u16>, u32> = HashMap::new();
+    let mut sample_bytes = 0;
+    for (&at, brick) in stored.iter().zip(bricks) {
+        let palette_len = brick.palette.len() as u16;
+        let palette_at = *by_palette.entry(brick.palette).or_insert_with_key(|run| {
+            palette.extend_from_slice(run);
+            (palette.len() - run.len()) as u32
+        });
+        let samples = *by_bytes.entry(brick.samples).or_insert_with_key(|bytes| {
+            sample_bytes += bytes.len();
+            append_aligned(&mut blob, bytes)
+        });
+        let indices = if brick.index_bits == 0 {
+            0
+        } else {
+            *by_bytes
+                .entry(brick.indices)
+                .or_insert_with_key(|bytes| append_aligned(&mut blob, bytes))
+        };
+        let key = (samples, indices, palette_at, palette_len, brick.index_bits);
+        let next = records.len();
+        // Numbers past the limit wrap here; the caller refuses such a field.
+        let number = *by_record.entry(key).or_insert_with(|| {
+            records.push(BrickRecord {
+                samples,
+                indices,
+                palette: palette_at,
+                palette_len,
+                index_bits: brick.index_bits,
+            });
+            next as u16
+        });
+        entries[grid.index(at)] = GridEntry::Brick(number).to_bits();
+    }
+    let units = options.units_per_cell();
+    let scale = (grid.cell() / 1000.0 / units) as f32;
+    BakedField {
+        record: FieldRecord {
+            origin: grid.origin_m,
+            cell: grid.cell_m,
+            scale,
+            band: (f64::from(scale) * options.format.max()) as f32,
+            brick_dims: grid.dims.map(|d| d as u16),
+            format: options.format.code(),
+            first_grid: 0,
+            first_brick: 0,
+            brick_count: records.len() as u32,
+        },
+        grid: entries,
+        bricks: records,
+        palette,
+        blob,
+        sample_bytes,
+        stored_entries: stored.len(),
+        sign_disagreements: 0,
+        sign_tests: 0,
+    }
+}
+
+/// Samples, indices, palette, palette length, index bits.
+type BrickRecord2 = (u32, u32, u32, u16, u16);
+
+fn append_aligned(blob: &mut Vec<u8>, bytes: &[u8]) -> u32 {
+    blob.resize(blob.len().next_multiple_of(4), 0);
+    let at = blob.len() as u32;
+    blob.extend_from_slice(bytes);
+    at
+}
+
+/// Bytes of samples in one brick.
+pub(crate) fn brick_bytes(format: SampleFormat) -> usize {
+    SAMPLES_PER_BRICK * format.bytes()
+}

@@ -1,0 +1,236 @@
+//! Putting the scene image together.
+
+use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
+use glam::DAffine3;
+use mortise_brep::{Face, Shape, Surface};
+use mortise_protocol::image::{
+    BrickRecord, CRC, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE, NodeRecord,
+    PART_GRABBABLE, PartRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode, surface_kind,
+};
+
+use crate::field::BakedField;
+use crate::grid::bounding_box;
+use crate::pointshell::Pointshell;
+use crate::report::ByteCount;
+use crate::tree::{build_tree, round_up};
+
+/// Where a part goes in the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartPlacement {
+    /// Number returned by [`ImageBuilder::add_shape`].
+    pub shape: u32,
+    /// Shape to world, mm.
+    pub placement: DAffine3,
+    /// Whether it may be grabbed.
+    pub grabbable: bool,
+}
+
+/// Collects shapes and parts, then writes the image. Takes millimetres, writes metres.
+#[derive(Default)]
+pub struct ImageBuilder {
+    parts: Vec<PartRecord>,
+    shapes: Vec<ShapeRecord>,
+    fields: Vec<FieldRecord>,
+    nodes: Vec<NodeRecord>,
+    points: Vec<PointRecord>,
+    faces: Vec<FaceRecord>,
+    bricks: Vec<BrickRecord>,
+    palette: Vec<u16>,
+    grid: Vec<u16>,
+    blob: Vec<u8>,
+}
+
+/// The last palette runs must cover every value their indices can take.
+const PALETTE_PADDING: usize = 256;
+
+impl ImageBuilder {
+    /// An image with nothing in it.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a shape with its field and pointshell; returns its number and the bytes it takes.
+    pub fn add_shape(&mut self, shape: &Shape, field: BakedField, shell: &Pointshell) -> (u32, ByteCount) {
+        let positions: Vec<[f32; 3]> = shell
+            .points
+            .iter()
+            .map(|p| (p.position / 1000.0).as_vec3().to_array())
+            .collect();
+        let tree = build_tree(&positions);
+        let (lo, hi) = bounding_box(shape);
+        let center = ((lo + hi) / 2000.0).as_vec3();
+        // Half the diagonal holds the tessellation; the exact surface may bulge past it, by less than the grid's own margin of a cell.
+        let radius = tree
+            .nodes
+            .first()
+            .map_or(0.0, |n| f64::from(n.radius))
+            .max((hi - lo).length() / 2000.0)
+            + f64::from(field.record.cell);
+        let meters = shape.center_of_mass / 1000.0;
+        let i = shape.inertia_mm5;
+        // mm⁵ to m⁵.
+        let inertia = [i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]].map(|v| (v * 1e-15) as f32);
+        let number = self.shapes.len() as u32;
+        self.shapes.push(ShapeRecord {
+            field: self.fields.len() as u32,
+            flags: if shape.closed { 0 } else { SHAPE_LEAKY },
+            first_node: self.nodes.len() as u32,
+            node_count: tree.nodes.len() as u32,
+            first_point: self.points.len() as u32,
+            point_count: positions.len() as u32,
+            first_face: self.faces.len() as u32,
+            face_count: shape.faces.len() as u32,
+            center: center.to_array(),
+            radius: round_up(radius),
+            volume: (shape.volume_mm3 * 1e-9) as f32,
+            center_of_mass: meters.as_vec3().to_array(),
+            inertia,
+        });
+        let bytes = ByteCount {
+            samples: field.sample_bytes,
+            indices: field.blob.len() - field.sample_bytes,
+            grid: field.grid.len() * 2,
+            bricks: field.bricks.len() * size_of::<BrickRecord>(),
+            palette: field.palette.len() * 2,
+            points: positions.len() * size_of::<PointRecord>(),
+            nodes: tree.nodes.len() * size_of::<NodeRecord>(),
+            faces: shape.faces.len() * size_of::<FaceRecord>(),
+            records: size_of::<ShapeRecord>() + size_of::<FieldRecord>(),
+        };
+        self.nodes.extend(tree.nodes);
+        self.points.extend(tree.order.iter().map(|&old| {
+            let p = &shell.points[old as usize];
+            PointRecord {
+                position: positions[old as usize],
+                normal: oct_encode(p.normal.as_vec3().to_array()),
+                face: p.face,
+                edge_face: p.edge_face,
+            }
+        }));
+        self.faces.extend(shape.faces.iter().map(face_record));
+        self.add_field(field);
+        (number, bytes)
+    }
+
+    fn add_field(&mut self, field: BakedField) {
+        self.blob.resize(self.blob.len().next_multiple_of(4), 0);
+        let blob_at = self.blob.len() as u32;
+        let palette_at = self.palette.len() as u32;
+        self.fields.push(FieldRecord {
+            first_grid: self.grid.len() as u32,
+            first_brick: self.bricks.len() as u32,
+            ..field.record
+        });
+        self.bricks.extend(field.bricks.iter().map(|b| BrickRecord {
+            samples: b.samples + blob_at,
+            indices: if b.index_bits == 0 { 0 } else { b.indices + blob_at },
+            palette: b.palette + palette_at,
+            ..*b
+        }));
+        self.grid.extend(field.grid);
+        self.palette.extend(field.palette);
+        self.blob.extend(field.blob);
+    }
+
+    /// Adds a part.
+    pub fn add_part(&mut self, part: &PartPlacement) {
+        let (_, rotation, translation) = part.placement.to_scale_rotation_translation();
+        let q = rotation.normalize();
+        self.parts.push(PartRecord {
+            shape: part.shape,
+            flags: if part.grabbable { PART_GRABBABLE } else { 0 },
+            position: (translation / 1000.0).as_vec3().to_array(),
+            orientation: [q.x as f32, q.y as f32, q.z as f32, q.w as f32],
+        });
+    }
+
+    /// Bytes the image will have.
+    pub fn len(&self) -> u64 {
+        let padded = |bytes: usize| bytes.next_multiple_of(4) as u64;
+        size_of::<Header>() as u64
+            + padded(size_of_val(self.parts.as_slice()))
+            + padded(size_of_val(self.shapes.as_slice()))
+            + padded(size_of_val(self.fields.as_slice()))
+            + padded(size_of_val(self.nodes.as_slice()))
+            + padded(size_of_val(self.points.as_slice()))
+            + padded(size_of_val(self.faces.as_slice()))
+            + padded(size_of_val(self.bricks.as_slice()))
+            + padded(2 * (self.palette.len() + PALETTE_PADDING))
+            + padded(size_of_val(self.grid.as_slice()))
+            + padded(self.blob.len())
+    }
+
+    /// Whether nothing was added.
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty() && self.shapes.is_empty()
+    }
+
+    /// The image. The caller sees to it that [`Self::len`] fits 32 bits.
+    pub fn finish(mut self) -> Vec<u8> {
+        self.palette.extend([NO_FACE; PALETTE_PADDING]);
+        let mut bytes = vec![0; size_of::<Header>()];
+        let mut header = Header {
+            magic: MAGIC,
+            layout: LAYOUT_VERSION,
+            parts: append(&mut bytes, &self.parts),
+            shapes: append(&mut bytes, &self.shapes),
+            fields: append(&mut bytes, &self.fields),
+            nodes: append(&mut bytes, &self.nodes),
+            points: append(&mut bytes, &self.points),
+            faces: append(&mut bytes, &self.faces),
+            bricks: append(&mut bytes, &self.bricks),
+            palette: append(&mut bytes, &self.palette),
+            grid: append(&mut bytes, &self.grid),
+            blob: append(&mut bytes, &self.blob),
+            ..Header::zeroed()
+        };
+        header.length = bytes.len() as u32;
+        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+        header.crc = CRC.checksum(&bytes[20..]);
+        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+        bytes
+    }
+}
+
+// Records are written as they lie in memory; the image is little-endian.
+const _: () = assert!(cfg!(target_endian = "little"), "scene images are little-endian");
+
+fn append<T: Pod>(bytes: &mut Vec<u8>, records: &[T]) -> Section {
+    let section = Section {
+        offset: bytes.len() as u32,
+        count: records.len() as u32,
+    };
+    bytes.extend_from_slice(cast_slice(records));
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    section
+}
+
+/// The exact surface of a face in metres. `sense` is the B-rep's.
+fn face_record(face: &Face) -> FaceRecord {
+    let sense = if face.reversed { -1.0 } else { 1.0 };
+    let of = |kind: u32, frame: &mortise_brep::Frame, radius: f64, second: f64| FaceRecord {
+        kind,
+        sense,
+        origin: (frame.origin / 1000.0).as_vec3().to_array(),
+        axis: frame.z.as_vec3().to_array(),
+        radius: radius as f32,
+        second: second as f32,
+    };
+    match face.surface {
+        Surface::Plane { frame } => of(surface_kind::PLANE, &frame, 0.0, 0.0),
+        Surface::Cylinder { frame, radius } => of(surface_kind::CYLINDER, &frame, radius / 1000.0, 0.0),
+        Surface::Cone {
+            frame,
+            radius,
+            half_angle,
+        } => of(surface_kind::CONE, &frame, radius / 1000.0, half_angle),
+        Surface::Sphere { frame, radius } => of(surface_kind::SPHERE, &frame, radius / 1000.0, 0.0),
+        Surface::Torus { frame, major, minor } => {
+            of(surface_kind::TORUS, &frame, major / 1000.0, minor / 1000.0)
+        }
+        Surface::Spline => FaceRecord {
+            sense,
+            ..FaceRecord::zeroed()
+        },
+    }
+}

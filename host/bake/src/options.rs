@@ -1,0 +1,104 @@
+//! What can be asked of a bake, and what it tells meanwhile.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::BakeError;
+use crate::field::SampleFormat;
+
+/// What to bake and how finely.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BakeOptions {
+    /// Cell edge, mm. `None`: a hundredth of the largest part, rounded to 1, 2 or 5, finer for parts much smaller than that, and coarser
+    /// until the image fits [`Self::image_limit_bytes`].
+    pub cell_mm: Option<f64>,
+    /// Depth and height, in cells, to which the surface's neighbourhood is stored.
+    pub band_cells: f64,
+    /// Number format of samples.
+    pub format: SampleFormat,
+    /// Bound on the pointshell's chord error, mm.
+    pub epsilon_mm: f64,
+    /// Largest spacing of pointshell points, mm. `None`: a tenth of the part's longest side.
+    pub max_spacing_mm: Option<f64>,
+    /// Which parts may be grabbed.
+    pub grabbable: Grabbable,
+    /// Most bytes the image may have.
+    pub image_limit_bytes: u64,
+}
+
+impl Default for BakeOptions {
+    fn default() -> Self {
+        Self {
+            cell_mm: None,
+            band_cells: 2.0,
+            format: SampleFormat::Int16,
+            epsilon_mm: 0.01,
+            max_spacing_mm: None,
+            grabbable: Grabbable::AllButLargest,
+            image_limit_bytes: 1 << 20,
+        }
+    }
+}
+
+impl BakeOptions {
+    /// Refuses values that make no sense.
+    pub(crate) fn check(&self) -> Result<(), BakeError> {
+        let within = |option, value: f64, least: f64, most: f64, expected| {
+            if value >= least && value <= most {
+                Ok(())
+            } else {
+                Err(BakeError::Option {
+                    option,
+                    value,
+                    expected,
+                })
+            }
+        };
+        if let Some(cell) = self.cell_mm {
+            within("cell_mm", cell, 1e-3, 1e3, "0.001 to 1000 mm")?;
+        }
+        // Below one diagonal the cells next to the surface would not all be stored.
+        within("band_cells", self.band_cells, 1.0, 64.0, "1 to 64 cells")?;
+        within("epsilon_mm", self.epsilon_mm, 1e-6, 1e3, "0.000001 to 1000 mm")?;
+        if let Some(spacing) = self.max_spacing_mm {
+            within("max_spacing_mm", spacing, 1e-3, 1e6, "0.001 to 1000000 mm")?;
+        }
+        Ok(())
+    }
+}
+
+/// Which parts may be grabbed and moved; the others are fixed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Grabbable {
+    /// Every part but the one of largest volume (a single part stays grabbable).
+    #[default]
+    AllButLargest,
+    /// Every part.
+    All,
+    /// These, by name.
+    Named(Vec<String>),
+}
+
+/// What a bake is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// Sampling the distance.
+    Field,
+    /// Sampling the surface.
+    Pointshell,
+    /// Putting the image together.
+    Image,
+}
+
+/// How far a bake has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress<'a> {
+    /// What it is doing.
+    pub stage: Stage,
+    /// Part whose shape it is at.
+    pub part: &'a str,
+    /// Shape, from 0, and number of shapes.
+    pub shape: (usize, usize),
+    /// 0 to 1 within this shape and stage.
+    pub fraction: f64,
+}

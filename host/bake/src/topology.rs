@@ -1,0 +1,317 @@
+//! What the tessellation knows of the B-rep: which mesh sides lie between faces, on which exact curve, and how faces are turned.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use mortise_brep::{Curve, Edge, Shape, Surface};
+
+use crate::piece::{Piece, PieceCurve, PieceSide};
+use crate::surface::{natural_normal, project};
+
+/// No piece, no neighbour.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Boundary pieces, neighbours, senses and chord errors of a shape's tessellation.
+pub(crate) struct Topology {
+    /// Boundary pieces between faces, and open sides.
+    pub pieces: Vec<Piece>,
+    /// For each triangle and side (corner i to i+1): its piece, or [`NONE`] inside a face.
+    pub triangle_pieces: Vec<[u32; 3]>,
+    /// For each triangle and side inside a face: the triangle beyond, or [`NONE`].
+    pub neighbors: Vec<[u32; 3]>,
+    /// For each face: +1 when its outward normal is the surface's natural one, else −1.
+    pub sense: Vec<f64>,
+    /// For each face: most its triangles and their boundary leave the exact face, mm.
+    pub chord: Vec<f64>,
+    /// Angle-weighted outward normal of each vertex (exact face normals; not unit length).
+    pub vertex_normals: Vec<DVec3>,
+    /// Pieces that end at each vertex that has any.
+    pub vertex_pieces: HashMap<u32, Vec<u32>>,
+    /// Unit outward facet normals; zero for a degenerate triangle.
+    pub facet_normals: Vec<DVec3>,
+}
+
+impl Topology {
+    /// From the tessellation and exact geometry of `shape`, whose triangles wind outward. Cost: linear in triangles and edges.
+    pub fn new(shape: &Shape) -> Self {
+        let mesh = &shape.mesh;
+        let corner = |v: u32| mesh.vertices[v as usize];
+        let facet_normals: Vec<DVec3> = mesh
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(corner);
+                (b - a).cross(c - a).normalize_or_zero()
+            })
+            .collect();
+        let sense = senses(shape);
+        let (pieces, triangle_pieces, neighbors) = split_sides(shape);
+        let chord = chords(shape, &pieces);
+        let mut vertex_pieces: HashMap<u32, Vec<u32>> = HashMap::new();
+        for (i, piece) in pieces.iter().enumerate() {
+            for end in piece.ends {
+                vertex_pieces.entry(end).or_default().push(i as u32);
+            }
+        }
+        let mut topology = Self {
+            pieces,
+            triangle_pieces,
+            neighbors,
+            sense,
+            chord,
+            vertex_normals: vec![DVec3::ZERO; mesh.vertices.len()],
+            vertex_pieces,
+            facet_normals,
+        };
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for i in 0..3 {
+                let [at, next, last] =
+                    [triangle[i], triangle[(i + 1) % 3], triangle[(i + 2) % 3]].map(corner);
+                let angle = (next - at).angle_between(last - at);
+                if angle.is_finite() {
+                    let normal = topology.outward(shape, t as u32, at);
+                    topology.vertex_normals[triangle[i] as usize] += normal * angle;
+                }
+            }
+        }
+        topology
+    }
+
+    /// Outward unit normal at `q` of the face that triangle `t` belongs to: exact where the face has a closed form, else the facet's.
+    pub fn outward(&self, shape: &Shape, t: u32, q: DVec3) -> DVec3 {
+        let face = shape.mesh.triangle_face[t as usize] as usize;
+        match natural_normal(&shape.faces[face].surface, q) {
+            Some(n) => n * self.sense[face],
+            None => self.facet_normals[t as usize],
+        }
+    }
+
+    /// Sum of the outward normals of the faces that meet at `q` on a piece.
+    pub fn piece_normal(&self, shape: &Shape, piece: &Piece, q: DVec3) -> DVec3 {
+        piece
+            .sides
+            .iter()
+            .map(|side| self.outward(shape, side.triangle, q))
+            .sum()
+    }
+}
+
+/// Sense of each face from its own triangles; where it has no (non-degenerate) triangle, from the B-rep.
+fn senses(shape: &Shape) -> Vec<f64> {
+    let mesh = &shape.mesh;
+    let mut agree = vec![0.0; shape.faces.len()];
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let face = mesh.triangle_face[t] as usize;
+        let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
+        let area = (b - a).cross(c - a);
+        if let Some(n) = natural_normal(&shape.faces[face].surface, (a + b + c) / 3.0) {
+            agree[face] += area.dot(n);
+        }
+    }
+    agree
+        .iter()
+        .zip(&shape.faces)
+        .map(|(&agree, face)| match agree {
+            a if a > 0.0 => 1.0,
+            a if a < 0.0 => -1.0,
+            _ if face.reversed => -1.0,
+            _ => 1.0,
+        })
+        .collect()
+}
+
+type Sides = (Vec<Piece>, Vec<[u32; 3]>, Vec<[u32; 3]>);
+
+fn split_sides(shape: &Shape) -> Sides {
+    let mesh = &shape.mesh;
+    let mut uses: HashMap<(u32, u32), Vec<(u32, usize)>> = HashMap::new();
+    let mut order = Vec::new();
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        for i in 0..3 {
+            let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
+            let list = uses.entry((a.min(b), a.max(b))).or_default();
+            if list.is_empty() {
+                order.push((a.min(b), a.max(b)));
+            }
+            list.push((t as u32, i));
+        }
+    }
+    let edge_of = edges_by_side(shape);
+    let mut triangle_pieces = vec![[NONE; 3]; mesh.triangles.len()];
+    let mut neighbors = vec![[NONE; 3]; mesh.triangles.len()];
+    let mut pieces = Vec::new();
+    for key in order {
+        let list = &uses[&key];
+        let face = |t: u32| mesh.triangle_face[t as usize];
+        if let &[(t, i), (u, j)] = list.as_slice()
+            && face(t) == face(u)
+        {
+            neighbors[t as usize][i] = u;
+            neighbors[u as usize][j] = t;
+            continue;
+        }
+        let ends = [key.0, key.1];
+        let points = ends.map(|v| mesh.vertices[v as usize]);
+        let sides: Vec<PieceSide> = list
+            .iter()
+            .map(|&(t, i)| PieceSide {
+                triangle: t,
+                face: face(t),
+                forward: mesh.triangles[t as usize][i] == key.0,
+            })
+            .collect();
+        let (edge, curve) = exact_curve(shape, &edge_of, ends, points, &sides);
+        for &(t, i) in list {
+            triangle_pieces[t as usize][i] = pieces.len() as u32;
+        }
+        pieces.push(Piece {
+            ends,
+            points,
+            curve,
+            sides,
+            edge,
+        });
+    }
+    (pieces, triangle_pieces, neighbors)
+}
+
+/// Mesh sides that an edge's polyline runs along: vertices are matched by position to a millionth of the shape's size.
+fn edges_by_side(shape: &Shape) -> HashMap<(u32, u32), u32> {
+    let size = shape
+        .mesh
+        .vertices
+        .iter()
+        .fold(0.0f64, |m, v| m.max(v.abs().max_element()));
+    let quantum = (size * 1e-6).max(1e-9);
+    let key = |p: DVec3| (p / quantum).round().to_array().map(|c| c as i64);
+    let mut by_place = HashMap::new();
+    for (i, &v) in shape.mesh.vertices.iter().enumerate() {
+        by_place.entry(key(v)).or_insert(i as u32);
+    }
+    let find = |p: DVec3| {
+        let k = key(p);
+        for x in -1..=1 {
+            for y in -1..=1 {
+                for z in -1..=1 {
+                    if let Some(&v) = by_place.get(&[k[0] + x, k[1] + y, k[2] + z])
+                        && shape.mesh.vertices[v as usize].distance(p) <= quantum
+                    {
+                        return Some(v);
+                    }
+                }
+            }
+        }
+        None
+    };
+    let mut sides = HashMap::new();
+    for (e, edge) in shape.edges.iter().enumerate() {
+        let on: Vec<Option<u32>> = edge.polyline.iter().map(|&p| find(p)).collect();
+        for pair in on.windows(2) {
+            if let &[Some(a), Some(b)] = pair {
+                sides.entry((a.min(b), a.max(b))).or_insert(e as u32);
+            }
+        }
+    }
+    sides
+}
+
+/// The edge a mesh side lies on and its exact curve: by the edge's own polyline, else the edge of its faces that fits its ends best.
+fn exact_curve(
+    shape: &Shape,
+    edge_of: &HashMap<(u32, u32), u32>,
+    ends: [u32; 2],
+    points: [DVec3; 2],
+    sides: &[PieceSide],
+) -> (Option<u32>, PieceCurve) {
+    // Half of STEP's customary accuracy of 1e-3 mm: nearer is the same place.
+    const TOLERANCE_MM: f64 = 5e-4;
+    if let Some(&e) = edge_of.get(&(ends[0], ends[1])) {
+        let curve = curve_through(&shape.edges[e as usize], points, TOLERANCE_MM);
+        return (Some(e), curve.unwrap_or(PieceCurve::Segment));
+    }
+    let mut candidates: Vec<u32> = sides
+        .iter()
+        .flat_map(|s| shape.faces[s.face as usize].edges.iter().copied())
+        .filter(|&e| (e as usize) < shape.edges.len())
+        .collect();
+    candidates.sort_unstable();
+    candidates.dedup();
+    for e in candidates {
+        let edge = &shape.edges[e as usize];
+        let middle = (points[0] + points[1]) / 2.0;
+        let length = points[0].distance(points[1]);
+        let beside = |p: DVec3| {
+            edge.polyline
+                .windows(2)
+                .map(|w| segment_distance(w[0], w[1], p))
+                .fold(f64::INFINITY, f64::min)
+        };
+        if beside(middle) < 0.1 * length
+            && let Some(curve) = curve_through(edge, points, TOLERANCE_MM)
+        {
+            return (Some(e), curve);
+        }
+    }
+    (None, PieceCurve::Segment)
+}
+
+fn curve_through(edge: &Edge, points: [DVec3; 2], tolerance: f64) -> Option<PieceCurve> {
+    match edge.curve {
+        Curve::Line { origin, direction } => points
+            .iter()
+            .all(|&p| {
+                let d = p - origin;
+                (d - direction * d.dot(direction)).length() <= tolerance
+            })
+            .then_some(PieceCurve::Segment),
+        Curve::Circle { frame, radius } => PieceCurve::arc(frame.origin, frame.z, radius, points, tolerance),
+        Curve::Other => None,
+    }
+}
+
+fn segment_distance(a: DVec3, b: DVec3, p: DVec3) -> f64 {
+    let ab = b - a;
+    let t = if ab == DVec3::ZERO {
+        0.0
+    } else {
+        ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0)
+    };
+    (a + ab * t).distance(p)
+}
+
+/// Most each face's triangles leave its exact surface, with its boundary's sagitta.
+///
+/// Measured at the centroid and at the middles of the sides, where the deviation of a chord from a surface of constant curvature is
+/// largest, times 1.5 for the surfaces whose curvature changes (cone, torus). Splines: 0, they are their tessellation here.
+fn chords(shape: &Shape, pieces: &[Piece]) -> Vec<f64> {
+    let mesh = &shape.mesh;
+    let mut chord = vec![0.0f64; shape.faces.len()];
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let face = mesh.triangle_face[t] as usize;
+        let surface = &shape.faces[face].surface;
+        if matches!(surface, Surface::Spline) {
+            continue;
+        }
+        let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
+        for p in [
+            a,
+            b,
+            c,
+            (a + b + c) / 3.0,
+            (a + b) / 2.0,
+            (b + c) / 2.0,
+            (c + a) / 2.0,
+        ] {
+            if let Some(q) = project(surface, p, p) {
+                chord[face] = chord[face].max(1.5 * q.point.distance(p));
+            }
+        }
+    }
+    for piece in pieces {
+        for side in &piece.sides {
+            let c = &mut chord[side.face as usize];
+            *c = c.max(piece.sagitta());
+        }
+    }
+    chord
+}

@@ -1,0 +1,133 @@
+//! The sphere tree over a pointshell, in preorder with skip links.
+
+use glam::DVec3;
+use mortise_protocol::image::NodeRecord;
+
+/// Most points of a leaf.
+pub const LEAF_POINTS: usize = 16;
+
+/// A tree and the order of points it refers to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SphereTree {
+    /// Nodes in preorder; lengths in the unit of the positions given.
+    pub nodes: Vec<NodeRecord>,
+    /// For each place in the new order, the old index of the point there.
+    pub order: Vec<u32>,
+}
+
+/// Builds the tree over `positions` as they will be stored: halves along the longest axis down to leaves of at most 16. Every sphere holds
+/// all points below it, also in the board's `f32`. Cost: n log² n.
+pub fn build_tree(positions: &[[f32; 3]]) -> SphereTree {
+    let mut tree = SphereTree {
+        nodes: Vec::new(),
+        order: (0..positions.len() as u32).collect(),
+    };
+    if !positions.is_empty() {
+        split(positions, &mut tree, 0, positions.len());
+    }
+    tree
+}
+
+fn split(positions: &[[f32; 3]], tree: &mut SphereTree, first: usize, count: usize) {
+    let at = |i: u32| DVec3::from_array(positions[i as usize].map(f64::from));
+    let run = &mut tree.order[first..first + count];
+    let points: Vec<DVec3> = run.iter().map(|&i| at(i)).collect();
+    let (center, radius) = sphere(&points);
+    let index = tree.nodes.len();
+    tree.nodes.push(NodeRecord {
+        center,
+        radius,
+        first_point: first as u32,
+        point_count: count as u32,
+        skip: 0,
+    });
+    if count > LEAF_POINTS {
+        let lo = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let hi = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let extent = hi - lo;
+        let axis = (0..3)
+            .max_by(|&a, &b| extent[a].total_cmp(&extent[b]))
+            .unwrap_or(0);
+        // The index breaks ties, so the order is one and the same everywhere.
+        run.sort_unstable_by(|&a, &b| at(a)[axis].total_cmp(&at(b)[axis]).then(a.cmp(&b)));
+        let half = count / 2;
+        split(positions, tree, first, half);
+        split(positions, tree, first + half, count - half);
+    }
+    tree.nodes[index].skip = tree.nodes.len() as u32;
+}
+
+/// A small sphere about `points`: Ritter's, tightened by moving the centre towards the farthest point (Bădoiu & Clarkson 2003).
+fn sphere(points: &[DVec3]) -> ([f32; 3], f32) {
+    let farthest = |from: DVec3| {
+        points
+            .iter()
+            .copied()
+            .max_by(|a, b| a.distance_squared(from).total_cmp(&b.distance_squared(from)))
+            .unwrap_or(from)
+    };
+    let lo = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let hi = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let mut center = (lo + hi) / 2.0;
+    let mut best = (farthest(center).distance(center), center);
+    for i in 1..64 {
+        let far = farthest(center);
+        center += (far - center) / f64::from(i + 1);
+        let radius = farthest(center).distance(center);
+        if radius < best.0 {
+            best = (radius, center);
+        }
+    }
+    // Measured again from the centre as stored, rounded up.
+    let stored = best.1.as_vec3();
+    let radius = farthest(stored.as_dvec3()).distance(stored.as_dvec3());
+    (stored.to_array(), round_up(radius))
+}
+
+/// The next `f32` not below `x`, and a millionth more for the board's own rounding.
+pub(crate) fn round_up(x: f64) -> f32 {
+    let mut r = (x * (1.0 + 1e-6)) as f32;
+    while f64::from(r) < x {
+        r = r.next_up();
+    }
+    r
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Preorder, skip links, leaf size, containment, and every point exactly once.
+        #[test]
+        fn tree_is_sound(positions in prop::collection::vec(prop::array::uniform3(-1.0f32..1.0), 0..400)) {
+            let tree = build_tree(&positions);
+            let mut seen = tree.order.clone();
+            seen.sort_unstable();
+            prop_assert_eq!(seen, (0..positions.len() as u32).collect::<Vec<_>>());
+            let mut leaf_points = 0;
+            for (i, node) in tree.nodes.iter().enumerate() {
+                let leaf = node.skip as usize == i + 1;
+                prop_assert!(node.skip as usize > i && node.skip as usize <= tree.nodes.len());
+                let run = &tree.order[node.first_point as usize..][..node.point_count as usize];
+                for &p in run {
+                    let p = DVec3::from_array(positions[p as usize].map(f64::from));
+                    prop_assert!(p.distance(DVec3::from_array(node.center.map(f64::from))) <= f64::from(node.radius));
+                }
+                if leaf {
+                    prop_assert!(run.len() <= LEAF_POINTS);
+                    leaf_points += run.len();
+                } else {
+                    let left = &tree.nodes[i + 1];
+                    let right = &tree.nodes[left.skip as usize];
+                    prop_assert_eq!(right.skip, node.skip);
+                    prop_assert_eq!(left.point_count + right.point_count, node.point_count);
+                    prop_assert_eq!(left.first_point, node.first_point);
+                    prop_assert_eq!(right.first_point, node.first_point + left.point_count);
+                }
+            }
+            prop_assert_eq!(leaf_points, positions.len());
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Generalised winding number: inside or outside, also for shells with gaps.
+//!
+//! w(p) = Σ Ω_t(p) / 4π over all triangles: 1 inside and 0 outside a closed mesh, in between near a gap, so that w > ½ is the best estimate.
+//! Far clusters of triangles are taken as dipoles (Barill, Dickson, Schmidt, Levin, Jacobson 2018, "Fast Winding Numbers for Soups and
+//! Clouds", first order): cost grows with the logarithm of the number of triangles.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use mortise_brep::Mesh;
+
+/// A cluster is a dipole from this many radii on: first-order error below 0.02 for closed meshes (property-tested).
+const FAR: f64 = 2.5;
+const LEAF: usize = 8;
+
+struct Node {
+    center: DVec3,
+    radius: f64,
+    /// Sum of area vectors, mm².
+    dipole: DVec3,
+    first: u32,
+    count: u32,
+    /// Index after the whole subtree (preorder).
+    skip: u32,
+}
+
+/// Triangles in a tree of dipoles.
+pub(crate) struct WindingTree {
+    nodes: Vec<Node>,
+    triangles: Vec<[DVec3; 3]>,
+}
+
+impl WindingTree {
+    /// Over all triangles of `mesh`.
+    pub fn new(mesh: &Mesh) -> Self {
+        let mut tree = Self {
+            nodes: Vec::new(),
+            triangles: mesh
+                .triangles
+                .iter()
+                .map(|t| t.map(|v| mesh.vertices[v as usize]))
+                .collect(),
+        };
+        let count = tree.triangles.len();
+        if count > 0 {
+            tree.build(0, count);
+        }
+        tree
+    }
+
+    fn build(&mut self, first: usize, count: usize) {
+        let run = &mut self.triangles[first..first + count];
+        let (mut area, mut weighted, mut dipole) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for t in run.iter() {
+            let vector = (t[1] - t[0]).cross(t[2] - t[0]) / 2.0;
+            area += vector.length();
+            weighted += (t[0] + t[1] + t[2]) / 3.0 * vector.length();
+            dipole += vector;
+            lo = lo.min((t[0] + t[1] + t[2]) / 3.0);
+            hi = hi.max((t[0] + t[1] + t[2]) / 3.0);
+        }
+        let center = if area > 0.0 { weighted / area } else { run[0][0] };
+        let radius = run
+            .iter()
+            .flatten()
+            .map(|v| v.distance(center))
+            .fold(0.0, f64::max);
+        let index = self.nodes.len();
+        self.nodes.push(Node {
+            center,
+            radius,
+            dipole,
+            first: first as u32,
+            count: count as u32,
+            skip: 0,
+        });
+        if count > LEAF {
+            let extent = hi - lo;
+            let axis = (0..3)
+                .max_by(|&a, &b| extent[a].total_cmp(&extent[b]))
+                .unwrap_or(0);
+            let key = |t: &[DVec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
+            let half = count / 2;
+            run.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)));
+            self.build(first, half);
+            self.build(first + half, count - half);
+        }
+        self.nodes[index].skip = self.nodes.len() as u32;
+    }
+
+    /// Winding number at `p`.
+    pub fn at(&self, p: DVec3) -> f64 {
+        let mut sum = 0.0;
+        let mut i = 0;
+        while i < self.nodes.len() {
+            let node = &self.nodes[i];
+            let d = node.center - p;
+            let distance = d.length();
+            if distance > FAR * node.radius {
+                sum += d.dot(node.dipole) / (distance * distance * distance);
+                i = node.skip as usize;
+            } else {
+                if node.skip as usize == i + 1 {
+                    sum += self.triangles[node.first as usize..][..node.count as usize]
+                        .iter()
+                        .map(|t| solid_angle(t, p))
+                        .sum::<f64>();
+                }
+                i += 1;
+            }
+        }
+        sum / (4.0 * PI)
+    }
+}
+
+/// Signed solid angle of a triangle seen from `p`, positive from its back (Van Oosterom & Strackee 1983).
+fn solid_angle(t: &[DVec3; 3], p: DVec3) -> f64 {
+    let [a, b, c] = t.map(|v| v - p);
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let determinant = a.dot(b.cross(c));
+    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * determinant.atan2(denominator)
+}

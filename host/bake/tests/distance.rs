@@ -1,0 +1,219 @@
+//! Exact distance against closed forms, on tessellations coarse enough that facets alone fail.
+
+mod common;
+
+use common::*;
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_bake::ExactSurface;
+use mortise_brep::{Shape, Surface};
+use proptest::prelude::*;
+
+/// A few operations on numbers up to 100 mm, in double precision.
+const EXACT_MM: f64 = 1e-9;
+
+fn check(surface: &ExactSurface, expected: impl Fn(DVec3) -> f64, p: DVec3) -> Result<(), TestCaseError> {
+    let found = surface.nearest(p).unwrap();
+    let d = expected(p);
+    prop_assert!(
+        (found.distance - d).abs() < EXACT_MM,
+        "at {p}: {} instead of {d}, nearest {}, face {}",
+        found.distance,
+        found.point,
+        found.face
+    );
+    prop_assert!((found.point.distance(p) - d.abs()).abs() < EXACT_MM);
+    Ok(())
+}
+
+fn points(size: f64) -> impl Strategy<Value = DVec3> {
+    prop::array::uniform3(-size..size).prop_map(DVec3::from_array)
+}
+
+/// Points within facets' reach of the surface of radius `r` about z.
+fn near_radius(r: f64, off: f64, z: std::ops::Range<f64>) -> impl Strategy<Value = DVec3> {
+    (-off..off, 0.0..std::f64::consts::TAU, z)
+        .prop_map(move |(d, a, z)| DVec3::new((r + d) * a.cos(), (r + d) * a.sin(), z))
+}
+
+thread_local! {
+    static BLOCK: ExactSurface = ExactSurface::new(&block_with_hole([25.0, 20.0], 30.0, 9.375, 24));
+    static PEG: ExactSurface = ExactSurface::new(&peg(8.875, 60.0, 16));
+    static SPHERE: ExactSurface = ExactSurface::new(&sphere(10.0, 16));
+    static TORUS: ExactSurface = ExactSurface::new(&torus(12.0, 4.0, 20));
+    static CONE: ExactSurface = ExactSurface::new(&cone(8.0, 20.0, 16));
+    static TURNED: (DAffine3, ExactSurface) = {
+        let to = DAffine3::from_rotation_translation(
+            DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0),
+            DVec3::new(40.0, -7.0, 12.0),
+        );
+        (to, ExactSurface::new(&moved(&block_with_hole([25.0, 20.0], 30.0, 9.375, 24), to)))
+    };
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4000))]
+
+    #[test]
+    fn block_with_hole_is_exact(p in points(45.0)) {
+        BLOCK.with(|s| check(s, |p| block_distance([25.0, 20.0], 30.0, 9.375, p), p))?;
+    }
+
+    /// Between the hole's circle and the chords of its facets, on and about both rims too.
+    #[test]
+    fn block_is_exact_about_its_hole(p in near_radius(9.375, 0.2, -1.0..31.0)) {
+        BLOCK.with(|s| check(s, |p| block_distance([25.0, 20.0], 30.0, 9.375, p), p))?;
+    }
+
+    #[test]
+    fn block_is_exact_in_the_plane_of_its_rim(p in near_radius(9.375, 0.3, 29.9999..30.0001)) {
+        BLOCK.with(|s| check(s, |p| block_distance([25.0, 20.0], 30.0, 9.375, p), p))?;
+    }
+
+    #[test]
+    fn turned_block_is_exact(p in points(45.0)) {
+        TURNED.with(|(to, s)| {
+            check(s, |p| block_distance([25.0, 20.0], 30.0, 9.375, to.inverse().transform_point3(p)), to.transform_point3(p))
+        })?;
+    }
+
+    #[test]
+    fn peg_is_exact(p in points(80.0), q in near_radius(8.875, 0.3, -1.0..61.0)) {
+        PEG.with(|s| { check(s, |p| peg_distance(8.875, 60.0, p), p)?; check(s, |p| peg_distance(8.875, 60.0, p), q) })?;
+    }
+
+    #[test]
+    fn sphere_is_exact(p in points(25.0)) {
+        SPHERE.with(|s| check(s, |p| p.length() - 10.0, p))?;
+    }
+
+    #[test]
+    fn torus_is_exact(p in points(25.0)) {
+        TORUS.with(|s| check(s, |p| (p.x.hypot(p.y) - 12.0).hypot(p.z) - 4.0, p))?;
+    }
+
+    #[test]
+    fn cone_is_exact(p in points(40.0), q in near_radius(2.0, 3.0, 10.0..22.0)) {
+        let (r, h) = (8.0f64, 20.0f64);
+        let expected = |p: DVec3| {
+            let rho = p.x.hypot(p.y);
+            let slant = r.hypot(h);
+            // Along the slant from base rim to tip, and off it.
+            let along = (((rho - r) * -r + p.z * h) / slant).clamp(0.0, slant);
+            let on = (r - along * r / slant, along * h / slant);
+            let side = (rho - on.0).hypot(p.z - on.1);
+            let base = (rho - r).max(0.0).hypot(p.z);
+            let inside = p.z > 0.0 && (rho - r) * h + p.z * r < 0.0;
+            side.min(base) * if inside { -1.0 } else { 1.0 }
+        };
+        CONE.with(|s| { check(s, expected, p)?; check(s, expected, q) })?;
+    }
+}
+
+/// Every point on the axis of a hole is equally far from the wall all round; the rim's corners likewise.
+#[test]
+fn degenerate_places_are_exact() {
+    BLOCK.with(|s| {
+        for z in [-3.0, 0.0, 1e-13, 15.0, 30.0, 42.0] {
+            let p = DVec3::new(0.0, 0.0, z);
+            let d = s.nearest(p).unwrap().distance;
+            assert!(
+                (d - block_distance([25.0, 20.0], 30.0, 9.375, p)).abs() < EXACT_MM,
+                "{z}: {d}"
+            );
+        }
+        for p in [DVec3::new(25.0, 20.0, 30.0), DVec3::new(9.375, 0.0, 30.0)] {
+            assert!(s.nearest(p).unwrap().distance.abs() < EXACT_MM);
+        }
+    });
+}
+
+/// A half cylinder: the foot on the full cylinder lies outside the trim for half of all points.
+#[test]
+fn trim_of_a_half_cylinder_is_respected() {
+    let full = peg(5.0, 10.0, 16);
+    let mut half = Shape {
+        faces: vec![full.faces[1].clone()],
+        mesh: full.mesh.clone(),
+        ..Shape::default()
+    };
+    half.faces[0].edges.clear();
+    let keep: Vec<[u32; 3]> = full
+        .mesh
+        .triangles
+        .iter()
+        .zip(&full.mesh.triangle_face)
+        .filter(|(t, f)| **f == 1 && t.iter().all(|&v| full.mesh.vertices[v as usize].y > -1e-9))
+        .map(|(t, _)| *t)
+        .collect();
+    half.mesh.triangle_face = vec![0; keep.len()];
+    half.mesh.triangles = keep;
+    let half = finish(half);
+    assert!(!half.closed);
+    let surface = ExactSurface::new(&half);
+    assert!(surface.sign_by_winding());
+    // Below the half shell: nearest is the straight border at (±5, 0).
+    let p = DVec3::new(1.0, -7.0, 5.0);
+    let d = surface.nearest(p).unwrap().distance.abs();
+    assert!((d - 4.0f64.hypot(7.0)).abs() < EXACT_MM, "{d}");
+    let p = DVec3::new(1.0, 7.0, 5.0);
+    let d = surface.nearest(p).unwrap().distance.abs();
+    assert!((d - (50f64.sqrt() - 5.0)).abs() < EXACT_MM, "{d}");
+}
+
+/// With one facet missing the sign still holds everywhere but in the gap.
+#[test]
+fn a_leaky_block_keeps_its_sign() {
+    let mut shape = block_with_hole([25.0, 20.0], 30.0, 9.375, 48);
+    let gone = shape.mesh.triangle_face.iter().position(|&f| f == 6).unwrap();
+    shape.mesh.triangles.remove(gone);
+    shape.mesh.triangle_face.remove(gone);
+    let shape = finish(shape);
+    assert_eq!(shape.open_edges, 3);
+    let surface = ExactSurface::new(&shape);
+    let mut wrong = 0;
+    let mut tested = 0;
+    for i in 0..20_000u32 {
+        // Halton-like cover of the box about the block.
+        let u = |base: f64| (f64::from(i) * base).fract() * 2.0 - 1.0;
+        let p = DVec3::new(
+            u(0.819_172_5) * 35.0,
+            u(0.671_043_6) * 30.0,
+            15.0 + u(0.549_700_5) * 25.0,
+        );
+        let d = block_distance([25.0, 20.0], 30.0, 9.375, p);
+        let in_gap = p.truncate().length() < 12.0;
+        if d.abs() < 1e-6 || in_gap {
+            continue;
+        }
+        tested += 1;
+        wrong += u32::from((surface.nearest(p).unwrap().distance < 0.0) != (d < 0.0));
+    }
+    assert_eq!(wrong, 0, "of {tested}");
+}
+
+/// A shape written inside out is turned round.
+#[test]
+fn an_inverted_mesh_is_turned_round() {
+    let mut shape = sphere(5.0, 12);
+    for t in &mut shape.mesh.triangles {
+        t.swap(0, 1);
+    }
+    let surface = ExactSurface::new(&finish(shape));
+    assert!(surface.nearest(DVec3::ZERO).unwrap().distance < 0.0);
+}
+
+/// Spline faces are their tessellation: the error is its chord error.
+#[test]
+fn a_spline_face_is_its_tessellation() {
+    let mut shape = sphere(10.0, 64);
+    shape.faces[0].surface = Surface::Spline;
+    let surface = ExactSurface::new(&shape);
+    let chord = 10.0 * (1.0 - (std::f64::consts::PI / 64.0).cos());
+    for i in 0..2000u32 {
+        let u = |base: f64| (f64::from(i) * base).fract() * 40.0 - 20.0;
+        let p = DVec3::new(u(0.819_172_5), u(0.671_043_6), u(0.549_700_5));
+        let d = surface.nearest(p).unwrap().distance - (p.length() - 10.0);
+        // Two chords: the facets turn in both directions.
+        assert!((-1e-9..2.0 * chord + 1e-9).contains(&d), "{d} at {p}");
+    }
+}
