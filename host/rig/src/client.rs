@@ -112,7 +112,7 @@ impl Client {
         let name = spec.to_string();
         match spec {
             RigSpec::Simulated { realtime } => {
-                let transport = simulated::start(simulated::Flash::default(), *realtime)?;
+                let transport = simulated::simulate(&simulated::Flash::default(), *realtime)?;
                 let client = Self::over(transport, &name, Patience::long(), None)?;
                 client.in_lockstep(!realtime)
             }
@@ -476,7 +476,7 @@ impl Ending {
 impl Drop for Ending {
     fn drop(&mut self) {
         if let Some(mut reader) = self.reader.take() {
-            self.link.closing.store(true, Ordering::Relaxed);
+            self.link.close();
             reader.join();
         }
     }
@@ -493,7 +493,7 @@ impl Drop for Client {
             let _ = self.link.send(&ToDevice::Stop);
         }
         drop(self.heartbeat.take());
-        self.link.closing.store(true, Ordering::Relaxed);
+        self.link.close();
         if let Some(mut reader) = self.reader.take() {
             reader.join();
         }

@@ -43,7 +43,7 @@ pub use error::{RigError, version_words};
 pub use event::{Event, Events, MAX_EVENTS};
 pub use list::{RigEntry, list};
 pub use pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};
-pub use simulated::Flash;
+pub use simulated::{Flash, simulate};
 pub use spec::{EmulatedMode, RigSpec, SpecError};
 pub use transport::{READ_WAIT, Transport};
 pub use upload::{UPLOAD_WINDOW, UploadProgress, begin_message, chunk_message};

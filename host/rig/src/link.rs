@@ -90,7 +90,7 @@ pub(crate) struct Link {
     desk: Mutex<Desk>,
     answered: Condvar,
     pub(crate) events: Events,
-    pub(crate) closing: AtomicBool,
+    closing: AtomicBool,
     state: Mutex<Option<DeviceState>>,
     heard: Mutex<Instant>,
     pub(crate) frames: AtomicU64,
@@ -292,6 +292,12 @@ impl Link {
                 why: error.to_string(),
             }
         })
+    }
+
+    /// Ends the reader and lets go of the port, after what was written.
+    pub(crate) fn close(&self) {
+        self.closing.store(true, Ordering::Relaxed);
+        lock(&self.writer).port = Box::new(std::io::sink());
     }
 
     /// Time since a frame went out.

@@ -1,16 +1,231 @@
-//! The in-process rig: the board's own planes and simulated mechanism on threads of this program.
+//! The in-process rig: the board's own planes, scene store and simulated mechanism on a thread of this program, reached through
+//! the same protocol bytes as a board.
+
+use std::cell::Cell;
+use std::io::{self, Write};
+use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mortise_firmware::board::{Clock, Identity, Outbound, SLOTS, TICK_HZ};
+use mortise_firmware::channel::Channels;
+use mortise_firmware::control::Ticked;
+use mortise_firmware::device;
+use mortise_firmware::link::OUTBOUND_MIN;
+use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
+use mortise_firmware::simulated::Simulated;
+use mortise_protocol::message::{CostUnit, ResetReason};
 
 use crate::error::RigError;
-use crate::transport::Transport;
+use crate::pipe::{PipeReader, PipeWriter, pipe};
+use crate::transport::{READ_WAIT, Transport, is_quiet};
 
-/// Flash of a simulated board; survives its restarts.
+/// Bytes of a scene slot: far more than a board has, so that a PC can feel scenes no board could hold yet.
+const SLOT: usize = 256 * ERASE_SIZE;
+/// Bytes a board's output buffer holds.
+const OUTBOUND: usize = 4 * OUTBOUND_MIN;
+const TICK: Duration = Duration::from_micros(1_000_000 / TICK_HZ as u64);
+/// Ticks a paced rig makes up for after this computer was busy; the rest count as missed.
+const CATCH_UP: u32 = 4;
+
+/// Flash of a simulated board: survives its restarts, and outlives the connection when the caller keeps a clone.
 #[derive(Clone, Debug, Default)]
-pub struct Flash;
+pub struct Flash(Arc<Mutex<Vec<FlashWord>>>);
 
-pub(crate) fn start(_flash: Flash, _realtime: bool) -> Result<Transport, RigError> {
-    Err(RigError::NoAnswer {
-        rig: "sim".into(),
-        waited_s: 0.0,
-        hint: "the in-process rig is not wired up in this build; use `emulated`".into(),
+/// Starts a simulated board. With `realtime`, ticks follow the wall clock; otherwise they run as fast as they can, in lockstep
+/// when asked. When another board still holds `flash`, it waits for its end.
+///
+/// # Errors
+/// `Thread`.
+pub fn simulate(flash: &Flash, realtime: bool) -> Result<Transport, RigError> {
+    let (to_board, from_host) = pipe();
+    let (to_host, from_board) = pipe();
+    let thread = std::thread::Builder::new()
+        .name("mortise-board".into())
+        .spawn({
+            let flash = flash.clone();
+            move || run(&flash, realtime, from_host, to_host)
+        })
+        .map_err(RigError::Thread)?;
+    Ok(Transport {
+        reader: Box::new(from_board),
+        writer: Box::new(to_board),
+        keep: Some(Box::new(Board(Some(thread)))),
     })
+}
+
+/// Waits for the board's end, so that its flash is free when the connection is gone. The board ends because its pipes are closed before.
+struct Board(Option<JoinHandle<()>>);
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        if let Some(thread) = self.0.take() {
+            // A panic there has shown as a lost link.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Power on, and again after each restart.
+fn run(flash: &Flash, realtime: bool, mut from_host: PipeReader, mut to_host: PipeWriter) {
+    let mut memory = flash.0.lock().unwrap_or_else(PoisonError::into_inner);
+    if memory.is_empty() {
+        memory.resize(SLOTS * SLOT / size_of::<FlashWord>(), ERASED);
+    }
+    let mut reset = ResetReason::PowerOn;
+    while power_on(&mut memory, reset, realtime, &mut from_host, &mut to_host).is_ok() {
+        reset = ResetReason::Requested;
+    }
+}
+
+/// Runs until a restart is asked for, or (error) the host is gone.
+fn power_on(
+    memory: &mut [FlashWord],
+    reset: ResetReason,
+    realtime: bool,
+    from_host: &mut PipeReader,
+    to_host: &mut PipeWriter,
+) -> io::Result<()> {
+    let mut channels = Box::new(Channels::new());
+    let pace = Rc::new(Pace::new(realtime));
+    let identity = Identity {
+        board: if realtime {
+            "simulation"
+        } else {
+            "simulation, lockstep"
+        },
+        force_axes: 3,
+        torque_axes: 3,
+        cost_unit: CostUnit::Nanoseconds,
+        // Without pacing nothing is due at any time.
+        cost_budget: if realtime { TICK.as_nanos() as u32 } else { 0 },
+        reset,
+        // The simulated mechanism stands still while a tick is late.
+        overrun_ticks: 0,
+    };
+    let (mut link, mut control) = device::start(
+        &mut channels,
+        RamFlash::new(memory),
+        Simulated::new(),
+        WallClock(pace.clone()),
+        identity,
+    );
+    let mut out = Wire {
+        pending: Vec::with_capacity(OUTBOUND),
+    };
+    let mut input = [0u8; 4096];
+    let (mut from, mut to) = (0, 0);
+    let mut patience = Duration::ZERO;
+    loop {
+        if from == to {
+            from = 0;
+            to = match from_host.read_within(&mut input, patience) {
+                Ok(0) => return Err(io::ErrorKind::BrokenPipe.into()),
+                Ok(count) => count,
+                Err(error) if is_quiet(&error) => 0,
+                Err(error) => return Err(error),
+            };
+        }
+        from += link.receive(&input[from..to], &mut out);
+        patience = pace.until_next();
+        if patience.is_zero() {
+            if control.tick() == Ticked::Waiting && !realtime {
+                patience = READ_WAIT;
+            }
+        }
+        link.poll(&mut out);
+        let said_something = !out.pending.is_empty();
+        out.flush(to_host)?;
+        if link.restart_requested() && out.pending.is_empty() {
+            return Ok(());
+        }
+        if said_something || from < to {
+            // What was held back for want of room can go on now.
+            patience = Duration::ZERO;
+        }
+    }
+}
+
+/// The board's output buffer.
+struct Wire {
+    pending: Vec<u8>,
+}
+
+impl Wire {
+    fn flush(&mut self, to: &mut PipeWriter) -> io::Result<()> {
+        if self.pending.is_empty() {
+            return Ok(());
+        }
+        match to.write(&self.pending) {
+            Ok(written) => {
+                self.pending.drain(..written);
+                Ok(())
+            }
+            Err(error) if is_quiet(&error) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+impl Outbound for Wire {
+    fn room(&self) -> usize {
+        OUTBOUND - self.pending.len().min(OUTBOUND)
+    }
+
+    fn write(&mut self, frame: &[u8]) {
+        self.pending.extend_from_slice(frame);
+    }
+}
+
+/// When ticks are due.
+struct Pace {
+    realtime: bool,
+    begun: Cell<Instant>,
+    due: Cell<Instant>,
+}
+
+impl Pace {
+    fn new(realtime: bool) -> Self {
+        let now = Instant::now();
+        Self {
+            realtime,
+            begun: Cell::new(now),
+            due: Cell::new(now),
+        }
+    }
+
+    fn until_next(&self) -> Duration {
+        if self.realtime {
+            self.due.get().saturating_duration_since(Instant::now())
+        } else {
+            Duration::ZERO
+        }
+    }
+
+    /// Ticks that are given up because this computer was busy for too long.
+    fn begin_tick(&self) -> u32 {
+        let now = Instant::now();
+        self.begun.set(now);
+        if !self.realtime {
+            return 0;
+        }
+        let late = now.saturating_duration_since(self.due.get());
+        let behind = (late.as_nanos() / TICK.as_nanos()) as u32;
+        let skipped = behind.saturating_sub(CATCH_UP);
+        self.due.set(self.due.get() + TICK * (skipped + 1));
+        skipped
+    }
+}
+
+struct WallClock(Rc<Pace>);
+
+impl Clock for WallClock {
+    fn begin(&mut self) -> u32 {
+        self.0.begin_tick()
+    }
+
+    fn cost(&mut self) -> u32 {
+        self.0.begun.get().elapsed().as_nanos().min(u128::from(u32::MAX)) as u32
+    }
 }
