@@ -66,11 +66,12 @@ pub trait Mechanism {
 
 /// Counts what a tick costs and whether one came too late.
 pub trait Clock {
+    /// A tick begins. Returns how many deadlines passed since the last one began: a tick that was not done when the next was due counts one,
+    /// each further tick that could not run another.
+    fn begin(&mut self) -> u32;
+
     /// Cost since the moment this tick was due, in [`Identity::cost_unit`]; includes the interrupt's latency where the board can tell.
     fn cost(&mut self) -> u32;
-
-    /// Ticks that were due and did not run since the last call.
-    fn missed(&mut self) -> u32;
 }
 
 /// Flash could not be erased or written, or was asked for something outside a slot.

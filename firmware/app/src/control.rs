@@ -149,24 +149,23 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     /// One millisecond. Call from the timer, at the highest priority.
     pub fn tick(&mut self) -> Ticked {
+        let missed = self.clock.begin();
         self.take_stop_and_session();
         // The first tick reads the sensors and belongs to no host.
         if self.safety != Safety::Boot {
             self.take_commands();
             if self.lockstep && (self.credit == 0 || !self.lockstep_has_room()) {
                 self.report();
-                // Nothing was due, so nothing was missed.
-                let _ = self.clock.missed();
                 return Ticked::Waiting;
             }
         }
-        self.run();
+        self.run(missed);
         Ticked::Ran
     }
 
-    fn run(&mut self) {
+    fn run(&mut self, missed: u32) {
         self.sense();
-        self.watch();
+        self.watch(missed);
         self.render();
         self.hash
             .tick(&self.sensed.handle, self.law.object().as_ref(), &self.commanded);
@@ -371,8 +370,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
     }
 
     /// Looks for faults, worst first, and runs the safety state machine.
-    fn watch(&mut self) {
-        let missed = self.clock.missed();
+    fn watch(&mut self, missed: u32) {
         self.missed_total = self.missed_total.saturating_add(missed);
         self.statistics.missed_ticks = self.statistics.missed_ticks.saturating_add(missed);
         self.missed_in_row = if missed == 0 {

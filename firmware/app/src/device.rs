@@ -12,7 +12,7 @@
 //! struct NoClock;
 //! impl Clock for NoClock {
 //!     fn cost(&mut self) -> u32 { 0 }
-//!     fn missed(&mut self) -> u32 { 0 }
+//!     fn begin(&mut self) -> u32 { 0 }
 //! }
 //! struct Wire(Vec<u8>);
 //! impl Outbound for Wire {

@@ -1,0 +1,132 @@
+//! Mortise on QEMU's `mps2-an500`: a Cortex-M7 with simulated mechanism and hand.
+//!
+//! | context | priority | what |
+//! |---|---|---|
+//! | `TIMER0` | 3 | the tick: [`ControlPlane::tick`] and nothing else. Budget 500,000 instructions ([`timer::BUDGET`]) |
+//! | `UART0RX` | 2 | a received byte into the pipe |
+//! | `UART0TX` | 1 | the sender is empty: wakes |
+//! | idle | 0 | embassy executor: the link |
+#![no_std]
+#![no_main]
+
+mod crash;
+mod device;
+mod link_task;
+mod log;
+mod memory;
+mod motors;
+mod timer;
+mod uart;
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m_rt as _;
+use mortise_firmware::control::ControlPlane;
+use mortise_firmware::link::LinkPlane;
+use mortise_firmware::ram_flash::RamFlash;
+
+/// The control plane of this board.
+type Control = ControlPlane<'static, 'static, motors::Motors, timer::TickClock>;
+/// The link plane of this board.
+type Link = LinkPlane<'static, 'static, RamFlash<'static>>;
+
+static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
+
+/// Timer ticks since start, for the log's timestamps.
+fn milliseconds() -> u32 {
+    MILLISECONDS.load(Ordering::Relaxed)
+}
+
+#[rtic::app(device = crate::device, peripherals = false)]
+mod app {
+    use core::sync::atomic::Ordering;
+
+    use heapless::spsc::{Consumer, Producer, Queue};
+    use mortise_firmware::board::Identity;
+    use mortise_firmware::channel::Channels;
+    use mortise_firmware::device::start;
+    use mortise_protocol::message::CostUnit;
+
+    use crate::{Control, Link, MILLISECONDS, crash, link_task, memory, motors, timer, uart};
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct Local {
+        control: Control,
+        link: Option<Link>,
+        bytes_in: Producer<'static, u8>,
+        bytes_out: Option<Consumer<'static, u8>>,
+    }
+
+    #[init(local = [
+        channels: Channels<'static> = Channels::new(),
+        bytes: Queue<u8, { uart::RECEIVED + 1 }> = Queue::new(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        let identity = Identity {
+            board: "mps2-an500",
+            force_axes: 3,
+            torque_axes: 3,
+            cost_unit: CostUnit::Instructions,
+            cost_budget: timer::BUDGET,
+            reset: crash::reset_reason(),
+            // The simulated mechanism stands still between ticks: late ticks are counted and do no harm.
+            overrun_ticks: 0,
+        };
+        // SAFETY: the only call.
+        let flash = unsafe { memory::scene_flash() };
+        let (bytes_in, bytes_out) = cx.local.bytes.split();
+        // Reads the scene in flash before the first tick is due.
+        let mechanism = motors::Motors::new();
+        let (link, control) = start(
+            cx.local.channels,
+            flash,
+            mechanism,
+            timer::TickClock::new(),
+            identity,
+        );
+        link_task::announce(&identity, &link);
+        uart::start();
+        let local = Local {
+            control,
+            link: Some(link),
+            bytes_in,
+            bytes_out: Some(bytes_out),
+        };
+        timer::start();
+        (Shared {}, local)
+    }
+
+    #[task(binds = TIMER0, priority = 3, local = [control])]
+    fn tick(cx: tick::Context) {
+        timer::clear_interrupt();
+        MILLISECONDS.fetch_add(1, Ordering::Relaxed);
+        cx.local.control.tick();
+        link_task::note();
+    }
+
+    #[task(binds = UART0RX, priority = 2, local = [bytes_in])]
+    fn received(cx: received::Context) {
+        uart::receive(cx.local.bytes_in);
+        link_task::note();
+    }
+
+    #[task(binds = UART0TX, priority = 1)]
+    fn sent(_: sent::Context) {
+        uart::sent();
+        link_task::note();
+    }
+
+    #[idle(local = [link, bytes_out])]
+    fn idle(cx: idle::Context) -> ! {
+        match (cx.local.link.take(), cx.local.bytes_out.take()) {
+            (Some(link), Some(bytes)) => link_task::run(link, bytes),
+            // Idle runs once.
+            _ => loop {
+                cortex_m::asm::wfi();
+            },
+        }
+    }
+}

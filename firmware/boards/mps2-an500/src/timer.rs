@@ -1,0 +1,79 @@
+//! The millisecond and what it costs.
+//!
+//! Both timers count 25 MHz of virtual time. With `-icount shift=1` an instruction takes 2 ns, so a count is 20 instructions and a
+//! tick has 500,000; without `-icount` virtual time follows the host and the figure means host time in units of 2 ns.
+
+use mortise_firmware::board::{Clock, TICK_HZ};
+
+use crate::device::Registers;
+
+/// Timer counts in a second.
+const TIMER_HZ: u32 = 25_000_000;
+/// Timer counts in a tick.
+const PERIOD: u32 = TIMER_HZ / TICK_HZ as u32;
+/// Instructions in a timer count at shift 1.
+const INSTRUCTIONS: u32 = 20;
+/// Instructions in a tick at shift 1.
+pub const BUDGET: u32 = PERIOD * INSTRUCTIONS;
+
+const CTRL: usize = 0x0;
+const VALUE: usize = 0x4;
+const RELOAD: usize = 0x8;
+const CLEAR: usize = 0xc;
+const ENABLE: u32 = 1;
+const INTERRUPT: u32 = 1 << 3;
+
+/// Starts the ticks: time is 0 now, the first tick is due one period later.
+pub fn start() {
+    let (tick, free) = (Registers::TIMER0, Registers::TIMER1);
+    tick.write::<RELOAD>(PERIOD - 1);
+    tick.write::<VALUE>(PERIOD - 1);
+    free.write::<RELOAD>(u32::MAX);
+    free.write::<VALUE>(u32::MAX);
+    free.write::<CTRL>(ENABLE);
+    tick.write::<CTRL>(ENABLE | INTERRUPT);
+}
+
+/// Takes the tick's interrupt back.
+pub fn clear_interrupt() {
+    Registers::TIMER0.write::<CLEAR>(1);
+}
+
+/// Counts up from [`start`], wraps after 171 s.
+fn now() -> u32 {
+    // The timer counts down.
+    u32::MAX - Registers::TIMER1.read::<VALUE>()
+}
+
+/// Knows when the tick was due.
+pub struct TickClock {
+    due: u32,
+    last_cost: u32,
+}
+
+impl TickClock {
+    /// For ticks that [`start`] begins.
+    pub const fn new() -> Self {
+        Self { due: 0, last_cost: 0 }
+    }
+
+    fn since_due(&self) -> u32 {
+        // A count of slack between the two timers may make it seem early.
+        (now().wrapping_sub(self.due) as i32).max(0) as u32
+    }
+}
+
+impl Clock for TickClock {
+    fn begin(&mut self) -> u32 {
+        self.due = self.due.wrapping_add(PERIOD);
+        let skipped = self.since_due() / PERIOD;
+        self.due = self.due.wrapping_add(skipped * PERIOD);
+        let overran = u32::from(core::mem::take(&mut self.last_cost) >= BUDGET);
+        skipped + overran
+    }
+
+    fn cost(&mut self) -> u32 {
+        self.last_cost = self.since_due().saturating_mul(INSTRUCTIONS);
+        self.last_cost
+    }
+}
