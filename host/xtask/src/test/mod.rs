@@ -47,7 +47,7 @@ const STEPS: &[Step] = &[
     Step { name: "hil", what: "scenarios on the simulated and the emulated rig", run: steps::hil },
     Step { name: "docs", what: "every public item's documentation builds; commands named in pages exist", run: steps::docs },
     Step { name: "figures", what: "end-to-end figures, the quick form", run: steps::figures },
-    Step { name: "window", what: "the program opens its window on a virtual screen and draws", run: window::run },
+    Step { name: "window", what: "the sample insertion moves in the program's window, on a virtual screen", run: window::run },
 ];
 
 /// Runs the steps.
@@ -79,7 +79,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
             step.what
         );
         let started = Instant::now();
-        let outcome = (step.run)(&mut bench).with_context(|| format!("step `{}`", step.name));
+        let outcome = (step.run)(&mut bench);
         report.add(
             step.name,
             started.elapsed(),

@@ -1,7 +1,9 @@
-//! Opens the real program in a window on a virtual screen and looks at what it draws.
+//! Plays the sample insertion in the real program's window, on a virtual screen, and looks whether it
+//! is drawn and moves.
 //!
 //! Needs no display and no GPU: Xvfb is the screen, Mesa draws in software.
 
+use std::collections::HashSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -19,6 +21,9 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// edges, has more than this.
 const COLOURS_MIN: u32 = 64;
 
+/// Different pictures to be seen: opening and baking the sample show a few, live plots one each time.
+const PICTURES_MIN: usize = 10;
+
 pub fn run(bench: &mut Bench) -> Result<String> {
     if !cfg!(target_os = "linux") {
         return Ok("not run: there is no Xvfb on this system".to_owned());
@@ -29,35 +34,43 @@ pub fn run(bench: &mut Bench) -> Result<String> {
     std::fs::create_dir_all(&place)?;
     let screen = Screen::start(&place)?;
     let log = place.join("mortise.log");
+    let log_file = File::create(&log)?;
     let mut child = Running(
         Command::new(&program)
+            .args(["demo", "--rig", "sim"])
             .current_dir(&bench.root)
             .env("DISPLAY", &screen.display)
             // Or the window would open on the desktop of whoever runs this.
             .env_remove("WAYLAND_DISPLAY")
             .env_remove("WAYLAND_SOCKET")
             .stdin(Stdio::null())
-            .stdout(File::create(&log)?)
-            .stderr(File::options().append(true).open(&log)?)
+            .stdout(log_file.try_clone()?)
+            .stderr(log_file)
             .spawn()
             .with_context(|| format!("{} cannot be started", program.display()))?,
     );
     let picture = place.join("window.png");
     let deadline = Instant::now() + PATIENCE;
+    let mut seen = HashSet::new();
     loop {
         if let Some(status) = child.0.try_wait()? {
             bail!("the program ended by itself ({status}); it said:\n{}", tail(&log));
         }
         if let Some(window) = visible_window(&screen.display) {
             take_picture(&screen.display, &window, &picture)?;
-            let colours = colours_in(&picture)?;
-            if colours >= COLOURS_MIN {
-                return Ok(format!("{colours} colours in {}", shown(&bench.root, &picture)));
+            let look = look_of(&picture)?;
+            if look.colours >= COLOURS_MIN {
+                seen.insert(look.signature);
+                if seen.len() >= PICTURES_MIN {
+                    let picture = shown(&bench.root, &picture);
+                    return Ok(format!("drawn and moving, {} colours in {picture}", look.colours));
+                }
             }
         }
         if Instant::now() > deadline {
             bail!(
-                "no drawn window within {} s (picture: {}); the program said:\n{}",
+                "no window that {} within {} s (picture: {}); the program said:\n{}",
+                if seen.is_empty() { "is drawn" } else { "moves" },
                 PATIENCE.as_secs(),
                 shown(&bench.root, &picture),
                 tail(&log)
@@ -147,11 +160,23 @@ fn take_picture(display: &str, window: &str, picture: &Path) -> Result<()> {
     Ok(())
 }
 
-fn colours_in(picture: &Path) -> Result<u32> {
-    let text = shell::read(Command::new("identify").args(["-format", "%k"]).arg(picture))?;
-    text.trim()
-        .parse()
-        .with_context(|| format!("`identify` printed `{}`", text.trim()))
+/// What tells one picture from another.
+#[derive(Debug)]
+struct Look {
+    colours: u32,
+    /// Hash of all pixels.
+    signature: String,
+}
+
+fn look_of(picture: &Path) -> Result<Look> {
+    let text = shell::read(Command::new("identify").args(["-format", "%k %#"]).arg(picture))?;
+    let parsed = text.split_once(' ').and_then(|(colours, signature)| {
+        Some(Look {
+            colours: colours.parse().ok()?,
+            signature: signature.trim().to_owned(),
+        })
+    });
+    parsed.with_context(|| format!("`identify` printed `{}`", text.trim()))
 }
 
 /// The last lines of a log.
