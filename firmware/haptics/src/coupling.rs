@@ -2,6 +2,8 @@
 //!
 //! F = k_T·d − b_T·v and τ = k_R·θ − b_R·ω on the object: d and θ lead from the object to where the handle holds it (handle ∘ G), v and ω
 //! are the object's motion relative to that place. Both act at the held part's centre of mass, so translation and rotation do not mix.
+//! Both are taken at the tick's end, the hand carried on at its measured twist: in free motion the object does not lag and the coupling is silent,
+//! and the half period by which a sampled spring comes late, which makes energy (b > k·h/2 of Colgate and Schenkel), is made up for.
 //! Beyond its largest force or torque the coupling slips: its stiffness and damping are scaled down together, which keeps the implicit step's matrix
 //! positive definite and the force's direction.
 
@@ -54,13 +56,15 @@ impl Coupling {
         }
     }
 
-    /// Wrench on the object at its centre of mass when it has moved with `twist` for `period_s`, before slipping.
+    /// Wrench on the object at its centre of mass at the tick's end, when it has moved with `twist` for `period_s`; before slipping.
+    ///
+    /// d' = d + h·(V_hand − V'), so F' = k·d + (b + h·k)·(V_hand − V'), and the same for the torque.
     pub fn pull(&self, settings: &CouplingSettings, period_s: f32, twist: Twist) -> Wrench {
         Wrench {
-            force: (self.stretch - twist.linear * period_s) * settings.k_t_n_per_m
-                + (self.target.linear - twist.linear) * settings.b_t,
-            torque: (self.angle - twist.angular * period_s) * settings.k_r
-                + (self.target.angular - twist.angular) * settings.b_r,
+            force: self.stretch * settings.k_t_n_per_m
+                + (self.target.linear - twist.linear) * (settings.b_t + period_s * settings.k_t_n_per_m),
+            torque: self.angle * settings.k_r
+                + (self.target.angular - twist.angular) * (settings.b_r + period_s * settings.k_r),
         }
     }
 

@@ -11,7 +11,7 @@
 //! | `pose`, `rotation` | rigid motions, between rotation vectors and quaternions |
 //! | `settings`, `io`, `state` | what a tick reads, returns and remembers |
 //! | `coupling` | virtual coupling between handle and object |
-//! | `proximity`, `contact` | sphere tree against field; bounded store of contacts |
+//! | `proximity`, `coherence`, `contact` | sphere tree against field; what is not due yet; bounded store of contacts |
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
@@ -21,6 +21,7 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod coherence;
 mod contact;
 mod coupling;
 mod io;

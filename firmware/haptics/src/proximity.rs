@@ -13,6 +13,7 @@
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{Field, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage};
 
+use crate::coherence::{Coherence, Key};
 use crate::contact::{Contact, Contacts, Phase};
 use crate::io::{Flags, Work};
 use crate::pose::Pose;
@@ -20,9 +21,10 @@ use crate::state::Placed;
 
 /// Trilinear interpolation can overstate the distance next to a sharp edge; measured at 0.2 cells for a right angle, taken as this many.
 const EDGE_ERROR_CELLS: f32 = 0.25;
-/// A gradient shorter than this (squared) tells no direction: the field is clamped there, or between two surfaces.
-const LEAST_GRADIENT2: f32 = 0.25;
-/// Passing over a point that is no edge point costs about an eighth of a look-up.
+/// A gradient shorter than this (squared) tells no direction: the field is clamped there, or between two surfaces. Within a cell of a sharp edge
+/// it shrinks to about 0.3 while its direction is still good.
+const LEAST_GRADIENT2: f32 = 0.01;
+/// Passing over a point that is no edge point, or a node that is not due, costs about an eighth of a look-up.
 const PASSED_OVER_PER_LOOKUP: u32 = 8;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
@@ -94,12 +96,15 @@ impl<'i> Search<'_, 'i> {
         &self,
         resume: Option<Leaf>,
         first: &[Leaf],
+        coherence: &mut Coherence,
         contacts: &mut Contacts,
         work: &mut Work,
     ) -> Option<Leaf> {
         contacts.clear();
         let mut walk = Walk {
             search: self,
+            horizon: coherence.horizon(self.margin),
+            coherence,
             contacts,
             work,
             passed_over: 0,
@@ -195,9 +200,12 @@ impl<'i> Search<'_, 'i> {
 /// A search under way.
 struct Walk<'w, 's, 'i> {
     search: &'w Search<'s, 'i>,
+    coherence: &'w mut Coherence,
+    /// Travel at which what lies within the margin is due.
+    horizon: u32,
     contacts: &'w mut Contacts,
     work: &'w mut Work,
-    /// Points that were no edge points.
+    /// Points that were no edge points, nodes that were not due.
     passed_over: u32,
 }
 
@@ -227,7 +235,7 @@ impl Walk<'_, '_, '_> {
     ///
     /// Ends because every record's `skip` points forward (checked when the image was opened).
     fn nodes(&mut self, job: &Job<'_>, from: u32, to: u32, done: &[Leaf]) -> Option<Leaf> {
-        let reach = self.search.margin + EDGE_ERROR_CELLS * job.field.record().cell;
+        let edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
         let mut index = from;
         while index < to {
             let Some(node) = job.nodes.get(index as usize) else {
@@ -240,9 +248,17 @@ impl Walk<'_, '_, '_> {
             if self.left() == 0 {
                 return Some(here);
             }
+            let key = Key::new(job.index, index);
+            if !self.coherence.is_due(key, self.horizon) {
+                self.passed_over += 1;
+                index = node.skip;
+                continue;
+            }
             self.work.nodes += 1;
             let center = job.to_field.apply(node.center);
-            if job.field.bound(center.to_array()) > node.radius + reach {
+            let distance = job.field.bound(center.to_array()) - (node.radius + edge_error);
+            if distance > self.search.margin {
+                self.coherence.set(key, distance);
                 index = node.skip;
                 continue;
             }
@@ -264,6 +280,7 @@ impl Walk<'_, '_, '_> {
     /// All points of a leaf; false when the budget ran out.
     fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> bool {
         let mut left = self.left();
+        let mut nearest = f32::INFINITY;
         for point in points {
             if job.backward && point.edge_face == NO_FACE {
                 self.passed_over += 1;
@@ -277,29 +294,36 @@ impl Walk<'_, '_, '_> {
             }
             left -= 1;
             self.work.points += 1;
-            self.point(job, leaf, point);
+            let gap = self.point(job, leaf, point);
+            if gap < nearest {
+                nearest = gap;
+            }
         }
+        self.coherence.set(Key::new(leaf.job, leaf.node), nearest);
         true
     }
 
+    /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
     #[inline]
-    fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) {
+    fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
         let in_field = job.to_field.apply(point.position);
         let sample = match job.field.lookup(in_field.to_array()) {
             Lookup::Near(sample) => sample,
-            Lookup::Far { inside, .. } => {
-                self.work.flags.insert_if(inside, Flags::DEEP);
-                return;
+            Lookup::Far { inside: false, bound } => return bound,
+            Lookup::Far { inside: true, .. } => {
+                self.work.flags.insert(Flags::DEEP);
+                return f32::NEG_INFINITY;
             }
         };
         if sample.distance >= self.search.margin {
-            return;
+            return sample.distance;
         }
         let gradient = Vec3::from_array(sample.gradient);
         let squared = gradient.length_squared();
         if squared < LEAST_GRADIENT2 {
-            self.work.flags.insert_if(sample.distance < 0.0, Flags::DEEP);
-            return;
+            let deep = sample.distance < -job.field.record().cell;
+            self.work.flags.insert_if(deep, Flags::DEEP);
+            return sample.distance;
         }
         let n = job.to_push * (gradient * inverse_sqrt(squared));
         let arm = job.to_arm.apply(point.position);
@@ -320,6 +344,7 @@ impl Walk<'_, '_, '_> {
             static_face,
             leaf,
         });
+        sample.distance
     }
 
     /// Look-ups left.
@@ -329,7 +354,7 @@ impl Walk<'_, '_, '_> {
     }
 }
 
-/// 1/√x for x from 0.25 to 4: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).
+/// 1/√x for ordinary positive x: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).
 #[inline]
 fn inverse_sqrt(x: f32) -> f32 {
     let mut y = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
@@ -346,7 +371,7 @@ mod tests {
     #[test]
     fn inverse_square_root() {
         for i in 0..10_000 {
-            let x = 0.25 + 3.75 * i as f32 / 10_000.0;
+            let x = 0.01 + 3.99 * i as f32 / 10_000.0;
             let y = inverse_sqrt(x);
             assert!(
                 (f64::from(y) * f64::from(y) * f64::from(x) - 1.0).abs() < 6e-7,

@@ -8,6 +8,7 @@ use mortise_protocol::image::{PART_GRABBABLE, SceneImage};
 use mortise_protocol::limits::MAX_PARTS;
 
 use crate::body::{Body, Grabbed};
+use crate::coherence::Coherence;
 use crate::contact::Contacts;
 use crate::pose::{Pose, Twist, Wrench};
 use crate::proximity::Leaf;
@@ -16,7 +17,7 @@ use crate::tick::usable_pose;
 /// Leaves remembered for the next tick, should the look-up budget run out.
 pub(crate) const MAX_LEAVES: usize = 64;
 
-/// Placements, the grabbed object, and what carries over. About 25 KiB; lives in a static on a board.
+/// Placements, the grabbed object, and what carries over. About 45 KiB; lives in a static on a board.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Every part's placement.
@@ -31,6 +32,8 @@ pub struct State {
     pub(crate) resume: Option<Leaf>,
     /// After such a tick: leaves whose points pushed, each once.
     pub(crate) leaves: Vec<Leaf, MAX_LEAVES>,
+    /// Nodes that need not be looked at yet.
+    pub(crate) coherence: Coherence,
     /// Scratch of one tick; kept here because a board's stack is small.
     pub(crate) contacts: Contacts,
 }
@@ -100,6 +103,7 @@ impl State {
             sharing: 0.0,
             resume: None,
             leaves: Vec::new(),
+            coherence: Coherence::new(),
             contacts: Contacts::new(),
         }
     }
@@ -196,11 +200,17 @@ impl State {
         self.previous_wrench = Wrench::ZERO;
     }
 
+    /// Has the next tick look at everything, as after a jump. Coherence changes the work, never the result; this is for showing so.
+    pub fn forget_coherence(&mut self) {
+        self.coherence.forget();
+    }
+
     fn forget_contacts(&mut self) {
         self.sharing = 0.0;
         self.resume = None;
         self.leaves.clear();
         self.contacts.clear();
+        self.coherence.forget();
     }
 
     /// Writes the held part's placement back to the list of parts.

@@ -173,15 +173,17 @@ impl Step<'_> {
         Coupling::slip(pull, self.settings)
     }
 
-    /// Matrix and right side of mass and coupling, scaled: (M + h·B + h²·K)·V' = M·V + h·(K·d + B·V_target).
+    /// Matrix and right side of mass and coupling, scaled: (M + h·B + h²·K)·V' = M·V + h·(K·d + (B + h·K)·V_hand).
     fn without_contact(&self, slip: Slip) -> (Symmetric6, [f32; 6]) {
         let h = self.period_s;
         let m = self.mass_kg;
         let s = self.settings;
         let c = self.coupling;
         let inverse_length = 1.0 / self.length;
-        let translation = m + h * (s.b_t + h * s.k_t_n_per_m) * slip.translation;
-        let rotation = h * (s.b_r + h * s.k_r) * slip.rotation * inverse_length * inverse_length;
+        let b_t = s.b_t + h * s.k_t_n_per_m;
+        let b_r = s.b_r + h * s.k_r;
+        let translation = m + h * b_t * slip.translation;
+        let rotation = h * b_r * slip.rotation * inverse_length * inverse_length;
         let inertia = self.gyration2 * (m * inverse_length * inverse_length);
         let mut matrix = Symmetric6::ZERO;
         let columns = [inertia.x_axis, inertia.y_axis, inertia.z_axis];
@@ -193,9 +195,9 @@ impl Step<'_> {
             matrix.add(3 + i, 3 + i, rotation);
         }
         let linear = self.twist.linear * m
-            + (c.stretch * s.k_t_n_per_m + c.target.linear * s.b_t) * (h * slip.translation);
+            + (c.stretch * s.k_t_n_per_m + c.target.linear * b_t) * (h * slip.translation);
         let angular = (self.gyration2 * self.twist.angular) * (m * inverse_length)
-            + (c.angle * s.k_r + c.target.angular * s.b_r) * (h * slip.rotation * inverse_length);
+            + (c.angle * s.k_r + c.target.angular * b_r) * (h * slip.rotation * inverse_length);
         let right = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
         (matrix, right)
     }

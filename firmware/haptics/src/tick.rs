@@ -93,6 +93,9 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     );
     let wanted = coupling.reaction(pull);
     let pairs = touching_faces(state.contacts.as_slice(), grabbed.center, settings.period_s);
+    state
+        .coherence
+        .travelled(settings.period_s * point_speed(twist, reach));
     state.grabbed = Some(grabbed);
     state.settle();
     let handle = state.hand_over(wanted, input.enabled, settings, &mut work.flags);
@@ -129,7 +132,13 @@ impl State {
             inverse_length: 1.0 / step.length,
             budget: settings.contact.point_budget,
         };
-        self.resume = search.run(self.resume, &self.leaves, &mut self.contacts, work);
+        self.resume = search.run(
+            self.resume,
+            &self.leaves,
+            &mut self.coherence,
+            &mut self.contacts,
+            work,
+        );
         work.flags
             .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
         let contact = &settings.contact;

@@ -5,8 +5,8 @@ mod support;
 use mortise_haptics::{Flags, Settings, State};
 use support::hand::{Hand, run};
 
-/// A face with 2,025 points pressed flat; deepest penetration, felt force.
-fn press(settings: &Settings) -> (f32, f32, support::hand::Seen) {
+/// A face with 2,025 points pressed flat, at rest within `unrest_n` (N, and 100 N s/m times the handle's speed) after a second; deepest penetration, felt force.
+fn press(settings: &Settings, unrest_n: f32) -> (f32, f32, support::hand::Seen) {
     let image = support::slab_and_box(0.05e-3, 45);
     let scene = image.open();
     let mut state = State::new();
@@ -25,8 +25,7 @@ fn press(settings: &Settings) -> (f32, f32, support::hand::Seen) {
         }
     });
     println!("{seen:?}, last {:?}, unrest {late}", out.work);
-    // Once settled the force stands still within a thousandth.
-    assert!(late < 9e-3, "{late}");
+    assert!(late < unrest_n, "{late}");
     (seen.deepest_m, out.handle.force.z, seen)
 }
 
@@ -34,7 +33,7 @@ fn press(settings: &Settings) -> (f32, f32, support::hand::Seen) {
 fn all_looked_up_the_deepest_kept() {
     let mut settings = Settings::default();
     settings.contact.point_budget = 20_000;
-    let (deepest, felt, seen) = press(&settings);
+    let (deepest, felt, seen) = press(&settings, 9e-3);
     assert!((felt - 9.0).abs() < 0.01);
     assert!(deepest < 20e-6);
     assert!(seen.flags.contains(Flags::CONTACTS_DROPPED));
@@ -45,16 +44,17 @@ fn a_million_newton_per_metre_in_all() {
     let mut settings = Settings::default();
     settings.contact.point_budget = 20_000;
     settings.contact.total_stiffness_n_per_m = 1e6;
-    let (deepest, felt, _) = press(&settings);
+    let (deepest, felt, _) = press(&settings, 9e-3);
     assert!((felt - 9.0).abs() < 0.01);
     // 9 N on 1 MN/m is 9 µm; as much again on impact.
     assert!(deepest < 20e-6);
 }
 
+// A third of the points at a time, those that pushed first: the box rocks by micrometres, within a fortieth of the force.
 #[test]
 fn on_the_usual_budget() {
-    let (deepest, felt, seen) = press(&Settings::default());
-    assert!((felt - 9.0).abs() < 0.01);
+    let (deepest, felt, seen) = press(&Settings::default(), 0.25);
+    assert!((felt - 9.0).abs() < 0.25);
     assert!(deepest < 20e-6);
     assert!(seen.flags.contains(Flags::BUDGET_EXCEEDED));
 }

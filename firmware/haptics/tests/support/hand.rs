@@ -58,13 +58,13 @@ impl Hand {
         let force = force.to_array().map(f64::from);
         let mut work = 0.0;
         for _ in 0..10 {
-            for a in 0..3 {
+            for (a, force) in force.iter().enumerate() {
                 let hand = self.spring_n_per_m * (self.goal[a] - self.position[a])
                     - self.damping_n_s_per_m * self.velocity[a]
                     + self.push[a];
-                self.velocity[a] += step * (hand + force[a]) / self.mass_kg;
+                self.velocity[a] += step * (hand + force) / self.mass_kg;
                 self.position[a] += step * self.velocity[a];
-                work += force[a] * self.velocity[a] * step;
+                work += force * self.velocity[a] * step;
             }
         }
         work

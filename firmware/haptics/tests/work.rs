@@ -1,0 +1,80 @@
+//! How much a tick has to do, counted; and the same scenes at length for an instruction counter.
+//!
+//! `valgrind --tool=callgrind --toggle-collect='*tick*'` on this test's release binary with one test chosen gives instructions a tick.
+
+mod support;
+
+use mortise_haptics::{Settings, State};
+use support::hand::{Hand, Seen, run};
+
+const TICKS: u32 = 2000;
+
+fn inside(clearance: f64, push: [f64; 3], sway: f64) -> Seen {
+    let image = support::hole_and_peg(clearance, 25e-3);
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let mut hand = Hand::at([0.0; 3]);
+    hand.push = push;
+    state.grab(&scene, 1, &hand.pose()).unwrap();
+    // The first tick looks at everything; what counts is a session.
+    let quiet = |_: u32, _: &mut Hand, _: Option<&_>| {};
+    let (_, first) = run(&mut state, &scene, &Settings::default(), &mut hand, 1, quiet);
+    let (_, seen) = run(
+        &mut state,
+        &scene,
+        &Settings::default(),
+        &mut hand,
+        TICKS,
+        |t, hand, _| {
+            hand.goal[2] = sway * (0.02 * f64::from(t)).sin();
+        },
+    );
+    println!(
+        "first {} look-ups; then at most {} nodes + {} points, {} candidates, {} solves",
+        first.nodes + first.points,
+        seen.nodes,
+        seen.points,
+        seen.candidates,
+        seen.solves
+    );
+    seen
+}
+
+#[test]
+fn centred_in_a_loose_hole() {
+    let seen = inside(1e-3, [0.0; 3], 1e-3);
+    // The gap of 0.5 mm is used up by 20 mm/s in 25 ticks, each node at its own time.
+    assert!(seen.nodes + seen.points < 600, "{seen:?}");
+    assert_eq!(seen.contacts, 0);
+}
+
+#[test]
+fn pressed_to_the_wall_of_a_close_hole() {
+    let seen = inside(20e-6, [5.0, 0.0, 0.0], 1e-3);
+    assert!(seen.nodes + seen.points < 900, "{seen:?}");
+    assert!(seen.contacts > 0);
+}
+
+#[test]
+fn free_above() {
+    let image = support::slab_and_box(20e-3, 9);
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let mut hand = Hand::at([0.0; 3]);
+    state.grab(&scene, 1, &hand.pose()).unwrap();
+    let (_, seen) = run(
+        &mut state,
+        &scene,
+        &Settings::default(),
+        &mut hand,
+        TICKS,
+        |t, hand, _| {
+            hand.goal[0] = 10e-3 * (0.005 * f64::from(t)).sin();
+        },
+    );
+    println!("at most {} nodes + {} points", seen.nodes, seen.points);
+    assert!(seen.nodes < 100, "{seen:?}");
+    assert_eq!(seen.points, 0);
+}
