@@ -26,12 +26,22 @@ const INTERRUPT: u32 = 1 << 3;
 /// Starts the ticks: time is 0 now, the first tick is due one period later.
 pub fn start() {
     let (tick, free) = (Registers::TIMER0, Registers::TIMER1);
-    tick.write::<RELOAD>(PERIOD - 1);
-    tick.write::<VALUE>(PERIOD - 1);
+    // No reload: each tick arms the next, see `arm`.
+    tick.write::<RELOAD>(0);
+    tick.write::<VALUE>(PERIOD);
     free.write::<RELOAD>(u32::MAX);
     free.write::<VALUE>(u32::MAX);
     free.write::<CTRL>(ENABLE);
     tick.write::<CTRL>(ENABLE | INTERRUPT);
+}
+
+/// Has the next tick come when the free timer reads `at`, or at once when that has passed.
+///
+/// Not by reloading: QEMU sets a reloading timer anew before it raises the interrupt, and with `sleep=off` a sleeping processor's time then
+/// leaps to the timer's next end as well (`timerlist_rearm`), so that every other tick would be lost.
+fn arm(at: u32) {
+    let left = at.wrapping_sub(now()) as i32;
+    Registers::TIMER0.write::<VALUE>(left.max(1) as u32);
 }
 
 /// Takes the tick's interrupt back.
@@ -68,6 +78,7 @@ impl Clock for TickClock {
         self.due = self.due.wrapping_add(PERIOD);
         let skipped = self.since_due() / PERIOD;
         self.due = self.due.wrapping_add(skipped * PERIOD);
+        arm(self.due.wrapping_add(PERIOD));
         let overran = u32::from(core::mem::take(&mut self.last_cost) >= BUDGET);
         skipped + overran
     }
