@@ -3,7 +3,7 @@
 
 use crate::kernel::{self, RawPart, RawResult};
 use crate::part21::check::{self, Content};
-use crate::part21::{self, Exchange, Part21Error, render, text, units};
+use crate::part21::{self, Exchange, Part21Error, operators, render, text, units};
 use crate::{BrepError, CadModel, LoadOptions, Part, shape};
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
@@ -16,7 +16,7 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
     if bytes.is_empty() {
         return Err(BrepError::Empty { path: path.into() });
     }
-    let file = part21::parse(bytes).map_err(|e| text_error(path, e))?;
+    let mut file = part21::parse(bytes).map_err(|e| text_error(path, e))?;
     let content = check::check(&file).map_err(|e| text_error(path, e))?;
     if content.solids.is_empty() && content.surfaces.is_empty() {
         return Err(BrepError::NoShape {
@@ -25,6 +25,7 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
         });
     }
     let units = units::length_units(&file).map_err(|e| text_error(path, e))?;
+    operators::split(&mut file).map_err(|e| text_error(path, e))?;
     let rendered = render::render(&file);
     let kernel_error = |e: cxx::Exception| {
         let reason = match e.what() {
@@ -125,7 +126,10 @@ fn found_instead(file: &Exchange) -> String {
 /// The file's length unit for people to read; every length is already in millimetres.
 fn unit(names: Vec<String>, warnings: &mut Vec<String>) -> String {
     if names.len() > 1 {
-        warnings.push(format!("length units differ within the file: {}", names.join(", ")));
+        warnings.push(format!(
+            "length units differ within the file: {}",
+            names.join(", ")
+        ));
     }
     names.into_iter().next().unwrap_or_else(|| {
         warnings.push("the file names no length unit; millimetre is assumed".into());

@@ -39,6 +39,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <locale>
 #include <map>
 #include <set>
 #include <sstream>
@@ -74,6 +75,19 @@ bool color_of(const Handle(XCAFDoc_ColorTool) & tool, const TDF_Label& label, Co
     }
   }
   return false;
+}
+
+// A token may end in * and a signed scale: see part21/operators.rs.
+TopLoc_Location scale_of(const std::string& token) {
+  const std::size_t star = token.find('*');
+  if (star == std::string::npos || token.compare(0, 8, "mortise-") != 0) return TopLoc_Location();
+  double scale = 1;
+  std::istringstream number(token.substr(star + 1));
+  number.imbue(std::locale::classic());
+  if (!(number >> scale) || scale == 0 || scale == 1) return TopLoc_Location();
+  gp_Trsf about_origin;
+  about_origin.SetScale(gp_Pnt(0, 0, 0), scale);
+  return TopLoc_Location(about_origin);
 }
 
 std::size_t count(const TopoDS_Shape& shape, TopAbs_ShapeEnum what, TopAbs_ShapeEnum outside_of = TopAbs_SHAPE) {
@@ -166,7 +180,8 @@ class Walker {
         Color own = color;
         const bool has = color_of(colors_, component, own) || color_of(colors_, product, own) || has_color;
         path.emplace_back(name_of(component), name_of(product));
-        walk(product, where * XCAFDoc_ShapeTool::GetLocation(component), path, has, own, depth + 1);
+        const TopLoc_Location here = where * XCAFDoc_ShapeTool::GetLocation(component) * scale_of(path.back().first);
+        walk(product, here, path, has, own, depth + 1);
         path.pop_back();
       }
       return;

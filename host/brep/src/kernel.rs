@@ -103,6 +103,9 @@ mod ffi {
         inertia: [f64; 9],
         /// Faces that could not be tessellated.
         faces_without_mesh: Vec<u32>,
+        /// Largest distance measured between mesh and surface, and the bound asked for, mm.
+        deflection: f64,
+        deflection_asked: f64,
     }
 
     unsafe extern "C++" {

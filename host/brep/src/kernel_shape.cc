@@ -16,6 +16,8 @@
 #include <Poly_Triangulation.hxx>
 #include <Standard_Version.hxx>
 #include <TColStd_Array1OfInteger.hxx>
+#include <TColStd_Array1OfReal.hxx>
+#include <TColStd_HArray1OfReal.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopTools_IndexedDataMapOfShapeListOfShape.hxx>
@@ -34,6 +36,7 @@
 #include <gp_Sphere.hxx>
 #include <gp_Torus.hxx>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -42,6 +45,8 @@ namespace brep {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
+// Relative error asked of each adaptive integral; 1e-9 costs six times as much on large spline models.
+constexpr double kQuadrature = 1e-6;
 
 std::array<double, 3> numbers(const gp_XYZ& v) { return {v.X(), v.Y(), v.Z()}; }
 
@@ -101,12 +106,37 @@ class Describer {
   }
 
  private:
+  // The kernel's plain quadrature is exact on analytic faces between lines and circles, and up to 1 % off on splines
+  // (a cylinder spelt as a spline): those are integrated adaptively.
+  static bool is_plain(const TopoDS_Face& face) {
+    if (BRepAdaptor_Surface(face, false).GetType() > GeomAbs_Torus) return false;
+    for (TopExp_Explorer it(face, TopAbs_EDGE); it.More(); it.Next()) {
+      const TopoDS_Edge edge = TopoDS::Edge(it.Current());
+      double first = 0, last = 0;
+      if (BRep_Tool::Degenerated(edge) || BRep_Tool::Curve(edge, first, last).IsNull()) continue;
+      if (BRepAdaptor_Curve(edge).GetType() > GeomAbs_Circle) return false;
+    }
+    return true;
+  }
+
+  static double area_of(const TopoDS_Face& face) {
+    GProp_GProps area;
+    if (is_plain(face) || BRepGProp::SurfaceProperties(face, area, kQuadrature) < 0) {
+      area = GProp_GProps();
+      BRepGProp::SurfaceProperties(face, area);
+    }
+    return std::abs(area.Mass());
+  }
+
   void mass() {
-    GProp_GProps volume, area;
-    BRepGProp::VolumeProperties(shape_, volume);
-    BRepGProp::SurfaceProperties(shape_, area);
+    bool plain = true;
+    for (int i = 1; i <= face_index_.Extent() && plain; ++i) plain = is_plain(TopoDS::Face(face_index_(i)));
+    GProp_GProps volume;
+    if (plain || BRepGProp::VolumeProperties(shape_, volume, kQuadrature) < 0) {
+      volume = GProp_GProps();
+      BRepGProp::VolumeProperties(shape_, volume);
+    }
     out_.volume = volume.Mass();
-    out_.area = area.Mass();
     out_.center = numbers(volume.CentreOfMass().XYZ());
     const gp_Mat inertia = volume.MatrixOfInertia();
     for (int row = 0; row < 3; ++row)
@@ -146,7 +176,7 @@ class Describer {
     return raw;
   }
 
-  static void surface(const TopoDS_Face& face, const BRepAdaptor_Surface& adaptor, RawFace& raw) {
+  static void surface(const BRepAdaptor_Surface& adaptor, RawFace& raw) {
     gp_Ax3 frame;
     raw.kind = 5;
     switch (adaptor.GetType()) {
@@ -197,10 +227,9 @@ class Describer {
   void face(const TopoDS_Face& face, std::uint32_t number) {
     RawFace raw{};
     const BRepAdaptor_Surface adaptor(face, false);
-    surface(face, adaptor, raw);
-    GProp_GProps area;
-    BRepGProp::SurfaceProperties(face, area);
-    raw.area = std::abs(area.Mass());
+    surface(adaptor, raw);
+    raw.area = area_of(face);
+    out_.area += raw.area;
     const auto color = colors_.find(face.TShape().get());
     raw.has_color = color != colors_.end();
     if (raw.has_color) raw.color = color->second;
@@ -348,21 +377,85 @@ class Describer {
   RawShape out_{};
 };
 
+// Largest distance seen between the mesh and what it stands for: at the middle of each segment of an edge and of each
+// triangle, where a chord's error is largest.
+double deviation(const TopoDS_Shape& shape) {
+  double worst = 0;
+  for (TopExp_Explorer faces(shape, TopAbs_FACE); faces.More(); faces.Next()) {
+    const TopoDS_Face face = TopoDS::Face(faces.Current());
+    TopLoc_Location place;
+    const Handle(Poly_Triangulation) mesh = BRep_Tool::Triangulation(face, place);
+    if (mesh.IsNull()) continue;
+    const gp_Trsf trsf = place.Transformation();
+    const BRepAdaptor_Surface surface(face, false);
+    if (surface.GetType() != GeomAbs_Plane && has_uv(mesh)) {
+      for (int i = 1; i <= mesh->NbTriangles(); ++i) {
+        int corners[3];
+        triangle(mesh, i, corners);
+        gp_XY uv(0, 0);
+        gp_XYZ points[3];
+        for (int k = 0; k < 3; ++k) {
+          uv += uv_node(mesh, corners[k]).XY();
+          points[k] = node(mesh, corners[k]).Transformed(trsf).XYZ();
+        }
+        const gp_XYZ normal = (points[1] - points[0]).Crossed(points[2] - points[0]);
+        const double twice_area = normal.Modulus();
+        if (twice_area < 1e-12) continue;
+        const gp_XYZ middle = surface.Value(uv.X() / 3, uv.Y() / 3).XYZ();
+        worst = std::max(worst, std::abs((middle - points[0]).Dot(normal)) / twice_area);
+      }
+    }
+    for (TopExp_Explorer edges(face, TopAbs_EDGE); edges.More(); edges.Next()) {
+      const TopoDS_Edge edge = TopoDS::Edge(edges.Current());
+      double first = 0, last = 0;
+      if (BRep_Tool::Degenerated(edge) || BRep_Tool::Curve(edge, first, last).IsNull()) continue;
+      const Handle(Poly_PolygonOnTriangulation) polygon = BRep_Tool::PolygonOnTriangulation(edge, mesh, place);
+      if (polygon.IsNull() || polygon->Parameters().IsNull()) continue;
+      const BRepAdaptor_Curve curve(edge);
+      const TColStd_Array1OfInteger& nodes = polygon->Nodes();
+      const TColStd_Array1OfReal& parameters = polygon->Parameters()->Array1();
+      for (int i = 0; i + 1 < nodes.Length(); ++i) {
+        const gp_XYZ a = node(mesh, nodes(nodes.Lower() + i)).Transformed(trsf).XYZ();
+        const gp_XYZ b = node(mesh, nodes(nodes.Lower() + i + 1)).Transformed(trsf).XYZ();
+        const double length = (b - a).Modulus();
+        if (length < 1e-12) continue;
+        const double middle = 0.5 * (parameters(parameters.Lower() + i) + parameters(parameters.Lower() + i + 1));
+        const gp_XYZ off = curve.Value(middle).XYZ() - a;
+        worst = std::max(worst, off.Crossed(b - a).Modulus() / length);
+      }
+    }
+  }
+  return worst;
+}
+
 }  // namespace
 
-RawShape describe(const TopoDS_Shape& given, const std::unordered_map<const void*, Color>& colors, double linear_mm,
+RawShape describe(const TopoDS_Shape& shape, const std::unordered_map<const void*, Color>& colors, double linear_mm,
                   double relative, double angular_rad) {
-  // Meshes left from an earlier call, or read from the file, are not ours.
-  BRepTools::Clean(given);
-  Bnd_Box box;
-  BRepBndLib::Add(given, box, false);
   double linear = linear_mm;
   if (!(linear > 0)) {
+    Bnd_Box box;
+    BRepBndLib::Add(shape, box, false);
     linear = box.IsVoid() ? 0.1 : relative * std::sqrt(box.SquareExtent());
     if (!(linear > 1e-6)) linear = 1e-6;
   }
-  BRepMesh_IncrementalMesh mesher(given, linear, false, angular_rad, false);
-  return Describer(given, colors, linear, angular_rad).run();
+  // The mesher may miss its bound (by 2.3 on a circle spelt as a spline), so it is measured and asked for more. The
+  // error falls with the square of a segment's length.
+  double ask_linear = linear, ask_angular = angular_rad, found = 0;
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    // Meshes left from an earlier call, or read from the file, are not ours.
+    BRepTools::Clean(shape);
+    BRepMesh_IncrementalMesh mesher(shape, ask_linear, false, ask_angular, false);
+    found = deviation(shape);
+    if (found <= 1.01 * linear) break;
+    const double shrink = std::max(0.1, 0.9 * linear / found);
+    ask_linear *= shrink;
+    ask_angular *= std::sqrt(shrink);
+  }
+  RawShape out = Describer(shape, colors, linear, angular_rad).run();
+  out.deflection = found;
+  out.deflection_asked = linear;
+  return out;
 }
 
 }  // namespace brep

@@ -31,6 +31,13 @@ pub fn convert(raw: RawShape, notes: &mut Vec<String>) -> Shape {
             raw.faces.len()
         ));
     }
+    // Twice: for display nothing shows below that, and a seam or pole may honestly measure a little more.
+    if raw.deflection > 2.0 * raw.deflection_asked {
+        let (found, asked) = (raw.deflection, raw.deflection_asked);
+        notes.push(format!(
+            "the mesh is up to {found:.3} mm off the surface where {asked:.3} was asked"
+        ));
+    }
     if open_edges > 0 {
         notes.push(format!("is not closed: {open_edges} mesh edges are open"));
     }

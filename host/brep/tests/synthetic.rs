@@ -18,8 +18,14 @@ fn names(model: &CadModel) -> Vec<&str> {
 /// Corners of the box of all mesh vertices of a part, placed.
 fn placed_box(model: &CadModel, part: usize) -> (DVec3, DVec3) {
     let part = &model.parts[part];
-    let points = model.shapes[part.shape].mesh.vertices.iter().map(|&v| part.placement.transform_point3(v));
-    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+    let points = model.shapes[part.shape]
+        .mesh
+        .vertices
+        .iter()
+        .map(|&v| part.placement.transform_point3(v));
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+        (low.min(p), high.max(p))
+    })
 }
 
 fn assert_near(a: DVec3, b: DVec3, tolerance: f64) {
@@ -29,7 +35,10 @@ fn assert_near(a: DVec3, b: DVec3, tolerance: f64) {
 #[test]
 fn several_solids_in_one_product_are_a_part_each() {
     let mut text = StepText::millimetres();
-    let solids = [text.solid_box("a", DVec3::splat(1.0), true), text.solid_box("b", DVec3::splat(2.0), true)];
+    let solids = [
+        text.solid_box("a", DVec3::splat(1.0), true),
+        text.solid_box("b", DVec3::splat(2.0), true),
+    ];
     text.part("pair", &solids);
     let model = load(&text.finish()).unwrap();
     assert_eq!(names(&model), ["pair.1", "pair.2"]);
@@ -48,10 +57,23 @@ fn names_are_decoded_here() {
     let sub = text.assembly("\\X2\\6A5F4F53\\X0\\");
     text.component("", root, sub, DAffine3::IDENTITY);
     text.component("cover ''back'' \\\\ 1, #3; Ø", sub, child, DAffine3::IDENTITY);
-    text.component("cover ''back'' \\\\ 1, #3; Ø", sub, child, DAffine3::from_translation(DVec3::X * 5.0));
-    text.component("=>[0:1:1:3]", sub, child, DAffine3::from_translation(DVec3::X * 9.0));
+    text.component(
+        "cover ''back'' \\\\ 1, #3; Ø",
+        sub,
+        child,
+        DAffine3::from_translation(DVec3::X * 5.0),
+    );
+    text.component(
+        "=>[0:1:1:3]",
+        sub,
+        child,
+        DAffine3::from_translation(DVec3::X * 9.0),
+    );
     let model = load(&text.finish()).unwrap();
-    assert_eq!(names(&model), ["cover 'back' \\ 1, #3; Ø", "cover 'back' \\ 1, #3; Ø (2)", "機体"]);
+    assert_eq!(
+        names(&model),
+        ["cover 'back' \\ 1, #3; Ø", "cover 'back' \\ 1, #3; Ø (2)", "機体"]
+    );
     assert_eq!(model.parts[0].path, ["機体"]);
     assert_eq!(model.shapes.len(), 1, "a shape placed three times is there once");
 }
@@ -74,7 +96,9 @@ fn assert_outward(shape: &mortise_brep::Shape, inside: DVec3) {
         let normal = (b - a).cross(c - a);
         assert!(normal.dot(a - inside) > 0.0);
         let face = &shape.faces[face as usize];
-        let Surface::Plane { frame } = face.surface else { panic!("a box has planes") };
+        let Surface::Plane { frame } = face.surface else {
+            panic!("a box has planes")
+        };
         let outward = if face.reversed { -frame.z } else { frame.z };
         assert!(normal.normalize().dot(outward) > 1.0 - 1e-12);
     }
@@ -106,7 +130,11 @@ fn mirrored_and_scaled_placements_become_shapes_of_their_own() {
     let part = text.part("block", &[solid]);
     let plain = text.axis(DVec3::ZERO, DVec3::Z, DVec3::X);
     let mirrored = text.operator([-DVec3::X, DVec3::Y, DVec3::Z], DVec3::new(-5.0, 0.0, 0.0), 1.0);
-    let doubled = text.operator(DMat3::IDENTITY.to_cols_array_2d().map(DVec3::from), DVec3::new(0.0, 0.0, 9.0), 2.0);
+    let doubled = text.operator(
+        DMat3::IDENTITY.to_cols_array_2d().map(DVec3::from),
+        DVec3::new(0.0, 0.0, 9.0),
+        2.0,
+    );
     let items = [plain, mirrored, doubled].map(|target| text.mapped(part, target));
     let whole = text.representation("SHAPE_REPRESENTATION", &items);
     text.product("whole", whole);
@@ -114,7 +142,10 @@ fn mirrored_and_scaled_placements_become_shapes_of_their_own() {
     assert_eq!(model.parts.len(), 3, "{:?}", model.warnings);
     for part in &model.parts {
         let m = part.placement.matrix3;
-        assert!((m.determinant() - 1.0).abs() < 1e-9, "a placement is a rigid motion");
+        assert!(
+            (m.determinant() - 1.0).abs() < 1e-9,
+            "a placement is a rigid motion"
+        );
         assert!(model.shapes[part.shape].closed);
     }
     let corners = [
@@ -142,11 +173,21 @@ fn a_solid_that_the_kernel_loses_is_an_error_or_a_warning() {
     text.part("pair", &[good, hollow]);
     let text = text.finish();
     let error = load(&text).unwrap_err().to_string();
-    assert!(error.contains("lost 1 of 2 solids") && error.contains("hollow") && !error.contains('\n'), "{error}");
-    let options = LoadOptions { allow_lost_solids: true, ..LoadOptions::default() };
+    assert!(
+        error.contains("lost 1 of 2 solids") && error.contains("hollow") && !error.contains('\n'),
+        "{error}"
+    );
+    let options = LoadOptions {
+        allow_lost_solids: true,
+        ..LoadOptions::default()
+    };
     let model = load_step_with(support::file(&text), &options).unwrap();
     assert_eq!(names(&model), ["pair"]);
-    assert!(model.warnings.iter().any(|w| w.contains("hollow")), "{:?}", model.warnings);
+    assert!(
+        model.warnings.iter().any(|w| w.contains("hollow")),
+        "{:?}",
+        model.warnings
+    );
 }
 
 #[test]
@@ -160,7 +201,10 @@ fn an_assembly_that_unfolds_without_bound_is_refused() {
         text.component("right", parent, child, DAffine3::from_translation(DVec3::X));
         child = parent;
     }
-    let options = LoadOptions { max_parts: 1000, ..LoadOptions::default() };
+    let options = LoadOptions {
+        max_parts: 1000,
+        ..LoadOptions::default()
+    };
     let error = load_step_with(support::file(&text.finish()), &options).unwrap_err();
     assert!(error.to_string().contains("more parts than the limit"), "{error}");
 }
@@ -168,10 +212,14 @@ fn an_assembly_that_unfolds_without_bound_is_refused() {
 fn rigid() -> impl Strategy<Value = DAffine3> {
     let angle = -3.0..3.0f64;
     let along = -50.0..50.0f64;
-    ((angle.clone(), angle.clone(), angle), (along.clone(), along.clone(), along)).prop_map(|(r, t)| {
-        let rotation = DQuat::from_euler(glam::EulerRot::XYZ, r.0, r.1, r.2);
-        DAffine3::from_rotation_translation(rotation, DVec3::from(t))
-    })
+    (
+        (angle.clone(), angle.clone(), angle),
+        (along.clone(), along.clone(), along),
+    )
+        .prop_map(|(r, t)| {
+            let rotation = DQuat::from_euler(glam::EulerRot::XYZ, r.0, r.1, r.2);
+            DAffine3::from_rotation_translation(rotation, DVec3::from(t))
+        })
 }
 
 proptest! {

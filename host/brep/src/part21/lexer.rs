@@ -141,9 +141,10 @@ impl Lexer<'_> {
         let line = self.line;
         let id = self.number_of_reference()?;
         self.body(id, line).map_err(|error| match error {
-            Part21Error::Truncated { line, .. } => {
-                Part21Error::Truncated { line, missing: format!("it ends within entity #{id}") }
-            }
+            Part21Error::Truncated { line, .. } => Part21Error::Truncated {
+                line,
+                missing: format!("it ends within entity #{id}"),
+            },
             other => other,
         })
     }
@@ -167,9 +168,15 @@ impl Lexer<'_> {
             let what = format!("#{id} is defined twice, first at line {earlier}");
             return Err(Part21Error::Invalid { line, what });
         }
+        self.out.largest = self.out.largest.max(id);
         let body = start..self.out.bodies.len();
         let references = first..self.out.references.len();
-        self.out.entities.push(Entity { id, line, body, references });
+        self.out.entities.push(Entity {
+            id,
+            line,
+            body,
+            references,
+        });
         Ok(())
     }
 

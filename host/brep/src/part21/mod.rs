@@ -8,6 +8,7 @@
 
 pub mod check;
 mod lexer;
+pub mod operators;
 pub mod render;
 pub mod text;
 pub mod units;
@@ -62,10 +63,14 @@ pub struct Exchange {
     pub entities: Vec<Entity>,
     /// All references, entity after entity.
     pub references: Vec<u64>,
+    /// Largest number in use.
+    pub largest: u64,
     /// Index in `entities` by number.
     pub index: HashMap<u64, u32>,
     /// Entities with a number that is no finite double, and the number.
     pub bad_numbers: Vec<(u32, String)>,
+    /// Signed scale of occurrences that mirror (negative) or scale; see [`operators`].
+    pub scales: HashMap<usize, f64>,
     /// What was left out, in words.
     pub warnings: Vec<String>,
 }

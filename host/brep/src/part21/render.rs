@@ -18,7 +18,7 @@ pub fn render(file: &Exchange) -> Vec<u8> {
                 // The name is a slice of the body: everything else stays.
                 let start = name.as_ptr() as usize - body.as_ptr() as usize;
                 renumbered(file, &body[..start], &mut out);
-                out.extend_from_slice(format!("'{}'", token(entity)).as_bytes());
+                out.extend_from_slice(format!("'{}'", token(file, entity)).as_bytes());
                 renumbered(file, &body[start + name.len()..], &mut out);
             }
             None => renumbered(file, body, &mut out),
@@ -31,7 +31,12 @@ pub fn render(file: &Exchange) -> Vec<u8> {
 
 /// What the token in a name stands for: the entity; `None` when the text is no token.
 pub fn entity_of(token: &str) -> Option<usize> {
-    token.strip_prefix("mortise-")?.parse().ok()
+    let number = token.strip_prefix("mortise-")?;
+    number
+        .split_once('*')
+        .map_or(number, |(number, _)| number)
+        .parse()
+        .ok()
 }
 
 /// Name of the product or occurrence that a token stands for, or the text itself when it is none.
@@ -53,8 +58,12 @@ pub fn product_id(file: &Exchange, token: &str) -> Option<String> {
     Some(id.trim().to_string()).filter(|id| !id.is_empty())
 }
 
-fn token(entity: usize) -> String {
-    format!("mortise-{entity}")
+/// `mortise-12`, or `mortise-12*-2.0` for an occurrence that mirrors and doubles: kernel.cc reads the scale.
+fn token(file: &Exchange, entity: usize) -> String {
+    match file.scales.get(&entity) {
+        Some(scale) => format!("mortise-{entity}*{scale:?}"),
+        None => format!("mortise-{entity}"),
+    }
 }
 
 /// The name argument of a product or occurrence.

@@ -9,9 +9,14 @@ use super::{Exchange, Part21Error, reference, references, text};
 pub fn length_units(file: &Exchange) -> Result<Vec<String>, Part21Error> {
     let mut names = Vec::new();
     for entity in 0..file.entities.len() {
-        let Some(units) = file.arguments_as(entity, "GLOBAL_UNIT_ASSIGNED_CONTEXT") else { continue };
+        let Some(units) = file.arguments_as(entity, "GLOBAL_UNIT_ASSIGNED_CONTEXT") else {
+            continue;
+        };
         for unit in units.first().map(|list| references(list)).unwrap_or_default() {
-            let Some(unit) = file.find(unit).filter(|&unit| file.kinds(unit).contains(&"LENGTH_UNIT")) else {
+            let Some(unit) = file
+                .find(unit)
+                .filter(|&unit| file.kinds(unit).contains(&"LENGTH_UNIT"))
+            else {
                 continue;
             };
             let name = length_unit(file, unit).ok_or_else(|| Part21Error::Invalid {
@@ -47,16 +52,24 @@ fn length_unit(file: &Exchange, unit: usize) -> Option<String> {
 /// Factor and base unit of `LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#1)`, which may be part of a complex entity.
 fn factor(file: &Exchange, measure: usize) -> Option<(f64, usize)> {
     let kinds = ["LENGTH_MEASURE_WITH_UNIT", "MEASURE_WITH_UNIT"];
-    let arguments = kinds.iter().find_map(|kind| file.arguments_as(measure, kind).filter(|a| a.len() == 2))?;
+    let arguments = kinds
+        .iter()
+        .find_map(|kind| file.arguments_as(measure, kind).filter(|a| a.len() == 2))?;
     let value = std::str::from_utf8(arguments[0]).ok()?;
-    let value = value.split_once('(').map_or(value, |(_, rest)| rest.trim_end_matches(')'));
+    let value = value
+        .split_once('(')
+        .map_or(value, |(_, rest)| rest.trim_end_matches(')'));
     let value: f64 = value.parse().ok()?;
     (value > 0.0 && value.is_finite()).then_some((value, file.find(reference(arguments[1])?)?))
 }
 
 fn si_unit(file: &Exchange, unit: usize) -> Option<String> {
     let arguments = file.arguments_as(unit, "SI_UNIT")?;
-    let word = |i: usize| arguments.get(i).map(|a| String::from_utf8_lossy(a).replace('.', "").to_lowercase());
+    let word = |i: usize| {
+        arguments
+            .get(i)
+            .map(|a| String::from_utf8_lossy(a).replace('.', "").to_lowercase())
+    };
     let prefix = word(0).filter(|p| p != "$" && p != "*").unwrap_or_default();
     Some(format!("{prefix}{}", word(1).filter(|name| name == "metre")?))
 }
@@ -82,14 +95,18 @@ mod tests {
 
     #[test]
     fn a_unit_without_a_size_is_refused() {
-        let context = "#5=(GLOBAL_UNIT_ASSIGNED_CONTEXT((#3)));#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.));";
+        let context =
+            "#5=(GLOBAL_UNIT_ASSIGNED_CONTEXT((#3)));#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.));";
         for unit in [
             "#3=(CONTEXT_DEPENDENT_UNIT('user')LENGTH_UNIT()NAMED_UNIT(#1));",
             "#3=(CONVERSION_BASED_UNIT('ELL',#9)LENGTH_UNIT()NAMED_UNIT(#9));#9=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.),#1);",
             "#3=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.PARSEC.));",
         ] {
             let error = units(&format!("{context}{unit}"));
-            assert!(matches!(&error, Err(Part21Error::Invalid { what, .. }) if what.contains("unknown size")), "{error:?}");
+            assert!(
+                matches!(&error, Err(Part21Error::Invalid { what, .. }) if what.contains("unknown size")),
+                "{error:?}"
+            );
         }
     }
 }

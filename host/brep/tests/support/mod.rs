@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part of this")]
 
+pub mod check;
+
 use glam::{DAffine3, DVec3};
 use std::path::{Path, PathBuf};
 
@@ -17,7 +19,9 @@ pub fn shared() -> Option<PathBuf> {
 
 /// A file of `tests/data`.
 pub fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name)
 }
 
 /// A product: its definition and its shape representation.
@@ -38,7 +42,12 @@ pub struct StepText {
 impl StepText {
     /// A text whose lengths are in `unit`: the body of a length unit entity, in which `#SI` stands for the metre.
     pub fn new(unit: &str) -> Self {
-        let mut text = Self { data: String::new(), next: 0, application: 0, context: 0 };
+        let mut text = Self {
+            data: String::new(),
+            next: 0,
+            application: 0,
+            context: 0,
+        };
         let metre = text.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.))");
         let unit = unit.replace("#SI", &format!("#{metre}"));
         let length = match unit.split_once(';') {
@@ -51,7 +60,9 @@ impl StepText {
         };
         let angle = text.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))");
         let solid_angle = text.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())");
-        let uncertainty = text.add(&format!("UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),#{length},'accuracy','')"));
+        let uncertainty = text.add(&format!(
+            "UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),#{length},'accuracy','')"
+        ));
         text.context = text.add(&format!(
             "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{uncertainty}))\
              GLOBAL_UNIT_ASSIGNED_CONTEXT((#{length},#{angle},#{solid_angle}))REPRESENTATION_CONTEXT('',''))"
@@ -102,9 +113,7 @@ impl StepText {
 
     /// A box from the origin to `size`. `outward` false makes its faces look inward.
     pub fn solid_box(&mut self, name: &str, size: DVec3, outward: bool) -> u64 {
-        let corner = |i: usize| {
-            DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) * size
-        };
+        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) * size;
         let vertices: Vec<u64> = (0..8)
             .map(|i| {
                 let p = self.point(corner(i));
@@ -113,8 +122,14 @@ impl StepText {
             .collect();
         let mut edges = std::collections::HashMap::new();
         // Corners of each face, counter-clockwise seen from outside.
-        const FACES: [[usize; 4]; 6] =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        const FACES: [[usize; 4]; 6] = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
         let mut faces = Vec::new();
         for face in FACES {
             let mut oriented = Vec::new();
@@ -138,7 +153,10 @@ impl StepText {
                     }
                 };
                 let sense = if a < b { "T" } else { "F" };
-                oriented.push(format!("#{}", self.add(&format!("ORIENTED_EDGE('',*,*,#{edge},.{sense}.)"))));
+                oriented.push(format!(
+                    "#{}",
+                    self.add(&format!("ORIENTED_EDGE('',*,*,#{edge},.{sense}.)"))
+                ));
             }
             let edge_loop = self.add(&format!("EDGE_LOOP('',({}))", oriented.join(",")));
             let sense = if outward { "T" } else { "F" };
@@ -146,7 +164,10 @@ impl StepText {
             let [p, q, r] = [corner(face[0]), corner(face[1]), corner(face[2])];
             let axis = self.axis(p, (q - p).cross(r - q).normalize(), (q - p).normalize());
             let plane = self.add(&format!("PLANE('',#{axis})"));
-            faces.push(format!("#{}", self.add(&format!("ADVANCED_FACE('',(#{bound}),#{plane},.{sense}.)"))));
+            faces.push(format!(
+                "#{}",
+                self.add(&format!("ADVANCED_FACE('',(#{bound}),#{plane},.{sense}.)"))
+            ));
         }
         let shell = self.add(&format!("CLOSED_SHELL('',({}))", faces.join(",")));
         self.add(&format!("MANIFOLD_SOLID_BREP('{name}',#{shell})"))
@@ -166,11 +187,20 @@ impl StepText {
         let context = self.add(&format!("PRODUCT_CONTEXT('',#{application},'mechanical')"));
         let product = self.add(&format!("PRODUCT('{name}','{name}','',(#{context}))"));
         let formation = self.add(&format!("PRODUCT_DEFINITION_FORMATION('','',#{product})"));
-        let context = self.add(&format!("PRODUCT_DEFINITION_CONTEXT('part definition',#{application},'design')"));
-        let definition = self.add(&format!("PRODUCT_DEFINITION('design','',#{formation},#{context})"));
+        let context = self.add(&format!(
+            "PRODUCT_DEFINITION_CONTEXT('part definition',#{application},'design')"
+        ));
+        let definition = self.add(&format!(
+            "PRODUCT_DEFINITION('design','',#{formation},#{context})"
+        ));
         let shape = self.add(&format!("PRODUCT_DEFINITION_SHAPE('','',#{definition})"));
-        self.add(&format!("SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation})"));
-        Product { definition, representation }
+        self.add(&format!(
+            "SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation})"
+        ));
+        Product {
+            definition,
+            representation,
+        }
     }
 
     /// A product of solids.
@@ -200,13 +230,18 @@ impl StepText {
              SHAPE_REPRESENTATION_RELATIONSHIP())",
             child.representation, parent.representation
         ));
-        self.add(&format!("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})"));
+        self.add(&format!(
+            "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})"
+        ));
     }
 
     /// An item that maps `child` to `target` (an axis placement or a transformation operator).
     pub fn mapped(&mut self, child: Product, target: u64) -> u64 {
         let origin = self.origin();
-        let map = self.add(&format!("REPRESENTATION_MAP(#{origin},#{})", child.representation));
+        let map = self.add(&format!(
+            "REPRESENTATION_MAP(#{origin},#{})",
+            child.representation
+        ));
         self.add(&format!("MAPPED_ITEM('',#{map},#{target})"))
     }
 
@@ -214,13 +249,18 @@ impl StepText {
     pub fn operator(&mut self, axes: [DVec3; 3], origin: DVec3, scale: f64) -> u64 {
         let [a, b, c] = axes.map(|d| self.direction(d));
         let origin = self.point(origin);
-        self.add(&format!("CARTESIAN_TRANSFORMATION_OPERATOR_3D('',#{a},#{b},#{origin},{scale:?},#{c})"))
+        self.add(&format!(
+            "CARTESIAN_TRANSFORMATION_OPERATOR_3D('',#{a},#{b},#{origin},{scale:?},#{c})"
+        ))
     }
 }
 
 /// Writes the text to a file that lives as long as what is returned.
 pub fn file(text: &str) -> tempfile::TempPath {
-    let file = tempfile::Builder::new().suffix(".step").tempfile().expect("a temporary file");
+    let file = tempfile::Builder::new()
+        .suffix(".step")
+        .tempfile()
+        .expect("a temporary file");
     std::fs::write(file.path(), text).expect("writing the temporary file");
     file.into_temp_path()
 }
