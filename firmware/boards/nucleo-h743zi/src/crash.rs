@@ -20,13 +20,17 @@ use crate::motors;
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS + 1]> = MaybeUninit::uninit();
 
 /// Takes the record of the last crash, if there is one, and clears it. Once, in `init`.
-pub fn take() -> Option<Crash> {
+///
+/// After power-on (`memory_is_new`) nothing is read: memory never written has no valid error correction.
+pub fn take(memory_is_new: bool) -> Option<Crash> {
     let mut words: CrashRecord = [0; RECORD_WORDS];
     let place = (&raw mut RECORD).cast::<u32>();
     for (i, word) in words.iter_mut().enumerate() {
         // SAFETY: inside RECORD; any bits are a u32. Nothing else runs yet.
         unsafe {
-            *word = read_volatile(place.add(i));
+            if !memory_is_new {
+                *word = read_volatile(place.add(i));
+            }
             write_volatile(place.add(i), 0);
         }
     }

@@ -95,7 +95,7 @@ mod app {
         let mut core = cx.core;
         memory::protect_and_cache(&mut core);
         let flags = reset::take_flags();
-        let last_crash = crash::take();
+        let last_crash = crash::take(flags.power_on || flags.brown_out);
 
         let (config, core_hz) = clocks::configuration();
         let p = embassy_stm32::init(config);
@@ -210,6 +210,7 @@ mod app {
         static INCOMING: StaticCell<InPipe> = StaticCell::new();
         static OUTGOING: StaticCell<OutPipe> = StaticCell::new();
 
+        memory::repaint_stack();
         let executor = EXECUTOR.init_with(|| raw::Executor::new(core::ptr::null_mut()));
         let spawner = executor.spawner();
         let incoming = INCOMING.init_with(InPipe::new);

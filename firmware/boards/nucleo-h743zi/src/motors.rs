@@ -165,8 +165,7 @@ impl Motors {
             .write(|w| w.0 = ((ALL & !forward) << 16) | forward);
         if !self.live {
             self.live = true;
-            // What a stop left behind, so that only a new one is seen; the hardware keeps flag and outputs as they are while the input is open.
-            clear_breaks();
+            // Does not take while the stop input is open. A stop since the last `stopped` has left its flag, and the next call reports it.
             pac::TIM1.bdtr().modify(|w| w.set_moe(true));
         }
     }

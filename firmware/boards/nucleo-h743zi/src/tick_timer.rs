@@ -3,6 +3,7 @@
 //! TIM7 gives the interrupt, the processor's cycle counter (DWT) measures. At the interrupt the timer's count says how long ago the tick was due,
 //! to 8 cycles; from there the cycle counter runs on, so a cost includes the interrupt's latency and may exceed the period.
 
+use core::num::NonZeroU32;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::{DCB, DWT};
@@ -23,7 +24,7 @@ static SKIPPED: AtomicBool = AtomicBool::new(true);
 /// The application's clock: processor cycles since the running tick was due.
 pub struct Cycles {
     cycles_per_count: u32,
-    cycles_per_tick: u32,
+    cycles_per_tick: NonZeroU32,
     due: u32,
 }
 
@@ -47,7 +48,8 @@ impl Cycles {
         timer.dier().modify(|w| w.set_uie(true));
         Self {
             cycles_per_count: core_hz / timer_hz * DIVIDER,
-            cycles_per_tick: core_hz / u32::from(TICK_HZ),
+            // Some 480,000.
+            cycles_per_tick: NonZeroU32::new(core_hz / u32::from(TICK_HZ)).unwrap_or(NonZeroU32::MIN),
             due: 0,
         }
     }
@@ -84,7 +86,7 @@ impl Clock for Cycles {
             return 0;
         }
         // Rounded: the count is read some cycles after the cycle counter.
-        let periods = since.saturating_add(self.cycles_per_tick / 2) / self.cycles_per_tick;
+        let periods = since.saturating_add(self.cycles_per_tick.get() / 2) / self.cycles_per_tick;
         u32::from(OVERRAN.load(Ordering::Relaxed)) + periods.saturating_sub(1)
     }
 
