@@ -1,3 +1,9 @@
-//! The program.
+//! The program `mortise`.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    // First: this program is also the process that reads STEP files for itself.
+    mortise_brep::child::init();
+    mortise::cli::main()
+}

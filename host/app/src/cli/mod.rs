@@ -1,0 +1,119 @@
+//! Commands: the same work as in the window, without one. Each has `--json`.
+//!
+//! Exit code 0: done; 1: a figure did not hold, or the insertion did not come to its end; 2: not possible, with one line on
+//! standard error that says why.
+
+mod bake;
+mod demo;
+mod inspect;
+mod output;
+mod ports;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand};
+use mortise_rig::RigSpec;
+
+use crate::session::Intent;
+use crate::ui::app::{self, Options, Screenshot};
+
+/// Feel whether CAD parts go together, before anything is made.
+///
+/// Without a command the window opens.
+#[derive(Debug, Parser)]
+#[command(name = "mortise", version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    open: Open,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Say what a STEP file holds: parts, faces, volumes, and what was lost
+    Inspect(inspect::Args),
+    /// Turn a STEP file into a scene image for the board
+    Bake(bake::Args),
+    /// Insert a peg into its hole with a simulated hand, in the window or without one
+    Demo(demo::Args),
+    /// List the rigs: simulated ones and serial ports
+    Ports(ports::Args),
+    /// Open the window
+    Open(Open),
+}
+
+
+/// What the window starts with.
+#[derive(Debug, Args)]
+struct Open {
+    /// STEP file to open
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    picture: Picture,
+}
+
+/// For automation.
+#[derive(Debug, Default, Args)]
+struct Picture {
+    /// Write a PNG of the window, then end
+    #[arg(long, hide = true, value_name = "PNG")]
+    screenshot: Option<PathBuf>,
+    /// Seconds from the start to the picture
+    #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
+    after: f64,
+    /// Draw fixed parts as glass
+    #[arg(long, hide = true)]
+    see_through: bool,
+}
+
+impl Picture {
+    fn options(self, first: Vec<Intent>) -> Options {
+        let after = Duration::try_from_secs_f64(self.after).unwrap_or_default();
+        Options {
+            first,
+            screenshot: self.screenshot.map(|file| Screenshot { file, after }),
+            see_through: self.see_through,
+        }
+    }
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse() {
+        Cli { command: None, open } => window(open),
+        Cli {
+            command: Some(command),
+            ..
+        } => match command {
+            Command::Open(open) => window(open),
+            Command::Inspect(args) => inspect::run(&args),
+            Command::Bake(args) => bake::run(&args),
+            Command::Demo(args) => demo::run(args),
+            Command::Ports(args) => ports::run(&args),
+        },
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) if output::is_closed(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            // One line, whatever is inside.
+            let line = format!("{error:#}").replace('\n', " ");
+            eprintln!("mortise: {line}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn window(open: Open) -> anyhow::Result<ExitCode> {
+    let first = open.file.map(Intent::Open).into_iter().collect();
+    app::run(open.picture.options(first))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Reads a rig from the command line.
+fn rig(text: &str) -> Result<RigSpec, String> {
+    text.parse().map_err(|error: mortise_rig::SpecError| error.to_string())
+}

@@ -1,0 +1,156 @@
+//! A STEP file, read and made ready to be shown.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use glam::DAffine3;
+use mortise_bake::Baked;
+use mortise_brep::CadModel;
+
+use super::insertion::{self, Insertion};
+use super::tree::{Branch, tree};
+use crate::viewport::camera::Extent;
+use crate::viewport::mesh::{ShapeMesh, srgb};
+
+/// Colours of parts that have none, sRGB: muted, told apart on a dark ground, none of them red (stop) or orange (in hand).
+const PALETTE: [[u8; 3]; 8] = [
+    [150, 163, 178],
+    [112, 152, 196],
+    [126, 176, 146],
+    [170, 146, 196],
+    [196, 182, 128],
+    [120, 180, 186],
+    [188, 150, 166],
+    [160, 176, 116],
+];
+
+/// What is open.
+#[derive(Clone, Debug)]
+pub struct Document {
+    /// Counts up with every file opened.
+    pub generation: u64,
+    /// Where it came from; `None`: the sample.
+    pub path: Option<PathBuf>,
+    /// File name without folders, for titles.
+    pub title: String,
+    /// What the file holds.
+    pub model: Arc<CadModel>,
+    /// The assembly.
+    pub tree: Vec<Branch>,
+    /// One for each shape.
+    pub meshes: Arc<Vec<ShapeMesh>>,
+    /// A sphere about each shape, its own frame.
+    pub extents: Vec<Extent>,
+    /// About everything as it was opened.
+    pub extent: Extent,
+    /// sRGB of each part.
+    pub colors: Vec<[u8; 3]>,
+    /// Where each part is now, mm.
+    pub poses: Vec<DAffine3>,
+    /// A peg before a hole, if there is one.
+    pub insertion: Option<Insertion>,
+    /// The scene image, once baked.
+    pub baked: Option<Arc<Baked>>,
+}
+
+impl Document {
+    /// Reads a STEP file. Takes as long as the CAD kernel does: call it off the window's thread.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn read(path: &Path, generation: u64) -> anyhow::Result<Self> {
+        let model = mortise_brep::load_step(path)?;
+        let title = (path.file_name()).map_or_else(
+            || path.display().to_string(),
+            |n| n.to_string_lossy().into_owned(),
+        );
+        Ok(Self::of(model, Some(path.to_owned()), title, generation))
+    }
+
+    /// Reads the sample that is part of the program.
+    ///
+    /// # Errors
+    /// When it cannot be written to the folder for temporary files, or not be read.
+    pub fn sample(generation: u64) -> anyhow::Result<Self> {
+        let file = crate::sample::File::write().context("the sample could not be unpacked")?;
+        let model = mortise_brep::load_step(file.path())?;
+        Ok(Self::of(model, None, crate::sample::NAME.to_owned(), generation))
+    }
+
+    /// From a model.
+    pub fn of(model: CadModel, path: Option<PathBuf>, title: String, generation: u64) -> Self {
+        let extents: Vec<Extent> = (model.shapes.iter())
+            .map(|shape| Extent::of_points(shape.mesh.vertices.iter().copied()))
+            .collect();
+        let poses: Vec<DAffine3> = model.parts.iter().map(|p| p.placement).collect();
+        let insertion = insertion::find(&model, &poses);
+        let extent = extent_of(&model, &poses);
+        Self {
+            generation,
+            path,
+            title,
+            tree: tree(&model),
+            meshes: Arc::new(model.shapes.iter().map(ShapeMesh::of).collect()),
+            extents,
+            extent,
+            colors: colors(&model),
+            poses,
+            insertion,
+            baked: None,
+            model: Arc::new(model),
+        }
+    }
+
+    /// Puts every part back where the file has it.
+    pub fn reset_poses(&mut self) {
+        for (pose, part) in self.poses.iter_mut().zip(&self.model.parts) {
+            *pose = part.placement;
+        }
+    }
+
+    /// Name of a part.
+    pub fn part_name(&self, part: usize) -> &str {
+        self.model.parts.get(part).map_or("?", |p| p.name.as_str())
+    }
+
+    /// Whether a part may be grabbed; not before the scene is baked.
+    pub fn is_grabbable(&self, part: usize) -> bool {
+        let reports = self.baked.as_ref().map(|b| b.report.parts.as_slice());
+        (reports.unwrap_or_default().iter()).any(|r| r.model_part == part && r.grabbable)
+    }
+
+    /// Index in the scene of a part of the model; parts without a surface have none.
+    pub fn scene_part(&self, part: usize) -> Option<u16> {
+        let reports = &self.baked.as_ref()?.report.parts;
+        let index = reports.iter().position(|r| r.model_part == part)?;
+        u16::try_from(index).ok()
+    }
+
+    /// The model's part behind an index of the scene.
+    pub fn model_part(&self, scene_part: u16) -> Option<usize> {
+        let reports = &self.baked.as_ref()?.report.parts;
+        reports.get(usize::from(scene_part)).map(|r| r.model_part)
+    }
+}
+
+/// A sphere about all parts where they are.
+fn extent_of(model: &CadModel, poses: &[DAffine3]) -> Extent {
+    Extent::of_points(model.parts.iter().zip(poses).flat_map(|(part, pose)| {
+        (model.shapes.get(part.shape))
+            .map(|shape| shape.mesh.vertices.as_slice())
+            .unwrap_or_default()
+            .iter()
+            .map(|&v| pose.transform_point3(v))
+    }))
+}
+
+fn colors(model: &CadModel) -> Vec<[u8; 3]> {
+    let own = |color: [f32; 3]| {
+        let [r, g, b, _] = srgb(color);
+        [r, g, b]
+    };
+    (model.parts.iter().enumerate())
+        .map(|(index, part)| part.color.map_or(PALETTE[index % PALETTE.len()], own))
+        .collect()
+}

@@ -1,0 +1,301 @@
+//! Finds a peg before a hole, and scripts the simulated hand that puts it in. Pure.
+//!
+//! A candidate is an outer cylinder of one part and a wider inner cylinder of another on nearly the same axis. Not recognition of mating
+//! faces: it only serves to show an insertion without anybody at the handle.
+
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_brep::{CadModel, Surface};
+use mortise_protocol::message::{HandScript, Keyframe};
+
+use super::pose::{moved, to_wire};
+
+/// Axes may lean by this much, rad.
+const LEAN: f64 = 0.02;
+/// The hole may be wider by this fraction.
+const SLACK: f64 = 0.2;
+
+/// A peg in front of a hole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Insertion {
+    /// Part with the peg.
+    pub moving: usize,
+    /// Part with the hole.
+    pub fixed: usize,
+    /// The way in, unit vector, world.
+    pub direction: DVec3,
+    /// Middle of the peg, world, mm.
+    pub center: DVec3,
+    /// From where the peg is until its end meets the hole's far end, mm.
+    pub travel_mm: f64,
+    /// Length of the hole, mm.
+    pub hole_mm: f64,
+    /// Difference of the diameters, mm.
+    pub clearance_mm: f64,
+}
+
+/// How the hand goes about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Manner {
+    /// Beside the axis at the start, mm.
+    pub offset_mm: f64,
+    /// Tilted at the start, rad.
+    pub tilt_rad: f64,
+    /// mm/s.
+    pub speed_mm_per_s: f64,
+    /// Pushed sideways at the end, N.
+    pub sideways_n: f64,
+}
+
+impl Default for Manner {
+    fn default() -> Self {
+        Self {
+            offset_mm: 0.2,
+            tilt_rad: 0.5f64.to_radians(),
+            speed_mm_per_s: 20.0,
+            sideways_n: 1.5,
+        }
+    }
+}
+
+struct Wall {
+    part: usize,
+    origin: DVec3,
+    axis: DVec3,
+    radius: f64,
+    /// Ends along the axis from the origin, mm.
+    ends: (f64, f64),
+    inner: bool,
+}
+
+impl Wall {
+    fn middle(&self) -> DVec3 {
+        self.origin + 0.5 * (self.ends.0 + self.ends.1) * self.axis
+    }
+}
+
+/// The pair with the least clearance whose peg is not yet all the way in; `None` when there is none.
+pub fn find(model: &CadModel, poses: &[DAffine3]) -> Option<Insertion> {
+    let walls = walls(model, poses);
+    let mut best: Option<Insertion> = None;
+    for peg in walls.iter().filter(|w| !w.inner) {
+        for hole in walls.iter().filter(|w| w.inner && w.part != peg.part) {
+            let Some(found) = pair(peg, hole) else { continue };
+            if best.is_none_or(|b| found.clearance_mm < b.clearance_mm) {
+                best = Some(found);
+            }
+        }
+    }
+    best
+}
+
+fn pair(peg: &Wall, hole: &Wall) -> Option<Insertion> {
+    let clearance_mm = 2.0 * (hole.radius - peg.radius);
+    if clearance_mm < 0.0 || clearance_mm > 2.0 * SLACK * hole.radius {
+        return None;
+    }
+    if peg.axis.cross(hole.axis).length() > LEAN {
+        return None;
+    }
+    let between = hole.middle() - peg.middle();
+    let aside = between - between.dot(hole.axis) * hole.axis;
+    if aside.length() > clearance_mm + 0.05 * hole.radius {
+        return None;
+    }
+    let along = between.dot(hole.axis);
+    let direction = if along >= 0.0 { hole.axis } else { -hole.axis };
+    let hole_mm = hole.ends.1 - hole.ends.0;
+    let peg_mm = peg.ends.1 - peg.ends.0;
+    // Both ends measured from the peg's middle along the way in.
+    let travel_mm = along.abs() + 0.5 * hole_mm - 0.5 * peg_mm;
+    (travel_mm > 1e-3).then_some(Insertion {
+        moving: peg.part,
+        fixed: hole.part,
+        direction,
+        center: peg.middle(),
+        travel_mm,
+        hole_mm,
+        clearance_mm,
+    })
+}
+
+fn walls(model: &CadModel, poses: &[DAffine3]) -> Vec<Wall> {
+    let mut walls = Vec::new();
+    for (index, (part, pose)) in model.parts.iter().zip(poses).enumerate() {
+        let Some(shape) = model.shapes.get(part.shape) else {
+            continue;
+        };
+        for (id, face) in shape.faces.iter().enumerate() {
+            let Surface::Cylinder { frame, radius } = face.surface else {
+                continue;
+            };
+            let along = |v: DVec3| (v - frame.origin).dot(frame.z);
+            let mut ends = (f64::INFINITY, f64::NEG_INFINITY);
+            for (corners, _) in (shape.mesh.triangles.iter().zip(&shape.mesh.triangle_face))
+                .filter(|&(_, &f)| f as usize == id)
+            {
+                for point in corners.iter().filter_map(|&c| shape.mesh.vertices.get(c as usize)) {
+                    ends = (ends.0.min(along(*point)), ends.1.max(along(*point)));
+                }
+            }
+            if ends.1 - ends.0 > 1e-6 {
+                walls.push(Wall {
+                    part: index,
+                    origin: pose.transform_point3(frame.origin),
+                    axis: pose.transform_vector3(frame.z),
+                    radius,
+                    ends,
+                    inner: face.reversed,
+                });
+            }
+        }
+    }
+    walls
+}
+
+/// The hand's script: first aside and tilted, in all the way, then pushed to the wall. `handle` is where the handle is now; the part is
+/// held where it stands, so the handle goes through the same motions.
+pub fn script(insertion: &Insertion, handle: &DAffine3, manner: &Manner) -> HandScript {
+    let aside = insertion.direction.any_orthonormal_vector();
+    let tilt_axis = insertion.direction.cross(aside);
+    let stiffness = 400.0;
+    let ms = |mm: f64| (1e3 * mm / manner.speed_mm_per_s).ceil() as u32;
+    let way = insertion.travel_mm;
+    // Lines up while it comes near: a tilted hand would wedge in a tight hole.
+    let stations = [
+        (0, 0.0, 0.0, 0.0),
+        (400, 0.0, manner.tilt_rad, manner.offset_mm),
+        (400 + ms(0.5 * way), 0.5 * way, manner.tilt_rad, manner.offset_mm),
+        (400 + ms(way), way, 0.0, 0.0),
+        (900 + ms(way), way, 0.0, 0.0),
+        (1_600 + ms(way), way, 0.0, 1e3 * manner.sideways_n / stiffness),
+    ];
+    HandScript {
+        stiffness: stiffness as f32,
+        damping: 4.0,
+        angular_stiffness: 2.0,
+        angular_damping: 0.02,
+        tremor: 0.0,
+        tremor_hz: 0.0,
+        keyframes: stations
+            .iter()
+            .map(|&(tick, depth, tilt, offset)| Keyframe {
+                tick,
+                pose: to_wire(&moved(
+                    handle,
+                    insertion.center,
+                    DQuat::from_axis_angle(tilt_axis, tilt),
+                    depth * insertion.direction + offset * aside,
+                )),
+                push: [0.0; 3],
+            })
+            .collect(),
+    }
+}
+
+/// A hand that simply holds the handle at `pose`.
+pub fn hold(pose: &DAffine3) -> HandScript {
+    HandScript {
+        stiffness: 400.0,
+        damping: 4.0,
+        angular_stiffness: 2.0,
+        angular_damping: 0.02,
+        tremor: 0.0,
+        tremor_hz: 0.0,
+        keyframes: [Keyframe {
+            tick: 0,
+            pose: to_wire(pose),
+            push: [0.0; 3],
+        }]
+        .into_iter()
+        .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mortise_brep::{Face, Frame, Mesh, Part, Shape};
+
+    use super::*;
+
+    /// A lone cylinder wall from z = 0 to `length`.
+    fn wall(radius: f64, length: f64, inner: bool) -> Shape {
+        let frame = Frame {
+            origin: DVec3::ZERO,
+            x: DVec3::X,
+            y: DVec3::Y,
+            z: DVec3::Z,
+        };
+        Shape {
+            faces: vec![Face {
+                surface: Surface::Cylinder { frame, radius },
+                reversed: inner,
+                area_mm2: 1.0,
+                edges: vec![],
+                color: None,
+            }],
+            mesh: Mesh {
+                vertices: vec![
+                    radius * DVec3::X,
+                    radius * DVec3::Y,
+                    radius * DVec3::X + length * DVec3::Z,
+                ],
+                triangles: vec![[0, 1, 2]],
+                triangle_face: vec![0],
+            },
+            ..Shape::default()
+        }
+    }
+
+    fn model(gap: f64) -> (CadModel, Vec<DAffine3>) {
+        let part = |name: &str, shape, z: f64| Part {
+            name: name.into(),
+            path: vec![],
+            shape,
+            placement: DAffine3::from_translation(z * DVec3::Z),
+            color: None,
+        };
+        let model = CadModel {
+            shapes: vec![wall(9.375, 40.0, true), wall(8.875, 60.0, false)],
+            parts: vec![part("block", 0, -40.0), part("peg", 1, gap)],
+            ..CadModel::default()
+        };
+        let poses = model.parts.iter().map(|p| p.placement).collect();
+        (model, poses)
+    }
+
+    #[test]
+    fn the_thesis_pair_is_found() {
+        let (model, poses) = model(20.0);
+        let found = find(&model, &poses).expect("peg before hole");
+        assert_eq!((found.moving, found.fixed), (1, 0));
+        assert!((found.direction + DVec3::Z).length() < 1e-12);
+        assert!((found.travel_mm - 60.0).abs() < 1e-9 && (found.hole_mm - 40.0).abs() < 1e-9);
+        assert!((found.clearance_mm - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn neither_too_thick_nor_beside_nor_already_in() {
+        let (mut thick, poses) = model(20.0);
+        thick.shapes[1] = wall(9.5, 60.0, false);
+        assert_eq!(find(&thick, &poses), None);
+        let (model, mut poses) = model(20.0);
+        poses[1].translation.x = 12.0;
+        assert_eq!(find(&model, &poses), None);
+        poses[1].translation = DVec3::new(0.0, 0.0, -40.0);
+        assert_eq!(find(&model, &poses), None);
+    }
+
+    #[test]
+    fn the_script_ends_at_full_depth() {
+        let (model, poses) = model(20.0);
+        let found = find(&model, &poses).expect("peg before hole");
+        let handle = DAffine3::from_translation(DVec3::new(5.0, 0.0, 100.0));
+        let script = script(&found, &handle, &Manner::default());
+        assert!(script.keyframes.windows(2).all(|k| k[0].tick < k[1].tick));
+        let first = script.keyframes.first().expect("some").pose;
+        assert_eq!(first, to_wire(&handle), "starts where the handle is");
+        let last = script.keyframes.last().expect("some").pose;
+        // f32 metres: 0.1 m to 7e-9.
+        assert!((f64::from(last.position[2]) - 0.040).abs() < 1e-7, "{last:?}");
+    }
+}

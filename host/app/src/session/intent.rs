@@ -1,0 +1,223 @@
+//! What the operator can want, and what stands in the way of it.
+//!
+//! One place decides: the window greys a button out with the reason [`obstacle`] gives, and the session refuses for the same reason.
+
+use std::path::PathBuf;
+
+use mortise_protocol::message::DeviceState;
+use mortise_protocol::parameter::ParameterId;
+use mortise_rig::RigSpec;
+
+use super::Session;
+use super::link::Link;
+
+/// Something the operator wants.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Intent {
+    /// Choose a file in a dialog.
+    Browse,
+    /// Open a file.
+    Open(PathBuf),
+    /// Open the sample.
+    OpenSample,
+    /// Bake the scene (again).
+    Bake,
+    /// End the reading or baking under way.
+    CancelWork,
+    /// Look for rigs again.
+    RefreshRigs,
+    /// Choose which rig to connect to.
+    ChooseRig(RigSpec),
+    /// Connect to the chosen rig.
+    Connect,
+    /// Let the rig go.
+    Disconnect,
+    /// Send the scene to the board.
+    Upload,
+    /// Motors on.
+    Arm,
+    /// Motors off.
+    Disarm,
+    /// Motors off now.
+    Stop,
+    /// Leave the stopped or faulted state.
+    ClearFault,
+    /// Mark a part in the list and the view.
+    Select(Option<usize>),
+    /// Take a part in hand.
+    Grab(usize),
+    /// Let it go.
+    Release,
+    /// Put every part back.
+    ResetScene,
+    /// Change a parameter.
+    SetParameter(ParameterId, f32),
+    /// Every parameter to its default.
+    ResetParameters,
+    /// Let the simulated hand put the peg in the hole.
+    PlayInsertion,
+    /// Everything from the sample to the insertion, by itself. `None`: the emulated board if it is there, else in-process.
+    Demo(Option<RigSpec>),
+}
+
+impl Intent {
+    /// Changes nothing on a rig: never in the way of a running demonstration.
+    pub fn is_passive(&self) -> bool {
+        matches!(
+            self,
+            Self::Select(_) | Self::RefreshRigs | Self::SetParameter(..) | Self::ResetParameters | Self::Demo(_)
+        )
+    }
+}
+
+const NO_RIG: &str = "No rig is connected";
+const NO_FILE: &str = "No file is open";
+
+/// Why `intent` is not possible now, in words; `None` when it is. [`Intent::Stop`] always is.
+pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
+    let no = |reason: &str| Some(reason.to_owned());
+    let armed = session.is_armed();
+    match intent {
+        Intent::Stop | Intent::RefreshRigs | Intent::Select(_) => None,
+        Intent::Browse | Intent::Open(_) | Intent::OpenSample => {
+            armed.then(|| "The rig is armed: disarm it before another file is opened".to_owned())
+        }
+        Intent::Demo(_) => {
+            armed.then(|| "The rig is armed: disarm it first".to_owned())
+        }
+        Intent::Bake => match &session.document {
+            None => no(NO_FILE),
+            Some(_) if session.is_busy() => no("Work is under way"),
+            Some(_) if armed => no("The rig is armed: disarm it first"),
+            Some(_) => None,
+        },
+        Intent::CancelWork => (!session.is_busy()).then(|| "Nothing is under way".to_owned()),
+        Intent::ChooseRig(_) => match session.link {
+            Link::None => None,
+            _ => no("Disconnect first"),
+        },
+        Intent::Connect => connect(session),
+        Intent::Disconnect => match session.link {
+            Link::None => no(NO_RIG),
+            _ => None,
+        },
+        Intent::Upload => upload(session),
+        Intent::Arm => arm(session),
+        Intent::Disarm => match session.device() {
+            None => no(NO_RIG),
+            Some(_) if armed => None,
+            Some(_) => no("The motors are off"),
+        },
+        Intent::ClearFault => match session.device() {
+            None => no(NO_RIG),
+            Some(DeviceState::Stopped | DeviceState::Fault(_)) => None,
+            Some(_) => no("Nothing is stopped"),
+        },
+        Intent::Grab(part) => grab(session, *part),
+        Intent::Release => match session.device() {
+            None => no(NO_RIG),
+            Some(DeviceState::Active) => None,
+            Some(_) => no("Nothing is in hand"),
+        },
+        Intent::ResetScene => match session.device() {
+            None => no(NO_RIG),
+            Some(_) if armed => no("Only while the motors are off: disarm first"),
+            Some(_) if !session.scene_is_on_board() => no("The scene is not on the board"),
+            Some(_) => None,
+        },
+        Intent::SetParameter(..) | Intent::ResetParameters => {
+            session.connection().is_none().then(|| NO_RIG.to_owned())
+        }
+        Intent::PlayInsertion => play(session),
+    }
+}
+
+fn connect(session: &Session) -> Option<String> {
+    match &session.link {
+        Link::Connecting { .. } => return Some("Connecting".to_owned()),
+        Link::Connected(_) => return Some("A rig is connected".to_owned()),
+        Link::None => {}
+    }
+    let entry = session.rigs.iter().find(|entry| entry.spec == session.chosen);
+    entry.and_then(|entry| entry.available.clone().err())
+}
+
+fn upload(session: &Session) -> Option<String> {
+    let no = |reason: &str| Some(reason.to_owned());
+    let Some(document) = &session.document else {
+        return no(NO_FILE);
+    };
+    let Some(connection) = session.connection() else {
+        return no(NO_RIG);
+    };
+    if document.baked.is_none() {
+        return no("The scene is not baked yet");
+    }
+    if connection.upload.is_some() {
+        return no("The scene is being sent");
+    }
+    session
+        .is_armed()
+        .then(|| "Only while the motors are off: disarm first".to_owned())
+}
+
+fn arm(session: &Session) -> Option<String> {
+    let no = |reason: &str| Some(reason.to_owned());
+    let Some(connection) = session.connection() else {
+        return no(NO_RIG);
+    };
+    match connection.state {
+        DeviceState::Armed | DeviceState::Active => return no("The rig is armed"),
+        DeviceState::Stopped => return no("Stopped: clear the stop first"),
+        DeviceState::Fault(_) => return no("Fault: see the messages, then clear it"),
+        DeviceState::Boot | DeviceState::SoftStop => return no("Wait until the board is idle"),
+        DeviceState::Idle => {}
+    }
+    if session.document.is_none() {
+        return no("Open a STEP file first: without it the window cannot show what is felt");
+    }
+    if !session.scene_is_on_board() {
+        return no("The scene is not on the board yet");
+    }
+    None
+}
+
+fn grab(session: &Session, part: usize) -> Option<String> {
+    let no = |reason: &str| Some(reason.to_owned());
+    let Some(document) = &session.document else {
+        return no(NO_FILE);
+    };
+    match session.device() {
+        None => return no(NO_RIG),
+        Some(DeviceState::Armed | DeviceState::Active) => {}
+        Some(_) => return no("Arm the rig first"),
+    }
+    if !document.is_grabbable(part) {
+        return no("This part is fixed: the largest part of the assembly stays where it is");
+    }
+    (session.grabbed() == Some(part)).then(|| "It is in hand".to_owned())
+}
+
+fn play(session: &Session) -> Option<String> {
+    let no = |reason: &str| Some(reason.to_owned());
+    let Some(document) = &session.document else {
+        return no(NO_FILE);
+    };
+    if document.insertion.is_none() {
+        return no("No peg stands in front of a hole in this assembly");
+    }
+    if session.is_touring() {
+        return no("It is playing");
+    }
+    let Some(connection) = session.connection() else {
+        return no(NO_RIG);
+    };
+    if !connection.capabilities.simulated {
+        return no("This rig has a real handle: the hand is yours");
+    }
+    match connection.state {
+        DeviceState::Stopped | DeviceState::Fault(_) => no("Stopped: clear the stop first"),
+        _ if !session.scene_is_on_board() => no("The scene is not on the board yet"),
+        _ => None,
+    }
+}

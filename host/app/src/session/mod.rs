@@ -1,0 +1,432 @@
+//! The program's state, apart from how it looks: what is open, which rig, what the board says. No window needed.
+//!
+//! The window draws a [`Session`] and hands it [`Intent`]s; threads beside it ([`work`], [`link`]) send messages that
+//! [`Session::poll`] takes in. [`intent::obstacle`] alone decides what is possible when.
+
+pub mod document;
+pub mod history;
+pub mod insertion;
+pub mod intent;
+pub mod link;
+pub mod notes;
+pub mod pose;
+mod tour;
+pub mod tree;
+mod update;
+pub mod work;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+
+use glam::DAffine3;
+use mortise_protocol::message::{DeviceState, HandScript, Telemetry, ToDevice};
+use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
+
+use self::document::Document;
+use self::history::History;
+pub use self::intent::{Intent, obstacle};
+use self::link::{Command, Connection, Link};
+use self::notes::{Notes, Severity};
+use self::tour::Tour;
+use self::work::{Cancel, Outbox, Update};
+
+/// Reading or baking under way.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// What is being done, in words.
+    pub doing: String,
+    /// 0 to 1 where it is known.
+    pub fraction: Option<f32>,
+    generation: u64,
+    cancel: Cancel,
+}
+
+/// Everything the window shows.
+pub struct Session {
+    /// What is open.
+    pub document: Option<Document>,
+    /// Reading or baking under way.
+    pub job: Option<Job>,
+    /// Rigs to choose from.
+    pub rigs: Vec<RigEntry>,
+    /// The one chosen.
+    pub chosen: RigSpec,
+    /// The connection.
+    pub link: Link,
+    /// Marked part.
+    pub selected: Option<usize>,
+    /// The last sample of the loop.
+    pub telemetry: Option<Box<Telemetry>>,
+    /// The last seconds of it.
+    pub history: History,
+    /// The board's parameters, in the order of [`PARAMETERS`].
+    pub parameters: Vec<f32>,
+    /// Messages.
+    pub notes: Notes,
+    /// There is no file dialog here: a path is wanted instead.
+    pub wants_path: bool,
+    tour: Option<Tour>,
+    /// Part in hand and its pose in the handle's frame when it was grabbed.
+    grip: Option<(usize, DAffine3)>,
+    outbox: Outbox,
+    inbox: Receiver<Update>,
+    generation: u64,
+    link_id: u64,
+    samples_since_statistics: u32,
+}
+
+impl Session {
+    /// Nothing open, nothing connected. `wake` is called from other threads whenever [`Self::poll`] has something to take in.
+    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+        let (outbox, inbox) = Outbox::new(wake);
+        work::list_rigs(&outbox);
+        Self {
+            document: None,
+            job: None,
+            rigs: Vec::new(),
+            chosen: RigSpec::Simulated { realtime: true },
+            link: Link::None,
+            selected: None,
+            telemetry: None,
+            history: History::default(),
+            parameters: PARAMETERS.iter().map(|row| row.default).collect(),
+            notes: Notes::default(),
+            wants_path: false,
+            tour: None,
+            grip: None,
+            outbox,
+            inbox,
+            generation: 0,
+            link_id: 0,
+            samples_since_statistics: 0,
+        }
+    }
+
+    /// Does what the operator wants, or says why not.
+    pub fn act(&mut self, intent: Intent) {
+        if let Some(reason) = obstacle(self, &intent) {
+            self.notes.add(Severity::Warning, reason);
+            return;
+        }
+        if !intent.is_passive() {
+            self.tour = None;
+        }
+        self.perform(intent);
+        self.follow();
+    }
+
+    /// Takes in what other threads sent. To be called before each picture.
+    pub fn poll(&mut self) {
+        while let Ok(update) = self.inbox.try_recv() {
+            update::take(self, update);
+        }
+        self.follow();
+    }
+
+    fn perform(&mut self, intent: Intent) {
+        match intent {
+            Intent::Browse => work::choose_file(&self.outbox, self.folder()),
+            Intent::Open(path) => self.open(Some(path)),
+            Intent::OpenSample => self.open(None),
+            Intent::Bake => self.bake(),
+            Intent::CancelWork => {
+                if let Some(job) = self.job.take() {
+                    job.cancel.set();
+                    self.notes.add(Severity::Info, "Cancelled");
+                }
+            }
+            Intent::RefreshRigs => work::list_rigs(&self.outbox),
+            Intent::ChooseRig(spec) => self.chosen = spec,
+            Intent::Connect => {
+                self.link_id += 1;
+                self.link = link::connect(&self.outbox, self.link_id, self.chosen.clone());
+            }
+            Intent::Disconnect => self.disconnect(),
+            Intent::Upload => self.upload(),
+            Intent::Arm => self.request(ToDevice::Arm),
+            Intent::Disarm => self.request(ToDevice::Disarm),
+            Intent::Stop => self.stop(),
+            Intent::ClearFault => self.request(ToDevice::ClearFault),
+            Intent::Select(part) => self.selected = part,
+            Intent::Grab(part) => self.grab(part),
+            Intent::Release => self.request(ToDevice::Release),
+            Intent::ResetScene => self.request(ToDevice::ResetScene),
+            Intent::SetParameter(id, value) => self.set_parameter(id, value),
+            Intent::ResetParameters => {
+                for row in PARAMETERS {
+                    if self.parameters[row.id as usize] != row.default {
+                        self.set_parameter(row.id, row.default);
+                    }
+                }
+            }
+            Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
+            Intent::Demo(rig) => self.demo(rig),
+        }
+    }
+
+    /// Work that follows from the state by itself: the scene goes to the board when both are there, a demonstration goes on.
+    fn follow(&mut self) {
+        let ready = (self.document.as_ref()).is_some_and(|d| d.baked.is_some());
+        if ready
+            && !self.scene_is_on_board()
+            && !self.scene_was_refused()
+            && self.device() == Some(DeviceState::Idle)
+            && obstacle(self, &Intent::Upload).is_none()
+        {
+            self.upload();
+        }
+        tour::advance(self);
+    }
+
+    fn open(&mut self, path: Option<PathBuf>) {
+        self.generation += 1;
+        let name = path
+            .as_ref()
+            .and_then(|p| p.file_name())
+            .map_or_else(|| "the sample".to_owned(), |n| n.to_string_lossy().into_owned());
+        self.start_job(format!("Reading {name}"), self.generation);
+        work::import(&self.outbox, path, self.generation);
+    }
+
+    fn bake(&mut self) {
+        let Some(document) = &mut self.document else { return };
+        document.baked = None;
+        let (model, generation) = (Arc::clone(&document.model), document.generation);
+        let mut limit = 1 << 20;
+        if let Some(connection) = self.connection_mut() {
+            limit = u64::from(connection.capabilities.scene_capacity);
+            connection.scene_of = None;
+            connection.refused_scene_of = None;
+        }
+        let cancel = self.start_job("Baking the scene".to_owned(), generation);
+        work::bake(&self.outbox, model, generation, limit, cancel);
+    }
+
+    fn start_job(&mut self, doing: String, generation: u64) -> Cancel {
+        if let Some(job) = self.job.take() {
+            job.cancel.set();
+        }
+        let cancel = Cancel::default();
+        self.job = Some(Job {
+            doing,
+            fraction: None,
+            generation,
+            cancel: cancel.clone(),
+        });
+        cancel
+    }
+
+    fn disconnect(&mut self) {
+        let link = std::mem::replace(&mut self.link, Link::None);
+        let name = match &link {
+            Link::Connected(connection) => Some(connection.capabilities.board.to_string()),
+            _ => None,
+        };
+        link.close(false);
+        self.forget_board();
+        if let Some(name) = name {
+            self.notes.add(Severity::Info, format!("Disconnected from {name}"));
+        }
+    }
+
+    /// What only a connection knows is gone; parts stay where they were last seen.
+    fn forget_board(&mut self) {
+        self.telemetry = None;
+        self.grip = None;
+        self.history.clear();
+    }
+
+    fn upload(&mut self) {
+        let Some(document) = &self.document else { return };
+        let (Some(baked), generation) = (document.baked.clone(), document.generation) else {
+            return;
+        };
+        let total = baked.image.len();
+        if let Some(connection) = self.connection_mut() {
+            connection.upload = Some(mortise_rig::UploadProgress { sent: 0, total });
+            connection.command(Command::Upload { baked, generation });
+        }
+    }
+
+    fn stop(&mut self) {
+        match self.connection() {
+            Some(connection) => {
+                connection.stop(&self.outbox);
+                self.notes.add(Severity::Error, "STOP: motors off");
+            }
+            None => self
+                .notes
+                .add(Severity::Info, "STOP: no rig is connected, nothing moves"),
+        }
+    }
+
+    fn grab(&mut self, part: usize) {
+        self.selected = Some(part);
+        let Some(scene_part) = self.document.as_ref().and_then(|d| d.scene_part(part)) else {
+            return;
+        };
+        if self.device() == Some(DeviceState::Active) {
+            self.request(ToDevice::Release);
+        }
+        self.request(ToDevice::Grab { part: scene_part });
+    }
+
+    fn set_parameter(&mut self, id: ParameterId, value: f32) {
+        let row = id.row();
+        let value = if value.is_finite() {
+            value.clamp(row.min, row.max)
+        } else {
+            row.default
+        };
+        if let Some(known) = self.parameters.get_mut(id as usize) {
+            *known = value;
+        }
+        if let Some(connection) = self.connection_mut() {
+            connection.set_parameter(id, value);
+        }
+    }
+
+    fn demo(&mut self, rig: Option<RigSpec>) {
+        let rig = rig.unwrap_or_else(|| self.demo_rig());
+        self.tour = Some(Tour::from_the_start(rig));
+        if self.document.is_none() && self.job.is_none() {
+            self.open(None);
+        }
+    }
+
+    /// The emulated board when it is there, else in-process, with a word about it.
+    fn demo_rig(&mut self) -> RigSpec {
+        let emulated = RigSpec::Emulated {
+            mode: EmulatedMode::Interactive,
+            firmware: None,
+        };
+        let rigs = mortise_rig::list();
+        match rigs.iter().find(|entry| entry.spec == emulated) {
+            Some(entry) if entry.available.is_ok() => emulated,
+            other => {
+                let why = other.and_then(|entry| entry.available.clone().err());
+                self.notes.add(
+                    Severity::Warning,
+                    format!(
+                        "The emulated board is not there, so the simulation in this program is used: {}",
+                        why.unwrap_or_else(|| "run `cargo xtask demo`".to_owned())
+                    ),
+                );
+                RigSpec::Simulated { realtime: true }
+            }
+        }
+    }
+
+    fn request(&self, message: ToDevice) {
+        if let Some(connection) = self.connection() {
+            connection.request(message);
+        }
+    }
+
+    fn folder(&self) -> Option<PathBuf> {
+        let path = self.document.as_ref()?.path.as_ref()?;
+        path.parent().map(PathBuf::from)
+    }
+
+    /// Moves the simulated hand; does nothing on a rig with a real one.
+    pub fn move_hand(&mut self, script: HandScript) {
+        self.tour = None;
+        if let Some(connection) = self.connection_mut()
+            && connection.capabilities.simulated
+        {
+            connection.set_hand(script);
+        }
+    }
+
+    /// The connection, once it is made.
+    pub fn connection(&self) -> Option<&Connection> {
+        match &self.link {
+            Link::Connected(connection) => Some(connection),
+            _ => None,
+        }
+    }
+
+    fn connection_mut(&mut self) -> Option<&mut Connection> {
+        match &mut self.link {
+            Link::Connected(connection) => Some(connection),
+            _ => None,
+        }
+    }
+
+    /// The board's state, once connected.
+    pub fn device(&self) -> Option<DeviceState> {
+        self.connection().map(|c| c.state)
+    }
+
+    /// Motors may push.
+    pub fn is_armed(&self) -> bool {
+        matches!(
+            self.device(),
+            Some(DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop)
+        )
+    }
+
+    /// Reading or baking is under way.
+    pub fn is_busy(&self) -> bool {
+        self.job.is_some()
+    }
+
+    /// A demonstration is under way.
+    pub fn is_touring(&self) -> bool {
+        self.tour.is_some()
+    }
+
+    /// The open document's scene is the one on the board.
+    pub fn scene_is_on_board(&self) -> bool {
+        match (&self.document, self.connection()) {
+            (Some(document), Some(connection)) => {
+                document.baked.is_some() && connection.scene_of == Some(document.generation)
+            }
+            _ => false,
+        }
+    }
+
+    /// The board did not take it: asked again only when the operator wants it.
+    fn scene_was_refused(&self) -> bool {
+        match (&self.document, self.connection()) {
+            (Some(document), Some(connection)) => connection.refused_scene_of == Some(document.generation),
+            _ => false,
+        }
+    }
+
+    /// Part in hand.
+    pub fn grabbed(&self) -> Option<usize> {
+        if self.device() != Some(DeviceState::Active) {
+            return None;
+        }
+        let (part, _) = self.telemetry.as_ref()?.object.as_ref()?;
+        self.document.as_ref()?.model_part(*part)
+    }
+
+    /// Part in hand and where the handle would have it, mm: away from the part itself by what the contacts hold back.
+    pub fn ghost(&self) -> Option<(usize, DAffine3)> {
+        let part = self.grabbed()?;
+        let (held, grip) = self.grip.as_ref()?;
+        let handle = pose::from_wire(&self.telemetry.as_ref()?.handle);
+        (*held == part).then(|| (part, handle * *grip))
+    }
+
+    /// Where the handle is, mm.
+    pub fn handle(&self) -> Option<DAffine3> {
+        self.telemetry.as_ref().map(|t| pose::from_wire(&t.handle))
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        if let Some(job) = &self.job {
+            job.cancel.set();
+        }
+        // Threads that wait to be heard must not be waited for.
+        self.inbox = std::sync::mpsc::sync_channel(1).1;
+        // Motors off and the emulator ended before the program is.
+        std::mem::replace(&mut self.link, Link::None).close(true);
+    }
+}

@@ -1,0 +1,170 @@
+//! The insertion that plays by itself: puts the parts back, arms, grabs the peg, moves the simulated hand.
+//!
+//! A list of waits: each step goes on when the board says it is done. Any refusal, stop or fault ends it.
+
+use std::time::{Duration, Instant};
+
+use mortise_protocol::message::{DeviceState, ToDevice};
+use mortise_rig::RigSpec;
+
+use super::insertion::{Manner, script};
+use super::intent::Intent;
+use super::notes::Severity;
+use super::{Session, pose};
+
+/// Longest wait for the board in one step; reading, baking and sending take as long as they take.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Where it is.
+#[derive(Clone, Debug, PartialEq)]
+enum Step {
+    /// Until the file is read and baked, then connect.
+    Connect(RigSpec),
+    /// Until the scene is on the board.
+    Scene,
+    /// Until the motors are off; then put the parts back.
+    PutBack,
+    /// Until they are back, then arm.
+    Arm,
+    /// Until armed; then grab.
+    Grab,
+    /// Until the peg is in hand; then move the hand.
+    Play,
+}
+
+/// A demonstration under way.
+#[derive(Clone, Debug)]
+pub struct Tour {
+    step: Step,
+    since: Instant,
+    asked: bool,
+}
+
+impl Tour {
+    /// From the very beginning: a file is being opened, nothing is connected.
+    pub fn from_the_start(rig: RigSpec) -> Self {
+        Self::at(Step::Connect(rig))
+    }
+
+    /// On a rig that is connected.
+    pub fn from_the_rig() -> Self {
+        Self::at(Step::Scene)
+    }
+
+    fn at(step: Step) -> Self {
+        Self {
+            step,
+            since: Instant::now(),
+            asked: false,
+        }
+    }
+
+    /// Whether the board has been asked for longer than [`PATIENCE`].
+    fn is_stuck(&self) -> bool {
+        !matches!(self.step, Step::Connect(_) | Step::Scene) && self.since.elapsed() > PATIENCE
+    }
+}
+
+/// Goes on as far as it can. To be called after every message.
+pub fn advance(session: &mut Session) {
+    while let Some(tour) = session.tour.clone() {
+        if tour.is_stuck() {
+            session.tour = None;
+            session
+                .notes
+                .add(Severity::Warning, "The demonstration ended: the board did not follow");
+            return;
+        }
+        match session.device() {
+            Some(DeviceState::Stopped | DeviceState::Fault(_)) => {
+                session.tour = None;
+                return;
+            }
+            None if !matches!(tour.step, Step::Connect(_) | Step::Scene) => {
+                session.tour = None;
+                return;
+            }
+            _ => {}
+        }
+        let Some(next) = step(session, &tour) else { return };
+        session.tour = next;
+    }
+}
+
+/// One step. `None`: wait; `Some(None)`: done; else where it goes on.
+fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
+    let ask = |session: &mut Session, message: ToDevice| {
+        if !tour.asked {
+            if let Some(connection) = session.connection() {
+                connection.request(message);
+            }
+            session.tour = Some(Tour {
+                asked: true,
+                ..tour.clone()
+            });
+        }
+    };
+    match &tour.step {
+        Step::Connect(rig) => {
+            session.document.as_ref()?.baked.as_ref()?;
+            if session.connection().is_none() && !tour.asked {
+                session.chosen = rig.clone();
+                session.tour = Some(Tour {
+                    asked: true,
+                    ..tour.clone()
+                });
+                session.perform(Intent::Connect);
+            }
+            session.connection()?;
+            Some(Some(Tour::at(Step::Scene)))
+        }
+        Step::Scene => {
+            session.scene_is_on_board().then(|| Some(Tour::at(Step::PutBack)))
+        }
+        Step::PutBack => {
+            if session.is_armed() {
+                ask(session, ToDevice::Disarm);
+                return None;
+            }
+            (session.device() == Some(DeviceState::Idle)).then(|| Some(Tour::at(Step::Arm)))
+        }
+        Step::Arm => {
+            if session.device() == Some(DeviceState::Idle) {
+                if !tour.asked
+                    && let Some(connection) = session.connection()
+                {
+                    connection.request(ToDevice::ResetScene);
+                }
+                ask(session, ToDevice::Arm);
+                return None;
+            }
+            (session.device() == Some(DeviceState::Armed)).then(|| Some(Tour::at(Step::Grab)))
+        }
+        Step::Grab => {
+            let document = session.document.as_ref()?;
+            let moving = document.insertion.as_ref()?.moving;
+            let part = document.scene_part(moving)?;
+            if session.grabbed() != Some(moving) {
+                ask(session, ToDevice::Grab { part });
+                return None;
+            }
+            Some(Some(Tour::at(Step::Play)))
+        }
+        Step::Play => {
+            let insertion = session.document.as_ref()?.insertion?;
+            let handle = session.telemetry.as_ref()?.handle;
+            let hand = script(&insertion, &pose::from_wire(&handle), &Manner::default());
+            if let Some(connection) = session.connection_mut() {
+                connection.set_hand(hand);
+            }
+            session.notes.add(
+                Severity::Info,
+                format!(
+                    "The simulated hand puts the peg into the hole: {:.0} mm, {:.2} mm clearance",
+                    insertion.travel_mm, insertion.clearance_mm
+                ),
+            );
+            Some(None)
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! What a message from another thread changes.
+
+use std::sync::Arc;
+
+use mortise_bake::Baked;
+use mortise_protocol::message::{DeviceState, Telemetry, ToDevice};
+use mortise_protocol::parameter::ParameterId;
+use mortise_rig::{Client, Event, describe};
+
+use super::document::Document;
+use super::history::Sample;
+use super::link::{Command, Connection, Link, LinkUpdate};
+use super::notes::Severity;
+use super::work::Update;
+use super::{Intent, Session, pose};
+
+/// Samples between two questions for the counters: about two seconds.
+const STATISTICS_EVERY: u32 = 120;
+
+/// Takes one message in. What belongs to a file or a connection that is no more is dropped.
+pub fn take(session: &mut Session, update: Update) {
+    match update {
+        Update::Imported { generation, result } if is_awaited(session, generation) => {
+            session.job = None;
+            match result {
+                Ok(document) => opened(session, *document),
+                Err(why) => {
+                    session.tour = None;
+                    session.notes.add(Severity::Error, why);
+                }
+            }
+        }
+        Update::Baking {
+            generation,
+            doing,
+            fraction,
+        } => {
+            if let Some(job) = &mut session.job
+                && job.generation == generation
+            {
+                job.doing = doing;
+                job.fraction = Some(fraction);
+            }
+        }
+        Update::Baked { generation, result } if is_awaited(session, generation) => {
+            session.job = None;
+            match result {
+                Ok(baked) => baked_of(session, baked),
+                Err(why) => {
+                    session.tour = None;
+                    session.notes.add(Severity::Error, format!("Not baked: {why}"));
+                }
+            }
+        }
+        Update::Imported { .. } | Update::Baked { .. } => {}
+        Update::Rigs(rigs) => session.rigs = rigs,
+        Update::Link { id, update } => {
+            let current = match &session.link {
+                Link::None => false,
+                Link::Connecting { id: current, .. } => *current == id,
+                Link::Connected(connection) => connection.id == id,
+            };
+            if current {
+                link(session, update);
+            }
+        }
+        Update::Chosen(path) => session.act(Intent::Open(path)),
+        Update::NoDialog => session.wants_path = true,
+    }
+}
+
+fn is_awaited(session: &Session, generation: u64) -> bool {
+    session.job.as_ref().is_some_and(|job| job.generation == generation)
+}
+
+fn opened(session: &mut Session, document: Document) {
+    let parts = document.model.parts.len();
+    session.notes.add(
+        Severity::Good,
+        format!(
+            "Opened {}: {parts} {}, unit {}",
+            document.title,
+            if parts == 1 { "part" } else { "parts" },
+            document.model.unit
+        ),
+    );
+    for warning in &document.model.warnings {
+        session.notes.add(Severity::Warning, warning.clone());
+    }
+    session.selected = None;
+    session.document = Some(document);
+    session.forget_board();
+    session.bake();
+}
+
+fn baked_of(session: &mut Session, baked: Arc<Baked>) {
+    let report = &baked.report;
+    session.notes.add(
+        Severity::Good,
+        format!(
+            "Scene baked: {} KiB, {} shapes, cells of {} mm at the finest",
+            report.image_bytes.div_ceil(1024),
+            report.shapes.len(),
+            report.shapes.iter().map(|s| s.cell_mm).fold(f64::INFINITY, f64::min),
+        ),
+    );
+    for warning in &report.warnings {
+        session.notes.add(Severity::Warning, warning.clone());
+    }
+    if let Some(document) = &mut session.document {
+        document.baked = Some(baked);
+    }
+}
+
+fn link(session: &mut Session, update: LinkUpdate) {
+    match update {
+        LinkUpdate::Connected { client, parameters } => connected(session, client, parameters),
+        LinkUpdate::Failed(why) => {
+            std::mem::replace(&mut session.link, Link::None).close(false);
+            session.tour = None;
+            session.notes.add(Severity::Error, why);
+        }
+        LinkUpdate::Event(event) => self::event(session, event),
+        LinkUpdate::Answered { message, result } => answered(session, &message, result),
+        LinkUpdate::Uploading(progress) => {
+            if let Some(connection) = session.connection_mut() {
+                connection.upload = Some(progress);
+            }
+        }
+        LinkUpdate::Uploaded { generation, result } => uploaded(session, generation, result),
+        LinkUpdate::Statistics(statistics) => {
+            if let Some(connection) = session.connection_mut() {
+                connection.statistics = Some(statistics);
+            }
+        }
+    }
+}
+
+fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(ParameterId, f32)>) {
+    let Link::Connecting {
+        id,
+        spec,
+        commands,
+        thread,
+    } = std::mem::replace(&mut session.link, Link::None)
+    else {
+        return;
+    };
+    let connection = Connection::new(id, spec, client, commands, thread);
+    session.notes.add(
+        Severity::Good,
+        format!(
+            "Connected to {} ({}), {} Hz, {}",
+            connection.capabilities.board,
+            connection.spec,
+            connection.capabilities.tick_hz,
+            describe(connection.state),
+        ),
+    );
+    for (id, value) in parameters {
+        if let Some(known) = session.parameters.get_mut(id as usize) {
+            *known = value;
+        }
+    }
+    let capacity = u64::from(connection.capabilities.scene_capacity);
+    session.link = Link::Connected(Box::new(connection));
+    session.history.clear();
+    let too_large = (session.document.as_ref())
+        .and_then(|d| d.baked.as_ref())
+        .is_some_and(|baked| baked.image.len() as u64 > capacity);
+    if too_large && !session.is_busy() {
+        session.notes.add(
+            Severity::Info,
+            format!("The scene is larger than the {} KiB this board holds: baking it coarser", capacity / 1024),
+        );
+        session.bake();
+    }
+}
+
+fn event(session: &mut Session, event: Event) {
+    match event {
+        Event::Telemetry(telemetry) => sample(session, telemetry),
+        Event::State { state, .. } => {
+            let Some(connection) = session.connection_mut() else { return };
+            if connection.state == state {
+                return;
+            }
+            connection.state = state;
+            if state != DeviceState::Active {
+                session.grip = None;
+            }
+            let severity = match state {
+                DeviceState::Stopped | DeviceState::Fault(_) => Severity::Error,
+                DeviceState::Armed => Severity::Good,
+                _ => Severity::Info,
+            };
+            session.notes.add(severity, format!("Board is {}", describe(state)));
+        }
+        Event::Fault { fault, .. } => session.notes.add(Severity::Error, describe(fault)),
+        Event::Log(line) => session.notes.add(Severity::Info, format!("Board: {line}")),
+        Event::LinkLost(why) => {
+            std::mem::replace(&mut session.link, Link::None).close(false);
+            session.forget_board();
+            session.tour = None;
+            session.notes.add(
+                Severity::Error,
+                format!("The link to the board is lost: {why}; the board switches its motors off by itself; connect again"),
+            );
+        }
+    }
+}
+
+fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
+    let Some(connection) = session.connection_mut() else { return };
+    let sample = Sample::of(&telemetry, connection.capabilities.tick_hz);
+    session.history.add(sample);
+    if let (Some((part, object)), Some(document)) = (&telemetry.object, &mut session.document)
+        && let Some(part) = document.model_part(*part)
+    {
+        let object = pose::from_wire(object);
+        if let Some(shown) = document.poses.get_mut(part) {
+            *shown = object;
+        }
+        if session.grip.is_none_or(|(held, _)| held != part) {
+            session.grip = Some((part, pose::from_wire(&telemetry.handle).inverse() * object));
+        }
+    }
+    session.telemetry = Some(telemetry);
+    session.samples_since_statistics += 1;
+    if session.samples_since_statistics >= STATISTICS_EVERY {
+        session.samples_since_statistics = 0;
+        if let Some(connection) = session.connection() {
+            connection.command(Command::Statistics);
+        }
+    }
+}
+
+fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String>) {
+    if let Some(connection) = session.connection_mut() {
+        connection.answered(message);
+    }
+    if let Err(why) = result {
+        session.tour = None;
+        session.notes.add(Severity::Error, why);
+        return;
+    }
+    if let (ToDevice::ResetScene, Some(document)) = (message, &mut session.document) {
+        document.reset_poses();
+    }
+}
+
+fn uploaded(session: &mut Session, generation: u64, result: Result<(), String>) {
+    let current = session.document.as_ref().map(|d| d.generation);
+    let Some(connection) = session.connection_mut() else { return };
+    connection.upload = None;
+    match result {
+        Ok(()) => {
+            connection.scene_of = Some(generation);
+            connection.refused_scene_of = None;
+            if current == Some(generation) {
+                if let Some(document) = &mut session.document {
+                    document.reset_poses();
+                }
+                session.notes.add(Severity::Good, "The scene is on the board");
+            }
+        }
+        Err(why) => {
+            connection.refused_scene_of = Some(generation);
+            session.tour = None;
+            session
+                .notes
+                .add(Severity::Error, format!("The scene was not taken: {why}"));
+        }
+    }
+}

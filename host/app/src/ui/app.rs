@@ -1,0 +1,176 @@
+//! The program's window: ties [`Window`] to eframe, and takes the screenshot automation asks for.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use egui::{ColorImage, Vec2, ViewportCommand};
+
+use super::{Window, theme};
+use crate::session::{Intent, Session};
+use crate::viewport::surface::Surface;
+
+/// A picture to be taken of the window.
+#[derive(Clone, Debug)]
+pub struct Screenshot {
+    /// PNG file to write.
+    pub file: PathBuf,
+    /// After the window appeared.
+    pub after: Duration,
+}
+
+/// How to start.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// What to do first.
+    pub first: Vec<Intent>,
+    /// Take a picture, then end.
+    pub screenshot: Option<Screenshot>,
+    /// Draw fixed parts as glass from the start.
+    pub see_through: bool,
+}
+
+struct App {
+    window: Window,
+    surface: Option<Surface>,
+    screenshot: Option<Screenshot>,
+    began: Instant,
+    taken: Arc<Mutex<Option<Arc<ColorImage>>>>,
+    asked: bool,
+    failed: Arc<Mutex<Option<anyhow::Error>>>,
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// No display, no graphics device, or the screenshot could not be written.
+pub fn run(options: Options) -> anyhow::Result<()> {
+    let failed = Arc::new(Mutex::new(None));
+    let report = Arc::clone(&failed);
+    let native = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Mortise")
+            .with_app_id("mortise")
+            .with_inner_size(Vec2::new(1520.0, 940.0))
+            .with_min_inner_size(Vec2::new(980.0, 640.0))
+            .with_icon(icon()),
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    };
+    eframe::run_native(
+        "Mortise",
+        native,
+        Box::new(move |creation| {
+            theme::apply(&creation.egui_ctx);
+            let ctx = creation.egui_ctx.clone();
+            let mut window = Window::new(Session::new(Arc::new(move || ctx.request_repaint())));
+            window.view.see_through = options.see_through;
+            for intent in options.first {
+                window.session.act(intent);
+            }
+            Ok(Box::new(App {
+                window,
+                surface: creation.wgpu_render_state.as_ref().map(Surface::new),
+                screenshot: options.screenshot,
+                began: Instant::now(),
+                taken: Arc::default(),
+                asked: false,
+                failed: report,
+            }))
+        }),
+    )
+    .map_err(|error| {
+        anyhow::anyhow!(
+            "the window cannot be opened: {error}; it needs a display and Vulkan, OpenGL, Metal or DirectX (on Debian without a \
+             graphics card: mesa-vulkan-drivers); `mortise demo --headless` needs neither"
+        )
+    })?;
+    let failure = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
+    failure.map_or(Ok(()), Err)
+}
+
+impl eframe::App for App {
+    fn logic(&mut self, _ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        // Also while the window is hidden: the board must not be left without a listener.
+        self.window.session.poll();
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.window.show(ui, self.surface.as_mut());
+        self.take_screenshot(ui.ctx());
+    }
+
+    fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
+        theme::GROUND.to_normalized_gamma_f32()
+    }
+}
+
+impl App {
+    fn take_screenshot(&mut self, ctx: &egui::Context) {
+        let Some(screenshot) = &self.screenshot else { return };
+        let left = screenshot.after.saturating_sub(self.began.elapsed());
+        if !left.is_zero() {
+            ctx.request_repaint_after(left);
+            return;
+        }
+        if !self.asked {
+            self.asked = true;
+            let (taken, wake) = (Arc::clone(&self.taken), ctx.clone());
+            ctx.send_viewport_cmd(ViewportCommand::Screenshot(egui::ScreenshotCallback::new(
+                move |image| {
+                    *taken.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
+                    wake.request_repaint();
+                },
+            )));
+        }
+        let image = self.taken.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match image {
+            Some(image) => {
+                if let Err(error) = write_png(&screenshot.file, &image) {
+                    *self.failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                }
+                self.screenshot = None;
+                ctx.send_viewport_cmd(ViewportCommand::Close);
+            }
+            None => ctx.request_repaint_after(Duration::from_millis(20)),
+        }
+    }
+}
+
+fn write_png(path: &std::path::Path, image: &ColorImage) -> anyhow::Result<()> {
+    let what = || format!("cannot write the screenshot to {}", path.display());
+    let file = std::fs::File::create(path).with_context(what)?;
+    let [width, height] = image.size.map(|n| n as u32);
+    let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let bytes: Vec<u8> = (image.pixels.iter())
+        .flat_map(|p| [p.r(), p.g(), p.b()])
+        .collect();
+    let mut writer = encoder.write_header().with_context(what)?;
+    writer.write_image_data(&bytes).with_context(what)?;
+    writer.finish().with_context(what)
+}
+
+/// The mark, 64 pixels a side: a tenon over its mortise.
+fn icon() -> egui::IconData {
+    const SIDE: usize = 64;
+    let mut rgba = vec![0u8; 4 * SIDE * SIDE];
+    let mut fill = |x: std::ops::Range<usize>, y: std::ops::Range<usize>, color: egui::Color32| {
+        for row in y {
+            for column in x.clone() {
+                rgba[4 * (row * SIDE + column)..][..4].copy_from_slice(&color.to_array());
+            }
+        }
+    };
+    fill(23..41, 3..33, theme::HELD);
+    fill(6..21, 37..62, theme::TEXT);
+    fill(43..58, 37..62, theme::TEXT);
+    fill(6..58, 52..62, theme::TEXT);
+    egui::IconData {
+        rgba,
+        width: SIDE as u32,
+        height: SIDE as u32,
+    }
+}

@@ -1,0 +1,111 @@
+//! Small building blocks: buttons that know what stands in their way, chips, section headings.
+
+use egui::{Align2, Button, Color32, CornerRadius, FontId, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, Role};
+
+use super::theme;
+use crate::session::{Intent, Session, obstacle};
+
+/// A button for `intent`: greyed out with the reason as hover text when it is not possible. Wishes are collected in `wanted`.
+pub fn intent_button(
+    ui: &mut Ui,
+    session: &Session,
+    wanted: &mut Vec<Intent>,
+    button: Button<'_>,
+    intent: Intent,
+    hint: &str,
+) -> Response {
+    let reason = obstacle(session, &intent);
+    let response = ui.add_enabled(reason.is_none(), button);
+    if response.clicked() {
+        wanted.push(intent);
+    }
+    match reason {
+        Some(reason) => response.on_disabled_hover_text(reason),
+        None if hint.is_empty() => response,
+        None => response.on_hover_text(hint),
+    }
+}
+
+/// A button in the accent colour: the next thing to do.
+pub fn primary(text: &str) -> Button<'_> {
+    Button::new(RichText::new(text).color(theme::TEXT_STRONG)).fill(theme::ACCENT_DIM)
+}
+
+/// A small rounded label with a dot: a state at a glance.
+pub fn chip(ui: &mut Ui, color: Color32, text: &str) -> Response {
+    let font = FontId::proportional(13.0);
+    let galley = ui
+        .painter()
+        .layout_no_wrap(text.to_owned(), font, theme::TEXT_STRONG);
+    let size = Vec2::new(galley.size().x + 34.0, 28.0);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+    let painter = ui.painter();
+    painter.rect(
+        rect,
+        CornerRadius::same(14),
+        color.gamma_multiply(0.16),
+        Stroke::new(1.0, color.gamma_multiply(0.45)),
+        egui::StrokeKind::Inside,
+    );
+    painter.circle_filled(rect.left_center() + Vec2::new(14.0, 0.0), 4.0, color);
+    let at = rect.left_center() + Vec2::new(24.0, -0.5 * galley.size().y);
+    painter.galley(at, galley, theme::TEXT_STRONG);
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
+    response
+}
+
+/// Heading of a section, with room above.
+pub fn section(ui: &mut Ui, text: &str) {
+    ui.label(
+        RichText::new(text.to_uppercase())
+            .size(11.0)
+            .color(theme::TEXT_WEAK)
+            .strong(),
+    );
+}
+
+/// A line between sections, with air.
+pub fn divider(ui: &mut Ui) {
+    ui.add_space(8.0);
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 1.0), Sense::hover());
+    ui.painter()
+        .hline(rect.x_range(), rect.center().y, Stroke::new(1.0, theme::LINE));
+    ui.add_space(8.0);
+}
+
+/// A name on the left and a value on the right.
+pub fn row(ui: &mut Ui, name: &str, value: impl Into<String>) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(name).color(theme::TEXT_WEAK));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.add(egui::Label::new(value.into()).truncate());
+        });
+    });
+}
+
+/// The mark of the program: a tenon over its mortise.
+pub fn mark(painter: &egui::Painter, rect: egui::Rect, color: Color32) {
+    let at = |x: f32, y: f32| rect.min + Vec2::new(x * rect.width(), y * rect.height());
+    let fill = |a: (f32, f32), b: (f32, f32), color: Color32| {
+        painter.rect_filled(
+            egui::Rect::from_two_pos(at(a.0, a.1), at(b.0, b.1)),
+            CornerRadius::same((rect.width() * 0.05) as u8),
+            color,
+        );
+    };
+    fill((0.36, 0.02), (0.64, 0.50), theme::HELD);
+    fill((0.08, 0.56), (0.32, 0.98), color);
+    fill((0.68, 0.56), (0.92, 0.98), color);
+    fill((0.08, 0.82), (0.92, 0.98), color);
+}
+
+/// Text centred in a rectangle.
+pub fn centered(painter: &egui::Painter, rect: egui::Rect, text: &str, size: f32, color: Color32) {
+    painter.text(
+        rect.center(),
+        Align2::CENTER_CENTER,
+        text,
+        FontId::proportional(size),
+        color,
+    );
+}

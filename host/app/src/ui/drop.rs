@@ -1,0 +1,40 @@
+//! STEP files dragged onto the window.
+
+use egui::{Color32, CornerRadius, Id, LayerId, Order, Stroke};
+
+use super::{control, theme};
+use crate::session::{Intent, Session, obstacle};
+
+/// Shows where a dragged file would go, and opens what was dropped.
+pub fn show(ctx: &egui::Context, session: &mut Session, wanted: &mut Vec<Intent>) {
+    let (hovering, dropped) = ctx.input(|i| {
+        let dropped: Vec<_> = (i.raw.dropped_files.iter())
+            .map(|file| file.path().to_owned())
+            .collect();
+        (!i.raw.hovered_files.is_empty(), dropped)
+    });
+    if hovering {
+        let rect = ctx.content_rect();
+        let painter = ctx.layer_painter(LayerId::new(Order::Foreground, Id::unique("drop")));
+        painter.rect(
+            rect.shrink(10.0),
+            CornerRadius::same(12),
+            Color32::from_black_alpha(170),
+            Stroke::new(2.0, theme::ACCENT),
+            egui::StrokeKind::Inside,
+        );
+        let text = match obstacle(session, &Intent::OpenSample) {
+            None => "Drop to open".to_owned(),
+            Some(reason) => reason,
+        };
+        control::centered(&painter, rect, &text, 26.0, theme::TEXT_STRONG);
+    }
+    match dropped.len() {
+        0 => {}
+        1 => wanted.extend(dropped.into_iter().map(Intent::Open)),
+        n => session.notes.add(
+            crate::session::notes::Severity::Warning,
+            format!("{n} files were dropped: one file is one assembly, drop one"),
+        ),
+    }
+}

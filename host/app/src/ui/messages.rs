@@ -1,0 +1,66 @@
+//! Messages in words, newest first.
+
+use egui::{Color32, RichText, ScrollArea, Ui, Vec2};
+
+use super::{control, theme};
+use crate::session::Session;
+use crate::session::notes::{Note, Severity};
+
+/// Colour of a severity.
+pub fn color(severity: Severity) -> Color32 {
+    match severity {
+        Severity::Info => theme::TEXT_WEAK,
+        Severity::Good => theme::GOOD,
+        Severity::Warning => theme::WARNING,
+        Severity::Error => theme::STOP_HOVER,
+    }
+}
+
+/// Draws them.
+pub fn show(ui: &mut Ui, session: &mut Session) {
+    ui.horizontal(|ui| {
+        control::section(ui, "Messages");
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            if session.notes.iter().len() > 0 {
+                let button = egui::Button::new(RichText::new("Clear").small()).frame(false);
+                if ui.add(button).on_hover_text("Forget all messages").clicked() {
+                    session.notes.clear();
+                }
+            }
+        });
+    });
+    ScrollArea::vertical()
+        .id_salt("messages")
+        .auto_shrink([false, false])
+        .show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 5.0;
+            for note in session.notes.iter() {
+                line(ui, note);
+            }
+        });
+}
+
+fn line(ui: &mut Ui, note: &Note) {
+    ui.horizontal_top(|ui| {
+        let (rect, _) = ui.allocate_exact_size(Vec2::new(8.0, 16.0), egui::Sense::hover());
+        ui.painter().circle_filled(rect.center(), 3.5, color(note.severity));
+        ui.vertical(|ui| {
+            let ink = match note.severity {
+                Severity::Error => theme::FAULT_TEXT,
+                Severity::Info => theme::TEXT,
+                _ => theme::TEXT_STRONG,
+            };
+            let mut text = note.text.clone();
+            if note.times > 1 {
+                text += &format!("  (×{})", note.times);
+            }
+            let seconds = note.at.as_secs_f64();
+            ui.add(
+                egui::Label::new(RichText::new(text).size(12.5).color(ink))
+                    .wrap()
+                    .selectable(true),
+            )
+            .on_hover_text(format!("{seconds:.1} s after the start"));
+        });
+    });
+}

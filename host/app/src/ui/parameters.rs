@@ -1,0 +1,159 @@
+//! The board's adjustable numbers as sliders, with unit and range.
+
+use egui::{RichText, Slider, Ui, Vec2};
+use mortise_protocol::parameter::{PARAMETERS, Parameter};
+
+use super::{control, theme};
+use crate::session::{Intent, Session, obstacle};
+
+/// First word of a name, and the heading of those that begin with it.
+const GROUPS: [(&str, &str); 4] = [
+    ("Coupling", "Coupling of hand and part"),
+    ("Contact", "Contact"),
+    ("Object", "Part in hand"),
+    ("", "Limits"),
+];
+
+/// Draws them.
+pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    ui.horizontal(|ui| {
+        control::section(ui, "Parameters");
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let changed = PARAMETERS
+                .iter()
+                .any(|row| session.parameters[row.id as usize] != row.default);
+            if changed {
+                let button = egui::Button::new(RichText::new("Defaults").small());
+                let hint = "Every parameter to its value at start";
+                control::intent_button(ui, session, wanted, button, Intent::ResetParameters, hint);
+            }
+        });
+    });
+    for (index, (word, heading)) in GROUPS.iter().enumerate() {
+        let earlier = &GROUPS[..index];
+        let mut rows = PARAMETERS
+            .iter()
+            .filter(|row| row.name.starts_with(word) && !earlier.iter().any(|(w, _)| row.name.starts_with(w)))
+            .peekable();
+        if rows.peek().is_none() {
+            continue;
+        }
+        egui::CollapsingHeader::new(*heading)
+            .default_open(index < 2)
+            .show_unindented(ui, |ui| {
+                for row in rows {
+                    slider(ui, session, wanted, row);
+                }
+                ui.add_space(4.0);
+            });
+    }
+}
+
+fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
+    let known = session.parameters[row.id as usize];
+    let mut value = known;
+    let reason = obstacle(session, &Intent::SetParameter(row.id, value));
+    let hover = format!(
+        "{}\n{} to {} {}, at start {}",
+        row.description.trim(),
+        short(row.min),
+        short(row.max),
+        row.unit,
+        short(row.default)
+    );
+    let name = words(row.name);
+    ui.spacing_mut().item_spacing.y = 1.0;
+    let label = ui.horizontal(|ui| {
+        let color = if known == row.default {
+            theme::TEXT_WEAK
+        } else {
+            theme::TEXT_STRONG
+        };
+        let label = ui.label(RichText::new(&name).small().color(color));
+        label.on_hover_text(&hover)
+    });
+    let wide = ui.available_width();
+    ui.spacing_mut().slider_width = (wide - 116.0).max(80.0);
+    ui.spacing_mut().interact_size = Vec2::new(104.0, 22.0);
+    // Ranges over more than two decades are walked by ratio.
+    let ratio = row.max / row.min.max(row.max * 1e-6);
+    let slider = Slider::new(&mut value, row.min..=row.max)
+        .logarithmic(ratio > 150.0)
+        .smallest_positive(f64::from(row.max) * 1e-4)
+        .suffix(format!(" {}", row.unit))
+        .custom_formatter(|value, _| short(value as f32));
+    let response = ui
+        .add_enabled(reason.is_none(), slider)
+        .labelled_by(label.inner.id);
+    if response.changed() && value != known {
+        wanted.push(Intent::SetParameter(row.id, value));
+    }
+    match reason {
+        Some(reason) => response.on_disabled_hover_text(format!("{hover}\n{reason}")),
+        None => response.on_hover_text(hover),
+    };
+    ui.add_space(5.0);
+}
+
+/// `CouplingAngularDamping` to `Coupling angular damping`.
+fn words(name: &str) -> String {
+    let mut text = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && !text.is_empty() {
+            text.push(' ');
+            text.extend(c.to_lowercase());
+        } else {
+            text.push(c);
+        }
+    }
+    text
+}
+
+/// Three or four digits that matter, without a tail of zeros.
+fn short(value: f32) -> String {
+    let magnitude = value.abs();
+    let decimals = match magnitude {
+        m if m >= 100.0 || m == 0.0 => 0,
+        m if m >= 10.0 => 1,
+        m if m >= 1.0 => 2,
+        m if m >= 0.1 => 3,
+        m if m >= 0.001 => 4,
+        _ => 6,
+    };
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_read_as_words() {
+        assert_eq!(words("CouplingAngularDamping"), "Coupling angular damping");
+        assert_eq!(words("ForceLimit"), "Force limit");
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        for (value, text) in [
+            (1_000.0, "1000"),
+            (0.5, "0.5"),
+            (0.0005, "0.0005"),
+            (8.0, "8"),
+            (12.25, "12.2"),
+            (0.0, "0"),
+        ] {
+            assert_eq!(short(value), text);
+        }
+    }
+
+    #[test]
+    fn every_parameter_has_a_group() {
+        assert_eq!(GROUPS.last().map(|g| g.0), Some(""), "the last takes the rest");
+    }
+}

@@ -1,0 +1,193 @@
+//! The list of parts on the left: the assembly as a tree; a click marks a part, a double click takes it in hand.
+
+use egui::{Color32, CornerRadius, Id, RichText, ScrollArea, Sense, Ui, Vec2, WidgetInfo, Role};
+use egui::collapsing_header::CollapsingState;
+use mortise_brep::Surface;
+
+use super::{control, theme};
+use crate::session::document::Document;
+use crate::session::tree::Branch;
+use crate::session::{Intent, Session, obstacle};
+
+/// Draws it.
+pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    egui::Panel::left("parts")
+        .default_size(248.0)
+        .size_range(180.0..=420.0)
+        .frame(theme::panel())
+        .show(ui, |ui| {
+            control::section(ui, "Parts");
+            ui.add_space(4.0);
+            let Some(document) = &session.document else {
+                ui.label(RichText::new("Nothing is open").color(theme::TEXT_WEAK));
+                return;
+            };
+            let details = session.selected.filter(|&p| p < document.model.parts.len());
+            let room = if details.is_some() { 188.0 } else { 0.0 };
+            ScrollArea::vertical()
+                .id_salt("tree")
+                .auto_shrink([false, false])
+                .max_height((ui.available_height() - room).max(80.0))
+                .show(ui, |ui| {
+                    ui.spacing_mut().item_spacing.y = 2.0;
+                    branches(ui, session, document, wanted, &document.tree, Id::unique("parts"));
+                });
+            if let Some(part) = details {
+                control::divider(ui);
+                self::details(ui, session, document, wanted, part);
+            }
+        });
+}
+
+fn branches(
+    ui: &mut Ui,
+    session: &Session,
+    document: &Document,
+    wanted: &mut Vec<Intent>,
+    branches: &[Branch],
+    id: Id,
+) {
+    for (index, branch) in branches.iter().enumerate() {
+        match branch {
+            Branch::Part(part) => line(ui, session, document, wanted, *part),
+            Branch::Assembly { name, children } => {
+                let id = id.with((index, name));
+                CollapsingState::load_with_default_open(ui.ctx(), id, true)
+                    .show_header(ui, |ui| {
+                        ui.add(
+                            egui::Label::new(RichText::new(name).color(theme::TEXT_WEAK)).truncate(),
+                        );
+                    })
+                    .body(|ui| self::branches(ui, session, document, wanted, children, id));
+            }
+        }
+    }
+}
+
+fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
+    let (name, color) = (document.part_name(part), document.colors[part]);
+    let (selected, held) = (session.selected == Some(part), session.grabbed() == Some(part));
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 28.0), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, selected, name));
+    let painter = ui.painter_at(rect);
+    let fill = match (held, selected, response.hovered()) {
+        (true, ..) => theme::HELD.gamma_multiply(0.22),
+        (_, true, _) => theme::ACCENT_DIM.gamma_multiply(0.8),
+        (_, _, true) => theme::CARD,
+        _ => Color32::TRANSPARENT,
+    };
+    painter.rect_filled(rect, CornerRadius::same(6), fill);
+    let swatch = egui::Rect::from_center_size(rect.left_center() + Vec2::new(15.0, 0.0), Vec2::splat(12.0));
+    let [r, g, b] = color;
+    painter.rect_filled(swatch, CornerRadius::same(3), Color32::from_rgb(r, g, b));
+    let note = if held {
+        Some(("in hand", theme::HELD))
+    } else if document.baked.is_some() && !document.is_grabbable(part) {
+        Some(("fixed", theme::TEXT_WEAK))
+    } else {
+        None
+    };
+    let mut right = rect.right() - 8.0;
+    if let Some((note, color)) = note {
+        let drawn = painter.text(
+            egui::Pos2::new(right, rect.center().y),
+            egui::Align2::RIGHT_CENTER,
+            note,
+            egui::FontId::proportional(11.5),
+            color,
+        );
+        right = drawn.left() - 8.0;
+    }
+    let mut job = egui::text::LayoutJob::single_section(
+        name.to_owned(),
+        egui::TextFormat::simple(egui::FontId::proportional(13.5), theme::TEXT_STRONG),
+    );
+    job.wrap = egui::text::TextWrapping::truncate_at_width((right - swatch.right() - 8.0).max(10.0));
+    let galley = painter.layout_job(job);
+    let at = egui::Pos2::new(swatch.right() + 8.0, rect.center().y - 0.5 * galley.size().y);
+    painter.galley(at, galley, theme::TEXT_STRONG);
+    if response.clicked() {
+        wanted.push(Intent::Select(Some(part)));
+    }
+    if response.double_clicked() {
+        wanted.push(Intent::Grab(part));
+    }
+    response.on_hover_ui(|ui| {
+        ui.label(name);
+        let hint = obstacle(session, &Intent::Grab(part)).unwrap_or_else(|| "Double click to take it in hand".into());
+        ui.label(RichText::new(hint).small().color(theme::TEXT_WEAK));
+    });
+}
+
+fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
+    let Some(shape) = document
+        .model
+        .shapes
+        .get(document.model.parts[part].shape)
+    else {
+        return;
+    };
+    ui.spacing_mut().item_spacing.y = 3.0;
+    let name = RichText::new(document.part_name(part)).color(theme::TEXT_STRONG);
+    ui.add(egui::Label::new(name).truncate());
+    control::row(ui, "Faces", shape.faces.len().to_string());
+    let exact = shape
+        .faces
+        .iter()
+        .filter(|f| !matches!(f.surface, Surface::Spline))
+        .count();
+    control::row(ui, "of closed form", exact.to_string());
+    control::row(ui, "Volume", format!("{} mm³", grouped(shape.volume_mm3)));
+    let closed = if shape.closed {
+        "closed".to_owned()
+    } else {
+        format!("{} open edges", shape.open_edges)
+    };
+    control::row(ui, "Shell", closed);
+    ui.add_space(4.0);
+    let wide = Vec2::new(ui.available_width(), 30.0);
+    if session.grabbed() == Some(part) {
+        let button = egui::Button::new("Let go").min_size(wide);
+        control::intent_button(
+            ui,
+            session,
+            wanted,
+            button,
+            Intent::Release,
+            "The part stays where it is",
+        );
+    } else {
+        let button = control::primary("Grab").min_size(wide);
+        control::intent_button(
+            ui,
+            session,
+            wanted,
+            button,
+            Intent::Grab(part),
+            "Couple the handle to this part, where both are",
+        );
+    }
+}
+
+/// Digits in groups of three.
+fn grouped(value: f64) -> String {
+    let digits = format!("{:.0}", value.abs());
+    let mut text = String::new();
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(c);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn thousands_are_set_apart() {
+        assert_eq!(super::grouped(88_955.4), "88\u{202f}955");
+        assert_eq!(super::grouped(12.0), "12");
+        assert_eq!(super::grouped(1_000_000.0), "1\u{202f}000\u{202f}000");
+    }
+}

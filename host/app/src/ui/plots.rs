@@ -1,0 +1,162 @@
+//! Live traces of force, torque and the cost of a tick over the last seconds.
+
+use egui::{Color32, RichText, Ui, Vec2b};
+use egui_plot::{HLine, Line, Plot, PlotPoints};
+
+use super::{rig, theme};
+use crate::session::Session;
+use crate::session::history::{SPAN_S, Sample};
+
+struct Trace {
+    name: &'static str,
+    color: Color32,
+    of: fn(&Sample) -> f32,
+}
+
+/// Draws three side by side.
+pub fn show(ui: &mut Ui, session: &Session) {
+    let cost_unit = session
+        .connection()
+        .map_or("", |c| rig::unit(c.capabilities.cost_unit));
+    let budget = session
+        .connection()
+        .map(|c| c.capabilities.cost_budget)
+        .filter(|&b| b > 0);
+    ui.columns_const(|[force, torque, cost]| {
+        let handle = Trace {
+            name: "handle",
+            color: theme::ACCENT,
+            of: |s| s.handle_n,
+        };
+        let contact = Trace {
+            name: "contacts",
+            color: theme::CONTACT,
+            of: |s| s.contact_n,
+        };
+        plot(force, session, "Force", "N", 1.0, &[contact, handle], None);
+        let handle = Trace {
+            name: "handle",
+            color: theme::ACCENT,
+            of: |s| 1e3 * s.handle_nm,
+        };
+        let contact = Trace {
+            name: "contacts",
+            color: theme::CONTACT,
+            of: |s| 1e3 * s.contact_nm,
+        };
+        plot(torque, session, "Torque", "mN·m", 10.0, &[contact, handle], None);
+        let tick = Trace {
+            name: "tick",
+            color: theme::GOOD,
+            of: |s| s.cost,
+        };
+        plot(cost, session, "Cost of a tick", cost_unit, 1000.0, &[tick], budget);
+    });
+}
+
+fn plot(
+    ui: &mut Ui,
+    session: &Session,
+    title: &'static str,
+    unit: &str,
+    least: f64,
+    traces: &[Trace],
+    budget: Option<u32>,
+) {
+    let history = &session.history;
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(title).color(theme::TEXT_STRONG));
+        ui.label(RichText::new(unit).small().color(theme::TEXT_WEAK));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            for trace in traces.iter().rev() {
+                if let Some(newest) = history.newest() {
+                    let value = (trace.of)(newest);
+                    let text = if value >= 100.0 {
+                        format!("{value:.0}")
+                    } else {
+                        format!("{value:.2}")
+                    };
+                    ui.label(RichText::new(text).monospace().color(trace.color));
+                }
+                ui.label(RichText::new(trace.name).small().color(theme::TEXT_WEAK));
+                ui.add_space(2.0);
+            }
+        });
+    });
+    let now = history.newest().map_or(0.0, |s| s.time_s);
+    let largest = traces
+        .iter()
+        .map(|trace| f64::from(history.largest(trace.of)))
+        .fold(0.0, f64::max);
+    let mut top = nice_above((1.12 * largest).max(least));
+    // The budget is worth its place once the trace comes near it.
+    let shown_budget = budget.map(f64::from).filter(|b| largest > 0.25 * b);
+    if let Some(budget) = shown_budget {
+        top = top.max(1.1 * budget);
+    }
+    Plot::new(title)
+        .height(ui.available_height())
+        .show_background(false)
+        .show_axes(Vec2b::new(false, true))
+        .show_grid(Vec2b::new(true, true))
+        .show_x(false)
+        .show_y(false)
+        .show_crosshair(false)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_double_click_reset(false)
+        .sense(egui::Sense::hover())
+        .set_margin_fraction(egui::Vec2::ZERO)
+        .grid_spacing(egui::Rangef::new(24.0, 120.0))
+        .y_axis_min_width(34.0)
+        .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 5.0, 10.0]))
+        .y_axis_formatter(|mark, _| axis_number(mark.value))
+        .show(ui, |plot| {
+            plot.set_plot_bounds_x(-SPAN_S..=0.0);
+            plot.set_plot_bounds_y(0.0..=top);
+            if let Some(budget) = shown_budget {
+                plot.hline(HLine::new("budget", budget).color(theme::STOP).width(1.0));
+            }
+            for trace in traces {
+                let points: PlotPoints<'_> = history
+                    .iter()
+                    .map(|s| [s.time_s - now, f64::from((trace.of)(s))])
+                    .collect();
+                plot.line(Line::new(trace.name, points).color(trace.color).width(1.6));
+            }
+        });
+}
+
+/// The least of 1, 2, 5 × 10ⁿ that is not below `value`.
+fn nice_above(value: f64) -> f64 {
+    let decade = 10f64.powf(value.max(1e-9).log10().floor());
+    [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|step| step * decade)
+        .find(|&top| top >= value)
+        .unwrap_or(10.0 * decade)
+}
+
+fn axis_number(value: f64) -> String {
+    match value.abs() {
+        v if v >= 1e6 => format!("{:.1} M", value / 1e6),
+        v if v >= 1e4 => format!("{:.0} k", value / 1e3),
+        v if v >= 1e3 => format!("{:.1} k", value / 1e3),
+        v if v >= 10.0 || v == 0.0 => format!("{value:.0}"),
+        _ => format!("{value:.1}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tops_are_round() {
+        for (value, top) in [(0.7, 1.0), (1.0, 1.0), (1.3, 2.0), (2.4, 5.0), (7.0, 10.0), (41_000.0, 50_000.0)] {
+            assert!((nice_above(value) - top).abs() < 1e-9 * top, "{value}");
+        }
+    }
+}

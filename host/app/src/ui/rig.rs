@@ -1,0 +1,209 @@
+//! The right side: which rig, what it says of itself, what the hand does, and the parameters.
+
+use egui::{RichText, ScrollArea, Ui, Vec2};
+use mortise_protocol::message::{Capabilities, CostUnit};
+use mortise_rig::RigSpec;
+
+use super::{control, parameters, theme};
+use crate::session::link::{Connection, Link};
+use crate::session::{Intent, Session, obstacle};
+
+/// Draws it.
+pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    egui::Panel::right("rig")
+        .default_size(318.0)
+        .size_range(280.0..=440.0)
+        .frame(theme::panel())
+        .show(ui, |ui| {
+            ScrollArea::vertical()
+                .id_salt("rig")
+                .auto_shrink([false, false])
+                .show(ui, |ui| {
+                    control::section(ui, "Rig");
+                    ui.add_space(2.0);
+                    chooser(ui, session, wanted);
+                    connect(ui, session, wanted);
+                    if let Some(connection) = session.connection() {
+                        ui.add_space(4.0);
+                        facts(ui, session, connection);
+                        scene(ui, session, connection, wanted);
+                    }
+                    control::divider(ui);
+                    control::section(ui, "Hand");
+                    ui.add_space(2.0);
+                    hand(ui, session, wanted);
+                    control::divider(ui);
+                    parameters::show(ui, session, wanted);
+                });
+        });
+}
+
+fn label_of(session: &Session, spec: &RigSpec) -> String {
+    let entry = session.rigs.iter().find(|entry| entry.spec == *spec);
+    entry.map_or_else(|| spec.to_string(), |entry| entry.label.clone())
+}
+
+fn chooser(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let blocked = obstacle(session, &Intent::ChooseRig(session.chosen.clone()));
+    ui.horizontal(|ui| {
+        let wide = ui.available_width() - 38.0;
+        let chooser = ui.add_enabled_ui(blocked.is_none(), |ui| {
+            egui::ComboBox::from_id_salt("rig")
+                .width(wide)
+                .selected_text(label_of(session, &session.chosen))
+                .truncate()
+                .show_ui(ui, |ui| {
+                    ui.set_min_width(300.0);
+                    for entry in &session.rigs {
+                        let chosen = entry.spec == session.chosen;
+                        let name = match &entry.available {
+                            Ok(()) => RichText::new(&entry.label).color(theme::TEXT_STRONG),
+                            Err(_) => RichText::new(&entry.label).color(theme::TEXT_WEAK),
+                        };
+                        let line = ui.selectable_label(chosen, name);
+                        let line = line.on_hover_text(&entry.detail);
+                        if line.clicked() {
+                            wanted.push(Intent::ChooseRig(entry.spec.clone()));
+                        }
+                        let (text, color) = match &entry.available {
+                            Ok(()) => (entry.detail.as_str(), theme::TEXT_WEAK),
+                            Err(hint) => (hint.as_str(), theme::WARNING),
+                        };
+                        ui.horizontal_wrapped(|ui| {
+                            ui.add_space(10.0);
+                            ui.label(RichText::new(text).small().color(color));
+                        });
+                        ui.add_space(4.0);
+                    }
+                });
+        });
+        chooser.response.on_hover_text(match &blocked {
+            Some(reason) => reason.clone(),
+            None => "Simulated rigs and serial ports".to_owned(),
+        });
+        let again = egui::Button::new("⟲").min_size(Vec2::new(28.0, 26.0));
+        control::intent_button(ui, session, wanted, again, Intent::RefreshRigs, "Look for rigs again");
+    });
+}
+
+fn connect(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let wide = Vec2::new(ui.available_width(), 32.0);
+    match &session.link {
+        Link::None => {
+            let button = control::primary("Connect").min_size(wide);
+            let hint = "Open the link and greet the board. Motors stay off until armed";
+            control::intent_button(ui, session, wanted, button, Intent::Connect, hint);
+            let chosen = session.rigs.iter().find(|entry| entry.spec == session.chosen);
+            if let Some(Err(hint)) = chosen.map(|entry| &entry.available) {
+                ui.label(RichText::new(hint).small().color(theme::WARNING));
+            }
+        }
+        Link::Connecting { .. } => {
+            ui.horizontal(|ui| {
+                ui.add(egui::Spinner::new().size(18.0).color(theme::ACCENT));
+                ui.label("Waiting for the board to answer");
+            });
+            let button = egui::Button::new("Cancel").min_size(wide);
+            control::intent_button(ui, session, wanted, button, Intent::Disconnect, "");
+        }
+        Link::Connected(_) => {
+            let button = egui::Button::new("Disconnect").min_size(wide);
+            let hint = "Motors off, and let the link go";
+            control::intent_button(ui, session, wanted, button, Intent::Disconnect, hint);
+        }
+    }
+}
+
+fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
+    let can = &connection.capabilities;
+    ui.spacing_mut().item_spacing.y = 3.0;
+    control::row(ui, "Board", can.board.to_string());
+    control::row(ui, "Loop", format!("{} Hz", can.tick_hz));
+    control::row(ui, "Handle", handle(can));
+    if let Some(telemetry) = &session.telemetry {
+        let missed = telemetry.missed;
+        let text = match missed {
+            0 => "none".to_owned(),
+            n => n.to_string(),
+        };
+        control::row(ui, "Missed ticks", text);
+    }
+    if let Some(statistics) = &connection.statistics {
+        let peak = format!("{} {}", statistics.cost_max, unit(can.cost_unit));
+        control::row(ui, "Dearest tick", peak);
+    }
+    let counts = connection.link_counts();
+    if counts.bad_frames > 0 {
+        control::row(ui, "Damaged frames", counts.bad_frames.to_string());
+    }
+}
+
+fn handle(can: &Capabilities) -> String {
+    let axes = format!("{} force, {} torque axes", can.force_axes, can.torque_axes);
+    if can.simulated {
+        format!("simulated, {axes}")
+    } else {
+        axes
+    }
+}
+
+/// Short name of what ticks cost.
+pub fn unit(unit: CostUnit) -> &'static str {
+    match unit {
+        CostUnit::Instructions => "instr.",
+        CostUnit::Cycles => "cycles",
+        CostUnit::Nanoseconds => "ns",
+    }
+}
+
+fn scene(ui: &mut Ui, session: &Session, connection: &Connection, wanted: &mut Vec<Intent>) {
+    if let Some(upload) = connection.upload {
+        let part = upload.sent as f32 / upload.total.max(1) as f32;
+        ui.add_space(2.0);
+        ui.add(
+            egui::ProgressBar::new(part)
+                .desired_height(18.0)
+                .fill(theme::ACCENT_DIM)
+                .text(format!(
+                    "Sending the scene, {} of {} KiB",
+                    upload.sent / 1024,
+                    upload.total.div_ceil(1024)
+                )),
+        );
+        return;
+    }
+    let state = if session.scene_is_on_board() {
+        "on the board"
+    } else if session.document.is_none() {
+        "nothing open"
+    } else {
+        "not on the board"
+    };
+    control::row(ui, "Scene", state);
+    let missing = session.document.as_ref().is_some_and(|d| d.baked.is_some()) && !session.scene_is_on_board();
+    if missing {
+        let button = egui::Button::new("Send the scene").min_size(Vec2::new(ui.available_width(), 28.0));
+        let hint = "The scene in use stays until all of the new one has arrived";
+        control::intent_button(ui, session, wanted, button, Intent::Upload, hint);
+    }
+}
+
+fn hand(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let half = Vec2::new(0.5 * (ui.available_width() - 8.0), 30.0);
+    ui.horizontal(|ui| {
+        let play = egui::Button::new("▶  Play insertion").min_size(half);
+        let hint = "The simulated hand arms, takes the peg and puts it into the hole";
+        control::intent_button(ui, session, wanted, play, Intent::PlayInsertion, hint);
+        let back = egui::Button::new("Put parts back").min_size(half);
+        let hint = "Every part to where the file has it";
+        control::intent_button(ui, session, wanted, back, Intent::ResetScene, hint);
+    });
+    let simulated = session.connection().is_some_and(|c| c.capabilities.simulated);
+    let text = match (simulated, session.grabbed()) {
+        (true, Some(_)) => "Drag the part in the view to move the simulated hand; with Ctrl to turn it.",
+        (true, None) => "The hand is simulated: once a part is in hand, drag it in the view.",
+        (false, _) if session.connection().is_some() => "The handle of the rig is the hand.",
+        (false, _) => "Connect a rig to feel the parts, or to watch a simulated hand.",
+    };
+    ui.label(RichText::new(text).small().color(theme::TEXT_WEAK));
+}

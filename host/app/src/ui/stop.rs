@@ -1,0 +1,61 @@
+//! The STOP button: large, red, always there, always enabled; also Space and Esc.
+
+use egui::{Color32, CornerRadius, FontId, Key, Modifiers, Response, Sense, Stroke, Ui, Vec2, WidgetInfo, Role};
+
+use super::theme;
+use crate::session::{Intent, Session};
+
+/// Draws it. A press, not a click: it acts when the button goes down.
+pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) -> Response {
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(148.0, 44.0), Sense::click());
+    let down = response.is_pointer_button_down_on();
+    let fill = match (down, response.hovered()) {
+        (true, _) => Color32::from_rgb(170, 30, 34),
+        (false, true) => theme::STOP_HOVER,
+        (false, false) => theme::STOP,
+    };
+    let painter = ui.painter();
+    painter.rect(
+        rect,
+        CornerRadius::same(8),
+        fill,
+        Stroke::new(1.0, Color32::from_rgb(255, 140, 134)),
+        egui::StrokeKind::Inside,
+    );
+    let sign = egui::Rect::from_center_size(rect.left_center() + Vec2::new(28.0, 0.0), Vec2::splat(13.0));
+    painter.rect_filled(sign, CornerRadius::same(2), Color32::WHITE);
+    painter.text(
+        rect.center() + Vec2::new(14.0, 0.0),
+        egui::Align2::CENTER_CENTER,
+        "STOP",
+        FontId::proportional(21.0),
+        Color32::WHITE,
+    );
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "STOP"));
+    // Going down and coming up are one wish.
+    let pressed = down && ui.input(|i| i.pointer.any_pressed());
+    let keyboard = response.clicked() && !ui.input(|i| i.pointer.any_released());
+    if pressed || keyboard {
+        wanted.push(Intent::Stop);
+    }
+    let hint = if session.connection().is_some() {
+        "Motors off, now (Space or Esc)"
+    } else {
+        "Motors off, now (Space or Esc). No rig is connected"
+    };
+    response.on_hover_text(hint)
+}
+
+/// Space and Esc, taken before any other control sees them. A text field keeps its Space.
+pub fn keys(ctx: &egui::Context, session: &Session, wanted: &mut Vec<Intent>) {
+    let typing = ctx.text_edit_focused();
+    let connected = session.connection().is_some();
+    let pressed = ctx.input_mut(|input| {
+        // Without a rig Esc closes menus as everywhere else.
+        (connected && input.consume_key(Modifiers::NONE, Key::Escape))
+            | (!typing && input.consume_key(Modifiers::NONE, Key::Space))
+    });
+    if pressed {
+        wanted.push(Intent::Stop);
+    }
+}

@@ -1,0 +1,226 @@
+//! The middle: the 3D view and what lies over it. Without a graphics device (tests) the scene is not drawn, all else is.
+
+use egui::{Align2, Color32, CornerRadius, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo, Role};
+use glam::DVec3;
+
+use super::{control, theme};
+use crate::session::{Intent, Session};
+use crate::viewport::camera::View;
+use crate::viewport::compose::{compose, touching_points};
+use crate::viewport::gesture::{Viewpoint, on_screen};
+use crate::viewport::surface::Surface;
+
+/// Draws it.
+pub fn show(
+    ui: &mut Ui,
+    session: &mut Session,
+    view: &mut Viewpoint,
+    surface: Option<&mut Surface>,
+    wanted: &mut Vec<Intent>,
+) {
+    let rect = ui.available_rect_before_wrap();
+    let response = ui.allocate_rect(rect, Sense::click_and_drag());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
+    ui.painter().rect_filled(rect, CornerRadius::ZERO, theme::GROUND);
+    if session.document.is_none() {
+        empty(ui, rect, session, wanted);
+        return;
+    }
+    view.respond(ui, &response, session, wanted);
+    let Some(document) = &session.document else { return };
+    if let Some(surface) = surface {
+        let scale = ui.pixels_per_point();
+        let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
+        let picture = compose(session, document, view.camera, view.see_through, scale);
+        if let Some(texture) = surface.show(&document.meshes, picture, size) {
+            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+            ui.painter().image(texture, rect, whole, Color32::WHITE);
+        }
+    }
+    touching(ui, rect, session, view);
+    triad(ui, rect, view);
+    toolbar(ui, rect, session, view);
+    readout(ui, rect, session);
+    let hint = if view.drags_hand() {
+        "Moving the hand · Ctrl turns it"
+    } else {
+        "Drag: orbit · Shift or middle: pan · Wheel: zoom · F: fit · Double click: grab"
+    };
+    ui.painter().text(
+        rect.right_bottom() - Vec2::new(14.0, 12.0),
+        Align2::RIGHT_BOTTOM,
+        hint,
+        FontId::proportional(11.5),
+        theme::TEXT_WEAK.gamma_multiply(0.8),
+    );
+}
+
+fn empty(ui: &mut Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
+    if session.is_busy() {
+        return;
+    }
+    let card = Rect::from_center_size(rect.center(), Vec2::new(400.0, 290.0));
+    dashed(ui, card.expand(18.0));
+    ui.scope_builder(UiBuilder::new().max_rect(card), |ui| {
+        ui.vertical_centered(|ui| {
+            ui.add_space(12.0);
+            let (mark, _) = ui.allocate_exact_size(Vec2::splat(72.0), Sense::hover());
+            control::mark(ui.painter(), mark, theme::TEXT_WEAK);
+            ui.add_space(14.0);
+            ui.label(
+                RichText::new("Drop a STEP file here")
+                    .size(22.0)
+                    .color(theme::TEXT_STRONG),
+            );
+            ui.label(
+                RichText::new("Feel whether its parts go together, before anything is made")
+                    .color(theme::TEXT_WEAK),
+            );
+            ui.add_space(16.0);
+            let wide = Vec2::new(220.0, 36.0);
+            let open = control::primary("Open STEP file…").min_size(wide);
+            control::intent_button(ui, session, wanted, open, Intent::Browse, "Ctrl+O");
+            ui.add_space(2.0);
+            let sample = egui::Button::new("Open the sample").min_size(wide);
+            let hint = "A block with an 18.75 mm hole and a peg 1 mm thinner";
+            control::intent_button(ui, session, wanted, sample, Intent::OpenSample, hint);
+        });
+    });
+}
+
+fn dashed(ui: &Ui, rect: Rect) {
+    let corners = [
+        rect.left_top(),
+        rect.right_top(),
+        rect.right_bottom(),
+        rect.left_bottom(),
+        rect.left_top(),
+    ];
+    let stroke = Stroke::new(1.5, theme::LINE);
+    ui.painter()
+        .extend(egui::Shape::dashed_line(&corners, stroke, 7.0, 6.0));
+}
+
+/// Dots where faces touch.
+fn touching(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
+    if session.grabbed().is_none() {
+        return;
+    }
+    let Some(telemetry) = &session.telemetry else { return };
+    let painter = ui.painter_at(rect);
+    for point in touching_points(telemetry) {
+        if let Some(at) = on_screen(&view.camera, rect, point) {
+            painter.circle(at, 3.5, theme::CONTACT, Stroke::new(1.0, Color32::WHITE));
+        }
+    }
+}
+
+/// The world's axes, in the lower left corner.
+fn triad(ui: &Ui, rect: Rect, view: &Viewpoint) {
+    let origin = rect.left_bottom() + Vec2::new(44.0, -44.0);
+    let camera = &view.camera;
+    let mut axes = [
+        (DVec3::X, "x", Color32::from_rgb(226, 98, 92)),
+        (DVec3::Y, "y", Color32::from_rgb(120, 196, 108)),
+        (DVec3::Z, "z", Color32::from_rgb(100, 152, 240)),
+    ];
+    axes.sort_by(|a, b| {
+        let near = |axis: DVec3| axis.dot(camera.backward());
+        near(a.0).total_cmp(&near(b.0))
+    });
+    let painter = ui.painter_at(rect);
+    for (axis, name, color) in axes {
+        let seen = Vec2::new(
+            axis.dot(camera.right()) as f32,
+            -axis.dot(camera.up()) as f32,
+        );
+        painter.line_segment([origin, origin + 24.0 * seen], Stroke::new(2.0, color));
+        painter.text(
+            origin + 33.0 * seen,
+            Align2::CENTER_CENTER,
+            name,
+            FontId::proportional(12.0),
+            color,
+        );
+    }
+}
+
+fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
+    let Some(document) = &session.document else { return };
+    let place = Rect::from_min_size(rect.min + Vec2::splat(12.0), Vec2::new(430.0, 34.0));
+    ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.spacing_mut().button_padding = Vec2::new(9.0, 4.0);
+            let flat = |text: &str| egui::Button::new(RichText::new(text).size(12.5)).fill(theme::CARD);
+            if ui.add(flat("Fit")).on_hover_text("See everything (F)").clicked() {
+                view.fit(document.extent, rect);
+            }
+            for named in View::ALL {
+                let hint = format!("Look from: {}", named.name().to_lowercase());
+                if ui.add(flat(named.name())).on_hover_text(hint).clicked() {
+                    view.look(named, document.extent, rect);
+                }
+            }
+            ui.add_space(6.0);
+            let through = egui::Button::new(RichText::new("See through").size(12.5))
+                .selected(view.see_through)
+                .fill(if view.see_through { theme::ACCENT_DIM } else { theme::CARD });
+            let hint = "Draw fixed parts as glass, to see what happens inside a hole";
+            if ui.add(through).on_hover_text(hint).clicked() {
+                view.see_through = !view.see_through;
+            }
+        });
+    });
+}
+
+/// Force now and which faces touch, in the upper right corner, while a part is in hand.
+fn readout(ui: &Ui, rect: Rect, session: &Session) {
+    let (Some(part), Some(telemetry), Some(document)) =
+        (session.grabbed(), &session.telemetry, &session.document)
+    else {
+        return;
+    };
+    let sample = session.history.newest();
+    let mut lines = vec![(
+        format!("{}", document.part_name(part)),
+        theme::HELD,
+        14.5,
+    )];
+    if let Some(sample) = sample {
+        lines.push((format!("{:.2} N on the handle", sample.handle_n), theme::TEXT_STRONG, 13.0));
+    }
+    if telemetry.pairs.is_empty() {
+        lines.push(("touches nothing".to_owned(), theme::TEXT_WEAK, 12.5));
+    }
+    for pair in telemetry.pairs.iter().take(3) {
+        let other = document.model_part(pair.static_part);
+        let other = other.map_or("?", |other| document.part_name(other));
+        let text = format!("touches {other}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));
+        lines.push((text, theme::CONTACT, 12.5));
+    }
+    let painter = ui.painter_at(rect);
+    let galleys: Vec<_> = lines
+        .into_iter()
+        .map(|(text, color, size)| painter.layout_no_wrap(text, FontId::proportional(size), color))
+        .collect();
+    let wide = galleys.iter().map(|g| g.size().x).fold(0.0, f32::max);
+    let high: f32 = galleys.iter().map(|g| g.size().y + 3.0).sum();
+    let card = Rect::from_min_size(
+        Pos2::new(rect.right() - wide - 38.0, rect.top() + 12.0),
+        Vec2::new(wide + 26.0, high + 15.0),
+    );
+    painter.rect(
+        card,
+        CornerRadius::same(8),
+        theme::CARD.gamma_multiply(0.9),
+        Stroke::new(1.0, theme::LINE),
+        egui::StrokeKind::Inside,
+    );
+    let mut at = card.min + Vec2::new(13.0, 9.0);
+    for galley in galleys {
+        let height = galley.size().y;
+        painter.galley(at, galley, theme::TEXT);
+        at.y += height + 3.0;
+    }
+}

@@ -1,0 +1,141 @@
+//! From the session to the picture: colours, what is in hand, what touches, which way it pushes. Pure.
+
+use glam::{DAffine3, DVec3};
+use mortise_protocol::image::NO_FACE;
+use mortise_protocol::message::Telemetry;
+
+use super::camera::{Camera, Extent};
+use super::picture::{Arrow, Item, MAX_LIT, Picture};
+use crate::session::Session;
+use crate::session::document::Document;
+use crate::session::pose::point_from_wire;
+
+/// Edges of parts, sRGB and opacity.
+const EDGE: [f32; 4] = [0.05, 0.06, 0.08, 0.75];
+/// Edges of the marked part.
+const EDGE_MARKED: [f32; 4] = [0.45, 0.72, 1.0, 1.0];
+/// Edges of the part in hand.
+const EDGE_HELD: [f32; 4] = [1.0, 0.80, 0.45, 1.0];
+/// Mixed into the part in hand, and how much.
+const TINT_HELD: [f32; 4] = [0.96, 0.65, 0.26, 0.55];
+/// The ghost: where the hand would have the part.
+const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
+/// Opacity of fixed parts when they are seen through.
+const SEEN_THROUGH: f32 = 0.26;
+/// Ghosts nearer to their part than this are not told apart by eye, in radii of the scene.
+const GHOST_FROM: f64 = 5e-4;
+/// Length of an arrow for one newton, in radii of the scene; forces far beyond a few newtons are drawn at the longest.
+const RADII_PER_NEWTON: f64 = 0.16;
+const LONGEST_RADII: f64 = 0.9;
+
+/// The picture of `document` as `session` has it.
+pub fn compose(session: &Session, document: &Document, camera: Camera, see_through: bool, scale: f32) -> Picture {
+    let held = session.grabbed();
+    let touching = session.telemetry.as_deref().filter(|_| held.is_some());
+    let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
+        .map(|(index, part)| {
+            let in_hand = held == Some(index);
+            let marked = session.selected == Some(index);
+            Item {
+                shape: part.shape,
+                pose: document.poses[index],
+                color: document.colors[index].map(|c| f32::from(c) / 255.0),
+                opacity: if see_through && !in_hand && is_fixed(document, index) {
+                    SEEN_THROUGH
+                } else {
+                    1.0
+                },
+                tint: if in_hand { TINT_HELD } else { [0.0; 4] },
+                line: match (in_hand, marked) {
+                    (true, _) => EDGE_HELD,
+                    (_, true) => EDGE_MARKED,
+                    _ => EDGE,
+                },
+                lit: touching.map_or_else(Vec::new, |t| lit(document, t, index, in_hand)),
+            }
+        })
+        .collect();
+    if let Some((part, pose)) = session.ghost()
+        && apart(&pose, &document.poses[part], document, part) > GHOST_FROM * document.extent.radius
+    {
+        items.push(Item {
+            shape: document.model.parts[part].shape,
+            pose,
+            color: GHOST,
+            opacity: 0.16,
+            tint: [0.0; 4],
+            line: [GHOST[0], GHOST[1], GHOST[2], 0.55],
+            lit: Vec::new(),
+        });
+    }
+    Picture {
+        camera,
+        extent: document.extent,
+        items,
+        arrows: touching.map_or_else(Vec::new, |t| arrows(document, t)),
+        line_width: 1.25 * scale,
+    }
+}
+
+fn is_fixed(document: &Document, part: usize) -> bool {
+    document.baked.is_some() && !document.is_grabbable(part)
+}
+
+/// Faces of a part that touch, deepest first.
+fn lit(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -> Vec<u32> {
+    let mut faces: Vec<u32> = Vec::new();
+    for pair in &telemetry.pairs {
+        let face = if in_hand {
+            pair.moving_face
+        } else if document.model_part(pair.static_part) == Some(part) {
+            pair.static_face
+        } else {
+            continue;
+        };
+        if face != NO_FACE && faces.len() < MAX_LIT && !faces.contains(&u32::from(face)) {
+            faces.push(face.into());
+        }
+    }
+    faces
+}
+
+/// Where the pushes act, mm: the mean of the touching points, weighted by depth.
+pub fn touching_points(telemetry: &Telemetry) -> Vec<DVec3> {
+    telemetry.pairs.iter().map(|pair| point_from_wire(pair.point)).collect()
+}
+
+fn arrows(document: &Document, telemetry: &Telemetry) -> Vec<Arrow> {
+    let mut total = (DVec3::ZERO, 0.0);
+    for pair in &telemetry.pairs {
+        let weight = f64::from(pair.depth).max(1e-9) * f64::from(pair.count.max(1));
+        total = (total.0 + weight * point_from_wire(pair.point), total.1 + weight);
+    }
+    let force = DVec3::from(telemetry.contact.force.map(f64::from));
+    // Less than a few hundredths of a newton nobody feels.
+    if total.1 <= 0.0 || !force.is_finite() || force.length() < 0.03 {
+        return Vec::new();
+    }
+    let radius = document.extent.radius;
+    let length = (RADII_PER_NEWTON * force.length()).min(LONGEST_RADII) * radius;
+    vec![Arrow {
+        tail: total.0 / total.1,
+        vector: length * force.normalize(),
+        thickness: 0.014 * radius,
+        color: [1.0, 0.44, 0.28, 0.95],
+    }]
+}
+
+/// Largest distance between where two poses have the points of a part's bounding sphere, mm.
+fn apart(a: &DAffine3, b: &DAffine3, document: &Document, part: usize) -> f64 {
+    let Extent { center, radius } = document
+        .extents
+        .get(document.model.parts[part].shape)
+        .copied()
+        .unwrap_or_default();
+    let centers = (a.transform_point3(center) - b.transform_point3(center)).length();
+    let turned: f64 = (0..3)
+        .map(|i| (a.matrix3.col(i) - b.matrix3.col(i)).length_squared())
+        .sum::<f64>()
+        .sqrt();
+    centers + radius * turned
+}

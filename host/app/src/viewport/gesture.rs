@@ -1,0 +1,247 @@
+//! What the pointer does in the view: orbit, pan, zoom to the cursor, pick, and drag the part in hand.
+
+use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Response, Ui};
+use glam::{DAffine3, DQuat, DVec2, DVec3};
+
+use super::camera::{Camera, Extent, View};
+use super::pick::{Pick, pick};
+use crate::session::document::Document;
+use crate::session::insertion::hold;
+use crate::session::pose::moved;
+use crate::session::{Intent, Session};
+
+/// Turn of the hand for a drag over the whole height, rad.
+const HAND_TURN: f64 = 1.5;
+/// Zoom for one point of wheel travel.
+const ZOOM_PER_POINT: f64 = 0.004;
+
+/// What the pointer drags.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Drag {
+    Orbit,
+    Pan,
+    /// The part in hand, held at `anchor`; the handle was at `handle`.
+    Hand {
+        anchor: DVec3,
+        handle: DAffine3,
+        shift: DVec3,
+        turn: DQuat,
+    },
+}
+
+/// The view's own state.
+#[derive(Clone, Debug)]
+pub struct Viewpoint {
+    /// From where the scene is seen.
+    pub camera: Camera,
+    /// Fixed parts are seen through.
+    pub see_through: bool,
+    goal: Option<Camera>,
+    drag: Option<Drag>,
+    seen: Option<u64>,
+}
+
+impl Default for Viewpoint {
+    fn default() -> Self {
+        Self {
+            camera: Camera::default(),
+            see_through: false,
+            goal: None,
+            drag: None,
+            seen: None,
+        }
+    }
+}
+
+fn ndc(rect: Rect, at: Pos2) -> DVec2 {
+    let x = f64::from((at.x - rect.left()) / rect.width());
+    let y = f64::from((at.y - rect.top()) / rect.height());
+    DVec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y)
+}
+
+fn aspect(rect: Rect) -> f64 {
+    f64::from((rect.width() / rect.height().max(1.0)).max(0.01))
+}
+
+/// Pixel of a point of the world.
+pub fn on_screen(camera: &Camera, rect: Rect, point: DVec3) -> Option<Pos2> {
+    let at = camera.project(point, aspect(rect))?;
+    let (x, y) = (0.5 * (at.x + 1.0), 0.5 * (1.0 - at.y));
+    Some(rect.min + egui::vec2(x as f32 * rect.width(), y as f32 * rect.height()))
+}
+
+impl Viewpoint {
+    /// Moves smoothly so that all is seen.
+    pub fn fit(&mut self, extent: Extent, rect: Rect) {
+        let mut goal = self.goal.unwrap_or(self.camera);
+        goal.fit(extent, aspect(rect));
+        self.goal = Some(goal);
+    }
+
+    /// Turns smoothly to a named direction, and fits.
+    pub fn look(&mut self, view: View, extent: Extent, rect: Rect) {
+        let mut goal = self.camera;
+        goal.look(view);
+        goal.fit(extent, aspect(rect));
+        self.goal = Some(goal);
+    }
+
+    /// Takes in everything the pointer and keys did over the view.
+    pub fn respond(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        session: &mut Session,
+        wanted: &mut Vec<Intent>,
+    ) {
+        let rect = response.rect;
+        let Some(document) = &session.document else { return };
+        let extent = document.extent;
+        if self.seen != Some(document.generation) {
+            self.seen = Some(document.generation);
+            self.camera.look(View::Iso);
+            self.camera.fit(extent, aspect(rect));
+            self.goal = None;
+        }
+        let typing = ui.ctx().text_edit_focused();
+        if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
+            self.fit(extent, rect);
+        }
+        if response.clicked() {
+            let hit = self.pick(document, rect, response.interact_pointer_pos());
+            wanted.push(Intent::Select(hit.map(|h| h.part)));
+        }
+        if response.double_clicked()
+            && let Some(hit) = self.pick(document, rect, response.interact_pointer_pos())
+        {
+            wanted.push(Intent::Grab(hit.part));
+        }
+        self.start_drag(ui, response, session);
+        self.go_on_dragging(ui, response, session);
+        if let Some(document) = &session.document {
+            self.zoom(ui, response, document);
+        }
+        self.glide(ui);
+    }
+
+    fn pick(&self, document: &Document, rect: Rect, at: Option<Pos2>) -> Option<Pick> {
+        let (origin, direction) = self.camera.ray(ndc(rect, at?), aspect(rect));
+        pick(&document.model, &document.extents, &document.poses, origin, direction)
+    }
+
+    fn start_drag(&mut self, ui: &Ui, response: &Response, session: &Session) {
+        if !response.drag_started() {
+            return;
+        }
+        let shift = ui.input(|i| i.modifiers.shift);
+        let left = response.drag_started_by(PointerButton::Primary);
+        if response.drag_started_by(PointerButton::Middle) || (left && shift) {
+            self.drag = Some(Drag::Pan);
+            return;
+        }
+        self.drag = Some(Drag::Orbit);
+        let simulated = session.connection().is_some_and(|c| c.capabilities.simulated);
+        let (Some(document), Some(held), Some(handle)) =
+            (&session.document, session.grabbed(), session.handle())
+        else {
+            return;
+        };
+        let pressed = ui.input(|i| i.pointer.press_origin());
+        if left
+            && simulated
+            && let Some(hit) = self.pick(document, response.rect, pressed)
+            && hit.part == held
+        {
+            self.drag = Some(Drag::Hand {
+                anchor: hit.point,
+                handle,
+                shift: DVec3::ZERO,
+                turn: DQuat::IDENTITY,
+            });
+        }
+    }
+
+    fn go_on_dragging(&mut self, ui: &Ui, response: &Response, session: &mut Session) {
+        if response.drag_stopped() {
+            self.drag = None;
+        }
+        let by = response.drag_delta();
+        if !response.dragged() || by == egui::Vec2::ZERO {
+            return;
+        }
+        let rect = response.rect;
+        let by = DVec2::new(f64::from(by.x), f64::from(by.y)) / f64::from(rect.height().max(1.0));
+        match &mut self.drag {
+            None => {}
+            Some(Drag::Orbit) => {
+                self.goal = None;
+                self.camera.orbit(by);
+            }
+            Some(Drag::Pan) => {
+                self.goal = None;
+                self.camera.pan(by);
+            }
+            Some(Drag::Hand {
+                anchor,
+                handle,
+                shift,
+                turn,
+            }) => {
+                let camera = &self.camera;
+                if ui.input(|i| i.modifiers.ctrl || i.modifiers.command) {
+                    let about_up = DQuat::from_axis_angle(camera.up(), HAND_TURN * by.x);
+                    let about_right = DQuat::from_axis_angle(camera.right(), HAND_TURN * by.y);
+                    *turn = (about_up * about_right * *turn).normalize();
+                } else {
+                    // A point at the anchor's depth follows the pointer.
+                    let depth = (camera.eye() - *anchor).dot(camera.backward());
+                    let height = 2.0 * depth * (0.5 * super::camera::FIELD_OF_VIEW).tan();
+                    *shift += height * (by.x * camera.right() - by.y * camera.up());
+                }
+                let target = moved(handle, *anchor, *turn, *shift);
+                session.move_hand(hold(&target));
+            }
+        }
+    }
+
+    fn zoom(&mut self, ui: &Ui, response: &Response, document: &Document) {
+        let Some(at) = response.hover_pos() else { return };
+        let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+        if scroll == 0.0 && pinch == 1.0 {
+            return;
+        }
+        let rect = response.rect;
+        let factor = (-ZOOM_PER_POINT * f64::from(scroll)).exp() / f64::from(pinch);
+        // Towards what is under the pointer; beside the parts, towards the plane of the target.
+        let anchor = self.pick(document, rect, Some(at)).map_or_else(
+            || {
+                self.camera
+                    .on_plane_through(self.camera.target, ndc(rect, at), aspect(rect))
+            },
+            |hit| hit.point,
+        );
+        self.goal = None;
+        self.camera.zoom_at(anchor, factor, document.extent);
+    }
+
+    /// A tenth of a second to go most of the way.
+    fn glide(&mut self, ui: &Ui) {
+        let Some(goal) = self.goal else { return };
+        let dt = f64::from(ui.input(|i| i.stable_dt)).min(0.1);
+        self.camera = self.camera.towards(&goal, 1.0 - (-dt / 0.07).exp());
+        let left = (self.camera.target - goal.target).length() / goal.distance
+            + (self.camera.distance / goal.distance - 1.0).abs()
+            + (self.camera.pitch - goal.pitch).abs()
+            + (self.camera.yaw - goal.yaw).sin().abs();
+        if left < 1e-3 {
+            self.camera = goal;
+            self.goal = None;
+        }
+        ui.ctx().request_repaint();
+    }
+
+    /// Whether the part in hand is being dragged.
+    pub fn drags_hand(&self) -> bool {
+        matches!(self.drag, Some(Drag::Hand { .. }))
+    }
+}

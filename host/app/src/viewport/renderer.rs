@@ -1,0 +1,384 @@
+//! Draws a [`Picture`] with wgpu into a texture of its own: colour with four samples, depth, and the resolved picture.
+//!
+//! Knows nothing of the window: a test draws with it on a software device. Cost: one draw call an item and one for its edges;
+//! matrices are multiplied in double precision, so that a micrometre gap stays visible half a metre from the origin.
+
+use bytemuck::{Pod, Zeroable};
+use eframe::wgpu;
+use glam::{DAffine3, DMat4, DVec3};
+use wgpu::util::DeviceExt as _;
+
+use super::mesh::ShapeMesh;
+use super::picture::{Item, MAX_LIT, Picture, arrow_poses};
+use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
+use super::solids;
+
+/// Room for one item's numbers; a multiple of every device's alignment for uniform buffers.
+const DRAW_STRIDE: u64 = 256;
+/// Lines are brought this fraction of their distance nearer, so that faces do not swallow them.
+const LINE_LIFT: f64 = 6e-4;
+/// Background at the top and at the bottom, sRGB.
+const SKY: [[f32; 4]; 2] = [[0.135, 0.150, 0.180, 1.0], [0.075, 0.082, 0.098, 1.0]];
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Globals {
+    key: [f32; 4],
+    fill: [f32; 4],
+    viewer: [f32; 4],
+    screen: [f32; 4],
+    top: [f32; 4],
+    bottom: [f32; 4],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Draw {
+    to_clip: [f32; 16],
+    to_world: [f32; 16],
+    color: [f32; 4],
+    tint: [f32; 4],
+    line: [f32; 4],
+    lit: [u32; MAX_LIT],
+}
+
+/// A shape on the graphics card.
+struct Loaded {
+    vertices: wgpu::Buffer,
+    indices: wgpu::Buffer,
+    index_count: u32,
+    segments: wgpu::Buffer,
+    segment_count: u32,
+}
+
+struct Targets {
+    size: [u32; 2],
+    samples: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    picture: wgpu::Texture,
+    view: wgpu::TextureView,
+}
+
+/// Pipelines, shapes and textures.
+pub struct Renderer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    pipelines: Pipelines,
+    globals: wgpu::Buffer,
+    globals_group: wgpu::BindGroup,
+    draws: wgpu::Buffer,
+    draws_group: wgpu::BindGroup,
+    shapes: Vec<Loaded>,
+    arrow: [Loaded; 2],
+    targets: Option<Targets>,
+}
+
+impl Renderer {
+    /// On a device. Compiles the shaders.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Self {
+        let pipelines = Pipelines::new(device, size_of::<Globals>() as u64, size_of::<Draw>() as u64);
+        let globals = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("globals"),
+            size: size_of::<Globals>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let globals_group = pipelines.globals_group(device, &globals);
+        let (draws, draws_group) = draw_buffer(device, &pipelines, 64);
+        let arrow = [solids::cylinder(), solids::cone()].map(|mesh| load(device, &mesh));
+        Self {
+            device: device.clone(),
+            queue: queue.clone(),
+            pipelines,
+            globals,
+            globals_group,
+            draws,
+            draws_group,
+            shapes: Vec::new(),
+            arrow,
+            targets: None,
+        }
+    }
+
+    /// Replaces the shapes items name.
+    pub fn set_shapes(&mut self, shapes: &[ShapeMesh]) {
+        self.shapes = shapes.iter().map(|mesh| load(&self.device, mesh)).collect();
+    }
+
+    /// Texture the picture is drawn into, once there is one.
+    pub fn texture(&self) -> Option<(&wgpu::Texture, &wgpu::TextureView)> {
+        self.targets.as_ref().map(|t| (&t.picture, &t.view))
+    }
+
+    /// Makes the texture `size` pixels large; says whether it is a new one.
+    pub fn resize(&mut self, size: [u32; 2]) -> bool {
+        let limit = self.device.limits().max_texture_dimension_2d;
+        let size = size.map(|n| n.clamp(1, limit));
+        if self.targets.as_ref().is_some_and(|t| t.size == size) {
+            return false;
+        }
+        self.targets = Some(targets(&self.device, size));
+        true
+    }
+
+    /// Draws. Does nothing before [`Self::resize`].
+    pub fn render(&mut self, picture: &Picture) {
+        let Some(size) = self.targets.as_ref().map(|t| t.size) else {
+            return;
+        };
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        let to_clip = picture.camera.view_projection(aspect, picture.extent);
+        self.queue
+            .write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals(picture, size)));
+
+        let items: Vec<&Item> = picture
+            .items
+            .iter()
+            .filter(|i| i.shape < self.shapes.len())
+            .collect();
+        let (solid, mut seen_through): (Vec<&Item>, Vec<&Item>) =
+            items.into_iter().partition(|i| i.opacity >= 1.0);
+        let eye = picture.camera.eye();
+        seen_through.sort_by(|a, b| {
+            let far = |i: &Item| (i.pose.translation - eye).length_squared();
+            far(b).total_cmp(&far(a))
+        });
+        let pieces: Vec<([DAffine3; 2], [f32; 4])> = picture
+            .arrows
+            .iter()
+            .filter_map(|arrow| Some((arrow_poses(arrow)?, arrow.color)))
+            .collect();
+
+        let mut draws: Vec<Draw> = Vec::new();
+        for item in solid.iter().chain(&seen_through) {
+            draws.push(draw_of(item, to_clip));
+        }
+        for (poses, color) in &pieces {
+            draws.extend(poses.iter().map(|pose| arrow_draw(pose, *color, to_clip)));
+        }
+        self.upload(&draws);
+
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("viewport"),
+        });
+        {
+            let Some(targets) = &self.targets else { return };
+            let mut pass = begin(&mut encoder, targets);
+            pass.set_bind_group(0, &self.globals_group, &[]);
+            pass.set_bind_group(1, &self.draws_group, &[0]);
+            pass.set_pipeline(&self.pipelines.sky);
+            pass.draw(0..3, 0..1);
+            let mut at = 0u32;
+            for item in &solid {
+                let shape = &self.shapes[item.shape];
+                self.select(&mut pass, at);
+                solid_of(&mut pass, &self.pipelines.solid, shape);
+                lines_of(&mut pass, &self.pipelines.lines, shape, item);
+                at += 1;
+            }
+            for item in &seen_through {
+                let shape = &self.shapes[item.shape];
+                self.select(&mut pass, at);
+                solid_of(&mut pass, &self.pipelines.ghost, shape);
+                lines_of(&mut pass, &self.pipelines.lines, shape, item);
+                at += 1;
+            }
+            for _ in &pieces {
+                for piece in &self.arrow {
+                    self.select(&mut pass, at);
+                    solid_of(&mut pass, &self.pipelines.arrow, piece);
+                    at += 1;
+                }
+            }
+        }
+        self.queue.submit([encoder.finish()]);
+    }
+
+    fn select(&self, pass: &mut wgpu::RenderPass<'_>, index: u32) {
+        pass.set_bind_group(1, &self.draws_group, &[index * DRAW_STRIDE as u32]);
+    }
+
+    fn upload(&mut self, draws: &[Draw]) {
+        let needed = draws.len().max(1) as u64;
+        if needed * DRAW_STRIDE > self.draws.size() {
+            (self.draws, self.draws_group) =
+                draw_buffer(&self.device, &self.pipelines, needed.next_power_of_two());
+        }
+        let mut bytes = vec![0u8; draws.len() * DRAW_STRIDE as usize];
+        for (room, draw) in bytes.chunks_exact_mut(DRAW_STRIDE as usize).zip(draws) {
+            room[..size_of::<Draw>()].copy_from_slice(bytemuck::bytes_of(draw));
+        }
+        self.queue.write_buffer(&self.draws, 0, &bytes);
+    }
+}
+
+fn globals(picture: &Picture, size: [u32; 2]) -> Globals {
+    let camera = &picture.camera;
+    let (right, up, viewer) = (camera.right(), camera.up(), camera.backward());
+    let (near, far) = camera.depth_range(picture.extent);
+    let lift = LINE_LIFT * near * far / (near - far);
+    let direction = |v: DVec3| v.normalize().as_vec3().extend(0.0).to_array();
+    Globals {
+        key: direction(viewer + 0.55 * up - 0.45 * right),
+        fill: direction(0.4 * viewer - 0.2 * up + right),
+        viewer: direction(viewer),
+        screen: [
+            size[0] as f32,
+            size[1] as f32,
+            picture.line_width,
+            lift as f32,
+        ],
+        top: SKY[0],
+        bottom: SKY[1],
+    }
+}
+
+fn matrix(m: DMat4) -> [f32; 16] {
+    m.as_mat4().to_cols_array()
+}
+
+fn draw_of(item: &Item, to_clip: DMat4) -> Draw {
+    let mut lit = [u32::MAX; MAX_LIT];
+    for (room, face) in lit.iter_mut().zip(&item.lit) {
+        *room = *face;
+    }
+    let world = DMat4::from(item.pose);
+    let [r, g, b] = item.color;
+    Draw {
+        to_clip: matrix(to_clip * world),
+        to_world: matrix(world),
+        color: [r, g, b, item.opacity],
+        tint: item.tint,
+        line: item.line,
+        lit,
+    }
+}
+
+fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
+    let world = DMat4::from(*pose);
+    Draw {
+        to_clip: matrix(to_clip * world),
+        to_world: matrix(world),
+        color,
+        tint: [0.0; 4],
+        line: [0.0; 4],
+        lit: [u32::MAX; MAX_LIT],
+    }
+}
+
+fn load(device: &wgpu::Device, mesh: &ShapeMesh) -> Loaded {
+    let buffer = |label, contents: &[u8], usage| {
+        // A buffer must not be empty; its count says that nothing of it is drawn.
+        let contents: &[u8] = if contents.is_empty() { &[0; 32] } else { contents };
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents,
+            usage,
+        })
+    };
+    Loaded {
+        vertices: buffer(
+            "vertices",
+            bytemuck::cast_slice(&mesh.vertices),
+            wgpu::BufferUsages::VERTEX,
+        ),
+        indices: buffer(
+            "indices",
+            bytemuck::cast_slice(&mesh.indices),
+            wgpu::BufferUsages::INDEX,
+        ),
+        index_count: mesh.indices.len() as u32,
+        segments: buffer(
+            "segments",
+            bytemuck::cast_slice(&mesh.segments),
+            wgpu::BufferUsages::VERTEX,
+        ),
+        segment_count: mesh.segments.len() as u32,
+    }
+}
+
+fn draw_buffer(device: &wgpu::Device, pipelines: &Pipelines, count: u64) -> (wgpu::Buffer, wgpu::BindGroup) {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("draws"),
+        size: count * DRAW_STRIDE,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let group = pipelines.draws_group(device, &buffer, size_of::<Draw>() as u64);
+    (buffer, group)
+}
+
+fn targets(device: &wgpu::Device, size: [u32; 2]) -> Targets {
+    let texture = |label, format, samples, usage| {
+        device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: samples,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+    };
+    let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
+    let view = |t: &wgpu::Texture| t.create_view(&wgpu::TextureViewDescriptor::default());
+    let picture = texture(
+        "picture",
+        COLOR,
+        1,
+        attachment | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+    );
+    Targets {
+        size,
+        samples: view(&texture("samples", COLOR, SAMPLES, attachment)),
+        depth: view(&texture("depth", DEPTH, SAMPLES, attachment)),
+        view: view(&picture),
+        picture,
+    }
+}
+
+fn begin<'e>(encoder: &'e mut wgpu::CommandEncoder, targets: &Targets) -> wgpu::RenderPass<'e> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("viewport"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: &targets.samples,
+            depth_slice: None,
+            resolve_target: Some(&targets.view),
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store: wgpu::StoreOp::Discard,
+            },
+        })],
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: &targets.depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(1.0),
+                store: wgpu::StoreOp::Discard,
+            }),
+            stencil_ops: None,
+        }),
+        ..Default::default()
+    })
+}
+
+fn solid_of(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, shape: &Loaded) {
+    if shape.index_count > 0 {
+        pass.set_pipeline(pipeline);
+        pass.set_vertex_buffer(0, shape.vertices.slice(..));
+        pass.set_index_buffer(shape.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..shape.index_count, 0, 0..1);
+    }
+}
+
+fn lines_of(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, shape: &Loaded, item: &Item) {
+    if shape.segment_count > 0 && item.line[3] > 0.0 {
+        pass.set_pipeline(pipeline);
+        pass.set_vertex_buffer(0, shape.segments.slice(..));
+        pass.draw(0..6, 0..shape.segment_count);
+    }
+}

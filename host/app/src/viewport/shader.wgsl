@@ -1,0 +1,159 @@
+// Parts, edges, ghosts and arrows. Colours come in as sRGB, are lit in linear light and go out as sRGB,
+// because the window blends and shows textures as they are.
+
+struct Globals {
+    // Directions in world space, towards the light or the viewer; w unused.
+    key: vec4<f32>,
+    fill: vec4<f32>,
+    viewer: vec4<f32>,
+    // Picture in pixels (x, y), line width in pixels (z), depth shift of lines (w), see `lines_vertex`.
+    screen: vec4<f32>,
+    top: vec4<f32>,
+    bottom: vec4<f32>,
+}
+
+struct Draw {
+    to_clip: mat4x4<f32>,
+    to_world: mat4x4<f32>,
+    // Part's colour, sRGB, and opacity.
+    color: vec4<f32>,
+    // Mixed in: sRGB, and how much.
+    tint: vec4<f32>,
+    // Of lines: sRGB, and opacity.
+    line: vec4<f32>,
+    // Faces lit up: up to 8 ids, unused ones 0xffffffff.
+    lit_a: vec4<u32>,
+    lit_b: vec4<u32>,
+}
+
+@group(0) @binding(0) var<uniform> globals: Globals;
+@group(1) @binding(0) var<uniform> draw: Draw;
+
+const LIT: vec3<f32> = vec3<f32>(1.0, 0.36, 0.24);
+
+fn linear(s: vec3<f32>) -> vec3<f32> {
+    return select(pow((s + 0.055) / 1.055, vec3<f32>(2.4)), s / 12.92, s <= vec3<f32>(0.04045));
+}
+
+fn encoded(l: vec3<f32>) -> vec3<f32> {
+    let c = clamp(l, vec3<f32>(0.0), vec3<f32>(1.0));
+    return select(1.055 * pow(c, vec3<f32>(1.0 / 2.4)) - 0.055, 12.92 * c, c <= vec3<f32>(0.0031308));
+}
+
+// Background ---------------------------------------------------------------------------------------------------
+
+struct Sky {
+    @builtin(position) position: vec4<f32>,
+    @location(0) height: f32,
+}
+
+@vertex
+fn sky_vertex(@builtin(vertex_index) i: u32) -> Sky {
+    // One triangle that covers the picture.
+    let p = vec2<f32>(f32(i32(i & 1u) * 4 - 1), f32(i32(i >> 1u) * 4 - 1));
+    return Sky(vec4<f32>(p, 1.0, 1.0), 0.5 * (p.y + 1.0));
+}
+
+@fragment
+fn sky_fragment(in: Sky) -> @location(0) vec4<f32> {
+    return vec4<f32>(mix(globals.bottom.rgb, globals.top.rgb, in.height), 1.0);
+}
+
+// Solids -------------------------------------------------------------------------------------------------------
+
+struct Solid {
+    @builtin(position) position: vec4<f32>,
+    @location(0) normal: vec3<f32>,
+    @location(1) color: vec4<f32>,
+    @location(2) @interpolate(flat) face: u32,
+}
+
+@vertex
+fn solid_vertex(
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) color: vec4<f32>,
+    @location(3) face: u32,
+) -> Solid {
+    var out: Solid;
+    out.position = draw.to_clip * vec4<f32>(position, 1.0);
+    out.normal = (draw.to_world * vec4<f32>(normal, 0.0)).xyz;
+    out.color = color;
+    out.face = face;
+    return out;
+}
+
+@fragment
+fn solid_fragment(in: Solid) -> @location(0) vec4<f32> {
+    var n = normalize(in.normal);
+    // Shells may be open: the back of a face is lit like its front.
+    if dot(n, globals.viewer.xyz) < 0.0 {
+        n = -n;
+    }
+    var base = linear(mix(draw.color.rgb, in.color.rgb, in.color.a));
+    base = mix(base, linear(draw.tint.rgb), draw.tint.a);
+    var alpha = draw.color.a;
+    let lit = any(draw.lit_a == vec4<u32>(in.face)) || any(draw.lit_b == vec4<u32>(in.face));
+    if lit {
+        base = mix(base, linear(LIT), 0.8);
+        alpha = max(alpha, 0.75);
+    }
+    let key = max(dot(n, globals.key.xyz), 0.0);
+    let fill = max(dot(n, globals.fill.xyz), 0.0);
+    let sky = 0.5 + 0.5 * n.z;
+    var light = base * (0.20 + 0.10 * sky + 0.72 * key + 0.16 * fill);
+    let half_way = normalize(globals.key.xyz + globals.viewer.xyz);
+    light += vec3<f32>(0.10) * pow(max(dot(n, half_way), 0.0), 40.0);
+    if lit {
+        light += 0.25 * linear(LIT);
+    }
+    return vec4<f32>(encoded(light), alpha);
+}
+
+// Arrows: no scene light, so that they read the same from everywhere.
+@fragment
+fn arrow_fragment(in: Solid) -> @location(0) vec4<f32> {
+    let n = normalize(in.normal);
+    let light = 0.62 + 0.38 * max(dot(n, globals.viewer.xyz), 0.0);
+    return vec4<f32>(encoded(linear(draw.color.rgb) * light), draw.color.a);
+}
+
+// Edges --------------------------------------------------------------------------------------------------------
+
+@vertex
+fn lines_vertex(
+    @builtin(vertex_index) i: u32,
+    @location(0) a: vec3<f32>,
+    @location(1) b: vec3<f32>,
+) -> @builtin(position) vec4<f32> {
+    var p = draw.to_clip * vec4<f32>(a, 1.0);
+    var q = draw.to_clip * vec4<f32>(b, 1.0);
+    // An end behind the eye is brought forward along the line.
+    let nearest = 1e-4 * max(abs(p.w), abs(q.w));
+    if p.w < nearest && q.w > nearest {
+        p = mix(p, q, (nearest - p.w) / (q.w - p.w));
+    } else if q.w < nearest && p.w > nearest {
+        q = mix(q, p, (nearest - q.w) / (p.w - q.w));
+    }
+    // Half the width to each side, in pixels across the line.
+    var across = vec2<f32>(0.0, 1.0);
+    let along = (q.xy / q.w - p.xy / p.w) * globals.screen.xy;
+    if dot(along, along) > 1e-12 {
+        across = normalize(vec2<f32>(-along.y, along.x));
+    }
+    let far_end = i == 1u || i == 2u || i == 4u;
+    let side = select(-1.0, 1.0, i == 2u || i == 4u || i == 5u);
+    var end = p;
+    if far_end {
+        end = q;
+    }
+    let shift = side * across * globals.screen.z / globals.screen.xy;
+    // Depth is A + B/w. Brought a fraction e nearer to the eye a point has depth A + B/(w(1 - e)), about e·B/w less;
+    // screen.w holds e·B, which is negative.
+    return vec4<f32>(end.xy + shift * end.w, end.z + globals.screen.w, end.w);
+}
+
+@fragment
+fn lines_fragment() -> @location(0) vec4<f32> {
+    return draw.line;
+}

@@ -1,0 +1,204 @@
+//! The whole way through the window without a display: open, choose a rig, connect, arm, grab, play, STOP.
+//! Controls are found by what a screen reader would find.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use mortise::session::notes::Severity;
+use mortise::session::{Intent, Session, obstacle};
+use mortise::ui::{Window, theme};
+use mortise_protocol::message::DeviceState;
+use mortise_protocol::parameter::ParameterId;
+
+/// A bound for what should take seconds: only a hang reaches it.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+fn harness() -> Harness<'static, Window> {
+    Harness::builder()
+        .with_size(egui::vec2(1500.0, 940.0))
+        .with_max_steps(1)
+        .with_context_setup(theme::apply)
+        .build_ui_state(
+            |ui, window: &mut Window| window.show(ui, None),
+            Window::new(Session::new(Arc::new(|| {}))),
+        )
+}
+
+/// Draws pictures until `done`.
+fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Session) -> bool) {
+    let begun = Instant::now();
+    loop {
+        harness.step();
+        if done(&harness.state().session) {
+            return;
+        }
+        if begun.elapsed() > PATIENCE {
+            let notes: Vec<_> = harness.state().session.notes.iter().map(|n| n.text.clone()).collect();
+            panic!("never: {what}; messages: {notes:#?}");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn click(harness: &mut Harness<'_, Window>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.step();
+    harness.step();
+}
+
+fn open_sample(harness: &mut Harness<'_, Window>) {
+    harness.step();
+    click(harness, "Open the sample");
+    until(harness, "the sample is baked", |s| {
+        s.document.as_ref().is_some_and(|d| d.baked.is_some())
+    });
+}
+
+fn connect(harness: &mut Harness<'_, Window>) {
+    until(harness, "rigs are listed", |s| !s.rigs.is_empty());
+    click(harness, "Connect");
+    until(harness, "the scene is on the board", Session::scene_is_on_board);
+}
+
+fn worst(session: &Session) -> Severity {
+    session
+        .notes
+        .iter()
+        .map(|n| n.severity)
+        .max()
+        .unwrap_or(Severity::Info)
+}
+
+#[test]
+fn from_an_empty_window_to_a_felt_insertion_and_stop() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let names: Vec<_> = {
+        let document = harness.state().session.document.as_ref().expect("open");
+        document.model.parts.iter().map(|p| p.name.clone()).collect()
+    };
+    assert_eq!(names, ["block", "peg"]);
+
+    connect(&mut harness);
+    assert_eq!(harness.state().session.device(), Some(DeviceState::Idle));
+    click(&mut harness, "Arm");
+    until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+
+    click(&mut harness, "peg");
+    click(&mut harness, "Grab");
+    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+
+    click(&mut harness, "▶  Play insertion");
+    // 60 mm of way; the peg's lower end is 20 mm above the hole.
+    until(&mut harness, "the peg is in to the full depth", |s| {
+        s.document
+            .as_ref()
+            .is_some_and(|d| d.poses[1].translation.z < 20.0 + 0.1)
+    });
+    let session = &harness.state().session;
+    assert!(
+        session.history.iter().len() > 10 && session.history.largest(|s| s.handle_n) > 0.0,
+        "the plots have something to show"
+    );
+    assert_eq!(session.telemetry.as_ref().expect("telemetry").missed, 0);
+    assert!(worst(session) < Severity::Warning, "nothing to complain about");
+
+    click(&mut harness, "STOP");
+    until(&mut harness, "stopped", |s| s.device() == Some(DeviceState::Stopped));
+    assert_eq!(harness.state().session.grabbed(), None);
+    click(&mut harness, "Clear stop");
+    until(&mut harness, "idle again", |s| s.device() == Some(DeviceState::Idle));
+}
+
+#[test]
+fn space_and_escape_stop() {
+    for key in [egui::Key::Space, egui::Key::Escape] {
+        let mut harness = harness();
+        open_sample(&mut harness);
+        connect(&mut harness);
+        click(&mut harness, "Arm");
+        until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+        harness.key_press(key);
+        until(&mut harness, "stopped", |s| s.device() == Some(DeviceState::Stopped));
+    }
+}
+
+#[test]
+fn stop_is_there_before_anything_else_and_does_no_harm() {
+    let mut harness = harness();
+    harness.step();
+    click(&mut harness, "STOP");
+    let session = &harness.state().session;
+    assert!(session.connection().is_none());
+    assert_eq!(session.notes.newest().map(|n| n.severity), Some(Severity::Info));
+}
+
+#[test]
+fn what_is_not_possible_says_why() {
+    let session = Session::new(Arc::new(|| {}));
+    for intent in [
+        Intent::Arm,
+        Intent::Disarm,
+        Intent::Upload,
+        Intent::Grab(0),
+        Intent::Release,
+        Intent::ResetScene,
+        Intent::ClearFault,
+        Intent::Disconnect,
+        Intent::PlayInsertion,
+        Intent::Bake,
+        Intent::SetParameter(ParameterId::ForceLimit, 1.0),
+    ] {
+        let reason = obstacle(&session, &intent);
+        assert!(reason.is_some_and(|r| r.len() > 5), "{intent:?}");
+    }
+    assert_eq!(obstacle(&session, &Intent::Stop), None);
+    assert_eq!(obstacle(&session, &Intent::OpenSample), None);
+}
+
+#[test]
+fn a_file_that_is_none_is_refused_in_one_line_and_the_old_one_stays() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("notes.step");
+    std::fs::write(&path, "shopping list").expect("written");
+    harness.state_mut().session.act(Intent::Open(path));
+    until(&mut harness, "the file is refused", |s| {
+        !s.is_busy() && s.notes.newest().is_some_and(|n| n.severity == Severity::Error)
+    });
+    let session = &harness.state().session;
+    let text = &session.notes.newest().expect("one").text;
+    assert!(!text.contains('\n') && text.contains("notes.step"), "{text}");
+    assert!(session.document.as_ref().is_some_and(|d| d.baked.is_some()));
+}
+
+#[test]
+fn parameters_reach_the_board_and_stay_in_range() {
+    let mut harness = harness();
+    connect_only(&mut harness);
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::SetParameter(ParameterId::ForceLimit, 1e9));
+    session.act(Intent::SetParameter(ParameterId::ForceLimit, 3.0));
+    session.act(Intent::SetParameter(ParameterId::ForceLimit, 4.0));
+    session.act(Intent::SetParameter(ParameterId::ObjectMass, f32::NAN));
+    let row = ParameterId::ObjectMass.row();
+    assert_eq!(session.parameters[ParameterId::ObjectMass as usize], row.default);
+    // Connecting anew reads back what the board has.
+    for _ in 0..200 {
+        harness.step();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let session = &harness.state().session;
+    assert_eq!(session.parameters[ParameterId::ForceLimit as usize], 4.0);
+    assert!(worst(session) < Severity::Warning, "no value was refused");
+}
+
+fn connect_only(harness: &mut Harness<'_, Window>) {
+    harness.step();
+    until(harness, "rigs are listed", |s| !s.rigs.is_empty());
+    click(harness, "Connect");
+    until(harness, "connected", |s| s.connection().is_some());
+}

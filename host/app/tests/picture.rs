@@ -1,0 +1,197 @@
+//! The 3D view's renderer on whatever graphics device there is, a software one included, without a window.
+
+use std::sync::Arc;
+
+use eframe::wgpu;
+use glam::DVec3;
+use mortise::session::document::Document;
+use mortise::viewport::camera::{Camera, View};
+use mortise::viewport::picture::{Arrow, Item, Picture};
+use mortise::viewport::renderer::Renderer;
+
+const SIZE: [u32; 2] = [320, 240];
+
+/// A device, or `None` with a message; in CI that is a failure.
+fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let opened = pollster::block_on(async {
+        let adapter = instance
+            .request_adapter(&wgpu::RequestAdapterOptions::default())
+            .await
+            .ok()?;
+        adapter.request_device(&wgpu::DeviceDescriptor::default()).await.ok()
+    });
+    if opened.is_none() {
+        assert!(
+            std::env::var_os("CI").is_none(),
+            "no graphics device, not even a software one: install mesa-vulkan-drivers"
+        );
+        eprintln!("skipped: no graphics device, not even a software one (mesa-vulkan-drivers)");
+    }
+    opened
+}
+
+/// Red, green, blue, alpha of each pixel, rows from the top.
+fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture) -> Vec<[u8; 4]> {
+    let row = 4 * SIZE[0];
+    assert!(row.is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(row * SIZE[1]),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        wgpu::TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(row),
+                rows_per_image: None,
+            },
+        },
+        texture.size(),
+    );
+    queue.submit([encoder.finish()]);
+    let slice = buffer.slice(..);
+    slice.map_async(wgpu::MapMode::Read, |mapped| mapped.expect("mapped"));
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("done");
+    let bytes = slice.get_mapped_range().expect("mapped").to_vec();
+    bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect()
+}
+
+fn picture(document: &Document, camera: Camera) -> Picture {
+    let items = (document.model.parts.iter().zip(&document.poses).enumerate())
+        .map(|(index, (part, pose))| Item {
+            shape: part.shape,
+            pose: *pose,
+            color: if index == 0 { [0.2, 0.4, 0.9] } else { [0.9, 0.8, 0.1] },
+            opacity: 1.0,
+            tint: [0.0; 4],
+            line: [0.0, 0.0, 0.0, 1.0],
+            lit: Vec::new(),
+        })
+        .collect();
+    Picture {
+        camera,
+        extent: document.extent,
+        items,
+        arrows: Vec::new(),
+        line_width: 1.5,
+    }
+}
+
+fn pixel(pixels: &[[u8; 4]], x: u32, y: u32) -> [i32; 3] {
+    let [r, g, b, _] = pixels[(y * SIZE[0] + x) as usize];
+    [r, g, b].map(i32::from)
+}
+
+#[test]
+fn parts_are_where_the_camera_looks_in_their_colours() {
+    let Some((device, queue)) = device() else { return };
+    let document = Document::sample(1).expect("the sample opens");
+    let mut renderer = Renderer::new(&device, &queue);
+    renderer.set_shapes(&document.meshes);
+    assert!(renderer.resize(SIZE));
+    assert!(!renderer.resize(SIZE), "the same size keeps its texture");
+    let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
+    let mut camera = Camera::default();
+    camera.look(View::Front);
+    camera.fit(document.extent, aspect);
+    let at = |point: DVec3| {
+        let ndc = camera.project(point, aspect).expect("in front");
+        let x = 0.5 * (ndc.x + 1.0) * f64::from(SIZE[0]);
+        let y = 0.5 * (1.0 - ndc.y) * f64::from(SIZE[1]);
+        (x as u32, y as u32)
+    };
+
+    renderer.render(&picture(&document, camera));
+    let (texture, _) = renderer.texture().expect("resized");
+    let pixels = read(&device, &queue, texture);
+    // Block below z = 0, peg above it: their fronts have their own hue, the corner has neither.
+    let (x, y) = at(DVec3::new(0.0, -25.0, -20.0));
+    let [r, _, b] = pixel(&pixels, x, y);
+    assert!(b > r + 60, "the block is blue: {r} {b}");
+    let (x, y) = at(DVec3::new(0.0, -8.875, 50.0));
+    let [r, g, b] = pixel(&pixels, x, y);
+    assert!(r > b + 60 && g > b + 60, "the peg is yellow: {r} {g} {b}");
+    let [r, g, b] = pixel(&pixels, 2, 2);
+    assert!(r.max(g).max(b) < 60, "the corner is background: {r} {g} {b}");
+    assert!(pixels.iter().all(|p| p[3] == 255), "the picture is opaque");
+
+    // A face lit up is red, a ghost lets the part behind it through, an arrow lies over everything.
+    let mut told = picture(&document, camera);
+    let front = face_at(&document, DVec3::new(0.0, -25.0, -20.0));
+    told.items[0].lit = vec![front];
+    told.items[1].opacity = 0.3;
+    told.arrows.push(Arrow {
+        tail: DVec3::new(-20.0, 0.0, 60.0),
+        vector: DVec3::new(0.0, 0.0, 30.0),
+        thickness: 4.0,
+        color: [0.0, 1.0, 0.0, 1.0],
+    });
+    renderer.render(&told);
+    let (texture, _) = renderer.texture().expect("resized");
+    let pixels = read(&device, &queue, texture);
+    let (x, y) = at(DVec3::new(0.0, -25.0, -20.0));
+    let [r, _, b] = pixel(&pixels, x, y);
+    assert!(r > b + 60, "the lit face is red: {r} {b}");
+    let (x, y) = at(DVec3::new(-20.0, 0.0, 68.0));
+    let [r, g, _] = pixel(&pixels, x, y);
+    assert!(g > r + 60, "the arrow is green: {r} {g}");
+}
+
+/// Face of the block under a point of its surface.
+fn face_at(document: &Document, point: DVec3) -> u32 {
+    let hit = mortise::viewport::pick::pick(
+        &document.model,
+        &document.extents,
+        &document.poses,
+        point - 100.0 * DVec3::Y,
+        DVec3::Y,
+    );
+    hit.expect("on the block").face
+}
+
+#[test]
+fn nothing_to_draw_is_no_trouble() {
+    let Some((device, queue)) = device() else { return };
+    let mut renderer = Renderer::new(&device, &queue);
+    renderer.render(&Picture {
+        camera: Camera::default(),
+        extent: Default::default(),
+        items: vec![],
+        arrows: vec![],
+        line_width: 1.0,
+    });
+    renderer.set_shapes(&Arc::new(vec![Default::default()]));
+    renderer.resize([0, 0]);
+    renderer.render(&Picture {
+        camera: Camera::default(),
+        extent: Default::default(),
+        items: vec![
+            Item {
+                shape: 0,
+                pose: glam::DAffine3::IDENTITY,
+                color: [1.0; 3],
+                opacity: 1.0,
+                tint: [0.0; 4],
+                line: [1.0; 4],
+                lit: vec![],
+            },
+            Item {
+                shape: 7,
+                pose: glam::DAffine3::IDENTITY,
+                color: [1.0; 3],
+                opacity: 1.0,
+                tint: [0.0; 4],
+                line: [1.0; 4],
+                lit: vec![],
+            },
+        ],
+        arrows: vec![],
+        line_width: 1.0,
+    });
+}
