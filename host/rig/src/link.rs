@@ -104,7 +104,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// A reader thread and whatever the transport keeps alive.
 pub(crate) struct Reader {
     thread: Option<JoinHandle<()>>,
-    _keep: Option<Box<dyn Send>>,
+    _keep: Option<Box<dyn Send + Sync>>,
 }
 
 impl Reader {

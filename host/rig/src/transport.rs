@@ -19,7 +19,7 @@ pub struct Transport {
     /// Bytes to the board.
     pub writer: Box<dyn Write + Send>,
     /// Dropped after reader and writer.
-    pub keep: Option<Box<dyn Send>>,
+    pub keep: Option<Box<dyn Send + Sync>>,
 }
 
 /// Nothing came this time; the stream is sound.
