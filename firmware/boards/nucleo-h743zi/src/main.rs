@@ -191,7 +191,12 @@ mod app {
         } else {
             cx.local.control.tick();
         }
-        cx.local.watchdog.pet();
+        // Live outputs in a state without motors: cut them, and let the watchdog start anew.
+        if motors::outputs_on() && !cx.local.control.safety().live() {
+            motors::cut();
+        } else {
+            cx.local.watchdog.pet();
+        }
         tick_timer::finish();
         TICK_RAN.store(true, Ordering::Release);
     }

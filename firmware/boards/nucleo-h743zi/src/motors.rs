@@ -87,6 +87,11 @@ pub fn release() {
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
 }
 
+/// PWM and enable line are live.
+pub fn outputs_on() -> bool {
+    pac::TIM1.bdtr().read().moe()
+}
+
 /// Lets the opening stop contact also raise the EXTI15_10 interrupt. The line watches the pin beside the timer that owns it.
 pub fn listen_to_stop() {
     /// SYSCFG_EXTICR: port E.
@@ -187,7 +192,7 @@ impl Motors {
         if broke {
             clear_breaks();
         }
-        let cut = self.live && !pac::TIM1.bdtr().read().moe();
+        let cut = self.live && !outputs_on();
         stop_is_open() || broke || cut
     }
 
