@@ -19,7 +19,10 @@ fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
             .request_adapter(&wgpu::RequestAdapterOptions::default())
             .await
             .ok()?;
-        adapter.request_device(&wgpu::DeviceDescriptor::default()).await.ok()
+        adapter
+            .request_device(&wgpu::DeviceDescriptor::default())
+            .await
+            .ok()
     });
     if opened.is_none() {
         assert!(
@@ -67,7 +70,11 @@ fn picture(document: &Document, camera: Camera) -> Picture {
         .map(|(index, (part, pose))| Item {
             shape: part.shape,
             pose: *pose,
-            color: if index == 0 { [0.2, 0.4, 0.9] } else { [0.9, 0.8, 0.1] },
+            color: if index == 0 {
+                [0.2, 0.4, 0.9]
+            } else {
+                [0.9, 0.8, 0.1]
+            },
             opacity: 1.0,
             tint: [0.0; 4],
             line: [0.0, 0.0, 0.0, 1.0],

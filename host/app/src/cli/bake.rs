@@ -83,7 +83,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     ))?;
     for shape in &report.shapes {
         output::line(&format!(
-            "  {}: cells of {} mm, {} bricks, {} points, {} bytes",
+            "  {}: cells of {:.3} mm, {} bricks, {} points, {} bytes",
             shape.name,
             shape.cell_mm,
             shape.bricks,

@@ -45,7 +45,6 @@ enum Command {
     Open(Open),
 }
 
-
 /// What the window starts with.
 #[derive(Debug, Args)]
 struct Open {
@@ -115,5 +114,6 @@ fn window(open: Open) -> anyhow::Result<ExitCode> {
 
 /// Reads a rig from the command line.
 fn rig(text: &str) -> Result<RigSpec, String> {
-    text.parse().map_err(|error: mortise_rig::SpecError| error.to_string())
+    text.parse()
+        .map_err(|error: mortise_rig::SpecError| error.to_string())
 }

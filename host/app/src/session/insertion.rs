@@ -133,7 +133,10 @@ fn walls(model: &CadModel, poses: &[DAffine3]) -> Vec<Wall> {
             for (corners, _) in (shape.mesh.triangles.iter().zip(&shape.mesh.triangle_face))
                 .filter(|&(_, &f)| f as usize == id)
             {
-                for point in corners.iter().filter_map(|&c| shape.mesh.vertices.get(c as usize)) {
+                for point in corners
+                    .iter()
+                    .filter_map(|&c| shape.mesh.vertices.get(c as usize))
+                {
                     ends = (ends.0.min(along(*point)), ends.1.max(along(*point)));
                 }
             }

@@ -65,7 +65,11 @@ impl Intent {
     pub fn is_passive(&self) -> bool {
         matches!(
             self,
-            Self::Select(_) | Self::RefreshRigs | Self::SetParameter(..) | Self::ResetParameters | Self::Demo(_)
+            Self::Select(_)
+                | Self::RefreshRigs
+                | Self::SetParameter(..)
+                | Self::ResetParameters
+                | Self::Demo(_)
         )
     }
 }
@@ -82,9 +86,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Browse | Intent::Open(_) | Intent::OpenSample => {
             armed.then(|| "The rig is armed: disarm it before another file is opened".to_owned())
         }
-        Intent::Demo(_) => {
-            armed.then(|| "The rig is armed: disarm it first".to_owned())
-        }
+        Intent::Demo(_) => armed.then(|| "The rig is armed: disarm it first".to_owned()),
         Intent::Bake => match &session.document {
             None => no(NO_FILE),
             Some(_) if session.is_busy() => no("Work is under way"),

@@ -312,7 +312,11 @@ impl Connection {
             self.request(ToDevice::SetParameter { id, value });
             return;
         }
-        match self.parameters_next.iter_mut().find(|(waiting, _)| *waiting == id) {
+        match self
+            .parameters_next
+            .iter_mut()
+            .find(|(waiting, _)| *waiting == id)
+        {
             Some(waiting) => waiting.1 = value,
             None => self.parameters_next.push((id, value)),
         }
@@ -350,11 +354,7 @@ impl Link {
         let (client, commands, thread) = match self {
             Self::None => return,
             Self::Connecting { commands, thread, .. } => (None, commands, thread),
-            Self::Connected(connection) => (
-                Some(connection.client),
-                connection.commands,
-                connection.thread,
-            ),
+            Self::Connected(connection) => (Some(connection.client), connection.commands, connection.thread),
         };
         let end = move || {
             if let Some(client) = &client {

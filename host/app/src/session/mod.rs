@@ -191,7 +191,9 @@ impl Session {
     }
 
     fn bake(&mut self) {
-        let Some(document) = &mut self.document else { return };
+        let Some(document) = &mut self.document else {
+            return;
+        };
         document.baked = None;
         let (model, generation) = (Arc::clone(&document.model), document.generation);
         let mut limit = 1 << 20;
@@ -227,7 +229,8 @@ impl Session {
         link.close(false);
         self.forget_board();
         if let Some(name) = name {
-            self.notes.add(Severity::Info, format!("Disconnected from {name}"));
+            self.notes
+                .add(Severity::Info, format!("Disconnected from {name}"));
         }
     }
 

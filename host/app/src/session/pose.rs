@@ -34,8 +34,9 @@ pub fn point_from_wire(point: [f32; 3]) -> DVec3 {
 
 /// Turns about `pivot`, then moves by `shift`, both in the world.
 pub fn moved(pose: &DAffine3, pivot: DVec3, turn: DQuat, shift: DVec3) -> DAffine3 {
-    let about =
-        DAffine3::from_translation(pivot + shift) * DAffine3::from_quat(turn) * DAffine3::from_translation(-pivot);
+    let about = DAffine3::from_translation(pivot + shift)
+        * DAffine3::from_quat(turn)
+        * DAffine3::from_translation(-pivot);
     about * *pose
 }
 

@@ -70,9 +70,10 @@ pub fn advance(session: &mut Session) {
     while let Some(tour) = session.tour.clone() {
         if tour.is_stuck() {
             session.tour = None;
-            session
-                .notes
-                .add(Severity::Warning, "The demonstration ended: the board did not follow");
+            session.notes.add(
+                Severity::Warning,
+                "The demonstration ended: the board did not follow",
+            );
             return;
         }
         match session.device() {
@@ -118,9 +119,7 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
             session.connection()?;
             Some(Some(Tour::at(Step::Scene)))
         }
-        Step::Scene => {
-            session.scene_is_on_board().then(|| Some(Tour::at(Step::PutBack)))
-        }
+        Step::Scene => session.scene_is_on_board().then(|| Some(Tour::at(Step::PutBack))),
         Step::PutBack => {
             if session.is_armed() {
                 ask(session, ToDevice::Disarm);

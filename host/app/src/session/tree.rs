@@ -61,7 +61,13 @@ mod tests {
             color: None,
         };
         let model = CadModel {
-            parts: vec![part(&[]), part(&["a"]), part(&["a", "b"]), part(&["a"]), part(&["c"])],
+            parts: vec![
+                part(&[]),
+                part(&["a"]),
+                part(&["a", "b"]),
+                part(&["a"]),
+                part(&["c"]),
+            ],
             ..CadModel::default()
         };
         let group = |name: &str, children| Branch::Assembly {
@@ -74,7 +80,11 @@ mod tests {
                 Branch::Part(0),
                 group(
                     "a",
-                    vec![Branch::Part(1), group("b", vec![Branch::Part(2)]), Branch::Part(3)]
+                    vec![
+                        Branch::Part(1),
+                        group("b", vec![Branch::Part(2)]),
+                        Branch::Part(3)
+                    ]
                 ),
                 group("c", vec![Branch::Part(4)]),
             ]

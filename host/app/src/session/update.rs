@@ -70,7 +70,10 @@ pub fn take(session: &mut Session, update: Update) {
 }
 
 fn is_awaited(session: &Session, generation: u64) -> bool {
-    session.job.as_ref().is_some_and(|job| job.generation == generation)
+    session
+        .job
+        .as_ref()
+        .is_some_and(|job| job.generation == generation)
 }
 
 fn opened(session: &mut Session, document: Document) {
@@ -98,10 +101,14 @@ fn baked_of(session: &mut Session, baked: Arc<Baked>) {
     session.notes.add(
         Severity::Good,
         format!(
-            "Scene baked: {} KiB, {} shapes, cells of {} mm at the finest",
+            "Scene baked: {} KiB, {} shapes, cells of {:.3} mm at the finest",
             report.image_bytes.div_ceil(1024),
             report.shapes.len(),
-            report.shapes.iter().map(|s| s.cell_mm).fold(f64::INFINITY, f64::min),
+            report
+                .shapes
+                .iter()
+                .map(|s| s.cell_mm)
+                .fold(f64::INFINITY, f64::min),
         ),
     );
     for warning in &report.warnings {
@@ -171,7 +178,10 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
     if too_large && !session.is_busy() {
         session.notes.add(
             Severity::Info,
-            format!("The scene is larger than the {} KiB this board holds: baking it coarser", capacity / 1024),
+            format!(
+                "The scene is larger than the {} KiB this board holds: baking it coarser",
+                capacity / 1024
+            ),
         );
         session.bake();
     }
@@ -181,7 +191,9 @@ fn event(session: &mut Session, event: Event) {
     match event {
         Event::Telemetry(telemetry) => sample(session, telemetry),
         Event::State { state, .. } => {
-            let Some(connection) = session.connection_mut() else { return };
+            let Some(connection) = session.connection_mut() else {
+                return;
+            };
             if connection.state == state {
                 return;
             }
@@ -194,7 +206,9 @@ fn event(session: &mut Session, event: Event) {
                 DeviceState::Armed => Severity::Good,
                 _ => Severity::Info,
             };
-            session.notes.add(severity, format!("Board is {}", describe(state)));
+            session
+                .notes
+                .add(severity, format!("Board is {}", describe(state)));
         }
         Event::Fault { fault, .. } => session.notes.add(Severity::Error, describe(fault)),
         Event::Log(line) => session.notes.add(Severity::Info, format!("Board: {line}")),
@@ -211,7 +225,9 @@ fn event(session: &mut Session, event: Event) {
 }
 
 fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
-    let Some(connection) = session.connection_mut() else { return };
+    let Some(connection) = session.connection_mut() else {
+        return;
+    };
     let sample = Sample::of(&telemetry, connection.capabilities.tick_hz);
     session.history.add(sample);
     if let (Some((part, object)), Some(document)) = (&telemetry.object, &mut session.document)
@@ -251,7 +267,9 @@ fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String
 
 fn uploaded(session: &mut Session, generation: u64, result: Result<(), String>) {
     let current = session.document.as_ref().map(|d| d.generation);
-    let Some(connection) = session.connection_mut() else { return };
+    let Some(connection) = session.connection_mut() else {
+        return;
+    };
     connection.upload = None;
     match result {
         Ok(()) => {

@@ -108,7 +108,9 @@ impl eframe::App for App {
 
 impl App {
     fn take_screenshot(&mut self, ctx: &egui::Context) {
-        let Some(screenshot) = &self.screenshot else { return };
+        let Some(screenshot) = &self.screenshot else {
+            return;
+        };
         let left = screenshot.after.saturating_sub(self.began.elapsed());
         if !left.is_zero() {
             ctx.request_repaint_after(left);

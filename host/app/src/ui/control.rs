@@ -1,6 +1,9 @@
 //! Small building blocks: buttons that know what stands in their way, chips, section headings.
 
-use egui::{Align2, Button, Color32, CornerRadius, FontId, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, Role};
+use egui::{
+    Align2, Button, Color32, CornerRadius, FontId, Response, RichText, Role, Sense, Stroke, Ui, Vec2,
+    WidgetInfo,
+};
 
 use super::theme;
 use crate::session::{Intent, Session, obstacle};
@@ -74,13 +77,22 @@ pub fn divider(ui: &mut Ui) {
 }
 
 /// A name on the left and a value on the right.
-pub fn row(ui: &mut Ui, name: &str, value: impl Into<String>) {
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(name).color(theme::TEXT_WEAK));
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.add(egui::Label::new(value.into()).truncate());
+pub fn row(ui: &mut Ui, name: &str, value: impl Into<String>) -> Response {
+    rich_row(ui, name, RichText::new(value.into()))
+}
+
+/// The same with a value of its own colour.
+pub fn rich_row(ui: &mut Ui, name: &str, value: RichText) -> Response {
+    ui.scope(|ui| {
+        ui.spacing_mut().interact_size.y = 21.0;
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(name).color(theme::TEXT_WEAK));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.add(egui::Label::new(value).truncate());
+            });
         });
-    });
+    })
+    .response
 }
 
 /// The mark of the program: a tenon over its mortise.

@@ -27,7 +27,14 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 );
                 ui.add_space(10.0);
                 let open = egui::Button::new("Open…").min_size(Vec2::new(72.0, 32.0));
-                control::intent_button(ui, session, wanted, open, Intent::Browse, "Open a STEP file (Ctrl+O)");
+                control::intent_button(
+                    ui,
+                    session,
+                    wanted,
+                    open,
+                    Intent::Browse,
+                    "Open a STEP file (Ctrl+O)",
+                );
                 title(ui, session);
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     stop::button(ui, session, wanted);

@@ -22,7 +22,8 @@ pub fn show(ui: &mut Ui, session: &mut Session) {
         control::section(ui, "Messages");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             if session.notes.iter().len() > 0 {
-                let button = egui::Button::new(RichText::new("Clear").small()).frame(false);
+                let button =
+                    egui::Button::new(RichText::new("Clear").small().color(theme::TEXT_WEAK)).frame(false);
                 if ui.add(button).on_hover_text("Forget all messages").clicked() {
                     session.notes.clear();
                 }
@@ -43,7 +44,8 @@ pub fn show(ui: &mut Ui, session: &mut Session) {
 fn line(ui: &mut Ui, note: &Note) {
     ui.horizontal_top(|ui| {
         let (rect, _) = ui.allocate_exact_size(Vec2::new(8.0, 16.0), egui::Sense::hover());
-        ui.painter().circle_filled(rect.center(), 3.5, color(note.severity));
+        ui.painter()
+            .circle_filled(rect.center(), 3.5, color(note.severity));
         ui.vertical(|ui| {
             let ink = match note.severity {
                 Severity::Error => theme::FAULT_TEXT,

@@ -73,13 +73,11 @@ fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parame
         label.on_hover_text(&hover)
     });
     let wide = ui.available_width();
-    ui.spacing_mut().slider_width = (wide - 116.0).max(80.0);
+    ui.spacing_mut().slider_width = (wide - 122.0).max(80.0);
     ui.spacing_mut().interact_size = Vec2::new(104.0, 22.0);
-    // Ranges over more than two decades are walked by ratio.
-    let ratio = row.max / row.min.max(row.max * 1e-6);
     let slider = Slider::new(&mut value, row.min..=row.max)
-        .logarithmic(ratio > 150.0)
-        .smallest_positive(f64::from(row.max) * 1e-4)
+        // Ranges over more than two decades are walked by ratio.
+        .logarithmic(row.min > 0.0 && row.max / row.min > 150.0)
         .suffix(format!(" {}", row.unit))
         .custom_formatter(|value, _| short(value as f32));
     let response = ui

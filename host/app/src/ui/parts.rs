@@ -1,7 +1,7 @@
 //! The list of parts on the left: the assembly as a tree; a click marks a part, a double click takes it in hand.
 
-use egui::{Color32, CornerRadius, Id, RichText, ScrollArea, Sense, Ui, Vec2, WidgetInfo, Role};
 use egui::collapsing_header::CollapsingState;
+use egui::{Color32, CornerRadius, Id, RichText, Role, ScrollArea, Sense, Ui, Vec2, WidgetInfo};
 use mortise_brep::Surface;
 
 use super::{control, theme};
@@ -16,6 +16,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         .size_range(180.0..=420.0)
         .frame(theme::panel())
         .show(ui, |ui| {
+            ui.take_available_width();
             control::section(ui, "Parts");
             ui.add_space(4.0);
             let Some(document) = &session.document else {
@@ -54,9 +55,7 @@ fn branches(
                 let id = id.with((index, name));
                 CollapsingState::load_with_default_open(ui.ctx(), id, true)
                     .show_header(ui, |ui| {
-                        ui.add(
-                            egui::Label::new(RichText::new(name).color(theme::TEXT_WEAK)).truncate(),
-                        );
+                        ui.add(egui::Label::new(RichText::new(name).color(theme::TEXT_WEAK)).truncate());
                     })
                     .body(|ui| self::branches(ui, session, document, wanted, children, id));
             }
@@ -114,17 +113,14 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     }
     response.on_hover_ui(|ui| {
         ui.label(name);
-        let hint = obstacle(session, &Intent::Grab(part)).unwrap_or_else(|| "Double click to take it in hand".into());
+        let hint = obstacle(session, &Intent::Grab(part))
+            .unwrap_or_else(|| "Double click to take it in hand".into());
         ui.label(RichText::new(hint).small().color(theme::TEXT_WEAK));
     });
 }
 
 fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
-    let Some(shape) = document
-        .model
-        .shapes
-        .get(document.model.parts[part].shape)
-    else {
+    let Some(shape) = document.model.shapes.get(document.model.parts[part].shape) else {
         return;
     };
     ui.spacing_mut().item_spacing.y = 3.0;
@@ -145,7 +141,11 @@ fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
     };
     control::row(ui, "Shell", closed);
     ui.add_space(4.0);
-    let wide = Vec2::new(ui.available_width(), 30.0);
+    ui.vertical_centered_justified(|ui| grab(ui, session, wanted, part));
+}
+
+fn grab(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, part: usize) {
+    let wide = Vec2::new(0.0, 30.0);
     if session.grabbed() == Some(part) {
         let button = egui::Button::new("Let go").min_size(wide);
         control::intent_button(
@@ -175,7 +175,7 @@ fn grouped(value: f64) -> String {
     let mut text = String::new();
     for (i, c) in digits.chars().enumerate() {
         if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push('\u{202f}');
+            text.push('\u{a0}');
         }
         text.push(c);
     }
@@ -186,8 +186,8 @@ fn grouped(value: f64) -> String {
 mod tests {
     #[test]
     fn thousands_are_set_apart() {
-        assert_eq!(super::grouped(88_955.4), "88\u{202f}955");
+        assert_eq!(super::grouped(88_955.4), "88\u{a0}955");
         assert_eq!(super::grouped(12.0), "12");
-        assert_eq!(super::grouped(1_000_000.0), "1\u{202f}000\u{202f}000");
+        assert_eq!(super::grouped(1_000_000.0), "1\u{a0}000\u{a0}000");
     }
 }

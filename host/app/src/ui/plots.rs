@@ -22,6 +22,7 @@ pub fn show(ui: &mut Ui, session: &Session) {
         .connection()
         .map(|c| c.capabilities.cost_budget)
         .filter(|&b| b > 0);
+    ui.spacing_mut().item_spacing.x = 26.0;
     ui.columns_const(|[force, torque, cost]| {
         let handle = Trace {
             name: "handle",
@@ -50,7 +51,15 @@ pub fn show(ui: &mut Ui, session: &Session) {
             color: theme::GOOD,
             of: |s| s.cost,
         };
-        plot(cost, session, "Cost of a tick", cost_unit, 1000.0, &[tick], budget);
+        plot(
+            cost,
+            session,
+            "Cost of a tick",
+            cost_unit,
+            1000.0,
+            &[tick],
+            budget,
+        );
     });
 }
 
@@ -64,6 +73,7 @@ fn plot(
     budget: Option<u32>,
 ) {
     let history = &session.history;
+    ui.spacing_mut().item_spacing.x = 7.0;
     ui.horizontal(|ui| {
         ui.label(RichText::new(title).color(theme::TEXT_STRONG));
         ui.label(RichText::new(unit).small().color(theme::TEXT_WEAK));
@@ -109,13 +119,21 @@ fn plot(
         .allow_double_click_reset(false)
         .sense(egui::Sense::hover())
         .set_margin_fraction(egui::Vec2::ZERO)
-        .grid_spacing(egui::Rangef::new(24.0, 120.0))
+        .grid_spacing(egui::Rangef::new(4.0, 5.0))
+        .grid_color(theme::LINE)
+        .grid_fade(0.0)
         .y_axis_min_width(34.0)
-        .x_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 5.0, 10.0]))
+        .x_grid_spacer(|_| (-4..=0).map(|n| mark(2.5 * f64::from(n), 2.5)).collect())
+        .y_grid_spacer(move |_| {
+            (0..=4)
+                .map(|n| mark(0.25 * top * f64::from(n), 0.25 * top))
+                .collect()
+        })
         .y_axis_formatter(|mark, _| axis_number(mark.value))
         .show(ui, |plot| {
             plot.set_plot_bounds_x(-SPAN_S..=0.0);
-            plot.set_plot_bounds_y(0.0..=top);
+            // A little below zero, so that a trace at zero and its label are whole.
+            plot.set_plot_bounds_y(-0.07 * top..=1.05 * top);
             if let Some(budget) = shown_budget {
                 plot.hline(HLine::new("budget", budget).color(theme::STOP).width(1.0));
             }
@@ -129,6 +147,10 @@ fn plot(
         });
 }
 
+fn mark(value: f64, step_size: f64) -> egui_plot::GridMark {
+    egui_plot::GridMark { value, step_size }
+}
+
 /// The least of 1, 2, 5 × 10ⁿ that is not below `value`.
 fn nice_above(value: f64) -> f64 {
     let decade = 10f64.powf(value.max(1e-9).log10().floor());
@@ -140,13 +162,13 @@ fn nice_above(value: f64) -> f64 {
 }
 
 fn axis_number(value: f64) -> String {
-    match value.abs() {
-        v if v >= 1e6 => format!("{:.1} M", value / 1e6),
-        v if v >= 1e4 => format!("{:.0} k", value / 1e3),
-        v if v >= 1e3 => format!("{:.1} k", value / 1e3),
-        v if v >= 10.0 || v == 0.0 => format!("{value:.0}"),
-        _ => format!("{value:.1}"),
-    }
+    let (value, unit) = match value.abs() {
+        v if v >= 1e6 => (value / 1e6, " M"),
+        v if v >= 1e3 => (value / 1e3, " k"),
+        _ => (value, ""),
+    };
+    let text = format!("{value:.2}");
+    format!("{}{unit}", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
 #[cfg(test)]
@@ -155,8 +177,28 @@ mod tests {
 
     #[test]
     fn tops_are_round() {
-        for (value, top) in [(0.7, 1.0), (1.0, 1.0), (1.3, 2.0), (2.4, 5.0), (7.0, 10.0), (41_000.0, 50_000.0)] {
+        for (value, top) in [
+            (0.7, 1.0),
+            (1.0, 1.0),
+            (1.3, 2.0),
+            (2.4, 5.0),
+            (7.0, 10.0),
+            (41_000.0, 50_000.0),
+        ] {
             assert!((nice_above(value) - top).abs() < 1e-9 * top, "{value}");
+        }
+    }
+
+    #[test]
+    fn axis_numbers_are_short() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.25, "0.25"),
+            (1.5, "1.5"),
+            (100.0, "100"),
+            (12_500.0, "12.5 k"),
+        ] {
+            assert_eq!(axis_number(value), text);
         }
     }
 }

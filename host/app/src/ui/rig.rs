@@ -11,8 +11,8 @@ use crate::session::{Intent, Session, obstacle};
 /// Draws it.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     egui::Panel::right("rig")
-        .default_size(318.0)
-        .size_range(280.0..=440.0)
+        .exact_size(336.0)
+        .resizable(false)
         .frame(theme::panel())
         .show(ui, |ui| {
             ScrollArea::vertical()
@@ -46,14 +46,14 @@ fn label_of(session: &Session, spec: &RigSpec) -> String {
 fn chooser(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let blocked = obstacle(session, &Intent::ChooseRig(session.chosen.clone()));
     ui.horizontal(|ui| {
-        let wide = ui.available_width() - 38.0;
+        let wide = ui.available_width() - 74.0;
         let chooser = ui.add_enabled_ui(blocked.is_none(), |ui| {
-            egui::ComboBox::from_id_salt("rig")
+            let list = egui::ComboBox::from_id_salt("rig")
                 .width(wide)
                 .selected_text(label_of(session, &session.chosen))
                 .truncate()
                 .show_ui(ui, |ui| {
-                    ui.set_min_width(300.0);
+                    ui.set_min_width(340.0);
                     for entry in &session.rigs {
                         let chosen = entry.spec == session.chosen;
                         let name = match &entry.available {
@@ -76,18 +76,30 @@ fn chooser(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                         ui.add_space(4.0);
                     }
                 });
+            list.response.accessible_name("Rig");
         });
         chooser.response.on_hover_text(match &blocked {
             Some(reason) => reason.clone(),
             None => "Simulated rigs and serial ports".to_owned(),
         });
-        let again = egui::Button::new("⟲").min_size(Vec2::new(28.0, 26.0));
-        control::intent_button(ui, session, wanted, again, Intent::RefreshRigs, "Look for rigs again");
+        let again = egui::Button::new("Rescan").min_size(Vec2::new(64.0, 26.0));
+        control::intent_button(
+            ui,
+            session,
+            wanted,
+            again,
+            Intent::RefreshRigs,
+            "Look for rigs again",
+        );
     });
 }
 
 fn connect(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
-    let wide = Vec2::new(ui.available_width(), 32.0);
+    ui.vertical_centered_justified(|ui| connect_button(ui, session, wanted));
+}
+
+fn connect_button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let wide = Vec2::new(0.0, 32.0);
     match &session.link {
         Link::None => {
             let button = control::primary("Connect").min_size(wide);
@@ -116,17 +128,12 @@ fn connect(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
 
 fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
     let can = &connection.capabilities;
-    ui.spacing_mut().item_spacing.y = 3.0;
+    ui.spacing_mut().item_spacing.y = 2.0;
     control::row(ui, "Board", can.board.to_string());
     control::row(ui, "Loop", format!("{} Hz", can.tick_hz));
     control::row(ui, "Handle", handle(can));
     if let Some(telemetry) = &session.telemetry {
-        let missed = telemetry.missed;
-        let text = match missed {
-            0 => "none".to_owned(),
-            n => n.to_string(),
-        };
-        control::row(ui, "Missed ticks", text);
+        missed(ui, connection, telemetry.missed);
     }
     if let Some(statistics) = &connection.statistics {
         let peak = format!("{} {}", statistics.cost_max, unit(can.cost_unit));
@@ -136,6 +143,24 @@ fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
     if counts.bad_frames > 0 {
         control::row(ui, "Damaged frames", counts.bad_frames.to_string());
     }
+}
+
+fn missed(ui: &mut Ui, connection: &Connection, missed: u32) {
+    let hint = match (missed, &connection.spec) {
+        (0, _) => "Every tick was done within its time",
+        (_, RigSpec::Simulated { .. }) => {
+            "This computer was busy with other things: its simulation is paced by the clock, but not hard real time"
+        }
+        (_, RigSpec::Emulated { .. }) => {
+            "The emulator runs at about the clock's speed: counted mode tells what the board would do"
+        }
+        (_, RigSpec::Serial { .. }) => "A smaller point budget or a coarser scene makes a tick cheaper",
+    };
+    let text = match missed {
+        0 => RichText::new("none"),
+        n => RichText::new(n.to_string()).color(theme::WARNING),
+    };
+    control::rich_row(ui, "Missed ticks", text).on_hover_text(hint);
 }
 
 fn handle(can: &Capabilities) -> String {
@@ -180,18 +205,21 @@ fn scene(ui: &mut Ui, session: &Session, connection: &Connection, wanted: &mut V
         "not on the board"
     };
     control::row(ui, "Scene", state);
-    let missing = session.document.as_ref().is_some_and(|d| d.baked.is_some()) && !session.scene_is_on_board();
+    let missing =
+        session.document.as_ref().is_some_and(|d| d.baked.is_some()) && !session.scene_is_on_board();
     if missing {
-        let button = egui::Button::new("Send the scene").min_size(Vec2::new(ui.available_width(), 28.0));
+        let button = egui::Button::new("Send the scene").min_size(Vec2::new(0.0, 28.0));
         let hint = "The scene in use stays until all of the new one has arrived";
-        control::intent_button(ui, session, wanted, button, Intent::Upload, hint);
+        ui.vertical_centered_justified(|ui| {
+            control::intent_button(ui, session, wanted, button, Intent::Upload, hint);
+        });
     }
 }
 
 fn hand(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let half = Vec2::new(0.5 * (ui.available_width() - 8.0), 30.0);
     ui.horizontal(|ui| {
-        let play = egui::Button::new("▶  Play insertion").min_size(half);
+        let play = egui::Button::new("Play insertion").min_size(half);
         let hint = "The simulated hand arms, takes the peg and puts it into the hole";
         control::intent_button(ui, session, wanted, play, Intent::PlayInsertion, hint);
         let back = egui::Button::new("Put parts back").min_size(half);

@@ -1,6 +1,8 @@
 //! The STOP button: large, red, always there, always enabled; also Space and Esc.
 
-use egui::{Color32, CornerRadius, FontId, Key, Modifiers, Response, Sense, Stroke, Ui, Vec2, WidgetInfo, Role};
+use egui::{
+    Color32, CornerRadius, FontId, Key, Modifiers, Response, Role, Sense, Stroke, Ui, Vec2, WidgetInfo,
+};
 
 use super::theme;
 use crate::session::{Intent, Session};

@@ -1,6 +1,8 @@
 //! Colours, type and spacing, in one place. Dark, quiet, one accent; red is kept for STOP and faults, orange for what is in hand or touches.
 
-use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Vec2, Visuals};
+use egui::{
+    Color32, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Vec2, Visuals,
+};
 
 /// Behind everything.
 pub const GROUND: Color32 = Color32::from_rgb(19, 21, 25);
@@ -122,7 +124,9 @@ fn visuals() -> Visuals {
 
 /// Frame of a side panel.
 pub fn panel() -> egui::Frame {
-    egui::Frame::NONE.fill(PANEL).inner_margin(Margin::symmetric(14, 12))
+    egui::Frame::NONE
+        .fill(PANEL)
+        .inner_margin(Margin::symmetric(14, 12))
 }
 
 /// Frame of a card over the picture.

@@ -1,6 +1,9 @@
 //! The middle: the 3D view and what lies over it. Without a graphics device (tests) the scene is not drawn, all else is.
 
-use egui::{Align2, Color32, CornerRadius, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo, Role};
+use egui::{
+    Align2, Color32, CornerRadius, FontId, Pos2, Rect, RichText, Role, Sense, Stroke, Ui, UiBuilder, Vec2,
+    WidgetInfo,
+};
 use glam::DVec3;
 
 use super::{control, theme};
@@ -106,7 +109,9 @@ fn touching(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
     if session.grabbed().is_none() {
         return;
     }
-    let Some(telemetry) = &session.telemetry else { return };
+    let Some(telemetry) = &session.telemetry else {
+        return;
+    };
     let painter = ui.painter_at(rect);
     for point in touching_points(telemetry) {
         if let Some(at) = on_screen(&view.camera, rect, point) {
@@ -130,10 +135,7 @@ fn triad(ui: &Ui, rect: Rect, view: &Viewpoint) {
     });
     let painter = ui.painter_at(rect);
     for (axis, name, color) in axes {
-        let seen = Vec2::new(
-            axis.dot(camera.right()) as f32,
-            -axis.dot(camera.up()) as f32,
-        );
+        let seen = Vec2::new(axis.dot(camera.right()) as f32, -axis.dot(camera.up()) as f32);
         painter.line_segment([origin, origin + 24.0 * seen], Stroke::new(2.0, color));
         painter.text(
             origin + 33.0 * seen,
@@ -152,7 +154,9 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = Vec2::new(9.0, 4.0);
-            let flat = |text: &str| egui::Button::new(RichText::new(text).size(12.5)).fill(theme::CARD);
+            let flat = |text: &str| {
+                egui::Button::new(RichText::new(text).size(12.5)).fill(theme::CONTROL.gamma_multiply(0.85))
+            };
             if ui.add(flat("Fit")).on_hover_text("See everything (F)").clicked() {
                 view.fit(document.extent, rect);
             }
@@ -165,7 +169,11 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
             ui.add_space(6.0);
             let through = egui::Button::new(RichText::new("See through").size(12.5))
                 .selected(view.see_through)
-                .fill(if view.see_through { theme::ACCENT_DIM } else { theme::CARD });
+                .fill(if view.see_through {
+                    theme::ACCENT_DIM
+                } else {
+                    theme::CONTROL.gamma_multiply(0.85)
+                });
             let hint = "Draw fixed parts as glass, to see what happens inside a hole";
             if ui.add(through).on_hover_text(hint).clicked() {
                 view.see_through = !view.see_through;
@@ -182,13 +190,13 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         return;
     };
     let sample = session.history.newest();
-    let mut lines = vec![(
-        format!("{}", document.part_name(part)),
-        theme::HELD,
-        14.5,
-    )];
+    let mut lines = vec![(format!("{}", document.part_name(part)), theme::HELD, 14.5)];
     if let Some(sample) = sample {
-        lines.push((format!("{:.2} N on the handle", sample.handle_n), theme::TEXT_STRONG, 13.0));
+        lines.push((
+            format!("{:.2} N on the handle", sample.handle_n),
+            theme::TEXT_STRONG,
+            13.0,
+        ));
     }
     if telemetry.pairs.is_empty() {
         lines.push(("touches nothing".to_owned(), theme::TEXT_WEAK, 12.5));

@@ -33,20 +33,18 @@ impl Default for Extent {
 }
 
 impl Extent {
-    /// About the axis-parallel box of `points`; the default when there are none.
-    pub fn of_points(points: impl IntoIterator<Item = DVec3>) -> Self {
+    /// Smallest sphere about `points` from the centre of their axis-parallel box; the default when there are none.
+    pub fn of_points(points: impl Iterator<Item = DVec3> + Clone) -> Self {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in points {
+        for p in points.clone() {
             (low, high) = (low.min(p), high.max(p));
         }
-        let radius = 0.5 * (high - low).length();
-        if !radius.is_finite() {
+        let center = 0.5 * (low + high);
+        if !center.is_finite() {
             return Self::default();
         }
-        Self {
-            center: 0.5 * (low + high),
-            radius: radius.max(1e-3),
-        }
+        let radius = points.map(|p| p.distance(center)).fold(1e-3, f64::max);
+        Self { center, radius }
     }
 }
 
@@ -169,7 +167,10 @@ impl Camera {
     ///
     /// Eye and target are scaled about the anchor, so the ray from the eye through it stays the same ray.
     pub fn zoom_at(&mut self, anchor: DVec3, factor: f64, extent: Extent) {
-        let allowed = (REACH.0 * extent.radius / self.distance, REACH.1 * extent.radius / self.distance);
+        let allowed = (
+            REACH.0 * extent.radius / self.distance,
+            REACH.1 * extent.radius / self.distance,
+        );
         // Already beyond one end (the scene changed): that end does not hold it back further.
         let factor = factor.clamp(allowed.0.min(1.0), allowed.1.max(1.0));
         self.target = anchor + factor * (self.target - anchor);
@@ -322,6 +323,6 @@ mod tests {
 
     #[test]
     fn no_points_have_the_default_extent() {
-        assert_eq!(Extent::of_points([]), Extent::default());
+        assert_eq!(Extent::of_points(std::iter::empty()), Extent::default());
     }
 }

@@ -24,12 +24,18 @@ const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
 const SEEN_THROUGH: f32 = 0.26;
 /// Ghosts nearer to their part than this are not told apart by eye, in radii of the scene.
 const GHOST_FROM: f64 = 5e-4;
-/// Length of an arrow for one newton, in radii of the scene; forces far beyond a few newtons are drawn at the longest.
-const RADII_PER_NEWTON: f64 = 0.16;
+/// Longest arrow, in radii of the scene, and the force at which 63 % of it are reached, N: small forces show, large ones stay in the picture.
 const LONGEST_RADII: f64 = 0.9;
+const ARROW_FORCE: f64 = 2.5;
 
 /// The picture of `document` as `session` has it.
-pub fn compose(session: &Session, document: &Document, camera: Camera, see_through: bool, scale: f32) -> Picture {
+pub fn compose(
+    session: &Session,
+    document: &Document,
+    camera: Camera,
+    see_through: bool,
+    scale: f32,
+) -> Picture {
     let held = session.grabbed();
     let touching = session.telemetry.as_deref().filter(|_| held.is_some());
     let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
@@ -101,7 +107,11 @@ fn lit(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -
 
 /// Where the pushes act, mm: the mean of the touching points, weighted by depth.
 pub fn touching_points(telemetry: &Telemetry) -> Vec<DVec3> {
-    telemetry.pairs.iter().map(|pair| point_from_wire(pair.point)).collect()
+    telemetry
+        .pairs
+        .iter()
+        .map(|pair| point_from_wire(pair.point))
+        .collect()
 }
 
 fn arrows(document: &Document, telemetry: &Telemetry) -> Vec<Arrow> {
@@ -116,11 +126,11 @@ fn arrows(document: &Document, telemetry: &Telemetry) -> Vec<Arrow> {
         return Vec::new();
     }
     let radius = document.extent.radius;
-    let length = (RADII_PER_NEWTON * force.length()).min(LONGEST_RADII) * radius;
+    let length = LONGEST_RADII * radius * (1.0 - (-force.length() / ARROW_FORCE).exp());
     vec![Arrow {
         tail: total.0 / total.1,
         vector: length * force.normalize(),
-        thickness: 0.014 * radius,
+        thickness: 0.018 * radius,
         color: [1.0, 0.44, 0.28, 0.95],
     }]
 }

@@ -87,13 +87,7 @@ impl Viewpoint {
     }
 
     /// Takes in everything the pointer and keys did over the view.
-    pub fn respond(
-        &mut self,
-        ui: &Ui,
-        response: &Response,
-        session: &mut Session,
-        wanted: &mut Vec<Intent>,
-    ) {
+    pub fn respond(&mut self, ui: &Ui, response: &Response, session: &mut Session, wanted: &mut Vec<Intent>) {
         let rect = response.rect;
         let Some(document) = &session.document else { return };
         let extent = document.extent;
@@ -126,7 +120,13 @@ impl Viewpoint {
 
     fn pick(&self, document: &Document, rect: Rect, at: Option<Pos2>) -> Option<Pick> {
         let (origin, direction) = self.camera.ray(ndc(rect, at?), aspect(rect));
-        pick(&document.model, &document.extents, &document.poses, origin, direction)
+        pick(
+            &document.model,
+            &document.extents,
+            &document.poses,
+            origin,
+            direction,
+        )
     }
 
     fn start_drag(&mut self, ui: &Ui, response: &Response, session: &Session) {

@@ -113,7 +113,9 @@ fn normal(face: &Face, point: DVec3) -> Option<DVec3> {
     let natural = match face.surface {
         Surface::Plane { frame } => frame.z,
         Surface::Cylinder { frame, .. } => radial(&frame, point)?,
-        Surface::Cone { frame, half_angle, .. } => {
+        Surface::Cone {
+            frame, half_angle, ..
+        } => {
             // Below the apex the radius is negative and the axis lies on the other side of the wall.
             let outward = radial(&frame, point)?;
             half_angle.cos() * outward - half_angle.sin() * frame.z

@@ -131,9 +131,7 @@ mod tests {
     #[test]
     fn the_nearer_part_is_picked_and_misses_pick_nothing() {
         let model = model();
-        let extents = [Extent::of_points(
-            model.shapes[0].mesh.vertices.iter().copied(),
-        )];
+        let extents = [Extent::of_points(model.shapes[0].mesh.vertices.iter().copied())];
         let poses: Vec<_> = model.parts.iter().map(|p| p.placement).collect();
         let down = |x: f64, y: f64| pick(&model, &extents, &poses, DVec3::new(x, y, 10.0), -DVec3::Z);
         let hit = down(0.5, -0.5).expect("above both");
@@ -146,9 +144,7 @@ mod tests {
     #[test]
     fn what_lies_behind_is_not_picked() {
         let model = model();
-        let extents = [Extent::of_points(
-            model.shapes[0].mesh.vertices.iter().copied(),
-        )];
+        let extents = [Extent::of_points(model.shapes[0].mesh.vertices.iter().copied())];
         let poses: Vec<_> = model.parts.iter().map(|p| p.placement).collect();
         assert_eq!(
             pick(&model, &extents, &poses, DVec3::new(0.1, 0.0, 10.0), DVec3::Z),

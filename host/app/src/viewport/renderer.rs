@@ -158,9 +158,11 @@ impl Renderer {
         }
         self.upload(&draws);
 
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("viewport"),
-        });
+        let mut encoder = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("viewport"),
+            });
         {
             let Some(targets) = &self.targets else { return };
             let mut pass = begin(&mut encoder, targets);
@@ -222,12 +224,7 @@ fn globals(picture: &Picture, size: [u32; 2]) -> Globals {
         key: direction(viewer + 0.55 * up - 0.45 * right),
         fill: direction(0.4 * viewer - 0.2 * up + right),
         viewer: direction(viewer),
-        screen: [
-            size[0] as f32,
-            size[1] as f32,
-            picture.line_width,
-            lift as f32,
-        ],
+        screen: [size[0] as f32, size[1] as f32, picture.line_width, lift as f32],
         top: SKY[0],
         bottom: SKY[1],
     }

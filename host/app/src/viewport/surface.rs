@@ -32,8 +32,16 @@ impl Surface {
     }
 
     /// The picture, `size` pixels large.
-    pub fn show(&mut self, meshes: &Arc<Vec<ShapeMesh>>, picture: Picture, size: [u32; 2]) -> Option<TextureId> {
-        let same_meshes = self.meshes.as_ref().is_some_and(|known| Arc::ptr_eq(known, meshes));
+    pub fn show(
+        &mut self,
+        meshes: &Arc<Vec<ShapeMesh>>,
+        picture: Picture,
+        size: [u32; 2],
+    ) -> Option<TextureId> {
+        let same_meshes = self
+            .meshes
+            .as_ref()
+            .is_some_and(|known| Arc::ptr_eq(known, meshes));
         if !same_meshes {
             self.renderer.set_shapes(meshes);
             self.meshes = Some(Arc::clone(meshes));
