@@ -299,6 +299,14 @@ impl Client {
         self.link.send(&ToDevice::Stop).map(|_| ())
     }
 
+    /// Writes bytes that are no frame, and ends them: for showing that they do no harm.
+    ///
+    /// # Errors
+    /// `LinkLost`.
+    pub fn send_garbage(&self, bytes: &[u8]) -> Result<(), RigError> {
+        self.link.write_raw(bytes)
+    }
+
     /// Restarts the board and greets it anew over the same link.
     ///
     /// # Errors
@@ -430,7 +438,7 @@ fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capabilities, R
     };
     loop {
         // Ends whatever half a frame lies on the wire.
-        link.write_delimiter()?;
+        link.write_raw(&[])?;
         let ticket = link.post(&hello)?;
         if let Some(Answer::Value(value)) = ticket.wait(GREETING_PAUSE)?
             && let FromDevice::Hello(device) = *value

@@ -283,10 +283,13 @@ impl Link {
         })
     }
 
-    /// Writes a lone delimiter: whatever garbage lies on the wire ends there.
-    pub(crate) fn write_delimiter(&self) -> Result<(), RigError> {
+    /// Writes `bytes` as they are, and a delimiter: whatever garbage lies on the wire ends there.
+    pub(crate) fn write_raw(&self, bytes: &[u8]) -> Result<(), RigError> {
         self.check()?;
-        write_whole(&mut *lock(&self.writer).port, &[0]).map_err(|error| {
+        let mut writer = lock(&self.writer);
+        let written =
+            write_whole(&mut *writer.port, bytes).and_then(|()| write_whole(&mut *writer.port, &[0]));
+        written.map_err(|error| {
             self.lose(&error.to_string());
             RigError::LinkLost {
                 why: error.to_string(),

@@ -129,10 +129,8 @@ fn power_on(
         }
         from += link.receive(&input[from..to], &mut out);
         patience = pace.until_next();
-        if patience.is_zero() {
-            if control.tick() == Ticked::Waiting && !realtime {
-                patience = READ_WAIT;
-            }
+        if patience.is_zero() && control.tick() == Ticked::Waiting && !realtime {
+            patience = READ_WAIT;
         }
         link.poll(&mut out);
         let said_something = !out.pending.is_empty();

@@ -1,0 +1,254 @@
+//! What every rig must do, whatever the scene. Each check takes a connection and leaves the board idle.
+//!
+//! A check returns what it saw in one line, or what was wrong.
+
+use std::time::{Duration, Instant};
+
+use mortise_protocol::image::CRC;
+use mortise_protocol::limits::MAX_CHUNK;
+use mortise_protocol::message::{DeviceState, Refusal, ToDevice, Version};
+use mortise_protocol::parameter::PARAMETERS;
+use mortise_rig::{Client, Event, RigError, begin_message, chunk_message};
+
+use crate::image;
+
+/// What a check saw, or what was wrong.
+pub type Verdict = Result<String, String>;
+
+/// A check by its name.
+pub type Check = (&'static str, fn(Client) -> Verdict);
+
+/// All checks.
+pub const CHECKS: &[Check] = &[
+    ("parameters_keep_their_ranges", parameters_keep_their_ranges),
+    ("bad_scenes_are_refused", bad_scenes_are_refused),
+    ("cut_uploads_leave_the_old_scene", cut_uploads_leave_the_old_scene),
+    ("garbage_does_no_harm", garbage_does_no_harm),
+    ("another_version_is_shut_out", another_version_is_shut_out),
+    ("stop_stops", stop_stops),
+    ("idle_ticks_are_on_time", idle_ticks_are_on_time),
+];
+
+fn fine<T>(result: Result<T, RigError>) -> Result<T, String> {
+    result.map_err(|error| error.to_string())
+}
+
+fn refused(result: Result<(), RigError>, what: &str) -> Result<Refusal, String> {
+    match result {
+        Ok(()) => Err(format!("{what} was accepted")),
+        Err(RigError::Refused { reason, .. }) => Ok(reason),
+        Err(other) => Err(format!("{what}: {other}")),
+    }
+}
+
+fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(otherwise()) }
+}
+
+/// Every parameter has its default, takes its bounds, and refuses what is beyond them, naming the range.
+pub fn parameters_keep_their_ranges(client: Client) -> Verdict {
+    for row in PARAMETERS {
+        let id = row.id;
+        let before = fine(client.parameter(id))?;
+        for value in [row.min, row.max, before] {
+            fine(client.request(ToDevice::SetParameter { id, value }))?;
+            let found = fine(client.parameter(id))?;
+            ensure(found == value, || {
+                format!("{} is {found} after setting {value}", row.name)
+            })?;
+        }
+        for value in [
+            row.max * 1.01 + 1.0,
+            row.min - 1.0,
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+        ] {
+            let reason = refused(
+                client.request(ToDevice::SetParameter { id, value }),
+                &format!("{} = {value}", row.name),
+            )?;
+            let expected = Refusal::OutOfRange {
+                id,
+                min: row.min,
+                max: row.max,
+            };
+            ensure(reason == expected, || {
+                format!("{} = {value}: {reason:?}", row.name)
+            })?;
+        }
+        let found = fine(client.parameter(id))?;
+        ensure(found == before, || {
+            format!("{} is {found}, not {before}", row.name)
+        })?;
+    }
+    Ok(format!("{} parameters", PARAMETERS.len()))
+}
+
+fn scene(client: &Client) -> Result<Option<u32>, String> {
+    Ok(fine(client.refresh_capabilities())?.scene)
+}
+
+/// Another layout, damaged, too large, incomplete: each refused with its reason, the scene in use stays.
+pub fn bad_scenes_are_refused(client: Client) -> Verdict {
+    let good = image(3000, 1);
+    fine(client.upload(&good, &mut |_| {}))?;
+    let in_use = Some(CRC.checksum(&good));
+    let mut damaged = image(3000, 2);
+    damaged[1500] ^= 4;
+    let mut layout = image(3000, 3);
+    layout[8] = layout[8].wrapping_add(1);
+    let reason = refused(client.upload(&damaged, &mut |_| {}), "a damaged scene")?;
+    ensure(matches!(reason, Refusal::SceneImage(_)), || {
+        format!("damaged: {reason:?}")
+    })?;
+    let reason = refused(client.upload(&layout, &mut |_| {}), "a scene of another layout")?;
+    ensure(matches!(reason, Refusal::SceneImage(_)), || {
+        format!("layout: {reason:?}")
+    })?;
+    let capacity = client.capabilities().scene_capacity;
+    let begin = |length, crc, layout| client.request(ToDevice::SceneBegin { length, crc, layout });
+    let own = client.capabilities().scene_layout;
+    let reason = refused(begin(capacity + 1, 0, own), "a scene too large")?;
+    ensure(reason == Refusal::SceneTooLarge { capacity }, || {
+        format!("too large: {reason:?}")
+    })?;
+    fine(begin(1000, 7, own))?;
+    fine(client.request(chunk_message(&good, 0)))?;
+    let reason = refused(client.request(ToDevice::SceneCommit), "an incomplete scene")?;
+    ensure(matches!(reason, Refusal::SceneIncomplete { .. }), || {
+        format!("incomplete: {reason:?}")
+    })?;
+    // Whatever is left of it.
+    let _ = client.request(ToDevice::SceneAbort);
+    let found = scene(&client)?;
+    ensure(found == in_use, || {
+        format!("the scene in use is {found:x?}, not {in_use:x?}")
+    })?;
+    Ok("layout, damaged, too large, incomplete".into())
+}
+
+/// An upload cut off after some chunks by a restart: the old scene is still in use. (Every boundary with power lost: `host/rig` tests.)
+pub fn cut_uploads_leave_the_old_scene(client: Client) -> Verdict {
+    let (old, new) = (image(4 * MAX_CHUNK + 12, 4), image(6 * MAX_CHUNK + 100, 5));
+    fine(client.upload(&old, &mut |_| {}))?;
+    let in_use = Some(CRC.checksum(&old));
+    let chunks = new.len().div_ceil(MAX_CHUNK);
+    let mut client = client;
+    for cut in 0..=chunks {
+        fine(client.request(fine(begin_message(&new))?))?;
+        for chunk in 0..cut {
+            fine(client.request(chunk_message(&new, chunk * MAX_CHUNK)))?;
+        }
+        client = fine(client.restart())?;
+        let found = client.capabilities().scene;
+        ensure(found == in_use, || {
+            format!("cut after {cut} chunks: scene {found:x?}, not {in_use:x?}")
+        })?;
+    }
+    fine(client.upload(&new, &mut |_| {}))?;
+    client = fine(client.restart())?;
+    let found = client.capabilities().scene;
+    ensure(found == Some(CRC.checksum(&new)), || {
+        format!("committed, but scene {found:x?}")
+    })?;
+    Ok(format!("{} cuts", chunks + 1))
+}
+
+/// Bytes that are no frames, and frames with flipped bits, change nothing; the next message is answered.
+pub fn garbage_does_no_harm(client: Client) -> Verdict {
+    const PIECES: u64 = 200;
+    let before = fine(client.statistics(false))?.bad_frames;
+    let mut seed = 0x9e37_79b9_7f4a_7c15u64;
+    for piece in 0..PIECES {
+        let bytes: Vec<u8> = (0..(piece % 40) + 1)
+            .map(|_| {
+                seed ^= seed << 13;
+                seed ^= seed >> 7;
+                seed ^= seed << 17;
+                // No delimiters inside: one bad frame a piece.
+                (seed as u8).max(1)
+            })
+            .collect();
+        fine(client.send_garbage(&bytes))?;
+    }
+    fine(client.request(ToDevice::Heartbeat))?;
+    let bad = fine(client.statistics(false))?.bad_frames - before;
+    ensure(u64::from(bad) == PIECES, || {
+        format!("{bad} of {PIECES} pieces counted as bad frames")
+    })?;
+    Ok(format!("{bad} pieces thrown away"))
+}
+
+/// A host of another version is told the board's, and then nothing is carried out for it but STOP.
+pub fn another_version_is_shut_out(client: Client) -> Verdict {
+    let own = Version::own();
+    let other = Version {
+        schema: own.schema ^ 1,
+        ..own
+    };
+    fine(client.request(ToDevice::Hello(other)))?;
+    for message in [
+        ToDevice::Arm,
+        ToDevice::SetTelemetry { every_ticks: 1 },
+        ToDevice::SceneCommit,
+    ] {
+        let reason = refused(client.request(message.clone()), &format!("{message:?}"))?;
+        ensure(reason == Refusal::NotGreeted, || {
+            format!("{message:?}: {reason:?}")
+        })?;
+    }
+    fine(client.request(ToDevice::Hello(own)))?;
+    fine(client.request(ToDevice::Heartbeat))?;
+    Ok("refused until greeted by its own version".into())
+}
+
+/// Armed, then STOP: stopped, and it stays so until cleared.
+pub fn stop_stops(client: Client) -> Verdict {
+    fine(client.upload(&image(500, 6), &mut |_| {}))?;
+    if client.capabilities().simulated {
+        fine(client.set_lockstep(false))?;
+    }
+    if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
+        fine(client.request(ToDevice::ClearFault))?;
+    }
+    fine(client.request(ToDevice::Arm))?;
+    let begun = Instant::now();
+    fine(client.stop())?;
+    loop {
+        let left = Duration::from_secs(20).saturating_sub(begun.elapsed());
+        match client.events().recv_timeout(left) {
+            Ok(Event::State {
+                state: DeviceState::Stopped,
+                ..
+            }) => break,
+            Ok(_) => {}
+            Err(_) => return Err(format!("not stopped, but {:?}", client.state())),
+        }
+    }
+    let reason = refused(client.request(ToDevice::Arm), "arming a stopped board")?;
+    ensure(reason == Refusal::State(DeviceState::Stopped), || {
+        format!("arming: {reason:?}")
+    })?;
+    fine(client.request(ToDevice::ClearFault))?;
+    Ok("stopped until cleared".into())
+}
+
+/// A second of ticks with nothing to do: none is missed. Only where a deadline means something: not on a PC's own clock.
+pub fn idle_ticks_are_on_time(client: Client) -> Verdict {
+    const TICKS: u32 = 1000;
+    fine(client.statistics(true))?;
+    if client.capabilities().simulated {
+        fine(client.run(TICKS))?;
+    } else {
+        std::thread::sleep(Duration::from_millis(u64::from(TICKS)));
+    }
+    let statistics = fine(client.statistics(false))?;
+    ensure(statistics.ticks >= TICKS / 2, || {
+        format!("only {} ticks", statistics.ticks)
+    })?;
+    ensure(statistics.missed_ticks == 0, || {
+        format!("{} ticks missed", statistics.missed_ticks)
+    })?;
+    Ok(format!("{} ticks, 0 missed", statistics.ticks))
+}

@@ -1,0 +1,188 @@
+//! Runs every scenario and every check on every rig there is to be: the simulation and the emulated board always, a real one when
+//! `MORTISE_PORT` or `--port NAME` names it.
+//!
+//! A missing emulator or firmware, or a port that cannot be opened, fails: a bench that tests nothing must not look as if it had.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use libtest_mimic::{Arguments, Completion, Failed, Trial};
+use mortise_hil_tests::checks::{CHECKS, Check};
+use mortise_hil_tests::{PORT_VARIABLE, scenarios};
+use mortise_lab::LabError;
+use mortise_lab::scenario::{Outcome, PreparedScene, Scenario, run_on};
+use mortise_rig::{Client, RigSpec};
+
+fn main() -> ExitCode {
+    // First: this program is also the process that reads STEP files for itself.
+    mortise_brep::child::init();
+    let mut arguments: Vec<String> = std::env::args().collect();
+    let port = match take_port(&mut arguments) {
+        Ok(port) => port,
+        Err(what) => {
+            eprintln!("{what}");
+            return ExitCode::from(2);
+        }
+    };
+    match trials(port) {
+        Ok(trials) => libtest_mimic::run(&Arguments::from_iter(arguments), trials).exit_code(),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// `--port NAME` or `--port=NAME`, else the environment's; taken out of the arguments.
+fn take_port(arguments: &mut Vec<String>) -> Result<Option<String>, String> {
+    let flag = arguments
+        .iter()
+        .position(|a| a == "--port" || a.starts_with("--port="));
+    let named = match flag {
+        None => return Ok(std::env::var(PORT_VARIABLE).ok().filter(|port| !port.is_empty())),
+        Some(at) => {
+            let flag = arguments.remove(at);
+            match flag.strip_prefix("--port=") {
+                Some(name) => name.to_owned(),
+                None if at < arguments.len() => arguments.remove(at),
+                None => String::new(),
+            }
+        }
+    };
+    if named.is_empty() {
+        return Err("--port needs the name of a serial port".into());
+    }
+    Ok(Some(named))
+}
+
+fn rig(text: &str) -> Result<RigSpec, String> {
+    text.parse().map_err(|error| format!("{text}: {error}"))
+}
+
+fn trials(port: Option<String>) -> Result<Vec<Trial>, String> {
+    let bench = Arc::new(Bench::default());
+    let (sim, emulated) = (rig("sim-fast")?, rig("emulated:lockstep")?);
+    let mut rigs = vec![("sim", sim.clone()), ("emulated", emulated.clone())];
+    if let Some(port) = port {
+        rigs.push(("port", RigSpec::Serial { port }));
+    }
+    let mut trials = Vec::new();
+    for file in scenarios().map_err(|error| error.to_string())? {
+        let name = file
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        for (rig_name, spec) in &rigs {
+            let (bench, file, spec) = (bench.clone(), file.clone(), spec.clone());
+            trials.push(Trial::ignorable_test(format!("{rig_name}::{name}"), move || {
+                bench.scenario(&file, &spec)
+            }));
+        }
+        let (bench, sim, emulated) = (bench.clone(), sim.clone(), emulated.clone());
+        trials.push(Trial::test(format!("sim_equals_emulated::{name}"), move || {
+            bench.equal(&file, &sim, &emulated)
+        }));
+    }
+    for (rig_name, spec) in &rigs {
+        for &check in CHECKS {
+            let spec = spec.clone();
+            trials.push(Trial::test(format!("{rig_name}::{}", check.0), move || {
+                run_check(check, &spec)
+            }));
+        }
+    }
+    Ok(trials)
+}
+
+fn run_check((name, check): Check, spec: &RigSpec) -> Result<(), Failed> {
+    let client = Client::connect(spec)?;
+    let seen = check(client)?;
+    println!("    {spec} {name}: {seen}");
+    Ok(())
+}
+
+/// Scenes baked and outcomes measured, so that comparing two rigs does not measure them again.
+#[derive(Default)]
+struct Bench {
+    scenes: Mutex<HashMap<String, Arc<Mutex<Option<Arc<PreparedScene>>>>>>,
+    outcomes: Mutex<HashMap<(PathBuf, RigSpec), Arc<Mutex<Option<Outcome>>>>>,
+}
+
+fn slot<K: std::hash::Hash + Eq, V: Default>(map: &Mutex<HashMap<K, Arc<V>>>, key: K) -> Arc<V> {
+    let mut map = map.lock().unwrap_or_else(PoisonError::into_inner);
+    map.entry(key).or_default().clone()
+}
+
+impl Bench {
+    fn scene(&self, scenario: &Scenario) -> Result<Arc<PreparedScene>, LabError> {
+        let slot = slot(&self.scenes, format!("{:?}", scenario.scene));
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(scene) = &*slot {
+            return Ok(scene.clone());
+        }
+        let scene = Arc::new(PreparedScene::of(scenario)?);
+        *slot = Some(scene.clone());
+        Ok(scene)
+    }
+
+    fn measure(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
+        let scene = self.scene(scenario)?;
+        let client = Client::connect(spec)?;
+        run_on(&client, scenario, &scene)
+    }
+
+    fn outcome(&self, file: &PathBuf, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
+        let slot = slot(&self.outcomes, (file.clone(), spec.clone()));
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(outcome) = &*slot {
+            return Ok(outcome.clone());
+        }
+        let outcome = self.measure(scenario, spec)?;
+        *slot = Some(outcome.clone());
+        Ok(outcome)
+    }
+
+    fn scenario(&self, file: &PathBuf, spec: &RigSpec) -> Result<Completion, Failed> {
+        let scenario = Scenario::load(file)?;
+        let outcome = match self.outcome(file, &scenario, spec) {
+            Err(error @ LabError::NeedsSimulatedHand { .. }) => {
+                return Ok(Completion::ignored_with(error.to_string()));
+            }
+            outcome => outcome?,
+        };
+        let verdicts = outcome.verdicts(&scenario);
+        let lines: Vec<String> = verdicts.iter().map(|verdict| format!("    {verdict}")).collect();
+        let text = format!(
+            "{} on {spec}, hash {}:\n{}",
+            scenario.name,
+            outcome.state_hash,
+            lines.join("\n")
+        );
+        if verdicts.iter().all(|verdict| verdict.holds) {
+            println!("{text}");
+            Ok(Completion::Completed)
+        } else {
+            Err(format!("{text}\n{outcome:#?}").into())
+        }
+    }
+
+    /// The board computes what this computer computes, to the bit; and computes it again the same.
+    fn equal(&self, file: &PathBuf, sim: &RigSpec, emulated: &RigSpec) -> Result<(), Failed> {
+        let scenario = Scenario::load(file)?;
+        let here = self.outcome(file, &scenario, sim)?.state_hash;
+        let again = self.measure(&scenario, sim)?.state_hash;
+        let there = self.outcome(file, &scenario, emulated)?.state_hash;
+        println!(
+            "{}: sim {here}, sim again {again}, emulated {there}",
+            scenario.name
+        );
+        if here == again && here == there {
+            Ok(())
+        } else {
+            Err(format!("hashes differ: sim {here}, sim again {again}, emulated {there}").into())
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Figures from telemetry: depth, penetration by the exact surfaces, press forces, energy at the handle.
+
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_protocol::message::{Telemetry, WirePose, WireWrench};
+
+use super::scene::{Body, PreparedScene};
+use super::{Depth, Press};
+
+/// Poses whose penetration is looked up at most; evenly spread over the run, the last always among them.
+const PENETRATION_POSES: usize = 160;
+
+/// A wire pose in millimetres.
+pub(crate) fn pose_mm(pose: &WirePose) -> DAffine3 {
+    let [x, y, z] = pose.position.map(f64::from);
+    let [i, j, k, w] = pose.orientation.map(f64::from);
+    DAffine3::from_rotation_translation(
+        DQuat::from_xyzw(i, j, k, w).normalize(),
+        1e3 * DVec3::new(x, y, z),
+    )
+}
+
+fn vector(v: [f32; 3]) -> DVec3 {
+    DVec3::from_array(v.map(f64::from))
+}
+
+/// How far the moving part is in, mm, the hole's depth, and how far off the axis its centre of mass is.
+pub(crate) fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<(f64, f64, f64)> {
+    let axis = DVec3::from_array(depth.axis).try_normalize()?;
+    let fixed = scene.bodies().get(scene.part_named(&depth.fixed)?)?;
+    let part = scene.bodies().get(usize::from(scene.part))?;
+    let along = |body: &Body, placement: &DAffine3| {
+        let vertices = body.surface.shape().mesh.vertices.iter();
+        vertices.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &vertex| {
+            let t = placement.transform_point3(vertex).dot(axis);
+            (low.min(t), high.max(t))
+        })
+    };
+    let (mouth, bottom) = along(fixed, &fixed.placement);
+    let (_, tip) = along(part, moving);
+    let center = moving.transform_point3(part.surface.shape().center_of_mass);
+    let off = center - DVec3::from_array(depth.through_mm);
+    Some((tip - mouth, bottom - mouth, (off - off.dot(axis) * axis).length()))
+}
+
+/// Deepest point of the moving part in any other, or of any other in it, mm, at `moving`; 0 when nowhere inside.
+fn penetration(scene: &PreparedScene, moving: &DAffine3) -> f64 {
+    let bodies = scene.bodies();
+    let Some(part) = bodies.get(usize::from(scene.part)) else {
+        return 0.0;
+    };
+    let here = moving.transform_point3(part.center);
+    let mut deepest: f64 = 0.0;
+    for (index, other) in bodies.iter().enumerate() {
+        let there = other.placement.transform_point3(other.center);
+        if index == usize::from(scene.part) || here.distance(there) > part.radius + other.radius {
+            continue;
+        }
+        let to_other = other.placement.inverse() * *moving;
+        deepest = deepest
+            .max(depth_in(&part.points, &to_other, other))
+            .max(depth_in(&other.points, &to_other.inverse(), part));
+    }
+    deepest
+}
+
+/// Deepest of `points` (moved by `to_body`) inside `body`, mm.
+fn depth_in(points: &[DVec3], to_body: &DAffine3, body: &Body) -> f64 {
+    points
+        .iter()
+        .map(|&point| to_body.transform_point3(point))
+        .filter(|point| point.distance(body.center) < body.radius)
+        .filter_map(|point| body.surface.nearest(point))
+        .map(|nearest| -nearest.distance)
+        .fold(0.0, f64::max)
+}
+
+/// Deepest penetration over the run, mm.
+pub(crate) fn deepest(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
+    let step = samples.len().div_ceil(PENETRATION_POSES).max(1);
+    samples
+        .iter()
+        .rev()
+        .step_by(step)
+        .filter_map(|sample| sample.object.as_ref())
+        .map(|(_, pose)| penetration(scene, &pose_mm(pose)))
+        .fold(0.0, f64::max)
+}
+
+/// The same as the board told it, mm.
+pub(crate) fn board_deepest(samples: &[Telemetry]) -> f64 {
+    let depths = samples.iter().filter_map(|sample| sample.pairs.first());
+    depths.map(|pair| 1e3 * f64::from(pair.depth)).fold(0.0, f64::max)
+}
+
+/// Means over the settled samples of the handle's reaction and of the hand's force along the press direction, N.
+pub(crate) fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> {
+    let direction = DVec3::from_array(press.direction).try_normalize()?;
+    let forces: Vec<(f64, f64)> = settled
+        .iter()
+        .filter_map(|sample| Some((sample.wrench, sample.hand?)))
+        .map(|(handle, hand)| {
+            (
+                -vector(handle.force).dot(direction),
+                vector(hand.force).dot(direction),
+            )
+        })
+        .collect();
+    if forces.is_empty() {
+        return None;
+    }
+    let count = forces.len() as f64;
+    let (handle, hand) = forces
+        .iter()
+        .fold((0.0, 0.0), |(a, b), &(handle, hand)| (a + handle, b + hand));
+    Some((handle / count, hand / count))
+}
+
+/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Trapezoids between
+/// samples: what happens between two of them is not seen.
+pub(crate) fn energy(samples: &[Telemetry]) -> (f64, f64) {
+    let (mut given, mut largest, mut passed) = (0.0f64, 0.0f64, 0.0f64);
+    for pair in samples.windows(2) {
+        let (from, to) = (pose_mm(&pair[0].handle), pose_mm(&pair[1].handle));
+        let moved = 1e-3 * (to.translation - from.translation);
+        let rotation = |pose: &DAffine3| DQuat::from_mat3(&pose.matrix3);
+        let turned = (rotation(&to) * rotation(&from).inverse())
+            .normalize()
+            .to_scaled_axis();
+        let mean = |get: fn(&WireWrench) -> [f32; 3]| {
+            0.5 * (vector(get(&pair[0].wrench)) + vector(get(&pair[1].wrench)))
+        };
+        let work = 1e3 * (mean(|w| w.force).dot(moved) + mean(|w| w.torque).dot(turned));
+        given += work;
+        largest = largest.max(given);
+        passed += work.abs();
+    }
+    (largest, passed)
+}

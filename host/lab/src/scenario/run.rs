@@ -1,0 +1,262 @@
+//! Playing a scenario on a rig.
+
+use glam::{DQuat, DVec3};
+use mortise_protocol::message::{
+    Capabilities, CostUnit, DeviceState, HandScript, Keyframe, Statistics, Telemetry, ToDevice, WirePose,
+};
+use mortise_protocol::parameter::ParameterId;
+use mortise_rig::{Client, Event, Ran, RigSpec, describe};
+
+use super::outcome::Outcome;
+use super::scene::PreparedScene;
+use super::{Hand, Key, Scenario, measure, parameter_named};
+use crate::error::LabError;
+
+/// Ticks in a second of every simulated rig.
+const TICK_HZ: f64 = 1000.0;
+/// Ticks in which the hand brings the handle to the grip, and in which it comes to rest there.
+const REACH_TICKS: u32 = 300;
+const REST_TICKS: u32 = 200;
+/// Ticks asked for at once: bounds the telemetry that waits, and the time until a fault is seen.
+const BATCH_TICKS: u32 = 500;
+/// Ticks after disarming in which the wrench fades out.
+const FADE_TICKS: u32 = 150;
+
+/// Reads, bakes and plays `scenario` on the rig `spec`, in lockstep, and measures.
+///
+/// # Errors
+/// Everything [`LabError`] lists but `NoSuchFigures`. A bound that does not hold is not an error: see [`Outcome::verdicts`].
+pub fn run(scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
+    let scene = PreparedScene::of(scenario)?;
+    let client = Client::connect(&spec.lockstep())?;
+    run_on(&client, scenario, &scene)
+}
+
+/// Plays `scenario` on a rig that is connected already and in lockstep, with a scene prepared before.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(client: &Client, scenario: &Scenario, scene: &PreparedScene) -> Result<Outcome, LabError> {
+    let capabilities = client.capabilities();
+    if !capabilities.simulated {
+        return Err(LabError::NeedsSimulatedHand {
+            rig: client.name().to_owned(),
+            scenario: scenario.name.clone(),
+        });
+    }
+    let mut play = Play {
+        client,
+        samples: Vec::new(),
+        messages: 0,
+    };
+    play.prepare(scenario, scene)?;
+    let ran = play.perform(scenario)?;
+    let statistics = client.statistics(false)?;
+    client.request(ToDevice::SetTelemetry { every_ticks: 0 })?;
+    client.request(ToDevice::Disarm)?;
+    client.run(FADE_TICKS)?;
+    Ok(outcome(scenario, scene, client, &play, &statistics, ran))
+}
+
+struct Play<'c> {
+    client: &'c Client,
+    samples: Vec<Telemetry>,
+    messages: u32,
+}
+
+impl Play<'_> {
+    /// Scene on the board, parameters set, handle at the grip, part in hand.
+    fn prepare(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<(), LabError> {
+        let client = self.client;
+        // An earlier run may have left it stopped.
+        if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
+            client.request(ToDevice::ClearFault)?;
+        }
+        client.upload(&scene.image, &mut |_| {})?;
+        for (name, &value) in &scenario.parameters {
+            if let Some(id) = parameter_named(name) {
+                client.request(ToDevice::SetParameter { id, value })?;
+            }
+        }
+        client.request(ToDevice::ResetScene)?;
+        client.request(ToDevice::SimulatedHand(reach(&scenario.hand)))?;
+        self.run(REACH_TICKS + REST_TICKS)?;
+        client.request(ToDevice::Arm)?;
+        client.request(ToDevice::Grab { part: scene.part })?;
+        Ok(())
+    }
+
+    fn perform(&mut self, scenario: &Scenario) -> Result<Ran, LabError> {
+        let client = self.client;
+        client.statistics(true)?;
+        let every_ticks = scenario.run.telemetry_every_ticks;
+        client.request(ToDevice::SetTelemetry { every_ticks })?;
+        client.request(ToDevice::SimulatedHand(script(&scenario.hand)))?;
+        let ticks = (scenario.run.duration_s * TICK_HZ).round() as u32;
+        let Some(every) = scenario.run.parameter_every_ticks else {
+            return self.run(ticks);
+        };
+        // The limit goes to and fro well above the forces that occur, so that each message changes a setting and none the outcome.
+        let id = ParameterId::ForceLimit;
+        let start = client.parameter(id)?;
+        let mut value = start;
+        let mut ran = None;
+        let mut left = ticks;
+        while left > 0 {
+            value = if value == start { id.row().max } else { start };
+            client.send(ToDevice::SetParameter { id, value })?;
+            self.messages += 1;
+            let batch = left.min(every.max(1));
+            ran = Some(self.run(batch)?);
+            left -= batch;
+        }
+        // All of them arrived when the last did: they are taken in order.
+        let found = client.parameter(id)?;
+        if found != value {
+            return Err(LabError::Scenario {
+                name: scenario.name.clone(),
+                what: format!(
+                    "ForceLimit is {found} after {} messages, the last said {value}",
+                    self.messages
+                ),
+            });
+        }
+        match ran {
+            Some(ran) => Ok(ran),
+            None => self.run(0),
+        }
+    }
+
+    /// Lets ticks run, in batches, and takes what the board says meanwhile.
+    fn run(&mut self, ticks: u32) -> Result<Ran, LabError> {
+        let mut left = ticks;
+        loop {
+            let batch = left.min(BATCH_TICKS);
+            let ran = self.client.run(batch)?;
+            self.listen()?;
+            left -= batch;
+            if left == 0 {
+                return Ok(ran);
+            }
+        }
+    }
+
+    fn listen(&mut self) -> Result<(), LabError> {
+        for event in self.client.events().try_iter() {
+            match event {
+                Event::Telemetry(sample) => self.samples.push(*sample),
+                Event::Fault { tick, fault } => {
+                    let what = describe(fault);
+                    return Err(LabError::Fault { tick, what });
+                }
+                Event::State { .. } | Event::Log(_) | Event::LinkLost(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+fn wire_pose(position_mm: DVec3, orientation: DQuat) -> WirePose {
+    WirePose {
+        position: (1e-3 * position_mm).as_vec3().to_array(),
+        orientation: orientation.as_quat().to_array(),
+    }
+}
+
+fn with_keyframes(hand: &Hand, keyframes: impl Iterator<Item = Keyframe>) -> HandScript {
+    HandScript {
+        stiffness: hand.stiffness_n_per_m,
+        damping: hand.damping_n_s_per_m,
+        angular_stiffness: hand.angular_stiffness_n_m_per_rad,
+        angular_damping: hand.angular_damping_n_m_s_per_rad,
+        tremor: (1e-3 * hand.tremor_mm) as f32,
+        tremor_hz: hand.tremor_hz,
+        keyframes: keyframes.collect(),
+    }
+}
+
+/// From where a simulated handle starts (the world's origin) to the grip, without tremor.
+fn reach(hand: &Hand) -> HandScript {
+    let keyframe = |tick, position_mm| Keyframe {
+        tick,
+        pose: wire_pose(position_mm, DQuat::IDENTITY),
+        push: [0.0; 3],
+    };
+    let way = [
+        keyframe(0, DVec3::ZERO),
+        keyframe(REACH_TICKS, DVec3::from_array(hand.grip_mm)),
+    ];
+    HandScript {
+        tremor: 0.0,
+        ..with_keyframes(hand, way.into_iter())
+    }
+}
+
+fn script(hand: &Hand) -> HandScript {
+    let grip = DVec3::from_array(hand.grip_mm);
+    let keyframe = |key: &Key| Keyframe {
+        tick: (key.t_s * TICK_HZ).round() as u32,
+        pose: wire_pose(
+            grip + DVec3::from_array(key.offset_mm),
+            DQuat::from_scaled_axis(DVec3::from_array(key.turn_deg.map(f64::to_radians))),
+        ),
+        push: key.push_n,
+    };
+    with_keyframes(hand, hand.keyframes.iter().map(keyframe))
+}
+
+fn outcome(
+    scenario: &Scenario,
+    scene: &PreparedScene,
+    client: &Client,
+    play: &Play<'_>,
+    statistics: &Statistics,
+    ran: Ran,
+) -> Outcome {
+    let capabilities: &Capabilities = client.capabilities();
+    let samples = play.samples.as_slice();
+    let settled_count =
+        (scenario.run.settled_s * TICK_HZ / f64::from(scenario.run.telemetry_every_ticks)).ceil();
+    let settled = &samples[samples.len().saturating_sub(settled_count as usize)..];
+    let last = samples.iter().rev().find_map(|sample| sample.object.as_ref());
+    let depth = (scenario.depth.as_ref().zip(last))
+        .and_then(|(depth, (_, pose))| measure::depth(scene, depth, &measure::pose_mm(pose)));
+    let press = scenario
+        .press
+        .as_ref()
+        .and_then(|press| measure::press(press, settled));
+    let (energy_given_mj, energy_passed_mj) = measure::energy(samples);
+    let counted = capabilities.cost_unit == CostUnit::Instructions;
+    Outcome {
+        scenario: scenario.name.clone(),
+        rig: client.name().to_owned(),
+        board: capabilities.board.to_string(),
+        inserted_mm: depth.map(|(inserted, _, _)| inserted),
+        hole_mm: depth.map(|(_, hole, _)| hole),
+        lateral_mm: depth.map(|(_, _, lateral)| lateral),
+        ticks: statistics.ticks,
+        missed_ticks: statistics.missed_ticks,
+        instructions_per_tick_max: counted.then_some(statistics.cost_max),
+        instructions_per_tick_mean: (counted && statistics.ticks > 0)
+            .then(|| statistics.cost_sum as f64 / f64::from(statistics.ticks)),
+        instructions_per_tick_budget: counted.then_some(capabilities.cost_budget),
+        points_per_tick_max: statistics.points_max,
+        peak_force_n: f64::from(statistics.peak_force),
+        peak_torque_nm: f64::from(statistics.peak_torque),
+        press_handle_n: press.map(|(handle, _)| handle),
+        press_hand_n: press.map(|(_, hand)| hand),
+        press_error_percent: press.map(|(handle, hand)| 100.0 * (handle - hand).abs() / hand.abs().max(1e-9)),
+        penetration_mm: measure::deepest(scene, samples),
+        board_penetration_mm: measure::board_deepest(samples),
+        energy_given_mj,
+        energy_passed_mj,
+        samples: samples.len() as u32,
+        dropped_samples: statistics.dropped,
+        bad_frames: statistics.bad_frames,
+        parameter_messages: play.messages,
+        flags: samples.iter().fold(0, |flags, sample| flags | sample.flags),
+        image_bytes: scene.image.len(),
+        stack_bytes_max: statistics.stack_max,
+        state_hash: format!("{:016x}", ran.state_hash),
+    }
+}
