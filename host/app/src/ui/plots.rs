@@ -11,67 +11,75 @@ struct Trace {
     name: &'static str,
     color: Color32,
     of: fn(&Sample) -> f32,
+    /// To the unit shown.
+    factor: f32,
+}
+
+impl Trace {
+    fn value(&self, sample: &Sample) -> f32 {
+        self.factor * (self.of)(sample)
+    }
+}
+
+/// One plot.
+struct Panel<'a> {
+    title: &'static str,
+    unit: &'a str,
+    /// The scale goes up to here at least.
+    least: f64,
+    traces: &'a [Trace],
+    /// A line not to be reached, where there is one.
+    budget: Option<f32>,
 }
 
 /// Draws three side by side.
 pub fn show(ui: &mut Ui, session: &Session) {
-    let cost_unit = session
-        .connection()
-        .map_or("", |c| rig::unit(c.capabilities.cost_unit));
-    let budget = session
-        .connection()
-        .map(|c| c.capabilities.cost_budget)
-        .filter(|&b| b > 0);
+    let (factor, cost_unit) = session.connection().map_or((1.0, ""), rig::cost_scale);
+    let budget = (session.connection().map(|c| c.capabilities.cost_budget))
+        .filter(|&budget| budget > 0)
+        .map(|budget| budget as f32 * factor);
+    let trace = |name, color, of, factor| Trace {
+        name,
+        color,
+        of,
+        factor,
+    };
+    let force = [
+        trace("contacts", theme::CONTACT, |s| s.contact_n, 1.0),
+        trace("handle", theme::ACCENT, |s| s.handle_n, 1.0),
+    ];
+    let torque = [
+        trace("contacts", theme::CONTACT, |s| s.contact_nm, 1e3),
+        trace("handle", theme::ACCENT, |s| s.handle_nm, 1e3),
+    ];
+    let cost = [trace("tick", theme::GOOD, |s| s.cost, factor)];
+    let panel = |title, unit, least, traces, budget| Panel {
+        title,
+        unit,
+        least,
+        traces,
+        budget,
+    };
     ui.spacing_mut().item_spacing.x = 26.0;
-    ui.columns_const(|[force, torque, cost]| {
-        let handle = Trace {
-            name: "handle",
-            color: theme::ACCENT,
-            of: |s| s.handle_n,
-        };
-        let contact = Trace {
-            name: "contacts",
-            color: theme::CONTACT,
-            of: |s| s.contact_n,
-        };
-        plot(force, session, "Force", "N", 1.0, &[contact, handle], None);
-        let handle = Trace {
-            name: "handle",
-            color: theme::ACCENT,
-            of: |s| 1e3 * s.handle_nm,
-        };
-        let contact = Trace {
-            name: "contacts",
-            color: theme::CONTACT,
-            of: |s| 1e3 * s.contact_nm,
-        };
-        plot(torque, session, "Torque", "mN·m", 10.0, &[contact, handle], None);
-        let tick = Trace {
-            name: "tick",
-            color: theme::GOOD,
-            of: |s| s.cost,
-        };
+    ui.columns_const(|[left, middle, right]| {
+        plot(left, session, &panel("Force", "N", 1.0, &force, None));
+        plot(middle, session, &panel("Torque", "mN·m", 10.0, &torque, None));
         plot(
-            cost,
+            right,
             session,
-            "Cost of a tick",
-            cost_unit,
-            1000.0,
-            &[tick],
-            budget,
+            &panel("Cost of a tick", cost_unit, 10.0, &cost, budget),
         );
     });
 }
 
-fn plot(
-    ui: &mut Ui,
-    session: &Session,
-    title: &'static str,
-    unit: &str,
-    least: f64,
-    traces: &[Trace],
-    budget: Option<u32>,
-) {
+fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
+    let &Panel {
+        title,
+        unit,
+        least,
+        traces,
+        budget,
+    } = panel;
     let history = &session.history;
     ui.spacing_mut().item_spacing.x = 7.0;
     ui.horizontal(|ui| {
@@ -80,7 +88,7 @@ fn plot(
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             for trace in traces.iter().rev() {
                 if let Some(newest) = history.newest() {
-                    let value = (trace.of)(newest);
+                    let value = trace.value(newest);
                     let text = if value >= 100.0 {
                         format!("{value:.0}")
                     } else {
@@ -96,7 +104,7 @@ fn plot(
     let now = history.newest().map_or(0.0, |s| s.time_s);
     let largest = traces
         .iter()
-        .map(|trace| f64::from(history.largest(trace.of)))
+        .map(|trace| f64::from(history.largest(|sample| trace.value(sample))))
         .fold(0.0, f64::max);
     let mut top = nice_above((1.12 * largest).max(least));
     // The budget is worth its place once the trace comes near it.
@@ -140,7 +148,7 @@ fn plot(
             for trace in traces {
                 let points: PlotPoints<'_> = history
                     .iter()
-                    .map(|s| [s.time_s - now, f64::from((trace.of)(s))])
+                    .map(|s| [s.time_s - now, f64::from(trace.value(s))])
                     .collect();
                 plot.line(Line::new(trace.name, points).color(trace.color).width(1.6));
             }

@@ -2,7 +2,7 @@
 
 use egui::{RichText, ScrollArea, Ui, Vec2};
 use mortise_protocol::message::{Capabilities, CostUnit};
-use mortise_rig::RigSpec;
+use mortise_rig::{EmulatedMode, RigSpec};
 
 use super::{control, parameters, theme};
 use crate::session::link::{Connection, Link};
@@ -136,7 +136,8 @@ fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
         missed(ui, connection, telemetry.missed);
     }
     if let Some(statistics) = &connection.statistics {
-        let peak = format!("{} {}", statistics.cost_max, unit(can.cost_unit));
+        let (factor, unit) = cost_scale(connection);
+        let peak = format!("{:.1} {unit}", statistics.cost_max as f32 * factor);
         control::row(ui, "Dearest tick", peak);
     }
     let counts = connection.link_counts();
@@ -172,12 +173,26 @@ fn handle(can: &Capabilities) -> String {
     }
 }
 
-/// Short name of what ticks cost.
-pub fn unit(unit: CostUnit) -> &'static str {
-    match unit {
-        CostUnit::Instructions => "instr.",
-        CostUnit::Cycles => "cycles",
-        CostUnit::Nanoseconds => "ns",
+/// What costs are multiplied by to be shown, and the unit then.
+///
+/// An emulator that is not counting runs by the clock of this computer: what it calls instructions is time, and its budget one period.
+pub fn cost_scale(connection: &Connection) -> (f32, &'static str) {
+    let can = &connection.capabilities;
+    let counting = !matches!(
+        connection.spec,
+        RigSpec::Emulated {
+            mode: EmulatedMode::Interactive,
+            ..
+        }
+    );
+    match can.cost_unit {
+        CostUnit::Instructions if counting => (1e-3, "k instructions"),
+        CostUnit::Instructions => {
+            let period_us = 1e6 / f32::from(can.tick_hz.max(1));
+            (period_us / can.cost_budget.max(1) as f32, "µs")
+        }
+        CostUnit::Cycles => (1e-3, "k cycles"),
+        CostUnit::Nanoseconds => (1e-3, "µs"),
     }
 }
 
