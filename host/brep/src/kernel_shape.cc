@@ -439,16 +439,17 @@ RawShape describe(const TopoDS_Shape& shape, const std::unordered_map<const void
     linear = box.IsVoid() ? 0.1 : relative * std::sqrt(box.SquareExtent());
     if (!(linear > 1e-6)) linear = 1e-6;
   }
-  // The mesher may miss its bound (by 2.3 on a circle spelt as a spline), so it is measured and asked for more. The
-  // error falls with the square of a segment's length.
+  // The mesher may miss its bound on splines, so it is measured and asked for more. The error falls with the square of
+  // a segment's length; where it does not fall, the geometry is at fault and a finer mesh would only grow without end.
   double ask_linear = linear, ask_angular = angular_rad, found = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
     // Meshes left from an earlier call, or read from the file, are not ours.
     BRepTools::Clean(shape);
     BRepMesh_IncrementalMesh mesher(shape, ask_linear, false, ask_angular, false);
+    const double before = found;
     found = deviation(shape);
-    if (found <= 1.01 * linear) break;
-    const double shrink = std::max(0.1, 0.9 * linear / found);
+    if (found <= 1.01 * linear || (attempt > 0 && found > 0.8 * before)) break;
+    const double shrink = std::max(0.25, 0.9 * linear / found);
     ask_linear *= shrink;
     ask_angular *= std::sqrt(shrink);
   }

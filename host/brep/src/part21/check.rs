@@ -4,7 +4,7 @@
 //! entities that matter are errors, since the kernel would drop a solid or crash on them; the same faults in
 //! styles, notes and the like are warnings. Cost: a few passes over the entities.
 
-use super::{Exchange, Part21Error, reference, references};
+use super::{Exchange, Part21Error, reference, references, schema};
 
 /// Solids by the kinds the kernel turns into a solid each.
 pub const SOLIDS: &[&str] = &[
@@ -30,14 +30,15 @@ pub struct Content {
 /// Checks the text and lists its solids.
 ///
 /// # Errors
-/// [`Part21Error::Invalid`] for a dangling or cyclic reference, a number that is no finite double, a radius that
-/// is not positive, or an assembly that contains itself.
+/// [`Part21Error::Invalid`] for a dangling, cyclic or mistyped reference, a number that is no finite double, a
+/// radius that is not positive, or an assembly that contains itself.
 pub fn check(file: &Exchange) -> Result<Content, Part21Error> {
     let matters = reachable(file, |kinds| kinds.iter().any(|kind| is_root(kind)));
     let mut warnings = Vec::new();
     bad_numbers(file, &matters, &mut warnings)?;
     dangling(file, &matters, &mut warnings)?;
     cycles(file, &matters)?;
+    schema::check(file, &matters)?;
     radii(file, &matters)?;
     assembly_cycles(file)?;
     let represented = reachable(file, |kinds| {
@@ -116,13 +117,13 @@ fn bad_numbers(file: &Exchange, matters: &[bool], warnings: &mut Vec<String>) ->
 fn dangling(file: &Exchange, matters: &[bool], warnings: &mut Vec<String>) -> Result<(), Part21Error> {
     let mut harmless = 0;
     let mut first = None;
-    for entity in 0..file.entities.len() {
+    for (entity, &counts) in matters.iter().enumerate() {
         for id in file.references_of(entity) {
             if file.find(*id).is_some() {
                 continue;
             }
             let what = format!("{} refers to #{id}, which does not exist", file.label(entity));
-            if matters[entity] {
+            if counts {
                 return Err(at(file, entity, what));
             }
             harmless += 1;

@@ -2,7 +2,7 @@
 //!
 //! The kernel is lenient where it must not be: it drops a solid that refers to nothing, crashes on a number
 //! that is none, and reads nothing at all from some legal texts. So the text is scanned here first: errors are
-//! named with their line ([`check`]), and the kernel gets a plain rendering ([`render`]) without comments, one
+//! named with their line ([`check`], [`schema`]), and the kernel gets a plain rendering ([`render`]) without comments, one
 //! entity a line, entities numbered 1, 2, …, and products and occurrences named by tokens whose text is decoded
 //! here ([`text`]).
 
@@ -10,6 +10,7 @@ pub mod check;
 mod lexer;
 pub mod operators;
 pub mod render;
+pub mod schema;
 pub mod text;
 pub mod units;
 

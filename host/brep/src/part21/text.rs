@@ -64,13 +64,13 @@ fn directive(text: &[u8], out: &mut String) -> Option<usize> {
             let end = text.windows(4).position(|w| w == b"\\X0\\")?;
             let digits = &text[4..end];
             match text.get(2)? {
-                b'2' if digits.len() % 4 == 0 => {
+                b'2' if digits.len().is_multiple_of(4) => {
                     let units = digits
                         .chunks(4)
                         .map(|d| hex(d).and_then(|u| u16::try_from(u).ok()));
                     out.push_str(&String::from_utf16_lossy(&units.collect::<Option<Vec<u16>>>()?));
                 }
-                b'4' if digits.len() % 8 == 0 => {
+                b'4' if digits.len().is_multiple_of(8) => {
                     let characters = digits.chunks(8).map(|d| hex(d).and_then(char::from_u32));
                     out.push_str(&characters.collect::<Option<String>>()?);
                 }

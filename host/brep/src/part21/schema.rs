@@ -1,0 +1,251 @@
+//! The few rules of ISO 10303-42 without which the kernel crashes instead of complaining: how many arguments an
+//! entity of geometry or topology has, and of which family each reference is.
+//!
+//! Only certain faults are reported: a reference to a type not listed here is left to the kernel.
+
+use super::{Exchange, Part21Error, reference};
+
+/// What a type is, as far as references tell it apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Family {
+    Point,
+    Direction,
+    Vector,
+    Placement,
+    Curve,
+    Surface,
+    Vertex,
+    Edge,
+    OrientedEdge,
+    Loop,
+    Bound,
+    Face,
+    Shell,
+    Solid,
+    Other,
+}
+
+/// One argument.
+#[derive(Clone, Copy, Debug)]
+enum Argument {
+    /// Text, number, flag: not looked at.
+    Any,
+    /// A reference to one of the family.
+    One(Family),
+    /// The same, or `$`, or `*`.
+    Maybe(Family),
+    /// A list of references to the family.
+    List(Family),
+}
+
+use Argument::{Any, List, Maybe, One};
+use Family::{
+    Bound, Curve, Direction, Edge, Face, Loop, OrientedEdge, Placement, Point, Shell, Surface, Vector, Vertex,
+};
+
+const RULES: &[(&str, &[Argument])] = &[
+    ("CARTESIAN_POINT", &[Any, Any]),
+    ("DIRECTION", &[Any, Any]),
+    ("VECTOR", &[Any, One(Direction), Any]),
+    ("AXIS1_PLACEMENT", &[Any, One(Point), Maybe(Direction)]),
+    ("AXIS2_PLACEMENT_2D", &[Any, One(Point), Maybe(Direction)]),
+    (
+        "AXIS2_PLACEMENT_3D",
+        &[Any, One(Point), Maybe(Direction), Maybe(Direction)],
+    ),
+    ("LINE", &[Any, One(Point), One(Vector)]),
+    ("CIRCLE", &[Any, One(Placement), Any]),
+    ("ELLIPSE", &[Any, One(Placement), Any, Any]),
+    ("PLANE", &[Any, One(Placement)]),
+    ("CYLINDRICAL_SURFACE", &[Any, One(Placement), Any]),
+    ("CONICAL_SURFACE", &[Any, One(Placement), Any, Any]),
+    ("SPHERICAL_SURFACE", &[Any, One(Placement), Any]),
+    ("TOROIDAL_SURFACE", &[Any, One(Placement), Any, Any]),
+    ("VERTEX_POINT", &[Any, One(Point)]),
+    ("EDGE_CURVE", &[Any, One(Vertex), One(Vertex), One(Curve), Any]),
+    (
+        "ORIENTED_EDGE",
+        &[Any, Maybe(Vertex), Maybe(Vertex), One(Edge), Any],
+    ),
+    ("EDGE_LOOP", &[Any, List(OrientedEdge)]),
+    ("POLY_LOOP", &[Any, List(Point)]),
+    ("VERTEX_LOOP", &[Any, One(Vertex)]),
+    ("FACE_BOUND", &[Any, One(Loop), Any]),
+    ("FACE_OUTER_BOUND", &[Any, One(Loop), Any]),
+    ("ADVANCED_FACE", &[Any, List(Bound), One(Surface), Any]),
+    ("FACE_SURFACE", &[Any, List(Bound), One(Surface), Any]),
+    ("CLOSED_SHELL", &[Any, List(Face)]),
+    ("OPEN_SHELL", &[Any, List(Face)]),
+    ("ORIENTED_CLOSED_SHELL", &[Any, Any, One(Shell), Any]),
+    ("MANIFOLD_SOLID_BREP", &[Any, One(Shell)]),
+    ("FACETED_BREP", &[Any, One(Shell)]),
+    ("BREP_WITH_VOIDS", &[Any, One(Shell), List(Shell)]),
+];
+
+/// Family of a simple type; `None` when this module does not know it.
+fn family(kind: &str) -> Option<Family> {
+    Some(match kind {
+        "CARTESIAN_POINT" => Point,
+        "DIRECTION" => Direction,
+        "VECTOR" => Vector,
+        "AXIS1_PLACEMENT" | "AXIS2_PLACEMENT_2D" | "AXIS2_PLACEMENT_3D" => Placement,
+        "LINE"
+        | "CIRCLE"
+        | "ELLIPSE"
+        | "PARABOLA"
+        | "HYPERBOLA"
+        | "POLYLINE"
+        | "B_SPLINE_CURVE_WITH_KNOTS"
+        | "TRIMMED_CURVE"
+        | "COMPOSITE_CURVE"
+        | "SURFACE_CURVE"
+        | "SEAM_CURVE"
+        | "INTERSECTION_CURVE"
+        | "BEZIER_CURVE"
+        | "QUASI_UNIFORM_CURVE"
+        | "UNIFORM_CURVE"
+        | "OFFSET_CURVE_3D"
+        | "PCURVE" => Curve,
+        "PLANE"
+        | "CYLINDRICAL_SURFACE"
+        | "CONICAL_SURFACE"
+        | "SPHERICAL_SURFACE"
+        | "TOROIDAL_SURFACE"
+        | "DEGENERATE_TOROIDAL_SURFACE"
+        | "B_SPLINE_SURFACE_WITH_KNOTS"
+        | "SURFACE_OF_LINEAR_EXTRUSION"
+        | "SURFACE_OF_REVOLUTION"
+        | "OFFSET_SURFACE"
+        | "BEZIER_SURFACE"
+        | "RECTANGULAR_TRIMMED_SURFACE"
+        | "CURVE_BOUNDED_SURFACE"
+        | "QUASI_UNIFORM_SURFACE"
+        | "UNIFORM_SURFACE" => Surface,
+        "VERTEX_POINT" => Vertex,
+        "EDGE_CURVE" => Edge,
+        "ORIENTED_EDGE" => OrientedEdge,
+        "EDGE_LOOP" | "POLY_LOOP" | "VERTEX_LOOP" => Loop,
+        "FACE_BOUND" | "FACE_OUTER_BOUND" => Bound,
+        "ADVANCED_FACE" | "FACE_SURFACE" | "ORIENTED_FACE" => Face,
+        "CLOSED_SHELL" | "OPEN_SHELL" | "ORIENTED_CLOSED_SHELL" | "ORIENTED_OPEN_SHELL" => Shell,
+        "MANIFOLD_SOLID_BREP" | "BREP_WITH_VOIDS" | "FACETED_BREP" => Family::Solid,
+        "PRODUCT"
+        | "PRODUCT_DEFINITION"
+        | "SHAPE_REPRESENTATION"
+        | "ADVANCED_BREP_SHAPE_REPRESENTATION"
+        | "COLOUR_RGB"
+        | "STYLED_ITEM"
+        | "NEXT_ASSEMBLY_USAGE_OCCURRENCE"
+        | "PRODUCT_DEFINITION_SHAPE" => Family::Other,
+        _ => return None,
+    })
+}
+
+/// Checks the entities that matter.
+///
+/// # Errors
+/// [`Part21Error::Invalid`] for the first entity with a wrong number of arguments or a reference to another family.
+pub fn check(file: &Exchange, matters: &[bool]) -> Result<(), Part21Error> {
+    let rules: std::collections::HashMap<&str, &[Argument]> = RULES.iter().copied().collect();
+    for entity in (0..file.entities.len()).filter(|&e| matters[e]) {
+        let Some(rule) = rules.get(file.kind(entity)) else {
+            continue;
+        };
+        let arguments = file.arguments(entity);
+        let fault = if arguments.len() != rule.len() {
+            Some(format!(
+                "has {} arguments where {} are due",
+                arguments.len(),
+                rule.len()
+            ))
+        } else {
+            arguments
+                .iter()
+                .zip(*rule)
+                .find_map(|(given, rule)| fault(file, given, *rule))
+        };
+        if let Some(fault) = fault {
+            let what = format!("{} {fault}", file.label(entity));
+            return Err(Part21Error::Invalid {
+                line: file.entities[entity].line,
+                what,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn fault(file: &Exchange, given: &[u8], rule: Argument) -> Option<String> {
+    let wrong = |given: &[u8], want: Family| {
+        let shown = String::from_utf8_lossy(&given[..given.len().min(40)]).into_owned();
+        let Some(target) = reference(given) else {
+            return Some(format!("has {shown} where a reference to a {want:?} is due"));
+        };
+        // A dangling reference is reported by another check.
+        let target = file.find(target)?;
+        let found = family(file.kind(target))?;
+        (found != want).then(|| format!("refers to {} where a {want:?} is due", file.label(target)))
+    };
+    match rule {
+        Any => None,
+        Maybe(_) if given == b"$" || given == b"*" => None,
+        One(want) | Maybe(want) => wrong(given, want),
+        List(want) => match given.strip_prefix(b"(").and_then(|g| g.strip_suffix(b")")) {
+            None => Some("has no list where one is due".into()),
+            Some(b"") => None,
+            Some(list) => list.split(|&b| b == b',').find_map(|item| wrong(item, want)),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault_of(data: &str) -> Option<String> {
+        let text = format!("ISO-10303-21;HEADER;ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+        let file = super::super::parse(text.as_bytes()).unwrap();
+        match check(&file, &vec![true; file.entities.len()]) {
+            Err(Part21Error::Invalid { what, .. }) => Some(what),
+            Ok(()) => None,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn wrong_families_and_counts_are_named() {
+        let base = "#1=CARTESIAN_POINT('',(0.,0.,0.));#2=DIRECTION('',(0.,0.,1.));";
+        assert_eq!(
+            fault_of(&format!("{base}#3=AXIS2_PLACEMENT_3D('',#1,#2,$);")),
+            None
+        );
+        let fault = fault_of(&format!("{base}#3=AXIS2_PLACEMENT_3D('',#2,#2,$);")).unwrap();
+        assert_eq!(
+            fault,
+            "#3 AXIS2_PLACEMENT_3D refers to #2 DIRECTION where a Point is due"
+        );
+        let fault = fault_of(&format!("{base}#3=AXIS2_PLACEMENT_3D('',#1);")).unwrap();
+        assert_eq!(fault, "#3 AXIS2_PLACEMENT_3D has 2 arguments where 4 are due");
+        let fault = fault_of(&format!("{base}#3=AXIS2_PLACEMENT_3D('',0.,#2,$);")).unwrap();
+        assert!(fault.contains("has 0. where a reference to a Point is due"));
+        assert!(
+            fault_of("#1=EDGE_LOOP('',(#2));#2=FACE_BOUND('',#1,.T.);")
+                .unwrap()
+                .contains("OrientedEdge")
+        );
+    }
+
+    #[test]
+    fn what_is_not_known_is_left_to_the_kernel() {
+        assert_eq!(
+            fault_of(
+                "#1=EDGE_CURVE('',#2,#2,#3,.T.);#2=VERTEX_POINT('',#4);#3=SPIRAL();#4=POINT_ON_CURVE();"
+            ),
+            None
+        );
+        assert_eq!(
+            fault_of("#1=VERTEX_POINT('',#2);#2=(CARTESIAN_POINT()POINT());"),
+            None
+        );
+    }
+}
