@@ -6,9 +6,11 @@ use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use glam::DVec3;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::{Window, theme};
+use mortise::viewport::gesture::on_screen;
 use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
@@ -141,6 +143,60 @@ fn space_and_escape_stop() {
             s.device() == Some(DeviceState::Stopped)
         });
     }
+}
+
+#[test]
+fn the_part_in_hand_follows_the_pointer() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    click(&mut harness, "Arm");
+    until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+    click(&mut harness, "peg");
+    click(&mut harness, "Grab");
+    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+
+    let view = harness.get_by_label("3D view").rect();
+    let camera = harness.state().view.camera;
+    let middle = harness.state().session.document.as_ref().expect("open").poses[1].translation;
+    // The peg's frame lies at its upper end; half way down it is surely under the pointer.
+    let from = on_screen(&camera, view, middle - 30.0 * DVec3::Z).expect("in front");
+    let to = from + egui::vec2(60.0, -40.0);
+    harness.drag_at(from);
+    harness.step();
+    for part in 1..=10 {
+        harness.hover_at(from.lerp(to, 0.1 * part as f32));
+        harness.step();
+    }
+    harness.drop_at(to);
+    let aimed = |s: &Session| {
+        let now = s.document.as_ref().expect("open").poses[1].translation;
+        let expected = on_screen(&camera, view, now - 30.0 * DVec3::Z).expect("in front");
+        expected.distance(to) < 5.0
+    };
+    until(&mut harness, "the peg is where the pointer went", aimed);
+    assert_eq!(harness.state().view.camera, camera, "the view did not turn");
+}
+
+#[test]
+fn a_press_that_is_over_within_one_picture_stops() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    click(&mut harness, "Arm");
+    until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+    let pos = harness.get_by_label("STOP").rect().center();
+    for pressed in [true, false] {
+        harness.input_mut().events.push(egui::Event::PointerButton {
+            pos,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        });
+    }
+    until(&mut harness, "stopped", |s| {
+        s.device() == Some(DeviceState::Stopped)
+    });
 }
 
 #[test]

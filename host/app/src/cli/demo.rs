@@ -1,11 +1,12 @@
-//! `mortise demo`: the sample insertion, in the window.
+//! `mortise demo`: the sample insertion, in the window or without one.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use mortise_rig::RigSpec;
+use mortise_lab::scenario::{self, Outcome, Scenario};
+use mortise_rig::{EmulatedMode, RigSpec};
 
-use super::Picture;
+use super::{Picture, output};
 use crate::session::Intent;
 use crate::ui::app;
 
@@ -14,18 +15,106 @@ use crate::ui::app;
 pub struct Args {
     /// STEP file with a peg before a hole [default: the sample that comes with the program]
     file: Option<PathBuf>,
+    /// Without a window: play the insertion tick by tick and print what was measured
+    #[arg(long)]
+    headless: bool,
     /// sim, emulated, or a serial port [default: emulated if it is there, else sim]
     #[arg(long, value_parser = super::rig)]
     rig: Option<RigSpec>,
+    /// One JSON object (with --headless)
+    #[arg(long, requires = "headless")]
+    json: bool,
     #[command(flatten)]
     picture: Picture,
 }
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.headless {
+        return headless(&args);
+    }
     let mut first = Vec::new();
     first.extend(args.file.map(Intent::Open));
     first.push(Intent::Demo(args.rig));
-    app::run(args.picture.options(first))?;
+    let mut options = args.picture.options(first);
+    // What happens in a hole is seen through its walls.
+    options.see_through = true;
+    app::run(options)?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn headless(args: &Args) -> anyhow::Result<ExitCode> {
+    let rig = args.rig.clone().unwrap_or_else(best_rig);
+    // The sample's file is removed when this is dropped, after the run.
+    let sample = match &args.file {
+        Some(_) => None,
+        None => Some(crate::sample::File::write()?),
+    };
+    let step = match (&args.file, &sample) {
+        (Some(file), _) => file.as_path(),
+        (None, Some(sample)) => sample.path(),
+        (None, None) => anyhow::bail!("there is no file to open"),
+    };
+    let scenario = Scenario::insertion(step)?;
+    let outcome = scenario::run(&scenario, &rig)?;
+    let verdicts = outcome.verdicts(&scenario);
+    if args.json {
+        output::json(&outcome)?;
+    } else {
+        table(&outcome)?;
+        for verdict in &verdicts {
+            output::line(&format!("  {verdict}"))?;
+        }
+    }
+    let holds = verdicts.iter().all(|verdict| verdict.holds);
+    if !holds {
+        for verdict in verdicts.iter().filter(|verdict| !verdict.holds) {
+            eprintln!("mortise: {verdict}");
+        }
+    }
+    Ok(if holds {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+fn table(outcome: &Outcome) -> anyhow::Result<()> {
+    let millimetres = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |v| format!("{v:.2}"));
+    output::line(&format!(
+        "{} on {} ({}): inserted {} of {} mm in {} ticks, {} missed, at most {:.2} N",
+        outcome.scenario,
+        outcome.rig,
+        outcome.board,
+        millimetres(outcome.inserted_mm),
+        millimetres(outcome.hole_mm),
+        outcome.ticks,
+        outcome.missed_ticks,
+        outcome.peak_force_n,
+    ))?;
+    if let Some(instructions) = outcome.instructions_per_tick_max {
+        output::line(&format!("  dearest tick: {instructions} instructions"))?;
+    }
+    output::line(&format!("  state hash: {}", outcome.state_hash))
+}
+
+/// The emulated board when it is there, else in-process, with a word about it.
+fn best_rig() -> RigSpec {
+    let emulated = RigSpec::Emulated {
+        mode: EmulatedMode::Interactive,
+        firmware: None,
+    };
+    let entry = mortise_rig::list()
+        .into_iter()
+        .find(|entry| entry.spec == emulated);
+    match entry.map(|entry| entry.available) {
+        Some(Ok(())) => emulated,
+        other => {
+            let why = other.and_then(Result::err).unwrap_or_default();
+            eprintln!(
+                "mortise: the emulated board is not there, so the simulation in this program is used: {why}"
+            );
+            RigSpec::Simulated { realtime: true }
+        }
+    }
 }

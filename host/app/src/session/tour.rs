@@ -119,7 +119,20 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
             session.connection()?;
             Some(Some(Tour::at(Step::Scene)))
         }
-        Step::Scene => session.scene_is_on_board().then(|| Some(Tour::at(Step::PutBack))),
+        Step::Scene => {
+            if !session.scene_is_on_board() {
+                return None;
+            }
+            if !session.connection()?.capabilities.simulated {
+                // Motors with a person at them are armed by that person.
+                session.notes.add(
+                    Severity::Info,
+                    "The scene is on the board: take the handle, arm, and grab a part",
+                );
+                return Some(None);
+            }
+            Some(Some(Tour::at(Step::PutBack)))
+        }
         Step::PutBack => {
             if session.is_armed() {
                 ask(session, ToDevice::Disarm);

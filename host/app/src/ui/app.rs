@@ -38,6 +38,8 @@ struct App {
     began: Instant,
     taken: Arc<Mutex<Option<Arc<ColorImage>>>>,
     asked: bool,
+    /// Document the window is named after.
+    named: Option<u64>,
     failed: Arc<Mutex<Option<anyhow::Error>>>,
 }
 
@@ -76,6 +78,7 @@ pub fn run(options: Options) -> anyhow::Result<()> {
                 began: Instant::now(),
                 taken: Arc::default(),
                 asked: false,
+                named: None,
                 failed: report,
             }))
         }),
@@ -98,6 +101,7 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         self.window.show(ui, self.surface.as_mut());
+        self.name_window(ui.ctx());
         self.take_screenshot(ui.ctx());
     }
 
@@ -107,6 +111,15 @@ impl eframe::App for App {
 }
 
 impl App {
+    fn name_window(&mut self, ctx: &egui::Context) {
+        let open = self.window.session.document.as_ref();
+        if open.map(|d| d.generation) != self.named {
+            self.named = open.map(|d| d.generation);
+            let title = open.map_or("Mortise".to_owned(), |d| format!("{} – Mortise", d.title));
+            ctx.send_viewport_cmd(ViewportCommand::Title(title));
+        }
+    }
+
     fn take_screenshot(&mut self, ctx: &egui::Context) {
         let Some(screenshot) = &self.screenshot else {
             return;

@@ -1,13 +1,14 @@
 //! The STOP button: large, red, always there, always enabled; also Space and Esc.
 
 use egui::{
-    Color32, CornerRadius, FontId, Key, Modifiers, Response, Role, Sense, Stroke, Ui, Vec2, WidgetInfo,
+    Color32, CornerRadius, Event, FontId, Key, Modifiers, Rect, Response, Role, Sense, Stroke, Ui, Vec2,
+    WidgetInfo,
 };
 
 use super::theme;
 use crate::session::{Intent, Session};
 
-/// Draws it. A press, not a click: it acts when the button goes down.
+/// Draws it. A press counts, not a click: it acts when the button goes down.
 pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) -> Response {
     let (rect, response) = ui.allocate_exact_size(Vec2::new(148.0, 44.0), Sense::click());
     let down = response.is_pointer_button_down_on();
@@ -24,7 +25,7 @@ pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) -> Respo
         Stroke::new(1.0, Color32::from_rgb(255, 140, 134)),
         egui::StrokeKind::Inside,
     );
-    let sign = egui::Rect::from_center_size(rect.left_center() + Vec2::new(28.0, 0.0), Vec2::splat(13.0));
+    let sign = Rect::from_center_size(rect.left_center() + Vec2::new(28.0, 0.0), Vec2::splat(13.0));
     painter.rect_filled(sign, CornerRadius::same(2), Color32::WHITE);
     painter.text(
         rect.center() + Vec2::new(14.0, 0.0),
@@ -34,10 +35,7 @@ pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) -> Respo
         Color32::WHITE,
     );
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "STOP"));
-    // Going down and coming up are one wish.
-    let pressed = down && ui.input(|i| i.pointer.any_pressed());
-    let keyboard = response.clicked() && !ui.input(|i| i.pointer.any_released());
-    if pressed || keyboard {
+    if pressed_on(ui, rect) || (response.clicked() && !by_pointer(ui)) {
         wanted.push(Intent::Stop);
     }
     let hint = if session.connection().is_some() {
@@ -46,6 +44,24 @@ pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) -> Respo
         "Motors off, now (Space or Esc). No rig is connected"
     };
     response.on_hover_text(hint)
+}
+
+/// The events themselves are looked at: a press that is over within one picture counts, and nothing that lies over the button,
+/// such as the backdrop of a dialog, can take it.
+fn pressed_on(ui: &Ui, rect: Rect) -> bool {
+    let is_press = |event: &Event| match event {
+        Event::PointerButton { pos, pressed, .. } => *pressed && rect.contains(*pos),
+        _ => false,
+    };
+    ui.input(|i| i.events.iter().any(is_press))
+}
+
+/// The click that follows a press is not a second wish; one by keyboard or screen reader has no press.
+fn by_pointer(ui: &Ui) -> bool {
+    ui.input(|i| {
+        let button = |event: &Event| matches!(event, Event::PointerButton { .. });
+        i.events.iter().any(button)
+    })
 }
 
 /// Space and Esc, taken before any other control sees them. A text field keeps its Space.

@@ -5,6 +5,7 @@ use egui::{
     WidgetInfo,
 };
 use glam::DVec3;
+use mortise_protocol::message::flag;
 
 use super::{control, theme};
 use crate::session::{Intent, Session};
@@ -182,6 +183,17 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
     });
 }
 
+/// What the board reports of the tick, in words.
+const FLAGS: [(u16, &str); 7] = [
+    (flag::FORCE_LIMIT, "force limit acts"),
+    (flag::TORQUE_LIMIT, "torque limit acts"),
+    (flag::SLEW_LIMIT, "slew limit acts"),
+    (flag::COUPLING_LIMIT, "the coupling slips"),
+    (flag::BUDGET, "point budget reached"),
+    (flag::CONTACTS, "more contacts than fit"),
+    (flag::NON_FINITE, "a number was not finite"),
+];
+
 /// Force now and which faces touch, in the upper right corner, while a part is in hand.
 fn readout(ui: &Ui, rect: Rect, session: &Session) {
     let (Some(part), Some(telemetry), Some(document)) =
@@ -200,6 +212,11 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
     }
     if telemetry.pairs.is_empty() {
         lines.push(("touches nothing".to_owned(), theme::TEXT_WEAK, 12.5));
+    }
+    for (bit, words) in FLAGS {
+        if telemetry.flags & bit != 0 {
+            lines.push((words.to_owned(), theme::WARNING, 12.5));
+        }
     }
     for pair in telemetry.pairs.iter().take(3) {
         let other = document.model_part(pair.static_part);
