@@ -180,6 +180,8 @@ fn account(
                     result.faces
                 ));
             }
+            // Faces beside solids are left out; the part they stand beside says how many.
+            Some(result) if !is_solid && result.faces > 0 && !content.solids.is_empty() => {}
             result => {
                 let why = result.map(|r| one_line(&r.message)).filter(|m| !m.is_empty());
                 lost.push(why.map_or(label(entity), |why| format!("{} ({why})", label(entity))));

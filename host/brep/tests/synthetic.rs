@@ -164,6 +164,103 @@ fn mirrored_and_scaled_placements_become_shapes_of_their_own() {
 }
 
 #[test]
+fn an_occurrence_may_be_placed_by_an_operator() {
+    let mut text = StepText::millimetres();
+    let solid = text.solid_box("", DVec3::new(1.0, 2.0, 3.0), true);
+    let part = text.part("block", &[solid]);
+    let inner = text.assembly("inner");
+    let outer = text.assembly("outer");
+    // Mirrored in y and three times as large, then moved.
+    let axes = [DVec3::X, -DVec3::Y, DVec3::Z];
+    let plain = text.operator(axes, DVec3::new(0.0, 0.0, 5.0), 3.0);
+    let complex = text.complex_operator(axes, DVec3::new(0.0, 0.0, 5.0), 3.0);
+    text.component_by_operator("a", inner, part, plain);
+    text.component_by_operator("b", inner, part, complex);
+    text.component("c", inner, part, DAffine3::IDENTITY);
+    text.component("inner", outer, inner, DAffine3::from_translation(DVec3::X * 10.0));
+    let model = load(&text.finish()).unwrap();
+    assert_eq!(names(&model), ["a", "b", "c"]);
+    assert_eq!(model.shapes.len(), 2, "the two mirrored ones are one shape");
+    for i in 0..2 {
+        assert_near(placed_box(&model, i).0, DVec3::new(10.0, -6.0, 5.0), 1e-9);
+        assert_near(placed_box(&model, i).1, DVec3::new(13.0, 0.0, 14.0), 1e-9);
+        let shape = &model.shapes[model.parts[i].shape];
+        assert!(shape.closed && (shape.volume_mm3 - 162.0).abs() < 1e-6);
+    }
+    assert_near(placed_box(&model, 2).1, DVec3::new(11.0, 2.0, 3.0), 1e-9);
+}
+
+#[test]
+fn open_shells_alone_are_a_leaky_part() {
+    let mut text = StepText::millimetres();
+    let faces = text.box_faces(DVec3::splat(2.0), true);
+    let shell = text.add(&format!("OPEN_SHELL('',{})", support::list(&faces[1..])));
+    let surface = text.add(&format!("SHELL_BASED_SURFACE_MODEL('',(#{shell}))"));
+    let whole = text.representation("MANIFOLD_SURFACE_SHAPE_REPRESENTATION", &[surface]);
+    text.product("tray", whole);
+    let model = load(&text.finish()).unwrap();
+    assert_eq!(names(&model), ["tray"]);
+    assert!(!model.shapes[0].closed);
+    assert_eq!((model.shapes[0].faces.len(), model.shapes[0].open_edges), (5, 4));
+    assert!(
+        model
+            .warnings
+            .iter()
+            .any(|w| w.contains("tray: is not closed: 4 mesh edges")),
+        "{:?}",
+        model.warnings
+    );
+}
+
+#[test]
+fn faces_beside_solids_are_left_out_and_said_so() {
+    let mut text = StepText::millimetres();
+    let solid = text.solid_box("", DVec3::splat(2.0), true);
+    let faces = text.box_faces(DVec3::splat(5.0), true);
+    let shell = text.add(&format!("OPEN_SHELL('',{})", support::list(&faces[1..])));
+    let surface = text.add(&format!("SHELL_BASED_SURFACE_MODEL('',(#{shell}))"));
+    text.part("both", &[solid, surface]);
+    let model = load(&text.finish()).unwrap();
+    assert_eq!(names(&model), ["both"]);
+    assert!(model.shapes[0].closed);
+    assert!(
+        model
+            .warnings
+            .iter()
+            .any(|w| w.contains("5 faces outside its solids")),
+        "{:?}",
+        model.warnings
+    );
+}
+
+#[test]
+fn faces_and_solids_keep_their_colours() {
+    let mut text = StepText::millimetres();
+    let faces = text.box_faces(DVec3::ONE, true);
+    let shell = text.add(&format!("CLOSED_SHELL('',{})", support::list(&faces)));
+    let solid = text.add(&format!("MANIFOLD_SOLID_BREP('',#{shell})"));
+    text.part("box", &[solid]);
+    text.color(solid, [0.0, 1.0, 0.0]);
+    text.color(faces[0], [1.0, 0.0, 0.0]);
+    let model = load(&text.finish()).unwrap();
+    assert_eq!(model.parts[0].color, Some([0.0, 1.0, 0.0]));
+    let colored: Vec<_> = model.shapes[0]
+        .faces
+        .iter()
+        .filter(|f| f.color.is_some())
+        .collect();
+    assert_eq!(colored.len(), 1);
+    assert_eq!(colored[0].color, Some([1.0, 0.0, 0.0]));
+    let Surface::Plane { frame } = colored[0].surface else {
+        panic!("a plane")
+    };
+    assert!(
+        frame.origin.z.abs() < 1e-12 && frame.z.z.abs() > 1.0 - 1e-12,
+        "the bottom is red"
+    );
+}
+
+#[test]
 fn a_solid_that_the_kernel_loses_is_an_error_or_a_warning() {
     let mut text = StepText::millimetres();
     let good = text.solid_box("good", DVec3::splat(1.0), true);

@@ -302,11 +302,18 @@ mod tests {
     #[test]
     fn faults_that_reach_a_shape_are_errors() {
         let with = |face: &str| format!("{SOLID}#4=ADVANCED_FACE('',(),#5,.T.);{face}");
-        assert!(checked(&with("#5=PLANE('',#6);#6=AXIS();")).is_ok());
+        assert!(
+            checked(&with(
+                "#5=PLANE('',#6);#6=AXIS2_PLACEMENT_3D('',#7,$,$);#7=CARTESIAN_POINT('',(0.,0.,0.));"
+            ))
+            .is_ok()
+        );
         assert!(fault(&with("")).contains("#4 ADVANCED_FACE refers to #5, which does not exist"));
-        assert!(fault(&with("#5=CYLINDRICAL_SURFACE('',#6,-5.);#6=AXIS();")).contains("radius -5."));
-        assert!(fault(&with("#5=CYLINDRICAL_SURFACE('',#6,1.E999);#6=AXIS();")).contains("1.E999"));
-        assert!(fault(&with("#5=PLANE('',#6);#6=AXIS(#5);")).contains("refer to each other"));
+        assert!(fault(&with("#5=CYLINDRICAL_SURFACE('',#6,-5.);#6=AXIS2_PLACEMENT_3D('',#7,$,$);#7=CARTESIAN_POINT('',(0.,0.,0.));")).contains("radius -5."));
+        assert!(fault(&with("#5=CYLINDRICAL_SURFACE('',#6,1.E999);#6=AXIS2_PLACEMENT_3D('',#7,$,$);#7=CARTESIAN_POINT('',(0.,0.,0.));")).contains("1.E999"));
+        assert!(
+            fault(&with("#5=PLANE('',#6);#6=AXIS2_PLACEMENT_3D('',#5,$,$);")).contains("refer to each other")
+        );
     }
 
     #[test]

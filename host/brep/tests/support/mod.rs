@@ -113,6 +113,13 @@ impl StepText {
 
     /// A box from the origin to `size`. `outward` false makes its faces look inward.
     pub fn solid_box(&mut self, name: &str, size: DVec3, outward: bool) -> u64 {
+        let faces = self.box_faces(size, outward);
+        let shell = self.add(&format!("CLOSED_SHELL('',{})", list(&faces)));
+        self.add(&format!("MANIFOLD_SOLID_BREP('{name}',#{shell})"))
+    }
+
+    /// The faces of a box, the bottom (z = 0) first, and no shell.
+    pub fn box_faces(&mut self, size: DVec3, outward: bool) -> Vec<u64> {
         let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) * size;
         let vertices: Vec<u64> = (0..8)
             .map(|i| {
@@ -164,13 +171,26 @@ impl StepText {
             let [p, q, r] = [corner(face[0]), corner(face[1]), corner(face[2])];
             let axis = self.axis(p, (q - p).cross(r - q).normalize(), (q - p).normalize());
             let plane = self.add(&format!("PLANE('',#{axis})"));
-            faces.push(format!(
-                "#{}",
-                self.add(&format!("ADVANCED_FACE('',(#{bound}),#{plane},.{sense}.)"))
-            ));
+            faces.push(self.add(&format!("ADVANCED_FACE('',(#{bound}),#{plane},.{sense}.)")));
         }
-        let shell = self.add(&format!("CLOSED_SHELL('',({}))", faces.join(",")));
-        self.add(&format!("MANIFOLD_SOLID_BREP('{name}',#{shell})"))
+        faces
+    }
+
+    /// Colours an item (a face, a solid), sRGB.
+    pub fn color(&mut self, item: u64, rgb: [f64; 3]) {
+        let [r, g, b] = rgb;
+        let color = self.add(&format!("COLOUR_RGB('',{r:?},{g:?},{b:?})"));
+        let color = self.add(&format!("FILL_AREA_STYLE_COLOUR('',#{color})"));
+        let area = self.add(&format!("FILL_AREA_STYLE('',(#{color}))"));
+        let fill = self.add(&format!("SURFACE_STYLE_FILL_AREA(#{area})"));
+        let side = self.add(&format!("SURFACE_SIDE_STYLE('',(#{fill}))"));
+        let usage = self.add(&format!("SURFACE_STYLE_USAGE(.BOTH.,#{side})"));
+        let style = self.add(&format!("PRESENTATION_STYLE_ASSIGNMENT((#{usage}))"));
+        let styled = self.add(&format!("STYLED_ITEM('color',(#{style}),#{item})"));
+        let context = self.context;
+        self.add(&format!(
+            "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#{styled}),#{context})"
+        ));
     }
 
     /// A representation of these items.
@@ -225,6 +245,20 @@ impl StepText {
         let from = self.origin();
         let to = self.axis(motion.translation, motion.matrix3.z_axis, motion.matrix3.x_axis);
         let transformation = self.add(&format!("ITEM_DEFINED_TRANSFORMATION('','',#{from},#{to})"));
+        self.related(shape, parent, child, transformation);
+    }
+
+    /// Puts `child` into `parent` with a transformation operator.
+    pub fn component_by_operator(&mut self, name: &str, parent: Product, child: Product, operator: u64) {
+        let occurrence = self.add(&format!(
+            "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
+            parent.definition, child.definition
+        ));
+        let shape = self.add(&format!("PRODUCT_DEFINITION_SHAPE('','',#{occurrence})"));
+        self.related(shape, parent, child, operator);
+    }
+
+    fn related(&mut self, shape: u64, parent: Product, child: Product, transformation: u64) {
         let relation = self.add(&format!(
             "(REPRESENTATION_RELATIONSHIP('','',#{},#{})REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{transformation})\
              SHAPE_REPRESENTATION_RELATIONSHIP())",
@@ -245,6 +279,16 @@ impl StepText {
         self.add(&format!("MAPPED_ITEM('',#{map},#{target})"))
     }
 
+    /// The same as [`Self::operator`], written as a complex entity.
+    pub fn complex_operator(&mut self, axes: [DVec3; 3], origin: DVec3, scale: f64) -> u64 {
+        let [a, b, c] = axes.map(|d| self.direction(d));
+        let origin = self.point(origin);
+        self.add(&format!(
+            "(CARTESIAN_TRANSFORMATION_OPERATOR(#{a},#{b},#{origin},{scale:?})CARTESIAN_TRANSFORMATION_OPERATOR_3D(#{c})\
+             FUNCTIONALLY_DEFINED_TRANSFORMATION('','')GEOMETRIC_REPRESENTATION_ITEM()REPRESENTATION_ITEM(''))"
+        ))
+    }
+
     /// x ↦ origin + scale · (axis1 axis2 axis3) x.
     pub fn operator(&mut self, axes: [DVec3; 3], origin: DVec3, scale: f64) -> u64 {
         let [a, b, c] = axes.map(|d| self.direction(d));
@@ -253,6 +297,18 @@ impl StepText {
             "CARTESIAN_TRANSFORMATION_OPERATOR_3D('',#{a},#{b},#{origin},{scale:?},#{c})"
         ))
     }
+}
+
+/// `(#1,#2)`.
+pub fn list(entities: &[u64]) -> String {
+    format!(
+        "({})",
+        entities
+            .iter()
+            .map(|e| format!("#{e}"))
+            .collect::<Vec<_>>()
+            .join(",")
+    )
 }
 
 /// Writes the text to a file that lives as long as what is returned.
