@@ -6,6 +6,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
+use mortise_haptics::State as LawState;
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{DeviceState, Fault, HandScript, Refusal, Statistics, Telemetry};
 
@@ -174,9 +175,11 @@ impl Shared {
     }
 }
 
-/// The memory of the queues. `'s`: how long the scene's flash lives.
+/// The memory of both planes: the queues between them, and the force law's state, which is too large to be moved about on a board's
+/// stack. `'s`: how long the scene's flash lives.
 #[derive(Debug)]
 pub struct Channels<'s> {
+    law: LawState,
     commands: Queue<Command<'s>, { COMMANDS + 1 }>,
     events: Queue<Event, { EVENTS + 1 }>,
     samples: Queue<Telemetry, { SAMPLES + 1 }>,
@@ -190,9 +193,10 @@ impl Default for Channels<'_> {
 }
 
 impl<'s> Channels<'s> {
-    /// Empty. About 10 kB: keep it in a static or on the heap.
+    /// Empty. Tens of kB: keep it in a static or on the heap.
     pub const fn new() -> Self {
         Self {
+            law: LawState::new(),
             commands: Queue::new(),
             events: Queue::new(),
             samples: Queue::new(),
@@ -219,6 +223,7 @@ impl<'s> Channels<'s> {
                 shared,
             },
             ControlEnds {
+                law: &mut self.law,
                 commands: commands_out,
                 events: events_in,
                 samples: samples_in,
@@ -239,6 +244,7 @@ pub struct LinkEnds<'c, 's> {
 
 /// The control plane's end.
 pub struct ControlEnds<'c, 's> {
+    pub(crate) law: &'c mut LawState,
     pub(crate) commands: Consumer<'c, Command<'s>>,
     pub(crate) events: Producer<'c, Event>,
     pub(crate) samples: Producer<'c, Telemetry>,

@@ -8,7 +8,7 @@
 //! done: what came before `Run` in the stream has taken effect before its first tick, whatever the timing of bytes and interrupts. That makes
 //! the in-process rig and the emulated board compute the same bits. The host's silence is not counted there, since time waits for the host.
 
-use mortise_haptics::{self as haptics, GrabError, Input, Output, Pose, State as LawState, Twist, Wrench};
+use mortise_haptics::{self as haptics, GrabError, Input, Output, Pose, Twist, Wrench};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{Fault, HandScript, Refusal, Statistics, Telemetry, flag};
 use mortise_protocol::parameter::ParameterId;
@@ -44,7 +44,7 @@ pub enum Ticked {
     Waiting,
 }
 
-/// Everything the 1 kHz task owns. About 30 kB: keep it in a static or on the heap.
+/// Everything the 1 kHz task owns.
 pub struct ControlPlane<'c, 's, M, C> {
     ends: ControlEnds<'c, 's>,
     mechanism: M,
@@ -53,7 +53,6 @@ pub struct ControlPlane<'c, 's, M, C> {
     safety: Safety,
     settings: ControlSettings,
     scene: Option<SceneImage<'s>>,
-    law: LawState,
     sensed: Sensed,
     /// A reading of this tick was not finite and was replaced.
     replaced: bool,
@@ -100,7 +99,6 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             safety: Safety::Boot,
             settings,
             scene: None,
-            law: LawState::new(),
             sensed: Sensed {
                 handle: Pose::IDENTITY,
                 twist: Twist::ZERO,
@@ -167,8 +165,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.sense();
         self.watch(missed);
         self.render();
-        self.hash
-            .tick(&self.sensed.handle, self.law.object().as_ref(), &self.commanded);
+        self.hash.tick(
+            &self.sensed.handle,
+            self.ends.law.object().as_ref(),
+            &self.commanded,
+        );
         self.tick = self.tick.wrapping_add(1);
         self.report();
         self.sample();
@@ -287,7 +288,8 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         if let (_, Action::Refuse(reason)) = self.safety.step(SafetyEvent::Grab) {
             return Err(reason);
         }
-        self.law
+        self.ends
+            .law
             .grab(scene, part, &self.sensed.handle)
             .map_err(|error| match error {
                 GrabError::NoSuchPart { parts, .. } => Refusal::NoSuchPart { parts },
@@ -303,7 +305,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             return Err(Refusal::State(self.safety.reported()));
         }
         if let Some(scene) = &self.scene {
-            self.law.load_scene(scene);
+            self.ends.law.load_scene(scene);
         }
         self.start_anew();
         Ok(())
@@ -313,14 +315,14 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         if self.safety.live() {
             return Err(Refusal::State(self.safety.reported()));
         }
-        self.law.load_scene(&scene);
+        self.ends.law.load_scene(&scene);
         self.scene = Some(scene);
         self.start_anew();
         Ok(())
     }
 
     fn start_anew(&mut self) {
-        self.law.restart_slew();
+        self.ends.law.restart_slew();
         if let Some(handle) = self.mechanism.reset() {
             self.sensed.handle = handle;
             self.sensed.twist = Twist::ZERO;
@@ -431,7 +433,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 handle_twist: self.sensed.twist,
                 enabled: true,
             };
-            let output = haptics::tick(&mut self.law, scene, &self.settings.law, &input);
+            let output = haptics::tick(self.ends.law, scene, &self.settings.law, &input);
             let bad = haptics::Flags::NON_FINITE;
             if output.work.flags.intersects(bad) || !output.handle.is_finite() {
                 self.apply(SafetyEvent::Fault(Fault::NonFinite));
@@ -497,23 +499,23 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         match action {
             Action::None | Action::Refuse(_) => {}
             Action::Enable => {
-                self.law.restart_slew();
+                self.ends.law.restart_slew();
                 self.ramp = 0;
                 self.silent_ticks = 0;
                 self.missed_in_row = 0;
             }
             Action::Couple => self.ramp = 0,
-            Action::Uncouple => self.law.release(),
+            Action::Uncouple => self.ends.law.release(),
             Action::Fade => {
-                self.law.release();
+                self.ends.law.release();
                 self.fade = (0, self.commanded);
             }
             Action::Off => {
                 // At once, not at the next tick: in lockstep that may be far away.
                 self.mechanism.drive(Drive::Off);
                 self.commanded = Wrench::ZERO;
-                self.law.release();
-                self.law.restart_slew();
+                self.ends.law.release();
+                self.ends.law.restart_slew();
             }
         }
     }
@@ -602,9 +604,10 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             tick: self.tick,
             handle: pose_to_wire(&self.sensed.handle),
             object: self
+                .ends
                 .law
                 .grabbed()
-                .zip(self.law.object())
+                .zip(self.ends.law.object())
                 .map(|(part, (pose, _))| (part, pose_to_wire(&pose))),
             wrench: wrench_to_wire(&self.commanded),
             contact: wrench_to_wire(&output.map_or(Wrench::ZERO, |o| o.contact)),

@@ -105,28 +105,32 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         bytes.len()
     }
 
-    /// Passes on what the control plane has to say, as far as there is room.
-    pub fn poll(&mut self, out: &mut impl Outbound) {
+    /// Passes on what the control plane has to say, as far as there is room; returns how much that was.
+    pub fn poll(&mut self, out: &mut impl Outbound) -> usize {
+        let mut passed = 0;
         for _ in 0..EVENTS {
             if out.room() < MAX_FRAME {
-                return;
+                return passed;
             }
             let Some(event) = self.ends.events.dequeue() else {
                 break;
             };
+            passed += 1;
             if let Some(message) = self.pass_on(event) {
                 self.send(&message, out);
             }
         }
         for _ in 0..SAMPLES {
             if out.room() < OUTBOUND_MIN {
-                return;
+                return passed;
             }
             let Some(sample) = self.ends.samples.dequeue() else {
-                return;
+                return passed;
             };
+            passed += 1;
             self.send(&FromDevice::Telemetry(sample), out);
         }
+        passed
     }
 
     /// Sends bytes of log when a host listens and there is room; returns how many were taken.

@@ -44,9 +44,11 @@ mod app {
     use heapless::spsc::{Consumer, Producer, Queue};
     use mortise_firmware::board::Identity;
     use mortise_firmware::channel::Channels;
+    use mortise_firmware::control::Ticked;
     use mortise_firmware::device::start;
     use mortise_protocol::message::CostUnit;
 
+    use crate::device::Interrupt;
     use crate::{Control, Link, MILLISECONDS, crash, link_task, memory, motors, timer, uart};
 
     #[shared]
@@ -64,7 +66,8 @@ mod app {
         channels: Channels<'static> = Channels::new(),
         bytes: Queue<u8, { uart::RECEIVED + 1 }> = Queue::new(),
     ])]
-    fn init(cx: init::Context) -> (Shared, Local) {
+    fn init(mut cx: init::Context) -> (Shared, Local) {
+        memory::guard_stack(&mut cx.core.MPU);
         let identity = Identity {
             board: "mps2-an500",
             force_axes: 3,
@@ -95,22 +98,31 @@ mod app {
             bytes_in,
             bytes_out: Some(bytes_out),
         };
-        timer::start();
+        // The first tick starts the timers.
+        cortex_m::peripheral::NVIC::pend(Interrupt::TIMER0);
         (Shared {}, local)
     }
 
     #[task(binds = TIMER0, priority = 3, local = [control])]
     fn tick(cx: tick::Context) {
         timer::clear_interrupt();
-        MILLISECONDS.fetch_add(1, Ordering::Relaxed);
-        cx.local.control.tick();
-        link_task::note();
+        if timer::is_stopped() {
+            timer::start();
+        }
+        match cx.local.control.tick() {
+            Ticked::Ran => {
+                MILLISECONDS.fetch_add(1, Ordering::Relaxed);
+                link_task::note();
+            }
+            Ticked::Waiting => timer::stop(),
+        }
     }
 
     #[task(binds = UART0RX, priority = 2, local = [bytes_in])]
     fn received(cx: received::Context) {
-        uart::receive(cx.local.bytes_in);
-        link_task::note();
+        if uart::receive(cx.local.bytes_in) {
+            link_task::note();
+        }
     }
 
     #[task(binds = UART0TX, priority = 1)]

@@ -1,10 +1,13 @@
 //! Memory that survives a reset: external RAM standing in for the flash of a real board, and the stack's high-water mark.
 
+use cortex_m::peripheral::MPU;
 use mortise_firmware::board::WRITE_SIZE;
 use mortise_firmware::ram_flash::{FlashWord, RamFlash};
 
 /// Start of the external RAM (QEMU puts it here for AN500, at 0x21000000 for the other images of the board).
 const PSRAM: usize = 0x6000_0000;
+/// Start of the stack's memory, as in memory.x.
+const GUARD: u32 = 0x2000_0000;
 /// Bytes in both scene slots: 2 MiB each.
 const SLOTS_SIZE: usize = 2 * 2 * 1024 * 1024;
 
@@ -16,6 +19,24 @@ pub unsafe fn scene_flash() -> RamFlash<'static> {
     // SAFETY: 16 MiB of RAM that nothing else uses (memory.x does not name it), aligned, any bit pattern is a byte.
     let words = unsafe { core::slice::from_raw_parts_mut(PSRAM as *mut FlashWord, SLOTS_SIZE / WRITE_SIZE) };
     RamFlash::new(words)
+}
+
+/// Makes the lowest 256 bytes of the stack's memory forbidden: an overflow is a fault, not a corrupted return address. (QEMU ignores
+/// accesses to addresses where this board has nothing, so the end of the memory alone would not stop it.)
+pub fn guard_stack(mpu: &mut MPU) {
+    const VALID: u32 = 1 << 4;
+    const SIZE_256: u32 = 7 << 1;
+    const NO_ACCESS_NEVER_EXECUTE: u32 = 1 << 28;
+    // Everything else as without an MPU.
+    const ENABLE_WITH_DEFAULT_MAP: u32 = 0b101;
+    // SAFETY: forbids memory below `_stack_end`, where nothing lies (memory.x).
+    unsafe {
+        mpu.rbar.write(GUARD | VALID);
+        mpu.rasr.write(NO_ACCESS_NEVER_EXECUTE | SIZE_256 | 1);
+        mpu.ctrl.write(ENABLE_WITH_DEFAULT_MAP);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
 }
 
 unsafe extern "C" {

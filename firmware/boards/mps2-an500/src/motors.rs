@@ -15,13 +15,19 @@ pub fn off() {
 }
 
 /// Simulated mechanism with an enable output.
-pub struct Motors(Simulated);
+pub struct Motors {
+    mechanism: Simulated,
+    enabled: bool,
+}
 
 impl Motors {
     /// Off.
     pub fn new() -> Self {
         off();
-        Self(Simulated::new())
+        Self {
+            mechanism: Simulated::new(),
+            enabled: false,
+        }
     }
 }
 
@@ -29,23 +35,28 @@ impl Mechanism for Motors {
     const SIMULATED: bool = true;
 
     fn sense(&mut self) -> Sensed {
-        self.0.sense()
+        self.mechanism.sense()
     }
 
     fn drive(&mut self, drive: Drive) {
-        Registers::FPGAIO.write::<LEDS>(u32::from(drive != Drive::Off));
-        self.0.drive(drive);
+        let enabled = drive != Drive::Off;
+        // Only when it changes: a device access costs QEMU more than the tick.
+        if enabled != self.enabled {
+            self.enabled = enabled;
+            Registers::FPGAIO.write::<LEDS>(u32::from(enabled));
+        }
+        self.mechanism.drive(drive);
     }
 
     fn hand(&self) -> Option<Wrench> {
-        self.0.hand()
+        self.mechanism.hand()
     }
 
     fn set_hand(&mut self, script: Option<&HandScript>) {
-        self.0.set_hand(script);
+        self.mechanism.set_hand(script);
     }
 
     fn reset(&mut self) -> Option<Pose> {
-        self.0.reset()
+        self.mechanism.reset()
     }
 }

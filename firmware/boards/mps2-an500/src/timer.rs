@@ -3,6 +3,8 @@
 //! Both timers count 25 MHz of virtual time. With `-icount shift=1` an instruction takes 2 ns, so a count is 20 instructions and a
 //! tick has 500,000; without `-icount` virtual time follows the host and the figure means host time in units of 2 ns.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use mortise_firmware::board::{Clock, TICK_HZ};
 
 use crate::device::Registers;
@@ -23,7 +25,12 @@ const CLEAR: usize = 0xc;
 const ENABLE: u32 = 1;
 const INTERRUPT: u32 = 1 << 3;
 
-/// Starts the ticks: time is 0 now, the first tick is due one period later.
+/// The timers stand still, and begin again with the next tick.
+static STOPPED: AtomicBool = AtomicBool::new(true);
+/// They began again: time is 0 and a tick is due.
+static BEGUN: AtomicBool = AtomicBool::new(false);
+
+/// Starts the ticks: time is 0 and a tick is due now, the next one period later.
 pub fn start() {
     let (tick, free) = (Registers::TIMER0, Registers::TIMER1);
     // No reload: each tick arms the next, see `arm`.
@@ -33,6 +40,21 @@ pub fn start() {
     free.write::<VALUE>(u32::MAX);
     free.write::<CTRL>(ENABLE);
     tick.write::<CTRL>(ENABLE | INTERRUPT);
+    BEGUN.store(true, Ordering::Release);
+    STOPPED.store(false, Ordering::Release);
+}
+
+/// Stops the ticks: lockstep waits for the host. With no timer running QEMU sleeps instead of racing through virtual time, which leaves the
+/// host's processor to the host.
+pub fn stop() {
+    Registers::TIMER0.write::<CTRL>(0);
+    Registers::TIMER1.write::<CTRL>(0);
+    STOPPED.store(true, Ordering::Release);
+}
+
+/// Whether the ticks are stopped.
+pub fn is_stopped() -> bool {
+    STOPPED.load(Ordering::Acquire)
 }
 
 /// Has the next tick come when the free timer reads `at`, or at once when that has passed.
@@ -75,6 +97,12 @@ impl TickClock {
 
 impl Clock for TickClock {
     fn begin(&mut self) -> u32 {
+        if BEGUN.swap(false, Ordering::AcqRel) {
+            // `start` has armed the next.
+            self.due = 0;
+            self.last_cost = 0;
+            return 0;
+        }
         self.due = self.due.wrapping_add(PERIOD);
         let skipped = self.since_due() / PERIOD;
         self.due = self.due.wrapping_add(skipped * PERIOD);

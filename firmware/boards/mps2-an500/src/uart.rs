@@ -3,6 +3,8 @@
 //! QEMU offers the next byte only when the last one was read, so input that finds no room is left with QEMU: nothing is lost. The baud rate
 //! means nothing there.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use heapless::spsc::{Consumer, Producer};
 use mortise_firmware::board::Outbound;
 use mortise_protocol::limits::MAX_FRAME;
@@ -21,10 +23,12 @@ const CTRL: usize = 0x8;
 const INTERRUPT_CLEAR: usize = 0xc;
 const BAUD_DIVISOR: usize = 0x10;
 const SEND_FULL: u32 = 1;
-const RECEIVE_FULL: u32 = 1 << 1;
 const ENABLE: u32 = 0b11;
 const SEND_INTERRUPT: u32 = 1 << 2;
 const RECEIVE_INTERRUPT: u32 = 1 << 3;
+
+/// No room was left: the receive interrupt is off and a byte waits.
+static STOPPED: AtomicBool = AtomicBool::new(false);
 
 /// Switches sender and receiver on.
 pub fn start() {
@@ -34,17 +38,20 @@ pub fn start() {
     uart.write::<CTRL>(ENABLE | SEND_INTERRUPT | RECEIVE_INTERRUPT);
 }
 
-/// In the receive interrupt: takes the byte if there is room, else stops asking until [`resume`].
-pub fn receive(queue: &mut Producer<'static, u8>) {
+/// In the receive interrupt: takes the byte if there is room, else stops asking until [`resume`]. Says whether it ended a frame or much waits.
+///
+/// Each access to a device costs QEMU more than a hundred instructions, so there are no more than needed.
+pub fn receive(queue: &mut Producer<'static, u8>) -> bool {
     let uart = Registers::UART0;
-    uart.write::<INTERRUPT_CLEAR>(1 << 1);
-    while uart.read::<STATE>() & RECEIVE_FULL != 0 {
-        if !queue.ready() {
-            uart.write::<CTRL>(ENABLE | SEND_INTERRUPT);
-            return;
-        }
-        let _ = queue.enqueue(uart.read::<DATA>() as u8);
+    if !queue.ready() {
+        STOPPED.store(true, Ordering::Release);
+        uart.write::<CTRL>(ENABLE | SEND_INTERRUPT);
+        return true;
     }
+    uart.write::<INTERRUPT_CLEAR>(1 << 1);
+    let byte = uart.read::<DATA>() as u8;
+    let _ = queue.enqueue(byte);
+    byte == 0 || queue.len() > RECEIVED / 2
 }
 
 /// In the send interrupt: it has done its work by waking the processor.
@@ -52,15 +59,14 @@ pub fn sent() {
     Registers::UART0.write::<INTERRUPT_CLEAR>(1);
 }
 
-/// Asks for received bytes again after the queue was full. The byte that waits raises no interrupt of its own, so it is taken here.
-pub fn resume(queue: &Consumer<'static, u8>) -> bool {
-    let uart = Registers::UART0;
-    let stopped = uart.read::<CTRL>() & RECEIVE_INTERRUPT == 0;
-    if stopped && queue.len() < RECEIVED / 2 {
-        uart.write::<CTRL>(ENABLE | SEND_INTERRUPT | RECEIVE_INTERRUPT);
+/// Asks for received bytes again after the queue was full.
+pub fn resume(queue: &Consumer<'static, u8>) {
+    if STOPPED.load(Ordering::Acquire) && queue.len() < RECEIVED / 2 {
+        STOPPED.store(false, Ordering::Release);
+        Registers::UART0.write::<CTRL>(ENABLE | SEND_INTERRUPT | RECEIVE_INTERRUPT);
+        // The byte that waits raises no interrupt of its own.
         cortex_m::peripheral::NVIC::pend(crate::device::Interrupt::UART0RX);
     }
-    stopped
 }
 
 /// Bytes on their way out.
@@ -79,11 +85,10 @@ impl Sender {
     /// Gives the UART what it takes now; the send interrupt wakes for the rest.
     pub fn flush(&mut self) {
         let uart = Registers::UART0;
-        while uart.read::<STATE>() & SEND_FULL == 0 {
-            let Some(byte) = self.ring.pop_front() else {
-                return;
-            };
-            uart.write::<DATA>(u32::from(byte));
+        while !self.ring.is_empty() && uart.read::<STATE>() & SEND_FULL == 0 {
+            if let Some(byte) = self.ring.pop_front() {
+                uart.write::<DATA>(u32::from(byte));
+            }
         }
     }
 
