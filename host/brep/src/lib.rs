@@ -6,6 +6,17 @@
 //! What the import loses is said: an error when a solid is missing, a warning otherwise.
 //!
 //! Programs call [`child::init`] first thing in `main`.
+//!
+//! ```no_run
+//! fn main() -> Result<(), mortise_brep::BrepError> {
+//!     mortise_brep::child::init();
+//!     let model = mortise_brep::load_step("pair.step")?;
+//!     for part in &model.parts {
+//!         println!("{}: {:.1} mm³", part.name, model.shapes[part.shape].volume_mm3);
+//!     }
+//!     Ok(())
+//! }
+//! ```
 
 mod assemble;
 pub mod child;
