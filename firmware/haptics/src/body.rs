@@ -6,6 +6,9 @@ use mortise_protocol::image::Shape;
 use crate::pose::{Pose, Twist};
 use crate::settings::ObjectSettings;
 
+/// Added to every reach: a part that is a mere point must not be divided by.
+const LEAST_REACH_M: f32 = 1e-6;
+
 /// Mass properties of a shape, without mass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
@@ -31,7 +34,8 @@ impl Body {
             Vec3::new(xy, yy, yz),
             Vec3::new(xz, yz, zz),
         ) * per_volume;
-        let reach = (center_of_mass - Vec3::from_array(record.center)).length() + record.radius;
+        let reach =
+            (center_of_mass - Vec3::from_array(record.center)).length() + record.radius + LEAST_REACH_M;
         // Largest sum of absolute values of a row: an upper bound of every eigenvalue (Gershgorin).
         let largest = [inertia.x_axis, inertia.y_axis, inertia.z_axis]
             .iter()

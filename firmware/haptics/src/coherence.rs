@@ -3,7 +3,7 @@
 //! A node whose points are all at least D from the other part cannot hold a candidate until some point of the object has travelled
 //! D − margin. The travel is added up once a tick from a bound on the speed of any point, so the due times are conservative and the
 //! candidates found are the same with and without them. They are kept in a direct-mapped table: a collision costs a look-up, never a contact.
-//! Whole numbers of nanometres, rounded to the safe side, so that no travel is lost to rounding.
+//! A node that was near is taken to be near still, without asking the field, and asked again once in [`ASK_AGAIN`] ticks. Whole numbers of nanometres, rounded to the safe side, so that no travel is lost to rounding.
 //!
 //! Cost: about 15 instructions for a node that is not due, against about 120 for looking at it.
 
@@ -17,17 +17,37 @@ const LONGEST_NM: u32 = 2_000_000_000;
 /// this much less.
 const SAFETY: f32 = 0.9;
 
+/// Ticks after which a node that was near is asked again; a power of two. Which tick depends on the node, so that the work is spread.
+const ASK_AGAIN: u32 = 16;
+
 /// Due times of nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct Coherence {
     travel_nm: u32,
+    /// Ticks since everything was forgotten.
+    round: u32,
     slots: [Slot; SLOTS],
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     key: u32,
+    /// [`NEAR`] or the travel at which the node is due.
     due_nm: u32,
+}
+
+/// Due time of a node that was near.
+const NEAR: u32 = 0;
+
+/// What is known of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Known {
+    /// None of its points can be a candidate.
+    Far,
+    /// It was near not long ago.
+    Near,
+    /// Nothing, or nothing of late.
+    Nothing,
 }
 
 /// Which node of which job.
@@ -61,6 +81,7 @@ impl Coherence {
         };
         Self {
             travel_nm: 0,
+            round: 0,
             slots: [EMPTY; SLOTS],
         }
     }
@@ -72,34 +93,51 @@ impl Coherence {
 
     /// The object moved, no point of it by more than `distance` m.
     pub fn travelled(&mut self, distance: f32) {
+        self.round = self.round.wrapping_add(1);
         self.travel_nm = self.travel_nm.saturating_add(up_nm(distance));
         if self.travel_nm > LONGEST_NM {
             self.forget();
         }
     }
 
-    /// The travel at which a point is due that must not come nearer than `margin` m unseen: to be compared with [`Self::is_due`].
+    /// The travel that leaves `margin` m unseen: to be given to [`Self::ask`].
     pub fn horizon(&self, margin: f32) -> u32 {
         self.travel_nm.saturating_add(up_nm(margin))
     }
 
-    /// Whether the node must be looked at.
+    /// What is known of a node, for points that come within the `horizon`.
     #[inline]
-    pub fn is_due(&self, key: Key, horizon: u32) -> bool {
+    pub fn ask(&self, key: Key, horizon: u32) -> Known {
         let slot = &self.slots[key.slot()];
-        slot.key != key.0 || slot.due_nm <= horizon
+        if slot.key != key.0 {
+            Known::Nothing
+        } else if slot.due_nm > horizon {
+            Known::Far
+        } else if slot.due_nm == NEAR && !(self.round.wrapping_add(key.0)).is_multiple_of(ASK_AGAIN) {
+            Known::Near
+        } else {
+            Known::Nothing
+        }
     }
 
     /// No point of the node is nearer than `distance` m, as seen now.
     #[inline]
-    pub fn set(&mut self, key: Key, distance: f32) {
+    pub fn set_distance(&mut self, key: Key, distance: f32) {
+        // A float that is negative or not a number becomes 0, a huge one the largest number.
+        let ahead = (distance * (SAFETY * 1e9)) as u32;
+        self.set(key, self.travel_nm.saturating_add(ahead));
+    }
+
+    /// The node is near.
+    #[inline]
+    pub fn set_near(&mut self, key: Key) {
+        self.set(key, NEAR);
+    }
+
+    #[inline]
+    fn set(&mut self, key: Key, due_nm: u32) {
         if key.0 != Key::NONE {
-            // A float that is negative or not a number becomes 0, a huge one the largest number.
-            let ahead = (distance * (SAFETY * 1e9)) as u32;
-            self.slots[key.slot()] = Slot {
-                key: key.0,
-                due_nm: self.travel_nm.saturating_add(ahead),
-            };
+            self.slots[key.slot()] = Slot { key: key.0, due_nm };
         }
     }
 }
@@ -117,44 +155,64 @@ mod tests {
     fn due_once_the_distance_is_used_up() {
         let mut c = Coherence::new();
         let key = Key::new(3, 77);
-        assert!(c.is_due(key, c.horizon(0.0)));
-        c.set(key, 1e-3);
-        assert!(!c.is_due(key, c.horizon(0.0)));
-        assert!(!c.is_due(key, c.horizon(0.85e-3)));
-        assert!(c.is_due(key, c.horizon(0.95e-3)));
+        assert_eq!(c.ask(key, c.horizon(0.0)), Known::Nothing);
+        c.set_distance(key, 1e-3);
+        assert_eq!(c.ask(key, c.horizon(0.0)), Known::Far);
+        assert_eq!(c.ask(key, c.horizon(0.85e-3)), Known::Far);
+        assert_eq!(c.ask(key, c.horizon(0.95e-3)), Known::Nothing);
         for _ in 0..89 {
             c.travelled(1e-5);
-            assert!(!c.is_due(key, c.horizon(0.0)));
+            assert_eq!(c.ask(key, c.horizon(0.0)), Known::Far);
         }
         c.travelled(1.1e-5);
-        assert!(c.is_due(key, c.horizon(0.0)));
+        assert_eq!(c.ask(key, c.horizon(0.0)), Known::Nothing);
     }
 
     #[test]
-    fn a_collision_makes_due() {
+    fn a_collision_forgets() {
         let mut c = Coherence::new();
         let (a, b) = (Key::new(0, 5), Key::new(0, 5 + SLOTS as u32));
-        c.set(a, 1.0);
-        c.set(b, 1.0);
-        assert!(c.is_due(a, c.horizon(0.0)) && !c.is_due(b, c.horizon(0.0)));
+        c.set_distance(a, 1.0);
+        c.set_distance(b, 1.0);
+        assert_eq!(c.ask(a, c.horizon(0.0)), Known::Nothing);
+        assert_eq!(c.ask(b, c.horizon(0.0)), Known::Far);
     }
 
     #[test]
     fn long_travel_starts_over() {
         let mut c = Coherence::new();
-        c.set(Key::new(0, 0), f32::INFINITY);
+        let key = Key::new(0, 0);
+        c.set_distance(key, f32::INFINITY);
         c.travelled(1.9);
-        assert!(!c.is_due(Key::new(0, 0), c.horizon(0.1)));
+        assert_eq!(c.ask(key, c.horizon(0.1)), Known::Far);
         c.travelled(0.2);
-        assert!(c.is_due(Key::new(0, 0), c.horizon(0.0)));
+        assert_eq!(c.ask(key, c.horizon(0.0)), Known::Nothing);
     }
 
     #[test]
     fn nothing_nearer_than_nothing() {
         let mut c = Coherence::new();
+        c.travelled(1e-3);
         for distance in [-1.0, 0.0, f32::NAN, f32::NEG_INFINITY] {
-            c.set(Key::new(1, 1), distance);
-            assert!(c.is_due(Key::new(1, 1), c.horizon(0.0)), "{distance}");
+            c.set_distance(Key::new(1, 1), distance);
+            assert_eq!(
+                c.ask(Key::new(1, 1), c.horizon(0.0)),
+                Known::Nothing,
+                "{distance}"
+            );
         }
+    }
+
+    #[test]
+    fn near_is_asked_again() {
+        let mut c = Coherence::new();
+        let key = Key::new(1, 9);
+        let mut asked = 0;
+        for _ in 0..4 * ASK_AGAIN {
+            c.set_near(key);
+            asked += u32::from(c.ask(key, c.horizon(1.0)) == Known::Nothing);
+            c.travelled(0.0);
+        }
+        assert_eq!(asked, 4);
     }
 }

@@ -78,7 +78,7 @@ pub struct Flags(u16);
 impl Flags {
     /// Look-ups reached [`crate::ContactSettings::point_budget`]: the rest waits for the next ticks, places that touched go first.
     pub const BUDGET_EXCEEDED: Self = Self(1 << 0);
-    /// More candidates than fit: the least deep were left out.
+    /// More candidates than fit: kept were the deepest, and of the rest those that a turn would bring to touch first.
     pub const CONTACTS_DROPPED: Self = Self(1 << 1);
     /// The set of touching points had not settled after the last solve allowed.
     pub const UNSETTLED: Self = Self(1 << 2);

@@ -4,8 +4,9 @@
 //! held part's field, or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every
 //! sphere that the field's distance at its centre puts farther off than the margin.
 //!
-//! When the look-up budget runs out, the next tick first looks at the leaves whose points pushed, then goes on where this one stopped,
-//! round and round: what touches stays felt, and everything is looked at again within a few ticks.
+//! When the look-up budget runs out, the next tick goes on where this one stopped, round and round, and the contacts of a leaf that was not reached
+//! are carried over with the gaps the last step predicted: what touches stays felt, and everything is looked at again within a few ticks.
+//! Carrying is prepared for once a tick needed half the budget.
 //!
 //! Cost on a Cortex-M7: about 135 instructions a look-up in the band and 15 outside (see [`Field`]), 30 to place the point, 80 more for a
 //! candidate.
@@ -13,18 +14,22 @@
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{Field, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage};
 
-use crate::coherence::{Coherence, Key};
-use crate::contact::{Contact, Contacts, Phase};
+use crate::coherence::{Coherence, Key, Known};
+use crate::contact::{Contacts, Phase};
 use crate::io::{Flags, Work};
 use crate::pose::Pose;
 use crate::state::Placed;
+use crate::step::dot;
 
 /// Trilinear interpolation can overstate the distance next to a sharp edge; measured at 0.2 cells for a right angle, taken as this many.
 const EDGE_ERROR_CELLS: f32 = 0.25;
 /// A gradient shorter than this (squared) tells no direction: the field is clamped there, or between two surfaces. Within a cell of a sharp edge
 /// it shrinks to about 0.3 while its direction is still good.
 const LEAST_GRADIENT2: f32 = 0.01;
-/// Passing over a point that is no edge point, or a node that is not due, costs about an eighth of a look-up.
+/// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
+/// the other end moves half as fast again. So the approach by either is taken this many times.
+pub(crate) const APPROACH: f32 = 2.0;
+/// Passing over a point that is no edge point, or a node of which enough is known, costs about an eighth of a look-up.
 const PASSED_OVER_PER_LOOKUP: u32 = 8;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
@@ -54,10 +59,19 @@ pub(crate) struct Search<'s, 'i> {
     pub pose: Pose,
     /// World position of its centre of mass, m.
     pub center: Vec3,
-    /// Points with a gap below this are candidates, m.
+    /// No point can travel farther in this tick: points with larger gaps are not looked at closely, m.
     pub margin: f32,
+    /// Points that come as near as this by the motion so far, or by that without contacts, are candidates, m.
+    pub slack: f32,
+    /// The motion so far and that without contacts, scaled as the step's unknowns, times [`APPROACH`] periods, m.
+    pub motions: [[f32; 6]; 2],
+    /// How much gap a lever makes up for when contacts are chosen: margin/reach², so that at the object's farthest point it is the margin, 1/m.
+    pub swing: f32,
     /// 1/L of the step's scaling, 1/m.
     pub inverse_length: f32,
+    pub period_s: f32,
+    /// The last tick came near the budget.
+    pub busy: bool,
     /// Look-ups allowed.
     pub budget: u32,
 }
@@ -91,16 +105,28 @@ impl Affine {
 }
 
 impl<'i> Search<'_, 'i> {
-    /// Fills `contacts`; returns where to go on when the budget ran out. After such a tick (`resume`), `first` are the leaves to begin with.
+    /// How far a contact's gap may close in this tick, m, at least 0.
+    #[inline]
+    fn approach(&self, row: &[f32; 6]) -> f32 {
+        let mut most = 0.0f32;
+        for motion in &self.motions {
+            let closing = -dot(row, motion);
+            if closing > most {
+                most = closing;
+            }
+        }
+        most
+    }
+
+    /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out.
     pub fn run(
         &self,
-        resume: Option<Leaf>,
-        first: &[Leaf],
+        start: Leaf,
         coherence: &mut Coherence,
         contacts: &mut Contacts,
         work: &mut Work,
     ) -> Option<Leaf> {
-        contacts.clear();
+        contacts.begin(self.period_s, self.busy);
         let mut walk = Walk {
             search: self,
             horizon: coherence.horizon(self.margin),
@@ -109,33 +135,21 @@ impl<'i> Search<'_, 'i> {
             work,
             passed_over: 0,
         };
-        let Some(start) = resume else {
-            let stopped = walk.jobs(Leaf::FIRST, None, &[]);
-            walk.work
-                .flags
-                .insert_if(stopped.is_some(), Flags::BUDGET_EXCEEDED);
-            return stopped;
-        };
-        let mut job = None;
-        for leaf in first {
-            if job.as_ref().is_none_or(|j: &Job<'_>| j.index != leaf.job) {
-                job = self.job(leaf.job);
-            }
-            if let Some(job) = &job
-                && let Some(stopped) = walk.nodes(job, leaf.node, leaf.node + 1, &[])
-            {
-                // The budget did not even do for what touched: begin there again.
-                walk.work.flags.insert(Flags::BUDGET_EXCEEDED);
-                return Some(stopped);
-            }
+        let stop = walk
+            .jobs(start, None)
+            .or_else(|| walk.jobs(Leaf::FIRST, Some(start)));
+        if let Some(stop) = stop {
+            work.flags.insert(Flags::BUDGET_EXCEEDED);
+            contacts.carry(|leaf| {
+                let seen = if start < stop {
+                    start <= leaf && leaf < stop
+                } else {
+                    start <= leaf || leaf < stop
+                };
+                !seen
+            });
         }
-        let stopped = walk
-            .jobs(start, None, first)
-            .or_else(|| walk.jobs(Leaf::FIRST, Some(start), first));
-        walk.work
-            .flags
-            .insert_if(stopped.is_some(), Flags::BUDGET_EXCEEDED);
-        stopped
+        stop
     }
 
     /// Trees and fields of job `index`, or none when the two parts' spheres are apart.
@@ -205,13 +219,13 @@ struct Walk<'w, 's, 'i> {
     horizon: u32,
     contacts: &'w mut Contacts,
     work: &'w mut Work,
-    /// Points that were no edge points, nodes that were not due.
+    /// Points that were no edge points, nodes known to be far or near.
     passed_over: u32,
 }
 
 impl Walk<'_, '_, '_> {
-    /// Everything from `start` to before `end` (or the last) but the leaves in `done`; where it stopped when the budget ran out.
-    fn jobs(&mut self, start: Leaf, end: Option<Leaf>, done: &[Leaf]) -> Option<Leaf> {
+    /// Everything from `start` to before `end` (or the last); where it stopped when the budget ran out.
+    fn jobs(&mut self, start: Leaf, end: Option<Leaf>) -> Option<Leaf> {
         let jobs = 2 * self.search.parts.len() as u16;
         let last = end.map_or(jobs, |e| (e.job + 1).min(jobs));
         for index in start.job..last {
@@ -223,7 +237,7 @@ impl Walk<'_, '_, '_> {
                 Some(end) if end.job == index => end.node,
                 _ => u32::MAX,
             };
-            let stopped = self.nodes(&job, from, to, done);
+            let stopped = self.nodes(&job, from, to);
             if stopped.is_some() {
                 return stopped;
             }
@@ -234,7 +248,7 @@ impl Walk<'_, '_, '_> {
     /// Nodes `from..to` of a job in preorder, skipping what is too far; where it stopped when the budget ran out.
     ///
     /// Ends because every record's `skip` points forward (checked when the image was opened).
-    fn nodes(&mut self, job: &Job<'_>, from: u32, to: u32, done: &[Leaf]) -> Option<Leaf> {
+    fn nodes(&mut self, job: &Job<'_>, from: u32, to: u32) -> Option<Leaf> {
         let edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
         let mut index = from;
         while index < to {
@@ -249,48 +263,60 @@ impl Walk<'_, '_, '_> {
                 return Some(here);
             }
             let key = Key::new(job.index, index);
-            if !self.coherence.is_due(key, self.horizon) {
-                self.passed_over += 1;
-                index = node.skip;
-                continue;
-            }
-            self.work.nodes += 1;
-            let center = job.to_field.apply(node.center);
-            let distance = job.field.bound(center.to_array()) - (node.radius + edge_error);
-            if distance > self.search.margin {
-                self.coherence.set(key, distance);
-                index = node.skip;
-                continue;
+            match self.coherence.ask(key, self.horizon) {
+                Known::Far => {
+                    self.passed_over += 1;
+                    index = node.skip;
+                    continue;
+                }
+                Known::Near => self.passed_over += 1,
+                Known::Nothing => {
+                    self.work.nodes += 1;
+                    let center = job.to_field.apply(node.center);
+                    let distance = job.field.bound(center.to_array()) - (node.radius + edge_error);
+                    if distance > self.search.margin {
+                        self.coherence.set_distance(key, distance);
+                        index = node.skip;
+                        continue;
+                    }
+                    self.coherence.set_near(key);
+                }
             }
             index += 1;
-            if node.skip == index && !done.contains(&here) {
+            if node.skip == index {
                 let first = node.first_point as usize;
                 let points = job
                     .points
                     .get(first..first + node.point_count as usize)
                     .unwrap_or(&[]);
-                if !self.points(job, here, points) {
+                // A leaf is looked at as a whole, unless even the whole budget would not do.
+                if (self.left() as usize) < points.len() && self.work.points > 0 {
                     return Some(here);
                 }
+                self.points(job, here, points);
             }
         }
         None
     }
 
-    /// All points of a leaf; false when the budget ran out.
-    fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> bool {
+    /// All points of a leaf, as far as the budget goes.
+    fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) {
         let mut left = self.left();
-        let mut nearest = f32::INFINITY;
-        for point in points {
+        let most = left.saturating_mul(PASSED_OVER_PER_LOOKUP) as usize;
+        // What is not looked at could be anywhere.
+        let mut nearest = if points.len() > most {
+            f32::NEG_INFINITY
+        } else {
+            f32::INFINITY
+        };
+        for point in points.iter().take(most) {
             if job.backward && point.edge_face == NO_FACE {
                 self.passed_over += 1;
-                if self.passed_over.is_multiple_of(PASSED_OVER_PER_LOOKUP) {
-                    left = left.saturating_sub(1);
-                }
                 continue;
             }
             if left == 0 {
-                return false;
+                nearest = f32::NEG_INFINITY;
+                break;
             }
             left -= 1;
             self.work.points += 1;
@@ -299,8 +325,10 @@ impl Walk<'_, '_, '_> {
                 nearest = gap;
             }
         }
-        self.coherence.set(Key::new(leaf.job, leaf.node), nearest);
-        true
+        if nearest > self.search.margin {
+            self.coherence
+                .set_distance(Key::new(leaf.job, leaf.node), nearest);
+        }
     }
 
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
@@ -328,22 +356,25 @@ impl Walk<'_, '_, '_> {
         let n = job.to_push * (gradient * inverse_sqrt(squared));
         let arm = job.to_arm.apply(point.position);
         let turn = arm.cross(n) * self.search.inverse_length;
-        let (moving_face, static_face) = if job.backward {
+        let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
+        if sample.distance >= self.search.slack + self.search.approach(&row) {
+            return sample.distance;
+        }
+        self.work.candidates = self.work.candidates.saturating_add(1);
+        let reach_gap = sample.distance - self.search.swing * arm.length_squared();
+        let Some(contact) = self.contacts.offer(sample.distance, reach_gap) else {
+            return sample.distance;
+        };
+        contact.row = row;
+        contact.arm = arm;
+        contact.rate = 0.0;
+        contact.phase = Phase::Free;
+        (contact.moving_face, contact.static_face) = if job.backward {
             (sample.face, point.face)
         } else {
             (point.face, sample.face)
         };
-        self.work.candidates = self.work.candidates.saturating_add(1);
-        self.contacts.offer(Contact {
-            row: [n.x, n.y, n.z, turn.x, turn.y, turn.z],
-            arm,
-            gap: sample.distance,
-            rate: 0.0,
-            phase: Phase::Free,
-            moving_face,
-            static_face,
-            leaf,
-        });
+        contact.leaf = leaf;
         sample.distance
     }
 

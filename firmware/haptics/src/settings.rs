@@ -48,7 +48,7 @@ pub struct ContactSettings {
     pub total_stiffness_n_per_m: f32,
     /// Damping on approach as a ratio of stiffness, s: λ = k·(depth + damping_s · approach speed). Default 0.5 ms.
     pub damping_s: f32,
-    /// Points this near are taken into the step beyond what the motion of one tick can reach, m. Default 20 µm.
+    /// Points that come this near in a tick, by twice the motion so far or without contacts, are taken into the step, m. Default 5 µm.
     pub margin_m: f32,
     /// Most field look-ups a tick, tree nodes and points alike. Default 1500.
     pub point_budget: u32,
@@ -96,7 +96,7 @@ impl Default for Settings {
                 stiffness_n_per_m: 200e3,
                 total_stiffness_n_per_m: 20e6,
                 damping_s: 0.5e-3,
-                margin_m: 20e-6,
+                margin_m: 5e-6,
                 point_budget: 1500,
             },
             object: ObjectSettings {

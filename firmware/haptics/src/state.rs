@@ -14,10 +14,7 @@ use crate::pose::{Pose, Twist, Wrench};
 use crate::proximity::Leaf;
 use crate::tick::usable_pose;
 
-/// Leaves remembered for the next tick, should the look-up budget run out.
-pub(crate) const MAX_LEAVES: usize = 64;
-
-/// Placements, the grabbed object, and what carries over. About 45 KiB; lives in a static on a board.
+/// Placements, the grabbed object, and what carries over. About 60 KiB; lives in a static on a board.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Every part's placement.
@@ -28,10 +25,10 @@ pub struct State {
     pub(crate) previous_wrench: Wrench,
     /// Points touching, rising at once and falling by a twentieth a tick: divides the total contact stiffness.
     pub(crate) sharing: f32,
-    /// Where to go on after a tick whose budget ran out.
-    pub(crate) resume: Option<Leaf>,
-    /// After such a tick: leaves whose points pushed, each once.
-    pub(crate) leaves: Vec<Leaf, MAX_LEAVES>,
+    /// Where to go on after a tick whose budget ran out, else the beginning.
+    pub(crate) resume: Leaf,
+    /// The last tick needed half the look-up budget or more.
+    pub(crate) busy: bool,
     /// Nodes that need not be looked at yet.
     pub(crate) coherence: Coherence,
     /// Scratch of one tick; kept here because a board's stack is small.
@@ -101,8 +98,8 @@ impl State {
             last_object: Pose::IDENTITY,
             previous_wrench: Wrench::ZERO,
             sharing: 0.0,
-            resume: None,
-            leaves: Vec::new(),
+            resume: Leaf::FIRST,
+            busy: false,
             coherence: Coherence::new(),
             contacts: Contacts::new(),
         }
@@ -207,8 +204,8 @@ impl State {
 
     fn forget_contacts(&mut self) {
         self.sharing = 0.0;
-        self.resume = None;
-        self.leaves.clear();
+        self.resume = Leaf::FIRST;
+        self.busy = false;
         self.contacts.clear();
         self.coherence.forget();
     }
@@ -223,5 +220,16 @@ impl State {
                 placed.center = pose.transform_point(placed.local_center);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The smallest board keeps it in 128 KiB of tightly coupled memory with its stack.
+    #[test]
+    fn fits_a_board() {
+        assert!(size_of::<State>() <= 64 * 1024, "{}", size_of::<State>());
     }
 }

@@ -202,7 +202,8 @@ impl Step<'_> {
         (matrix, right)
     }
 
-    fn scale(&self, twist: Twist) -> [f32; 6] {
+    /// The step's unknowns for a twist: (v, ω·L).
+    pub fn scale(&self, twist: Twist) -> [f32; 6] {
         let (v, w) = (twist.linear, twist.angular * self.length);
         [v.x, v.y, v.z, w.x, w.y, w.z]
     }
@@ -245,7 +246,7 @@ fn next_phase(c: &Contact, h: f32, damping_s: f32, band: f32) -> Phase {
 }
 
 #[inline]
-fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
+pub(crate) fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 }
 

@@ -3,12 +3,11 @@
 use mortise_protocol::image::SceneImage;
 
 use crate::body::Grabbed;
-use crate::contact::Phase;
 use crate::coupling::Coupling;
 use crate::io::{FacePairs, Flags, Input, Output, Work};
 use crate::limits::{length, limit};
 use crate::pose::{Pose, Twist, Wrench, renormalize};
-use crate::proximity::Search;
+use crate::proximity::{APPROACH, Leaf, Search};
 use crate::rotation;
 use crate::settings::Settings;
 use crate::state::State;
@@ -129,16 +128,19 @@ impl State {
             pose: grabbed.pose(),
             center: grabbed.center,
             margin,
+            slack: settings.contact.margin_m,
+            motions: [grabbed.twist, free.twist]
+                .map(|t| step.scale(t).map(|x| x * (APPROACH * settings.period_s))),
+            swing: margin / (grabbed.body.reach * grabbed.body.reach),
             inverse_length: 1.0 / step.length,
+            period_s: settings.period_s,
+            busy: self.busy,
             budget: settings.contact.point_budget,
         };
-        self.resume = search.run(
-            self.resume,
-            &self.leaves,
-            &mut self.coherence,
-            &mut self.contacts,
-            work,
-        );
+        self.resume = search
+            .run(self.resume, &mut self.coherence, &mut self.contacts, work)
+            .unwrap_or(Leaf::FIRST);
+        self.busy = work.nodes + work.points > settings.contact.point_budget / 2;
         work.flags
             .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
         let contact = &settings.contact;
@@ -150,27 +152,9 @@ impl State {
         );
         let solution = step.with_contacts(free, self.contacts.as_mut_slice(), k, contact.damping_s);
         work.contacts = self.contacts.pushing() as u16;
-        self.remember_leaves();
         work.solves = solution.solves;
         work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
         solution
-    }
-
-    /// After a tick whose budget ran out: the leaves whose points pushed, to be looked at first next time. Further ones lose their place in
-    /// the queue, not their force.
-    fn remember_leaves(&mut self) {
-        self.leaves.clear();
-        if self.resume.is_none() {
-            return;
-        }
-        for contact in self.contacts.as_slice() {
-            if contact.phase != Phase::Free
-                && !self.leaves.contains(&contact.leaf)
-                && self.leaves.push(contact.leaf).is_err()
-            {
-                return;
-            }
-        }
     }
 
     /// The wrench for the mechanism; remembered for the slew limit.

@@ -2,7 +2,7 @@
 
 mod support;
 
-use mortise_haptics::{Quat, Settings, State};
+use mortise_haptics::{Flags, Quat, Settings, State};
 use support::hand::{Hand, Seen, run};
 
 /// Degrees the peg tilts in the hand.
@@ -74,4 +74,18 @@ fn soft_and_stiff_contact_alike() {
         println!("{stiffness:e} N/m a point");
         goes_in(0.1e-3, &settings);
     }
+}
+
+/// A third of the look-ups it would need: contacts of what is not reached are carried over.
+#[test]
+fn on_a_starved_budget() {
+    let mut settings = Settings::default();
+    settings.contact.point_budget = 200;
+    let (depth, seen) = insert(20e-6, &settings);
+    println!("{:.2} mm in, {seen:?}", 1e3 * depth);
+    assert!(seen.flags.contains(Flags::BUDGET_EXCEEDED));
+    assert!(seen.nodes + seen.points <= 400);
+    assert!(depth > TRAVEL_M, "{depth}");
+    assert!(seen.deepest_m < 50e-6);
+    assert!(seen.peak_force_n < 3.0);
 }

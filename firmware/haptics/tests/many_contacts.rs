@@ -30,7 +30,7 @@ fn press(settings: &Settings, unrest_n: f32) -> (f32, f32, support::hand::Seen) 
 }
 
 #[test]
-fn all_looked_up_the_deepest_kept() {
+fn all_looked_up_some_kept() {
     let mut settings = Settings::default();
     settings.contact.point_budget = 20_000;
     let (deepest, felt, seen) = press(&settings, 9e-3);
@@ -50,11 +50,11 @@ fn a_million_newton_per_metre_in_all() {
     assert!(deepest < 20e-6);
 }
 
-// A third of the points at a time, those that pushed first: the box rocks by micrometres, within a fortieth of the force.
+// Two thirds of the points a tick, the contacts of the others carried over.
 #[test]
 fn on_the_usual_budget() {
-    let (deepest, felt, seen) = press(&Settings::default(), 0.25);
-    assert!((felt - 9.0).abs() < 0.25);
+    let (deepest, felt, seen) = press(&Settings::default(), 9e-3);
+    assert!((felt - 9.0).abs() < 0.01);
     assert!(deepest < 20e-6);
     assert!(seen.flags.contains(Flags::BUDGET_EXCEEDED));
 }

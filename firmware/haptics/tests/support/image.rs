@@ -30,6 +30,11 @@ pub struct Writer {
 pub struct Image(Vec<u32>);
 
 impl Image {
+    /// The image as written to flash.
+    pub fn bytes(&self) -> &[u8] {
+        cast_slice(&self.0)
+    }
+
     pub fn open(&self) -> SceneImage<'_> {
         SceneImage::open(cast_slice(&self.0)).expect("the writer makes valid images")
     }
