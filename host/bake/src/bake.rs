@@ -3,17 +3,21 @@
 use std::ops::ControlFlow;
 
 use mortise_brep::{CadModel, Shape, Surface};
-use mortise_protocol::image::NO_FACE;
+use mortise_protocol::image::{
+    BrickRecord, FaceRecord, FieldRecord, Header, NO_FACE, NodeRecord, PartRecord, PointRecord, ShapeRecord,
+};
 use mortise_protocol::limits::MAX_PARTS;
+use rayon::prelude::*;
 
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, FieldOptions, bake_field};
 use crate::grid::bounding_box;
-use crate::image::{ImageBuilder, PartPlacement};
+use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement};
 use crate::options::{BakeOptions, Grabbable, Progress, Stage};
 use crate::pointshell::{Pointshell, PointshellOptions, sample_pointshell};
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
+use crate::tree::node_count;
 
 /// A scene image and what is in it.
 #[derive(Clone, Debug)]
@@ -24,12 +28,21 @@ pub struct Baked {
     pub report: BakeReport,
 }
 
-/// Attempts at making an image fit when the cell is free to choose: each cuts the field's bytes by a third or more.
+/// Attempts at the largest scale that fits.
 const ATTEMPTS: usize = 12;
+/// The first, coarse attempt at a scene whose cells are free to choose: a sixteenth of the work, and its bytes tell how far to refine.
+const SCOUT: f64 = 4.0;
+/// Cells in the pointshell's default error bound. Field and shell err alike, as spacing²/(8R): a fiftieth of a cell is what the field
+/// leaves at R = 6 cells, so neither is finer than the other is worth on the radii that matter.
+const EPSILON_PER_CELL: f64 = 50.0;
 
 /// Bakes `model` into a scene image. `progress` is called from any thread; it may stop the work with [`ControlFlow::Break`].
 ///
-/// Parts without a surface are left out with a warning. Cost: see [`crate::bake_field`].
+/// Parts without a surface are left out with a warning. Cost: see [`crate::bake_field`]; when the cell is free to choose and the image
+/// limit binds, about twice that.
+///
+/// # Errors
+/// See [`BakeError`].
 pub fn bake(
     model: &CadModel,
     options: &BakeOptions,
@@ -39,42 +52,15 @@ pub fn bake(
     let scene = Scene::new(model, options)?;
     let mut prepared: Vec<ExactSurface> = scene
         .shapes
-        .iter()
+        .par_iter()
         .map(|&s| ExactSurface::new(&model.shapes[s]))
         .collect();
-    let mut cells = scene.cells(model, options);
-    let mut fields: Vec<Option<BakedField>> = prepared.iter().map(|_| None).collect();
-    let shells = sample_shells(&scene, model, options, &prepared, progress)?;
-    for attempt in 0.. {
-        for (i, surface) in prepared.iter_mut().enumerate() {
-            if fields[i].is_none() {
-                fields[i] = Some(scene.field(i, surface, &mut cells[i], options, progress)?);
-            }
-        }
-        let sizes: Vec<u64> = fields.iter().flatten().map(field_bytes).collect();
-        let rest: u64 = shells.iter().map(|s| 25 * s.points.len() as u64).sum::<u64>() + 4096;
-        let total = sizes.iter().sum::<u64>() + rest;
-        let limit = options.image_limit_bytes;
-        if total <= limit || options.cell_mm.is_some() || attempt >= ATTEMPTS {
-            break;
-        }
-        // Bytes go with the inverse square of the cell. The shapes with more than their share are made coarser.
-        let ratio = (total as f64 / limit as f64).sqrt().clamp(1.2, 2.0) * 1.02;
-        let share = (limit / (2 * sizes.len() as u64)).min(sizes.iter().copied().max().unwrap_or(0));
-        for (i, &size) in sizes.iter().enumerate() {
-            if size >= share {
-                cells[i] *= ratio;
-                fields[i] = None;
-            }
-        }
-    }
-    let baked = scene.assemble(
-        model,
-        options,
-        &prepared,
-        fields.into_iter().flatten().collect(),
-        &shells,
-    )?;
+    let first = scene.cells(model, options);
+    let made = match options.cell_mm {
+        Some(_) => scene.fields_and_shells(model, options, &mut prepared, first, progress)?,
+        None => scene.fit(model, options, &mut prepared, &first, progress)?,
+    };
+    let baked = scene.assemble(model, options, &prepared, made)?;
     let _ = progress(Progress {
         stage: Stage::Image,
         part: "",
@@ -84,41 +70,27 @@ pub fn bake(
     Ok(baked)
 }
 
-fn field_bytes(field: &BakedField) -> u64 {
-    (field.blob.len() + 2 * field.grid.len() + 16 * field.bricks.len() + 2 * field.palette.len()) as u64
+/// What is made of each shape.
+struct Made {
+    fields: Vec<BakedField>,
+    shells: Vec<Pointshell>,
 }
 
-fn sample_shells(
-    scene: &Scene,
-    model: &CadModel,
-    options: &BakeOptions,
-    prepared: &[ExactSurface],
-    progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
-) -> Result<Vec<Pointshell>, BakeError> {
-    let count = prepared.len();
-    prepared
-        .iter()
-        .enumerate()
-        .map(|(i, surface)| {
-            let step = Progress {
-                stage: Stage::Pointshell,
-                part: &scene.names[i],
-                shape: (i, count),
-                fraction: 0.0,
-            };
-            if progress(step).is_break() {
-                return Err(BakeError::Cancelled);
-            }
-            let longest = longest_side(&model.shapes[scene.shapes[i]]);
-            Ok(sample_pointshell(
-                surface,
-                &PointshellOptions {
-                    epsilon_mm: options.epsilon_mm,
-                    max_spacing_mm: options.max_spacing_mm.unwrap_or(longest / 10.0).max(1e-3),
-                },
-            ))
-        })
-        .collect()
+impl Made {
+    /// Bytes it takes in the image, parts and header apart.
+    fn bytes(&self) -> u64 {
+        let shells = self.shells.iter().map(|shell| {
+            let points = shell.points.len();
+            (points * size_of::<PointRecord>() + node_count(points) * size_of::<NodeRecord>()) as u64
+        });
+        self.fields.iter().map(field_bytes).chain(shells).sum()
+    }
+}
+
+fn field_bytes(field: &BakedField) -> u64 {
+    let bricks = field.bricks.len() * size_of::<BrickRecord>();
+    // Alignment of the blob and of the grid: less than 8 bytes.
+    (field.blob.len() + 2 * field.grid.len() + bricks + 2 * field.palette.len() + 8) as u64
 }
 
 fn longest_side(shape: &Shape) -> f64 {
@@ -234,9 +206,100 @@ impl Scene {
             .map(|side| {
                 options
                     .cell_mm
-                    .unwrap_or_else(|| round_down_125((largest / 100.0).min(side / 20.0)).max(1e-3))
+                    .unwrap_or_else(|| round_down_125((largest / 100.0).min(side / 20.0)).clamp(1e-3, 1e3))
             })
             .collect()
+    }
+
+    /// Fields and pointshells with cells of about these sizes (a size too small for the layout is made larger when the choice is free).
+    fn fields_and_shells(
+        &self,
+        model: &CadModel,
+        options: &BakeOptions,
+        prepared: &mut [ExactSurface],
+        cells: Vec<f64>,
+        progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    ) -> Result<Made, BakeError> {
+        let mut fields = Vec::new();
+        let mut shells = Vec::new();
+        for (i, mut cell) in cells.into_iter().enumerate() {
+            fields.push(self.field(i, &mut prepared[i], &mut cell, options, progress)?);
+            shells.push(self.shell(i, model, &prepared[i], cell, options, progress)?);
+        }
+        Ok(Made { fields, shells })
+    }
+
+    /// The finest scale, not finer than `first`, whose image fits: from coarse to fine, as bytes grow at most with the inverse square of
+    /// the cell.
+    fn fit(
+        &self,
+        model: &CadModel,
+        options: &BakeOptions,
+        prepared: &mut [ExactSurface],
+        first: &[f64],
+        progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    ) -> Result<Made, BakeError> {
+        let faces: usize = self.shapes.iter().map(|&s| model.shapes[s].faces.len()).sum();
+        let fixed = (size_of::<Header>()
+            + 2 * PALETTE_PADDING
+            + self.parts.len() * size_of::<PartRecord>()
+            + self.shapes.len() * (size_of::<ShapeRecord>() + size_of::<FieldRecord>())
+            + faces * size_of::<FaceRecord>()
+            + 64) as u64;
+        let mut scale = SCOUT;
+        // How bytes grow with the inverse of the cell: at most as its square; less where bricks repeat, which two attempts show.
+        let mut power = 2.0;
+        let mut best: Option<(f64, Made)> = None;
+        let largest_cell = first.iter().copied().fold(0.0, f64::max);
+        for _ in 0..ATTEMPTS {
+            let cells = first.iter().map(|c| c * scale).collect();
+            let quiet = |p: Progress| {
+                progress(Progress {
+                    shape: (0, p.shape.1),
+                    fraction: 0.0,
+                    ..p
+                })
+            };
+            // Only the finest attempt there can be moves the bar; the ones before take a fraction of its time.
+            let made = if scale <= 1.0 {
+                self.fields_and_shells(model, options, prepared, cells, progress)?
+            } else {
+                self.fields_and_shells(model, options, prepared, cells, &quiet)?
+            };
+            let room = options.image_limit_bytes as f64 / (made.bytes() + fixed) as f64;
+            if room >= 1.0 {
+                if let Some((coarser, before)) = &best {
+                    let grown = (made.bytes() as f64 / before.bytes() as f64).ln();
+                    power = (grown / (coarser / scale).ln()).clamp(1.0, 2.0);
+                }
+                best = Some((scale, made));
+                // A little less than the room there is: an attempt that overshoots is wasted.
+                let next = (scale / (room * 0.97).max(1.0).powf(1.0 / power)).max(1.0);
+                if next > 0.97 * scale {
+                    break;
+                }
+                scale = next;
+            } else if let Some((fitting, _)) = best {
+                // Overshot: back half of the way, as long as that is worth another attempt.
+                scale = (scale * fitting).sqrt();
+                power = 2.0;
+                if scale > 0.95 * fitting {
+                    break;
+                }
+            } else if scale * largest_cell > 1e3 {
+                // Cells of a metre and still too large: parts and faces alone do not fit. The caller says so.
+                return Ok(made);
+            } else {
+                scale /= (room * 0.9).sqrt().min(0.8);
+            }
+        }
+        match best {
+            Some((_, made)) => Ok(made),
+            None => {
+                let cells = first.iter().map(|c| c * scale).collect();
+                self.fields_and_shells(model, options, prepared, cells, progress)
+            }
+        }
     }
 
     fn field(
@@ -273,13 +336,40 @@ impl Scene {
         }
     }
 
+    fn shell(
+        &self,
+        index: usize,
+        model: &CadModel,
+        surface: &ExactSurface,
+        cell_mm: f64,
+        options: &BakeOptions,
+        progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    ) -> Result<Pointshell, BakeError> {
+        let step = Progress {
+            stage: Stage::Pointshell,
+            part: &self.names[index],
+            shape: (index, self.shapes.len()),
+            fraction: 0.0,
+        };
+        if progress(step).is_break() {
+            return Err(BakeError::Cancelled);
+        }
+        let longest = longest_side(&model.shapes[self.shapes[index]]);
+        Ok(sample_pointshell(
+            surface,
+            &PointshellOptions {
+                epsilon_mm: options.epsilon_mm.unwrap_or(cell_mm / EPSILON_PER_CELL),
+                max_spacing_mm: options.max_spacing_mm.unwrap_or(longest / 10.0).max(1e-3),
+            },
+        ))
+    }
+
     fn assemble(
         &self,
         model: &CadModel,
         options: &BakeOptions,
         prepared: &[ExactSurface],
-        fields: Vec<BakedField>,
-        shells: &[Pointshell],
+        Made { fields, shells }: Made,
     ) -> Result<Baked, BakeError> {
         let mut builder = ImageBuilder::new();
         let mut report = BakeReport {

@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::NO_FACE;
 
@@ -22,7 +21,7 @@ pub(crate) fn sample_face(
 ) {
     let kind = surface.shape().faces[face as usize].surface;
     match kind {
-        Surface::Spline => sample_spline(surface, face, options, out),
+        Surface::Spline => crate::spline_samples::sample_spline(surface, face, options, out),
         _ => sample_analytic(surface, face, &kind, options, out),
     }
 }
@@ -162,63 +161,5 @@ fn u_scale(kind: &Surface, v: f64) -> (f64, f64) {
             (r, v.cos() / r)
         }
         _ => (1.0, 0.0),
-    }
-}
-
-/// A spline face: points on its triangles, as dense as the turn between neighbouring facets asks.
-fn sample_spline(surface: &ExactSurface, face: u32, options: &PointshellOptions, out: &mut Vec<ShellPoint>) {
-    let mesh = &surface.shape().mesh;
-    let topology = &surface.topology;
-    // Points owed so far: small triangles share one.
-    let mut owed = 0.5;
-    for t in 0..mesh.triangles.len() {
-        if mesh.triangle_face[t] != face {
-            continue;
-        }
-        let [a, b, c] = surface.triangles.corners(t as u32);
-        let area = (b - a).cross(c - a).length() / 2.0;
-        let normal = topology.facet_normals[t];
-        if area <= 0.0 || normal == DVec3::ZERO {
-            continue;
-        }
-        let center = (a + b + c) / 3.0;
-        let mut curvature = 0.0f64;
-        for &other in topology.neighbors[t]
-            .iter()
-            .filter(|&&n| n != crate::topology::NONE)
-        {
-            let [d, e, f] = surface.triangles.corners(other);
-            let apart = center.distance((d + e + f) / 3.0);
-            let turn = normal.angle_between(topology.facet_normals[other as usize]);
-            if apart > 0.0 && turn.is_finite() {
-                curvature = curvature.max(turn / apart);
-            }
-        }
-        let spacing = options.spacing(curvature);
-        owed += area / (spacing * spacing);
-        let due = owed.floor().min(MAX_ROWS);
-        if due < 1.0 {
-            continue;
-        }
-        owed -= due;
-        for i in 0..due as usize {
-            // R2 low-discrepancy sequence (Roberts 2018), folded into the triangle: even cover for any count.
-            let mut x = (0.5 + (i + 1) as f64 * 0.754_877_666_246_692_7).fract();
-            let mut y = (0.5 + (i + 1) as f64 * 0.569_840_290_998_053_2).fract();
-            if x + y > 1.0 {
-                (x, y) = (1.0 - x, 1.0 - y);
-            }
-            let position = if due < 2.0 {
-                center
-            } else {
-                a + (b - a) * x + (c - a) * y
-            };
-            out.push(ShellPoint {
-                position,
-                normal,
-                face: face as u16,
-                edge_face: NO_FACE,
-            });
-        }
     }
 }

@@ -23,9 +23,9 @@ use crate::grid::Grid;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SampleFormat {
-    /// One byte: half the size, steps of about a twentieth of a cell at a band of one cell.
+    /// One byte: half the size, steps of a 34th of a cell at a band of two cells, a 46th at one.
     Int8,
-    /// Two bytes: steps of about a two-thousandth of a cell, and exact over the whole of every stored brick.
+    /// Two bytes: steps of an 8700th of a cell at a band of two cells.
     #[default]
     Int16,
 }
@@ -70,12 +70,8 @@ pub struct FieldOptions {
 impl FieldOptions {
     /// Units of a sample in one cell: a whole number, so that planes and repeated features at whole-cell offsets give equal bricks.
     pub(crate) fn units_per_cell(&self) -> f64 {
-        let range = match self.format {
-            // The corners of a cell the band touches are at most its diagonal farther.
-            SampleFormat::Int8 => self.band_cells + 3f64.sqrt(),
-            // The far corner of a brick the band touches: nothing is ever clamped.
-            SampleFormat::Int16 => self.band_cells + 3f64.sqrt() * (BRICK_CELLS as f64 + 1.0),
-        };
+        // The corners of a cell the band touches are at most its diagonal farther. Clamping what is beyond also lets more bricks be equal.
+        let range = self.band_cells + 3f64.sqrt();
         (self.format.max() / range).floor().max(1.0)
     }
 }
@@ -119,7 +115,7 @@ pub fn bake_field(
     let grid = Grid::over(
         surface.shape(),
         options.cell_mm,
-        (options.band_cells + 1.0) * options.cell_mm,
+        options.band_cells * options.cell_mm,
         surface.chord,
     );
     let reach = options.band_cells * grid.cell();

@@ -19,17 +19,20 @@ impl Grid {
     /// A grid of `cell_mm` cells over `shape`, every part of whose surface is at least `reach_mm` inside it.
     ///
     /// Its phase lets planes of constant x, y or z fall on sample layers, the largest area first: there, and at the edges between such
-    /// planes, trilinear interpolation is exact. `bulge_mm` is how far the exact surface may leave the tessellation.
+    /// planes, trilinear interpolation is exact. Of the whole cells left to choose, those are taken that let the fewest bricks be near
+    /// such planes. `bulge_mm` is how far the exact surface may leave the tessellation.
     pub fn over(shape: &Shape, cell_mm: f64, reach_mm: f64, bulge_mm: f64) -> Self {
         let cell_m = (cell_mm / 1000.0) as f32;
         let cell = f64::from(cell_m) * 1000.0;
         let (lo, hi) = bounding_box(shape);
-        let margin = reach_mm + bulge_mm + 0.01 * cell;
+        // A tenth of a cell: the stored f32 cell may be smaller than asked by rounding, over thousands of cells.
+        let margin = reach_mm + bulge_mm + 0.1 * cell;
         let mut origin_m = [0.0f32; 3];
         let mut dims = [1u32; 3];
         for axis in 0..3 {
             let phase = phase(shape, axis, cell);
             let first = ((lo[axis] - margin - phase) / cell).floor() * cell + phase;
+            let first = first - f64::from(shift(shape, axis, cell, first, reach_mm)) * cell;
             origin_m[axis] = (first / 1000.0) as f32;
             let cells = (hi[axis] + margin - first) / cell;
             dims[axis] = (cells / BRICK_CELLS as f64)
@@ -82,6 +85,50 @@ pub(crate) fn bounding_box(shape: &Shape) -> (DVec3, DVec3) {
         .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), v| {
             (lo.min(v), hi.max(v))
         })
+}
+
+/// Whole cells to move the origin down so that the neighbourhoods of planes across `axis` spread over the fewest layers of bricks.
+fn shift(shape: &Shape, axis: usize, cell: f64, first: f64, reach: f64) -> u32 {
+    // Where surface lies across the axis, mm, and how much: planes wholly; a cylinder along another axis touches each of its extremes
+    // with about a sixth of its area (as far as it stays within half a brick of a large radius).
+    let mut layers: Vec<(f64, f64)> = Vec::new();
+    for face in &shape.faces {
+        match face.surface {
+            Surface::Plane { frame } if frame.z[axis].abs() > 0.999 => {
+                layers.push((frame.origin[axis], face.area_mm2));
+            }
+            Surface::Cylinder { frame, radius } if frame.z[axis].abs() < 0.001 => {
+                for side in [-radius, radius] {
+                    layers.push((frame.origin[axis] + side, face.area_mm2 / 6.0));
+                }
+            }
+            _ => {}
+        }
+    }
+    let bricks = BRICK_CELLS as f64;
+    let cost = |shift: u32| -> f64 {
+        layers
+            .iter()
+            .map(|&(at, area)| {
+                let place = ((at - first) / cell + f64::from(shift)).rem_euclid(bricks);
+                // Cells to the nearer boundary between layers of bricks: within reach of it both layers are stored.
+                let clear = place.min(bricks - place) * cell;
+                if clear > reach + 1e-6 * cell {
+                    area
+                } else {
+                    2.0 * area
+                }
+            })
+            .sum()
+    };
+    let mut best = (cost(0), 0);
+    for shift in 1..BRICK_CELLS as u32 {
+        let c = cost(shift);
+        if c < best.0 * (1.0 - 1e-9) {
+            best = (c, shift);
+        }
+    }
+    best.1
 }
 
 /// Offset in [0, cell) of the sample layers across `axis` that most plane area falls on.

@@ -41,7 +41,7 @@ pub struct ImageBuilder {
 }
 
 /// The last palette runs must cover every value their indices can take.
-const PALETTE_PADDING: usize = 256;
+pub(crate) const PALETTE_PADDING: usize = 256;
 
 impl ImageBuilder {
     /// An image with nothing in it.

@@ -15,8 +15,8 @@ pub struct BakeOptions {
     pub band_cells: f64,
     /// Number format of samples.
     pub format: SampleFormat,
-    /// Bound on the pointshell's chord error, mm.
-    pub epsilon_mm: f64,
+    /// Bound on the pointshell's chord error, mm. `None`: a fiftieth of the cell.
+    pub epsilon_mm: Option<f64>,
     /// Largest spacing of pointshell points, mm. `None`: a tenth of the part's longest side.
     pub max_spacing_mm: Option<f64>,
     /// Which parts may be grabbed.
@@ -31,7 +31,7 @@ impl Default for BakeOptions {
             cell_mm: None,
             band_cells: 2.0,
             format: SampleFormat::Int16,
-            epsilon_mm: 0.01,
+            epsilon_mm: None,
             max_spacing_mm: None,
             grabbable: Grabbable::AllButLargest,
             image_limit_bytes: 1 << 20,
@@ -58,7 +58,9 @@ impl BakeOptions {
         }
         // Below one diagonal the cells next to the surface would not all be stored.
         within("band_cells", self.band_cells, 1.0, 64.0, "1 to 64 cells")?;
-        within("epsilon_mm", self.epsilon_mm, 1e-6, 1e3, "0.000001 to 1000 mm")?;
+        if let Some(epsilon) = self.epsilon_mm {
+            within("epsilon_mm", epsilon, 1e-6, 1e3, "0.000001 to 1000 mm")?;
+        }
         if let Some(spacing) = self.max_spacing_mm {
             within("max_spacing_mm", spacing, 1e-3, 1e6, "0.001 to 1000000 mm")?;
         }

@@ -28,6 +28,15 @@ pub fn build_tree(positions: &[[f32; 3]]) -> SphereTree {
     tree
 }
 
+/// Nodes of the tree over `points` points.
+pub(crate) fn node_count(points: usize) -> usize {
+    match points {
+        0 => 0,
+        1..=LEAF_POINTS => 1,
+        _ => 1 + node_count(points / 2) + node_count(points - points / 2),
+    }
+}
+
 fn split(positions: &[[f32; 3]], tree: &mut SphereTree, first: usize, count: usize) {
     let at = |i: u32| DVec3::from_array(positions[i as usize].map(f64::from));
     let run = &mut tree.order[first..first + count];
@@ -106,6 +115,7 @@ mod tests {
             let mut seen = tree.order.clone();
             seen.sort_unstable();
             prop_assert_eq!(seen, (0..positions.len() as u32).collect::<Vec<_>>());
+            prop_assert_eq!(tree.nodes.len(), node_count(positions.len()));
             let mut leaf_points = 0;
             for (i, node) in tree.nodes.iter().enumerate() {
                 let leaf = node.skip as usize == i + 1;
