@@ -4,6 +4,7 @@
 //! uploads, plays it on a rig in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and [`figures()`] are all
 //! this one function. [`figures()`] measures every row of a named table.
 
+pub mod corpus;
 mod error;
 pub mod scenario;
 

