@@ -178,6 +178,8 @@ impl<'a> Field<'a> {
 /// A lower bound of √x that needs no library: two Newton steps from above would overshoot, so the result is divided back (x/y ≤ √x ≤ y).
 #[inline]
 fn sqrt_below(x: f32) -> f32 {
+    // A square that overflowed: its root is at least that of the largest number.
+    let x = if x < f32::MAX { x } else { f32::MAX };
     // Bit-level first guess within 3.5 % (Kahan/Blinn), one Newton step to 0.06 %, always from above.
     let guess = f32::from_bits((x.to_bits() >> 1) + 0x1fbd_1df5);
     let above = 0.5 * (guess + x / guess);

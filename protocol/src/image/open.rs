@@ -173,6 +173,9 @@ impl<'a> SceneImage<'a> {
                 && (1.0 / field.cell).is_finite()
                 && field.scale.is_finite()
                 && field.scale > 0.0
+                // No sample and no difference of samples overflows, in metres or for each cell.
+                && (field.scale * 32768.0).is_finite()
+                && (field.scale / field.cell * 131_072.0).is_finite()
                 && field.band.is_finite()
                 && field.band >= 0.0
                 && (field.format == FORMAT_I8 || field.format == FORMAT_I16)

@@ -1,0 +1,161 @@
+//! Whatever bytes come in: opening refuses or every access is in bounds.
+
+mod scene;
+
+use mortise_protocol::image::*;
+use scene::Aligned;
+
+/// xorshift64*: the same damage every run.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() % n as u64) as usize
+    }
+}
+
+/// Touches everything an image gives access to; returns something that depends on all of it.
+fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
+    let mut sum = 0.0;
+    for i in 0..image.parts().len() {
+        sum += image.shape_of_part(i).record.radius;
+    }
+    for i in 0..image.shape_count() {
+        let shape = image.shape(i);
+        let mut node = 0;
+        while node < shape.nodes.len() {
+            let n = &shape.nodes[node];
+            for p in &shape.points[n.first_point as usize..][..n.point_count as usize] {
+                sum += shape.faces[usize::from(p.face)].sense;
+                if p.edge_face != NO_FACE {
+                    sum += shape.faces[usize::from(p.edge_face)].sense;
+                }
+                sum += oct_decode(p.normal)[0];
+            }
+            node = if random.below(2) == 0 {
+                node + 1
+            } else {
+                n.skip as usize
+            };
+        }
+        let record = *shape.field.record();
+        for _ in 0..40 {
+            let p = core::array::from_fn(|axis| {
+                let cells = f32::from(record.brick_dims[axis]) * 8.0;
+                let u = random.below(1 << 16) as f32 / 65536.0;
+                record.origin[axis] + record.cell * (u * (cells + 2.0) - 1.0)
+            });
+            match shape.field.lookup(p) {
+                Lookup::Near(s) => {
+                    assert!(
+                        s.distance.is_finite() && s.gradient.iter().all(|g| g.is_finite()),
+                        "{s:?}"
+                    );
+                    sum += s.distance + f32::from(s.face);
+                }
+                Lookup::Far { bound, .. } => {
+                    assert!(!bound.is_nan());
+                    sum += shape.field.bound(p);
+                }
+            }
+        }
+    }
+    sum
+}
+
+/// Damage the checksum sees is refused.
+#[test]
+fn damage_is_refused() {
+    let good = scene::bytes();
+    let mut random = Random(1);
+    for _ in 0..20_000 {
+        let mut aligned = Aligned::new(&good);
+        let at = random.below(good.len());
+        aligned.bytes_mut()[at] ^= 1 << random.below(8);
+        assert!(SceneImage::open(aligned.bytes()).is_err(), "byte {at}");
+    }
+    for length in 0..good.len() {
+        let aligned = Aligned::new(&good[..length]);
+        assert!(SceneImage::open(aligned.bytes()).is_err(), "cut to {length}");
+    }
+}
+
+/// Damage with a checksum that fits (a faulty or hostile writer): refused, or harmless.
+#[test]
+fn sealed_damage_never_leads_out_of_bounds() {
+    let good = scene::bytes();
+    let records = {
+        let aligned = Aligned::new(&good);
+        let image = SceneImage::open(aligned.bytes()).unwrap();
+        image.header().blob.offset as usize
+    };
+    let mut random = Random(2);
+    let (mut opened, mut refused) = (0, 0);
+    let mut sum = 0.0;
+    for round in 0..60_000 {
+        let mut aligned = Aligned::new(&good);
+        for _ in 0..=random.below(4) {
+            // Mostly records: samples may be anything.
+            let range = if random.below(10) == 0 {
+                good.len()
+            } else {
+                records
+            };
+            let at = 20 + random.below(range - 20);
+            let bytes = aligned.bytes_mut();
+            match round % 3 {
+                0 => bytes[at] ^= 1 << random.below(8),
+                1 => bytes[at] = random.next() as u8,
+                _ => {
+                    let at = at & !3;
+                    let odd =
+                        [0, 1, 0x7fff_ffff, u32::MAX, 0x7f80_0000, 0x0000_ffff, 0x8000_0000][random.below(7)];
+                    bytes[at..at + 4].copy_from_slice(&odd.to_le_bytes());
+                }
+            }
+        }
+        aligned.seal();
+        match SceneImage::open(aligned.bytes()) {
+            Ok(image) => {
+                opened += 1;
+                sum += use_everything(&image, &mut random);
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    // Both ways are really taken.
+    assert!(
+        opened > 1000 && refused > 1000,
+        "{opened} opened, {refused} refused, {sum}"
+    );
+}
+
+/// The order of checks tells apart what to do: another layout is said before damage is.
+#[test]
+fn refusals_name_the_reason() {
+    let good = scene::bytes();
+    let mut other = Aligned::new(&good);
+    other.bytes_mut()[8..12].copy_from_slice(&99u32.to_le_bytes());
+    assert_eq!(
+        SceneImage::open(other.bytes()).unwrap_err(),
+        ImageError::Layout {
+            expected: LAYOUT_VERSION,
+            found: 99
+        }
+    );
+    let mut other = Aligned::new(&good);
+    other.bytes_mut()[0] = b'X';
+    assert_eq!(SceneImage::open(other.bytes()).unwrap_err(), ImageError::BadMagic);
+    let misaligned = Aligned::new(&[&[0u8][..], &good].concat());
+    assert_eq!(
+        SceneImage::open(&misaligned.bytes()[1..]).unwrap_err(),
+        ImageError::Misaligned
+    );
+}

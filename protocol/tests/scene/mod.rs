@@ -1,0 +1,243 @@
+//! A tiny scene made by hand: every record, both sample formats, all three widths of palette index.
+
+// Each test binary uses its part of it.
+#![allow(dead_code)]
+
+use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
+use mortise_protocol::image::*;
+
+/// Bytes at an address aligned to 4, as in flash.
+pub struct Aligned(Vec<u32>, usize);
+
+impl Aligned {
+    pub fn new(bytes: &[u8]) -> Self {
+        let mut words = vec![0u32; bytes.len().div_ceil(4)];
+        bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..bytes.len()].copy_from_slice(bytes);
+        Self(words, bytes.len())
+    }
+
+    pub fn bytes(&self) -> &[u8] {
+        &cast_slice(&self.0)[..self.1]
+    }
+
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut bytemuck::cast_slice_mut(&mut self.0)[..self.1]
+    }
+
+    /// Writes the checksum that fits the rest.
+    pub fn seal(&mut self) {
+        let crc = CRC.checksum(&self.bytes()[20..]);
+        self.bytes_mut()[16..20].copy_from_slice(&crc.to_le_bytes());
+    }
+}
+
+/// The scene's bytes.
+///
+/// Shape 0: the half-space z < 4 mm in one 16-bit brick of 1 mm cells, under an empty one; face 0 for x < 4 mm, face 1 beyond.
+/// Shape 1: a plane at x = 2 mm in two 8-bit bricks, one with a single face, one with a byte for each cell.
+/// Three parts: two place shape 0, one of them turned a quarter about z and grabbable; one places shape 1.
+pub fn bytes() -> Vec<u8> {
+    let mut blob = Vec::new();
+    let mut bricks = Vec::new();
+    let samples = append(&mut blob, |blob| {
+        each(BRICK_SAMPLES, |_, _, z| {
+            blob.extend(((z as i16 - 4) * 4096).to_le_bytes());
+        });
+    });
+    let indices = append(&mut blob, |blob| {
+        let mut cells = Vec::new();
+        each(BRICK_CELLS, |x, _, _| cells.push(u8::from(x >= 4)));
+        blob.extend(cells.chunks_exact(2).map(|c| c[0] | c[1] << 4));
+    });
+    bricks.push(BrickRecord {
+        samples,
+        indices,
+        palette: 0,
+        palette_len: 2,
+        index_bits: 4,
+    });
+    for number in 0..2i32 {
+        let samples = append(&mut blob, |blob| {
+            each(BRICK_SAMPLES, |x, _, _| {
+                let cells = x as i32 + 8 * number - 2;
+                blob.push((cells * 10).clamp(-127, 127) as i8 as u8);
+            });
+        });
+        let indices = append(&mut blob, |blob| {
+            if number == 1 {
+                blob.extend((0..CELLS_PER_BRICK).map(|i| (i % 3) as u8));
+            }
+        });
+        bricks.push(BrickRecord {
+            samples,
+            indices: if number == 1 { indices } else { 0 },
+            palette: if number == 1 { 2 } else { 5 },
+            palette_len: if number == 1 { 3 } else { 1 },
+            index_bits: if number == 1 { 8 } else { 0 },
+        });
+    }
+    let mut palette = vec![0, 1, 0, 1, NO_FACE, 1];
+    palette.resize(6 + 256, NO_FACE);
+    let empty = GridEntry::Empty {
+        inside: false,
+        cells: 4,
+    };
+    let grid = [
+        GridEntry::Brick(0),
+        empty,
+        GridEntry::Brick(0),
+        GridEntry::Brick(1),
+    ]
+    .map(GridEntry::to_bits);
+    let field = |format: u16, scale: f32, band: f32, dims: [u16; 3], first: u32, count: u32| FieldRecord {
+        origin: [0.0; 3],
+        cell: 0.001,
+        scale,
+        band,
+        brick_dims: dims,
+        format,
+        first_grid: 2 * first,
+        first_brick: first,
+        brick_count: count,
+    };
+    let fields = [
+        field(FORMAT_I16, 0.001 / 4096.0, 0.0079, [1, 1, 2], 0, 1),
+        field(FORMAT_I8, 0.0001, 0.0127, [2, 1, 1], 1, 2),
+    ];
+    let point = |position: [f32; 3], face: u16, edge_face: u16| PointRecord {
+        position,
+        normal: oct_encode([0.0, 0.0, 1.0]),
+        face,
+        edge_face,
+    };
+    let points = [
+        point([0.001, 0.001, 0.004], 0, NO_FACE),
+        point([0.007, 0.001, 0.004], 1, NO_FACE),
+        point([0.004, 0.001, 0.004], 0, 1),
+        point([0.002, 0.0, 0.0], 0, 1),
+    ];
+    let node = |center: [f32; 3], radius: f32, first_point: u32, point_count: u32, skip: u32| NodeRecord {
+        center,
+        radius,
+        first_point,
+        point_count,
+        skip,
+    };
+    let nodes = [
+        node([0.004, 0.001, 0.004], 0.0031, 0, 3, 3),
+        node([0.001, 0.001, 0.004], 0.0001, 0, 1, 2),
+        node([0.0055, 0.001, 0.004], 0.0016, 1, 2, 3),
+        node([0.002, 0.0, 0.0], 0.0001, 0, 1, 1),
+    ];
+    let plane = |origin: [f32; 3], axis: [f32; 3]| FaceRecord {
+        kind: surface_kind::PLANE,
+        sense: 1.0,
+        origin,
+        axis,
+        radius: 0.0,
+        second: 0.0,
+    };
+    let faces = [
+        plane([0.0, 0.0, 0.004], [0.0, 0.0, 1.0]),
+        plane([0.004, 0.0, 0.004], [0.0, 0.0, 1.0]),
+        plane([0.002, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        FaceRecord {
+            kind: surface_kind::CYLINDER,
+            sense: -1.0,
+            origin: [0.01, 0.0, 0.0],
+            axis: [0.0, 1.0, 0.0],
+            radius: 0.003,
+            second: 0.0,
+        },
+    ];
+    let shapes = [
+        ShapeRecord {
+            field: 0,
+            flags: 0,
+            first_node: 0,
+            node_count: 3,
+            first_point: 0,
+            point_count: 3,
+            first_face: 0,
+            face_count: 2,
+            center: [0.004, 0.004, 0.002],
+            radius: 0.01,
+            volume: 2.56e-7,
+            center_of_mass: [0.004, 0.004, 0.002],
+            inertia: [1e-12, 2e-12, 3e-12, 0.0, 0.0, 0.0],
+        },
+        ShapeRecord {
+            field: 1,
+            flags: SHAPE_LEAKY,
+            first_node: 3,
+            node_count: 1,
+            first_point: 3,
+            point_count: 1,
+            first_face: 2,
+            face_count: 2,
+            radius: 0.02,
+            ..ShapeRecord::zeroed()
+        },
+    ];
+    let part = |shape: u32, flags: u32, position: [f32; 3], orientation: [f32; 4]| PartRecord {
+        shape,
+        flags,
+        position,
+        orientation,
+    };
+    let half = core::f32::consts::FRAC_1_SQRT_2;
+    let parts = [
+        part(0, 0, [0.0; 3], [0.0, 0.0, 0.0, 1.0]),
+        part(0, PART_GRABBABLE, [0.1, -0.2, 0.3], [0.0, 0.0, half, half]),
+        part(1, PART_GRABBABLE, [0.0, 0.0, 0.05], [0.0, 0.0, 0.0, 1.0]),
+    ];
+
+    let mut bytes = vec![0u8; size_of::<Header>()];
+    let mut header = Header {
+        magic: MAGIC,
+        layout: LAYOUT_VERSION,
+        parts: section(&mut bytes, &parts),
+        shapes: section(&mut bytes, &shapes),
+        fields: section(&mut bytes, &fields),
+        nodes: section(&mut bytes, &nodes),
+        points: section(&mut bytes, &points),
+        faces: section(&mut bytes, &faces),
+        bricks: section(&mut bytes, &bricks),
+        palette: section(&mut bytes, &palette),
+        grid: section(&mut bytes, &grid),
+        blob: section(&mut bytes, &blob),
+        ..Header::zeroed()
+    };
+    header.length = bytes.len() as u32;
+    bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+    let crc = CRC.checksum(&bytes[20..]);
+    bytes[16..20].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+fn each(n: usize, mut visit: impl FnMut(usize, usize, usize)) {
+    for z in 0..n {
+        for y in 0..n {
+            for x in 0..n {
+                visit(x, y, z);
+            }
+        }
+    }
+}
+
+fn append(blob: &mut Vec<u8>, write: impl FnOnce(&mut Vec<u8>)) -> u32 {
+    blob.resize(blob.len().next_multiple_of(4), 0);
+    let at = blob.len() as u32;
+    write(blob);
+    at
+}
+
+fn section<T: Pod>(bytes: &mut Vec<u8>, records: &[T]) -> Section {
+    let section = Section {
+        offset: bytes.len() as u32,
+        count: records.len() as u32,
+    };
+    bytes.extend_from_slice(cast_slice(records));
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    section
+}
