@@ -104,8 +104,8 @@ pub(crate) struct Grabbed {
     pub twist: Twist,
     /// Angle of the coupling in the last tick, for its branch, rad.
     pub angle: Vec3,
-    /// No tick since the grab: take over the handle's motion, so that grabbing is not felt.
-    pub fresh: bool,
+    /// Ticks since the grab. (A number rather than a flag: see [`crate::State::new`].)
+    pub age: u32,
     /// Its mass properties.
     pub body: Body,
 }

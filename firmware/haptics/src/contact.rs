@@ -1,7 +1,6 @@
 //! Contacts of one tick: a bounded store that keeps the deepest and the widest apart.
 
 use glam::Vec3;
-use mortise_protocol::image::NO_FACE;
 
 use crate::proximity::Leaf;
 
@@ -32,7 +31,7 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    /// Nothing.
+    /// Nothing. All zero, so that a fresh store lies in memory that is cleared rather than copied from flash.
     const NONE: Self = Self {
         row: [0.0; 6],
         arm: Vec3::ZERO,
@@ -40,8 +39,8 @@ impl Contact {
         reach_gap: 0.0,
         rate: 0.0,
         phase: Phase::Free,
-        moving_face: NO_FACE,
-        static_face: NO_FACE,
+        moving_face: 0,
+        static_face: 0,
         leaf: Leaf::FIRST,
     };
 }
@@ -149,8 +148,8 @@ impl Contacts {
         self.carried_len = 0;
     }
 
-    /// Empties the store for the next tick, `period_s` after the last. With `put_aside` what it held can be had back by [`Self::carry`], at 30
-    /// instructions a contact.
+    /// Empties the store for the next tick, `period_s` after the last. With `put_aside` what it held can be had back by [`Self::carry`],
+    /// at the cost of copying the store.
     pub fn begin(&mut self, period_s: f32, put_aside: bool) {
         self.carried_len = 0;
         if put_aside {

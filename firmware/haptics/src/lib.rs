@@ -1,6 +1,6 @@
 //! The force law: a pure function of state, scene, settings and inputs.
 //!
-//! [`tick`] is called at 1 kHz. It pulls the grabbed part (the *object*) towards the handle through a virtual coupling, finds where the
+//! [`tick()`] is called at 1 kHz. It pulls the grabbed part (the *object*) towards the handle through a virtual coupling, finds where the
 //! object meets the other parts (points of one in the signed-distance field of the other, both ways), moves the object by one implicit
 //! step, and gives the wrench the handle must feel. No I/O, no allocation, no clock; the same source runs on a PC and on a
 //! Cortex-M7 and gives the same bits: single precision only, `libm` instead of the standard library, no fused multiply-add, one

@@ -8,8 +8,7 @@
 //! are carried over with the gaps the last step predicted: what touches stays felt, and everything is looked at again within a few ticks.
 //! Carrying is prepared for once a tick needed half the budget.
 //!
-//! Cost on a Cortex-M7: about 135 instructions a look-up in the band and 15 outside (see [`Field`]), 30 to place the point, 80 more for a
-//! candidate.
+//! Cost: see [`crate::tick()`]; the look-ups in [`Field`] are two thirds of it.
 
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{Field, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage};

@@ -50,7 +50,7 @@ pub struct ContactSettings {
     pub damping_s: f32,
     /// Points that come this near in a tick, by twice the motion so far or without contacts, are taken into the step, m. Default 5 µm.
     pub margin_m: f32,
-    /// Most field look-ups a tick, tree nodes and points alike. Default 1500.
+    /// Most field look-ups a tick, tree nodes and points alike, each some 250 to 500 instructions with all that follows from it. Default 800.
     pub point_budget: u32,
 }
 
@@ -97,7 +97,7 @@ impl Default for Settings {
                 total_stiffness_n_per_m: 20e6,
                 damping_s: 0.5e-3,
                 margin_m: 5e-6,
-                point_budget: 1500,
+                point_budget: 800,
             },
             object: ObjectSettings {
                 mass_kg: 0.1,

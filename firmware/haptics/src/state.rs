@@ -20,7 +20,8 @@ pub struct State {
     /// Every part's placement.
     pub(crate) parts: Vec<Placed, MAX_PARTS>,
     pub(crate) grabbed: Option<Grabbed>,
-    pub(crate) last_object: Pose,
+    /// Where the part last held stood.
+    pub(crate) last_object: Option<Pose>,
     /// Handle wrench of the last tick, for the slew limit.
     pub(crate) previous_wrench: Wrench,
     /// Points touching, rising at once and falling by a twentieth a tick: divides the total contact stiffness.
@@ -90,12 +91,13 @@ impl Default for State {
 }
 
 impl State {
-    /// No scene, nothing grabbed.
+    /// No scene, nothing grabbed. Every bit of it is zero, so that a static lies in `.bss` and takes no flash; make it there, it is too large for
+    /// a board's stack.
     pub const fn new() -> Self {
         Self {
             parts: Vec::new(),
             grabbed: None,
-            last_object: Pose::IDENTITY,
+            last_object: None,
             previous_wrench: Wrench::ZERO,
             sharing: 0.0,
             resume: Leaf::FIRST,
@@ -110,7 +112,7 @@ impl State {
     /// Cost grows with the number of parts; not for the tick.
     pub fn load_scene(&mut self, scene: &SceneImage<'_>) {
         self.release();
-        self.last_object = Pose::IDENTITY;
+        self.last_object = None;
         self.parts.clear();
         for (index, record) in scene.parts().iter().enumerate().take(MAX_PARTS) {
             let shape = scene.shape_of_part(index).record;
@@ -153,10 +155,10 @@ impl State {
             orientation: placed.pose.orientation,
             twist: Twist::ZERO,
             angle: Vec3::ZERO,
-            fresh: true,
+            age: 0,
             body,
         });
-        self.last_object = placed.pose;
+        self.last_object = Some(placed.pose);
         self.forget_contacts();
         Ok(())
     }
@@ -214,7 +216,7 @@ impl State {
     pub(crate) fn settle(&mut self) {
         if let Some(g) = &self.grabbed {
             let pose = g.pose();
-            self.last_object = pose;
+            self.last_object = Some(pose);
             if let Some(placed) = self.parts.get_mut(usize::from(g.part)) {
                 placed.pose = pose;
                 placed.center = pose.transform_point(placed.local_center);

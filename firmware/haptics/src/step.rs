@@ -12,7 +12,8 @@
 //!
 //! The gyroscopic torque is left out: it does no work, and the object's rotation is led by the hand within a few ticks.
 //!
-//! Cost: 40 instructions a contact and solve, 130 when its phase changes, 600 a solve.
+//! Cost on a Cortex-M7 (counted as in [`crate::tick()`]): 150 instructions to set a system up, 150 to solve it, and about 300 for a contact in all
+//! passes over it together.
 
 use glam::{Mat3, Vec3};
 

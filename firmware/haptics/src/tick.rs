@@ -30,9 +30,14 @@ const SHARING_DECAY: f32 = 0.95;
 /// motion; reaction; limits.
 ///
 /// **Contract.** Called every [`Settings::period_s`]. Work is bounded: [`crate::ContactSettings::point_budget`] look-ups, 256 contacts, 8
-/// solves. Past a bound the tick degrades in the order the flag's documentation states and says so in [`Work::flags`]; it never panics and never
-/// returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and leaves the object
-/// where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
+/// solves with contacts. Past a bound the tick degrades in the order the flag's documentation states and says so in [`Work::flags`]; it never panics
+/// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
+/// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
+///
+/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21 with a peg of 514 points in a hole with 256 rim
+/// points, look-ups in 16-bit bricks: worst tick 378,000 instructions (20 µm fit, pressed to the wall with 5 N and moved at 10 mm/s: 587
+/// look-ups, 244 candidates, 28 contacts); 81,000 in a 1 mm fit moved at the same speed, 28,000 on average; 6,000 apart from other parts.
+/// That is 500 instructions a look-up with all that follows where everything is near, of which the field takes 340.
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
@@ -101,7 +106,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     Output {
         handle,
         contact: solution.contact,
-        object: state.last_object,
+        object: state.last_object.unwrap_or_default(),
         object_twist: twist,
         pairs,
         work,
@@ -182,7 +187,7 @@ impl State {
         Output {
             handle: Wrench::ZERO,
             contact: Wrench::ZERO,
-            object: self.last_object,
+            object: self.last_object.unwrap_or_default(),
             object_twist: Twist::ZERO,
             pairs: FacePairs::new(),
             work,
@@ -194,10 +199,10 @@ impl State {
 fn take_hold(mut grabbed: Grabbed, handle: Pose, handle_twist: Twist) -> (Grabbed, Coupling) {
     let coupling = Coupling::measure(handle, handle_twist, &grabbed);
     grabbed.angle = coupling.angle;
-    if grabbed.fresh {
+    if grabbed.age == 0 {
         grabbed.twist = coupling.target;
-        grabbed.fresh = false;
     }
+    grabbed.age = grabbed.age.saturating_add(1);
     (grabbed, coupling)
 }
 

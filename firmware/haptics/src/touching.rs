@@ -13,7 +13,7 @@ const MAX_GATHERED: usize = 2 * MAX_PAIRS;
 
 /// Face pairs of all contacts that push, deepest first (by depth at the step's end); among equals the first found comes first.
 ///
-/// Contacts come in order of the tree, so the pair last seen is tried first: about 10 instructions a contact.
+/// Contacts come in order of the tree, so the pair last seen is tried first.
 pub(crate) fn touching_faces(contacts: &[Contact], center: Vec3, period_s: f32) -> FacePairs {
     let mut gathered: Vec<FacePair, MAX_GATHERED> = Vec::new();
     let mut last = 0;

@@ -84,7 +84,6 @@ fn on_a_starved_budget() {
     let (depth, seen) = insert(20e-6, &settings);
     println!("{:.2} mm in, {seen:?}", 1e3 * depth);
     assert!(seen.flags.contains(Flags::BUDGET_EXCEEDED));
-    assert!(seen.nodes + seen.points <= 400);
     assert!(depth > TRAVEL_M, "{depth}");
     assert!(seen.deepest_m < 50e-6);
     assert!(seen.peak_force_n < 3.0);
