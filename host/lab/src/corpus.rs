@@ -15,8 +15,6 @@ use crate::scenario::{self, Bounds, Hand, Key, Run, Scenario, Scene};
 
 /// How far the hand takes a part along each axis, mm.
 const SWEEP_MM: f64 = 30.0;
-/// Virtual time a part is moved for, s.
-const MOVE_S: f64 = 5.0;
 
 /// The shared parts' `cad` folder, if it is there.
 pub fn folder() -> Option<PathBuf> {
@@ -34,6 +32,19 @@ pub struct Import {
     pub file: String,
     /// What differs from what is written about the file; `None` when nothing does.
     pub wrong: Option<String>,
+}
+
+impl Import {
+    /// Whether the file is broken on purpose, by its name.
+    pub fn is_broken(&self) -> bool {
+        is_broken(&self.file)
+    }
+}
+
+fn is_broken(file: &str) -> bool {
+    Path::new(file)
+        .file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with("broken_"))
 }
 
 /// What is written about a file beside it.
@@ -77,11 +88,8 @@ pub fn imports(cad: &Path) -> Result<Vec<Import>, LabError> {
 }
 
 fn judge(file: &str, expected: Option<&Expected>, read: Result<CadModel, BrepError>) -> Option<String> {
-    let broken = Path::new(file)
-        .file_name()
-        .is_some_and(|name| name.to_string_lossy().starts_with("broken_"));
     match (read, expected) {
-        (Ok(_), _) if broken => Some("was read although it is broken".into()),
+        (Ok(_), _) if is_broken(file) => Some("was read although it is broken".into()),
         (Ok(model), Some(expected)) => {
             let names: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
             let same = names.len() == expected.parts.len()
@@ -119,12 +127,12 @@ pub struct Moved {
     pub failed: bool,
 }
 
-/// Opens every assembly of two parts or more in `cad/real`, bakes it, and moves its smallest part against the others in the
-/// in-process rig.
+/// Opens every assembly of two parts or more in `cad/real`, bakes it, and moves its smallest part against the others for
+/// `seconds` of virtual time in the in-process rig.
 ///
 /// # Errors
 /// `Unreadable` when the folder cannot be read.
-pub fn assemblies(cad: &Path) -> Result<Vec<Moved>, LabError> {
+pub fn assemblies(cad: &Path, seconds: f64) -> Result<Vec<Moved>, LabError> {
     let mut moved = Vec::new();
     for path in step_files(&cad.join("real"))? {
         let Ok(model) = load_step(&path) else {
@@ -139,7 +147,7 @@ pub fn assemblies(cad: &Path) -> Result<Vec<Moved>, LabError> {
             .to_string_lossy()
             .into_owned();
         let spec = RigSpec::Simulated { realtime: false };
-        let (scenario, part) = sweep(&path, &model);
+        let (scenario, part) = sweep(&path, &model, seconds);
         let (outcome, failed) = match scenario::run(&scenario, &spec) {
             Ok(outcome) => (Ok((part, outcome.image_bytes)), outcome.missed_ticks > 0),
             Err(error @ LabError::Bake { .. }) => (Err(error.to_string()), error.to_string().contains('\n')),
@@ -155,7 +163,7 @@ pub fn assemblies(cad: &Path) -> Result<Vec<Moved>, LabError> {
 }
 
 /// A hand that takes the smallest part with a volume to and fro along each axis.
-fn sweep(path: &Path, model: &CadModel) -> (Scenario, String) {
+fn sweep(path: &Path, model: &CadModel, seconds: f64) -> (Scenario, String) {
     let volume = |index: usize| {
         let volume = model.shapes[model.parts[index].shape].volume_mm3;
         if volume > 0.0 { volume } else { f64::INFINITY }
@@ -176,7 +184,7 @@ fn sweep(path: &Path, model: &CadModel) -> (Scenario, String) {
         -DVec3::Z,
         DVec3::ZERO,
     ];
-    let step_s = MOVE_S / turns.len() as f64;
+    let step_s = seconds / turns.len() as f64;
     let still = Key {
         t_s: 0.0,
         offset_mm: [0.0; 3],
@@ -209,7 +217,7 @@ fn sweep(path: &Path, model: &CadModel) -> (Scenario, String) {
             keyframes: std::iter::once(still.clone()).chain(keys).collect(),
         },
         run: Run {
-            duration_s: MOVE_S,
+            duration_s: seconds,
             telemetry_every_ticks: 20,
             parameter_every_ticks: None,
             settled_s: 0.5,

@@ -1,11 +1,12 @@
 //! Experiments: scenarios that any rig can run, and the figures the product is measured by.
 //!
 //! A [`scenario`] is data (TOML): a STEP file, a part to grab, what the simulated hand does, and what must hold. [`scenario::run`] bakes,
-//! uploads, plays it on a rig in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and [`figures()`] are all
-//! this one function. [`figures()`] measures every row of a named table.
+//! uploads, plays it on a rig in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and [`figures::figures`] are all
+//! this one function. [`figures::figures`] measures every row of a named table.
 
 pub mod corpus;
 mod error;
+pub mod figures;
 pub mod scenario;
 
 pub use error::LabError;
