@@ -1,0 +1,118 @@
+//! Flash with small sectors that loses power after a number of operations, in the middle of one.
+
+use std::cell::{Cell, UnsafeCell};
+use std::rc::Rc;
+
+use mortise_firmware::board::{Flash, FlashError, SLOTS, WRITE_SIZE};
+use mortise_firmware::ram_flash::{ERASED, FlashWord};
+
+pub const SECTOR: usize = 512;
+pub const SLOT: usize = 16 * SECTOR;
+const WORDS: usize = SLOTS * SLOT / WRITE_SIZE;
+
+struct Memory(UnsafeCell<[FlashWord; WORDS]>);
+
+/// Operations left until the power goes; `None`: it stays.
+pub type Fuse = Rc<Cell<Option<u32>>>;
+
+/// A handle on leaked memory: cloning it is taking the chip out and putting it into the next board.
+#[derive(Clone)]
+pub struct TestFlash {
+    memory: &'static Memory,
+    pub fuse: Fuse,
+    /// Operations done so far.
+    pub operations: Rc<Cell<u32>>,
+}
+
+impl TestFlash {
+    pub fn leaked() -> Self {
+        Self {
+            memory: Box::leak(Box::new(Memory(UnsafeCell::new([ERASED; WORDS])))),
+            fuse: Rc::default(),
+            operations: Rc::default(),
+        }
+    }
+
+    /// Overwrites a byte as a failing cell would.
+    pub fn damage(&self, slot: usize, offset: usize) {
+        let word = self.word(slot, offset / WRITE_SIZE * WRITE_SIZE);
+        // SAFETY: inside the memory; the tests are single-threaded.
+        unsafe { (*word).0[offset % WRITE_SIZE] ^= 0x10 };
+    }
+
+    fn word(&self, slot: usize, offset: usize) -> *mut FlashWord {
+        assert!(slot < SLOTS && offset < SLOT && offset.is_multiple_of(WRITE_SIZE));
+        let index = (slot * SLOT + offset) / WRITE_SIZE;
+        // SAFETY: index < WORDS.
+        unsafe { self.memory.0.get().cast::<FlashWord>().add(index) }
+    }
+
+    /// How much of the next operation happens: all, half (power goes), none.
+    fn power(&self) -> Power {
+        self.operations.set(self.operations.get() + 1);
+        match self.fuse.get() {
+            None => Power::On,
+            Some(0) => Power::Off,
+            Some(1) => {
+                self.fuse.set(Some(0));
+                Power::Going
+            }
+            Some(left) => {
+                self.fuse.set(Some(left - 1));
+                Power::On
+            }
+        }
+    }
+}
+
+#[derive(PartialEq)]
+enum Power {
+    On,
+    Going,
+    Off,
+}
+
+// SAFETY: aligned words, leaked memory; `erase` and `write` stay in their slot.
+unsafe impl Flash<'static> for TestFlash {
+    fn capacity(&self) -> usize {
+        SLOT
+    }
+
+    fn erase_size(&self) -> usize {
+        SECTOR
+    }
+
+    unsafe fn slot(&self, slot: usize) -> &'static [u8] {
+        // SAFETY: SLOT bytes from the slot's first word.
+        unsafe { std::slice::from_raw_parts(self.word(slot, 0).cast::<u8>(), SLOT) }
+    }
+
+    fn erase(&mut self, slot: usize, offset: usize) -> Result<(), FlashError> {
+        assert!(offset.is_multiple_of(SECTOR));
+        let power = self.power();
+        let words = match power {
+            Power::On => SECTOR / WRITE_SIZE,
+            Power::Going => SECTOR / WRITE_SIZE / 2,
+            Power::Off => 0,
+        };
+        for i in 0..words {
+            // SAFETY: inside the slot.
+            unsafe { self.word(slot, offset + i * WRITE_SIZE).write(ERASED) };
+        }
+        if power == Power::On { Ok(()) } else { Err(FlashError) }
+    }
+
+    fn write(&mut self, slot: usize, offset: usize, word: &[u8; WRITE_SIZE]) -> Result<(), FlashError> {
+        let power = self.power();
+        let place = self.word(slot, offset);
+        // SAFETY: inside the slot.
+        let now = unsafe { &mut *place };
+        assert_eq!(now.0, ERASED.0, "written twice without erasing");
+        match power {
+            Power::On => now.0 = *word,
+            Power::Going => now.0[..WRITE_SIZE / 2].copy_from_slice(&word[..WRITE_SIZE / 2]),
+            Power::Off => {}
+        }
+        if power == Power::On { Ok(()) } else { Err(FlashError) }
+    }
+}

@@ -1,0 +1,62 @@
+//! A mechanism on strings: the test says what it senses and sees what it was told to do.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use mortise_firmware::board::{Drive, Mechanism, Sensed};
+use mortise_haptics::{Pose, Twist};
+
+/// Shared between the test and the mechanism.
+#[derive(Clone)]
+pub struct Strings(pub Rc<RefCell<Pulled>>);
+
+pub struct Pulled {
+    pub sensed: Sensed,
+    /// Every drive command so far.
+    pub drives: Vec<Drive>,
+}
+
+impl Default for Strings {
+    fn default() -> Self {
+        Self(Rc::new(RefCell::new(Pulled {
+            sensed: Sensed {
+                handle: Pose::IDENTITY,
+                twist: Twist::ZERO,
+                stop_open: false,
+                driver_fault: None,
+                encoder_jump: None,
+            },
+            drives: Vec::new(),
+        })))
+    }
+}
+
+impl Strings {
+    pub fn pull(&self, change: impl FnOnce(&mut Sensed)) {
+        change(&mut self.0.borrow_mut().sensed);
+    }
+
+    pub fn last(&self) -> Drive {
+        *self.0.borrow().drives.last().expect("driven at start")
+    }
+}
+
+pub struct Puppet<const SIMULATED: bool>(Strings);
+
+impl<const SIMULATED: bool> Puppet<SIMULATED> {
+    pub fn new(strings: Strings) -> Self {
+        Self(strings)
+    }
+}
+
+impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
+    const SIMULATED: bool = SIMULATED;
+
+    fn sense(&mut self) -> Sensed {
+        self.0.0.borrow().sensed
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.0.0.borrow_mut().drives.push(drive);
+    }
+}
