@@ -205,7 +205,7 @@ fn half_a_turn_does_not_flip_the_torque() {
 fn the_world_frame_does_not_matter() {
     let felt = |place: Pose| {
         use support::solids::{Block, Peg};
-        let mut w = support::image::Writer::default();
+        let mut w = support::image::Writer::new(0.5e-3);
         let block = w.shape(&Block {
             half: [15e-3, 15e-3, support::BLOCK_HALF],
             hole: support::HOLE,
@@ -349,7 +349,7 @@ fn disabled_means_zero_at_once() {
 #[test]
 fn a_blow_at_a_metre_a_second_does_not_go_through_a_millimetre() {
     use support::solids::Block;
-    let mut w = support::image::Writer::default();
+    let mut w = support::image::Writer::new(0.5e-3);
     let wall = w.shape(&Block {
         half: [15e-3, 15e-3, 0.5e-3],
         hole: 0.0,

@@ -5,6 +5,7 @@ mod support;
 use mortise_haptics::{Settings, State};
 use support::hand::{Hand, run};
 
+/// Felt force (N) and deepest penetration (m) when part 1 is pressed in a direction.
 fn pressed(image: &support::image::Image, from: [f64; 3], direction: [f64; 3], force: f64) -> (f64, f64) {
     let scene = image.open();
     let mut state = State::new();
@@ -30,6 +31,8 @@ fn pressed(image: &support::image::Image, from: [f64; 3], direction: [f64; 3], f
         1e6 * seen.deepest_m,
         seen
     );
+    // At no time had the device given the hand more than it had taken.
+    assert!(seen.work_given_j < 1e-6);
     (felt, f64::from(seen.deepest_m))
 }
 
@@ -48,6 +51,33 @@ fn on_the_wall_of_a_hole() {
     let image = support::hole_and_peg(1e-3, 25e-3);
     for force in [1.0, 3.0, 5.0] {
         let (felt, deepest) = pressed(&image, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], force);
+        assert!((felt - force).abs() < 0.02 * force, "{felt} of {force} N");
+        assert!(deepest < 50e-6);
+    }
+}
+
+/// The thesis' large pair: 0.69 m in 0.7 m, on cells of 10 mm.
+#[test]
+fn a_large_part_on_coarse_cells() {
+    use support::solids::{Block, Peg};
+    let mut w = support::image::Writer::new(10e-3);
+    let block = w.shape(&Block {
+        half: [0.5, 0.5, 0.2],
+        hole: 0.35,
+        around: 128,
+        across: 9,
+    });
+    let peg = w.shape(&Peg {
+        radius: 0.345,
+        half_length: 0.3,
+        around: 128,
+        rings: 3,
+    });
+    w.part(block, false, [0.0; 3], support::UPRIGHT);
+    w.part(peg, true, [0.0; 3], support::UPRIGHT);
+    let image = w.finish();
+    for force in [1.0, 5.0] {
+        let (felt, deepest) = pressed(&image, [0.0, 0.0, 0.0], [0.6, 0.8, 0.0], force);
         assert!((felt - force).abs() < 0.02 * force, "{felt} of {force} N");
         assert!(deepest < 50e-6);
     }

@@ -5,15 +5,14 @@ use mortise_protocol::image::*;
 
 use super::solids::{Solid, SurfacePoint};
 
-/// Cell edge, m.
-pub const CELL: f64 = 0.5e-3;
-/// Distances are stored this far from the surface, m.
-pub const BAND: f64 = 2e-3;
+/// Distances are stored this far from the surface, cells.
+const BAND_CELLS: f64 = 4.0;
 const LEAF_POINTS: usize = 8;
 
 /// An image under construction.
-#[derive(Default)]
 pub struct Writer {
+    /// Cell edge, m.
+    cell: f64,
     parts: Vec<PartRecord>,
     shapes: Vec<ShapeRecord>,
     fields: Vec<FieldRecord>,
@@ -41,6 +40,23 @@ impl Image {
 }
 
 impl Writer {
+    /// Fields on cells of this edge, m.
+    pub fn new(cell: f64) -> Self {
+        Self {
+            cell,
+            parts: Vec::new(),
+            shapes: Vec::new(),
+            fields: Vec::new(),
+            nodes: Vec::new(),
+            points: Vec::new(),
+            faces: Vec::new(),
+            bricks: Vec::new(),
+            palette: Vec::new(),
+            grid: Vec::new(),
+            blob: Vec::new(),
+        }
+    }
+
     /// Adds a shape; its index.
     pub fn shape(&mut self, solid: &dyn Solid) -> u32 {
         let field = self.field(solid);
@@ -99,10 +115,12 @@ impl Writer {
 
     fn field(&mut self, solid: &dyn Solid) -> u32 {
         let half = solid.half_size();
-        let brick = CELL * BRICK_CELLS as f64;
-        let dims = half.map(|h| (2.0 * (h + BAND) / brick).ceil() as usize);
+        let cell = self.cell;
+        let band = BAND_CELLS * cell;
+        let brick = cell * BRICK_CELLS as f64;
+        let dims = half.map(|h| (2.0 * (h + band) / brick).ceil() as usize);
         let origin = core::array::from_fn::<_, 3, _>(|a| -0.5 * brick * dims[a] as f64);
-        let scale = BAND / 32767.0;
+        let scale = band / 32767.0;
         let first_brick = self.bricks.len() as u32;
         let first_grid = self.grid.len() as u32;
         for index in 0..dims[0] * dims[1] * dims[2] {
@@ -112,7 +130,7 @@ impl Writer {
                 index / dims[0] / dims[1],
             ];
             let at = |c: [f64; 3]| -> [f64; 3] {
-                core::array::from_fn(|a| origin[a] + CELL * (c[a] + (b[a] * BRICK_CELLS) as f64))
+                core::array::from_fn(|a| origin[a] + cell * (c[a] + (b[a] * BRICK_CELLS) as f64))
             };
             let samples: Vec<f64> = (0..SAMPLES_PER_BRICK)
                 .map(|i| {
@@ -121,23 +139,23 @@ impl Writer {
                 })
                 .collect();
             let nearest = samples.iter().fold(f64::MAX, |m, d| m.min(d.abs()));
-            let entry = if nearest <= BAND {
+            let entry = if nearest <= band {
                 self.brick(solid, &samples, scale, at);
                 GridEntry::Brick((self.bricks.len() as u32 - 1 - first_brick) as u16)
             } else {
                 // Any place in the brick is within half a cell's diagonal of a sample.
                 GridEntry::Empty {
                     inside: samples[0] < 0.0,
-                    cells: (nearest / CELL - 0.87).floor().max(0.0) as u16,
+                    cells: (nearest / cell - 0.87).floor().max(0.0) as u16,
                 }
             };
             self.grid.push(entry.to_bits());
         }
         self.fields.push(FieldRecord {
             origin: origin.map(|x| x as f32),
-            cell: CELL as f32,
+            cell: cell as f32,
             scale: scale as f32,
-            band: BAND as f32,
+            band: band as f32,
             brick_dims: dims.map(|d| d as u16),
             format: FORMAT_I16,
             first_grid,

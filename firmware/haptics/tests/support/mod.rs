@@ -19,7 +19,7 @@ pub const PEG_HALF: f64 = 15e-3;
 /// Fixed block (part 0) with the thesis' 18.75 mm hole and a peg (part 1) of the given diametral clearance, its lower end `engaged`
 /// below the block's top.
 pub fn hole_and_peg(clearance: f64, engaged: f64) -> Image {
-    let mut w = Writer::default();
+    let mut w = Writer::new(0.5e-3);
     let block = w.shape(&Block {
         half: [15e-3, 15e-3, BLOCK_HALF],
         hole: HOLE,
@@ -45,7 +45,7 @@ pub fn hole_and_peg(clearance: f64, engaged: f64) -> Image {
 /// Fixed slab (part 0) with its top at z = 0 and a box of 20 × 20 × 10 mm (part 1) that hovers `height` above it; `across` squared
 /// points on each of the box's large faces.
 pub fn slab_and_box(height: f64, across: usize) -> Image {
-    let mut w = Writer::default();
+    let mut w = Writer::new(0.5e-3);
     let slab = w.shape(&Block {
         half: [20e-3, 20e-3, 4e-3],
         hole: 0.0,
