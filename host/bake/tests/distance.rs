@@ -217,3 +217,101 @@ fn a_spline_face_is_its_tessellation() {
         assert!((-1e-9..2.0 * chord + 1e-9).contains(&d), "{d} at {p}");
     }
 }
+
+/// A flat disc of radius 10 without the quarter x > 0, y < 0, as one open face with a coarse rim: its centre is a re-entrant corner.
+fn three_quarter_disc() -> Shape {
+    use mortise_brep::{Curve, Edge, Face, Mesh};
+    let n = 12;
+    let mut vertices = vec![DVec3::ZERO];
+    vertices.extend((0..=n).map(|i| {
+        let a = 1.5 * std::f64::consts::PI * f64::from(i) / f64::from(n);
+        DVec3::new(10.0 * a.cos(), 10.0 * a.sin(), 0.0)
+    }));
+    let triangles: Vec<[u32; 3]> = (0..n).map(|i| [0, i + 1, i + 2]).collect();
+    let line = |to: DVec3| Edge {
+        curve: Curve::Line {
+            origin: DVec3::ZERO,
+            direction: to.normalize(),
+        },
+        length_mm: 10.0,
+        faces: vec![0],
+        polyline: vec![DVec3::ZERO, to],
+    };
+    let rim = Edge {
+        curve: Curve::Circle {
+            frame: world(),
+            radius: 10.0,
+        },
+        length_mm: 15.0 * std::f64::consts::PI,
+        faces: vec![0],
+        polyline: vertices[1..].to_vec(),
+    };
+    finish(Shape {
+        faces: vec![Face {
+            surface: Surface::Plane { frame: world() },
+            reversed: false,
+            area_mm2: 1.0,
+            edges: vec![0, 1, 2],
+            color: None,
+        }],
+        edges: vec![line(vertices[1]), rim, line(vertices[vertices.len() - 1])],
+        mesh: Mesh {
+            triangle_face: vec![0; triangles.len()],
+            vertices,
+            triangles,
+        },
+        ..Shape::default()
+    })
+}
+
+thread_local! {
+    static VOID: ExactSurface =
+        ExactSurface::new(&with_void(&sphere(60.0, 24), &block_with_hole([25.0, 20.0], 30.0, 9.375, 24)));
+    static DISC: ExactSurface = ExactSurface::new(&three_quarter_disc());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4000))]
+
+    /// Beyond a corner of the top face but within its facets' reach: the corner is nearest, not the plane.
+    #[test]
+    fn block_is_exact_about_its_corners(p in points(0.4), q in points(0.05)) {
+        let corner = DVec3::new(25.0, 20.0, 30.0);
+        BLOCK.with(|s| {
+            for p in [p, q, DVec3::new(p.x, p.y, q.z)] {
+                check(s, |p| block_distance([25.0, 20.0], 30.0, 9.375, p), corner + p)?;
+            }
+            Ok::<(), TestCaseError>(())
+        })?;
+    }
+
+    /// In the solid about a block-shaped void edges and corners are re-entrant: the sign comes from their own normals.
+    #[test]
+    fn a_void_is_exact(p in points(45.0), q in points(3.0)) {
+        let expected = |p: DVec3| (p.length() - 60.0).max(-block_distance([25.0, 20.0], 30.0, 9.375, p));
+        VOID.with(|s| {
+            check(s, expected, p)?;
+            check(s, expected, DVec3::new(25.0, 20.0, 30.0) + q)
+        })?;
+    }
+
+    /// Within reach of a re-entrant corner and of the ends of the rim.
+    #[test]
+    fn a_face_is_exact_about_its_corners(p in points(0.5), height in -0.2f64..0.2) {
+        for center in [DVec3::ZERO, DVec3::X * 10.0, -DVec3::Y * 10.0, DVec3::new(-7.0, 7.0, 0.0)] {
+            let p = center + DVec3::new(p.x, p.y, height);
+            let rho = p.x.hypot(p.y);
+            let in_quarter = p.x > 0.0 && p.y < 0.0;
+            // In the plane: 0 inside; else to the straight sides (clamped to their ends) or the rim.
+            let to_side = |along: f64, across: f64| (along - along.clamp(0.0, 10.0)).hypot(across);
+            let flat = if in_quarter {
+                to_side(p.x, p.y).min(to_side(-p.y, p.x))
+            } else {
+                (rho - 10.0).max(0.0)
+            };
+            let expected = flat.hypot(p.z);
+            let found = DISC.with(|s| s.nearest(p).unwrap());
+            prop_assert!((found.distance.abs() - expected).abs() < EXACT_MM, "{} instead of {expected} at {p}", found.distance);
+        }
+    }
+}

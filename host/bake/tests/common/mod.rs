@@ -458,3 +458,32 @@ impl AlignedBytes {
         &bytemuck::cast_slice(&self.words)[..self.length]
     }
 }
+
+/// `outer` with the room that `void` takes left empty.
+pub fn with_void(outer: &Shape, void: &Shape) -> Shape {
+    let mut shape = outer.clone();
+    let vertices = shape.mesh.vertices.len() as u32;
+    let faces = shape.faces.len() as u32;
+    let edges = shape.edges.len() as u32;
+    shape.mesh.vertices.extend(&void.mesh.vertices);
+    shape.mesh.triangles.extend(
+        void.mesh
+            .triangles
+            .iter()
+            .map(|t| [t[0], t[2], t[1]].map(|v| v + vertices)),
+    );
+    shape
+        .mesh
+        .triangle_face
+        .extend(void.mesh.triangle_face.iter().map(|f| f + faces));
+    shape.faces.extend(void.faces.iter().map(|f| Face {
+        reversed: !f.reversed,
+        edges: f.edges.iter().map(|e| e + edges).collect(),
+        ..f.clone()
+    }));
+    shape.edges.extend(void.edges.iter().map(|e| Edge {
+        faces: e.faces.iter().map(|f| f + faces).collect(),
+        ..e.clone()
+    }));
+    finish(shape)
+}
