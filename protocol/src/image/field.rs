@@ -14,6 +14,8 @@ pub struct Field<'a> {
     pub(super) palette: &'a [u16],
     pub(super) blob: &'a [u8],
     pub(super) inverse_cell: f32,
+    /// Cells along x, y, z.
+    pub(super) cells: [f32; 3],
 }
 
 /// Where a position lies in a field.
@@ -50,129 +52,174 @@ impl<'a> Field<'a> {
     /// Distance, gradient and face at `p` (m, shape frame), or a lower bound. A non-finite `p` is far outside with bound 0.
     #[inline]
     pub fn lookup(&self, p: [f32; 3]) -> Lookup {
-        match self.locate(p) {
-            Ok((brick, cell, fraction)) => Lookup::Near(self.interpolate(brick, cell, fraction)),
-            Err(far) => far,
+        let g = self.grid_position(p);
+        if !self.holds(g) {
+            return Lookup::Far {
+                inside: false,
+                bound: self.beyond(g),
+            };
+        }
+        let (entry, cell, f) = self.entry(g);
+        match entry {
+            GridEntry::Brick(number) => {
+                let brick = &self.bricks[number as usize];
+                Lookup::Near(self.interpolate(brick, cell, f))
+            }
+            GridEntry::Empty { inside, cells } => Lookup::Far {
+                inside,
+                bound: f32::from(cells) * self.record.cell,
+            },
         }
     }
 
     /// Signed distance at `p` if stored there, else the signed lower bound: what culling needs, without the gradient's cost.
     #[inline]
     pub fn bound(&self, p: [f32; 3]) -> f32 {
-        match self.locate(p) {
-            Ok((brick, cell, fraction)) => self.interpolate(brick, cell, fraction).distance,
-            Err(Lookup::Far { inside, bound }) => {
-                if inside {
-                    -bound
-                } else {
-                    bound
-                }
+        let g = self.grid_position(p);
+        if !self.holds(g) {
+            return self.beyond(g);
+        }
+        let (entry, cell, f) = self.entry(g);
+        match entry {
+            GridEntry::Brick(number) => {
+                let c = self.corners(&self.bricks[number as usize], cell);
+                trilinear(&c, f).0 * self.record.scale
             }
-            Err(Lookup::Near(_)) => 0.0,
+            GridEntry::Empty { inside, cells } => {
+                let bound = f32::from(cells) * self.record.cell;
+                if inside { -bound } else { bound }
+            }
         }
     }
 
-    #[inline]
-    fn locate(&self, p: [f32; 3]) -> Result<(&'a BrickRecord, [usize; 3], [f32; 3]), Lookup> {
-        let mut brick = [0usize; 3];
-        let mut cell = [0usize; 3];
-        let mut fraction = [0f32; 3];
-        let mut outside2 = 0.0f32;
-        for axis in 0..3 {
-            let cells = (self.record.brick_dims[axis] as usize * BRICK_CELLS) as f32;
-            let g = (p[axis] - self.record.origin[axis]) * self.inverse_cell;
-            if g < 0.0 {
-                outside2 += g * g + f32::MIN_POSITIVE;
-            } else if g.is_nan() {
-                outside2 += f32::MIN_POSITIVE;
-            } else if g >= cells {
-                outside2 += (g - cells) * (g - cells) + f32::MIN_POSITIVE;
+    /// `p` in cells from the grid's corner.
+    #[inline(always)]
+    fn grid_position(&self, p: [f32; 3]) -> [f32; 3] {
+        let o = &self.record.origin;
+        let k = self.inverse_cell;
+        [(p[0] - o[0]) * k, (p[1] - o[1]) * k, (p[2] - o[2]) * k]
+    }
+
+    /// Whether a grid position lies in the grid; no for one that is not a number.
+    #[inline(always)]
+    fn holds(&self, g: [f32; 3]) -> bool {
+        let n = &self.cells;
+        g[0] >= 0.0 && g[0] < n[0] && g[1] >= 0.0 && g[1] < n[1] && g[2] >= 0.0 && g[2] < n[2]
+    }
+
+    /// Lower bound of the distance (m) from a position outside the grid: that to its box, which holds the whole shape. 0 for one that is not a number.
+    #[cold]
+    fn beyond(&self, g: [f32; 3]) -> f32 {
+        let mut squared = f32::MIN_POSITIVE;
+        for (g, n) in g.iter().zip(&self.cells) {
+            let d = if *g < 0.0 {
+                *g
+            } else if *g >= *n {
+                g - n
             } else {
-                let whole = g as usize;
-                brick[axis] = whole / BRICK_CELLS;
-                cell[axis] = whole % BRICK_CELLS;
-                fraction[axis] = g - whole as f32;
-            }
+                0.0
+            };
+            squared += d * d;
         }
-        if outside2 > 0.0 {
-            // The grid's box holds the whole shape, so the distance to the box bounds the distance to the surface.
-            return Err(Lookup::Far {
-                inside: false,
-                bound: sqrt_below(outside2) * self.record.cell,
-            });
-        }
-        let dims = self.record.brick_dims;
-        let index = brick[0] + dims[0] as usize * (brick[1] + dims[1] as usize * brick[2]);
-        match GridEntry::from_bits(self.grid[index]) {
-            GridEntry::Brick(number) => Ok((&self.bricks[number as usize], cell, fraction)),
-            GridEntry::Empty { inside, cells } => Err(Lookup::Far {
-                inside,
-                bound: f32::from(cells) * self.record.cell,
-            }),
-        }
+        sqrt_below(squared) * self.record.cell
     }
 
-    #[inline]
-    fn interpolate(&self, brick: &BrickRecord, cell: [usize; 3], f: [f32; 3]) -> FieldSample {
-        let first = cell[0] + BRICK_SAMPLES * (cell[1] + BRICK_SAMPLES * cell[2]);
-        let row = BRICK_SAMPLES;
-        let layer = BRICK_SAMPLES * BRICK_SAMPLES;
-        let corners = [first, first + row, first + layer, first + layer + row];
-        let mut low = [0f32; 4];
-        let mut high = [0f32; 4];
+    /// The entry, cell of the brick, and position in the cell of a grid position that the grid holds.
+    #[inline(always)]
+    fn entry(&self, g: [f32; 3]) -> (GridEntry, usize, [f32; 3]) {
+        let w = [g[0] as u32, g[1] as u32, g[2] as u32];
+        let f = [g[0] - w[0] as f32, g[1] - w[1] as f32, g[2] - w[2] as f32];
+        let dims = &self.record.brick_dims;
+        let row = (w[2] >> BRICK_SHIFT) * u32::from(dims[1]) + (w[1] >> BRICK_SHIFT);
+        let index = row * u32::from(dims[0]) + (w[0] >> BRICK_SHIFT);
+        // Three bits for each axis, x lowest: also the cell's place among the palette indices.
+        let cell = (w[0] & 7) | (w[1] & 7) << 3 | (w[2] & 7) << 6;
+        (GridEntry::from_bits(self.grid[index as usize]), cell as usize, f)
+    }
+
+    /// The eight samples round a cell, x fastest.
+    #[inline(always)]
+    fn corners(&self, brick: &BrickRecord, cell: usize) -> [f32; 8] {
+        let first =
+            (cell & 7) + BRICK_SAMPLES * (cell >> 3 & 7) + BRICK_SAMPLES * BRICK_SAMPLES * (cell >> 6 & 7);
+        let mut c = [0f32; 8];
         if self.record.format == FORMAT_I8 {
             let samples = &self.blob[brick.samples as usize..][..SAMPLES_PER_BRICK];
-            for (i, &c) in corners.iter().enumerate() {
-                low[i] = f32::from(samples[c] as i8);
-                high[i] = f32::from(samples[c + 1] as i8);
+            for (c, corner) in c.iter_mut().zip(CORNERS) {
+                *c = f32::from(samples[first + corner] as i8);
             }
         } else {
             let samples = &self.blob[brick.samples as usize..][..2 * SAMPLES_PER_BRICK];
-            for (i, &c) in corners.iter().enumerate() {
-                low[i] = f32::from(i16::from_le_bytes([samples[2 * c], samples[2 * c + 1]]));
-                high[i] = f32::from(i16::from_le_bytes([samples[2 * c + 2], samples[2 * c + 3]]));
+            for (c, corner) in c.iter_mut().zip(CORNERS) {
+                let at = 2 * (first + corner);
+                *c = f32::from(i16::from_le_bytes([samples[at], samples[at + 1]]));
             }
         }
-        let [fx, fy, fz] = f;
-        let dx = [
-            high[0] - low[0],
-            high[1] - low[1],
-            high[2] - low[2],
-            high[3] - low[3],
-        ];
-        let v = [
-            low[0] + fx * dx[0],
-            low[1] + fx * dx[1],
-            low[2] + fx * dx[2],
-            low[3] + fx * dx[3],
-        ];
-        let (near, far) = (v[0] + fy * (v[1] - v[0]), v[2] + fy * (v[3] - v[2]));
-        let (dx_near, dx_far) = (dx[0] + fy * (dx[1] - dx[0]), dx[2] + fy * (dx[3] - dx[2]));
+        c
+    }
+
+    #[inline(always)]
+    fn interpolate(&self, brick: &BrickRecord, cell: usize, f: [f32; 3]) -> FieldSample {
+        let c = self.corners(brick, cell);
+        let (distance, gradient) = trilinear(&c, f);
         let per_cell = self.record.scale * self.inverse_cell;
         FieldSample {
-            distance: (near + fz * (far - near)) * self.record.scale,
+            distance: distance * self.record.scale,
             gradient: [
-                (dx_near + fz * (dx_far - dx_near)) * per_cell,
-                ((v[1] - v[0]) + fz * ((v[3] - v[2]) - (v[1] - v[0]))) * per_cell,
-                (far - near) * per_cell,
+                gradient[0] * per_cell,
+                gradient[1] * per_cell,
+                gradient[2] * per_cell,
             ],
             face: self.face(brick, cell),
         }
     }
 
-    #[inline]
-    fn face(&self, brick: &BrickRecord, cell: [usize; 3]) -> u16 {
-        let index = cell[0] + BRICK_CELLS * (cell[1] + BRICK_CELLS * cell[2]);
+    #[inline(always)]
+    fn face(&self, brick: &BrickRecord, cell: usize) -> u16 {
         let entry = match brick.index_bits {
             0 => 0,
             4 => {
-                let byte = self.blob[brick.indices as usize + index / 2];
-                usize::from(if index & 1 == 0 { byte & 15 } else { byte >> 4 })
+                let byte = self.blob[brick.indices as usize + cell / 2];
+                usize::from(if cell & 1 == 0 { byte & 15 } else { byte >> 4 })
             }
-            _ => usize::from(self.blob[brick.indices as usize + index]),
+            _ => usize::from(self.blob[brick.indices as usize + cell]),
         };
         self.palette[brick.palette as usize + entry]
     }
+}
+
+/// log₂ of [`BRICK_CELLS`].
+const BRICK_SHIFT: u32 = BRICK_CELLS.trailing_zeros();
+/// Samples from a cell's first corner to each of its corners, x fastest.
+const CORNERS: [usize; 8] = {
+    let (row, layer) = (BRICK_SAMPLES, BRICK_SAMPLES * BRICK_SAMPLES);
+    [0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1]
+};
+// `entry` packs three bits an axis.
+const _: () = assert!(BRICK_CELLS == 8);
+
+/// Value and gradient (per cell) between the corners `c` at `f`.
+#[inline(always)]
+fn trilinear(c: &[f32; 8], f: [f32; 3]) -> (f32, [f32; 3]) {
+    let [fx, fy, fz] = f;
+    let dx = [c[1] - c[0], c[3] - c[2], c[5] - c[4], c[7] - c[6]];
+    let v = [
+        c[0] + fx * dx[0],
+        c[2] + fx * dx[1],
+        c[4] + fx * dx[2],
+        c[6] + fx * dx[3],
+    ];
+    let (dy_near, dy_far) = (v[1] - v[0], v[3] - v[2]);
+    let (near, far) = (v[0] + fy * dy_near, v[2] + fy * dy_far);
+    let (dx_near, dx_far) = (dx[0] + fy * (dx[1] - dx[0]), dx[2] + fy * (dx[3] - dx[2]));
+    (
+        near + fz * (far - near),
+        [
+            dx_near + fz * (dx_far - dx_near),
+            dy_near + fz * (dy_far - dy_near),
+            far - near,
+        ],
+    )
 }
 
 /// A lower bound of √x that needs no library: two Newton steps from above would overshoot, so the result is divided back (x/y ≤ √x ≤ y).

@@ -5,7 +5,9 @@
 
 mod bake;
 mod demo;
+mod figures;
 mod inspect;
+mod lab;
 mod output;
 mod ports;
 
@@ -39,10 +41,21 @@ enum Command {
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
     Demo(demo::Args),
+    /// Run experiments and measure figures
+    Lab(lab::Args),
     /// List the rigs: simulated ones and serial ports
     Ports(ports::Args),
+    /// Experiments
+    #[command(subcommand)]
+    Lab(Lab),
     /// Open the window
     Open(Open),
+}
+
+#[derive(Debug, Subcommand)]
+enum Lab {
+    /// Measure the figures of one topic; exit code 1 when one does not hold
+    Figures(figures::Args),
 }
 
 /// What the window starts with.
@@ -91,7 +104,9 @@ pub fn main() -> ExitCode {
             Command::Inspect(args) => inspect::run(&args),
             Command::Bake(args) => bake::run(&args),
             Command::Demo(args) => demo::run(args),
+            Command::Lab(args) => lab::run(&args),
             Command::Ports(args) => ports::run(&args),
+            Command::Lab(Lab::Figures(args)) => figures::run(&args),
         },
     };
     match result {
