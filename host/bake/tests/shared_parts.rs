@@ -1,0 +1,149 @@
+//! The shared test parts, baked: whole assemblies open, and the thesis pair agrees with its closed form.
+//!
+//! Looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; where they are absent the tests say so and pass.
+
+mod common;
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use common::*;
+use glam::DVec3;
+use mortise_bake::{BakeError, BakeOptions, Baked, ExactSurface, bake};
+use mortise_brep::{CadModel, load_step};
+use mortise_protocol::image::SceneImage;
+
+fn shared(path: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("MORTISE_SHARED").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")),
+        PathBuf::from,
+    );
+    let file = root.join("cad").join(path);
+    if file.exists() {
+        return Some(file);
+    }
+    println!("skipped: no {}", file.display());
+    None
+}
+
+fn quickly(model: &CadModel) -> Result<Baked, BakeError> {
+    let options = BakeOptions {
+        image_limit_bytes: 256 << 10,
+        ..BakeOptions::default()
+    };
+    bake(model, &options, &|_| ControlFlow::Continue(()))
+}
+
+/// A block of 50 × 50 × 40 with an 18.75 mm hole and a peg of 17.75 × 60, wherever the file puts them.
+#[test]
+fn the_thesis_pair_agrees_with_its_closed_form() {
+    let Some(file) = shared("01_thesis_pair/pair_d18.75_clear1.00.step") else {
+        return;
+    };
+    let model = load_step(file).unwrap();
+    let named = |name: &str| {
+        let part = model.parts.iter().find(|p| p.name.contains(name)).unwrap();
+        &model.shapes[part.shape]
+    };
+    let (block, peg) = (named("block"), named("peg"));
+    let center = |shape: &mortise_brep::Shape| shape.center_of_mass;
+    let (block_at, peg_at) = (center(block), center(peg));
+    let (block, peg) = (ExactSurface::new(block), ExactSurface::new(peg));
+    let mut worst = 0.0f64;
+    let mut wrong = 0;
+    let count = 100_000u32;
+    for i in 0..count {
+        let u = |base: f64| (f64::from(i) * base).fract() * 2.0 - 1.0;
+        let p = DVec3::new(
+            u(0.819_172_513_4) * 40.0,
+            u(0.671_043_606_7) * 40.0,
+            u(0.549_700_477_9) * 40.0,
+        );
+        let pairs = [
+            (
+                block.nearest(p + block_at).unwrap().distance,
+                block_distance([25.0, 25.0], 40.0, 9.375, p + DVec3::Z * 20.0),
+            ),
+            (
+                peg.nearest(p + peg_at).unwrap().distance,
+                peg_distance(8.875, 60.0, p + DVec3::Z * 30.0),
+            ),
+        ];
+        for (found, exact) in pairs {
+            worst = worst.max((found - exact).abs());
+            wrong += u32::from((found < 0.0) != (exact < 0.0) && exact.abs() > 1e-6);
+        }
+    }
+    println!("{count} points: largest error {worst:.1e} mm, {wrong} wrong signs");
+    assert_eq!(wrong, 0);
+    // The kernel's centre of mass is good to a few 1e-9 mm, STEP text to 1e-10.
+    assert!(worst < 1e-6, "{worst}");
+}
+
+/// The default image of the pair fits the smallest slot there is.
+#[test]
+fn the_default_image_of_the_pair_fits_half_a_megabyte() {
+    for clearance in ["1.00", "0.02"] {
+        let Some(file) = shared(&format!("01_thesis_pair/pair_d18.75_clear{clearance}.step")) else {
+            return;
+        };
+        let baked = bake(&load_step(file).unwrap(), &BakeOptions::default(), &|_| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        let points: Vec<usize> = baked
+            .report
+            .shapes
+            .iter()
+            .map(|s| s.points.iter().sum())
+            .collect();
+        println!(
+            "clearance {clearance}: {} bytes, {points:?} points",
+            baked.image.len()
+        );
+        assert!(baked.image.len() <= 512 << 10);
+        assert!(baked.report.shapes.iter().all(|s| s.cell_mm < 0.5001));
+    }
+}
+
+#[test]
+fn the_motor_and_other_assemblies_bake() {
+    for name in [
+        "05_motor/motor_flat.step",
+        "05_motor/motor_nested.step",
+        "06_joints/ball_in_socket.step",
+        "06_joints/cone_in_cone.step",
+        "07_fixture/fixture_row.step",
+        "08_hard/mirrored_brackets.step",
+        "08_hard/pair_clear0.10_nurbs.step",
+        "08_hard/split_bearing_block.step",
+        "08_hard/tiny_edges.step",
+        "real/as1-oc-214.stp",
+        "real/chrono_assembly.stp",
+        "real/wrs_02-PANEL.step",
+        "real/brl_ap214_brep_with_voids.stp",
+        "real/brl_ap214_nonmanifold_four_use_edge.stp",
+    ] {
+        let Some(file) = shared(name) else { continue };
+        let model = load_step(file).unwrap();
+        let baked = quickly(&model).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let aligned = AlignedBytes::new(&baked.image);
+        let image = SceneImage::open(aligned.bytes()).unwrap();
+        assert_eq!(image.parts().len(), model.parts.len(), "{name}");
+        for shape in &baked.report.shapes {
+            // A closed, consistent part: normals and winding number agree wherever they were compared.
+            if shape.open_edges == 0 && !shape.sign_by_winding {
+                assert_eq!(shape.sign_disagreements, 0, "{name}: {}", shape.name);
+            }
+            assert!(shape.points.iter().sum::<usize>() > 0, "{name}: {}", shape.name);
+        }
+        println!(
+            "{name}: {} parts, {} shapes, {} bytes, cells of {:.2} mm, {:?}",
+            baked.report.parts.len(),
+            baked.report.shapes.len(),
+            baked.image.len(),
+            baked.report.shapes[0].cell_mm,
+            baked.report.warnings
+        );
+    }
+}
