@@ -140,6 +140,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.tick
     }
 
+    /// See [`Statistics::state_hash`].
+    pub fn state_hash(&self) -> u64 {
+        self.hash.value()
+    }
+
     /// The mechanism, for a test that presses its stop input.
     pub fn mechanism_mut(&mut self) -> &mut M {
         &mut self.mechanism

@@ -42,6 +42,8 @@ pub struct LinkPlane<'c, 's, F> {
     frames: u32,
     bad_frames: u32,
     dropped_before: u32,
+    /// Sequence number of the question after whose answer the link's counters start anew.
+    count_anew: Option<u16>,
     stack_max: u32,
 }
 
@@ -66,6 +68,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             frames: 0,
             bad_frames: 0,
             dropped_before: 0,
+            count_anew: None,
             stack_max: 0,
         };
         if let Some(stored) = plane.store.current() {
@@ -259,7 +262,13 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::Release => CommandKind::Release,
             ToDevice::ResetScene => CommandKind::ResetScene,
             ToDevice::SetTelemetry { every_ticks } => CommandKind::Telemetry(every_ticks),
-            ToDevice::GetStatistics { reset } => CommandKind::Statistics { reset },
+            ToDevice::GetStatistics { reset } => {
+                self.command(seq, CommandKind::Statistics { reset })?;
+                if reset {
+                    self.count_anew = Some(seq);
+                }
+                return Ok(None);
+            }
             ToDevice::SimulatedHand(script) => {
                 check_script(&script)?;
                 CommandKind::Hand(script)
@@ -370,12 +379,21 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                 FromDevice::Refused { seq, reason }
             }
             Reply::Ran { tick, state_hash } => FromDevice::Ran { tick, state_hash },
-            Reply::Statistics(statistics) => FromDevice::Statistics(self.complete(statistics)),
+            Reply::Statistics(statistics) => {
+                let statistics = self.complete(statistics);
+                if self.count_anew == Some(seq) {
+                    self.count_anew = None;
+                    self.frames = 0;
+                    self.bad_frames = 0;
+                    self.dropped_before = self.ends.shared.dropped();
+                }
+                FromDevice::Statistics(statistics)
+            }
         }
     }
 
     /// Adds the link's own counters.
-    fn complete(&mut self, statistics: Statistics) -> Statistics {
+    fn complete(&self, statistics: Statistics) -> Statistics {
         Statistics {
             frames: self.frames,
             bad_frames: self.bad_frames,

@@ -174,3 +174,201 @@ impl Safety {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::format;
+    use std::string::{String, ToString};
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// A fault that fades and one that does not; together they stand for all, see `every_fault_is_of_one_kind`.
+    const FADING: Fault = Fault::HostSilent { silent_ms: 500 };
+    const SUDDEN: Fault = Fault::StopInput;
+
+    const FAULTS: [Fault; 8] = [
+        Fault::StopInput,
+        Fault::HostSilent { silent_ms: 1 },
+        Fault::EncoderJump { axis: 0 },
+        Fault::OverSpeed,
+        Fault::Driver { axis: 0 },
+        Fault::TickOverrun,
+        Fault::SceneDamaged,
+        Fault::NonFinite,
+    ];
+
+    const STATES: [(&str, Safety); 8] = [
+        ("Boot", Safety::Boot),
+        ("Idle", Safety::Idle),
+        ("Armed", Safety::Armed),
+        ("Active", Safety::Active),
+        ("SoftStop (disarming)", Safety::SoftStop(AfterSoftStop::Idle)),
+        (
+            "SoftStop (fault)",
+            Safety::SoftStop(AfterSoftStop::Fault(Fault::SceneDamaged)),
+        ),
+        ("Stopped", Safety::Stopped),
+        ("Fault", Safety::Fault(Fault::OverSpeed)),
+    ];
+
+    const EVENTS: [(&str, Event); 12] = [
+        ("ready", Event::Ready),
+        ("arm", Event::Arm { scene: true }),
+        ("arm, no scene", Event::Arm { scene: false }),
+        ("disarm", Event::Disarm),
+        ("STOP", Event::Stop),
+        ("clear", Event::Clear { cause_gone: true }),
+        ("clear, cause there", Event::Clear { cause_gone: false }),
+        ("grab", Event::Grab),
+        ("release", Event::Release),
+        ("fading fault", Event::Fault(FADING)),
+        ("sudden fault", Event::Fault(SUDDEN)),
+        ("fade over", Event::SoftStopOver),
+    ];
+
+    fn name(state: Safety) -> &'static str {
+        match state {
+            Safety::Boot => "Boot",
+            Safety::Idle => "Idle",
+            Safety::Armed => "Armed",
+            Safety::Active => "Active",
+            Safety::SoftStop(_) => "SoftStop",
+            Safety::Stopped => "Stopped",
+            Safety::Fault(_) => "Fault",
+        }
+    }
+
+    /// One cell of the table: where the event leads, or that it is refused, or that nothing happens.
+    fn cell(state: Safety, event: Event) -> String {
+        match state.step(event) {
+            (_, Action::Refuse(_)) => "refused".to_string(),
+            (next, _) if next == state => "–".to_string(),
+            (next, _) => format!("**{}**", name(next)),
+        }
+    }
+
+    fn table() -> String {
+        let mut rows = Vec::new();
+        let states: Vec<&str> = STATES.iter().map(|(name, _)| *name).collect();
+        rows.push(format!("| event | {} |", states.join(" | ")));
+        rows.push(format!("|---|{}", "---|".repeat(STATES.len())));
+        for (event_name, event) in EVENTS {
+            let cells: Vec<String> = STATES.iter().map(|&(_, state)| cell(state, event)).collect();
+            rows.push(format!("| {event_name} | {} |", cells.join(" | ")));
+        }
+        rows.join("\n")
+    }
+
+    #[test]
+    fn the_table_in_the_documentation_is_this_one() {
+        let documented = include_str!("../../../docs/safety.md");
+        assert!(
+            documented.replace('\r', "").contains(&table()),
+            "docs/safety.md must hold this table:\n{}",
+            table()
+        );
+    }
+
+    #[test]
+    fn motors_come_alive_only_by_arming_from_idle_with_a_scene() {
+        for (_, state) in STATES {
+            for (what, event) in EVENTS {
+                let (next, action) = state.step(event);
+                if !state.live() && next.live() {
+                    assert_eq!(
+                        (state, event),
+                        (Safety::Idle, Event::Arm { scene: true }),
+                        "{what}"
+                    );
+                    assert_eq!(action, Action::Enable);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn leaving_a_live_state_always_turns_the_motors_off() {
+        for (_, state) in STATES {
+            for (what, event) in EVENTS {
+                let (next, action) = state.step(event);
+                if state.live() && !next.live() {
+                    assert_eq!(action, Action::Off, "{state:?}, {what}");
+                }
+                // A rendered wrench never just stops being computed: it is uncoupled, faded or off.
+                if state == Safety::Active && next != state {
+                    assert!(
+                        matches!(action, Action::Uncouple | Action::Fade | Action::Off),
+                        "{what}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stop_means_off_in_every_state() {
+        for (_, state) in STATES {
+            let (next, action) = state.step(Event::Stop);
+            assert_eq!(action, Action::Off, "{state:?}");
+            assert!(matches!(next, Safety::Stopped | Safety::Fault(_)), "{state:?}");
+        }
+    }
+
+    #[test]
+    fn every_fault_is_of_one_kind() {
+        for fault in FAULTS {
+            // A new fault must be decided on here.
+            let fading = match fault {
+                Fault::HostSilent { .. } | Fault::SceneDamaged => true,
+                Fault::StopInput
+                | Fault::EncoderJump { .. }
+                | Fault::OverSpeed
+                | Fault::Driver { .. }
+                | Fault::TickOverrun
+                | Fault::NonFinite => false,
+            };
+            assert_eq!(fades(fault), fading, "{fault:?}");
+            for (_, state) in STATES {
+                let (next, _) = state.step(Event::Fault(fault));
+                let expected = match state {
+                    Safety::Fault(first) => Safety::Fault(first),
+                    Safety::SoftStop(AfterSoftStop::Fault(first)) if fading => {
+                        Safety::SoftStop(AfterSoftStop::Fault(first))
+                    }
+                    _ if fading && state.live() => Safety::SoftStop(AfterSoftStop::Fault(fault)),
+                    _ => Safety::Fault(fault),
+                };
+                assert_eq!(next, expected, "{fault:?} in {state:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_fault_and_a_stop_are_left_only_by_clearing_when_the_cause_is_gone() {
+        for (_, state) in STATES {
+            if !matches!(state, Safety::Fault(_) | Safety::Stopped) {
+                continue;
+            }
+            for (what, event) in EVENTS {
+                let (next, _) = state.step(event);
+                if next == Safety::Idle {
+                    assert_eq!(event, Event::Clear { cause_gone: true }, "{what}");
+                } else {
+                    assert!(matches!(next, Safety::Fault(_) | Safety::Stopped), "{what}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_refusal_changes_nothing() {
+        for (_, state) in STATES {
+            for (what, event) in EVENTS {
+                if let (next, Action::Refuse(_)) = state.step(event) {
+                    assert_eq!(next, state, "{what}");
+                }
+            }
+        }
+    }
+}

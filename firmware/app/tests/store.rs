@@ -35,7 +35,10 @@ fn scenes_are_found_again_whatever_the_chunks() {
             assert_eq!(current(&store), Some(CRC.checksum(&image)));
             let again = Store::open(flash.clone());
             assert_eq!(current(&again), Some(CRC.checksum(&image)));
-            assert_eq!(again.current().unwrap().image.parts()[1].position[2], f32::from(tag) * 1e-3);
+            assert_eq!(
+                again.current().unwrap().image.parts()[1].position[2],
+                f32::from(tag) * 1e-3
+            );
         }
     }
 }
@@ -64,10 +67,18 @@ fn power_lost_at_any_operation_leaves_the_old_scene_or_the_whole_new_one() {
         let result = store_whole(&mut store, &new, 512);
         // The last operation is the record: half a record is none.
         assert_eq!(result, Err(Refusal::Flash), "cut {cut}");
-        assert_eq!(current(&store), Some(CRC.checksum(&old)), "cut {cut}, before the restart");
+        assert_eq!(
+            current(&store),
+            Some(CRC.checksum(&old)),
+            "cut {cut}, before the restart"
+        );
         flash.fuse.set(None);
         let mut store = Store::open(flash);
-        assert_eq!(current(&store), Some(CRC.checksum(&old)), "cut {cut}, after the restart");
+        assert_eq!(
+            current(&store),
+            Some(CRC.checksum(&old)),
+            "cut {cut}, after the restart"
+        );
         kept += 1;
         // And the next upload works.
         store_whole(&mut store, &new, 512).unwrap();
@@ -84,11 +95,17 @@ fn a_break_between_chunks_keeps_the_old_scene() {
         let flash = TestFlash::leaked();
         store_whole(&mut Store::open(flash.clone()), &old, 512).unwrap();
         let mut store = Store::open(flash.clone());
-        store.begin(new.len() as u32, CRC.checksum(&new), LAYOUT_VERSION).unwrap();
+        store
+            .begin(new.len() as u32, CRC.checksum(&new), LAYOUT_VERSION)
+            .unwrap();
         for (i, piece) in new.chunks(64).take(sent).enumerate() {
             store.chunk((i * 64) as u32, piece).unwrap();
         }
-        assert_eq!(current(&Store::open(flash)), Some(CRC.checksum(&old)), "after {sent} chunks");
+        assert_eq!(
+            current(&Store::open(flash)),
+            Some(CRC.checksum(&old)),
+            "after {sent} chunks"
+        );
     }
 }
 
@@ -120,9 +137,19 @@ fn what_cannot_be_a_scene_is_refused_with_the_reason() {
 
     store.begin(length, crc, LAYOUT_VERSION).unwrap();
     store.chunk(0, &image[..512]).unwrap();
-    assert_eq!(store.chunk(0, &image[..512]), Ok(()), "the last chunk again is acknowledged again");
-    assert_eq!(store.chunk(100, &image[100..200]), Err(Refusal::ChunkOrder { expected: 512 }));
-    assert_eq!(store.commit().map(drop), Err(Refusal::SceneIncomplete { received: 512 }));
+    assert_eq!(
+        store.chunk(0, &image[..512]),
+        Ok(()),
+        "the last chunk again is acknowledged again"
+    );
+    assert_eq!(
+        store.chunk(100, &image[100..200]),
+        Err(Refusal::ChunkOrder { expected: 512 })
+    );
+    assert_eq!(
+        store.commit().map(drop),
+        Err(Refusal::SceneIncomplete { received: 512 })
+    );
     store.chunk(512, &image[512..1024]).unwrap();
     assert_eq!(
         store.chunk(1024, &[0; 512]),
@@ -144,10 +171,13 @@ fn what_cannot_be_a_scene_is_refused_with_the_reason() {
             found: CRC.checksum(&damaged)
         })
     );
-    assert_eq!(store_whole(&mut store, &damaged, 512), Err(Refusal::SceneImage(ImageError::Crc {
-        expected: u32::from_le_bytes([image[16], image[17], image[18], image[19]]),
-        found: CRC.checksum(&damaged[20..]),
-    })));
+    assert_eq!(
+        store_whole(&mut store, &damaged, 512),
+        Err(Refusal::SceneImage(ImageError::Crc {
+            expected: u32::from_le_bytes([image[16], image[17], image[18], image[19]]),
+            found: CRC.checksum(&damaged[20..]),
+        }))
+    );
     let mut other = image.clone();
     other[0] = b'X';
     seal(&mut other);
@@ -156,7 +186,11 @@ fn what_cannot_be_a_scene_is_refused_with_the_reason() {
         Err(Refusal::SceneImage(ImageError::BadMagic))
     );
     assert_eq!(current(&store), None);
-    assert_eq!(current(&Store::open(flash)), None, "nothing of that was committed");
+    assert_eq!(
+        current(&Store::open(flash)),
+        None,
+        "nothing of that was committed"
+    );
 }
 
 #[test]
@@ -166,11 +200,16 @@ fn more_parts_than_the_board_holds_are_refused() {
     let memory = vec![ERASED; SLOTS * ERASE_SIZE / 32].leak();
     let mut store = Store::open(RamFlash::new(memory));
     let image = parts(257, 1);
-    store.begin(image.len() as u32, CRC.checksum(&image), LAYOUT_VERSION).unwrap();
+    store
+        .begin(image.len() as u32, CRC.checksum(&image), LAYOUT_VERSION)
+        .unwrap();
     for (i, piece) in image.chunks(512).enumerate() {
         store.chunk((i * 512) as u32, piece).unwrap();
     }
-    assert_eq!(store.commit().map(drop), Err(Refusal::TooManyParts { capacity: 256 }));
+    assert_eq!(
+        store.commit().map(drop),
+        Err(Refusal::TooManyParts { capacity: 256 })
+    );
 }
 
 #[test]
@@ -195,7 +234,9 @@ fn an_upload_never_touches_the_slot_in_use_until_the_control_plane_has_let_go() 
     let mut store = Store::open(flash.clone());
     let (old, new) = (two_parts(1), two_parts(2));
     store_whole(&mut store, &old, 512).unwrap();
-    store.begin(new.len() as u32, CRC.checksum(&new), LAYOUT_VERSION).unwrap();
+    store
+        .begin(new.len() as u32, CRC.checksum(&new), LAYOUT_VERSION)
+        .unwrap();
     for (i, piece) in new.chunks(512).enumerate() {
         store.chunk((i * 512) as u32, piece).unwrap();
     }

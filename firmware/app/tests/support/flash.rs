@@ -99,7 +99,11 @@ unsafe impl Flash<'static> for TestFlash {
             // SAFETY: inside the slot.
             unsafe { self.word(slot, offset + i * WRITE_SIZE).write(ERASED) };
         }
-        if power == Power::On { Ok(()) } else { Err(FlashError) }
+        if power == Power::On {
+            Ok(())
+        } else {
+            Err(FlashError)
+        }
     }
 
     fn write(&mut self, slot: usize, offset: usize, word: &[u8; WRITE_SIZE]) -> Result<(), FlashError> {
@@ -113,6 +117,10 @@ unsafe impl Flash<'static> for TestFlash {
             Power::Going => now.0[..WRITE_SIZE / 2].copy_from_slice(&word[..WRITE_SIZE / 2]),
             Power::Off => {}
         }
-        if power == Power::On { Ok(()) } else { Err(FlashError) }
+        if power == Power::On {
+            Ok(())
+        } else {
+            Err(FlashError)
+        }
     }
 }

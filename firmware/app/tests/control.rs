@@ -1,0 +1,467 @@
+//! The control plane: what each fault does to the motors and how soon, the ramp, the soft stop, lockstep.
+
+mod support;
+
+use glam::Vec3;
+use mortise_firmware::board::{Clock, Drive, Identity, Outbound};
+use mortise_firmware::channel::Channels;
+use mortise_firmware::control::{ControlPlane, FADE_TICKS, RAMP_TICKS, SOFT_STOP_TICKS, Ticked};
+use mortise_firmware::device::start;
+use mortise_firmware::simulated::Simulated;
+use mortise_haptics::Wrench;
+use mortise_protocol::message::*;
+use mortise_protocol::parameter::ParameterId;
+use support::flash::TestFlash;
+use support::image::two_parts;
+use support::{Bench, IDENTITY};
+
+fn active() -> Bench {
+    let mut bench = Bench::ready();
+    bench.request(&ToDevice::Arm).unwrap();
+    bench.request(&ToDevice::Grab { part: 1 }).unwrap();
+    assert_eq!(bench.state(), DeviceState::Active);
+    bench.forget();
+    bench
+}
+
+fn armed() -> Bench {
+    let mut bench = Bench::ready();
+    bench.request(&ToDevice::Arm).unwrap();
+    bench.forget();
+    bench
+}
+
+fn wrench(drive: Drive) -> Wrench {
+    match drive {
+        Drive::Wrench(wrench) => wrench,
+        Drive::Off => panic!("motors off"),
+    }
+}
+
+/// Moves the handle away from the part and waits until the coupling pulls with all it has.
+fn pulled() -> Bench {
+    let mut bench = active();
+    bench
+        .strings
+        .pull(|s| s.handle.position = Vec3::new(0.004, 0.0, 0.0));
+    bench.ticks(20);
+    bench
+}
+
+#[test]
+fn motors_are_off_from_the_start_until_armed() {
+    let mut bench = Bench::ready();
+    bench.ticks(100);
+    let pulled = bench.strings.0.borrow();
+    assert!(pulled.drives.iter().all(|d| *d == Drive::Off));
+    assert!(pulled.drives.len() > 100);
+}
+
+#[test]
+fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
+    for make in [armed, active] {
+        for (name, fault) in [
+            ("stop input", Fault::StopInput),
+            ("driver", Fault::Driver { axis: 2 }),
+            ("encoder", Fault::EncoderJump { axis: 1 }),
+            ("speed", Fault::OverSpeed),
+            ("nan", Fault::NonFinite),
+        ] {
+            let mut bench = make();
+            bench.strings.pull(|s| match fault {
+                Fault::StopInput => s.stop_open = true,
+                Fault::Driver { axis } => s.driver_fault = Some(axis),
+                Fault::EncoderJump { axis } => s.encoder_jump = Some(axis),
+                Fault::OverSpeed => s.twist.linear = Vec3::new(0.0, 2.1, 0.0),
+                _ => s.handle.position.z = f32::NAN,
+            });
+            bench.tick();
+            assert_eq!(bench.strings.last(), Drive::Off, "{name}");
+            assert_eq!(bench.state(), DeviceState::Fault(fault), "{name}");
+            assert_eq!(bench.fault_heard(), Some(fault), "{name}");
+            // Arming is refused with the reason; clearing while the cause lasts as well where the sensors still show it.
+            let state = Refusal::State(DeviceState::Fault(fault));
+            assert_eq!(bench.request(&ToDevice::Arm), Err(state), "{name}");
+            let lasts = matches!(fault, Fault::StopInput | Fault::Driver { .. } | Fault::NonFinite);
+            if lasts {
+                assert_eq!(bench.request(&ToDevice::ClearFault), Err(state), "{name}");
+            }
+            bench.strings.pull(|s| {
+                s.stop_open = false;
+                s.driver_fault = None;
+                s.encoder_jump = None;
+                s.twist.linear = Vec3::ZERO;
+                s.handle.position.z = 0.0;
+            });
+            bench.tick();
+            bench.request(&ToDevice::ClearFault).unwrap();
+            assert_eq!(bench.state(), DeviceState::Idle, "{name}");
+            bench.request(&ToDevice::Arm).unwrap();
+        }
+    }
+}
+
+#[test]
+fn what_only_matters_with_motors_on_is_no_fault_without() {
+    let mut bench = Bench::ready();
+    bench.strings.pull(|s| {
+        s.encoder_jump = Some(0);
+        s.twist.linear = Vec3::new(9.0, 0.0, 0.0);
+    });
+    bench.clock.0.set((100, 0));
+    bench.ticks(2000);
+    assert_eq!(bench.state(), DeviceState::Idle);
+    bench.strings.pull(|s| s.stop_open = true);
+    bench.tick();
+    assert_eq!(bench.state(), DeviceState::Fault(Fault::StopInput));
+}
+
+#[test]
+fn stop_turns_the_motors_off_in_the_next_tick_and_stays_until_cleared() {
+    let mut bench = pulled();
+    assert_ne!(wrench(bench.strings.last()), Wrench::ZERO);
+    bench.send(&ToDevice::Stop);
+    bench.tick();
+    assert_eq!(bench.strings.last(), Drive::Off);
+    assert_eq!(bench.state(), DeviceState::Stopped);
+    assert_eq!(
+        bench.request(&ToDevice::Arm),
+        Err(Refusal::State(DeviceState::Stopped))
+    );
+    bench.request(&ToDevice::ClearFault).unwrap();
+    assert_eq!(bench.state(), DeviceState::Idle);
+}
+
+#[test]
+fn commands_older_than_a_stop_do_not_undo_it() {
+    let mut bench = armed();
+    bench.request(&ToDevice::Stop).unwrap();
+    bench.tick();
+    // On their way when the second stop comes.
+    bench.send(&ToDevice::ClearFault);
+    bench.send(&ToDevice::Arm);
+    bench.send(&ToDevice::Stop);
+    bench.ticks(3);
+    assert_eq!(bench.state(), DeviceState::Stopped);
+    assert_eq!(bench.strings.last(), Drive::Off);
+}
+
+#[test]
+fn a_silent_host_ends_in_a_soft_stop_and_a_fault() {
+    let mut bench = pulled();
+    bench
+        .request(&ToDevice::SetParameter {
+            id: ParameterId::HostTimeout,
+            value: 0.1,
+        })
+        .unwrap();
+    let mut ticks = 0;
+    while bench.state() == DeviceState::Active {
+        bench.tick();
+        ticks += 1;
+        assert!(ticks < 200);
+    }
+    // 100 ticks of patience; the one that answered counts from its own message.
+    assert!((99..=102).contains(&ticks), "{ticks}");
+    assert_eq!(bench.state(), DeviceState::SoftStop);
+    assert!(matches!(bench.fault_heard(), Some(Fault::HostSilent { silent_ms }) if silent_ms > 99));
+    bench.ticks(u32::from(SOFT_STOP_TICKS) + 2);
+    assert!(matches!(
+        bench.state(),
+        DeviceState::Fault(Fault::HostSilent { .. })
+    ));
+    assert_eq!(bench.strings.last(), Drive::Off);
+    bench.request(&ToDevice::ClearFault).unwrap();
+    bench.request(&ToDevice::Arm).unwrap();
+}
+
+#[test]
+fn any_frame_keeps_the_link_alive() {
+    let mut bench = active();
+    for _ in 0..20 {
+        bench.ticks(400);
+        bench.send(&ToDevice::Heartbeat);
+    }
+    assert_eq!(bench.state(), DeviceState::Active);
+}
+
+#[test]
+fn a_soft_stop_fades_within_its_time_and_never_grows() {
+    let mut bench = pulled();
+    let before = wrench(bench.strings.last()).force.length();
+    assert!(before > 0.1, "{before}");
+    bench.request(&ToDevice::Disarm).unwrap();
+    assert_eq!(bench.state(), DeviceState::SoftStop);
+    let mut last = before;
+    for tick in 1..SOFT_STOP_TICKS {
+        let now = wrench(bench.strings.last()).force.length();
+        // At rest there is no damping: the fade alone.
+        assert!(now <= last, "tick {tick}: {now} after {last}");
+        if tick >= FADE_TICKS {
+            assert_eq!(now, 0.0, "tick {tick}");
+        }
+        last = now;
+        bench.tick();
+    }
+    assert_eq!(bench.state(), DeviceState::Idle);
+    assert_eq!(bench.strings.last(), Drive::Off);
+}
+
+#[test]
+fn a_soft_stop_brakes_and_stays_below_its_limits() {
+    let mut bench = active();
+    bench.strings.pull(|s| s.twist.linear = Vec3::new(0.5, 0.0, 0.0));
+    bench.request(&ToDevice::Disarm).unwrap();
+    bench.ticks(u32::from(FADE_TICKS));
+    assert_eq!(wrench(bench.strings.last()).force, Vec3::new(-1.0, 0.0, 0.0));
+    bench.strings.pull(|s| s.twist.linear = Vec3::new(0.0, 1.9, 0.0));
+    bench.tick();
+    let force = wrench(bench.strings.last()).force.length();
+    // Two roundings.
+    assert!((force - 2.0).abs() < 1e-6, "{force}");
+}
+
+#[test]
+fn the_wrench_ramps_up_from_zero() {
+    let mut bench = active();
+    bench
+        .strings
+        .pull(|s| s.handle.position = Vec3::new(0.3, 0.0, 0.0));
+    // Far away: the coupling pulls at its limit from the first ticks on, and the limit is 8 N.
+    let mut forces = Vec::new();
+    for _ in 0..RAMP_TICKS {
+        bench.tick();
+        forces.push(wrench(bench.strings.last()).force.length());
+    }
+    for (i, &force) in forces.iter().enumerate() {
+        let ramp = 8.0 * (i + 2) as f32 / f32::from(RAMP_TICKS);
+        assert!(force <= ramp + 1e-3, "tick {i}: {force} above {ramp}");
+    }
+    let peak = forces.iter().copied().fold(0.0, f32::max);
+    assert!(peak > 1.0, "the ramp was never met: {peak}");
+}
+
+#[test]
+fn too_many_late_ticks_in_a_row_are_a_fault() {
+    let mut bench = active();
+    for _ in 0..2 {
+        bench.clock.0.set((1, 0));
+        bench.tick();
+    }
+    bench.tick();
+    assert_eq!(bench.state(), DeviceState::Active, "not in a row");
+    for _ in 0..u32::from(IDENTITY.overrun_ticks) {
+        bench.clock.0.set((1, 0));
+        bench.tick();
+    }
+    assert_eq!(bench.state(), DeviceState::Fault(Fault::TickOverrun));
+    assert_eq!(bench.strings.last(), Drive::Off);
+    let statistics = bench.statistics(true);
+    assert_eq!(statistics.missed_ticks, 5);
+    assert_eq!(bench.statistics(false).missed_ticks, 0);
+}
+
+#[test]
+fn lockstep_runs_what_is_released_and_nothing_else() {
+    let mut bench = Bench::ready();
+    bench.request(&ToDevice::Lockstep(true)).unwrap();
+    let before = bench.control.ticks();
+    for _ in 0..10 {
+        assert_eq!(bench.tick(), Ticked::Waiting);
+    }
+    bench.send(&ToDevice::Run { ticks: 7 });
+    bench.send(&ToDevice::Arm);
+    let ran = (0..20).filter(|_| bench.tick() == Ticked::Ran).count();
+    assert_eq!(ran, 7);
+    assert_eq!(bench.control.ticks(), before + 7);
+    assert_eq!(
+        bench.state(),
+        DeviceState::Armed,
+        "what came behind Run waited for it"
+    );
+    let order: Vec<_> = bench
+        .heard
+        .iter()
+        .filter(|m| {
+            matches!(
+                m,
+                FromDevice::Ran { .. }
+                    | FromDevice::State {
+                        state: DeviceState::Armed,
+                        ..
+                    }
+            )
+        })
+        .collect();
+    assert!(
+        matches!(order[..], [FromDevice::Ran { .. }, FromDevice::State { .. }]),
+        "{order:?}"
+    );
+    // No silence is counted while time stands still.
+    bench.send(&ToDevice::Run { ticks: 5000 });
+    bench.ticks(5000);
+    assert_eq!(bench.state(), DeviceState::Armed);
+    // A stop needs no tick.
+    bench.send(&ToDevice::Stop);
+    assert_eq!(bench.tick(), Ticked::Waiting);
+    assert_eq!(bench.strings.last(), Drive::Off);
+    // A new host ends lockstep, in the middle of a run too.
+    bench.send(&ToDevice::Run { ticks: u32::MAX });
+    bench.ticks(3);
+    bench.forget();
+    bench.greet();
+    assert_eq!(bench.tick(), Ticked::Ran);
+}
+
+#[test]
+fn lockstep_waits_for_telemetry_instead_of_dropping_it() {
+    let mut bench = Bench::ready();
+    bench.request(&ToDevice::Lockstep(true)).unwrap();
+    bench.request(&ToDevice::SetTelemetry { every_ticks: 1 }).unwrap();
+    bench.forget();
+    bench.send(&ToDevice::Run { ticks: 100 });
+    let mut waited = 0;
+    for _ in 0..200 {
+        // The link gets its turn only every twentieth time.
+        for _ in 0..20 {
+            if bench.control.tick() == Ticked::Waiting {
+                waited += 1;
+            }
+        }
+        bench.link.poll(&mut bench.wire);
+        bench.listen();
+    }
+    let samples = bench
+        .heard
+        .iter()
+        .filter(|m| matches!(m, FromDevice::Telemetry(_)))
+        .count();
+    assert_eq!(samples, 100);
+    assert!(waited > 0);
+    bench.forget();
+    assert_eq!(bench.statistics(false).dropped, 0);
+}
+
+#[test]
+fn resetting_is_refused_while_live_and_puts_everything_back() {
+    let mut bench = active();
+    assert_eq!(
+        bench.request(&ToDevice::ResetScene),
+        Err(Refusal::State(DeviceState::Active))
+    );
+    bench.request(&ToDevice::Stop).unwrap();
+    bench.tick();
+    bench.request(&ToDevice::ResetScene).unwrap();
+}
+
+struct NoClock;
+
+impl Clock for NoClock {
+    fn begin(&mut self) -> u32 {
+        0
+    }
+
+    fn cost(&mut self) -> u32 {
+        0
+    }
+}
+
+struct Sink;
+
+impl Outbound for Sink {
+    fn room(&self) -> usize {
+        1 << 16
+    }
+
+    fn write(&mut self, _: &[u8]) {}
+}
+
+/// The same scenario after different histories gives the same bits.
+#[test]
+fn a_reset_forgets_the_past_to_the_bit() {
+    let run = |history: u32| {
+        let channels = Box::leak(Box::new(Channels::new()));
+        let identity = Identity {
+            overrun_ticks: 0,
+            ..IDENTITY
+        };
+        let (mut link, mut control): (_, ControlPlane<'_, 'static, Simulated, NoClock>) =
+            start(channels, TestFlash::leaked(), Simulated::new(), NoClock, identity);
+        let mut seq = 0;
+        let mut say = |link: &mut mortise_firmware::link::LinkPlane<'_, 'static, TestFlash>,
+                       control: &mut ControlPlane<'_, 'static, Simulated, NoClock>,
+                       message: &ToDevice| {
+            let mut frame = [0; mortise_protocol::limits::MAX_FRAME];
+            seq += 1;
+            let bytes = mortise_protocol::frame::encode(seq, message, &mut frame).unwrap();
+            assert_eq!(link.receive(bytes, &mut Sink), bytes.len());
+            control.tick();
+            link.poll(&mut Sink);
+        };
+        let image = two_parts(1);
+        say(&mut link, &mut control, &ToDevice::Hello(Version::own()));
+        let begin = ToDevice::SceneBegin {
+            length: image.len() as u32,
+            crc: mortise_protocol::image::CRC.checksum(&image),
+            layout: mortise_protocol::image::LAYOUT_VERSION,
+        };
+        say(&mut link, &mut control, &begin);
+        for (i, piece) in image.chunks(512).enumerate() {
+            let chunk = ToDevice::SceneChunk {
+                offset: (i * 512) as u32,
+                data: heapless::Vec::from_slice(piece).unwrap(),
+            };
+            say(&mut link, &mut control, &chunk);
+        }
+        say(&mut link, &mut control, &ToDevice::SceneCommit);
+        let pose = |x: f32| WirePose {
+            position: [x, 0.01, 0.0],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+        };
+        let script = |x: f32| {
+            let frames = [(0, 0.0), (50, x)].map(|(tick, x)| Keyframe {
+                tick,
+                pose: pose(x),
+                push: [0.0, 0.5, 0.0],
+            });
+            ToDevice::SimulatedHand(HandScript {
+                stiffness: 400.0,
+                damping: 5.0,
+                angular_stiffness: 1.0,
+                angular_damping: 0.01,
+                tremor: 1e-4,
+                tremor_hz: 9.0,
+                keyframes: heapless::Vec::from_slice(&frames).unwrap(),
+            })
+        };
+        for message in [script(0.05), ToDevice::Arm, ToDevice::Grab { part: 1 }] {
+            say(&mut link, &mut control, &message);
+        }
+        for _ in 0..history {
+            control.tick();
+        }
+        for message in [ToDevice::Disarm, ToDevice::Heartbeat] {
+            say(&mut link, &mut control, &message);
+        }
+        for _ in 0..200 {
+            control.tick();
+        }
+        for message in [
+            ToDevice::Lockstep(true),
+            ToDevice::ResetScene,
+            script(0.02),
+            ToDevice::Arm,
+            ToDevice::Grab { part: 1 },
+            ToDevice::Run { ticks: 400 },
+        ] {
+            say(&mut link, &mut control, &message);
+        }
+        while control.tick() == Ticked::Ran {}
+        control.state_hash()
+    };
+    let hash = run(0);
+    assert_ne!(hash, mortise_firmware::statistics::StateHash::new().value());
+    for history in [1, 77, 499] {
+        assert_eq!(run(history), hash, "after {history} ticks");
+    }
+}
