@@ -70,9 +70,13 @@ pub struct FieldOptions {
 impl FieldOptions {
     /// Units of a sample in one cell: a whole number, so that planes and repeated features at whole-cell offsets give equal bricks.
     pub(crate) fn units_per_cell(&self) -> f64 {
-        // The corners of a cell the band touches are at most its diagonal farther. Clamping what is beyond also lets more bricks be equal.
-        let range = self.band_cells + 3f64.sqrt();
-        (self.format.max() / range).floor().max(1.0)
+        (self.format.max() / self.range_cells()).floor().max(1.0)
+    }
+
+    /// Distance up to which samples are exact, in cells: the corners of a cell the band touches are at most its diagonal farther. Clamping
+    /// what is beyond lets more bricks be equal.
+    fn range_cells(&self) -> f64 {
+        self.band_cells + 3f64.sqrt()
     }
 }
 
@@ -279,7 +283,7 @@ fn pack(
             origin: grid.origin_m,
             cell: grid.cell_m,
             scale,
-            band: (f64::from(scale) * options.format.max()) as f32,
+            band: (options.range_cells() * grid.cell() / 1000.0) as f32,
             brick_dims: grid.dims.map(|d| d as u16),
             format: options.format.code(),
             first_grid: 0,
