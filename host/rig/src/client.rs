@@ -299,6 +299,13 @@ impl Client {
         self.link.send(&ToDevice::Stop).map(|_| ())
     }
 
+    /// Ends the link from this side: whoever waits for the board (an upload on another thread) gets `LinkLost` at once. No event tells of it.
+    /// Where motors may be on, [`Client::stop`] comes first.
+    pub fn hang_up(&self) {
+        self.link.close();
+        self.link.lose("this program ended it");
+    }
+
     /// Writes bytes that are no frame, and ends them: for showing that they do no harm.
     ///
     /// # Errors

@@ -5,7 +5,6 @@
 
 mod bake;
 mod demo;
-mod figures;
 mod inspect;
 mod lab;
 mod output;
@@ -45,17 +44,8 @@ enum Command {
     Lab(lab::Args),
     /// List the rigs: simulated ones and serial ports
     Ports(ports::Args),
-    /// Experiments
-    #[command(subcommand)]
-    Lab(Lab),
     /// Open the window
     Open(Open),
-}
-
-#[derive(Debug, Subcommand)]
-enum Lab {
-    /// Measure the figures of one topic; exit code 1 when one does not hold
-    Figures(figures::Args),
 }
 
 /// What the window starts with.
@@ -106,7 +96,6 @@ pub fn main() -> ExitCode {
             Command::Demo(args) => demo::run(args),
             Command::Lab(args) => lab::run(&args),
             Command::Ports(args) => ports::run(&args),
-            Command::Lab(Lab::Figures(args)) => figures::run(&args),
         },
     };
     match result {

@@ -11,7 +11,7 @@ use mortise_brep::CadModel;
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
 use crate::viewport::camera::Extent;
-use crate::viewport::mesh::{ShapeMesh, srgb};
+use crate::viewport::mesh::{ShapeMesh, shown};
 
 /// Colours of parts that have none, sRGB: muted, told apart on a dark ground, none of them red (stop) or orange (in hand).
 const PALETTE: [[u8; 3]; 8] = [
@@ -147,7 +147,7 @@ fn extent_of(model: &CadModel, poses: &[DAffine3]) -> Extent {
 
 fn colors(model: &CadModel) -> Vec<[u8; 3]> {
     let own = |color: [f32; 3]| {
-        let [r, g, b, _] = srgb(color);
+        let [r, g, b, _] = shown(color);
         [r, g, b]
     };
     (model.parts.iter().enumerate())

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use mortise_bake::Baked;
 use mortise_protocol::message::{Capabilities, DeviceState, HandScript, Statistics, ToDevice};
@@ -17,10 +18,14 @@ use super::work::{Outbox, Update};
 /// Ticks between telemetry messages: some 60 a second, half of what an emulated UART carries.
 pub const TELEMETRY_TICKS: u16 = 16;
 
+/// Longest wait for a connection to end when the program does: longer than a rig is greeted, so that an emulator that has just been
+/// started is ended as well. The window is gone by then.
+const CLOSING: Duration = Duration::from_secs(40);
+
 /// Something to do over the link.
 pub enum Command {
-    /// Send and wait for the answer; `what` is said when it fails.
-    Request(ToDevice),
+    /// Send and wait for the answer.
+    Request(Box<ToDevice>),
     /// Send a scene.
     Upload {
         /// The image.
@@ -48,7 +53,7 @@ pub enum LinkUpdate {
     /// A request was carried out, or why not.
     Answered {
         /// What was asked.
-        message: ToDevice,
+        message: Box<ToDevice>,
         /// One line why not.
         result: Result<(), String>,
     },
@@ -200,7 +205,7 @@ fn introduce(client: &Client) -> Result<Vec<(ParameterId, f32)>, RigError> {
 fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool) -> LinkUpdate {
     match command {
         Command::Request(message) => {
-            let result = client.request(message.clone()).map_err(|e| e.to_string());
+            let result = client.request((*message).clone()).map_err(|e| e.to_string());
             LinkUpdate::Answered { message, result }
         }
         Command::Upload { baked, generation } => {
@@ -220,7 +225,7 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
         Command::Statistics => match client.statistics(false) {
             Ok(statistics) => LinkUpdate::Statistics(statistics),
             Err(error) => LinkUpdate::Answered {
-                message: ToDevice::GetStatistics { reset: false },
+                message: Box::new(ToDevice::GetStatistics { reset: false }),
                 result: Err(error.to_string()),
             },
         },
@@ -230,7 +235,7 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
 /// Passes events on until there are no more.
 fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events) {
     loop {
-        match events.recv_timeout(std::time::Duration::from_secs(1)) {
+        match events.recv_timeout(Duration::from_secs(1)) {
             Ok(event) => {
                 let update = LinkUpdate::Event(event);
                 if !outbox.send(Update::Link { id, update }) {
@@ -279,7 +284,7 @@ impl Connection {
 
     /// Has a message sent and its answer waited for.
     pub fn request(&self, message: ToDevice) {
-        self.command(Command::Request(message));
+        self.command(Command::Request(Box::new(message)));
     }
 
     /// Motors off, now: written from a thread of its own, past everything that waits.
@@ -288,7 +293,7 @@ impl Connection {
         super::work::spawn("mortise-stop", move || {
             let result = client.stop().map_err(|error| error.to_string());
             let update = LinkUpdate::Answered {
-                message: ToDevice::Stop,
+                message: Box::new(ToDevice::Stop),
                 result,
             };
             outbox.send(Update::Link { id, update });
@@ -349,7 +354,8 @@ impl Connection {
 }
 
 impl Link {
-    /// Ends the connection: motors off, threads and emulator ended. Waits for them when `wait` is set, else lets them end by themselves.
+    /// Ends the connection: motors off, threads and emulator ended. Waits for them when `wait` is set, but no longer
+    /// than [`CLOSING`], else lets them end by themselves.
     pub fn close(self, wait: bool) {
         let (client, commands, thread) = match self {
             Self::None => return,
@@ -360,12 +366,14 @@ impl Link {
             if let Some(client) = &client {
                 // Past whatever the other thread is doing; a lost link stops the board by itself.
                 let _ = client.stop();
+                // An upload under way must not be waited for.
+                client.hang_up();
             }
             drop(commands);
             drop(client);
-            if let Some(thread) = thread {
-                // What it had to say it has sent.
-                let _ = thread.join();
+            let begun = Instant::now();
+            while thread.as_ref().is_some_and(|t| !t.is_finished()) && begun.elapsed() < CLOSING {
+                std::thread::sleep(Duration::from_millis(5));
             }
         };
         if wait {

@@ -23,7 +23,8 @@ impl PathDialog {
         }
         let mut done = false;
         let modal = Modal::new(Id::unique("path"))
-            .frame(theme::card().inner_margin(20))
+            .frame(theme::card().fill(theme::CARD).inner_margin(20))
+            .backdrop_color(egui::Color32::from_black_alpha(90))
             .show(ctx, |ui| {
                 ui.set_width(460.0);
                 ui.label(

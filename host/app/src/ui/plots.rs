@@ -82,6 +82,8 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
     } = panel;
     let history = &session.history;
     ui.spacing_mut().item_spacing.x = 7.0;
+    // Names give way first; colours and the tooltip still tell.
+    let narrow = ui.available_width() < 270.0;
     ui.horizontal(|ui| {
         ui.label(RichText::new(title).color(theme::TEXT_STRONG));
         ui.label(RichText::new(unit).small().color(theme::TEXT_WEAK));
@@ -96,8 +98,10 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
                     };
                     ui.label(RichText::new(text).monospace().color(trace.color));
                 }
-                ui.label(RichText::new(trace.name).small().color(theme::TEXT_WEAK));
-                ui.add_space(2.0);
+                if !narrow {
+                    ui.label(RichText::new(trace.name).small().color(theme::TEXT_WEAK));
+                    ui.add_space(2.0);
+                }
             }
         });
     });

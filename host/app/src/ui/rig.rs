@@ -1,12 +1,16 @@
 //! The right side: which rig, what it says of itself, what the hand does, and the parameters.
 
-use egui::{RichText, ScrollArea, Ui, Vec2};
+use egui::text::LayoutJob;
+use egui::{FontId, Response, RichText, ScrollArea, TextFormat, Ui, Vec2};
 use mortise_protocol::message::{Capabilities, CostUnit};
-use mortise_rig::{EmulatedMode, RigSpec};
+use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
 
 use super::{control, parameters, theme};
 use crate::session::link::{Connection, Link};
 use crate::session::{Intent, Session, obstacle};
+
+/// Width of the list of rigs, points.
+const CHOOSER_WIDTH: f32 = 380.0;
 
 /// Draws it.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
@@ -52,28 +56,13 @@ fn chooser(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 .width(wide)
                 .selected_text(label_of(session, &session.chosen))
                 .truncate()
+                .height(420.0)
                 .show_ui(ui, |ui| {
-                    ui.set_min_width(340.0);
+                    ui.set_min_width(CHOOSER_WIDTH);
                     for entry in &session.rigs {
-                        let chosen = entry.spec == session.chosen;
-                        let name = match &entry.available {
-                            Ok(()) => RichText::new(&entry.label).color(theme::TEXT_STRONG),
-                            Err(_) => RichText::new(&entry.label).color(theme::TEXT_WEAK),
-                        };
-                        let line = ui.selectable_label(chosen, name);
-                        let line = line.on_hover_text(&entry.detail);
-                        if line.clicked() {
+                        if choice(ui, entry, entry.spec == session.chosen).clicked() {
                             wanted.push(Intent::ChooseRig(entry.spec.clone()));
                         }
-                        let (text, color) = match &entry.available {
-                            Ok(()) => (entry.detail.as_str(), theme::TEXT_WEAK),
-                            Err(hint) => (hint.as_str(), theme::WARNING),
-                        };
-                        ui.horizontal_wrapped(|ui| {
-                            ui.add_space(10.0);
-                            ui.label(RichText::new(text).small().color(color));
-                        });
-                        ui.add_space(4.0);
                     }
                 });
             list.response.accessible_name("Rig");
@@ -92,6 +81,23 @@ fn chooser(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             "Look for rigs again",
         );
     });
+}
+
+/// Two lines: what it is called, and what it is or what keeps it from being used.
+fn choice(ui: &mut Ui, entry: &RigEntry, chosen: bool) -> Response {
+    let (ink, text, color) = match &entry.available {
+        Ok(()) => (theme::TEXT_STRONG, &entry.detail, theme::TEXT_WEAK),
+        Err(hint) => (theme::TEXT_WEAK, hint, theme::WARNING),
+    };
+    let mut job = LayoutJob::default();
+    let format = |size, color| TextFormat::simple(FontId::proportional(size), color);
+    job.append(&entry.label, 0.0, format(13.5, ink));
+    job.append("\n", 0.0, format(13.5, ink));
+    job.append(text, 0.0, format(11.5, color));
+    job.wrap.max_width = CHOOSER_WIDTH - 24.0;
+    let size = Vec2::new(ui.available_width(), 0.0);
+    let line = ui.add(egui::Button::selectable(chosen, job).wrap().min_size(size));
+    line.accessible_name(&entry.label)
 }
 
 fn connect(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {

@@ -202,7 +202,7 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         return;
     };
     let sample = session.history.newest();
-    let mut lines = vec![(format!("{}", document.part_name(part)), theme::HELD, 14.5)];
+    let mut lines = vec![(document.part_name(part).to_owned(), theme::HELD, 14.5)];
     if let Some(sample) = sample {
         lines.push((
             format!("{:.2} N on the handle", sample.handle_n),

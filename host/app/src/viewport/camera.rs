@@ -246,7 +246,7 @@ mod tests {
         (
             prop::array::uniform3(-100.0..100.0),
             1.0..1e3f64,
-            0.0..6.28,
+            0.0..2.0 * PI,
             -1.55..1.55,
         )
             .prop_map(|(t, distance, yaw, pitch)| Camera {

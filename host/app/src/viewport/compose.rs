@@ -12,6 +12,8 @@ use crate::session::pose::point_from_wire;
 
 /// Edges of parts, sRGB and opacity.
 const EDGE: [f32; 4] = [0.05, 0.06, 0.08, 0.75];
+/// Edges of parts seen through: light, or they would be lost on the dark ground.
+const EDGE_GLASS: [f32; 4] = [0.66, 0.72, 0.80, 0.55];
 /// Edges of the marked part.
 const EDGE_MARKED: [f32; 4] = [0.45, 0.72, 1.0, 1.0];
 /// Edges of the part in hand.
@@ -42,19 +44,17 @@ pub fn compose(
         .map(|(index, part)| {
             let in_hand = held == Some(index);
             let marked = session.selected == Some(index);
+            let glass = see_through && !in_hand && is_fixed(document, index);
             Item {
                 shape: part.shape,
                 pose: document.poses[index],
                 color: document.colors[index].map(|c| f32::from(c) / 255.0),
-                opacity: if see_through && !in_hand && is_fixed(document, index) {
-                    SEEN_THROUGH
-                } else {
-                    1.0
-                },
+                opacity: if glass { SEEN_THROUGH } else { 1.0 },
                 tint: if in_hand { TINT_HELD } else { [0.0; 4] },
                 line: match (in_hand, marked) {
                     (true, _) => EDGE_HELD,
                     (_, true) => EDGE_MARKED,
+                    _ if glass => EDGE_GLASS,
                     _ => EDGE,
                 },
                 lit: touching.map_or_else(Vec::new, |t| lit(document, t, index, in_hand)),

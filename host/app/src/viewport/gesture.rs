@@ -30,7 +30,7 @@ enum Drag {
 }
 
 /// The view's own state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Viewpoint {
     /// From where the scene is seen.
     pub camera: Camera,
@@ -39,18 +39,6 @@ pub struct Viewpoint {
     goal: Option<Camera>,
     drag: Option<Drag>,
     seen: Option<u64>,
-}
-
-impl Default for Viewpoint {
-    fn default() -> Self {
-        Self {
-            camera: Camera::default(),
-            see_through: false,
-            goal: None,
-            drag: None,
-            seen: None,
-        }
-    }
 }
 
 fn ndc(rect: Rect, at: Pos2) -> DVec2 {

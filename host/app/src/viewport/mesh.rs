@@ -63,7 +63,7 @@ impl ShapeMesh {
                     mesh.vertices.push(Vertex {
                         position: point.as_vec3().to_array(),
                         normal: [0.0; 3],
-                        color: face.color.map_or([0; 4], srgb),
+                        color: face.color.map_or([0; 4], shown),
                         face: face_id,
                     });
                     gathered.push(DVec3::ZERO);
@@ -101,6 +101,13 @@ pub fn srgb(linear: [f32; 3]) -> [u8; 4] {
         (255.0 * s + 0.5) as u8
     };
     [encode(linear[0]), encode(linear[1]), encode(linear[2]), 255]
+}
+
+/// How a colour of a file is shown: files like pure red and green, eyes do not. An eighth of the way to a middle grey.
+pub fn shown(linear: [f32; 3]) -> [u8; 4] {
+    let [r, g, b, a] = srgb(linear);
+    let soften = |c: u8| ((7 * u32::from(c) + 128) / 8) as u8;
+    [soften(r), soften(g), soften(b), a]
 }
 
 fn points_of(shape: &Shape, corners: &[u32; 3]) -> Option<[DVec3; 3]> {
