@@ -131,6 +131,23 @@ fn from_an_empty_window_to_a_felt_insertion_and_stop() {
 }
 
 #[test]
+fn the_demonstration_goes_from_nothing_to_an_inserted_peg_and_plays_again() {
+    let mut harness = harness();
+    let demo = Intent::Demo(Some(RigSpec::Simulated { realtime: true }));
+    harness.state_mut().session.act(demo);
+    let lowest = |s: &Session| {
+        s.document
+            .as_ref()
+            .map_or(f64::INFINITY, |d| d.poses[1].translation.z)
+    };
+    until(&mut harness, "the peg is in", |s| lowest(s) < 20.0 + 0.1);
+    click(&mut harness, "Play insertion");
+    until(&mut harness, "the peg is back", |s| lowest(s) > 79.0);
+    until(&mut harness, "the peg is in again", |s| lowest(s) < 20.0 + 0.1);
+    assert!(worst(&harness.state().session) < Severity::Warning);
+}
+
+#[test]
 fn space_and_escape_stop() {
     for key in [egui::Key::Space, egui::Key::Escape] {
         let mut harness = harness();
