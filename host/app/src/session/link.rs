@@ -355,7 +355,7 @@ impl Connection {
 
 impl Link {
     /// Ends the connection: motors off, threads and emulator ended. Waits for them when `wait` is set, but no longer
-    /// than [`CLOSING`], else lets them end by themselves.
+    /// than 40 s, else lets them end by themselves.
     pub fn close(self, wait: bool) {
         let (client, commands, thread) = match self {
             Self::None => return,
