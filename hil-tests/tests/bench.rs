@@ -4,7 +4,7 @@
 //! A missing emulator or firmware, or a port that cannot be opened, fails: a bench that tests nothing must not look as if it had.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -104,28 +104,44 @@ fn run_check((name, check): Check, spec: &RigSpec) -> Result<(), Failed> {
     Ok(())
 }
 
+/// Values made once, by whoever asks first; the others wait for it. A failure is not kept.
+struct Once<K, V>(Mutex<HashMap<K, Slot<V>>>);
+
+type Slot<V> = Arc<Mutex<Option<V>>>;
+
+impl<K, V> Default for Once<K, V> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<K: std::hash::Hash + Eq, V: Clone> Once<K, V> {
+    fn get<E>(&self, key: K, make: impl FnOnce() -> Result<V, E>) -> Result<V, E> {
+        let slot = {
+            let mut map = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            map.entry(key).or_default().clone()
+        };
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(value) = &*slot {
+            return Ok(value.clone());
+        }
+        let value = make()?;
+        *slot = Some(value.clone());
+        Ok(value)
+    }
+}
+
 /// Scenes baked and outcomes measured, so that comparing two rigs does not measure them again.
 #[derive(Default)]
 struct Bench {
-    scenes: Mutex<HashMap<String, Arc<Mutex<Option<Arc<PreparedScene>>>>>>,
-    outcomes: Mutex<HashMap<(PathBuf, RigSpec), Arc<Mutex<Option<Outcome>>>>>,
-}
-
-fn slot<K: std::hash::Hash + Eq, V: Default>(map: &Mutex<HashMap<K, Arc<V>>>, key: K) -> Arc<V> {
-    let mut map = map.lock().unwrap_or_else(PoisonError::into_inner);
-    map.entry(key).or_default().clone()
+    scenes: Once<String, Arc<PreparedScene>>,
+    outcomes: Once<(PathBuf, RigSpec), Outcome>,
 }
 
 impl Bench {
     fn scene(&self, scenario: &Scenario) -> Result<Arc<PreparedScene>, LabError> {
-        let slot = slot(&self.scenes, format!("{:?}", scenario.scene));
-        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(scene) = &*slot {
-            return Ok(scene.clone());
-        }
-        let scene = Arc::new(PreparedScene::of(scenario)?);
-        *slot = Some(scene.clone());
-        Ok(scene)
+        let key = format!("{:?}", scenario.scene);
+        self.scenes.get(key, || PreparedScene::of(scenario).map(Arc::new))
     }
 
     fn measure(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
@@ -134,18 +150,12 @@ impl Bench {
         run_on(&client, scenario, &scene)
     }
 
-    fn outcome(&self, file: &PathBuf, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
-        let slot = slot(&self.outcomes, (file.clone(), spec.clone()));
-        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(outcome) = &*slot {
-            return Ok(outcome.clone());
-        }
-        let outcome = self.measure(scenario, spec)?;
-        *slot = Some(outcome.clone());
-        Ok(outcome)
+    fn outcome(&self, file: &Path, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
+        let key = (file.to_owned(), spec.clone());
+        self.outcomes.get(key, || self.measure(scenario, spec))
     }
 
-    fn scenario(&self, file: &PathBuf, spec: &RigSpec) -> Result<Completion, Failed> {
+    fn scenario(&self, file: &Path, spec: &RigSpec) -> Result<Completion, Failed> {
         let scenario = Scenario::load(file)?;
         let outcome = match self.outcome(file, &scenario, spec) {
             Err(error @ LabError::NeedsSimulatedHand { .. }) => {
@@ -170,7 +180,7 @@ impl Bench {
     }
 
     /// The board computes what this computer computes, to the bit; and computes it again the same.
-    fn equal(&self, file: &PathBuf, sim: &RigSpec, emulated: &RigSpec) -> Result<(), Failed> {
+    fn equal(&self, file: &Path, sim: &RigSpec, emulated: &RigSpec) -> Result<(), Failed> {
         let scenario = Scenario::load(file)?;
         let here = self.outcome(file, &scenario, sim)?.state_hash;
         let again = self.measure(&scenario, sim)?.state_hash;

@@ -207,8 +207,9 @@ impl Scenario {
             return wrong("[holds] is empty: a scenario that cannot fail shows nothing".into());
         }
         for (quantity, bounds) in &self.holds {
-            // Written so that NaN fails too.
-            if !(bounds.min <= bounds.max) {
+            let ordered = bounds.min <= bounds.max;
+            // NaN is not.
+            if !ordered {
                 return wrong(format!(
                     "holds.{quantity}: min {} is above max {}",
                     bounds.min, bounds.max
