@@ -42,27 +42,27 @@ parameters! {
     /// Virtual coupling, translational stiffness k_T.
     CouplingStiffness = "N/m", 0.0, 5_000.0, 1_000.0;
     /// Virtual coupling, translational damping b_T.
-    CouplingDamping = "N·s/m", 0.0, 50.0, 5.0;
+    CouplingDamping = "N·s/m", 0.0, 50.0, 20.0;
     /// Virtual coupling, rotational stiffness k_R.
-    CouplingAngularStiffness = "N·m/rad", 0.0, 20.0, 2.0;
+    CouplingAngularStiffness = "N·m/rad", 0.0, 20.0, 0.5;
     /// Virtual coupling, rotational damping b_R.
     CouplingAngularDamping = "N·m·s/rad", 0.0, 0.1, 0.01;
     /// Force at which the virtual coupling saturates.
-    CouplingForce = "N", 0.1, 50.0, 20.0;
+    CouplingForce = "N", 0.1, 50.0, 10.0;
     /// Torque at which the virtual coupling saturates.
-    CouplingTorque = "N·m", 0.01, 2.0, 1.0;
+    CouplingTorque = "N·m", 0.01, 2.0, 0.3;
     /// Contact stiffness of one point.
-    ContactStiffness = "N/m", 1e3, 5e6, 5e5;
+    ContactStiffness = "N/m", 1e3, 5e6, 2e5;
     /// Contact damping over stiffness.
     ContactDamping = "s", 0.0, 0.01, 0.0005;
     /// Mass of the dynamic object.
     ObjectMass = "kg", 0.01, 5.0, 0.1;
     /// Largest force commanded to the handle.
-    ForceLimit = "N", 0.0, 20.0, 8.0;
+    ForceLimit = "N", 0.0, 20.0, 12.0;
     /// Largest torque commanded to the handle.
     TorqueLimit = "N·m", 0.0, 1.0, 0.5;
     /// Largest change of force in a second.
-    ForceSlew = "N/s", 10.0, 20_000.0, 4_000.0;
+    ForceSlew = "N/s", 10.0, 20_000.0, 5_000.0;
     /// Largest change of torque in a second.
     TorqueSlew = "N·m/s", 0.1, 1_000.0, 200.0;
     /// Handle speed that counts as a fault.
@@ -70,7 +70,7 @@ parameters! {
     /// Host silence while armed that counts as a fault.
     HostTimeout = "s", 0.05, 5.0, 0.5;
     /// Points looked at in a tick at the most.
-    PointBudget = "points", 16.0, 65_535.0, 2_000.0;
+    PointBudget = "points", 16.0, 65_535.0, 800.0;
 }
 
 impl ParameterId {

@@ -99,6 +99,12 @@ mod tests {
     }
 
     #[test]
+    fn a_board_starts_with_the_force_laws_own_defaults() {
+        let started = Parameters::default().settings().map(|settings| settings.law);
+        assert_eq!(started, Ok(Settings::default()));
+    }
+
+    #[test]
     fn what_is_outside_is_refused_with_the_range_and_changes_nothing() {
         for row in PARAMETERS {
             let outside = [
