@@ -9,7 +9,7 @@
 //! at a vertex), so that a point between a facet and the true cylinder is on the right side. Where the shell is open, and wherever the two
 //! could disagree, the generalised winding number decides away from the surface.
 //!
-//! Cost: about 1.5 µs near the surface of a simple part (the 1.2 million samples of the 50 mm pair take 0.9 s on two cores, November 2025,
+//! Cost: about 1.5 µs near the surface of a simple part (the 1.2 million samples of the 50 mm pair take 0.9 s on two cores, November 2026,
 //! `cargo run --release -p mortise-bake --example bake`), more where many triangles are equally near.
 
 use glam::DVec3;
