@@ -203,12 +203,9 @@ pub fn another_version_is_shut_out(client: Client) -> Verdict {
     Ok("refused until greeted by its own version".into())
 }
 
-/// Armed, then STOP: stopped, and it stays so until cleared.
+/// Armed, then STOP: stopped, and it stays so until cleared. In lockstep too, where no tick runs meanwhile: STOP waits for none.
 pub fn stop_stops(client: Client) -> Verdict {
     fine(client.upload(&image(500, 6), &mut |_| {}))?;
-    if client.capabilities().simulated {
-        fine(client.set_lockstep(false))?;
-    }
     if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
         fine(client.request(ToDevice::ClearFault))?;
     }

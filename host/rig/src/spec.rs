@@ -42,7 +42,8 @@ pub enum EmulatedMode {
     /// About wall-clock speed on a quiet machine: for a person at the window.
     Interactive,
     /// One instruction takes 2 ns of virtual time (`-icount shift=1,sleep=off`): instruction counts and missed
-    /// ticks do not depend on this machine's load. Virtual time may run ahead of the wall clock.
+    /// ticks do not depend on this machine's load. Virtual time runs ahead of the wall clock whenever the board idles, so a host that is armed
+    /// and slow looks silent to the board sooner than it is: what arms belongs in lockstep.
     Counted,
     /// Counted, and a tick runs only when the host releases it: bit-identical run after run.
     Lockstep,
