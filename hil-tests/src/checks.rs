@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_CHUNK;
-use mortise_protocol::message::{DeviceState, Refusal, ToDevice, Version};
+use mortise_protocol::message::{CostUnit, DeviceState, Refusal, ToDevice, Version};
 use mortise_protocol::parameter::PARAMETERS;
 use mortise_rig::{Client, Event, RigError, begin_message, chunk_message};
 
@@ -27,6 +27,7 @@ pub const CHECKS: &[Check] = &[
     ("another_version_is_shut_out", another_version_is_shut_out),
     ("stop_stops", stop_stops),
     ("idle_ticks_are_on_time", idle_ticks_are_on_time),
+    ("the_log_is_readable", the_log_is_readable),
 ];
 
 fn fine<T>(result: Result<T, RigError>) -> Result<T, String> {
@@ -248,4 +249,25 @@ pub fn idle_ticks_are_on_time(client: Client) -> Verdict {
         format!("{} ticks missed", statistics.missed_ticks)
     })?;
     Ok(format!("{} ticks, 0 missed", statistics.ticks))
+}
+
+/// A restarted board says so in its log, in words: the log's frames and the firmware's ELF fit together. The simulation has no log, and a real
+/// board's ELF is not known.
+pub fn the_log_is_readable(client: Client) -> Verdict {
+    if client.capabilities().cost_unit != CostUnit::Instructions {
+        return Ok("no log here whose words are known".into());
+    }
+    let client = fine(client.restart())?;
+    // Log has the lowest rank on the link: it comes when there is nothing else to say.
+    for _ in 0..50 {
+        fine(client.run(1))?;
+        let found = client.events().try_iter().find_map(|event| match event {
+            Event::Log(line) if line.contains("started: as requested") => Some(line),
+            _ => None,
+        });
+        if let Some(line) = found {
+            return Ok(line);
+        }
+    }
+    Err("no line of the log tells of the restart".into())
 }

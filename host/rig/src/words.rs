@@ -140,3 +140,73 @@ impl Words for ToDevice {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mortise_protocol::image::ImageError;
+    use mortise_protocol::parameter::ParameterId;
+
+    use super::*;
+
+    /// One line each, long enough to mean something, and without a full stop: it goes into the middle of messages.
+    fn is_a_sentence(words: &str) {
+        assert!(words.len() > 12, "{words}");
+        assert!(!words.contains('\n') && !words.ends_with('.'), "{words}");
+        assert!(words.is_ascii() || words.contains('·'), "{words}");
+    }
+
+    #[test]
+    fn every_fault_says_what_to_do() {
+        for fault in [
+            Fault::StopInput,
+            Fault::HostSilent { silent_ms: 501 },
+            Fault::EncoderJump { axis: 2 },
+            Fault::OverSpeed,
+            Fault::Driver { axis: 1 },
+            Fault::TickOverrun,
+            Fault::SceneDamaged,
+            Fault::NonFinite,
+        ] {
+            let words = describe(fault);
+            is_a_sentence(&words);
+            assert!(words.contains(": "), "what, then what to do: {words}");
+        }
+    }
+
+    #[test]
+    fn every_refusal_is_a_sentence() {
+        for refusal in [
+            Refusal::NotGreeted,
+            Refusal::State(DeviceState::Active),
+            Refusal::State(DeviceState::Fault(Fault::OverSpeed)),
+            Refusal::NoScene,
+            Refusal::NoSuchPart { parts: 0 },
+            Refusal::NoSuchPart { parts: 3 },
+            Refusal::NotGrabbable,
+            Refusal::OutOfRange {
+                id: ParameterId::ForceLimit,
+                min: 0.0,
+                max: 20.0,
+            },
+            Refusal::ChunkOrder { expected: 512 },
+            Refusal::NoUpload,
+            Refusal::SceneTooLarge { capacity: 1000 },
+            Refusal::TooManyParts { capacity: 256 },
+            Refusal::SceneIncomplete { received: 10 },
+            Refusal::SceneCrc {
+                expected: 1,
+                found: 2,
+            },
+            Refusal::SceneImage(ImageError::BadMagic),
+            Refusal::Flash,
+            Refusal::NotSimulated,
+            Refusal::Lockstep,
+            Refusal::BadNumber,
+            Refusal::Unsupported,
+            Refusal::Busy,
+            Refusal::Undecodable,
+        ] {
+            is_a_sentence(&describe(refusal));
+        }
+    }
+}
