@@ -36,7 +36,10 @@ pub struct Command<'s> {
 
 /// What a command asks for. Everything in it has been checked as far as the link plane can.
 #[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "nothing to allocate from; eight of the largest are 5 kB")]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nothing to allocate from; eight of the largest are 5 kB"
+)]
 pub enum CommandKind<'s> {
     /// See [`mortise_protocol::message::ToDevice::Arm`].
     Arm,

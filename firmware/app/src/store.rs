@@ -57,6 +57,19 @@ impl Record {
     }
 }
 
+/// The record that makes `image`, written after it, a stored scene: what a slot holds in its first [`IMAGE_OFFSET`] bytes. For tools that fill
+/// flash without a running board; newer scenes have larger sequence numbers.
+pub fn commit_record(sequence: u32, image: &[u8]) -> [u8; WRITE_SIZE] {
+    Record {
+        sequence,
+        // No flash holds 4 GiB.
+        length: image.len() as u32,
+        crc: CRC.checksum(image),
+        layout: LAYOUT_VERSION,
+    }
+    .to_bytes()
+}
+
 /// A scene in flash.
 #[derive(Clone, Copy, Debug)]
 pub struct Stored<'s> {

@@ -2,8 +2,8 @@
 
 mod support;
 
-use mortise_firmware::board::SLOTS;
-use mortise_firmware::store::{IMAGE_OFFSET, Store};
+use mortise_firmware::board::{Flash, SLOTS, WRITE_SIZE};
+use mortise_firmware::store::{IMAGE_OFFSET, Store, commit_record};
 use mortise_protocol::image::{CRC, ImageError, LAYOUT_VERSION};
 use mortise_protocol::message::Refusal;
 use support::flash::{SECTOR, SLOT, TestFlash};
@@ -191,6 +191,19 @@ fn what_cannot_be_a_scene_is_refused_with_the_reason() {
         None,
         "nothing of that was committed"
     );
+}
+
+#[test]
+fn a_slot_filled_by_a_tool_is_a_scene() {
+    let image = two_parts(7);
+    let mut flash = TestFlash::leaked();
+    let mut bytes = commit_record(3, &image).to_vec();
+    bytes.extend_from_slice(&image);
+    bytes.resize(bytes.len().next_multiple_of(WRITE_SIZE), 0xff);
+    for (i, word) in bytes.chunks_exact(WRITE_SIZE).enumerate() {
+        flash.write(1, i * WRITE_SIZE, word.try_into().unwrap()).unwrap();
+    }
+    assert_eq!(current(&Store::open(flash)), Some(CRC.checksum(&image)));
 }
 
 #[test]
