@@ -23,6 +23,7 @@ mod options;
 mod piece;
 mod pointshell;
 mod report;
+mod scene;
 mod spline_samples;
 mod surface;
 mod topology;

@@ -1,0 +1,216 @@
+//! Which shapes and parts of a model go into the image, and the first choice of their cells.
+
+use mortise_brep::{CadModel, Shape};
+use mortise_protocol::image::NO_FACE;
+use mortise_protocol::limits::MAX_PARTS;
+
+use crate::error::BakeError;
+use crate::grid::bounding_box;
+use crate::options::{BakeOptions, Grabbable};
+
+/// Which shapes and parts of a model go into the image.
+pub(crate) struct Scene {
+    /// Model shapes, each once.
+    pub shapes: Vec<usize>,
+    /// First part of each.
+    pub names: Vec<String>,
+    /// Model part and index into `shapes`.
+    pub parts: Vec<(usize, usize)>,
+    /// For each of `parts`.
+    pub grabbable: Vec<bool>,
+    /// What was left out, in words.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Chooses and checks.
+    pub fn new(model: &CadModel, options: &BakeOptions) -> Result<Self, BakeError> {
+        let mut scene = Self {
+            shapes: Vec::new(),
+            names: Vec::new(),
+            parts: Vec::new(),
+            grabbable: Vec::new(),
+            warnings: Vec::new(),
+        };
+        for (index, part) in model.parts.iter().enumerate() {
+            let shape = model
+                .shapes
+                .get(part.shape)
+                .ok_or_else(|| BakeError::BrokenGeometry {
+                    part: part.name.clone(),
+                    what: format!("shape {} does not exist", part.shape),
+                })?;
+            if shape.mesh.triangles.is_empty() {
+                scene
+                    .warnings
+                    .push(format!("part \"{}\" has no surface and is left out", part.name));
+                continue;
+            }
+            check_shape(shape, &part.name)?;
+            if !part.placement.is_finite() {
+                return Err(BakeError::BrokenGeometry {
+                    part: part.name.clone(),
+                    what: "its placement is not finite".to_owned(),
+                });
+            }
+            let known = scene
+                .shapes
+                .iter()
+                .position(|&s| s == part.shape || same_shape(&model.shapes[s], shape));
+            let number = known.unwrap_or_else(|| {
+                scene.shapes.push(part.shape);
+                scene.names.push(part.name.clone());
+                scene.shapes.len() - 1
+            });
+            scene.parts.push((index, number));
+        }
+        if scene.parts.is_empty() {
+            return Err(BakeError::NothingToBake {
+                parts: model.parts.len(),
+            });
+        }
+        if scene.parts.len() > MAX_PARTS {
+            return Err(BakeError::TooManyParts {
+                parts: scene.parts.len(),
+                limit: MAX_PARTS,
+            });
+        }
+        scene.grabbable = scene.choose_grabbable(model, &options.grabbable)?;
+        Ok(scene)
+    }
+
+    fn choose_grabbable(&self, model: &CadModel, rule: &Grabbable) -> Result<Vec<bool>, BakeError> {
+        let name = |&(part, _): &(usize, usize)| model.parts[part].name.as_str();
+        match rule {
+            Grabbable::All => Ok(vec![true; self.parts.len()]),
+            Grabbable::AllButLargest => {
+                let volume = |i: usize| model.shapes[self.shapes[self.parts[i].1]].volume_mm3.abs();
+                // The first of equals.
+                let largest = (0..self.parts.len())
+                    .rev()
+                    .max_by(|&a, &b| volume(a).total_cmp(&volume(b)));
+                Ok((0..self.parts.len())
+                    .map(|i| self.parts.len() == 1 || Some(i) != largest)
+                    .collect())
+            }
+            Grabbable::Named(names) => {
+                for wanted in names {
+                    if !self.parts.iter().any(|p| name(p) == wanted) {
+                        return Err(BakeError::UnknownPart {
+                            name: wanted.clone(),
+                            known: self.parts.iter().map(name).collect::<Vec<_>>().join(", "),
+                        });
+                    }
+                }
+                Ok(self
+                    .parts
+                    .iter()
+                    .map(|p| names.iter().any(|n| n == name(p)))
+                    .collect())
+            }
+        }
+    }
+
+    /// First choice of cell for each shape, mm.
+    pub fn cells(&self, model: &CadModel, options: &BakeOptions) -> Vec<f64> {
+        let sides = self.shapes.iter().map(|&s| longest_side(&model.shapes[s]));
+        let largest = sides.clone().fold(0.0, f64::max);
+        sides
+            .map(|side| {
+                options
+                    .cell_mm
+                    .unwrap_or_else(|| round_down_125((largest / 100.0).min(side / 20.0)).clamp(1e-3, 1e3))
+            })
+            .collect()
+    }
+}
+
+/// Longest side of the box about a shape, mm.
+pub(crate) fn longest_side(shape: &Shape) -> f64 {
+    let (lo, hi) = bounding_box(shape);
+    (hi - lo).max_element().max(1e-3)
+}
+
+/// The largest of 1, 2, 5 × 10ⁿ not above `x`.
+fn round_down_125(x: f64) -> f64 {
+    let decade = 10f64.powf(x.log10().floor());
+    let digit = x / decade;
+    // A hair of slack: 0.5 must not become 0.2 by rounding of the logarithm.
+    let step = if digit >= 5.0 - 1e-9 {
+        5.0
+    } else if digit >= 2.0 - 1e-9 {
+        2.0
+    } else {
+        1.0
+    };
+    step * decade
+}
+
+/// Refuses geometry the distance cannot work on: indices that lead nowhere, coordinates that are not finite.
+fn check_shape(shape: &Shape, part: &str) -> Result<(), BakeError> {
+    let broken = |what: &str| {
+        Err(BakeError::BrokenGeometry {
+            part: part.to_owned(),
+            what: what.to_owned(),
+        })
+    };
+    let mesh = &shape.mesh;
+    if shape.faces.len() >= usize::from(NO_FACE) {
+        return Err(BakeError::TooManyFaces {
+            part: part.to_owned(),
+            faces: shape.faces.len(),
+            limit: usize::from(NO_FACE) - 1,
+        });
+    }
+    if mesh.triangle_face.len() != mesh.triangles.len() {
+        return broken("not every triangle has a face");
+    }
+    if mesh
+        .triangle_face
+        .iter()
+        .any(|&f| f as usize >= shape.faces.len())
+    {
+        return broken("a triangle belongs to a face that does not exist");
+    }
+    if mesh
+        .triangles
+        .iter()
+        .flatten()
+        .any(|&v| v as usize >= mesh.vertices.len())
+    {
+        return broken("a triangle has a corner that does not exist");
+    }
+    if mesh.vertices.iter().any(|v| !v.is_finite()) {
+        return broken("a mesh vertex is not finite");
+    }
+    if mesh.triangles.iter().all(|&[a, b, c]| a == b || b == c || c == a) {
+        return broken("all its triangles are degenerate");
+    }
+    if !shape.volume_mm3.is_finite()
+        || !shape.center_of_mass.is_finite()
+        || shape.inertia_mm5.iter().flatten().any(|v| !v.is_finite())
+    {
+        return broken("its volume, centre of mass or inertia is not finite");
+    }
+    Ok(())
+}
+
+/// Whether two shapes have the same geometry in the same frame, so that one set of data does for both.
+fn same_shape(a: &Shape, b: &Shape) -> bool {
+    // Exporters repeat a body with the last digits different: a nanometre is the same place.
+    const SAME_MM: f64 = 1e-6;
+    a.mesh.triangles == b.mesh.triangles
+        && a.mesh.triangle_face == b.mesh.triangle_face
+        && a.faces.len() == b.faces.len()
+        && a.closed == b.closed
+        && a.mesh.vertices.len() == b.mesh.vertices.len()
+        && a.mesh
+            .vertices
+            .iter()
+            .zip(&b.mesh.vertices)
+            .all(|(p, q)| p.distance(*q) <= SAME_MM)
+        && a.faces.iter().zip(&b.faces).all(|(f, g)| {
+            f.reversed == g.reversed
+                && std::mem::discriminant(&f.surface) == std::mem::discriminant(&g.surface)
+        })
+}
