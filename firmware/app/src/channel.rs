@@ -3,7 +3,7 @@
 //! The link plane sends finished [`Command`]s; the control plane takes them at the start of a tick, in order, and answers each
 //! with a [`Reply`]. Neither ever waits for the other.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 use mortise_haptics::State as LawState;
@@ -135,6 +135,8 @@ pub struct Shared {
     heard: AtomicU32,
     /// Telemetry samples dropped.
     dropped: AtomicU32,
+    /// Motors may be driven.
+    live: AtomicBool,
 }
 
 impl Shared {
@@ -173,6 +175,16 @@ impl Shared {
         self.dropped.load(Ordering::Relaxed)
     }
 
+    /// Whether motors may be driven now: ahead of the events that tell of it.
+    pub fn live(&self) -> bool {
+        self.live.load(Ordering::Acquire)
+    }
+
+    /// From the control plane, with every change of state.
+    pub(crate) fn set_live(&self, live: bool) {
+        self.live.store(live, Ordering::Release);
+    }
+
     /// A sample found no room.
     pub fn drop_sample(&self) {
         self.dropped.fetch_add(1, Ordering::Relaxed);
@@ -209,6 +221,7 @@ impl<'s> Channels<'s> {
                 sessions: AtomicU32::new(0),
                 heard: AtomicU32::new(0),
                 dropped: AtomicU32::new(0),
+                live: AtomicBool::new(false),
             },
         }
     }

@@ -8,9 +8,11 @@
 //! done: what came before `Run` in the stream has taken effect before its first tick, whatever the timing of bytes and interrupts. That makes
 //! the in-process rig and the emulated board compute the same bits. The host's silence is not counted there, since time waits for the host.
 
+mod report;
+
 use mortise_haptics::{self as haptics, GrabError, Input, Output, Pose, Twist, Wrench};
 use mortise_protocol::image::SceneImage;
-use mortise_protocol::message::{Fault, HandScript, Refusal, Statistics, Telemetry, flag};
+use mortise_protocol::message::{Fault, HandScript, Refusal, Statistics};
 use mortise_protocol::parameter::ParameterId;
 
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
@@ -18,7 +20,6 @@ use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Event, R
 use crate::parameters::{ControlSettings, Parameters};
 use crate::safety::{Action, Event as SafetyEvent, Motors, Safety};
 use crate::statistics::{StateHash, count_tick};
-use crate::wire::{flags_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire};
 
 /// Ticks from zero to whole wrench after arming or grabbing.
 pub const RAMP_TICKS: u16 = 200;
@@ -439,7 +440,9 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 enabled: true,
             };
             let output = haptics::tick(self.ends.law, scene, &self.settings.law, &input);
-            let bad = haptics::Flags::NON_FINITE;
+            // A reading out of all proportion is as good as none.
+            let mut bad = haptics::Flags::NON_FINITE;
+            bad.insert(haptics::Flags::BAD_INPUT);
             if output.work.flags.intersects(bad) || !output.handle.is_finite() {
                 self.apply(SafetyEvent::Fault(Fault::NonFinite));
             }
@@ -501,6 +504,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             self.unreported_fault = Some((self.tick, fault));
         }
         self.safety = next;
+        self.ends.shared.set_live(next.live());
         match action {
             Action::None | Action::Refuse(_) => {}
             Action::Enable => {
@@ -522,108 +526,6 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.ends.law.release();
                 self.ends.law.restart_slew();
             }
-        }
-    }
-
-    fn lockstep_has_room(&self) -> bool {
-        let events = self.ends.events.capacity() - self.ends.events.len() >= EVENTS_AT_ONCE;
-        events && (self.telemetry_every == 0 || self.ends.samples.ready())
-    }
-
-    fn send(&mut self, event: Event) {
-        // Commands are taken only when there is room, and `report` looks first.
-        let _ = self.ends.events.enqueue(event);
-    }
-
-    /// Tells the link of a fault and a changed state, when there is room; else at the next tick.
-    fn report(&mut self) {
-        if let Some((tick, fault)) = self.unreported_fault
-            && self.ends.events.ready()
-        {
-            self.unreported_fault = None;
-            self.send(Event::Fault { tick, fault });
-        }
-        if self.reported != self.safety && self.ends.events.ready() {
-            self.reported = self.safety;
-            self.send(Event::State {
-                tick: self.tick,
-                state: self.safety.reported(),
-            });
-        }
-    }
-
-    fn reply(&mut self, seq: u16, reply: Reply) {
-        let session = self.session;
-        self.send(Event::Reply { seq, session, reply });
-    }
-
-    fn ran(&mut self) {
-        let ran = Reply::Ran {
-            tick: self.tick,
-            state_hash: self.hash.value(),
-        };
-        self.reply(self.run_seq, ran);
-    }
-
-    fn send_statistics(&mut self, seq: u16, reset: bool) {
-        let statistics = Statistics {
-            state_hash: self.hash.value(),
-            ..self.statistics
-        };
-        self.reply(seq, Reply::Statistics(statistics));
-        if reset {
-            self.statistics = Statistics::default();
-        }
-    }
-
-    /// Queues a telemetry sample when one is due.
-    fn sample(&mut self) {
-        if self.telemetry_every == 0 {
-            return;
-        }
-        self.telemetry_left = self.telemetry_left.saturating_sub(1);
-        if self.telemetry_left > 0 {
-            return;
-        }
-        self.telemetry_left = self.telemetry_every;
-        if !self.ends.samples.ready() {
-            self.ends.shared.drop_sample();
-            return;
-        }
-        let sample = self.telemetry();
-        let _ = self.ends.samples.enqueue(sample);
-    }
-
-    fn telemetry(&mut self) -> Telemetry {
-        let output = self.output.as_ref();
-        let mut flags = output.map_or(0, |o| {
-            flags_to_wire(o.work.flags, &o.handle, &self.settings.law.limits)
-        });
-        if self.replaced {
-            flags |= flag::NON_FINITE;
-        }
-        if output.is_some_and(|o| o.pairs.is_full()) {
-            flags |= flag::PAIRS;
-        }
-        Telemetry {
-            tick: self.tick,
-            handle: pose_to_wire(&self.sensed.handle),
-            object: self
-                .ends
-                .law
-                .grabbed()
-                .zip(self.ends.law.object())
-                .map(|(part, (pose, _))| (part, pose_to_wire(&pose))),
-            wrench: wrench_to_wire(&self.commanded),
-            contact: wrench_to_wire(&output.map_or(Wrench::ZERO, |o| o.contact)),
-            hand: self.mechanism.hand().as_ref().map(wrench_to_wire),
-            points: output.map_or(0, |o| o.work.points.min(u32::from(u16::MAX)) as u16),
-            flags,
-            missed: self.missed_total,
-            dropped: self.ends.shared.dropped(),
-            pairs: output.map(|o| pairs_to_wire(&o.pairs)).unwrap_or_default(),
-            // Last, so that it covers what comes before it.
-            cost: self.clock.cost(),
         }
     }
 }

@@ -32,8 +32,8 @@ pub struct LinkPlane<'c, 's, F> {
     sequence: u16,
     greeted: bool,
     session: u32,
-    /// Commands sent and not replied to.
-    pending: u32,
+    /// An `Arm` that the control plane has not replied to.
+    arming: Option<u16>,
     state: DeviceState,
     /// Sequence number of the commit that waits for the control plane, and the session it belongs to.
     commit: Option<(u16, u32)>,
@@ -60,7 +60,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             sequence: 0,
             greeted: false,
             session: 0,
-            pending: 0,
+            arming: None,
             state: DeviceState::Boot,
             commit: None,
             restart: None,
@@ -204,7 +204,8 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         self.store.abort();
         self.ends.shared.begin_session();
         self.session = self.ends.shared.sessions();
-        self.pending = 0;
+        // What waits in the queue belongs to the old session and will be dropped.
+        self.arming = None;
         self.restart = None;
     }
 
@@ -247,12 +248,14 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
 
             ToDevice::Arm => {
                 self.may_arm()?;
-                CommandKind::Arm
+                self.enqueue(seq, CommandKind::Arm)?;
+                self.arming = Some(seq);
+                return Ok(None);
             }
             ToDevice::SetParameter { id, value } => {
                 let parameters = self.parameters.with(id, value)?;
                 let settings = parameters.settings()?;
-                self.command(seq, CommandKind::Settings(settings))?;
+                self.enqueue(seq, CommandKind::Settings(settings))?;
                 self.parameters = parameters;
                 return Ok(None);
             }
@@ -263,7 +266,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::ResetScene => CommandKind::ResetScene,
             ToDevice::SetTelemetry { every_ticks } => CommandKind::Telemetry(every_ticks),
             ToDevice::GetStatistics { reset } => {
-                self.command(seq, CommandKind::Statistics { reset })?;
+                self.enqueue(seq, CommandKind::Statistics { reset })?;
                 if reset {
                     self.count_anew = Some(seq);
                 }
@@ -276,12 +279,12 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::Lockstep(on) => CommandKind::Lockstep(on),
             ToDevice::Run { ticks } => CommandKind::Run(ticks),
             ToDevice::Restart => {
-                self.command(seq, CommandKind::Restart)?;
+                self.enqueue(seq, CommandKind::Restart)?;
                 self.restart = Some(seq);
                 return Ok(None);
             }
         };
-        self.command(seq, kind)?;
+        self.enqueue(seq, kind)?;
         Ok(None)
     }
 
@@ -291,18 +294,15 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop => {
                 Err(Refusal::State(self.state))
             }
-            DeviceState::Boot | DeviceState::Idle | DeviceState::Stopped | DeviceState::Fault(_)
-                if self.pending > 0 =>
-            {
-                Err(Refusal::Busy)
-            }
+            // The change of state is on its way here.
+            _ if self.ends.shared.live() || self.arming.is_some() => Err(Refusal::Busy),
             DeviceState::Boot | DeviceState::Idle | DeviceState::Stopped | DeviceState::Fault(_) => Ok(()),
         }
     }
 
     /// No motors while flash is written, and none for a scene that has changed in flash. Reads the whole scene: about 10 instructions a byte.
     fn may_arm(&mut self) -> Result<(), Refusal> {
-        if self.store.busy() {
+        if self.store.busy() || self.arming.is_some() {
             return Err(Refusal::Busy);
         }
         let Some(stored) = self.store.current() else {
@@ -312,12 +312,6 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             self.enqueue(0, CommandKind::SceneDamaged)?;
             return Err(Refusal::State(DeviceState::Fault(Fault::SceneDamaged)));
         }
-        Ok(())
-    }
-
-    fn command(&mut self, seq: u16, kind: CommandKind<'s>) -> Result<(), Refusal> {
-        self.enqueue(seq, kind)?;
-        self.pending += 1;
         Ok(())
     }
 
@@ -358,7 +352,9 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             // What an earlier host asked for.
             Event::Reply { session, .. } if session != self.session => None,
             Event::Reply { seq, reply, .. } => {
-                self.pending = self.pending.saturating_sub(1);
+                if self.arming == Some(seq) {
+                    self.arming = None;
+                }
                 Some(self.translate(seq, reply))
             }
         }

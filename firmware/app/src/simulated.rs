@@ -21,7 +21,7 @@ pub const MASS: f32 = 0.15;
 pub const INERTIA: f32 = 1e-4;
 /// Viscous friction, N·s/m. Above k_T·h/2 = 0.5 for the default coupling (Colgate–Schenkel).
 pub const VISCOUS: f32 = 1.0;
-/// Viscous friction in rotation, N·m·s/rad. Above k_R·h/2 = 0.001.
+/// Viscous friction in rotation, N·m·s/rad. Above k_R·h/2 = 0.00025 for the default coupling.
 pub const ANGULAR_VISCOUS: f32 = 0.002;
 /// Coulomb friction, N: 1 % of a push of 1 N.
 pub const COULOMB: f32 = 0.01;

@@ -189,7 +189,7 @@ fn any_frame_keeps_the_link_alive() {
 fn a_soft_stop_fades_within_its_time_and_never_grows() {
     let mut bench = pulled();
     let before = wrench(bench.strings.last()).force.length();
-    assert!(before > 0.1, "{before}");
+    assert!(before > 0.02, "nothing to fade: {before}");
     bench.request(&ToDevice::Disarm).unwrap();
     assert_eq!(bench.state(), DeviceState::SoftStop);
     let mut last = before;
@@ -227,14 +227,15 @@ fn the_wrench_ramps_up_from_zero() {
     bench
         .strings
         .pull(|s| s.handle.position = Vec3::new(0.3, 0.0, 0.0));
-    // Far away: the coupling pulls at its limit from the first ticks on, and the limit is 8 N.
+    // Far away: the coupling pulls at its limit from the first ticks on.
+    let limit = ParameterId::ForceLimit.row().default;
     let mut forces = Vec::new();
     for _ in 0..RAMP_TICKS {
         bench.tick();
         forces.push(wrench(bench.strings.last()).force.length());
     }
     for (i, &force) in forces.iter().enumerate() {
-        let ramp = 8.0 * (i + 2) as f32 / f32::from(RAMP_TICKS);
+        let ramp = limit * (i + 2) as f32 / f32::from(RAMP_TICKS);
         assert!(force <= ramp + 1e-3, "tick {i}: {force} above {ramp}");
     }
     let peak = forces.iter().copied().fold(0.0, f32::max);

@@ -326,6 +326,36 @@ fn no_flash_while_motors_are_live_and_no_motors_while_flash_is_written() {
     bench.request(&ToDevice::SceneAbort).unwrap();
     bench.request(&ToDevice::Arm).unwrap();
 
+    // Live, but the link plane has not been told yet.
+    let mut bench = Bench::ready();
+    bench.send(&ToDevice::Arm);
+    bench.control.tick();
+    bench.send(&ToDevice::Hello(Version::own()));
+    bench.forget();
+    bench.send(&ToDevice::SceneBegin {
+        length: 1000,
+        crc: 0,
+        layout: LAYOUT_VERSION,
+    });
+    assert!(matches!(
+        bench.heard.pop_front(),
+        Some(FromDevice::Refused {
+            reason: Refusal::Busy,
+            ..
+        })
+    ));
+
+    // Statistics and parameters on their way do not count.
+    let mut bench = Bench::ready();
+    bench.send(&ToDevice::GetStatistics { reset: false });
+    let image = two_parts(3);
+    let seq = bench.send(&ToDevice::SceneBegin {
+        length: image.len() as u32,
+        crc: 0,
+        layout: LAYOUT_VERSION,
+    });
+    assert!(bench.heard.contains(&FromDevice::Ack { seq }));
+
     // An Arm that the control plane has not seen yet counts as live.
     let mut bench = Bench::ready();
     bench.send(&ToDevice::Arm);
