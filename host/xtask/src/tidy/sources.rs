@@ -10,7 +10,10 @@ use super::{Finding, tree};
 const MAX_LINES: usize = 600;
 
 /// Files which may be longer, each with the reason.
-const MAY_BE_LONGER: &[(&str, &str)] = &[];
+const MAY_BE_LONGER: &[(&str, &str)] = &[(
+    "protocol/src/message.rs",
+    "the message table is one file, so that it can be read as one",
+)];
 
 const SOURCE: &[&str] = &["rs", "c", "cc", "cpp", "cxx", "h", "hpp", "toml", "x", "sh", "py"];
 const TEXT: &[&str] = &[
