@@ -3,70 +3,19 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use mortise_protocol::message::{
-    Capabilities, DeviceState, FromDevice, Refusal, Statistics, ToDevice, Version,
-};
+use mortise_protocol::message::{Capabilities, DeviceState, FromDevice, Statistics, ToDevice};
 use mortise_protocol::parameter::ParameterId;
 
 use crate::error::RigError;
 use crate::event::Events;
+use crate::exchange::{Patience, greet, no_answer, obtain, patience_for};
+use crate::heartbeat::{HEARTBEAT, HEARTBEAT_COUNTED, Heartbeat};
 use crate::link::{Answer, Link, Reader};
 use crate::spec::{EmulatedMode, RigSpec};
 use crate::transport::Transport;
-use crate::words::Words;
 use crate::{emulator, serial, simulated};
-
-/// How patient a client is.
-#[derive(Clone, Debug)]
-pub struct Patience {
-    /// Handshake, whole.
-    pub greeting: Duration,
-    /// One answer. A message that may be sent twice without harm is sent [`ATTEMPTS`] times.
-    pub answer: Duration,
-    /// No sound frame for so long, though asked: the link is lost.
-    pub silence: Duration,
-}
-
-impl Default for Patience {
-    /// For a real board: a pseudo-terminal may hold its first bytes for a second, so the greeting waits well over two.
-    fn default() -> Self {
-        Self {
-            greeting: Duration::from_secs(4),
-            answer: Duration::from_secs(1),
-            silence: Duration::from_secs(3),
-        }
-    }
-}
-
-impl Patience {
-    /// For rigs that share this computer: nothing gets lost, but a loaded computer makes them slow.
-    pub fn long() -> Self {
-        Self {
-            greeting: Duration::from_secs(30),
-            answer: Duration::from_secs(20),
-            silence: Duration::from_secs(20),
-        }
-    }
-}
-
-/// Sendings of a message that may be repeated.
-pub const ATTEMPTS: u32 = 3;
-/// Sendings after "the queue is full", which changes nothing on the board.
-const BUSY_ATTEMPTS: u32 = 200;
-const BUSY_PAUSE: Duration = Duration::from_millis(5);
-/// Between two greetings.
-const GREETING_PAUSE: Duration = Duration::from_millis(250);
-/// Between two heartbeats: a fifth of the default silence the board bears while armed.
-const HEARTBEAT: Duration = Duration::from_millis(100);
-/// The same for a counted board, whose virtual time runs ahead of the wall clock.
-const HEARTBEAT_COUNTED: Duration = Duration::from_millis(5);
-/// Erasing and checking a slot of flash takes seconds on a real board.
-const FLASH_WAIT: Duration = Duration::from_secs(15);
-/// Wall time a lockstep tick may take: an emulated board under load on a slow machine.
-const TICK_WAIT: Duration = Duration::from_millis(20);
 
 /// Answer to [`ToDevice::Run`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -355,127 +304,6 @@ impl Client {
     }
 }
 
-/// Sending it twice does what sending it once does.
-fn repeatable(message: &ToDevice) -> bool {
-    match message {
-        ToDevice::Hello(_)
-        | ToDevice::GetCapabilities
-        | ToDevice::Disarm
-        | ToDevice::Stop
-        | ToDevice::Heartbeat
-        | ToDevice::SetParameter { .. }
-        | ToDevice::GetParameter(_)
-        | ToDevice::Release
-        | ToDevice::ResetScene
-        | ToDevice::SceneBegin { .. }
-        | ToDevice::SceneChunk { .. }
-        | ToDevice::SceneAbort
-        | ToDevice::ClearTarget { .. }
-        | ToDevice::SetTelemetry { .. }
-        | ToDevice::GetStatistics { reset: false }
-        | ToDevice::Lockstep(_) => true,
-        ToDevice::Arm
-        | ToDevice::ClearFault
-        | ToDevice::Grab { .. }
-        | ToDevice::SceneCommit
-        | ToDevice::SetTarget(_)
-        | ToDevice::GetStatistics { reset: true }
-        | ToDevice::SimulatedHand(_)
-        | ToDevice::Run { .. }
-        | ToDevice::Restart => false,
-    }
-}
-
-fn patience_for(message: &ToDevice, patience: &Patience) -> Duration {
-    match message {
-        ToDevice::SceneBegin { .. } | ToDevice::SceneCommit => patience.answer.max(FLASH_WAIT),
-        ToDevice::Run { ticks } => patience.answer + TICK_WAIT.saturating_mul(*ticks),
-        _ => patience.answer,
-    }
-}
-
-fn no_answer(message: &ToDevice, after: Duration) -> RigError {
-    RigError::Timeout {
-        what: message.words(),
-        after_ms: after.as_millis() as u64,
-    }
-}
-
-/// Sends until answered, as often as the message allows.
-fn obtain(link: &Link, message: &ToDevice, patience: &Patience) -> Result<Answer, RigError> {
-    let wait = patience_for(message, patience);
-    let attempts = if repeatable(message) { ATTEMPTS } else { 1 };
-    let mut busy = 0;
-    'anew: loop {
-        let ticket = link.post(message)?;
-        for attempt in 0..attempts {
-            if attempt > 0 {
-                ticket.resend(message)?;
-            }
-            match ticket.wait(wait)? {
-                Some(Answer::Refused(Refusal::Busy)) if busy < BUSY_ATTEMPTS => {
-                    busy += 1;
-                    std::thread::sleep(BUSY_PAUSE);
-                    continue 'anew;
-                }
-                Some(Answer::Refused(reason)) => {
-                    return Err(RigError::Refused {
-                        what: message.words(),
-                        reason,
-                    });
-                }
-                Some(answer) => return Ok(answer),
-                None => {}
-            }
-        }
-        return Err(no_answer(message, wait * attempts));
-    }
-}
-
-/// Says hello until the board does, then asks what it can do.
-fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capabilities, RigError> {
-    let begun = Instant::now();
-    let hello = ToDevice::Hello(Version::own());
-    let silent = || {
-        RigError::NoAnswer {
-        rig: name.to_owned(),
-        waited_s: begun.elapsed().as_secs_f64(),
-        hint: "check that the board runs Mortise's firmware, that its cable carries data, and that this is the right port".into(),
-    }
-    };
-    loop {
-        // Ends whatever half a frame lies on the wire.
-        link.write_raw(&[])?;
-        let ticket = link.post(&hello)?;
-        if let Some(Answer::Value(value)) = ticket.wait(GREETING_PAUSE)?
-            && let FromDevice::Hello(device) = *value
-        {
-            let host = Version::own();
-            if device.schema != host.schema {
-                return Err(RigError::VersionMismatch { host, device });
-            }
-            drop(ticket);
-            match obtain(link, &ToDevice::GetCapabilities, patience) {
-                Ok(Answer::Value(value)) => {
-                    if let FromDevice::Capabilities(capabilities) = *value {
-                        return Ok(capabilities);
-                    }
-                }
-                // The answer came from before a restart: greet once more.
-                Err(RigError::Refused {
-                    reason: Refusal::NotGreeted,
-                    ..
-                }) => {}
-                Err(error) => return Err(error),
-                Ok(_) => {}
-            }
-        }
-        if begun.elapsed() > patience.greeting {
-            return Err(silent());
-        }
-    }
-}
-
 /// Ends the reader when the connection does not come about.
 struct Ending {
     link: Arc<Link>,
@@ -513,67 +341,5 @@ impl Drop for Client {
             reader.join();
         }
         self.link.events.close();
-    }
-}
-
-/// Keeps the link alive and notices when it is not.
-struct Heartbeat {
-    ending: Arc<(Mutex<bool>, std::sync::Condvar)>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Heartbeat {
-    fn start(
-        link: Arc<Link>,
-        lockstep: Arc<AtomicBool>,
-        period: Duration,
-        silence: Duration,
-    ) -> Result<Self, RigError> {
-        let ending = Arc::new((Mutex::new(false), std::sync::Condvar::new()));
-        let thread = std::thread::Builder::new()
-            .name("mortise-heartbeat".into())
-            .spawn({
-                let ending = ending.clone();
-                move || loop {
-                    let ended = ending.0.lock().unwrap_or_else(PoisonError::into_inner);
-                    let (ended, _) = ending
-                        .1
-                        .wait_timeout_while(ended, period, |ended| !*ended)
-                        .unwrap_or_else(PoisonError::into_inner);
-                    if *ended {
-                        return;
-                    }
-                    drop(ended);
-                    // In lockstep the board waits for the host, however long that takes.
-                    if lockstep.load(Ordering::Relaxed) {
-                        link.forgive_silence();
-                        continue;
-                    }
-                    if link.silent_for() >= period && link.send(&ToDevice::Heartbeat).is_err() {
-                        return;
-                    }
-                    let unheard = link.unheard_for();
-                    if unheard > silence {
-                        link.lose(&format!("nothing was heard for {:.1} s", unheard.as_secs_f64()));
-                        return;
-                    }
-                }
-            })
-            .map_err(RigError::Thread)?;
-        Ok(Self {
-            ending,
-            thread: Some(thread),
-        })
-    }
-}
-
-impl Drop for Heartbeat {
-    fn drop(&mut self) {
-        *self.ending.0.lock().unwrap_or_else(PoisonError::into_inner) = true;
-        self.ending.1.notify_all();
-        if let Some(thread) = self.thread.take() {
-            // A panic there has no more to say here.
-            let _ = thread.join();
-        }
     }
 }

@@ -1,0 +1,175 @@
+//! One message and its answer, and the greeting: how often and how long a client asks.
+
+use std::time::{Duration, Instant};
+
+use mortise_protocol::message::{Capabilities, FromDevice, Refusal, ToDevice, Version};
+
+use crate::error::RigError;
+use crate::link::{Answer, Link};
+use crate::words::Words;
+
+/// How patient a client is.
+#[derive(Clone, Debug)]
+pub struct Patience {
+    /// Handshake, whole.
+    pub greeting: Duration,
+    /// One answer. A message that may be sent twice without harm is sent [`ATTEMPTS`] times.
+    pub answer: Duration,
+    /// No sound frame for so long, though asked: the link is lost.
+    pub silence: Duration,
+}
+
+impl Default for Patience {
+    /// For a real board: a pseudo-terminal may hold its first bytes for a second, so the greeting waits well over two.
+    fn default() -> Self {
+        Self {
+            greeting: Duration::from_secs(4),
+            answer: Duration::from_secs(1),
+            silence: Duration::from_secs(3),
+        }
+    }
+}
+
+impl Patience {
+    /// For rigs that share this computer: nothing gets lost, but a loaded computer makes them slow.
+    pub fn long() -> Self {
+        Self {
+            greeting: Duration::from_secs(30),
+            answer: Duration::from_secs(20),
+            silence: Duration::from_secs(20),
+        }
+    }
+}
+
+/// Sendings of a message that may be repeated.
+pub const ATTEMPTS: u32 = 3;
+/// Sendings after "the queue is full", which changes nothing on the board.
+const BUSY_ATTEMPTS: u32 = 200;
+const BUSY_PAUSE: Duration = Duration::from_millis(5);
+/// Between two greetings.
+const GREETING_PAUSE: Duration = Duration::from_millis(250);
+/// Erasing and checking a slot of flash takes seconds on a real board.
+const FLASH_WAIT: Duration = Duration::from_secs(15);
+/// Wall time a lockstep tick may take: an emulated board under load on a slow machine.
+const TICK_WAIT: Duration = Duration::from_millis(20);
+
+/// Sending it twice does what sending it once does.
+fn repeatable(message: &ToDevice) -> bool {
+    match message {
+        ToDevice::Hello(_)
+        | ToDevice::GetCapabilities
+        | ToDevice::Disarm
+        | ToDevice::Stop
+        | ToDevice::Heartbeat
+        | ToDevice::SetParameter { .. }
+        | ToDevice::GetParameter(_)
+        | ToDevice::Release
+        | ToDevice::ResetScene
+        | ToDevice::SceneBegin { .. }
+        | ToDevice::SceneChunk { .. }
+        | ToDevice::SceneAbort
+        | ToDevice::ClearTarget { .. }
+        | ToDevice::SetTelemetry { .. }
+        | ToDevice::GetStatistics { reset: false }
+        | ToDevice::Lockstep(_) => true,
+        ToDevice::Arm
+        | ToDevice::ClearFault
+        | ToDevice::Grab { .. }
+        | ToDevice::SceneCommit
+        | ToDevice::SetTarget(_)
+        | ToDevice::GetStatistics { reset: true }
+        | ToDevice::SimulatedHand(_)
+        | ToDevice::Run { .. }
+        | ToDevice::Restart => false,
+    }
+}
+
+pub(crate) fn patience_for(message: &ToDevice, patience: &Patience) -> Duration {
+    match message {
+        ToDevice::SceneBegin { .. } | ToDevice::SceneCommit => patience.answer.max(FLASH_WAIT),
+        ToDevice::Run { ticks } => patience.answer + TICK_WAIT.saturating_mul(*ticks),
+        _ => patience.answer,
+    }
+}
+
+pub(crate) fn no_answer(message: &ToDevice, after: Duration) -> RigError {
+    RigError::Timeout {
+        what: message.words(),
+        after_ms: after.as_millis() as u64,
+    }
+}
+
+/// Sends until answered, as often as the message allows.
+pub(crate) fn obtain(link: &Link, message: &ToDevice, patience: &Patience) -> Result<Answer, RigError> {
+    let wait = patience_for(message, patience);
+    let attempts = if repeatable(message) { ATTEMPTS } else { 1 };
+    let mut busy = 0;
+    'anew: loop {
+        let ticket = link.post(message)?;
+        for attempt in 0..attempts {
+            if attempt > 0 {
+                ticket.resend(message)?;
+            }
+            match ticket.wait(wait)? {
+                Some(Answer::Refused(Refusal::Busy)) if busy < BUSY_ATTEMPTS => {
+                    busy += 1;
+                    std::thread::sleep(BUSY_PAUSE);
+                    continue 'anew;
+                }
+                Some(Answer::Refused(reason)) => {
+                    return Err(RigError::Refused {
+                        what: message.words(),
+                        reason,
+                    });
+                }
+                Some(answer) => return Ok(answer),
+                None => {}
+            }
+        }
+        return Err(no_answer(message, wait * attempts));
+    }
+}
+
+/// Says hello until the board does, then asks what it can do.
+pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capabilities, RigError> {
+    let begun = Instant::now();
+    let hello = ToDevice::Hello(Version::own());
+    let silent = || {
+        RigError::NoAnswer {
+        rig: name.to_owned(),
+        waited_s: begun.elapsed().as_secs_f64(),
+        hint: "check that the board runs Mortise's firmware, that its cable carries data, and that this is the right port".into(),
+    }
+    };
+    loop {
+        // Ends whatever half a frame lies on the wire.
+        link.write_raw(&[])?;
+        let ticket = link.post(&hello)?;
+        if let Some(Answer::Value(value)) = ticket.wait(GREETING_PAUSE)?
+            && let FromDevice::Hello(device) = *value
+        {
+            let host = Version::own();
+            if device.schema != host.schema {
+                return Err(RigError::VersionMismatch { host, device });
+            }
+            drop(ticket);
+            match obtain(link, &ToDevice::GetCapabilities, patience) {
+                Ok(Answer::Value(value)) => {
+                    if let FromDevice::Capabilities(capabilities) = *value {
+                        return Ok(capabilities);
+                    }
+                }
+                // The answer came from before a restart: greet once more.
+                Err(RigError::Refused {
+                    reason: Refusal::NotGreeted,
+                    ..
+                }) => {}
+                Err(error) => return Err(error),
+                Ok(_) => {}
+            }
+        }
+        if begun.elapsed() > patience.greeting {
+            return Err(silent());
+        }
+    }
+}
