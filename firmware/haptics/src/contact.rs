@@ -65,79 +65,100 @@ const HALF: usize = MAX_CONTACTS / 2;
 /// offered stay. A contact is filled in place: it is too large to be handed about by value in the innermost loop.
 #[derive(Clone, Debug)]
 pub(crate) struct Contacts {
-    /// The deepest in the first half, the others in the second. Filled up to `len`.
-    list: [Contact; MAX_CONTACTS],
+    /// This tick's and the last one's, in turn: the deepest in the first half, the others in the second. Filled up to their lengths.
+    lists: [[Contact; MAX_CONTACTS]; 2],
+    /// Which is this tick's: 0 or 1.
+    current: usize,
+    /// Length of this tick's.
     len: usize,
     /// Once the first half is full: its least deep on top.
     by_gap: Heap,
     /// Once all is full: the one of the second half that would touch last on top.
     by_reach: Heap,
     dropped: bool,
-    /// The last tick's, moved on to the beginning of this one.
-    carried: [Contact; MAX_CONTACTS],
+    /// How many of the last tick's can be carried over.
     carried_len: usize,
+    /// Time since the last tick, s.
+    period_s: f32,
 }
 
-/// Indices into half a list, the one with the largest key on top.
+/// Places in half a list, the one with the largest key on top. Keys lie side by side, not a contact's size apart in the list.
 #[derive(Clone, Debug)]
-struct Heap([u8; HALF]);
+struct Heap {
+    keys: [f32; HALF],
+    places: [u8; HALF],
+}
 
 // Every index into half the list must fit a byte.
 const _: () = assert!(HALF <= 256);
 
 impl Heap {
     const fn new() -> Self {
-        Self([0; HALF])
+        Self {
+            keys: [0.0; HALF],
+            places: [0; HALF],
+        }
     }
 
-    /// Over all of `half`.
+    /// Over the `keys` of all of a half, in its order.
     #[cold]
-    fn build(&mut self, half: &[Contact], key: impl Fn(&Contact) -> f32 + Copy) {
-        for (i, slot) in self.0.iter_mut().enumerate() {
-            *slot = i as u8;
+    fn build(&mut self, keys: impl Iterator<Item = f32>) {
+        for (i, key) in keys.enumerate().take(HALF) {
+            self.keys[i] = key;
+            self.places[i] = i as u8;
         }
         for i in (0..HALF / 2).rev() {
-            self.sift_down(i, half, key);
+            self.sift_down(i);
         }
     }
 
-    fn top(&self) -> usize {
-        usize::from(self.0[0])
+    fn largest(&self) -> f32 {
+        self.keys[0]
+    }
+
+    /// Gives the place on top a new key, not larger than the old; that place.
+    fn replace_largest(&mut self, key: f32) -> usize {
+        let place = self.places[0];
+        self.keys[0] = key;
+        self.sift_down(0);
+        usize::from(place)
     }
 
     /// Moves the entry at `i` below all with larger keys: at most 7 steps.
-    fn sift_down(&mut self, mut i: usize, half: &[Contact], key: impl Fn(&Contact) -> f32) {
-        let at = |heap: &Self, i: usize| key(&half[usize::from(heap.0[i])]);
+    fn sift_down(&mut self, mut i: usize) {
+        let (key, place) = (self.keys[i], self.places[i]);
         loop {
             let left = 2 * i + 1;
             if left >= HALF {
-                return;
+                break;
             }
             let right = left + 1;
-            let child = if right < HALF && at(self, right) > at(self, left) {
+            let child = if right < HALF && self.keys[right] > self.keys[left] {
                 right
             } else {
                 left
             };
-            if at(self, child) <= at(self, i) {
-                return;
+            if self.keys[child] <= key {
+                break;
             }
-            self.0.swap(i, child);
+            (self.keys[i], self.places[i]) = (self.keys[child], self.places[child]);
             i = child;
         }
+        (self.keys[i], self.places[i]) = (key, place);
     }
 }
 
 impl Contacts {
     pub const fn new() -> Self {
         Self {
-            list: [Contact::NONE; MAX_CONTACTS],
+            lists: [[Contact::NONE; MAX_CONTACTS]; 2],
+            current: 0,
             len: 0,
             by_gap: Heap::new(),
             by_reach: Heap::new(),
             dropped: false,
-            carried: [Contact::NONE; MAX_CONTACTS],
             carried_len: 0,
+            period_s: 0.0,
         }
     }
 
@@ -148,19 +169,11 @@ impl Contacts {
         self.carried_len = 0;
     }
 
-    /// Empties the store for the next tick, `period_s` after the last. With `put_aside` what it held can be had back by [`Self::carry`],
-    /// at the cost of copying the store.
+    /// Empties the store for the next tick, `period_s` after the last. With `put_aside` what it held can be had back by [`Self::carry`].
     pub fn begin(&mut self, period_s: f32, put_aside: bool) {
-        self.carried_len = 0;
-        if put_aside {
-            self.carried = self.list;
-            self.carried_len = self.len;
-            for contact in self.carried.iter_mut().take(self.len) {
-                contact.gap += period_s * contact.rate;
-                contact.rate = 0.0;
-                contact.phase = Phase::Free;
-            }
-        }
+        self.carried_len = if put_aside { self.len } else { 0 };
+        self.period_s = period_s;
+        self.current = 1 - self.current;
         self.len = 0;
         self.dropped = false;
     }
@@ -168,21 +181,31 @@ impl Contacts {
     /// Takes the last tick's contacts over into this one where their leaf was not looked at: the gap as predicted, the normal as it was.
     pub fn carry(&mut self, unseen: impl Fn(Leaf) -> bool) {
         for i in 0..self.carried_len {
-            let old = self.carried[i];
+            let old = self.lists[1 - self.current][i];
+            let gap = old.gap + self.period_s * old.rate;
             if unseen(old.leaf)
-                && let Some(new) = self.offer(old.gap, old.reach_gap)
+                && let Some(new) = self.offer(gap, old.reach_gap)
             {
-                *new = old;
+                *new = Contact {
+                    gap,
+                    rate: 0.0,
+                    phase: Phase::Free,
+                    ..old
+                };
             }
         }
     }
 
+    fn list(&self) -> &[Contact; MAX_CONTACTS] {
+        &self.lists[self.current]
+    }
+
     pub fn as_slice(&self) -> &[Contact] {
-        self.list.get(..self.len).unwrap_or(&[])
+        self.list().get(..self.len).unwrap_or(&[])
     }
 
     pub fn as_mut_slice(&mut self) -> &mut [Contact] {
-        self.list.get_mut(..self.len).unwrap_or(&mut [])
+        self.lists[self.current].get_mut(..self.len).unwrap_or(&mut [])
     }
 
     /// Contacts with a force in the last solution.
@@ -199,53 +222,52 @@ impl Contacts {
     /// heap when it displaces others.
     #[inline]
     pub fn offer(&mut self, gap: f32, reach_gap: f32) -> Option<&mut Contact> {
-        if self.len < HALF {
-            let place = self.len;
-            self.len += 1;
-            self.list[place].gap = gap;
-            self.list[place].reach_gap = reach_gap;
-            if self.len == HALF {
-                self.by_gap.build(&self.list[..HALF], |c| c.gap);
-            }
-            return Some(&mut self.list[place]);
-        }
-        let top = self.by_gap.top();
-        let place = if gap < self.list[top].gap {
-            let displaced = self.list[top];
-            if let Some(place) = self.offer_second_half(displaced.gap, displaced.reach_gap) {
-                self.list[place] = displaced;
-            }
-            self.list[top].gap = gap;
-            self.list[top].reach_gap = reach_gap;
-            self.by_gap.sift_down(0, &self.list[..HALF], |c| c.gap);
-            top
-        } else {
-            self.offer_second_half(gap, reach_gap)?
-        };
-        Some(&mut self.list[place])
-    }
-
-    fn offer_second_half(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
-        let filling = self.len < MAX_CONTACTS;
-        let place = if filling {
+        let place = if self.len < HALF {
             self.len += 1;
             self.len - 1
         } else {
-            self.dropped = true;
-            let top = HALF + self.by_reach.top();
-            if reach_gap >= self.list[top].reach_gap {
-                return None;
-            }
-            top
+            self.displace(gap, reach_gap)?
         };
-        self.list[place].gap = gap;
-        self.list[place].reach_gap = reach_gap;
-        if !filling {
-            self.by_reach.sift_down(0, &self.list[HALF..], |c| c.reach_gap);
-        } else if self.len == MAX_CONTACTS {
-            self.by_reach.build(&self.list[HALF..], |c| c.reach_gap);
+        let list = &mut self.lists[self.current];
+        list[place].gap = gap;
+        list[place].reach_gap = reach_gap;
+        if place + 1 == HALF && self.len == HALF {
+            self.by_gap.build(list[..HALF].iter().map(|c| c.gap));
         }
-        Some(place)
+        Some(&mut list[place])
+    }
+
+    /// A place once the first half is full. Out of line: the loop over points is faster for it.
+    #[inline(never)]
+    fn displace(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
+        if gap < self.by_gap.largest() {
+            let place = self.by_gap.replace_largest(gap);
+            let displaced = self.lists[self.current][place];
+            if let Some(second) = self.offer_second_half(displaced.reach_gap) {
+                self.lists[self.current][second] = displaced;
+            }
+            return Some(place);
+        }
+        self.offer_second_half(reach_gap)
+    }
+
+    /// A place in the second half, unless all there would touch sooner.
+    fn offer_second_half(&mut self, reach_gap: f32) -> Option<usize> {
+        if self.len < MAX_CONTACTS {
+            self.len += 1;
+            let place = self.len - 1;
+            if self.len == MAX_CONTACTS {
+                let half = &mut self.lists[self.current][HALF..];
+                half[HALF - 1].reach_gap = reach_gap;
+                self.by_reach.build(half.iter().map(|c| c.reach_gap));
+            }
+            return Some(place);
+        }
+        self.dropped = true;
+        if reach_gap >= self.by_reach.largest() {
+            return None;
+        }
+        Some(HALF + self.by_reach.replace_largest(reach_gap))
     }
 }
 

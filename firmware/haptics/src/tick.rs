@@ -34,10 +34,10 @@ const SHARING_DECAY: f32 = 0.95;
 /// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
-/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21 with a peg of 514 points in a hole with 256 rim
-/// points, look-ups in 16-bit bricks: worst tick 378,000 instructions (20 µm fit, pressed to the wall with 5 N and moved at 10 mm/s: 587
-/// look-ups, 244 candidates, 28 contacts); 81,000 in a 1 mm fit moved at the same speed, 28,000 on average; 6,000 apart from other parts.
-/// That is 500 instructions a look-up with all that follows where everything is near, of which the field takes 340.
+/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21 with the baked thesis pair, 0.5 mm cells, 16-bit,
+/// 840 points on the peg, 1294 on the block, the peg through the hole and moved at 10 mm/s: worst tick 406,000 instructions, 333,000 on average
+/// (20 µm fit pressed to the wall with 5 N: 682 points looked up, 293 candidates, 19 contacts); 315,000 in a 0.1 mm fit pressed likewise; 85,000 in
+/// a 1 mm fit without touching, 26,000 on average; 6,000 apart from other parts.
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
