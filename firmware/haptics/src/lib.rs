@@ -15,11 +15,13 @@
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
+//! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
 //!
 //! Symbols are those of `docs/notation.md`.
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod analytic;
 mod body;
 mod coherence;
 mod contact;
@@ -27,7 +29,9 @@ mod coupling;
 mod io;
 mod limits;
 mod linear;
+mod nearest;
 mod pose;
+mod probe;
 mod proximity;
 pub mod rotation;
 mod settings;
@@ -39,6 +43,7 @@ mod touching;
 pub use glam::{Quat, Vec3};
 pub use io::{FacePair, FacePairs, Flags, Input, Output, Work};
 pub use pose::{Pose, Twist, Wrench};
+pub use probe::{ContactPoint, Nearest, Probe, ProbeError, Prober};
 pub use settings::{
     ContactSettings, CouplingSettings, LimitSettings, ObjectSettings, Range, Settings, SettingsError, ranges,
 };

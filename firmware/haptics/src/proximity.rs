@@ -11,7 +11,7 @@
 //! Cost: see [`crate::tick()`]; the look-ups in [`Field`] are two thirds of it.
 
 use glam::{Mat3, Vec3};
-use mortise_protocol::image::{Field, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage};
+use mortise_protocol::image::{Field, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage, Shape};
 
 use crate::coherence::{Coherence, Key, Known};
 use crate::contact::{Contacts, Phase};
@@ -21,7 +21,7 @@ use crate::state::Placed;
 use crate::step::dot;
 
 /// Trilinear interpolation can overstate the distance next to a sharp edge; measured at 0.2 cells for a right angle, taken as this many.
-const EDGE_ERROR_CELLS: f32 = 0.25;
+pub(crate) const EDGE_ERROR_CELLS: f32 = 0.25;
 /// A gradient shorter than this (squared) tells no direction: the field is clamped there, or between two surfaces. Within a cell of a sharp edge
 /// it shrinks to about 0.3 while its direction is still good.
 const LEAST_GRADIENT2: f32 = 0.01;
@@ -76,29 +76,29 @@ pub(crate) struct Search<'s, 'i> {
 }
 
 /// Trees and fields of one job, and the way between their frames.
-struct Job<'i> {
+pub(crate) struct Job<'i> {
     index: u16,
-    backward: bool,
-    nodes: &'i [NodeRecord],
-    points: &'i [PointRecord],
-    field: Field<'i>,
+    pub backward: bool,
+    pub nodes: &'i [NodeRecord],
+    pub points: &'i [PointRecord],
+    pub field: Field<'i>,
     /// Tree frame to field frame.
-    to_field: Affine,
+    pub to_field: Affine,
     /// Tree frame to arm (from the held part's centre of mass, world axes).
-    to_arm: Affine,
+    pub to_arm: Affine,
     /// Field gradient to the direction, in the world, that pushes the held part away.
     to_push: Mat3,
 }
 
 #[derive(Clone, Copy)]
-struct Affine {
+pub(crate) struct Affine {
     linear: Mat3,
     offset: Vec3,
 }
 
 impl Affine {
     #[inline]
-    fn apply(&self, p: [f32; 3]) -> Vec3 {
+    pub fn apply(&self, p: [f32; 3]) -> Vec3 {
         self.linear * Vec3::from_array(p) + self.offset
     }
 }
@@ -167,46 +167,62 @@ impl<'i> Search<'_, 'i> {
         }
         let held_shape = self.scene.shape_of_part(usize::from(self.held));
         let other_shape = self.scene.shape_of_part(usize::from(part));
-        let held_rotation = self.pose.rotation();
-        let other_rotation = other.pose.rotation();
-        let apart = self.pose.position - other.pose.position;
-        Some(if index.is_multiple_of(2) {
-            let back = other_rotation.transpose();
-            Job {
-                index,
-                backward: false,
-                nodes: held_shape.nodes,
-                points: held_shape.points,
-                field: other_shape.field,
-                to_field: Affine {
-                    linear: back * held_rotation,
-                    offset: back * apart,
-                },
-                to_arm: Affine {
-                    linear: held_rotation,
-                    offset: self.pose.position - self.center,
-                },
-                to_push: other_rotation,
-            }
-        } else {
-            let back = held_rotation.transpose();
-            Job {
-                index,
-                backward: true,
-                nodes: other_shape.nodes,
-                points: other_shape.points,
-                field: held_shape.field,
-                to_field: Affine {
-                    linear: back * other_rotation,
-                    offset: back * -apart,
-                },
-                to_arm: Affine {
-                    linear: other_rotation,
-                    offset: other.pose.position - self.center,
-                },
-                to_push: held_rotation * -1.0,
-            }
-        })
+        Some(Job::new(
+            index,
+            (&held_shape, self.pose),
+            (&other_shape, other.pose),
+            self.center,
+        ))
+    }
+
+    /// Fills `contacts` from all of `jobs`, whatever the budget and the spheres say.
+    pub fn run_all(
+        &self,
+        jobs: &[Job<'_>],
+        coherence: &mut Coherence,
+        contacts: &mut Contacts,
+        work: &mut Work,
+    ) {
+        contacts.begin(self.period_s, false);
+        let mut walk = Walk {
+            search: self,
+            horizon: coherence.horizon(self.margin),
+            coherence,
+            contacts,
+            work,
+            passed_over: 0,
+        };
+        for job in jobs {
+            let _ = walk.nodes(job, 0, u32::MAX);
+        }
+    }
+}
+
+impl<'i> Job<'i> {
+    /// Job `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
+    /// the world.
+    pub fn new(index: u16, held: (&Shape<'i>, Pose), other: (&Shape<'i>, Pose), center: Vec3) -> Self {
+        let backward = !index.is_multiple_of(2);
+        let ((tree, tree_pose), (field, field_pose)) = if backward { (other, held) } else { (held, other) };
+        let back = field_pose.rotation().transpose();
+        let apart = tree_pose.position - field_pose.position;
+        let rotation = tree_pose.rotation();
+        Self {
+            index,
+            backward,
+            nodes: tree.nodes,
+            points: tree.points,
+            field: field.field,
+            to_field: Affine {
+                linear: back * rotation,
+                offset: back * apart,
+            },
+            to_arm: Affine {
+                linear: rotation,
+                offset: tree_pose.position - center,
+            },
+            to_push: field_pose.rotation() * if backward { -1.0 } else { 1.0 },
+        }
     }
 }
 

@@ -54,6 +54,18 @@ pub struct ContactSettings {
     pub point_budget: u32,
 }
 
+impl ContactSettings {
+    /// Stiffness of each of `touching` points, N/m: that of one, or its share of the total.
+    pub(crate) fn shared_stiffness(&self, touching: f32) -> f32 {
+        let share = self.total_stiffness_n_per_m / touching;
+        if share < self.stiffness_n_per_m {
+            share
+        } else {
+            self.stiffness_n_per_m
+        }
+    }
+}
+
 /// The simulated object: its mass is chosen for the feel, not taken from the CAD part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectSettings {

@@ -157,15 +157,7 @@ impl Step<'_> {
             solved = true;
             solves += 1;
         };
-        let mut contact = Wrench::ZERO;
-        for c in contacts.iter() {
-            let force = force(c, k, h, damping_s);
-            if force > 0.0 {
-                let n = Vec3::new(c.row[0], c.row[1], c.row[2]) * force;
-                contact.force += n;
-                contact.torque += c.arm.cross(n);
-            }
-        }
+        let contact = total_force(contacts, k, h, damping_s);
         Solution {
             twist: self.unscale(&x),
             slip,
@@ -221,6 +213,20 @@ impl Step<'_> {
             angular: Vec3::new(x[3], x[4], x[5]) * (1.0 / self.length),
         }
     }
+}
+
+/// Sum of the forces of `contacts` on the object, at its centre of mass.
+pub(crate) fn total_force(contacts: &[Contact], k: f32, period_s: f32, damping_s: f32) -> Wrench {
+    let mut total = Wrench::ZERO;
+    for c in contacts {
+        let force = force(c, k, period_s, damping_s);
+        if force > 0.0 {
+            let n = Vec3::new(c.row[0], c.row[1], c.row[2]) * force;
+            total.force += n;
+            total.torque += c.arm.cross(n);
+        }
+    }
+    total
 }
 
 /// Force of a contact (N) at its rate, never negative.

@@ -151,10 +151,7 @@ impl State {
         let contact = &settings.contact;
         let touching_now = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as f32;
         self.sharing = larger(larger(touching_now, 1.0), self.sharing * SHARING_DECAY);
-        let k = smaller(
-            contact.stiffness_n_per_m,
-            contact.total_stiffness_n_per_m / self.sharing,
-        );
+        let k = contact.shared_stiffness(self.sharing);
         let solution = step.with_contacts(free, self.contacts.as_mut_slice(), k, contact.damping_s);
         work.contacts = self.contacts.pushing() as u16;
         work.solves = solution.solves;

@@ -21,6 +21,14 @@ pub enum LabError {
         /// What is wrong, where.
         what: String,
     },
+    /// Something given to an experiment cannot be used.
+    #[error("{name}: {what}")]
+    Input {
+        /// File, with the line where there is one.
+        name: String,
+        /// What is wrong, and what to do.
+        what: String,
+    },
     /// The STEP file could not be read.
     #[error(transparent)]
     Brep(#[from] mortise_brep::BrepError),

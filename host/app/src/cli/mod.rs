@@ -9,6 +9,7 @@ mod inspect;
 mod lab;
 mod output;
 mod ports;
+mod probe;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -42,6 +43,8 @@ enum Command {
     Demo(demo::Args),
     /// Run experiments and measure figures
     Lab(lab::Args),
+    /// Measure gap, depth and contact forces at given poses of one part
+    Probe(probe::Args),
     /// List the rigs: simulated ones and serial ports
     Ports(ports::Args),
     /// Open the window
@@ -95,6 +98,7 @@ pub fn main() -> ExitCode {
             Command::Bake(args) => bake::run(&args),
             Command::Demo(args) => demo::run(args),
             Command::Lab(args) => lab::run(&args),
+            Command::Probe(args) => probe::run(&args),
             Command::Ports(args) => ports::run(&args),
         },
     };

@@ -1,0 +1,288 @@
+//! Distance from a point to a baked shape by its analytic faces: exact where the field interpolates or has ended.
+//!
+//! A face record is an unbounded surface; which piece of it belongs to the shape the field tells: a foot of the perpendicular counts when the
+//! field has the shape's surface there. Near an edge the field is not sharp enough to tell, so there the other face decides: at a convex edge
+//! a foot that lies outside the other face's surface is beyond the edge, at a re-entrant edge one that lies inside it. The nearest point of
+//! an edge is that of the two surfaces' intersection, by Newton steps.
+//!
+//! Metres, shape frame. Every loop is bounded by the number of faces (squared, for edges). Cost: one projection a face, and a look-up for each
+//! that could be the nearest.
+
+use glam::Vec3;
+use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Shape, surface_kind};
+
+use crate::limits::length;
+
+/// A foot counts when the field's distance there is below this many cells: interpolation errs by 0.2 next to a right angle.
+const ON_SURFACE_CELLS: f32 = 0.3;
+/// Within this many cells of an edge the other face decides whether a foot is beyond it.
+const NEAR_EDGE_CELLS: f32 = 2.0;
+/// Sine of the least angle between faces that makes an edge: below it one face goes on in the other.
+const LEAST_EDGE_SINE: f32 = 0.05;
+/// Newton steps to an edge: each squares the error, which starts below the radius of curvature.
+const EDGE_STEPS: usize = 6;
+
+/// A point on a face's unbounded surface.
+#[derive(Clone, Copy)]
+struct Foot {
+    /// Signed distance to it, outside positive, m.
+    distance: f32,
+    point: Vec3,
+    /// Outward unit normal there.
+    normal: Vec3,
+}
+
+/// Signed distance, outside positive, and foot of the perpendicular from `p`; none for a face without closed form, or where the foot is
+/// not unique.
+fn foot(face: &FaceRecord, p: Vec3) -> Option<Foot> {
+    let origin = Vec3::from_array(face.origin);
+    let axis = Vec3::from_array(face.axis);
+    let from = p - origin;
+    let along = from.dot(axis);
+    let radial = from - axis * along;
+    let (natural, normal) = match face.kind {
+        surface_kind::PLANE => (along, axis),
+        surface_kind::CYLINDER => {
+            let r = length(radial);
+            (r - face.radius, unit(radial, r)?)
+        }
+        surface_kind::CONE => {
+            let r = length(radial);
+            let (sin, cos) = (libm::sinf(face.second), libm::cosf(face.second));
+            let out = unit(radial, r)?;
+            ((r - face.radius) * cos - along * sin, out * cos - axis * sin)
+        }
+        surface_kind::SPHERE => {
+            let r = length(from);
+            (r - face.radius, unit(from, r)?)
+        }
+        surface_kind::TORUS => {
+            let spine = origin + unit(radial, length(radial))? * face.radius;
+            let r = length(p - spine);
+            (r - face.second, unit(p - spine, r)?)
+        }
+        _ => return None,
+    };
+    Some(Foot {
+        distance: natural * face.sense,
+        point: p - normal * natural,
+        normal: normal * face.sense,
+    })
+}
+
+/// `v` over its length, unless that is nothing.
+fn unit(v: Vec3, length: f32) -> Option<Vec3> {
+    (length > 1e-9).then(|| v * (1.0 / length))
+}
+
+/// Largest curvature of a face's surface near `p`, 1/m.
+fn curvature(face: &FaceRecord, p: Vec3) -> f32 {
+    let radius = match face.kind {
+        surface_kind::PLANE => return 0.0,
+        surface_kind::TORUS => face.second,
+        surface_kind::CONE => {
+            let axis = Vec3::from_array(face.axis);
+            let from = p - Vec3::from_array(face.origin);
+            length(from - axis * from.dot(axis))
+        }
+        _ => face.radius,
+    };
+    1.0 / if radius > 1e-9 { radius } else { 1e-9 }
+}
+
+/// Distance to the surface of `face` when it agrees with the field's `distance` at `p` as well as interpolation lets it: twice
+/// cell²·κ/8 in each of two directions, and two steps of a sample. Then no edge comes between.
+pub(crate) fn agreeing(shape: &Shape<'_>, face: u16, p: Vec3, distance: f32) -> Option<f32> {
+    let face = shape.faces.get(usize::from(face))?;
+    let exact = foot(face, p)?.distance;
+    let record = shape.field.record();
+    let tolerance = 0.5 * record.cell * record.cell * curvature(face, p) + 2.0 * record.scale;
+    ((exact - distance).abs() <= tolerance).then_some(exact)
+}
+
+/// Distance from `p` to the shape's faces and edges, and with `corners` to samples of edges and corners too (one corner against another is
+/// found in no other way), never negative; none when a face without closed form could be nearer, or no foot was found.
+///
+/// Where it is no less than `enough`, it is given as `enough`.
+pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, corners: bool, enough: f32) -> Option<f32> {
+    if shape.faces.iter().any(|face| face.kind == surface_kind::OTHER) {
+        return None;
+    }
+    let near_edge = NEAR_EDGE_CELLS * shape.field.record().cell;
+    let mut best = enough;
+    for (a, face) in shape.faces.iter().enumerate() {
+        let Some(foot_a) = foot(face, p) else { continue };
+        let distance = foot_a.distance.abs();
+        if distance < best && on_surface(shape, foot_a.point) {
+            let beyond = shape.faces.iter().enumerate().any(|(b, other)| {
+                a != b
+                    && foot(other, foot_a.point).is_some_and(|o| o.distance.abs() < near_edge)
+                    && beyond_edge(shape, face, other, foot_a.point, near_edge)
+            });
+            if !beyond {
+                best = distance;
+            }
+        }
+    }
+    for (a, face) in shape.faces.iter().enumerate() {
+        let nearer = |face, best| foot(face, p).is_some_and(|f| f.distance.abs() < best);
+        if !nearer(face, best) {
+            continue;
+        }
+        for other in shape.faces.iter().skip(a + 1) {
+            if nearer(other, best)
+                && let Some(edge) = edge_foot(face, other, p)
+                && on_surface(shape, edge)
+            {
+                let distance = length(p - edge);
+                if distance < best {
+                    best = distance;
+                }
+            }
+        }
+    }
+    if corners {
+        let nearest = nearest_edge_point(shape, p, best);
+        if nearest < best {
+            best = nearest;
+        }
+    }
+    best.is_finite().then_some(best)
+}
+
+/// Distance from `p` to the nearest sample of an edge or corner, never less than that to the surface; infinite when none can be nearer than
+/// `enough`: each lies on two faces at least, and is no nearer than they.
+fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
+    let near = (shape.faces.iter())
+        .filter(|face| foot(face, p).is_none_or(|f| f.distance.abs() < enough))
+        .count();
+    if near < 2 {
+        return f32::INFINITY;
+    }
+    let squared = (shape.points.iter())
+        .filter(|point| point.edge_face != NO_FACE)
+        .map(|point| (Vec3::from_array(point.position) - p).length_squared())
+        .fold(f32::INFINITY, |a, b| if b < a { b } else { a });
+    libm::sqrtf(squared)
+}
+
+/// Whether the field has the surface at `p`, as well as it can tell.
+fn on_surface(shape: &Shape<'_>, p: Vec3) -> bool {
+    match shape.field.lookup(p.to_array()) {
+        Lookup::Near(sample) => sample.distance.abs() <= ON_SURFACE_CELLS * shape.field.record().cell,
+        Lookup::Far { .. } => false,
+    }
+}
+
+/// Whether `p` on the surface of `face` lies beyond its edge with `other`, when there is one within `near_edge`.
+fn beyond_edge(shape: &Shape<'_>, face: &FaceRecord, other: &FaceRecord, p: Vec3, near_edge: f32) -> bool {
+    let Some(edge) = edge_foot(face, other, p) else {
+        return false;
+    };
+    if length(edge - p) > near_edge || !on_surface(shape, edge) {
+        return false;
+    }
+    let (Some(a), Some(b)) = (foot(face, edge), foot(other, edge)) else {
+        return false;
+    };
+    // From the edge along the first normal and against the second: outside at a convex edge, inside at a re-entrant one.
+    let across = a.normal - b.normal;
+    let Some(across) = unit(across, length(across)) else {
+        return false;
+    };
+    let convex = shape.field.bound((edge + across * near_edge).to_array()) > 0.0;
+    let side = foot(other, p).map_or(0.0, |f| f.distance);
+    if convex { side > 0.0 } else { side < 0.0 }
+}
+
+/// The point nearest to `p` on the intersection of two surfaces: Newton steps, each the point nearest to `p` on the line in which the
+/// tangent planes meet. None where the surfaces do not cross, or hardly.
+fn edge_foot(a: &FaceRecord, b: &FaceRecord, p: Vec3) -> Option<Vec3> {
+    let mut x = p;
+    let mut left = f32::INFINITY;
+    for _ in 0..EDGE_STEPS {
+        let (fa, fb) = (foot(a, x)?, foot(b, x)?);
+        left = fa.distance.abs() + fb.distance.abs();
+        let cosine = fa.normal.dot(fb.normal);
+        let sine2 = 1.0 - cosine * cosine;
+        if sine2 < LEAST_EDGE_SINE * LEAST_EDGE_SINE {
+            return None;
+        }
+        // From p, to the plane through each foot.
+        let (da, db) = ((fa.point - p).dot(fa.normal), (fb.point - p).dot(fb.normal));
+        let along_a = (da - cosine * db) * (1.0 / sine2);
+        let along_b = (db - cosine * da) * (1.0 / sine2);
+        x = p + fa.normal * along_a + fb.normal * along_b;
+    }
+    // A hundredth of a micrometre in a tenth of a metre: single precision.
+    (left <= 1e-7 * (1.0 + 10.0 * length(x))).then_some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cylinder(sense: f32) -> FaceRecord {
+        FaceRecord {
+            kind: surface_kind::CYLINDER,
+            sense,
+            origin: [0.0; 3],
+            axis: [0.0, 0.0, 1.0],
+            radius: 0.01,
+            second: 0.0,
+        }
+    }
+
+    #[test]
+    fn rim_of_a_cylinder() {
+        let top = FaceRecord {
+            kind: surface_kind::PLANE,
+            sense: 1.0,
+            origin: [0.0, 0.0, 0.02],
+            axis: [0.0, 0.0, 1.0],
+            radius: 0.0,
+            second: 0.0,
+        };
+        let p = Vec3::new(0.0090, 0.0110, 0.025);
+        let edge = edge_foot(&cylinder(1.0), &top, p).expect("they cross");
+        let expected = Vec3::new(0.0090, 0.0110, 0.0) * (0.01 / libm::hypotf(0.0090, 0.0110))
+            + Vec3::new(0.0, 0.0, 0.02);
+        assert!(length(edge - expected) < 1e-8, "{edge} {expected}");
+        let parallel = FaceRecord {
+            origin: [0.0, 0.0, 0.03],
+            ..top
+        };
+        assert!(edge_foot(&parallel, &top, p).is_none());
+    }
+
+    #[test]
+    fn feet_lie_on_their_surfaces() {
+        let plain = cylinder(-1.0);
+        let kinds = [
+            plain,
+            FaceRecord {
+                kind: surface_kind::SPHERE,
+                ..plain
+            },
+            FaceRecord {
+                kind: surface_kind::CONE,
+                second: 0.3,
+                ..plain
+            },
+            FaceRecord {
+                kind: surface_kind::TORUS,
+                second: 0.002,
+                ..plain
+            },
+        ];
+        for face in kinds {
+            let p = Vec3::new(0.013, -0.004, 0.003);
+            let f = foot(&face, p).expect("unique");
+            assert!((length(p - f.point) - f.distance.abs()).abs() < 1e-8);
+            let again = foot(&face, f.point).expect("unique");
+            assert!(again.distance.abs() < 1e-8, "{} {}", face.kind, again.distance);
+            // Outside the solid is where the surface's natural inside is.
+            assert!((p - f.point).dot(f.normal) * f.distance > 0.0);
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! How near two parts are at one pose, and what contact would push with: what the tick sees, asked without a motion.
+//!
+//! For measuring, on a PC as on a board: it walks the trees and fields of the tick's own search, both ways, without its budget and without
+//! what earlier poses left. Forces are those of the contact law at rest, λ = k·depth, k shared as in the tick.
+
+use core::fmt;
+
+use glam::Vec3;
+use mortise_protocol::image::SceneImage;
+
+use crate::body::Body;
+use crate::coherence::Coherence;
+use crate::contact::{Contacts, Phase};
+use crate::io::{Flags, Work};
+use crate::nearest::NearestSearch;
+use crate::pose::{Pose, Wrench};
+use crate::proximity::{Job, Search};
+use crate::settings::ContactSettings;
+use crate::step::total_force;
+use crate::tick::usable_pose;
+
+/// What was found at one pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probe {
+    /// Where the gap is smallest or the depth largest.
+    pub nearest: Nearest,
+    /// Sum of all contact forces on the moving part, about its centre of mass, axes of the fixed part.
+    pub wrench: Wrench,
+    /// Points that push.
+    pub contacts: u16,
+    /// What was looked at, for gap and contacts together. [`Flags::DEEP`]: some point lies too deep to push;
+    /// [`Flags::CONTACTS_DROPPED`]: more touch than the store holds.
+    pub work: Work,
+}
+
+/// The smallest gap between two parts, or the largest depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// Signed distance, m: gap positive, deepest point negative. By the analytic faces when `exact`, else as the field has it.
+    pub distance_m: f32,
+    /// The smallest distance the field itself gave, of the points looked at, m: what the tick acts on. Infinite when none lay where the field
+    /// stores distances.
+    pub field_distance_m: f32,
+    /// The distance is one to an analytic face or edge, within single precision.
+    pub exact: bool,
+    /// The point lies where the field stores distances; when neither this nor `exact`, the distance is only a bound: at least so far apart,
+    /// or at least so deep.
+    pub in_band: bool,
+    /// From the moving part's centre of mass to the point, axes of the fixed part, m.
+    pub arm: Vec3,
+    /// Face of the moving part, [`mortise_protocol::image::NO_FACE`] when unknown.
+    pub moving_face: u16,
+    /// Face of the fixed part, [`mortise_protocol::image::NO_FACE`] when unknown.
+    pub fixed_face: u16,
+}
+
+/// A point that pushes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPoint {
+    /// From the moving part's centre of mass, axes of the fixed part, m.
+    pub arm: Vec3,
+    /// Unit direction in which the moving part is pushed.
+    pub normal: Vec3,
+    /// As the field has it, m, positive.
+    pub depth_m: f32,
+    /// Face of the moving part.
+    pub moving_face: u16,
+    /// Face of the fixed part.
+    pub fixed_face: u16,
+}
+
+/// Why a pose could not be looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProbeError {
+    /// The scene has no part of this index.
+    NoSuchPart {
+        /// Asked for.
+        part: u16,
+    },
+    /// A part has no distance to itself.
+    SamePart,
+    /// The pose is not finite, farther than 100 m, or not a rotation.
+    BadPose,
+}
+
+impl fmt::Display for ProbeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoSuchPart { part } => write!(f, "the scene has no part {part}"),
+            Self::SamePart => f.write_str("a part has no distance to itself: choose two parts"),
+            Self::BadPose => {
+                f.write_str("the pose is not finite, farther than 100 m, or not a rotation: correct it")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ProbeError {}
+
+/// Room for one query. About 60 KiB; make it once.
+#[derive(Clone, Debug)]
+pub struct Prober {
+    contacts: Contacts,
+    coherence: Coherence,
+}
+
+impl Default for Prober {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Prober {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            contacts: Contacts::new(),
+            coherence: Coherence::new(),
+        }
+    }
+
+    /// Gap and contacts of part `moving`, placed at `pose` in the frame of part `fixed`.
+    ///
+    /// Cost: a look-up for every tree node and point that could be the nearest, both ways; when parts overlap a second walk
+    /// for the contacts. Unbounded by a budget: not for the tick.
+    ///
+    /// # Errors
+    /// [`ProbeError`].
+    pub fn probe(
+        &mut self,
+        scene: &SceneImage<'_>,
+        moving: u16,
+        fixed: u16,
+        pose: &Pose,
+        settings: &ContactSettings,
+    ) -> Result<Probe, ProbeError> {
+        for part in [moving, fixed] {
+            if usize::from(part) >= scene.parts().len() {
+                return Err(ProbeError::NoSuchPart { part });
+            }
+        }
+        if moving == fixed {
+            return Err(ProbeError::SamePart);
+        }
+        let pose = usable_pose(pose).ok_or(ProbeError::BadPose)?;
+        let held = scene.shape_of_part(usize::from(moving));
+        let other = scene.shape_of_part(usize::from(fixed));
+        let body = Body::of(&held);
+        let center = pose.transform_point(body.center_of_mass);
+        let jobs = [0, 1].map(|way| Job::new(way, (&held, pose), (&other, Pose::IDENTITY), center));
+
+        let mut nearest = Nearest {
+            distance_m: f32::INFINITY,
+            field_distance_m: f32::INFINITY,
+            exact: false,
+            in_band: false,
+            arm: Vec3::ZERO,
+            moving_face: mortise_protocol::image::NO_FACE,
+            fixed_face: mortise_protocol::image::NO_FACE,
+        };
+        let mut work = Work::default();
+        for (job, shape) in jobs.iter().zip([&other, &held]) {
+            (nearest, work) = NearestSearch::run(job, shape, nearest, work);
+        }
+        self.contacts.clear();
+        let mut wrench = Wrench::ZERO;
+        if nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0 {
+            self.touch(scene, moving, &jobs, center, pose, &mut work);
+            let touching = self.contacts.as_slice().len();
+            let k = settings.shared_stiffness(if touching == 0 { 1.0 } else { touching as f32 });
+            for contact in self.contacts.as_mut_slice() {
+                // At rest: no rate, so neither period nor damping counts.
+                contact.phase = Phase::Parting;
+            }
+            wrench = total_force(self.contacts.as_slice(), k, 0.0, 0.0);
+            work.contacts = touching as u16;
+        }
+        Ok(Probe {
+            nearest,
+            wrench,
+            contacts: work.contacts,
+            work,
+        })
+    }
+
+    /// The points that pushed in the last query, in no order that means anything.
+    pub fn contacts(&self) -> impl Iterator<Item = ContactPoint> {
+        self.contacts.as_slice().iter().map(|c| ContactPoint {
+            arm: c.arm,
+            normal: Vec3::new(c.row[0], c.row[1], c.row[2]),
+            depth_m: -c.gap,
+            moving_face: c.moving_face,
+            fixed_face: c.static_face,
+        })
+    }
+
+    /// Everything that overlaps, into the store.
+    fn touch(
+        &mut self,
+        scene: &SceneImage<'_>,
+        moving: u16,
+        jobs: &[Job<'_>],
+        center: Vec3,
+        pose: Pose,
+        work: &mut Work,
+    ) {
+        self.coherence.forget();
+        Search {
+            scene,
+            parts: &[],
+            held: moving,
+            pose,
+            center,
+            margin: 0.0,
+            slack: 0.0,
+            motions: [[0.0; 6]; 2],
+            swing: 0.0,
+            inverse_length: 1.0,
+            period_s: 0.0,
+            busy: false,
+            budget: u32::MAX,
+        }
+        .run_all(jobs, &mut self.coherence, &mut self.contacts, work);
+        work.flags
+            .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
+    }
+}

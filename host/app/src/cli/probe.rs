@@ -1,0 +1,47 @@
+//! `mortise probe`: gap, depth and contact forces at given poses.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use mortise_lab::probe::{self, ProbeScene};
+
+use super::output;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// STEP file or baked scene image
+    scene: PathBuf,
+    /// The part that is placed: its name, or its number in an image
+    #[arg(long, value_name = "PART")]
+    moving: String,
+    /// The part it is placed against [default: the other one of two]
+    #[arg(long, value_name = "PART")]
+    against: Option<String>,
+    /// CSV with the columns name,x,y,z,qw,qx,qy,qz: mm, moving part in the fixed part's frame
+    #[arg(long, value_name = "CSV")]
+    poses: PathBuf,
+    /// Cell edge of a STEP file's scene, mm [default: chosen so that the image fits]
+    #[arg(long, value_name = "MM")]
+    cell: Option<f64>,
+    /// One JSON object a pose
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs it.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    // Cheap first: a mistake in the poses need not wait for a bake.
+    let poses = probe::read_poses(&args.poses)?;
+    let scene = ProbeScene::load(&args.scene, args.cell)?;
+    let pair = scene.pair(&args.moving, args.against.as_deref())?;
+    for pose in &poses {
+        let row = scene.probe(pair, pose)?;
+        if args.json {
+            output::json(&row)?;
+        } else {
+            output::line(&row.to_string())?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
