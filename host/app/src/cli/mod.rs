@@ -106,12 +106,24 @@ pub fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) if output::is_closed(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // One line, whatever is inside.
-            let line = format!("{error:#}").replace('\n', " ");
-            eprintln!("mortise: {line}");
+            eprintln!("mortise: {}", one_line(&error));
             ExitCode::from(2)
         }
     }
+}
+
+/// An error with its causes in one line; a cause that the message before it already tells is not told again.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text = cause.to_string().replace('\n', " ");
+        if line.is_empty() {
+            line = text;
+        } else if !line.contains(&text) {
+            line = format!("{line}: {text}");
+        }
+    }
+    line
 }
 
 fn window(open: Open) -> anyhow::Result<ExitCode> {
@@ -124,4 +136,20 @@ fn window(open: Open) -> anyhow::Result<ExitCode> {
 fn rig(text: &str) -> Result<RigSpec, String> {
     text.parse()
         .map_err(|error: mortise_rig::SpecError| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_one_line_that_tells_each_cause_once() {
+        let cause = anyhow::anyhow!("no room\non the disk");
+        let told = cause.context("cannot write x: no room on the disk");
+        assert_eq!(one_line(&told), "cannot write x: no room on the disk");
+        assert_eq!(
+            one_line(&told.context("baking")),
+            "baking: cannot write x: no room on the disk"
+        );
+    }
 }

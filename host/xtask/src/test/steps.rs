@@ -9,6 +9,7 @@ use super::Bench;
 use crate::{figures, firmware as boards, program, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
+const HIL_BENCH: &str = "bench";
 const BOARD_SIDE: [&str; 3] = ["mortise-protocol", "mortise-haptics", "mortise-firmware"];
 
 pub fn format(bench: &mut Bench) -> Result<String> {
@@ -106,7 +107,15 @@ pub fn unit_boards(bench: &mut Bench) -> Result<String> {
 pub fn hil(bench: &mut Bench) -> Result<String> {
     boards::build(&bench.root, boards::EMULATED)?;
     let mut command = shell::cargo(&bench.root);
-    command.args(["test", "--release", "--package", HIL_TESTS, "--no-fail-fast"]);
+    // The whole workspace, so that dependencies keep the features they were built with.
+    command.args([
+        "test",
+        "--release",
+        "--workspace",
+        "--test",
+        HIL_BENCH,
+        "--no-fail-fast",
+    ]);
     counted(bench, &mut command)
 }
 
