@@ -1,7 +1,7 @@
 //! Looking up a signed-distance field in place.
 //!
-//! Trilinear interpolation inside a stored brick: on a cylinder of radius R the error is about cell²/(8R). Cost on a Cortex-M7: about
-//! 135 instructions with gradient in the band, 15 outside.
+//! Trilinear interpolation inside a stored brick: on a cylinder of radius R the error is about cell²/(8R). Cost: about half of the 300 instructions
+//! that a point near the surface takes in a tick, counted on an emulated Cortex-M7 on 2026-11-21.
 
 use super::records::*;
 
