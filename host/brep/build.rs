@@ -40,6 +40,7 @@ fn main() {
         "src/kernel.h",
         "src/kernel.cc",
         "src/kernel_shape.cc",
+        "src/kernel_oracle.cc",
         "build.rs",
     ] {
         println!("cargo:rerun-if-changed={file}");
@@ -57,6 +58,7 @@ fn main() {
     cxx_build::bridge("src/kernel.rs")
         .file("src/kernel.cc")
         .file("src/kernel_shape.cc")
+        .file("src/kernel_oracle.cc")
         .include("src")
         .include(&include)
         .std("c++17")

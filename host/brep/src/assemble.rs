@@ -11,8 +11,16 @@ use std::collections::{HashMap, HashSet};
 /// Names that say nothing: what writers put where a body or occurrence has no name of its own.
 const MEANINGLESS: &[&str] = &["", "NONE", "SOLID", "COMPOUND", "COMPSOLID", "SHELL", "SHAPE"];
 
-/// Reads a STEP text. `path` is for messages only.
-pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadModel, BrepError> {
+/// A text that the kernel has read, and what is known of it.
+struct Source {
+    file: Exchange,
+    content: Content,
+    units: Vec<String>,
+    document: cxx::UniquePtr<kernel::Document>,
+}
+
+/// Checks and rewrites a STEP text and lets the kernel read it. The caller holds [`kernel::lock`].
+fn read(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<Source, BrepError> {
     if bytes.is_empty() {
         return Err(BrepError::Empty { path: path.into() });
     }
@@ -27,19 +35,56 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
     let units = units::length_units(&file).map_err(|e| text_error(path, e))?;
     operators::split(&mut file).map_err(|e| text_error(path, e))?;
     let rendered = render::render(&file);
-    let kernel_error = |e: cxx::Exception| {
-        let reason = match e.what() {
-            "std::bad_alloc" => "out of the memory it may use",
-            what => what,
-        };
-        BrepError::Kernel {
-            path: path.into(),
-            reason: one_line(reason),
-        }
-    };
+    let document = kernel::read_document(&rendered, options.max_parts).map_err(|e| kernel_error(path, &e))?;
+    Ok(Source {
+        file,
+        content,
+        units,
+        document,
+    })
+}
+
+/// Reads a STEP text and asks the kernel something about its shape `shape`, numbered as in [`CadModel::shapes`].
+pub fn ask<T>(
+    path: &str,
+    bytes: &[u8],
+    options: &LoadOptions,
+    shape: usize,
+    question: impl FnOnce(&kernel::Document) -> Result<T, cxx::Exception>,
+) -> Result<T, BrepError> {
     let _kernel = kernel::lock();
-    let document = kernel::read_document(&rendered, options.max_parts).map_err(kernel_error)?;
-    drop(rendered);
+    let document = read(path, bytes, options)?.document;
+    let count = document.shape_count();
+    if shape >= count {
+        return Err(BrepError::NoSuchShape {
+            path: path.into(),
+            shape,
+            count,
+        });
+    }
+    question(&document).map_err(|e| kernel_error(path, &e))
+}
+
+fn kernel_error(path: &str, e: &cxx::Exception) -> BrepError {
+    let reason = match e.what() {
+        "std::bad_alloc" => "out of the memory it may use",
+        what => what,
+    };
+    BrepError::Kernel {
+        path: path.into(),
+        reason: one_line(reason),
+    }
+}
+
+/// Reads a STEP text. `path` is for messages only.
+pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadModel, BrepError> {
+    let _kernel = kernel::lock();
+    let Source {
+        file,
+        content,
+        units,
+        document,
+    } = read(path, bytes, options)?;
 
     let mut warnings = file.warnings.clone();
     warnings.extend(content.warnings.iter().cloned());
@@ -70,7 +115,7 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
                 options.relative_deflection,
                 options.angular_deflection_rad,
             )
-            .map_err(kernel_error)?;
+            .map_err(|e| kernel_error(path, &e))?;
         let mut notes = Vec::new();
         shapes.push(shape::convert(raw, &mut notes));
         let owner = parts.iter().find(|p| p.shape == index).map_or("?", |p| &p.name);

@@ -3,8 +3,12 @@
 //! The program starts itself again with a request in its environment; the copy sees it in [`init`], reads the
 //! file, writes a framed [`postcard`] result to standard output and exits. A frame is eight bytes of magic, the
 //! payload's length (64 bits, little-endian) and the payload: whatever the kernel prints around it is skipped.
+//! A question about a shape comes on standard input.
 
+use crate::oracle::{self, Answer, Question};
 use crate::{BrepError, CadModel, LoadOptions, kernel, load_in_process};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
 use std::io::{Read, Write};
 use std::path::Path;
@@ -14,12 +18,20 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 const PATH_VARIABLE: &str = "MORTISE_BREP_CHILD_PATH";
-const OPTIONS_VARIABLE: &str = "MORTISE_BREP_CHILD_OPTIONS";
+const REQUEST_VARIABLE: &str = "MORTISE_BREP_CHILD_REQUEST";
 const MAGIC: &[u8; 8] = b"\x93MTBREP1";
 /// How much of the child's standard error is kept for the message.
 const STDERR_TAIL: usize = 4096;
 /// How often the parent looks whether the child has ended.
 const POLL: Duration = Duration::from_millis(2);
+
+/// What the environment asks for.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Request {
+    options: LoadOptions,
+    /// A [`Question`] is to be read from standard input; else the model is asked for.
+    question: bool,
+}
 
 static READY: AtomicBool = AtomicBool::new(false);
 
@@ -30,9 +42,9 @@ static READY: AtomicBool = AtomicBool::new(false);
 pub fn init() {
     match (
         std::env::var_os(PATH_VARIABLE),
-        std::env::var_os(OPTIONS_VARIABLE),
+        std::env::var_os(REQUEST_VARIABLE),
     ) {
-        (Some(path), Some(options)) => serve(Path::new(&path), &options),
+        (Some(path), Some(request)) => serve(Path::new(&path), &request),
         _ => READY.store(true, Ordering::Release),
     }
 }
@@ -43,37 +55,66 @@ pub fn is_ready() -> bool {
 }
 
 /// The reading process: never returns.
-fn serve(path: &Path, options: &OsStr) -> ! {
-    let result = match options
+fn serve(path: &Path, request: &OsStr) -> ! {
+    let damaged = || process_error(path, "the request is damaged");
+    let request = request
         .to_str()
         .and_then(from_hex)
-        .and_then(|b| postcard::from_bytes(&b).ok())
-    {
-        Some::<LoadOptions>(options) => {
+        .and_then(|b| postcard::from_bytes::<Request>(&b).ok());
+    let written = match request {
+        Some(Request { options, question }) => {
             // The parent's clock decides; this one only ends a process whose parent is gone. Sixteen threads' worth.
             kernel::limit_process(
                 options.memory_limit_bytes,
                 options.time_limit_s.saturating_mul(16),
             );
-            load_in_process(path, &options)
+            if question {
+                let question = postcard::from_bytes::<Question>(&read_all(std::io::stdin().lock()));
+                respond(&question.map_or_else(|_| Err(damaged()), |q| oracle::answer(path, &options, &q)))
+            } else {
+                respond(&load_in_process(path, &options))
+            }
         }
-        None => Err(process_error(path, "the request is damaged")),
+        None => respond(&Err::<(), _>(damaged())),
     };
+    std::process::exit(if written { 0 } else { 3 })
+}
+
+/// Whether the frame got out.
+fn respond<T: Serialize>(result: &Result<T, BrepError>) -> bool {
     kernel::flush_output();
-    let written = postcard::to_allocvec(&result).is_ok_and(|payload| {
+    postcard::to_allocvec(result).is_ok_and(|payload| {
         let mut out = std::io::stdout().lock();
         out.write_all(MAGIC)
             .and_then(|()| out.write_all(&(payload.len() as u64).to_le_bytes()))
             .and_then(|()| out.write_all(&payload))
             .and_then(|()| out.flush())
             .is_ok()
-    });
-    std::process::exit(if written { 0 } else { 3 })
+    })
 }
 
 /// Reads `path` in a child process.
 pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
-    let mut child = spawn(path, options).map_err(|e| process_error(path, &e.to_string()))?;
+    run(path, options, None)
+}
+
+/// Asks about a shape of `path` in a child process.
+pub(crate) fn ask(path: &Path, options: &LoadOptions, question: &Question) -> Result<Answer, BrepError> {
+    let question = postcard::to_allocvec(question).map_err(|e| process_error(path, &e.to_string()))?;
+    run(path, options, Some(question))
+}
+
+fn run<T: DeserializeOwned>(
+    path: &Path,
+    options: &LoadOptions,
+    question: Option<Vec<u8>>,
+) -> Result<T, BrepError> {
+    let mut child =
+        spawn(path, options, question.is_some()).map_err(|e| process_error(path, &e.to_string()))?;
+    if let (Some(mut pipe), Some(question)) = (child.stdin.take(), question) {
+        // A child that dies early breaks the pipe; how it ended is told below.
+        thread::spawn(move || pipe.write_all(&question));
+    }
     let output = child
         .stdout
         .take()
@@ -108,12 +149,16 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepE
     }
 }
 
-fn spawn(path: &Path, options: &LoadOptions) -> std::io::Result<Child> {
-    let options = postcard::to_allocvec(options).map_err(std::io::Error::other)?;
+fn spawn(path: &Path, options: &LoadOptions, question: bool) -> std::io::Result<Child> {
+    let request = Request {
+        options: options.clone(),
+        question,
+    };
+    let request = postcard::to_allocvec(&request).map_err(std::io::Error::other)?;
     Command::new(std::env::current_exe()?)
         .env(PATH_VARIABLE, path)
-        .env(OPTIONS_VARIABLE, to_hex(&options))
-        .stdin(Stdio::null())
+        .env(REQUEST_VARIABLE, to_hex(&request))
+        .stdin(if question { Stdio::piped() } else { Stdio::null() })
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -224,14 +269,17 @@ mod tests {
     }
 
     #[test]
-    fn options_survive_the_environment() {
-        let options = LoadOptions {
-            linear_deflection_mm: Some(0.125),
-            max_parts: 7,
-            ..LoadOptions::default()
+    fn a_request_survives_the_environment() {
+        let request = Request {
+            options: LoadOptions {
+                linear_deflection_mm: Some(0.125),
+                max_parts: 7,
+                ..LoadOptions::default()
+            },
+            question: true,
         };
-        let bytes = from_hex(&to_hex(&postcard::to_allocvec(&options).unwrap())).unwrap();
-        assert_eq!(postcard::from_bytes::<LoadOptions>(&bytes).unwrap(), options);
+        let bytes = from_hex(&to_hex(&postcard::to_allocvec(&request).unwrap())).unwrap();
+        assert_eq!(postcard::from_bytes::<Request>(&bytes).unwrap(), request);
     }
 
     #[test]

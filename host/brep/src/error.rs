@@ -75,6 +75,16 @@ pub enum BrepError {
         /// The kernel's message.
         reason: String,
     },
+    /// A question about a shape the file does not have.
+    #[error("{path}: no shape number {shape}: it has {count}; ask about one of those")]
+    NoSuchShape {
+        /// The path asked for.
+        path: String,
+        /// The number asked for, from 0.
+        shape: usize,
+        /// How many the file has.
+        count: usize,
+    },
     /// The process that reads the file died.
     #[error("{path}: the CAD kernel crashed on it ({how}); repair or export it again")]
     Crashed {

@@ -44,6 +44,8 @@ class Document {
   rust::Vec<RawResult> results() const;
   std::size_t shape_count() const;
   RawShape shape(std::size_t index, double linear_mm, double relative, double angular_rad) const;
+  rust::Vec<std::uint8_t> sides(std::size_t index, rust::Slice<const double> points, double tolerance_mm) const;
+  rust::Vec<double> feet(std::size_t index, rust::Slice<const double> points) const;
 
  private:
   std::unique_ptr<Content> content_;

@@ -125,6 +125,12 @@ mod ffi {
             angular_rad: f64,
         ) -> Result<RawShape>;
 
+        /// Side of each point (x, y, z in turn) of the shape's solid by the kernel's own classifier: 0 inside, 1 outside, 2 within
+        /// the tolerance of the surface, 3 it cannot tell.
+        fn sides(self: &Document, index: usize, points: &[f64], tolerance_mm: f64) -> Result<Vec<u8>>;
+        /// Nearest point of the shape's faces to each point, by the kernel: distance, x, y, z; distance -1 where it finds none.
+        fn feet(self: &Document, index: usize, points: &[f64]) -> Result<Vec<f64>>;
+
         /// Caps address space (bytes) and processor time (seconds) of this process where the system can; 0 for none.
         fn limit_process(memory_bytes: u64, cpu_seconds: u64) -> bool;
         fn flush_output();

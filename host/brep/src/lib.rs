@@ -24,6 +24,7 @@ mod error;
 mod kernel;
 mod model;
 mod options;
+pub mod oracle;
 mod part21;
 mod shape;
 mod topology;
@@ -59,10 +60,13 @@ pub fn load_step_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<C
 }
 
 fn load_in_process(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
-    let name = || path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| BrepError::Unreadable {
-        path: name(),
+    let bytes = read_file(path)?;
+    assemble::assemble(&path.display().to_string(), &bytes, options)
+}
+
+fn read_file(path: &Path) -> Result<Vec<u8>, BrepError> {
+    std::fs::read(path).map_err(|e| BrepError::Unreadable {
+        path: path.display().to_string(),
         reason: e.to_string(),
-    })?;
-    assemble::assemble(&name(), &bytes, options)
+    })
 }

@@ -4,13 +4,15 @@
 
 mod support;
 
+use glam::DVec3;
 use libtest_mimic::{Arguments, Failed, Trial};
+use mortise_brep::oracle::{self, Side};
 use mortise_brep::{BrepError, LoadOptions, child, load_step, load_step_with};
 use std::process::{Command, ExitCode};
 
 fn main() -> ExitCode {
     child::init();
-    let tests: [(&str, fn()); 6] = [
+    let tests: [(&str, fn()); 8] = [
         (
             "a_child_reads_what_the_program_itself_would",
             a_child_reads_what_the_program_itself_would,
@@ -21,6 +23,11 @@ fn main() -> ExitCode {
         ),
         ("a_hang_ends_at_the_time_limit", a_hang_ends_at_the_time_limit),
         ("memory_is_limited", memory_is_limited),
+        (
+            "the_kernel_classifies_points_and_finds_the_nearest",
+            the_kernel_classifies_points_and_finds_the_nearest,
+        ),
+        ("questions_fail_like_reading", questions_fail_like_reading),
         (
             "the_program_prints_the_parts_of_a_file",
             the_program_prints_the_parts_of_a_file,
@@ -98,6 +105,64 @@ fn memory_is_limited() {
         .unwrap_err()
         .to_string();
     assert!(error.contains("memory") && !error.contains('\n'), "{error}");
+}
+
+/// The block of the pair against its closed form: 50 × 50 × 40 with a hole of 18.75.
+fn the_kernel_classifies_points_and_finds_the_nearest() {
+    let file = support::data("pair_d18.75_clear1.00.step");
+    let options = LoadOptions::default();
+    let model = load_step(&file).unwrap();
+    let block = model.parts.iter().find(|p| p.name.contains("block")).unwrap();
+    let center = model.shapes[block.shape].center_of_mass;
+    let points: Vec<DVec3> = (0..2000u32)
+        .map(|i| {
+            let u = |base: f64| (f64::from(i) * base).fract() * 2.0 - 1.0;
+            center + DVec3::new(u(0.819_172_5), u(0.671_043_6), u(0.549_700_5)) * 30.0
+        })
+        .collect();
+    // Of the box less the cylinder; exact inside and outside near faces, a lower bound beyond edges.
+    let expected = |p: DVec3| {
+        let p = p - center;
+        let outer = (p.abs() - DVec3::new(25.0, 25.0, 20.0)).max_element();
+        outer.max(9.375 - p.truncate().length())
+    };
+    let sides = oracle::classify(&file, &options, block.shape, &points, 1e-6).unwrap();
+    let feet = oracle::nearest(&file, &options, block.shape, &points).unwrap();
+    for ((&p, side), foot) in points.iter().zip(sides).zip(feet) {
+        let d = expected(p);
+        assert_eq!(side, if d < 0.0 { Side::In } else { Side::Out }, "{p}: {d}");
+        let foot = foot.unwrap();
+        assert!((foot.point.distance(p) - foot.distance).abs() < 1e-9);
+        assert!(expected(foot.point).abs() < 1e-6, "{p}");
+        assert!(foot.distance > d.abs() - 1e-6, "{p}");
+        if d < 0.0 {
+            assert!(foot.distance < -d + 1e-6, "{p}: {} for {d}", foot.distance);
+        }
+    }
+    let on = oracle::classify(&file, &options, block.shape, &[center + DVec3::X * 25.0], 1e-6).unwrap();
+    assert_eq!(on, [Side::On]);
+}
+
+fn questions_fail_like_reading() {
+    let file = support::data("pair_d18.75_clear1.00.step");
+    let slow = LoadOptions {
+        time_limit_s: 0,
+        ..LoadOptions::default()
+    };
+    let points = vec![DVec3::ZERO; 100_000];
+    let error = oracle::classify(&file, &slow, 0, &points, 1e-6).unwrap_err();
+    assert!(matches!(error, BrepError::TimedOut { seconds: 0, .. }), "{error}");
+    let error = oracle::classify(&file, &LoadOptions::default(), 2, &points, 1e-6).unwrap_err();
+    assert!(
+        error.to_string().contains("no shape number 2: it has 2"),
+        "{error}"
+    );
+    let error = oracle::nearest("no such file.step", &slow, 0, &[]).unwrap_err();
+    // A child that takes any time at all is over this limit.
+    assert!(
+        matches!(error, BrepError::Unreadable { .. } | BrepError::TimedOut { .. }),
+        "{error}"
+    );
 }
 
 fn program() -> Command {
