@@ -13,9 +13,10 @@ use crate::error::BakeError;
 use crate::field::{BakedField, FieldOptions, bake_field};
 use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement};
 use crate::options::{BakeOptions, Progress, Stage};
+use crate::partners::Partners;
 use crate::pointshell::{Pointshell, PointshellOptions, sample_pointshell};
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
-use crate::scene::{Scene, longest_side};
+use crate::scene::Scene;
 use crate::tree::node_count;
 
 /// A scene image and what is in it.
@@ -31,9 +32,11 @@ pub struct Baked {
 const ATTEMPTS: usize = 12;
 /// The first, coarse attempt at a scene whose cells are free to choose: a sixteenth of the work, and its bytes tell how far to refine.
 const SCOUT: f64 = 4.0;
-/// Cells in the pointshell's default error bound. Field and shell err alike, as spacing²/(8R): a fiftieth of a cell is what the field
-/// leaves at R = 6 cells, so neither is finer than the other is worth on the radii that matter.
-const EPSILON_PER_CELL: f64 = 50.0;
+/// Cells in the pointshell's default error bound. It is met only where a lone convex edge or a curved face touches something unlike itself; in
+/// a fit the error is smaller by the ratio of the radii to their difference.
+const EPSILON_PER_CELL: f64 = 10.0;
+/// Default of the largest spacing along edges, in cells.
+const MAX_SPACING_CELLS: f64 = 4.0;
 
 /// Bakes `model` into a scene image. `progress` is called from any thread; it may stop the work with [`ControlFlow::Break`].
 ///
@@ -48,15 +51,16 @@ pub fn bake(
     progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
 ) -> Result<Baked, BakeError> {
     options.check()?;
-    let scene = Scene::new(model, options)?;
+    let mut scene = Scene::new(model, options)?;
     let mut prepared: Vec<ExactSurface> = scene
         .shapes
         .par_iter()
         .map(|&s| ExactSurface::new(&model.shapes[s]))
         .collect();
+    scene.find_partners(&prepared);
     let first = scene.cells(model, options);
     let made = match options.cell_mm {
-        Some(_) => scene.fields_and_shells(model, options, &mut prepared, first, progress)?,
+        Some(_) => scene.fields_and_shells(options, &mut prepared, first, progress)?,
         None => scene.fit(model, options, &mut prepared, &first, progress)?,
     };
     let baked = scene.assemble(model, options, &prepared, made)?;
@@ -96,7 +100,6 @@ impl Scene {
     /// Fields and pointshells with cells of about these sizes (a size too small for the layout is made larger when the choice is free).
     fn fields_and_shells(
         &self,
-        model: &CadModel,
         options: &BakeOptions,
         prepared: &mut [ExactSurface],
         cells: Vec<f64>,
@@ -106,7 +109,7 @@ impl Scene {
         let mut shells = Vec::new();
         for (i, mut cell) in cells.into_iter().enumerate() {
             fields.push(self.field(i, &mut prepared[i], &mut cell, options, progress)?);
-            shells.push(self.shell(i, model, &prepared[i], cell, options, progress)?);
+            shells.push(self.shell(i, &prepared[i], &self.partners[i], cell, options, progress)?);
         }
         Ok(Made { fields, shells })
     }
@@ -144,9 +147,9 @@ impl Scene {
             };
             // Only the finest attempt there can be moves the bar; the ones before take a fraction of its time.
             let made = if scale <= 1.0 {
-                self.fields_and_shells(model, options, prepared, cells, progress)?
+                self.fields_and_shells(options, prepared, cells, progress)?
             } else {
-                self.fields_and_shells(model, options, prepared, cells, &quiet)?
+                self.fields_and_shells(options, prepared, cells, &quiet)?
             };
             let room = options.image_limit_bytes as f64 / (made.bytes() + fixed) as f64;
             if room >= 1.0 {
@@ -179,7 +182,7 @@ impl Scene {
             Some((_, made)) => Ok(made),
             None => {
                 let cells = first.iter().map(|c| c * scale).collect();
-                self.fields_and_shells(model, options, prepared, cells, progress)
+                self.fields_and_shells(options, prepared, cells, progress)
             }
         }
     }
@@ -221,8 +224,8 @@ impl Scene {
     fn shell(
         &self,
         index: usize,
-        model: &CadModel,
         surface: &ExactSurface,
+        partners: &Partners,
         cell_mm: f64,
         options: &BakeOptions,
         progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
@@ -236,12 +239,15 @@ impl Scene {
         if progress(step).is_break() {
             return Err(BakeError::Cancelled);
         }
-        let longest = longest_side(&model.shapes[self.shapes[index]]);
+        let epsilon_mm = options.epsilon_mm.unwrap_or(cell_mm / EPSILON_PER_CELL);
         Ok(sample_pointshell(
             surface,
             &PointshellOptions {
-                epsilon_mm: options.epsilon_mm.unwrap_or(cell_mm / EPSILON_PER_CELL),
-                max_spacing_mm: options.max_spacing_mm.unwrap_or(longest / 10.0).max(1e-3),
+                epsilon_mm,
+                // The field shows nothing sharper than a cell: what is, is sampled as if it were a cell's radius.
+                least_spacing_mm: (4.0 * epsilon_mm * cell_mm).sqrt(),
+                max_spacing_mm: options.max_spacing_mm.unwrap_or(MAX_SPACING_CELLS * cell_mm),
+                partners: partners.clone(),
             },
         ))
     }

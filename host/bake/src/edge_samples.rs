@@ -1,15 +1,34 @@
 //! Points along edges: pieces joined to chains, sampled at equal steps by length.
+//!
+//! A sharp convex edge is found by no sample of a smooth partner, so all partners count. A smooth edge (a fillet's) is part of the surface it
+//! borders: partners no sharper than that count, and where it borders a flat, the flats that may lie across that. Concave edges, and smooth
+//! ones between faces that are nowhere convex, are left out: what touches there has an edge of its own, or touches a face beside.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
-use crate::piece::Piece;
+use glam::DVec3;
+use mortise_brep::Surface;
+
+use crate::partners::{Partners, face_range};
+use crate::piece::{Piece, PieceCurve};
 use crate::pointshell::{PointshellOptions, ShellPoint};
 
 /// Most points on one chain.
 const MAX_POINTS: f64 = 4000.0;
+/// Faces whose normals differ by a smaller angle (rad) meet smoothly: ten times what modellers and STEP files leave.
+const SMOOTH: f64 = 0.01;
+
+/// What an edge asks for: curvature to sample its length by, apart from its own, and the largest spacing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Demand {
+    curvature: f64,
+    max_spacing_mm: f64,
+    /// Whether the edge's own curvature counts only as far as the edge bends away from the normals at it.
+    away_only: bool,
+}
 
 /// Appends points strictly inside each chain of boundary pieces, and returns the vertices where chains end.
 pub(crate) fn sample_edges(
@@ -26,9 +45,22 @@ pub(crate) fn sample_edges(
         groups.entry((piece.edge, faces)).or_default().push(i as u32);
     }
     let mut corners = BTreeSet::new();
+    let convex: Vec<f64> = (0..surface.shape().faces.len() as u32)
+        .map(|face| face_range(surface, face).map_or(0.0, |[_, high]| high))
+        .collect();
     for group in groups.into_values() {
         for chain in chains(pieces, &group) {
-            sample_chain(surface, &chain, options, out);
+            let demands = chain
+                .iter()
+                .filter_map(|&(i, _)| demand(surface, &pieces[i as usize], &convex, options));
+            let Some(demand) = demands.reduce(|a, b| Demand {
+                curvature: a.curvature.max(b.curvature),
+                max_spacing_mm: a.max_spacing_mm.min(b.max_spacing_mm),
+                ..a
+            }) else {
+                continue;
+            };
+            sample_chain(surface, &chain, &demand, options, out);
             if let (Some(&(first, from)), Some(&(last, to))) = (chain.first(), chain.last()) {
                 let start = pieces[first as usize].ends[usize::from(!from)];
                 let end = pieces[last as usize].ends[usize::from(to)];
@@ -98,6 +130,7 @@ fn chains(pieces: &[Piece], group: &[u32]) -> Vec<Vec<Link>> {
 fn sample_chain(
     surface: &ExactSurface,
     chain: &[Link],
+    demand: &Demand,
     options: &PointshellOptions,
     out: &mut Vec<ShellPoint>,
 ) {
@@ -109,7 +142,7 @@ fn sample_chain(
         pieces[first as usize].ends[usize::from(!from)] == pieces[last as usize].ends[usize::from(to)]
             && chain.len() > 1
     };
-    let steps = steps(pieces, chain, length, options, closed);
+    let steps = steps(surface, chain, length, demand, options, closed);
     let mut walked = 0.0;
     let mut at = 0;
     // A closed chain has no ends of its own: its first point is sampled too.
@@ -141,27 +174,124 @@ fn sample_chain(
     }
 }
 
-/// Equal steps along a chain: ∫√(κ/8ε) ds of them, κ ds being the turn of the tangent, and no longer than the limit.
-fn steps(pieces: &[Piece], chain: &[Link], length: f64, options: &PointshellOptions, closed: bool) -> usize {
-    let mut root_curvature = 0.0;
-    for (k, &(i, forward)) in chain.iter().enumerate() {
-        let piece = &pieces[i as usize];
-        root_curvature += (piece.turn() * piece.length()).sqrt();
-        if let Some(&(j, next_forward)) = chain.get(k + 1) {
-            let next = &pieces[j as usize];
-            if piece.turn() == 0.0 && next.turn() == 0.0 {
-                let along = |p: &Piece, f: bool| p.tangent(p.at(0.5)) * if f { 1.0 } else { -1.0 };
-                let turn = along(piece, forward).angle_between(along(next, next_forward));
-                if turn.is_finite() {
-                    root_curvature += (turn * 0.5 * (piece.length() + next.length())).sqrt();
-                }
+/// What `piece` asks for; `None` when it needs no samples. `convex`: largest convex curvature of each face.
+fn demand(
+    surface: &ExactSurface,
+    piece: &Piece,
+    convex: &[f64],
+    options: &PointshellOptions,
+) -> Option<Demand> {
+    if options.partners == Partners::Unknown {
+        return Some(Demand {
+            curvature: 0.0,
+            max_spacing_mm: options.max_spacing_mm,
+            away_only: false,
+        });
+    }
+    let sharp = Demand {
+        curvature: options.partners.sharpest(),
+        max_spacing_mm: options.max_spacing_mm,
+        away_only: true,
+    };
+    let [first, second] = piece.sides.as_slice() else {
+        // A border of an open shell, or more than two faces: whatever it is, it is sharp.
+        return Some(sharp);
+    };
+    let at = piece.at(0.5);
+    let [a, b] = [first, second].map(|side| surface.topology.outward(surface.shape(), side.triangle, at));
+    if a.cross(b).length() < SMOOTH && a.dot(b) > 0.0 {
+        let own = [first, second].map(|side| convex[side.face as usize]);
+        let sharper = own[0].max(own[1]);
+        let flat = |face: u32| {
+            matches!(
+                surface.shape().faces[face as usize].surface,
+                Surface::Plane { .. } | Surface::Spline
+            )
+        };
+        return (sharper > 0.0).then(|| Demand {
+            curvature: options.partners.no_sharper_than(sharper),
+            max_spacing_mm: if flat(first.face) || flat(second.face) {
+                options.max_spacing_mm
+            } else {
+                f64::INFINITY
+            },
+            away_only: true,
+        });
+    }
+    // Into the first face, which lies on the left of its side.
+    let inward = a.cross(piece.tangent(at) * if first.forward { 1.0 } else { -1.0 });
+    (b.dot(inward) < 0.0).then_some(sharp)
+}
+
+/// Equal steps along a chain: ∫√((κ + κ')/8ε) ds of them, κ ds being the turn of the tangent and κ' what `demand` adds, each no longer and no
+/// shorter than the limits.
+fn steps(
+    surface: &ExactSurface,
+    chain: &[Link],
+    length: f64,
+    demand: &Demand,
+    options: &PointshellOptions,
+    closed: bool,
+) -> usize {
+    let pieces = &surface.topology.pieces;
+    // Turn of the tangent in each piece: an arc's own, and half of that at each end between segments.
+    let mut turns: Vec<f64> = chain
+        .iter()
+        .map(|&(i, _)| own_turn(surface, &pieces[i as usize], demand))
+        .collect();
+    for (k, pair) in chain.windows(2).enumerate() {
+        let [(i, forward), (j, next_forward)] = [pair[0], pair[1]];
+        let (piece, next) = (&pieces[i as usize], &pieces[j as usize]);
+        if piece.turn() == 0.0 && next.turn() == 0.0 {
+            let along = |p: &Piece, f: bool| p.tangent(p.at(0.5)) * if f { 1.0 } else { -1.0 };
+            let turn = along(piece, forward).angle_between(along(next, next_forward));
+            if turn.is_finite() {
+                turns[k] += 0.5 * turn;
+                turns[k + 1] += 0.5 * turn;
             }
         }
     }
-    let by_curvature = root_curvature / (8.0 * options.epsilon_mm).sqrt();
-    let least = if closed { 3.0 } else { 1.0 };
-    by_curvature
-        .max(length / options.max_spacing_mm)
+    let by_curvature: f64 = chain
+        .iter()
+        .zip(&turns)
+        .map(|(&(i, _), turn)| {
+            let length = pieces[i as usize].length();
+            length * (turn / length.max(1e-300) + demand.curvature.min(1e12)).sqrt()
+        })
+        .sum();
+    let steps = by_curvature / (8.0 * options.epsilon_mm).sqrt();
+    let most = if options.least_spacing_mm > 0.0 {
+        length / options.least_spacing_mm
+    } else {
+        f64::INFINITY
+    };
+    let least = if closed && steps > 0.0 { 3.0 } else { 1.0 };
+    (steps.min(most) - 1e-9)
+        .max(length / demand.max_spacing_mm)
         .ceil()
         .clamp(least, MAX_POINTS) as usize
+}
+
+/// Angle by which the tangent of `piece` turns, as far as that is away from what touches it: a bore's rim bends towards what is in the bore.
+fn own_turn(surface: &ExactSurface, piece: &Piece, demand: &Demand) -> f64 {
+    let PieceCurve::Arc { center, .. } = piece.curve else {
+        return piece.turn();
+    };
+    if !demand.away_only {
+        return piece.turn();
+    }
+    let at = piece.at(0.5);
+    let outward = (at - center).normalize_or_zero();
+    let normals = || {
+        piece
+            .sides
+            .iter()
+            .map(|side| surface.topology.outward(surface.shape(), side.triangle, at))
+    };
+    let middle = normals().sum::<DVec3>().normalize_or_zero();
+    let away = normals()
+        .chain([middle])
+        .map(|n| n.dot(outward))
+        .fold(0.0, f64::max);
+    piece.turn() * away.min(1.0)
 }

@@ -6,22 +6,36 @@ use mortise_brep::Surface;
 use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
+use crate::partners::Partners;
 use crate::pointshell::{PointshellOptions, ShellPoint};
-use crate::surface::{angle_range, at_parameters, natural_normal, parameters};
+use crate::surface::{angle_range, at_parameters, natural_normal, parameters, principal_curvatures};
 
 /// Most rows of a lattice, and most points of a row: a face that would need more is sampled more sparsely.
 const MAX_ROWS: f64 = 2000.0;
+/// Steps in which the density of rows is summed up.
+const STEPS: usize = 256;
 
-/// Appends the points inside `face`.
+/// Appends the points inside `face`. `flat_mm`: largest spacing inside spline faces when the partners are known.
 pub(crate) fn sample_face(
     surface: &ExactSurface,
     face: u32,
     options: &PointshellOptions,
+    flat_mm: f64,
     out: &mut Vec<ShellPoint>,
 ) {
     let kind = surface.shape().faces[face as usize].surface;
     match kind {
-        Surface::Spline => crate::spline_samples::sample_spline(surface, face, options, out),
+        Surface::Spline => {
+            let largest = match options.partners {
+                Partners::Unknown => options.max_spacing_mm,
+                Partners::Known(_) => options.max_spacing_mm.max(flat_mm),
+            };
+            let options = PointshellOptions {
+                max_spacing_mm: largest,
+                ..options.clone()
+            };
+            crate::spline_samples::sample_spline(surface, face, &options, out);
+        }
         _ => sample_analytic(surface, face, &kind, options, out),
     }
 }
@@ -36,31 +50,66 @@ fn sample_analytic(
     let Some(Range { u, v, around }) = parameter_range(surface, face, kind) else {
         return;
     };
-    let rows = count(v.1 * v_scale(kind), v_spacing(kind, options));
+    let sense = surface.topology.sense[face as usize];
+    let mut push = |position, normal| {
+        if surface.contains(face, position) {
+            out.push(ShellPoint {
+                position,
+                normal: normal * sense,
+                face: face as u16,
+                edge_face: NO_FACE,
+            });
+        }
+    };
+    let spacings = |at_v: f64| options.face_spacings(principal_curvatures(kind, at_v).map(|k| k * sense));
+    // Rows lie as dense as asked where they lie: their places are equal shares of the summed density.
+    let step = v.1 / STEPS as f64;
+    let mut summed = 0.0;
+    let sums: Vec<f64> = (0..STEPS)
+        .map(|i| {
+            let along = spacings(v.0 + step * (i as f64 + 0.5)).map(|[_, s]| s);
+            summed += along.map_or(0.0, |s| step * v_scale(kind) / s);
+            summed
+        })
+        .collect();
+    let rows = if summed > 0.0 { count(summed, 1.0) } else { 0 };
     for row in 0..rows {
-        let at_v = v.0 + v.1 * (row as f64 + 0.5) / rows as f64;
-        let (scale, curvature) = u_scale(kind, at_v);
-        let columns = count(u.1 * scale, options.spacing(curvature));
+        let share = summed * (row as f64 + 0.5) / rows as f64;
+        let i = sums.partition_point(|&s| s < share).min(STEPS - 1);
+        let before = if i == 0 { 0.0 } else { sums[i - 1] };
+        let at_v = v.0 + step * (i as f64 + (share - before) / (sums[i] - before).max(1e-300));
+        // A row serves its neighbourhood, half-way to the next: as dense as the most curved of it asks.
+        let half = spacings(at_v).map_or(0.0, |[_, along]| 0.5 * along / v_scale(kind));
+        let neighbourhood = [at_v - half, at_v, at_v + half];
+        let across = neighbourhood
+            .iter()
+            .filter_map(|&v| spacings(v))
+            .map(|[across, _]| across);
+        let Some(across) = across.reduce(f64::min) else {
+            continue;
+        };
+        let columns = count(u.1 * u_scale(kind, at_v), across);
         // Every other row is shifted by half a step where the row closes on itself: the same count covers more.
         let shift = if around && row % 2 == 1 { 0.0 } else { 0.5 };
         for column in 0..columns {
             let at_u = u.0 + u.1 * (column as f64 + shift) / columns as f64;
-            let Some(position) = at_parameters(kind, [at_u, at_v]) else {
-                continue;
-            };
-            if !surface.contains(face, position) {
-                continue;
-            }
-            let sense = surface.topology.sense[face as usize];
-            if let Some(normal) = natural_normal(kind, position) {
-                out.push(ShellPoint {
-                    position,
-                    normal: normal * sense,
-                    face: face as u16,
-                    edge_face: NO_FACE,
-                });
+            if let Some(position) = at_parameters(kind, [at_u, at_v])
+                && let Some(normal) = natural_normal(kind, position)
+            {
+                push(position, normal);
             }
         }
+    }
+    if let Surface::Cone {
+        frame,
+        radius,
+        half_angle,
+    } = *kind
+        && sense > 0.0
+    {
+        // A tip is sharp, and no edge ends there.
+        let tip = frame.origin - frame.z * (radius / half_angle.tan());
+        push(tip, -frame.z * half_angle.signum());
     }
 }
 
@@ -137,29 +186,15 @@ fn v_scale(kind: &Surface) -> f64 {
     }
 }
 
-fn v_spacing(kind: &Surface, options: &PointshellOptions) -> f64 {
+/// Millimetres along the surface for each unit of u at this v.
+fn u_scale(kind: &Surface, v: f64) -> f64 {
     match *kind {
-        Surface::Sphere { radius, .. } => options.spacing(1.0 / radius),
-        Surface::Torus { minor, .. } => options.spacing(1.0 / minor),
-        _ => options.max_spacing_mm,
-    }
-}
-
-/// Millimetres along the surface for each unit of u at this v, and the normal curvature there (1/mm).
-fn u_scale(kind: &Surface, v: f64) -> (f64, f64) {
-    match *kind {
-        Surface::Cylinder { radius, .. } => (radius, 1.0 / radius),
+        Surface::Cylinder { radius, .. } => radius,
         Surface::Cone {
             radius, half_angle, ..
-        } => {
-            let r = (radius + v * half_angle.tan()).abs().max(1e-9);
-            (r, half_angle.cos() / r)
-        }
-        Surface::Sphere { radius, .. } => ((radius * v.cos()).abs(), 1.0 / radius),
-        Surface::Torus { major, minor, .. } => {
-            let r = (major + minor * v.cos()).abs().max(1e-9);
-            (r, v.cos() / r)
-        }
-        _ => (1.0, 0.0),
+        } => (radius + v * half_angle.tan()).abs().max(1e-9),
+        Surface::Sphere { radius, .. } => (radius * v.cos()).abs(),
+        Surface::Torus { major, minor, .. } => (major + minor * v.cos()).abs().max(1e-9),
+        _ => 1.0,
     }
 }

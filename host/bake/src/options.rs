@@ -15,9 +15,10 @@ pub struct BakeOptions {
     pub band_cells: f64,
     /// Number format of samples.
     pub format: SampleFormat,
-    /// Bound on the pointshell's chord error, mm. `None`: a fiftieth of the cell.
+    /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a tenth of the cell.
     pub epsilon_mm: Option<f64>,
-    /// Largest spacing of pointshell points, mm. `None`: a tenth of the part's longest side.
+    /// Largest spacing of pointshell points along edges, mm: two flat strips narrower than this, across each other, can miss each other.
+    /// `None`: four cells.
     pub max_spacing_mm: Option<f64>,
     /// Which parts may be grabbed.
     pub grabbable: Grabbable,

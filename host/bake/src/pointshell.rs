@@ -1,29 +1,77 @@
 //! The pointshell: samples of the exact surface, as dense as an error bound asks.
 //!
-//! Between two samples s apart on a curve of radius R the surface rises at most s²/(8R) above the chord; spacing s = √(8Rε) keeps that below
-//! ε. Straight generators and planes have no such error: there the spacing is only limited so that a small boss pressed on a large flat is
-//! felt. Edges are sampled by their own curvature and carry both faces; their ends are sampled once.
+//! The points of a shape are looked up in its partner's field and the partner's in the shape's, so a place needs a sample only where no
+//! sample of a partner would find it. With ε the bound and κ' the curvature of the partners (see [`crate::partners`]):
+//!
+//! | where | spacing |
+//! |---|---|
+//! | inside planes, concave faces, along concave edges | none |
+//! | inside faces convex in some direction | √(4ε/(κᵢ + κ')) in each principal direction i; none where κᵢ + κ' ≤ 0 |
+//! | along convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from what touches it |
+//!
+//! Two directions of a face share ε, an edge has it alone. So a cylinder that only flats and bores can meet has its two rims and nothing
+//! between; a peg's rim in its hole errs by s²/8 times the *difference* of the two curvatures, and on a flat at tilt α by ε·sin α.
+//!
+//! No such bound holds where two sharp edges cross: a sample s/2 from the crossing lies up to (s/2)·sin(θ/2) less deep, θ the angle between
+//! the edge and the partner's face it dives under. So edges are never sampled more sparsely than `max_spacing_mm`, and a strip of
+//! flat narrower than that can be missed by another one across it.
 
 use glam::DVec3;
 use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
+use crate::grid::bounding_box;
+use crate::partners::Partners;
 
 /// How dense a pointshell is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PointshellOptions {
-    /// Bound on the chord error between neighbouring points, mm.
+    /// Bound on how much deeper a contact can be than its deepest sample, mm.
     pub epsilon_mm: f64,
-    /// Largest spacing anywhere, mm.
+    /// No spacing need be smaller than this, mm: where the bound asks for less, the error is that of this spacing, s²·κ/8 in each direction.
+    pub least_spacing_mm: f64,
+    /// Largest spacing along edges, mm; inside faces too where nothing is known of the partners.
     pub max_spacing_mm: f64,
+    /// What the shape can meet.
+    pub partners: Partners,
 }
 
+/// Fewer points than this are too few to feel anything by: the shape is then sampled without relying on partners.
+const FEWEST: usize = 8;
+
 impl PointshellOptions {
-    /// Spacing along a direction of curvature `curvature` (1/mm), mm.
+    /// Samples everywhere, whatever the partners, no two neighbours farther apart than `max_spacing_mm`.
+    pub fn everywhere(epsilon_mm: f64, max_spacing_mm: f64) -> Self {
+        Self {
+            epsilon_mm,
+            least_spacing_mm: 0.0,
+            max_spacing_mm,
+            partners: Partners::Unknown,
+        }
+    }
+
+    /// Spacing with chord error ε at `curvature` (1/mm), mm, whatever the partners.
     pub(crate) fn spacing(&self, curvature: f64) -> f64 {
         (8.0 * self.epsilon_mm / curvature.abs().max(1e-12))
             .sqrt()
+            .max(self.least_spacing_mm)
             .min(self.max_spacing_mm)
+    }
+
+    /// Spacings inside a face of principal curvatures `own` (convex positive), mm; `None` where no partner needs a sample.
+    pub(crate) fn face_spacings(&self, own: [f64; 2]) -> Option<[f64; 2]> {
+        if self.partners == Partners::Unknown {
+            return Some(own.map(|k| self.spacing(k)));
+        }
+        let sharper = own[0].max(own[1]);
+        if sharper <= 0.0 {
+            return None;
+        }
+        let other = self.partners.no_sharper_than(sharper);
+        let relative = own.map(|k| k + other);
+        // Equal and opposite to rounding is a fit, which rims and edges find.
+        (relative[0].min(relative[1]) > 1e-9 * sharper)
+            .then(|| relative.map(|k| (4.0 * self.epsilon_mm / k).sqrt().max(self.least_spacing_mm)))
     }
 }
 
@@ -53,11 +101,27 @@ pub struct Pointshell {
     pub corner_points: usize,
 }
 
-/// Samples `surface`. Spline faces are sampled on their tessellation. Cost: grows with area over spacing².
+/// Samples `surface`. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: grows with area over spacing².
 pub fn sample_pointshell(surface: &ExactSurface, options: &PointshellOptions) -> Pointshell {
+    let (low, high) = bounding_box(surface.shape());
+    let tenth = ((high - low).max_element() / 10.0).max(1e-3);
+    let shell = sample(surface, options, tenth);
+    if shell.points.len() >= FEWEST || options.partners == Partners::Unknown {
+        return shell;
+    }
+    let alone = PointshellOptions {
+        max_spacing_mm: options.max_spacing_mm.min(tenth),
+        partners: Partners::Unknown,
+        ..options.clone()
+    };
+    sample(surface, &alone, tenth)
+}
+
+/// `flat_mm`: largest spacing inside spline faces of which the partners are known.
+fn sample(surface: &ExactSurface, options: &PointshellOptions, flat_mm: f64) -> Pointshell {
     let mut points = Vec::new();
     for face in 0..surface.shape().faces.len() as u32 {
-        crate::face_samples::sample_face(surface, face, options, &mut points);
+        crate::face_samples::sample_face(surface, face, options, flat_mm, &mut points);
     }
     let face_points = points.len();
     let corners = crate::edge_samples::sample_edges(surface, options, &mut points);

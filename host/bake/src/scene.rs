@@ -3,10 +3,13 @@
 use mortise_brep::{CadModel, Shape};
 use mortise_protocol::image::NO_FACE;
 use mortise_protocol::limits::MAX_PARTS;
+use rayon::prelude::*;
 
+use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::grid::bounding_box;
 use crate::options::{BakeOptions, Grabbable};
+use crate::partners::{CurvatureRange, Partners, shape_ranges, tidy};
 
 /// Which shapes and parts of a model go into the image.
 pub(crate) struct Scene {
@@ -18,6 +21,8 @@ pub(crate) struct Scene {
     pub parts: Vec<(usize, usize)>,
     /// For each of `parts`.
     pub grabbable: Vec<bool>,
+    /// For each of `shapes`: what it can meet.
+    pub partners: Vec<Partners>,
     /// What was left out, in words.
     pub warnings: Vec<String>,
 }
@@ -30,6 +35,7 @@ impl Scene {
             names: Vec::new(),
             parts: Vec::new(),
             grabbable: Vec::new(),
+            partners: Vec::new(),
             warnings: Vec::new(),
         };
         for (index, part) in model.parts.iter().enumerate() {
@@ -77,6 +83,24 @@ impl Scene {
         }
         scene.grabbable = scene.choose_grabbable(model, &options.grabbable)?;
         Ok(scene)
+    }
+
+    /// What each shape can meet: the other parts of the scene of which one at least may be grabbed, or a second part of the same shape.
+    pub fn find_partners(&mut self, prepared: &[ExactSurface]) {
+        let ranges: Vec<Vec<CurvatureRange>> = prepared.par_iter().map(shape_ranges).collect();
+        let of = |shape: usize| {
+            let mut met: Vec<CurvatureRange> = Vec::new();
+            for (i, &(_, own)) in self.parts.iter().enumerate() {
+                for (j, &(_, other)) in self.parts.iter().enumerate() {
+                    if own == shape && i != j && (self.grabbable[i] || self.grabbable[j]) {
+                        met.extend(&ranges[other]);
+                    }
+                }
+            }
+            tidy(&mut met);
+            Partners::Known(met)
+        };
+        self.partners = (0..self.shapes.len()).map(of).collect();
     }
 
     fn choose_grabbable(&self, model: &CadModel, rule: &Grabbable) -> Result<Vec<bool>, BakeError> {

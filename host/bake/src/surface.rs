@@ -168,6 +168,26 @@ pub(crate) fn at_parameters(surface: &Surface, [u, v]: [f64; 2]) -> Option<DVec3
     Some(frame.origin + from_local(&frame, local))
 }
 
+/// Principal curvatures along the first and the second parameter at the second parameter `v` (see [`parameters`]), 1/mm, positive where the
+/// surface bends away from its natural normal; 0 for a spline.
+pub(crate) fn principal_curvatures(surface: &Surface, v: f64) -> [f64; 2] {
+    match *surface {
+        Surface::Plane { .. } | Surface::Spline => [0.0; 2],
+        Surface::Cylinder { radius, .. } => [1.0 / radius, 0.0],
+        Surface::Cone {
+            radius, half_angle, ..
+        } => {
+            let r = (radius + v * half_angle.tan()).abs().max(1e-9);
+            [half_angle.cos() / r, 0.0]
+        }
+        Surface::Sphere { radius, .. } => [1.0 / radius; 2],
+        Surface::Torus { major, minor, .. } => {
+            let r = (major + minor * v.cos()).abs().max(1e-9);
+            [v.cos() / r, 1.0 / minor]
+        }
+    }
+}
+
 /// Smallest interval of angles that holds all of `angles` (radians): start and span, the span 2π when they leave no gap wider than `gap`.
 pub(crate) fn angle_range(angles: &mut [f64], gap: f64) -> (f64, f64) {
     angles.sort_by(f64::total_cmp);

@@ -1,4 +1,5 @@
-//! The pointshell lies on the exact surface, inside the trim, as dense as asked and no denser than needed.
+//! The pointshell lies on the exact surface, inside the trim, as dense as asked and no denser than needed. What relying on partners leaves out
+//! is tested in `contact_sampling.rs`.
 
 mod common;
 
@@ -14,10 +15,7 @@ fn sample(shape: &Shape, epsilon_mm: f64, max_spacing_mm: f64) -> (ExactSurface,
     let surface = ExactSurface::new(shape);
     let shell = sample_pointshell(
         &surface,
-        &PointshellOptions {
-            epsilon_mm,
-            max_spacing_mm,
-        },
+        &PointshellOptions::everywhere(epsilon_mm, max_spacing_mm),
     );
     assert_eq!(
         shell.points.len(),
@@ -154,9 +152,16 @@ fn cone_keeps_its_points_on_the_slant() {
     for p in of_face(&shell, 1) {
         let rho = p.position.truncate().length();
         assert!((rho - r * (1.0 - p.position.z / h)).abs() < 1e-9);
-        assert!(p.position.z > 0.0 && p.position.z < h);
+        assert!(p.position.z > 0.0 && p.position.z <= h);
     }
     assert!(of_face(&shell, 1).len() > 50);
+    // The tip, where no edge ends, once.
+    let tips = shell
+        .points
+        .iter()
+        .filter(|p| (p.position - DVec3::Z * h).length() < 1e-9);
+    assert_eq!(tips.clone().count(), 1);
+    assert!(tips.into_iter().all(|p| p.normal == DVec3::Z));
 }
 
 /// A spline face that is a cylinder gets few points along its generators.

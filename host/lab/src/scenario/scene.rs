@@ -101,10 +101,7 @@ impl PreparedScene {
 fn body(model: &CadModel, part: usize) -> Body {
     let part = &model.parts[part];
     let surface = ExactSurface::new(&model.shapes[part.shape]);
-    let options = PointshellOptions {
-        epsilon_mm: EPSILON_MM,
-        max_spacing_mm: SPACING_MM,
-    };
+    let options = PointshellOptions::everywhere(EPSILON_MM, SPACING_MM);
     let points: Vec<DVec3> = (sample_pointshell(&surface, &options).points.iter())
         .map(|point| point.position)
         .collect();

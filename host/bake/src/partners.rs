@@ -1,0 +1,106 @@
+//! How sharply curved the surfaces are that a shape can meet: it decides how densely the shape must be sampled.
+//!
+//! Two smooth convex surfaces with principal curvatures κ and κ' touch with relative curvature κ + κ'. Both are sampled and both sample sets
+//! are looked up, so the sharper one finds the contact: its own lattice, with spacings sᵢ = √(4ε/(κᵢ + κ')), leaves at most
+//! Σ sᵢ²/8·(κᵢ + κ') ≤ ε. A surface therefore counts only those partners that are *no sharper* than itself. Flat and concave faces need no
+//! samples inside at all: what touches them there is convex, or has an edge or a corner there.
+
+use mortise_brep::Surface;
+
+use crate::distance::ExactSurface;
+use crate::spline_samples::area_curvatures;
+use crate::surface::{parameters, principal_curvatures};
+
+/// What a shape can meet.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Partners {
+    /// Nothing is known and nothing is relied on: every face is sampled, no two neighbours farther apart than the largest spacing.
+    #[default]
+    Unknown,
+    /// Surfaces of these convex curvatures and, always, flat and concave ones and edges.
+    Known(Vec<CurvatureRange>),
+}
+
+/// Smallest and largest convex principal curvature over a face, 1/mm: at each of its points the larger of the two counts.
+pub type CurvatureRange = [f64; 2];
+
+/// Share of a spline face's area whose curvature is counted: what a tessellation says of its slivers is noise.
+const SPLINE_AREA: f64 = 0.9;
+
+impl Partners {
+    /// These surfaces and whatever is flat or concave.
+    pub fn of<'a>(surfaces: impl IntoIterator<Item = &'a ExactSurface>) -> Self {
+        let mut ranges: Vec<CurvatureRange> = surfaces.into_iter().flat_map(shape_ranges).collect();
+        tidy(&mut ranges);
+        Self::Known(ranges)
+    }
+
+    /// Largest curvature of a partner no sharper than `own`, 1/mm; 0 when there are only flats.
+    pub(crate) fn no_sharper_than(&self, own: f64) -> f64 {
+        match self {
+            Self::Unknown => own,
+            Self::Known(ranges) => ranges
+                .iter()
+                .filter(|[low, _]| *low <= own * (1.0 + 1e-9))
+                .map(|[_, high]| high.min(own))
+                .fold(0.0, f64::max),
+        }
+    }
+
+    /// Largest curvature of any partner, 1/mm.
+    pub(crate) fn sharpest(&self) -> f64 {
+        match self {
+            Self::Unknown => f64::INFINITY,
+            Self::Known(ranges) => ranges.iter().map(|[_, high]| *high).fold(0.0, f64::max),
+        }
+    }
+}
+
+/// Convex curvatures of `face`; `None` when it is flat or concave everywhere.
+pub(crate) fn face_range(surface: &ExactSurface, face: u32) -> Option<CurvatureRange> {
+    let shape = surface.shape();
+    let kind = &shape.faces[face as usize].surface;
+    let own = || (0..shape.mesh.triangles.len()).filter(move |&t| shape.mesh.triangle_face[t] == face);
+    let [low, high] = match kind {
+        Surface::Plane { .. } => return None,
+        Surface::Spline => {
+            let mut curvatures = area_curvatures(surface, face);
+            curvatures.sort_by(|a, b| a.1.total_cmp(&b.1));
+            let mut area = SPLINE_AREA * curvatures.iter().map(|c| c.0).sum::<f64>();
+            let high = curvatures.iter().find(|c| {
+                area -= c.0;
+                area <= 0.0
+            });
+            [curvatures.first()?.1.max(0.0), high?.1]
+        }
+        _ => {
+            let sense = surface.topology.sense[face as usize];
+            own()
+                .flat_map(|t| shape.mesh.triangles[t])
+                .filter_map(|v| parameters(kind, shape.mesh.vertices[v as usize]))
+                .map(|[_, v]| {
+                    let [a, b] = principal_curvatures(kind, v);
+                    (a * sense).max(b * sense)
+                })
+                .fold([f64::INFINITY, 0.0], |[low, high], k| {
+                    [low.min(k.max(0.0)), high.max(k)]
+                })
+        }
+    };
+    (high > 1e-9).then_some([low.min(high), high])
+}
+
+/// Convex curvatures of all faces of a shape, each once.
+pub(crate) fn shape_ranges(surface: &ExactSurface) -> Vec<CurvatureRange> {
+    let mut ranges: Vec<CurvatureRange> = (0..surface.shape().faces.len() as u32)
+        .filter_map(|face| face_range(surface, face))
+        .collect();
+    tidy(&mut ranges);
+    ranges
+}
+
+/// Sorted, each once.
+pub(crate) fn tidy(ranges: &mut Vec<CurvatureRange>) {
+    ranges.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    ranges.dedup();
+}
