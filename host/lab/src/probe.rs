@@ -170,6 +170,8 @@ impl ProbeScene {
             let model = load_step(path)?;
             let options = BakeOptions {
                 cell_mm,
+                // A probe is asked for accuracy: the shell is to err no more than the field does on the radii of common parts.
+                epsilon_mm: cell_mm.map(|cell| cell / 100.0),
                 grabbable: Grabbable::All,
                 ..BakeOptions::default()
             };

@@ -14,8 +14,8 @@ const HOLE: f64 = 10.1;
 const BLOCK_HALF: f64 = 20.0;
 const SIDE: f64 = 30.0;
 
-/// Gaps: the samples along circles are as dense as a chord error of 10 µm asks (cell/50), which between curves as alike as
-/// these leaves a tenth of a micrometre, but a peg against a flat may come between two samples.
+/// Gaps: the samples along circles are as dense as a bound of 5 µm asks (cell/100), which between curves as alike as these leaves a tenth of
+/// a micrometre, but a peg against a flat may come between two samples.
 const GAP_TOLERANCE_MM: f64 = 0.005;
 /// Depths likewise.
 const DEPTH_TOLERANCE_MM: f64 = 0.010;
