@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::proximity::Leaf;
+use crate::step::dot;
 
 /// Contacts one tick can carry.
 pub(crate) const MAX_CONTACTS: usize = 256;
@@ -18,8 +19,10 @@ pub(crate) struct Contact {
     pub gap: f32,
     /// How soon a turn of the object could bring it to touch, m: the gap less what its lever makes up for. Small is soon.
     pub reach_gap: f32,
-    /// Rate of the gap in the last solution, m/s.
+    /// Rate of the gap in the last solution, m/s; not kept up while the contact is free.
     pub rate: f32,
+    /// While a solution is sought: stays free until gaps could have closed by more than this, m.
+    pub clear: f32,
     /// Part of the force law the last solution assumed.
     pub phase: Phase,
     /// Face of the held part.
@@ -38,6 +41,7 @@ impl Contact {
         gap: 0.0,
         reach_gap: 0.0,
         rate: 0.0,
+        clear: 0.0,
         phase: Phase::Free,
         moving_face: 0,
         static_face: 0,
@@ -78,8 +82,6 @@ pub(crate) struct Contacts {
     dropped: bool,
     /// How many of the last tick's can be carried over.
     carried_len: usize,
-    /// Time since the last tick, s.
-    period_s: f32,
 }
 
 /// Places in half a list, the one with the largest key on top. Keys lie side by side, not a contact's size apart in the list.
@@ -158,7 +160,6 @@ impl Contacts {
             by_reach: Heap::new(),
             dropped: false,
             carried_len: 0,
-            period_s: 0.0,
         }
     }
 
@@ -169,20 +170,20 @@ impl Contacts {
         self.carried_len = 0;
     }
 
-    /// Empties the store for the next tick, `period_s` after the last. With `put_aside` what it held can be had back by [`Self::carry`].
-    pub fn begin(&mut self, period_s: f32, put_aside: bool) {
+    /// Empties the store for the next tick. With `put_aside` what it held can be had back by [`Self::carry`].
+    pub fn begin(&mut self, put_aside: bool) {
         self.carried_len = if put_aside { self.len } else { 0 };
-        self.period_s = period_s;
         self.current = 1 - self.current;
         self.len = 0;
         self.dropped = false;
     }
 
-    /// Takes the last tick's contacts over into this one where their leaf was not looked at: the gap as predicted, the normal as it was.
-    pub fn carry(&mut self, unseen: impl Fn(Leaf) -> bool) {
+    /// Takes the last tick's contacts over into this one where their leaf was not looked at: the gap as the object's `motion` since (scaled as the
+    /// rows) has changed it, the normal as it was.
+    pub fn carry(&mut self, motion: &[f32; 6], unseen: impl Fn(Leaf) -> bool) {
         for i in 0..self.carried_len {
             let old = self.lists[1 - self.current][i];
-            let gap = old.gap + self.period_s * old.rate;
+            let gap = old.gap + dot(&old.row, motion);
             if unseen(old.leaf)
                 && let Some(new) = self.offer(gap, old.reach_gap)
             {
@@ -319,22 +320,22 @@ mod tests {
         let mut contacts = Contacts::new();
         for i in 0..10 {
             let c = contacts.offer(-1e-6, 0.0).unwrap();
-            c.rate = 1e-3;
+            c.row = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
             c.phase = Phase::Parting;
             c.moving_face = i;
         }
-        contacts.begin(1e-3, true);
+        contacts.begin(true);
         assert!(contacts.as_slice().is_empty());
-        contacts.carry(|_| false);
+        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |_| false);
         assert!(contacts.as_slice().is_empty());
-        contacts.carry(|leaf| leaf == Leaf::FIRST);
+        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |leaf| leaf == Leaf::FIRST);
         assert_eq!(contacts.as_slice().len(), 10);
         for (i, c) in contacts.as_slice().iter().enumerate() {
             assert_eq!((usize::from(c.moving_face), c.phase), (i, Phase::Free));
-            assert_eq!(c.gap, -1e-6 + 1e-3 * 1e-3);
+            assert_eq!(c.gap, -1e-6 + 1e-6);
         }
-        contacts.begin(1e-3, false);
-        contacts.carry(|_| true);
+        contacts.begin(false);
+        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |_| true);
         assert!(contacts.as_slice().is_empty());
     }
 }

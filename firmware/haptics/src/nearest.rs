@@ -109,9 +109,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         let first = node.first_point as usize;
         let points = self.job.points.get(first..first + node.point_count as usize);
         for point in points.unwrap_or(&[]) {
-            if !(self.job.backward && point.edge_face == NO_FACE) {
-                self.point(point);
-            }
+            self.point(point);
         }
     }
 

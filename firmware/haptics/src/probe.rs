@@ -216,7 +216,6 @@ impl Prober {
             motions: [[0.0; 6]; 2],
             swing: 0.0,
             inverse_length: 1.0,
-            period_s: 0.0,
             busy: false,
             budget: u32::MAX,
         }

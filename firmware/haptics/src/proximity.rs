@@ -1,8 +1,8 @@
 //! Where the held part is near another: points of one in the signed-distance field of the other, both ways.
 //!
-//! Forward, every point of the held part is looked up in the other part's field; backward, the other part's *edge* points are looked up in the
-//! held part's field, or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every
-//! sphere that the field's distance at its centre puts farther off than the margin.
+//! Forward, every point of the held part is looked up in the other part's field; backward, every point of the other part in the held part's,
+//! or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every sphere that the
+//! field's distance at its centre puts farther off than the margin.
 //!
 //! When the look-up budget runs out, the next tick goes on where this one stopped, round and round, and the contacts of a leaf that was not reached
 //! are carried over with the gaps the last step predicted: what touches stays felt, and everything is looked at again within a few ticks.
@@ -11,7 +11,7 @@
 //! Cost: see [`crate::tick()`]; the look-ups in [`Field`] are two thirds of it.
 
 use glam::{Mat3, Vec3};
-use mortise_protocol::image::{Field, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage, Shape};
+use mortise_protocol::image::{Field, FieldSample, Lookup, NodeRecord, PointRecord, SceneImage, Shape};
 
 use crate::coherence::{Coherence, Key, Known};
 use crate::contact::{Contacts, Phase};
@@ -28,8 +28,8 @@ pub(crate) const EDGE_ERROR_CELLS: f32 = 0.25;
 const LEAST_GRADIENT2: f32 = 0.01;
 /// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
 /// the other end moves half as fast again. So the approach by either is taken this many times.
-pub(crate) const APPROACH: f32 = 2.0;
-/// Passing over a point that is no edge point, or a node of which enough is known, costs about an eighth of a look-up.
+const APPROACH: f32 = 2.0;
+/// Passing over a node of which enough is known costs about an eighth of a look-up.
 const PASSED_OVER_PER_LOOKUP: u32 = 8;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
@@ -63,13 +63,12 @@ pub(crate) struct Search<'s, 'i> {
     pub margin: f32,
     /// Points that come as near as this by the motion so far, or by that without contacts, are candidates, m.
     pub slack: f32,
-    /// The motion so far and that without contacts, scaled as the step's unknowns, times [`APPROACH`] periods, m.
+    /// The last tick's motion and that without contacts, of one period, scaled as the step's unknowns, m.
     pub motions: [[f32; 6]; 2],
     /// How much gap a lever makes up for when contacts are chosen: margin/reach², so that at the object's farthest point it is the margin, 1/m.
     pub swing: f32,
     /// 1/L of the step's scaling, 1/m.
     pub inverse_length: f32,
-    pub period_s: f32,
     /// The last tick came near the budget.
     pub busy: bool,
     /// Look-ups allowed.
@@ -85,6 +84,8 @@ pub(crate) struct Job<'i> {
     pub field: Field<'i>,
     /// Tree frame to field frame.
     pub to_field: Affine,
+    /// Tree frame to cells from the corner of the field's grid.
+    to_cells: Affine,
     /// Tree frame to arm (from the held part's centre of mass, world axes).
     pub to_arm: Affine,
     /// Field gradient to the direction, in the world, that pushes the held part away.
@@ -115,7 +116,7 @@ impl<'i> Search<'_, 'i> {
                 most = closing;
             }
         }
-        most
+        APPROACH * most
     }
 
     /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out.
@@ -126,7 +127,7 @@ impl<'i> Search<'_, 'i> {
         contacts: &mut Contacts,
         work: &mut Work,
     ) -> Option<Leaf> {
-        contacts.begin(self.period_s, self.busy);
+        contacts.begin(self.busy);
         let mut walk = Walk {
             search: self,
             horizon: coherence.horizon(self.margin),
@@ -140,7 +141,7 @@ impl<'i> Search<'_, 'i> {
             .or_else(|| walk.jobs(Leaf::FIRST, Some(start)));
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET_EXCEEDED);
-            contacts.carry(|leaf| {
+            contacts.carry(&self.motions[0], |leaf| {
                 let seen = if start < stop {
                     start <= leaf && leaf < stop
                 } else {
@@ -184,7 +185,7 @@ impl<'i> Search<'_, 'i> {
         contacts: &mut Contacts,
         work: &mut Work,
     ) {
-        contacts.begin(self.period_s, false);
+        contacts.begin(false);
         let mut walk = Walk {
             search: self,
             horizon: coherence.horizon(self.margin),
@@ -208,16 +209,22 @@ impl<'i> Job<'i> {
         let back = field_pose.rotation().transpose();
         let apart = tree_pose.position - field_pose.position;
         let rotation = tree_pose.rotation();
+        let to_field = Affine {
+            linear: back * rotation,
+            offset: back * apart,
+        };
+        let per_metre = 1.0 / field.field.record().cell;
         Self {
             index,
             backward,
             nodes: tree.nodes,
             points: tree.points,
             field: field.field,
-            to_field: Affine {
-                linear: back * rotation,
-                offset: back * apart,
+            to_cells: Affine {
+                linear: to_field.linear * per_metre,
+                offset: Vec3::from_array(field.field.in_cells(to_field.offset.to_array())),
             },
+            to_field,
             to_arm: Affine {
                 linear: rotation,
                 offset: tree_pose.position - center,
@@ -235,7 +242,7 @@ struct Walk<'w, 's, 'i> {
     horizon: u32,
     contacts: &'w mut Contacts,
     work: &'w mut Work,
-    /// Points that were no edge points, nodes known to be far or near.
+    /// Nodes known to be far or near.
     passed_over: u32,
 }
 
@@ -288,8 +295,8 @@ impl Walk<'_, '_, '_> {
                 Known::Near => self.passed_over += 1,
                 Known::Nothing => {
                     self.work.nodes += 1;
-                    let center = job.to_field.apply(node.center);
-                    let distance = job.field.bound(center.to_array()) - (node.radius + edge_error);
+                    let center = job.to_cells.apply(node.center);
+                    let distance = job.field.bound_at(center.to_array()) - (node.radius + edge_error);
                     if distance > self.search.margin {
                         self.coherence.set_distance(key, distance);
                         index = node.skip;
@@ -317,30 +324,21 @@ impl Walk<'_, '_, '_> {
 
     /// All points of a leaf, as far as the budget goes.
     fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) {
-        let mut left = self.left();
-        let most = left.saturating_mul(PASSED_OVER_PER_LOOKUP) as usize;
+        let most = (self.left() as usize).min(points.len());
         // What is not looked at could be anywhere.
-        let mut nearest = if points.len() > most {
+        let mut nearest = if most < points.len() {
             f32::NEG_INFINITY
         } else {
             f32::INFINITY
         };
-        for point in points.iter().take(most) {
-            if job.backward && point.edge_face == NO_FACE {
-                self.passed_over += 1;
-                continue;
-            }
-            if left == 0 {
-                nearest = f32::NEG_INFINITY;
-                break;
-            }
-            left -= 1;
-            self.work.points += 1;
+        for point in &points[..most] {
             let gap = self.point(job, leaf, point);
-            if gap < nearest {
+            // A gap that is not a number is none to rely on.
+            if !(gap >= nearest) {
                 nearest = gap;
             }
         }
+        self.work.points += most as u32;
         if nearest > self.search.margin {
             self.coherence
                 .set_distance(Key::new(leaf.job, leaf.node), nearest);
@@ -348,20 +346,21 @@ impl Walk<'_, '_, '_> {
     }
 
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
-    #[inline]
+    #[inline(always)]
     fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
-        let in_field = job.to_field.apply(point.position);
-        let sample = match job.field.lookup(in_field.to_array()) {
-            Lookup::Near(sample) => sample,
-            Lookup::Far { inside: false, bound } => return bound,
+        let in_cells = job.to_cells.apply(point.position);
+        match job.field.lookup_within(in_cells.to_array(), self.search.margin) {
+            Lookup::Near(sample) => self.near(job, leaf, point, &sample),
+            Lookup::Far { inside: false, bound } => bound,
             Lookup::Far { inside: true, .. } => {
                 self.work.flags.insert(Flags::DEEP);
-                return f32::NEG_INFINITY;
+                f32::NEG_INFINITY
             }
-        };
-        if sample.distance >= self.search.margin {
-            return sample.distance;
         }
+    }
+
+    /// Offers a point within the margin as a contact; its gap.
+    fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, sample: &FieldSample) -> f32 {
         let gradient = Vec3::from_array(sample.gradient);
         let squared = gradient.length_squared();
         if squared < LEAST_GRADIENT2 {

@@ -7,7 +7,7 @@ use crate::coupling::Coupling;
 use crate::io::{FacePairs, Flags, Input, Output, Work};
 use crate::limits::{length, limit};
 use crate::pose::{Pose, Twist, Wrench, renormalize};
-use crate::proximity::{APPROACH, Leaf, Search};
+use crate::proximity::{Leaf, Search};
 use crate::rotation;
 use crate::settings::Settings;
 use crate::state::State;
@@ -23,6 +23,12 @@ const FASTEST_RAD_PER_S: f32 = 1000.0;
 /// How fast the number of points that share the total stiffness may fall, a tick: stiffness of points still touching then rises
 /// slowly, and little energy is made of it.
 const SHARING_DECAY: f32 = 0.95;
+
+/// What held the object back may be gone from one tick to the next. Then it starts with this speed, m/s, and grows faster by [`FASTER`] a tick, until
+/// it has caught up with the motion that nothing holds back: 3 ticks to 0.1 m/s, which 10 N give 0.1 kg in one.
+const START_M_PER_S: f32 = 0.02;
+/// See [`START_M_PER_S`].
+const FASTER: f32 = 2.0;
 
 /// Moves the held object by one period and gives the wrench the handle must feel.
 ///
@@ -66,12 +72,17 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         mass_kg: settings.object.mass_kg,
         gyration2,
         length: scale,
+        // What lies deep in another part may be a little farther off than the object's own points.
+        reach: 2.0 * grabbed.body.reach,
         twist: grabbed.twist,
     };
     let mut free = step.free();
     let reach = grabbed.body.reach;
     let capped = slow_down(&mut free.twist, reach, settings.object.speed_max_m_per_s);
-    let margin = settings.contact.margin_m + settings.period_s * point_speed(free.twist, reach);
+    // As far as it would go with nothing in the way; but what leans on something stays there, and need not look as far as if it let go.
+    let likely = FASTER * point_speed(grabbed.twist, reach) + START_M_PER_S;
+    let margin =
+        settings.contact.margin_m + settings.period_s * smaller(likely, point_speed(free.twist, reach));
     let solution = state.meet(scene, settings, &grabbed, &step, &free, margin, &mut work);
 
     let mut twist = solution.twist;
@@ -134,11 +145,9 @@ impl State {
             center: grabbed.center,
             margin,
             slack: settings.contact.margin_m,
-            motions: [grabbed.twist, free.twist]
-                .map(|t| step.scale(t).map(|x| x * (APPROACH * settings.period_s))),
+            motions: [grabbed.twist, free.twist].map(|t| step.scale(t).map(|x| x * settings.period_s)),
             swing: margin / (grabbed.body.reach * grabbed.body.reach),
             inverse_length: 1.0 / step.length,
-            period_s: settings.period_s,
             busy: self.busy,
             budget: settings.contact.point_budget,
         };

@@ -52,7 +52,28 @@ impl<'a> Field<'a> {
     /// Distance, gradient and face at `p` (m, shape frame), or a lower bound. A non-finite `p` is far outside with bound 0.
     #[inline]
     pub fn lookup(&self, p: [f32; 3]) -> Lookup {
-        let g = self.grid_position(p);
+        self.lookup_within(self.in_cells(p), f32::INFINITY)
+    }
+
+    /// Signed distance at `p` (m, shape frame) if stored there, else the signed lower bound: what culling needs, without the gradient's cost.
+    #[inline]
+    pub fn bound(&self, p: [f32; 3]) -> f32 {
+        self.bound_at(self.in_cells(p))
+    }
+
+    /// `p` (m, shape frame) in cells from the grid's corner. Who looks up many positions folds this into their own transformation:
+    /// (p − origin)/cell.
+    #[inline(always)]
+    pub fn in_cells(&self, p: [f32; 3]) -> [f32; 3] {
+        let o = &self.record.origin;
+        let k = self.inverse_cell;
+        [(p[0] - o[0]) * k, (p[1] - o[1]) * k, (p[2] - o[2]) * k]
+    }
+
+    /// [`Self::lookup`] at `g` cells from the grid's corner, for who wants to know only what is nearer than `enough` m: beyond that the stored
+    /// distance comes back as the bound, without gradient and face, for half the cost.
+    #[inline(always)]
+    pub fn lookup_within(&self, g: [f32; 3], enough: f32) -> Lookup {
         if !self.holds(g) {
             return Lookup::Far {
                 inside: false,
@@ -63,7 +84,21 @@ impl<'a> Field<'a> {
         match entry {
             GridEntry::Brick(number) => {
                 let brick = &self.bricks[number as usize];
-                Lookup::Near(self.interpolate(brick, cell, f))
+                let corners = self.corners(brick, cell);
+                let distance = value(&corners, f) * self.record.scale;
+                if distance < enough {
+                    let gradient = gradient(&corners, f);
+                    let per_cell = self.record.scale * self.inverse_cell;
+                    return Lookup::Near(FieldSample {
+                        distance,
+                        gradient: gradient.map(|x| x * per_cell),
+                        face: self.face(brick, cell),
+                    });
+                }
+                Lookup::Far {
+                    inside: false,
+                    bound: distance,
+                }
             }
             GridEntry::Empty { inside, cells } => Lookup::Far {
                 inside,
@@ -72,18 +107,17 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Signed distance at `p` if stored there, else the signed lower bound: what culling needs, without the gradient's cost.
+    /// [`Self::bound`] at `g` cells from the grid's corner.
     #[inline]
-    pub fn bound(&self, p: [f32; 3]) -> f32 {
-        let g = self.grid_position(p);
+    pub fn bound_at(&self, g: [f32; 3]) -> f32 {
         if !self.holds(g) {
             return self.beyond(g);
         }
         let (entry, cell, f) = self.entry(g);
         match entry {
             GridEntry::Brick(number) => {
-                let c = self.corners(&self.bricks[number as usize], cell);
-                trilinear(&c, f).0 * self.record.scale
+                let corners = self.corners(&self.bricks[number as usize], cell);
+                value(&corners, f) * self.record.scale
             }
             GridEntry::Empty { inside, cells } => {
                 let bound = f32::from(cells) * self.record.cell;
@@ -92,19 +126,13 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// `p` in cells from the grid's corner.
-    #[inline(always)]
-    fn grid_position(&self, p: [f32; 3]) -> [f32; 3] {
-        let o = &self.record.origin;
-        let k = self.inverse_cell;
-        [(p[0] - o[0]) * k, (p[1] - o[1]) * k, (p[2] - o[2]) * k]
-    }
-
     /// Whether a grid position lies in the grid; no for one that is not a number.
+    ///
+    /// Compared as bits: those of positive numbers are in the numbers' order, those of negative ones and of what is no number lie above all.
     #[inline(always)]
     fn holds(&self, g: [f32; 3]) -> bool {
         let n = &self.cells;
-        g[0] >= 0.0 && g[0] < n[0] && g[1] >= 0.0 && g[1] < n[1] && g[2] >= 0.0 && g[2] < n[2]
+        g[0].to_bits() < n[0].to_bits() && g[1].to_bits() < n[1].to_bits() && g[2].to_bits() < n[2].to_bits()
     }
 
     /// Lower bound of the distance (m) from a position outside the grid: that to its box, which holds the whole shape. 0 for one that is not a number.
@@ -143,35 +171,19 @@ impl<'a> Field<'a> {
         let first =
             (cell & 7) + BRICK_SAMPLES * (cell >> 3 & 7) + BRICK_SAMPLES * BRICK_SAMPLES * (cell >> 6 & 7);
         let mut c = [0f32; 8];
+        // All eight lie in the run from the first to the last: one check for it instead of one for each.
         if self.record.format == FORMAT_I8 {
-            let samples = &self.blob[brick.samples as usize..][..SAMPLES_PER_BRICK];
+            let run: &[u8; RUN] = chunk(self.blob, brick.samples as usize + first);
             for (c, corner) in c.iter_mut().zip(CORNERS) {
-                *c = f32::from(samples[first + corner] as i8);
+                *c = f32::from(run[corner] as i8);
             }
         } else {
-            let samples = &self.blob[brick.samples as usize..][..2 * SAMPLES_PER_BRICK];
+            let run: &[u8; 2 * RUN] = chunk(self.blob, brick.samples as usize + 2 * first);
             for (c, corner) in c.iter_mut().zip(CORNERS) {
-                let at = 2 * (first + corner);
-                *c = f32::from(i16::from_le_bytes([samples[at], samples[at + 1]]));
+                *c = f32::from(i16::from_le_bytes([run[2 * corner], run[2 * corner + 1]]));
             }
         }
         c
-    }
-
-    #[inline(always)]
-    fn interpolate(&self, brick: &BrickRecord, cell: usize, f: [f32; 3]) -> FieldSample {
-        let c = self.corners(brick, cell);
-        let (distance, gradient) = trilinear(&c, f);
-        let per_cell = self.record.scale * self.inverse_cell;
-        FieldSample {
-            distance: distance * self.record.scale,
-            gradient: [
-                gradient[0] * per_cell,
-                gradient[1] * per_cell,
-                gradient[2] * per_cell,
-            ],
-            face: self.face(brick, cell),
-        }
     }
 
     #[inline(always)]
@@ -195,13 +207,36 @@ const CORNERS: [usize; 8] = {
     let (row, layer) = (BRICK_SAMPLES, BRICK_SAMPLES * BRICK_SAMPLES);
     [0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1]
 };
+/// Samples from a cell's first corner to its last.
+const RUN: usize = CORNERS[7] + 1;
+
+/// `N` bytes from `at`. An image that was opened holds every run its bricks lead to.
+#[inline(always)]
+fn chunk<const N: usize>(blob: &[u8], at: usize) -> &[u8; N] {
+    blob[at..]
+        .first_chunk()
+        .expect("checked when the image was opened")
+}
+
 // `entry` packs three bits an axis.
 const _: () = assert!(BRICK_CELLS == 8);
 
-/// Value and gradient (per cell) between the corners `c` at `f`.
+/// Value between the corners `c` at `f`.
 #[inline(always)]
-fn trilinear(c: &[f32; 8], f: [f32; 3]) -> (f32, [f32; 3]) {
-    let [fx, fy, fz] = f;
+fn value(c: &[f32; 8], [fx, fy, fz]: [f32; 3]) -> f32 {
+    let v = [
+        c[0] + fx * (c[1] - c[0]),
+        c[2] + fx * (c[3] - c[2]),
+        c[4] + fx * (c[5] - c[4]),
+        c[6] + fx * (c[7] - c[6]),
+    ];
+    let (near, far) = (v[0] + fy * (v[1] - v[0]), v[2] + fy * (v[3] - v[2]));
+    near + fz * (far - near)
+}
+
+/// Gradient (per cell) of [`value`].
+#[inline(always)]
+fn gradient(c: &[f32; 8], [fx, fy, fz]: [f32; 3]) -> [f32; 3] {
     let dx = [c[1] - c[0], c[3] - c[2], c[5] - c[4], c[7] - c[6]];
     let v = [
         c[0] + fx * dx[0],
@@ -212,14 +247,11 @@ fn trilinear(c: &[f32; 8], f: [f32; 3]) -> (f32, [f32; 3]) {
     let (dy_near, dy_far) = (v[1] - v[0], v[3] - v[2]);
     let (near, far) = (v[0] + fy * dy_near, v[2] + fy * dy_far);
     let (dx_near, dx_far) = (dx[0] + fy * (dx[1] - dx[0]), dx[2] + fy * (dx[3] - dx[2]));
-    (
-        near + fz * (far - near),
-        [
-            dx_near + fz * (dx_far - dx_near),
-            dy_near + fz * (dy_far - dy_near),
-            far - near,
-        ],
-    )
+    [
+        dx_near + fz * (dx_far - dx_near),
+        dy_near + fz * (dy_far - dy_near),
+        far - near,
+    ]
 }
 
 /// A lower bound of √x that needs no library: two Newton steps from above would overshoot, so the result is divided back (x/y ≤ √x ≤ y).
