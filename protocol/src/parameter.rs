@@ -69,8 +69,8 @@ parameters! {
     SpeedLimit = "m/s", 0.1, 5.0, 2.0;
     /// Host silence while armed that counts as a fault.
     HostTimeout = "s", 0.05, 5.0, 0.5;
-    /// Points looked at in a tick at the most.
-    PointBudget = "points", 16.0, 65_535.0, 800.0;
+    /// Most work of a tick, in field look-ups; a point that may touch counts six.
+    PointBudget = "look-ups", 16.0, 65_535.0, 500.0;
 }
 
 impl ParameterId {

@@ -21,8 +21,6 @@ pub(crate) struct Contact {
     pub reach_gap: f32,
     /// Rate of the gap in the last solution, m/s; not kept up while the contact is free.
     pub rate: f32,
-    /// While a solution is sought: stays free until gaps could have closed by more than this, m.
-    pub clear: f32,
     /// Part of the force law the last solution assumed.
     pub phase: Phase,
     /// Face of the held part.
@@ -41,7 +39,6 @@ impl Contact {
         gap: 0.0,
         reach_gap: 0.0,
         rate: 0.0,
-        clear: 0.0,
         phase: Phase::Free,
         moving_face: 0,
         static_face: 0,
@@ -91,8 +88,8 @@ struct Heap {
     places: [u8; HALF],
 }
 
-// Every index into half the list must fit a byte.
-const _: () = assert!(HALF <= 256);
+// Every index into the list must fit a byte.
+const _: () = assert!(MAX_CONTACTS <= 256);
 
 impl Heap {
     const fn new() -> Self {

@@ -76,7 +76,8 @@ pub struct Work {
 pub struct Flags(u16);
 
 impl Flags {
-    /// Look-ups reached [`crate::ContactSettings::point_budget`]: the rest waits for the next ticks, places that touched go first.
+    /// The work reached [`crate::ContactSettings::point_budget`]: points are left out evenly, and when that is not enough the rest waits for the next
+    /// ticks; what touched stays felt.
     pub const BUDGET_EXCEEDED: Self = Self(1 << 0);
     /// More candidates than fit: kept were the deepest, and of the rest those that a turn would bring to touch first.
     pub const CONTACTS_DROPPED: Self = Self(1 << 1);

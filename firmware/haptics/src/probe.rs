@@ -217,6 +217,7 @@ impl Prober {
             swing: 0.0,
             inverse_length: 1.0,
             busy: false,
+            thinning: 0,
             budget: u32::MAX,
         }
         .run_all(jobs, &mut self.coherence, &mut self.contacts, work);

@@ -4,9 +4,11 @@
 //! or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every sphere that the
 //! field's distance at its centre puts farther off than the margin.
 //!
-//! When the look-up budget runs out, the next tick goes on where this one stopped, round and round, and the contacts of a leaf that was not reached
-//! are carried over with the gaps the last step predicted: what touches stays felt, and everything is looked at again within a few ticks.
-//! Carrying is prepared for once a tick needed half the budget.
+//! When the budget runs out, work is left undone in this order. For a tick or two, as after a grab, the contacts of leaves not reached are carried over
+//! with the gaps the last motion left them, and the next tick goes on where this one stopped, round and round. When that does not catch up,
+//! points are left out evenly: each second, fourth or eighth of a leaf that is near is looked at, always the same ones, until there is room
+//! again; the error bound of the pointshell grows by four at each step, all else stays as it was. Carrying is prepared for once a tick needed
+//! half the budget.
 //!
 //! Cost: see [`crate::tick()`]; the look-ups in [`Field`] are two thirds of it.
 
@@ -29,8 +31,12 @@ const LEAST_GRADIENT2: f32 = 0.01;
 /// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
 /// the other end moves half as fast again. So the approach by either is taken this many times.
 const APPROACH: f32 = 2.0;
-/// Passing over a node of which enough is known costs about an eighth of a look-up.
+/// The budget counts what a look-up costs, 150 instructions. Passing over a node of which enough is known costs an eighth of that.
 const PASSED_OVER_PER_LOOKUP: u32 = 8;
+/// A point within the margin costs as much again.
+const NEAR: u32 = 1;
+/// And a candidate, with its share of the step, four times as much on top.
+const CANDIDATE: u32 = 4;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,6 +77,8 @@ pub(crate) struct Search<'s, 'i> {
     pub inverse_length: f32,
     /// The last tick came near the budget.
     pub busy: bool,
+    /// Of the points of a leaf that is near only each 2ⁿth is looked at.
+    pub thinning: u8,
     /// Look-ups allowed.
     pub budget: u32,
 }
@@ -119,14 +127,14 @@ impl<'i> Search<'_, 'i> {
         APPROACH * most
     }
 
-    /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out.
+    /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out, and how much of the budget was used.
     pub fn run(
         &self,
         start: Leaf,
         coherence: &mut Coherence,
         contacts: &mut Contacts,
         work: &mut Work,
-    ) -> Option<Leaf> {
+    ) -> (Option<Leaf>, u32) {
         contacts.begin(self.busy);
         let mut walk = Walk {
             search: self,
@@ -135,10 +143,12 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             passed_over: 0,
+            near: 0,
         };
         let stop = walk
             .jobs(start, None)
             .or_else(|| walk.jobs(Leaf::FIRST, Some(start)));
+        let used = walk.used();
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET_EXCEEDED);
             contacts.carry(&self.motions[0], |leaf| {
@@ -150,7 +160,7 @@ impl<'i> Search<'_, 'i> {
                 !seen
             });
         }
-        stop
+        (stop, used)
     }
 
     /// Trees and fields of job `index`, or none when the two parts' spheres are apart.
@@ -193,6 +203,7 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             passed_over: 0,
+            near: 0,
         };
         for job in jobs {
             let _ = walk.nodes(job, 0, u32::MAX);
@@ -244,6 +255,8 @@ struct Walk<'w, 's, 'i> {
     work: &'w mut Work,
     /// Nodes known to be far or near.
     passed_over: u32,
+    /// Points within the margin.
+    near: u32,
 }
 
 impl Walk<'_, '_, '_> {
@@ -325,24 +338,36 @@ impl Walk<'_, '_, '_> {
     /// All points of a leaf, as far as the budget goes.
     fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) {
         let most = (self.left() as usize).min(points.len());
-        // What is not looked at could be anywhere.
-        let mut nearest = if most < points.len() {
-            f32::NEG_INFINITY
-        } else {
-            f32::INFINITY
-        };
-        for point in &points[..most] {
-            let gap = self.point(job, leaf, point);
-            // A gap that is not a number is none to rely on.
-            if !(gap >= nearest) {
-                nearest = gap;
+        let stride = 1 << self.search.thinning;
+        let mut nearest = self.some(job, leaf, points[..most].iter().step_by(stride));
+        if stride > 1 && nearest > self.search.margin {
+            // None of these is near: with the others, too, it is known for how long the leaf can be left alone.
+            for start in 1..stride {
+                let others = points[..most].iter().skip(start).step_by(stride);
+                nearest = nearest.min(self.some(job, leaf, others));
             }
         }
-        self.work.points += most as u32;
-        if nearest > self.search.margin {
+        // What is not looked at could be anywhere.
+        if nearest > self.search.margin && most == points.len() {
             self.coherence
                 .set_distance(Key::new(leaf.job, leaf.node), nearest);
         }
+    }
+
+    /// Some points of a leaf; the smallest gap.
+    #[inline(always)]
+    fn some<'p>(&mut self, job: &Job<'_>, leaf: Leaf, points: impl Iterator<Item = &'p PointRecord>) -> f32 {
+        let mut nearest = f32::INFINITY;
+        let mut looked_at = 0;
+        for point in points {
+            looked_at += 1;
+            let gap = self.point(job, leaf, point);
+            if gap < nearest {
+                nearest = gap;
+            }
+        }
+        self.work.points += looked_at;
+        nearest
     }
 
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
@@ -361,6 +386,7 @@ impl Walk<'_, '_, '_> {
 
     /// Offers a point within the margin as a contact; its gap.
     fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, sample: &FieldSample) -> f32 {
+        self.near += 1;
         let gradient = Vec3::from_array(sample.gradient);
         let squared = gradient.length_squared();
         if squared < LEAST_GRADIENT2 {
@@ -393,10 +419,18 @@ impl Walk<'_, '_, '_> {
         sample.distance
     }
 
+    /// What was done so far, in look-ups.
+    fn used(&self) -> u32 {
+        self.work.nodes
+            + self.work.points
+            + self.passed_over / PASSED_OVER_PER_LOOKUP
+            + NEAR * self.near
+            + CANDIDATE * u32::from(self.work.candidates)
+    }
+
     /// Look-ups left.
     fn left(&self) -> u32 {
-        let used = self.work.nodes + self.work.points + self.passed_over / PASSED_OVER_PER_LOOKUP;
-        self.search.budget.saturating_sub(used)
+        self.search.budget.saturating_sub(self.used())
     }
 }
 

@@ -32,8 +32,6 @@ const MAX_FREE_SOLVES: u8 = 3;
 const FORCE_BAND_N: f32 = 0.5e-3;
 /// Rates within this of zero do not change between parting and closing, m/s: k·τ times this is 0.1 mN at 200 kN/m and 0.5 ms.
 const RATE_BAND_M_PER_S: f32 = 1e-6;
-/// A hair more than the exact sum, for the rounding of few additions.
-const ROUNDING: f32 = 1.000_01;
 /// A slip that changes by less than this is settled.
 const SLIP_BAND: f32 = 1e-3;
 
@@ -47,8 +45,6 @@ pub(crate) struct Step<'a> {
     pub gyration2: Mat3,
     /// L, m.
     pub length: f32,
-    /// Farthest a contact can be from the centre of mass, m.
-    pub reach: f32,
     /// V.
     pub twist: Twist,
 }
@@ -94,7 +90,7 @@ impl Step<'_> {
     /// The step with `contacts` of stiffness `k` (N/m) and approach damping `damping_s` (τ), starting from the motion so far, or from the
     /// `free` solution when that touches nothing.
     ///
-    /// On return each contact's phase, and the rate of those that are not free, are those of the solution.
+    /// On return each contact's rate and phase are those of the solution.
     pub fn with_contacts(
         &self,
         free: &Solution,
@@ -119,31 +115,13 @@ impl Step<'_> {
         let mut stiffness = Symmetric6::ZERO;
         let mut push = [0.0f32; 6];
         let mut solves = 0;
-        // What the changes of `x` so far could have closed at most of any gap, m, and where `x` was then.
-        let mut closed = 0.0;
-        let mut before = x;
-        let longest_row = length6(&[1.0, 0.0, 0.0, self.reach / self.length, 0.0, 0.0]);
-        for c in contacts.iter_mut() {
-            c.clear = f32::NEG_INFINITY;
-        }
         let is_settled = loop {
             let mut changed = false;
-            let change = [0, 1, 2, 3, 4, 5].map(|i| x[i] - before[i]);
-            closed += closing_s * longest_row * length6(&change) * ROUNDING;
-            before = x;
             for c in contacts.iter_mut() {
-                // Most points are free and stay so: a gap that closing in full would leave open needs no closer look, until the solution has
-                // changed by as much as it was open.
-                if c.clear > closed {
-                    continue;
-                }
                 c.rate = dot(&c.row, &x);
-                if c.phase == Phase::Free && c.gap >= 0.0 {
-                    let open = c.gap + closing_s * c.rate;
-                    if open >= 0.0 {
-                        c.clear = closed + open;
-                        continue;
-                    }
+                // Most points are free and stay so: a gap that closing in full would leave open needs no closer look.
+                if c.phase == Phase::Free && c.gap >= 0.0 && c.gap + closing_s * c.rate >= 0.0 {
+                    continue;
                 }
                 let phase = next_phase(c, h, damping_s, band);
                 if phase != c.phase {
@@ -283,10 +261,6 @@ fn next_phase(c: &Contact, h: f32, damping_s: f32, band: f32) -> Phase {
 #[inline]
 pub(crate) fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
-}
-
-fn length6(a: &[f32; 6]) -> f32 {
-    libm::sqrtf(dot(a, a))
 }
 
 fn settled(a: Slip, b: Slip) -> bool {

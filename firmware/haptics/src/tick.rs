@@ -30,6 +30,13 @@ const START_M_PER_S: f32 = 0.02;
 /// See [`START_M_PER_S`].
 const FASTER: f32 = 2.0;
 
+/// Ticks in a row whose budget runs out before points are left out: what is looked at for the first time needs one or two.
+const OVERRUNS_BORNE: u8 = 2;
+/// Of a leaf's points each eighth is looked at in any case.
+const MOST_THINNING: u8 = 3;
+/// Twice the points cost up to twice as much, and the next tick may need more: they are looked at again once this share of the budget was enough.
+const ROOM_TO_THICKEN: u32 = 3;
+
 /// Moves the held object by one period and gives the wrench the handle must feel.
 ///
 /// Order: input check; coupling; step without contacts, which tells how far anything can move; search within that; step with contacts;
@@ -40,10 +47,10 @@ const FASTER: f32 = 2.0;
 /// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
-/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21 with the baked thesis pair, 0.5 mm cells, 16-bit,
-/// 840 points on the peg, 1294 on the block, the peg through the hole and moved at 10 mm/s: worst tick 406,000 instructions, 333,000 on average
-/// (20 µm fit pressed to the wall with 5 N: 682 points looked up, 293 candidates, 19 contacts); 315,000 in a 0.1 mm fit pressed likewise; 85,000 in
-/// a 1 mm fit without touching, 26,000 on average; 6,000 apart from other parts.
+/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21, thesis pair with 20 µm clearance baked at 0.5 mm cells,
+/// 16-bit, 62 points on the peg, 350 on the block: 10,000 instructions centred in the hole and still; 52,000 at worst pressed to the wall with 5 N
+/// and twisted. A peg of 0.7 m with 0.2 mm clearance, 370 points on each rim pair, pressed with 10 N and moved at 20 mm/s needs more than the default
+/// budget, is thinned, and stays below 120,000.
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
@@ -72,8 +79,6 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         mass_kg: settings.object.mass_kg,
         gyration2,
         length: scale,
-        // What lies deep in another part may be a little farther off than the object's own points.
-        reach: 2.0 * grabbed.body.reach,
         twist: grabbed.twist,
     };
     let mut free = step.free();
@@ -149,12 +154,20 @@ impl State {
             swing: margin / (grabbed.body.reach * grabbed.body.reach),
             inverse_length: 1.0 / step.length,
             busy: self.busy,
+            thinning: self.thinning,
             budget: settings.contact.point_budget,
         };
-        self.resume = search
-            .run(self.resume, &mut self.coherence, &mut self.contacts, work)
-            .unwrap_or(Leaf::FIRST);
-        self.busy = work.nodes + work.points > settings.contact.point_budget / 2;
+        let (stopped, used) = search.run(self.resume, &mut self.coherence, &mut self.contacts, work);
+        self.resume = stopped.unwrap_or(Leaf::FIRST);
+        self.busy = used > settings.contact.point_budget / 2;
+        work.flags.insert_if(self.thinning > 0, Flags::BUDGET_EXCEEDED);
+        self.overruns = if stopped.is_some() { self.overruns + 1 } else { 0 };
+        if self.overruns > OVERRUNS_BORNE {
+            self.overruns = 0;
+            self.thinning = (self.thinning + 1).min(MOST_THINNING);
+        } else if self.thinning > 0 && used < settings.contact.point_budget / ROOM_TO_THICKEN {
+            self.thinning -= 1;
+        }
         work.flags
             .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
         let contact = &settings.contact;

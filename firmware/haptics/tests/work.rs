@@ -45,15 +45,15 @@ fn inside(clearance: f64, push: [f64; 3], sway: f64) -> Seen {
 fn centred_in_a_loose_hole() {
     let seen = inside(1e-3, [0.0; 3], 1e-3);
     // The gap of 0.5 mm is used up by 20 mm/s in 11 to 22 ticks, each node at its own time.
-    assert!(seen.nodes + seen.points < 300, "{seen:?}");
+    assert!(seen.nodes + seen.points < 400, "{seen:?}");
     assert_eq!(seen.contacts, 0);
 }
 
 #[test]
 fn pressed_to_the_wall_of_a_close_hole() {
     let seen = inside(20e-6, [5.0, 0.0, 0.0], 1e-3);
-    // 514 points and one rim, all within the margin.
-    assert!(seen.nodes < 150 && seen.points < 700, "{seen:?}");
+    // 514 points each way, all within the margin; the budget thins them.
+    assert!(seen.nodes < 150 && seen.points < 1100, "{seen:?}");
     assert!(seen.contacts > 0);
 }
 
