@@ -5,7 +5,7 @@ mod support;
 use std::sync::LazyLock;
 
 use mortise_haptics::{ContactSettings, Pose, ProbeError, Prober, Quat, Settings, Vec3};
-use mortise_protocol::image::{Lookup, NO_FACE, SceneImage};
+use mortise_protocol::image::{Lookup, SceneImage};
 use proptest::prelude::*;
 use support::hole_and_peg;
 use support::image::Image;
@@ -32,7 +32,7 @@ fn brute_force(scene: &SceneImage<'_>, pose: Pose) -> (f32, usize) {
         take(block.field.lookup(p.to_array()));
     }
     let back = pose.inverse();
-    for point in block.points.iter().filter(|point| point.edge_face != NO_FACE) {
+    for point in block.points {
         let p = back.transform_point(Vec3::from_array(point.position));
         take(peg.field.lookup(p.to_array()));
     }
@@ -58,7 +58,8 @@ proptest! {
         let mut prober = Prober::new();
         let found = prober.probe(&scene, PEG, BLOCK, &pose, &settings()).expect("two parts");
         let (least, touching) = brute_force(&scene, pose);
-        prop_assume!(least.abs() < 1.2e-3);
+        // A point beside the field's grid has a bound only; the probe says so.
+        prop_assume!(least.abs() < 1.2e-3 && found.nearest.in_band);
         // Poses are put together in another order: a few roundings of 40 mm, 3.7 nm each.
         let rounding = 5e-8;
         prop_assert!((found.nearest.field_distance_m - least).abs() < rounding, "{found:?} {least}");
