@@ -65,6 +65,11 @@ fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
                     sum += shape.field.bound(p);
                 }
             }
+            let voxel = shape.field.voxel(p);
+            assert!(
+                !voxel.bound.is_nan() && voxel.center.iter().zip(p).all(|(c, p)| !c.is_nan() || p.is_nan())
+            );
+            sum += voxel.bound + f32::from(voxel.face);
         }
     }
     sum
@@ -90,9 +95,13 @@ fn damage_is_refused() {
 /// Damage with a checksum that fits (a faulty or hostile writer): refused, or harmless.
 #[test]
 fn sealed_damage_never_leads_out_of_bounds() {
-    let good = scene::bytes();
+    sealed_damage(&scene::bytes());
+    sealed_damage(&scene::occupancy_bytes());
+}
+
+fn sealed_damage(good: &[u8]) {
     let records = {
-        let aligned = Aligned::new(&good);
+        let aligned = Aligned::new(good);
         let image = SceneImage::open(aligned.bytes()).unwrap();
         image.header().blob.offset as usize
     };
@@ -100,7 +109,7 @@ fn sealed_damage_never_leads_out_of_bounds() {
     let (mut opened, mut refused) = (0, 0);
     let mut sum = 0.0;
     for round in 0..60_000 {
-        let mut aligned = Aligned::new(&good);
+        let mut aligned = Aligned::new(good);
         for _ in 0..=random.below(4) {
             // Mostly records: samples may be anything.
             let range = if random.below(10) == 0 {

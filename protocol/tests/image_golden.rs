@@ -6,20 +6,76 @@ use mortise_protocol::image::*;
 use scene::Aligned;
 
 const GOLDEN: &[u8] = include_bytes!("golden/tiny.scene");
+const GOLDEN_OCCUPANCY: &[u8] = include_bytes!("golden/occupancy.scene");
 
 /// A change of layout or meaning shows here. Count up `LAYOUT_VERSION`, then write the file anew with `MORTISE_BLESS=1`.
 #[test]
 fn golden_bytes_have_not_changed() {
-    let made = scene::bytes();
-    if std::env::var_os("MORTISE_BLESS").is_some() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/tiny.scene");
-        std::fs::write(path, &made).expect("the golden file can be written");
-        return;
+    let all = [
+        ("tiny", scene::bytes(), GOLDEN),
+        ("occupancy", scene::occupancy_bytes(), GOLDEN_OCCUPANCY),
+    ];
+    for (name, made, golden) in all {
+        if std::env::var_os("MORTISE_BLESS").is_some() {
+            let path = format!("{}/tests/golden/{name}.scene", env!("CARGO_MANIFEST_DIR"));
+            std::fs::write(path, &made).expect("the golden file can be written");
+            continue;
+        }
+        assert!(
+            made == golden,
+            "{name}: the layout changed: raise LAYOUT_VERSION and run with MORTISE_BLESS=1"
+        );
     }
-    assert!(
-        made == GOLDEN,
-        "the layout changed: raise LAYOUT_VERSION and run with MORTISE_BLESS=1"
-    );
+}
+
+#[test]
+fn golden_voxmap_reads_back() {
+    let aligned = Aligned::new(GOLDEN_OCCUPANCY);
+    let image = SceneImage::open(aligned.bytes()).unwrap();
+    let field = image.shape(0).field;
+    assert!(field.is_occupancy());
+    // (height in mm, what is there, least distance to a surface voxel in mm)
+    for (z, voxel, bound) in [
+        (-3.2f32, Voxel::Interior, 4.0f32),
+        (1.5, Voxel::Interior, 0.0),
+        (4.01, Voxel::Surface, 0.0),
+        (4.99, Voxel::Surface, 0.0),
+        (5.3, Voxel::Proximity, 0.0),
+        (6.1, Voxel::Free, 1.0),
+        (9.0, Voxel::Free, 3.0),
+    ] {
+        let p = [0.0023, 0.0071, 1e-3 * z];
+        let sample = field.voxel(p);
+        assert_eq!(sample.voxel, voxel, "{z}");
+        assert!((sample.bound - 1e-3 * bound).abs() < 1e-9, "{z}: {sample:?}");
+        let inside = voxel == Voxel::Interior;
+        // The distance look-up has only bounds to give.
+        assert_eq!(
+            field.lookup(p),
+            Lookup::Far {
+                inside,
+                bound: sample.bound
+            },
+            "{z}"
+        );
+        if bound < 2.0 {
+            let center = [0.0025, 0.0075, 1e-3 * (z.floor() + 0.5)];
+            for (found, wanted) in sample.center.iter().zip(center) {
+                assert!((found - wanted).abs() < 2e-9, "{z}: {sample:?}");
+            }
+            assert_eq!(sample.face, 0);
+        }
+    }
+    // Beside the box: the distance to it.
+    let beside = field.voxel([-0.003, 0.004, 0.020]);
+    assert_eq!(beside.voxel, Voxel::Free);
+    assert!(beside.bound <= 0.005 && beside.bound > 0.00498, "{beside:?}");
+    assert_eq!(field.voxel([f32::NAN; 3]).voxel, Voxel::Free);
+    // A distance field knows no voxels.
+    let aligned = Aligned::new(GOLDEN);
+    let image = SceneImage::open(aligned.bytes()).unwrap();
+    assert!(!image.shape(0).field.is_occupancy());
+    assert_eq!(image.shape(0).field.voxel([0.001; 3]).voxel, Voxel::Free);
 }
 
 #[test]

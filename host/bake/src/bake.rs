@@ -12,7 +12,8 @@ use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, FieldOptions, bake_field};
 use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement};
-use crate::options::{BakeOptions, Progress, Stage};
+use crate::occupancy::bake_occupancy;
+use crate::options::{BakeOptions, Method, Progress, Stage};
 use crate::partners::Partners;
 use crate::pointshell::{Pointshell, PointshellOptions, sample_pointshell};
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
@@ -210,7 +211,11 @@ impl Scene {
                 band_cells: options.band_cells,
                 format: options.format,
             };
-            match bake_field(surface, &field, part, &step) {
+            let baked = match options.method {
+                Method::DistanceField => bake_field(surface, &field, part, &step),
+                Method::Occupancy => bake_occupancy(surface, *cell_mm, part, &step),
+            };
+            match baked {
                 Err(BakeError::CellTooSmall { enough_mm, .. })
                     if options.cell_mm.is_none() && enough_mm > *cell_mm && enough_mm < 1e3 =>
                 {
@@ -318,6 +323,7 @@ fn shape_report(
     ShapeReport {
         name: name.to_owned(),
         cell_mm: f64::from(field.record.cell) * 1000.0,
+        method: options.method,
         format: options.format,
         scale_mm: f64::from(field.record.scale) * 1000.0,
         brick_dims: field.record.brick_dims,

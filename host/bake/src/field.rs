@@ -123,70 +123,110 @@ pub fn bake_field(
         surface.chord,
     );
     let reach = options.band_cells * grid.cell();
-    let too_small = |what: String, ratio: f64| BakeError::CellTooSmall {
-        part: part.to_owned(),
-        cell_mm: options.cell_mm,
-        what,
-        enough_mm: options.cell_mm * ratio,
-    };
-    if grid.entries() > MAX_ENTRIES || grid.dims.iter().any(|&d| d > u32::from(u16::MAX)) {
-        let ratio = (grid.entries() as f64 / MAX_ENTRIES as f64).cbrt().max(1.1);
-        return Err(too_small(
-            format!("{} grid entries, at most {MAX_ENTRIES}", grid.entries()),
-            ratio * 1.1,
-        ));
-    }
-    let alive = || progress(0, 0).is_continue();
-    let classes = classify(surface, &grid, reach, &alive);
-    if !alive() {
-        return Err(BakeError::Cancelled);
-    }
-    let stored: Vec<[u32; 3]> = positions(&grid)
-        .filter(|&b| classes[grid.index(b)] == Class::Stored)
-        .collect();
-    if stored.len() > MAX_STORED {
-        let ratio = (stored.len() as f64 / MAX_STORED as f64).sqrt() * 1.1;
-        return Err(too_small(
-            format!("{} bricks near its surface, at most {MAX_STORED}", stored.len()),
-            ratio,
-        ));
-    }
-    let (sign_tests, sign_disagreements) = compare_signs(surface, &grid, &stored, &classes);
-    // A shell that is closed by count of sides but not by meaning (overlapping, inside-out or doubled solids): the winding number decides.
-    let classes = if sign_disagreements > 0 && !surface.sign_by_winding() {
-        surface.set_sign_by_winding();
-        classify(surface, &grid, reach, &alive)
-    } else {
-        classes
-    };
+    let near = NearSurface::find(surface, &grid, reach, options.cell_mm, part, progress)?;
     let surface = &*surface;
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let bricks: Option<Vec<Brick>> = stored
+    let bricks: Option<Vec<Brick>> = near
+        .stored
         .par_iter()
         .map(|&at| {
             let brick = bake_brick(surface, &grid, options, at);
             let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            progress(n, stored.len()).is_continue().then_some(brick)
+            progress(n, near.stored.len()).is_continue().then_some(brick)
         })
         .collect();
     let bricks = bricks.ok_or(BakeError::Cancelled)?;
-    let packed = pack(&grid, options, &classes, &stored, bricks);
-    if packed.bricks.len() > GridEntry::MAX_BRICKS {
-        let ratio = (packed.bricks.len() as f64 / GridEntry::MAX_BRICKS as f64).sqrt() * 1.1;
-        return Err(too_small(
-            format!(
-                "{} different bricks, at most {}",
-                packed.bricks.len(),
-                GridEntry::MAX_BRICKS
-            ),
-            ratio,
-        ));
-    }
+    let packed = pack(&grid, options, &near.classes, &near.stored, bricks);
+    check_brick_count(packed.bricks.len(), options.cell_mm, part)?;
     Ok(BakedField {
-        sign_tests,
-        sign_disagreements,
+        sign_tests: near.sign_tests,
+        sign_disagreements: near.sign_disagreements,
         ..packed
     })
+}
+
+/// Which bricks of a grid are near the surface.
+pub(crate) struct NearSurface {
+    /// Of every grid entry.
+    pub classes: Vec<Class>,
+    /// Places of the bricks to store, x fastest.
+    pub stored: Vec<[u32; 3]>,
+    /// See [`BakedField::sign_tests`].
+    pub sign_tests: usize,
+    /// See [`BakedField::sign_disagreements`].
+    pub sign_disagreements: usize,
+}
+
+impl NearSurface {
+    /// Bricks of `grid` with a point within `reach` mm of the surface; the winding number decides signs from here on if normals turn out wrong.
+    pub fn find(
+        surface: &mut ExactSurface,
+        grid: &Grid,
+        reach: f64,
+        cell_mm: f64,
+        part: &str,
+        progress: &(dyn Fn(usize, usize) -> ControlFlow<()> + Sync),
+    ) -> Result<Self, BakeError> {
+        if grid.entries() > MAX_ENTRIES || grid.dims.iter().any(|&d| d > u32::from(u16::MAX)) {
+            let ratio = (grid.entries() as f64 / MAX_ENTRIES as f64).cbrt().max(1.1);
+            return Err(too_small(
+                part,
+                cell_mm,
+                format!("{} grid entries, at most {MAX_ENTRIES}", grid.entries()),
+                ratio * 1.1,
+            ));
+        }
+        let alive = || progress(0, 0).is_continue();
+        let classes = classify(surface, grid, reach, &alive);
+        if !alive() {
+            return Err(BakeError::Cancelled);
+        }
+        let stored: Vec<[u32; 3]> = positions(grid)
+            .filter(|&b| classes[grid.index(b)] == Class::Stored)
+            .collect();
+        if stored.len() > MAX_STORED {
+            let ratio = (stored.len() as f64 / MAX_STORED as f64).sqrt() * 1.1;
+            return Err(too_small(
+                part,
+                cell_mm,
+                format!("{} bricks near its surface, at most {MAX_STORED}", stored.len()),
+                ratio,
+            ));
+        }
+        let (sign_tests, sign_disagreements) = compare_signs(surface, grid, &stored, &classes);
+        // A shell that is closed by count of sides but not by meaning (overlapping, inside-out or doubled solids): the winding number decides.
+        let classes = if sign_disagreements > 0 && !surface.sign_by_winding() {
+            surface.set_sign_by_winding();
+            classify(surface, grid, reach, &alive)
+        } else {
+            classes
+        };
+        Ok(Self {
+            classes,
+            stored,
+            sign_tests,
+            sign_disagreements,
+        })
+    }
+}
+
+/// Refuses more different bricks than a field can number.
+pub(crate) fn check_brick_count(bricks: usize, cell_mm: f64, part: &str) -> Result<(), BakeError> {
+    if bricks <= GridEntry::MAX_BRICKS {
+        return Ok(());
+    }
+    let ratio = (bricks as f64 / GridEntry::MAX_BRICKS as f64).sqrt() * 1.1;
+    let what = format!("{bricks} different bricks, at most {}", GridEntry::MAX_BRICKS);
+    Err(too_small(part, cell_mm, what, ratio))
+}
+
+fn too_small(part: &str, cell_mm: f64, what: String, ratio: f64) -> BakeError {
+    BakeError::CellTooSmall {
+        part: part.to_owned(),
+        cell_mm,
+        what,
+        enough_mm: cell_mm * ratio,
+    }
 }
 
 fn positions(grid: &Grid) -> impl Iterator<Item = [u32; 3]> {
@@ -304,7 +344,7 @@ fn pack(
 /// Samples, indices, palette, palette length, index bits.
 type BrickRecord2 = (u32, u32, u32, u16, u16);
 
-fn append_aligned(blob: &mut Vec<u8>, bytes: &[u8]) -> u32 {
+pub(crate) fn append_aligned(blob: &mut Vec<u8>, bytes: &[u8]) -> u32 {
     blob.resize(blob.len().next_multiple_of(4), 0);
     let at = blob.len() as u32;
     blob.extend_from_slice(bytes);

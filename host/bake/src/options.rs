@@ -8,6 +8,8 @@ use crate::field::SampleFormat;
 /// What to bake and how finely.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeOptions {
+    /// How a part's inside is told from its outside.
+    pub method: Method,
     /// Cell edge, mm. `None`: a hundredth of the largest part, rounded to 1, 2 or 5, finer for parts much smaller than that, and coarser
     /// until the image fits [`Self::image_limit_bytes`].
     pub cell_mm: Option<f64>,
@@ -29,6 +31,7 @@ pub struct BakeOptions {
 impl Default for BakeOptions {
     fn default() -> Self {
         Self {
+            method: Method::DistanceField,
             cell_mm: None,
             band_cells: 2.0,
             format: SampleFormat::Int16,
@@ -66,6 +69,51 @@ impl BakeOptions {
             within("max_spacing_mm", spacing, 1e-3, 1e6, "0.001 to 1000000 mm")?;
         }
         Ok(())
+    }
+}
+
+/// How contact finds depth and direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Signed distance, interpolated: depth and direction to micrometres.
+    #[default]
+    DistanceField,
+    /// Two bits a voxel, depth to a tangent plane through its centre (McNeely, Puterbaugh & Troy 1999): the textbook baseline, off by up to a voxel.
+    Occupancy,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::DistanceField, Self::Occupancy];
+
+    /// As written on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::DistanceField => "distance-field",
+            Self::Occupancy => "occupancy",
+        }
+    }
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl std::str::FromStr for Method {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        (Self::ALL.into_iter())
+            .find(|method| method.name() == text)
+            .ok_or_else(|| {
+                format!(
+                    "no method `{text}`; give {}",
+                    Self::ALL.map(Self::name).join(" or ")
+                )
+            })
     }
 }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::field::SampleFormat;
+use crate::options::Method;
 
 /// Bytes by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,9 +50,11 @@ pub struct ShapeReport {
     pub name: String,
     /// Cell edge, mm.
     pub cell_mm: f64,
-    /// Number format.
+    /// What its field holds.
+    pub method: Method,
+    /// Number format of distances.
     pub format: SampleFormat,
-    /// One step of a sample, mm.
+    /// One step of a sample, mm; the cell's edge where there are no distances.
     pub scale_mm: f64,
     /// Bricks along x, y, z.
     pub brick_dims: [u16; 3],

@@ -49,7 +49,8 @@ impl<'a> Field<'a> {
         self.record
     }
 
-    /// Distance, gradient and face at `p` (m, shape frame), or a lower bound. A non-finite `p` is far outside with bound 0.
+    /// Distance, gradient and face at `p` (m, shape frame), or a lower bound. A non-finite `p` is far outside with bound 0. A voxmap has no
+    /// distances: bounds everywhere, to its surface voxels.
     #[inline]
     pub fn lookup(&self, p: [f32; 3]) -> Lookup {
         self.lookup_within(self.in_cells(p), f32::INFINITY)
@@ -84,6 +85,9 @@ impl<'a> Field<'a> {
         match entry {
             GridEntry::Brick(number) => {
                 let brick = &self.bricks[number as usize];
+                if self.is_occupancy() {
+                    return self.voxel_as_far(brick, cell);
+                }
                 let corners = self.corners(brick, cell);
                 let distance = value(&corners, f) * self.record.scale;
                 if distance < enough {
@@ -116,7 +120,11 @@ impl<'a> Field<'a> {
         let (entry, cell, f) = self.entry(g);
         match entry {
             GridEntry::Brick(number) => {
-                let corners = self.corners(&self.bricks[number as usize], cell);
+                let brick = &self.bricks[number as usize];
+                if self.is_occupancy() {
+                    return self.voxel_bound(brick, cell);
+                }
+                let corners = self.corners(brick, cell);
                 value(&corners, f) * self.record.scale
             }
             GridEntry::Empty { inside, cells } => {
@@ -130,14 +138,14 @@ impl<'a> Field<'a> {
     ///
     /// Compared as bits: those of positive numbers are in the numbers' order, those of negative ones and of what is no number lie above all.
     #[inline(always)]
-    fn holds(&self, g: [f32; 3]) -> bool {
+    pub(super) fn holds(&self, g: [f32; 3]) -> bool {
         let n = &self.cells;
         g[0].to_bits() < n[0].to_bits() && g[1].to_bits() < n[1].to_bits() && g[2].to_bits() < n[2].to_bits()
     }
 
     /// Lower bound of the distance (m) from a position outside the grid: that to its box, which holds the whole shape. 0 for one that is not a number.
     #[cold]
-    fn beyond(&self, g: [f32; 3]) -> f32 {
+    pub(super) fn beyond(&self, g: [f32; 3]) -> f32 {
         let mut squared = f32::MIN_POSITIVE;
         for (g, n) in g.iter().zip(&self.cells) {
             let d = if *g < 0.0 {
@@ -154,7 +162,7 @@ impl<'a> Field<'a> {
 
     /// The entry, cell of the brick, and position in the cell of a grid position that the grid holds.
     #[inline(always)]
-    fn entry(&self, g: [f32; 3]) -> (GridEntry, usize, [f32; 3]) {
+    pub(super) fn entry(&self, g: [f32; 3]) -> (GridEntry, usize, [f32; 3]) {
         let w = [g[0] as u32, g[1] as u32, g[2] as u32];
         let f = [g[0] - w[0] as f32, g[1] - w[1] as f32, g[2] - w[2] as f32];
         let dims = &self.record.brick_dims;
@@ -187,7 +195,7 @@ impl<'a> Field<'a> {
     }
 
     #[inline(always)]
-    fn face(&self, brick: &BrickRecord, cell: usize) -> u16 {
+    pub(super) fn face(&self, brick: &BrickRecord, cell: usize) -> u16 {
         let entry = match brick.index_bits {
             0 => 0,
             4 => {

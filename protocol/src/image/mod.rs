@@ -8,15 +8,17 @@
 //! header | parts | shapes | fields | nodes | points | faces | bricks | palette | grid | blob
 //! ```
 //!
-//! A **shape** is geometry in its own frame: a signed-distance **field** (dense grid of bricks, sparse brick
+//! A **shape** is geometry in its own frame: a signed-distance **field** or voxmap (dense grid of bricks, sparse brick
 //! data), a **pointshell** (points under a preorder sphere tree of nodes) and its B-rep **faces**. A **part** places a shape.
 
 mod error;
 mod field;
+mod occupancy;
 mod open;
 mod records;
 
 pub use error::ImageError;
 pub use field::{Field, FieldSample, Lookup};
+pub use occupancy::{VOXEL_BRICK_BYTES, Voxel, VoxelSample};
 pub use open::{CRC, SceneImage, Shape};
 pub use records::*;

@@ -5,6 +5,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 
 use super::error::ImageError;
 use super::field::Field;
+use super::occupancy::VOXEL_BRICK_BYTES;
 use super::records::*;
 
 /// The checksum of images and frames.
@@ -179,7 +180,7 @@ impl<'a> SceneImage<'a> {
                 && (field.scale / field.cell * 131_072.0).is_finite()
                 && field.band.is_finite()
                 && field.band >= 0.0
-                && (field.format == FORMAT_I8 || field.format == FORMAT_I16)
+                && brick_bytes(field.format).is_some()
                 && field.brick_count as usize <= GridEntry::MAX_BRICKS
                 && fits(field.first_brick, field.brick_count, self.bricks.len())
                 && u32::try_from(grid_len(field)).is_ok_and(|n| fits(field.first_grid, n, self.grid.len()))
@@ -192,9 +193,9 @@ impl<'a> SceneImage<'a> {
                 && run(self.bricks, field.first_brick, field.brick_count)
                     .iter()
                     .all(|b| {
-                        let wide = if field.format == FORMAT_I8 { 1 } else { 2 };
                         b.samples.is_multiple_of(4)
-                            && fits(b.samples, (wide * SAMPLES_PER_BRICK) as u32, self.blob.len())
+                            && brick_bytes(field.format)
+                                .is_some_and(|n| fits(b.samples, n as u32, self.blob.len()))
                     })
         })?;
         each(self.bricks, SECTION_BRICKS, |brick| {
@@ -240,6 +241,16 @@ impl<'a> SceneImage<'a> {
                 && finite(&face.axis)
                 && finite(&[face.sense, face.radius, face.second])
         })
+    }
+}
+
+/// Bytes of a brick's samples; `None` for a format this side does not know.
+fn brick_bytes(format: u16) -> Option<usize> {
+    match format {
+        FORMAT_I8 => Some(SAMPLES_PER_BRICK),
+        FORMAT_I16 => Some(2 * SAMPLES_PER_BRICK),
+        FORMAT_OCCUPANCY => Some(VOXEL_BRICK_BYTES),
+        _ => None,
     }
 }
 

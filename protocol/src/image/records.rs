@@ -119,8 +119,10 @@ pub struct ShapeRecord {
 pub const FORMAT_I8: u16 = 1;
 /// Samples are `i16`.
 pub const FORMAT_I16: u16 = 2;
+/// No distances: two bits for each cell (see [`super::Voxel`]).
+pub const FORMAT_OCCUPANCY: u16 = 3;
 
-/// A signed-distance field on bricks of 8³ cells, in its shape's frame.
+/// A signed-distance field, or a voxmap, on bricks of 8³ cells, in its shape's frame.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FieldRecord {
@@ -128,13 +130,13 @@ pub struct FieldRecord {
     pub origin: [f32; 3],
     /// Cell edge, m.
     pub cell: f32,
-    /// Metres for each unit of a sample.
+    /// Metres for each unit of a sample; the cell's edge in a voxmap, where nothing uses it.
     pub scale: f32,
-    /// Samples are exact distances up to this far from the surface, and clamped beyond, m.
+    /// Samples are exact distances up to this far from the surface, and clamped beyond, m. In a voxmap: no surface voxel is nearer to a free one.
     pub band: f32,
     /// Bricks along x, y, z.
     pub brick_dims: [u16; 3],
-    /// [`FORMAT_I8`] or [`FORMAT_I16`].
+    /// [`FORMAT_I8`], [`FORMAT_I16`] or [`FORMAT_OCCUPANCY`].
     pub format: u16,
     /// Its grid entries: `dims.x·dims.y·dims.z` of them, x fastest.
     pub first_grid: u32,
@@ -147,7 +149,7 @@ pub struct FieldRecord {
 /// One entry of a field's brick grid, as stored in 16 bits.
 ///
 /// Bit 15 clear: the number of a brick (from `first_brick`). Bit 15 set: no brick; bit 14 tells inside (1) from outside (0), bits 0–13
-/// are a lower bound of the distance to the surface from anywhere in the brick's volume, in cells, rounded down.
+/// are a lower bound of the distance to the surface (in a voxmap: to a surface voxel) from anywhere in the brick's volume, in cells, rounded down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridEntry {
     /// Samples are stored.
@@ -200,7 +202,7 @@ impl GridEntry {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BrickRecord {
-    /// Byte offset in the blob of its 9³ samples; a multiple of 4.
+    /// Byte offset in the blob of its 9³ samples, or 8³ voxels; a multiple of 4.
     pub samples: u32,
     /// Byte offset in the blob of its 8³ palette indices (`index_bits` each, low nibble first); unused when `index_bits` is 0.
     pub indices: u32,

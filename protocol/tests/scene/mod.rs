@@ -192,27 +192,125 @@ pub fn bytes() -> Vec<u8> {
         part(1, PART_GRABBABLE, [0.0, 0.0, 0.05], [0.0, 0.0, 0.0, 1.0]),
     ];
 
-    let mut bytes = vec![0u8; size_of::<Header>()];
-    let mut header = Header {
-        magic: MAGIC,
-        layout: LAYOUT_VERSION,
-        parts: section(&mut bytes, &parts),
-        shapes: section(&mut bytes, &shapes),
-        fields: section(&mut bytes, &fields),
-        nodes: section(&mut bytes, &nodes),
-        points: section(&mut bytes, &points),
-        faces: section(&mut bytes, &faces),
-        bricks: section(&mut bytes, &bricks),
-        palette: section(&mut bytes, &palette),
-        grid: section(&mut bytes, &grid),
-        blob: section(&mut bytes, &blob),
-        ..Header::zeroed()
+    Sections {
+        parts: &parts,
+        shapes: &shapes,
+        fields: &fields,
+        nodes: &nodes,
+        points: &points,
+        faces: &faces,
+        bricks: &bricks,
+        palette: &palette,
+        grid: &grid,
+        blob: &blob,
+    }
+    .image()
+}
+
+/// A scene with a voxmap: the half-space z < 4.5 mm on voxels of 1 mm, in one brick under an empty one, over an empty one inside; one part.
+pub fn occupancy_bytes() -> Vec<u8> {
+    let mut voxels = [0u8; VOXEL_BRICK_BYTES];
+    let mut cell = 0;
+    each(BRICK_CELLS, |_, _, z| {
+        let voxel = match z {
+            0..4 => Voxel::Interior,
+            4 => Voxel::Surface,
+            5 => Voxel::Proximity,
+            _ => Voxel::Free,
+        };
+        voxels[cell / 4] |= (voxel as u8) << (2 * (cell % 4));
+        cell += 1;
+    });
+    let empty = |inside, cells| GridEntry::Empty { inside, cells };
+    let grid = [
+        empty(true, 4),
+        GridEntry::Brick(0),
+        empty(false, 3),
+        empty(false, 3),
+    ]
+    .map(GridEntry::to_bits);
+    let field = FieldRecord {
+        origin: [0.0, 0.0, -0.008],
+        cell: 0.001,
+        scale: 0.001,
+        band: 0.001,
+        brick_dims: [1, 1, 3],
+        format: FORMAT_OCCUPANCY,
+        first_grid: 0,
+        first_brick: 0,
+        brick_count: 1,
     };
-    header.length = bytes.len() as u32;
-    bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
-    let crc = CRC.checksum(&bytes[20..]);
-    bytes[16..20].copy_from_slice(&crc.to_le_bytes());
-    bytes
+    let brick = BrickRecord {
+        palette_len: 1,
+        ..BrickRecord::zeroed()
+    };
+    let part = PartRecord {
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        ..PartRecord::zeroed()
+    };
+    let shape = ShapeRecord {
+        face_count: 1,
+        radius: 0.02,
+        ..ShapeRecord::zeroed()
+    };
+    Sections {
+        parts: &[part],
+        shapes: &[shape],
+        fields: &[field],
+        nodes: &[],
+        points: &[],
+        faces: &[FaceRecord {
+            kind: surface_kind::PLANE,
+            sense: 1.0,
+            origin: [0.0, 0.0, 0.0045],
+            axis: [0.0, 0.0, 1.0],
+            ..FaceRecord::zeroed()
+        }],
+        bricks: &[brick],
+        palette: &[0],
+        grid: &grid,
+        blob: &voxels,
+    }
+    .image()
+}
+
+struct Sections<'a> {
+    parts: &'a [PartRecord],
+    shapes: &'a [ShapeRecord],
+    fields: &'a [FieldRecord],
+    nodes: &'a [NodeRecord],
+    points: &'a [PointRecord],
+    faces: &'a [FaceRecord],
+    bricks: &'a [BrickRecord],
+    palette: &'a [u16],
+    grid: &'a [u16],
+    blob: &'a [u8],
+}
+
+impl Sections<'_> {
+    fn image(&self) -> Vec<u8> {
+        let mut bytes = vec![0u8; size_of::<Header>()];
+        let mut header = Header {
+            magic: MAGIC,
+            layout: LAYOUT_VERSION,
+            parts: section(&mut bytes, self.parts),
+            shapes: section(&mut bytes, self.shapes),
+            fields: section(&mut bytes, self.fields),
+            nodes: section(&mut bytes, self.nodes),
+            points: section(&mut bytes, self.points),
+            faces: section(&mut bytes, self.faces),
+            bricks: section(&mut bytes, self.bricks),
+            palette: section(&mut bytes, self.palette),
+            grid: section(&mut bytes, self.grid),
+            blob: section(&mut bytes, self.blob),
+            ..Header::zeroed()
+        };
+        header.length = bytes.len() as u32;
+        bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
+        let crc = CRC.checksum(&bytes[20..]);
+        bytes[16..20].copy_from_slice(&crc.to_le_bytes());
+        bytes
+    }
 }
 
 fn each(n: usize, mut visit: impl FnMut(usize, usize, usize)) {
