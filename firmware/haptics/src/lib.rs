@@ -12,7 +12,9 @@
 //! | `settings`, `io`, `state` | what a tick reads, returns and remembers |
 //! | `coupling` | virtual coupling between handle and object |
 //! | `proximity`, `coherence`, `contact` | sphere tree against field; what is not due yet; bounded store of contacts |
+//! | `occupancy` | the same with a voxmap in place of the field: the textbook method, to be compared with |
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
+//! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
 //! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
@@ -26,10 +28,12 @@ mod body;
 mod coherence;
 mod contact;
 mod coupling;
+mod explicit;
 mod io;
 mod limits;
 mod linear;
 mod nearest;
+mod occupancy;
 mod pose;
 mod probe;
 mod proximity;
@@ -45,7 +49,8 @@ pub use io::{FacePair, FacePairs, Flags, Input, Output, Work};
 pub use pose::{Pose, Twist, Wrench};
 pub use probe::{ContactPoint, Nearest, Probe, ProbeError, Prober};
 pub use settings::{
-    ContactSettings, CouplingSettings, LimitSettings, ObjectSettings, Range, Settings, SettingsError, ranges,
+    ContactSettings, CouplingSettings, Integrator, LimitSettings, ObjectSettings, Range, Settings,
+    SettingsError, ranges,
 };
 pub use state::{GrabError, State};
 pub use tick::tick;

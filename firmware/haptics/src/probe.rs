@@ -1,7 +1,8 @@
 //! How near two parts are at one pose, and what contact would push with: what the tick sees, asked without a motion.
 //!
 //! For measuring, on a PC as on a board: it walks the trees and fields of the tick's own search, both ways, without its budget and without
-//! what earlier poses left. Forces are those of the contact law at rest, λ = k·depth, k shared as in the tick.
+//! what earlier poses left. Forces are those of the contact law at rest, λ = k·depth, k shared as in the tick. A voxmap answers for itself: depth to
+//! its tangent planes, gaps only as bounds, nothing from the analytic faces.
 
 use core::fmt;
 
@@ -13,6 +14,7 @@ use crate::coherence::Coherence;
 use crate::contact::{Contacts, Phase};
 use crate::io::{Flags, Work};
 use crate::nearest::NearestSearch;
+use crate::occupancy::nearest_voxel;
 use crate::pose::{Pose, Wrench};
 use crate::proximity::{Job, Search};
 use crate::settings::ContactSettings;
@@ -36,14 +38,15 @@ pub struct Probe {
 /// The smallest gap between two parts, or the largest depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// Signed distance, m: gap positive, deepest point negative. By the analytic faces when `exact`, else as the field has it.
+    /// Signed distance, m: gap positive, deepest point negative. By the analytic faces when `exact`, else as the field has it, or the
+    /// voxmap's tangent planes.
     pub distance_m: f32,
     /// The smallest distance the field itself gave, of the points looked at, m: what the tick acts on. Infinite when none lay where the field
     /// stores distances.
     pub field_distance_m: f32,
     /// The distance is one to an analytic face or edge, within single precision.
     pub exact: bool,
-    /// The point lies where the field stores distances; when neither this nor `exact`, the distance is only a bound: at least so far apart,
+    /// The point lies where the field stores distances, or past a tangent plane; when neither this nor `exact`, the distance is only a bound: at least so far apart,
     /// or at least so deep.
     pub in_band: bool,
     /// From the moving part's centre of mass to the point, axes of the fixed part, m.
@@ -160,7 +163,14 @@ impl Prober {
         };
         let mut work = Work::default();
         for (job, shape) in jobs.iter().zip([&other, &held]) {
-            (nearest, work) = NearestSearch::run(job, shape, nearest, work);
+            if job.left_out() {
+                continue;
+            }
+            (nearest, work) = if shape.field.is_occupancy() {
+                nearest_voxel(job, shape, nearest, work)
+            } else {
+                NearestSearch::run(job, shape, nearest, work)
+            };
         }
         self.contacts.clear();
         let mut wrench = Wrench::ZERO;
@@ -219,6 +229,7 @@ impl Prober {
             busy: false,
             thinning: 0,
             budget: u32::MAX,
+            braking_m: 0.0,
         }
         .run_all(jobs, &mut self.coherence, &mut self.contacts, work);
         work.flags

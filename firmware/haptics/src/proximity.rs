@@ -81,6 +81,8 @@ pub(crate) struct Search<'s, 'i> {
     pub thinning: u8,
     /// Look-ups allowed.
     pub budget: u32,
+    /// Points that come this near are braked, m; 0 for no braking. Then points in proximity voxels are wanted too.
+    pub braking_m: f32,
 }
 
 /// Trees and fields of one job, and the way between their frames.
@@ -111,12 +113,18 @@ impl Affine {
     pub fn apply(&self, p: [f32; 3]) -> Vec3 {
         self.linear * Vec3::from_array(p) + self.offset
     }
+
+    /// A direction.
+    #[inline]
+    pub fn turn(&self, direction: Vec3) -> Vec3 {
+        self.linear * direction
+    }
 }
 
 impl<'i> Search<'_, 'i> {
     /// How far a contact's gap may close in this tick, m, at least 0.
     #[inline]
-    fn approach(&self, row: &[f32; 6]) -> f32 {
+    pub fn approach(&self, row: &[f32; 6]) -> f32 {
         let mut most = 0.0f32;
         for motion in &self.motions {
             let closing = -dot(row, motion);
@@ -246,17 +254,17 @@ impl<'i> Job<'i> {
 }
 
 /// A search under way.
-struct Walk<'w, 's, 'i> {
-    search: &'w Search<'s, 'i>,
+pub(crate) struct Walk<'w, 's, 'i> {
+    pub search: &'w Search<'s, 'i>,
     coherence: &'w mut Coherence,
     /// Travel at which what lies within the margin is due.
     horizon: u32,
-    contacts: &'w mut Contacts,
-    work: &'w mut Work,
+    pub contacts: &'w mut Contacts,
+    pub work: &'w mut Work,
     /// Nodes known to be far or near.
     passed_over: u32,
     /// Points within the margin.
-    near: u32,
+    pub near: u32,
 }
 
 impl Walk<'_, '_, '_> {
@@ -285,6 +293,9 @@ impl Walk<'_, '_, '_> {
     ///
     /// Ends because every record's `skip` points forward (checked when the image was opened).
     fn nodes(&mut self, job: &Job<'_>, from: u32, to: u32) -> Option<Leaf> {
+        if job.left_out() {
+            return None;
+        }
         let edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
         let mut index = from;
         while index < to {
@@ -329,22 +340,26 @@ impl Walk<'_, '_, '_> {
                 if (self.left() as usize) < points.len() && self.work.points > 0 {
                     return Some(here);
                 }
-                self.points(job, here, points);
+                if job.field.is_occupancy() {
+                    self.points::<true>(job, here, points);
+                } else {
+                    self.points::<false>(job, here, points);
+                }
             }
         }
         None
     }
 
-    /// All points of a leaf, as far as the budget goes.
-    fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) {
+    /// All points of a leaf, as far as the budget goes; `VOXELS`: against a voxmap.
+    fn points<const VOXELS: bool>(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) {
         let most = (self.left() as usize).min(points.len());
         let stride = 1 << self.search.thinning;
-        let mut nearest = self.some(job, leaf, points[..most].iter().step_by(stride));
+        let mut nearest = self.some::<VOXELS>(job, leaf, points[..most].iter().step_by(stride));
         if stride > 1 && nearest > self.search.margin {
             // None of these is near: with the others, too, it is known for how long the leaf can be left alone.
             for start in 1..stride {
                 let others = points[..most].iter().skip(start).step_by(stride);
-                nearest = nearest.min(self.some(job, leaf, others));
+                nearest = nearest.min(self.some::<VOXELS>(job, leaf, others));
             }
         }
         // What is not looked at could be anywhere.
@@ -356,12 +371,17 @@ impl Walk<'_, '_, '_> {
 
     /// Some points of a leaf; the smallest gap.
     #[inline(always)]
-    fn some<'p>(&mut self, job: &Job<'_>, leaf: Leaf, points: impl Iterator<Item = &'p PointRecord>) -> f32 {
+    fn some<'p, const VOXELS: bool>(
+        &mut self,
+        job: &Job<'_>,
+        leaf: Leaf,
+        points: impl Iterator<Item = &'p PointRecord>,
+    ) -> f32 {
         let mut nearest = f32::INFINITY;
         let mut looked_at = 0;
         for point in points {
             looked_at += 1;
-            let gap = self.point(job, leaf, point);
+            let gap = self.point::<VOXELS>(job, leaf, point);
             if gap < nearest {
                 nearest = gap;
             }
@@ -372,7 +392,10 @@ impl Walk<'_, '_, '_> {
 
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
     #[inline(always)]
-    fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
+    fn point<const VOXELS: bool>(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
+        if VOXELS {
+            return self.voxel(job, leaf, point);
+        }
         let in_cells = job.to_cells.apply(point.position);
         match job.field.lookup_within(in_cells.to_array(), self.search.margin) {
             Lookup::Near(sample) => self.near(job, leaf, point, &sample),
@@ -436,7 +459,7 @@ impl Walk<'_, '_, '_> {
 
 /// 1/√x for ordinary positive x: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).
 #[inline]
-fn inverse_sqrt(x: f32) -> f32 {
+pub(crate) fn inverse_sqrt(x: f32) -> f32 {
     let mut y = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
     for _ in 0..3 {
         y *= 1.5 - 0.5 * x * y * y;

@@ -18,6 +18,19 @@ pub struct Settings {
     pub limits: LimitSettings,
     /// Time from tick to tick (h in the notation), s. Default 1 ms.
     pub period_s: f32,
+    /// How the object is moved. Default [`Integrator::Implicit`].
+    pub integrator: Integrator,
+}
+
+/// How the object is moved from tick to tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Integrator {
+    /// Backward Euler: stable at any contact stiffness.
+    #[default]
+    Implicit,
+    /// Newton–Euler with forces of the tick's start, eqs. 11–12 of Faas 2010, with its speed limit and pre-contact braking, eqs. 5–6: the
+    /// textbook's, which trembles once h²·k/m of all touching points together comes near 4. [`ContactSettings::damping_s`] has no part in it.
+    Explicit,
 }
 
 /// Virtual coupling, eqs. 1–2 of Faas 2010: F = k_T·d − b_T·v, τ = k_R·θ − b_R·ω, with v and ω of the object relative to the handle.
@@ -125,6 +138,7 @@ impl Default for Settings {
                 torque_slew_nm_per_s: 200.0,
             },
             period_s: 1e-3,
+            integrator: Integrator::Implicit,
         }
     }
 }
@@ -226,6 +240,7 @@ impl Settings {
             object,
             limits,
             period_s,
+            integrator: Integrator::Implicit | Integrator::Explicit,
         } = self;
         let gyration_max = Range {
             min: object.gyration_min_m,

@@ -4,7 +4,7 @@ use core::fmt;
 
 use glam::Vec3;
 use heapless::Vec;
-use mortise_protocol::image::{PART_GRABBABLE, SceneImage};
+use mortise_protocol::image::{PART_GRABBABLE, SceneImage, Shape};
 use mortise_protocol::limits::MAX_PARTS;
 
 use crate::body::{Body, Grabbed};
@@ -34,6 +34,10 @@ pub struct State {
     pub(crate) thinning: u8,
     /// Ticks in a row whose budget ran out.
     pub(crate) overruns: u8,
+    /// Smallest cell of any field in the scene, m; 0 without parts.
+    pub(crate) finest_cell_m: f32,
+    /// Smallest voxel of any voxmap in the scene, m; 0 when there is none.
+    pub(crate) finest_voxel_m: f32,
     /// Nodes that need not be looked at yet.
     pub(crate) coherence: Coherence,
     /// Scratch of one tick; kept here because a board's stack is small.
@@ -108,6 +112,8 @@ impl State {
             busy: false,
             thinning: 0,
             overruns: 0,
+            finest_cell_m: 0.0,
+            finest_voxel_m: 0.0,
             coherence: Coherence::new(),
             contacts: Contacts::new(),
         }
@@ -120,8 +126,16 @@ impl State {
         self.release();
         self.last_object = None;
         self.parts.clear();
+        (self.finest_cell_m, self.finest_voxel_m) = (0.0, 0.0);
         for (index, record) in scene.parts().iter().enumerate().take(MAX_PARTS) {
-            let shape = scene.shape_of_part(index).record;
+            let Shape {
+                record: shape, field, ..
+            } = scene.shape_of_part(index);
+            let cell = field.record().cell;
+            self.finest_cell_m = finer(self.finest_cell_m, cell);
+            if field.is_occupancy() {
+                self.finest_voxel_m = finer(self.finest_voxel_m, cell);
+            }
             let pose = Pose::from_arrays(record.position, record.orientation);
             let local_center = Vec3::from_array(shape.center);
             // The loop is no longer than the vector.
@@ -231,6 +245,11 @@ impl State {
             }
         }
     }
+}
+
+/// The smaller of a size found so far (0: none) and another.
+fn finer(known: f32, cell: f32) -> f32 {
+    if known > 0.0 && known < cell { known } else { cell }
 }
 
 #[cfg(test)]

@@ -4,12 +4,13 @@ use mortise_protocol::image::SceneImage;
 
 use crate::body::Grabbed;
 use crate::coupling::Coupling;
+use crate::explicit;
 use crate::io::{FacePairs, Flags, Input, Output, Work};
 use crate::limits::{length, limit};
 use crate::pose::{Pose, Twist, Wrench, renormalize};
 use crate::proximity::{Leaf, Search};
 use crate::rotation;
-use crate::settings::Settings;
+use crate::settings::{Integrator, Settings};
 use crate::state::State;
 use crate::step::{Solution, Step};
 use crate::touching::touching_faces;
@@ -36,6 +37,8 @@ const OVERRUNS_BORNE: u8 = 2;
 const MOST_THINNING: u8 = 3;
 /// Twice the points cost up to twice as much, and the next tick may need more: they are looked at again once this share of the budget was enough.
 const ROOM_TO_THICKEN: u32 = 3;
+/// The diagonal of a cell, cells.
+const DIAGONAL_CELLS: f32 = 1.733;
 
 /// Moves the held object by one period and gives the wrench the handle must feel.
 ///
@@ -81,22 +84,23 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         length: scale,
         twist: grabbed.twist,
     };
-    let mut free = step.free();
+    let mut free = match settings.integrator {
+        Integrator::Implicit => step.free(),
+        Integrator::Explicit => explicit::free(&step),
+    };
     let reach = grabbed.body.reach;
-    let capped = slow_down(&mut free.twist, reach, settings.object.speed_max_m_per_s);
+    let fastest = state.fastest(settings);
+    let capped = slow_down(&mut free.twist, reach, fastest);
     // As far as it would go with nothing in the way; but what leans on something stays there, and need not look as far as if it let go.
     let likely = FASTER * point_speed(grabbed.twist, reach) + START_M_PER_S;
-    let margin =
-        settings.contact.margin_m + settings.period_s * smaller(likely, point_speed(free.twist, reach));
+    let margin = settings.contact.margin_m
+        + state.braking_margin(settings)
+        + settings.period_s * smaller(likely, point_speed(free.twist, reach));
     let solution = state.meet(scene, settings, &grabbed, &step, &free, margin, &mut work);
 
     let mut twist = solution.twist;
     // Nothing beyond the margin was looked at, so nothing may move farther.
-    let slowed = slow_down(
-        &mut twist,
-        reach,
-        smaller(margin / settings.period_s, settings.object.speed_max_m_per_s),
-    );
+    let slowed = slow_down(&mut twist, reach, smaller(margin / settings.period_s, fastest));
     work.flags.insert_if(capped || slowed, Flags::SPEED_LIMITED);
     grabbed.advance(twist, settings.period_s);
     if !(grabbed.twist.is_finite() && grabbed.pose().is_finite() && solution.contact.is_finite()) {
@@ -142,6 +146,8 @@ impl State {
         margin: f32,
         work: &mut Work,
     ) -> Solution {
+        let explicit = settings.integrator == Integrator::Explicit;
+        let braking_m = if explicit { self.finest_cell_m } else { 0.0 };
         let search = Search {
             scene,
             parts: &self.parts,
@@ -149,13 +155,14 @@ impl State {
             pose: grabbed.pose(),
             center: grabbed.center,
             margin,
-            slack: settings.contact.margin_m,
+            slack: larger(settings.contact.margin_m, braking_m),
             motions: [grabbed.twist, free.twist].map(|t| step.scale(t).map(|x| x * settings.period_s)),
             swing: margin / (grabbed.body.reach * grabbed.body.reach),
             inverse_length: 1.0 / step.length,
             busy: self.busy,
             thinning: self.thinning,
             budget: settings.contact.point_budget,
+            braking_m,
         };
         let (stopped, used) = search.run(self.resume, &mut self.coherence, &mut self.contacts, work);
         self.resume = stopped.unwrap_or(Leaf::FIRST);
@@ -173,12 +180,45 @@ impl State {
         let contact = &settings.contact;
         let touching_now = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as f32;
         self.sharing = larger(larger(touching_now, 1.0), self.sharing * SHARING_DECAY);
-        let k = contact.shared_stiffness(self.sharing);
-        let solution = step.with_contacts(free, self.contacts.as_mut_slice(), k, contact.damping_s);
+        let fastest = self.fastest(settings);
+        let contacts = self.contacts.as_mut_slice();
+        let solution = if explicit {
+            let k = explicit::shared_stiffness(contact, self.sharing);
+            let reach = grabbed.body.reach;
+            explicit::with_contacts(step, contacts, k, braking_m, |mut twist| {
+                slow_down(&mut twist, reach, fastest);
+                twist
+            })
+        } else {
+            let k = contact.shared_stiffness(self.sharing);
+            step.with_contacts(free, contacts, k, contact.damping_s)
+        };
         work.contacts = self.contacts.pushing() as u16;
         work.solves = solution.solves;
         work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
         solution
+    }
+
+    /// No point of the object may be faster, m/s. The textbook methods see no farther than the next voxel, so half a cell a tick (eq. 5 of Faas
+    /// 2010) bounds the explicit step, and half a voxel any step where there are voxmaps.
+    fn fastest(&self, settings: &Settings) -> f32 {
+        let cell = match settings.integrator {
+            Integrator::Implicit => self.finest_voxel_m,
+            Integrator::Explicit => self.finest_cell_m,
+        };
+        if cell > 0.0 {
+            smaller(0.5 * cell / settings.period_s, settings.object.speed_max_m_per_s)
+        } else {
+            settings.object.speed_max_m_per_s
+        }
+    }
+
+    /// How far from contact braking begins, m: within a cell of the surface, or in the layer of voxels round it, at most a diagonal away.
+    fn braking_margin(&self, settings: &Settings) -> f32 {
+        match settings.integrator {
+            Integrator::Implicit => 0.0,
+            Integrator::Explicit => DIAGONAL_CELLS * self.finest_cell_m,
+        }
     }
 
     /// The wrench for the mechanism; remembered for the slew limit.

@@ -4,7 +4,7 @@ mod support;
 
 use std::sync::LazyLock;
 
-use mortise_haptics::{Flags, Input, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick};
+use mortise_haptics::{Flags, Input, Integrator, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick};
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
 use support::image::Image;
@@ -23,6 +23,7 @@ fn scene_of(i: usize) -> &'static Image {
 }
 
 static SCENE: LazyLock<Image> = LazyLock::new(|| support::hole_and_peg(0.1e-3, 5e-3));
+static VOXELS: LazyLock<Image> = LazyLock::new(|| support::hole_and_peg_in_voxels(0.1e-3, 5e-3));
 
 /// Mostly ordinary, sometimes absurd.
 fn number(scale: f32) -> impl Strategy<Value = f32> {
@@ -73,9 +74,13 @@ fn settings() -> impl Strategy<Value = Settings> {
         0.0f32..1.0,
         100.0f32..1e5,
         16u32..3000,
+        prop_oneof![Just(Integrator::Implicit), Just(Integrator::Explicit)],
     )
-        .prop_map(|(k, k_t, b_t, force, torque, slew, budget)| {
-            let mut s = Settings::default();
+        .prop_map(|(k, k_t, b_t, force, torque, slew, budget, integrator)| {
+            let mut s = Settings {
+                integrator,
+                ..Settings::default()
+            };
             s.contact.stiffness_n_per_m = k;
             s.coupling.k_t_n_per_m = k_t;
             s.coupling.b_t = b_t;
@@ -96,8 +101,12 @@ proptest! {
     })]
 
     #[test]
-    fn stays_within_limits(settings in settings(), inputs in prop::collection::vec(input(), 1..60)) {
-        let scene = SCENE.open();
+    fn stays_within_limits(
+        settings in settings(),
+        inputs in prop::collection::vec(input(), 1..60),
+        voxels in prop::bool::weighted(0.3),
+    ) {
+        let scene = if voxels { VOXELS.open() } else { SCENE.open() };
         let mut state = State::new();
         state.load_scene(&scene);
         prop_assert_eq!(state.grab(&scene, 1, &Pose::IDENTITY), Ok(()));

@@ -1,4 +1,5 @@
-//! A compact scene-image writer for analytic solids: exact distances sampled into 16-bit bricks, points under a median-split tree.
+//! A compact scene-image writer for analytic solids: exact distances sampled into 16-bit bricks, or voxels classified by them, points under a
+//! median-split tree.
 
 use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
 use mortise_protocol::image::*;
@@ -13,6 +14,8 @@ const LEAF_POINTS: usize = 8;
 pub struct Writer {
     /// Cell edge, m.
     cell: f64,
+    /// Voxmaps instead of distance fields.
+    voxmaps: bool,
     parts: Vec<PartRecord>,
     shapes: Vec<ShapeRecord>,
     fields: Vec<FieldRecord>,
@@ -44,6 +47,7 @@ impl Writer {
     pub fn new(cell: f64) -> Self {
         Self {
             cell,
+            voxmaps: false,
             parts: Vec::new(),
             shapes: Vec::new(),
             fields: Vec::new(),
@@ -57,9 +61,21 @@ impl Writer {
         }
     }
 
+    /// Voxmaps with voxels of this edge, m.
+    pub fn voxmaps(cell: f64) -> Self {
+        Self {
+            voxmaps: true,
+            ..Self::new(cell)
+        }
+    }
+
     /// Adds a shape; its index.
     pub fn shape(&mut self, solid: &dyn Solid) -> u32 {
-        let field = self.field(solid);
+        let field = if self.voxmaps {
+            self.voxmap(solid)
+        } else {
+            self.field(solid)
+        };
         let mut points = solid.points();
         let first_node = self.nodes.len() as u32;
         let first_point = self.points.len() as u32;
@@ -165,6 +181,50 @@ impl Writer {
         self.fields.len() as u32 - 1
     }
 
+    /// Every brick of the box is stored: culling is by what bricks say, and by the box.
+    fn voxmap(&mut self, solid: &dyn Solid) -> u32 {
+        let cell = self.cell;
+        let voxmap = Voxmap::of(solid, cell);
+        let dims = voxmap.size.map(|n| n / BRICK_CELLS);
+        let (first_brick, first_grid) = (self.bricks.len() as u32, self.grid.len() as u32);
+        for index in 0..dims[0] * dims[1] * dims[2] {
+            let b = [
+                index % dims[0],
+                index / dims[0] % dims[1],
+                index / dims[0] / dims[1],
+            ];
+            pad(&mut self.blob);
+            let samples = self.blob.len();
+            self.blob.resize(samples + VOXEL_BRICK_BYTES, 0);
+            for i in 0..CELLS_PER_BRICK {
+                let (n, n2) = (BRICK_CELLS, BRICK_CELLS * BRICK_CELLS);
+                let at = [i % n + n * b[0], i / n % n + n * b[1], i / n2 + n * b[2]];
+                self.blob[samples + i / 4] |= (voxmap.at(at) as u8) << (2 * (i % 4));
+            }
+            self.grid.push(GridEntry::Brick(index as u16).to_bits());
+            self.bricks.push(BrickRecord {
+                samples: samples as u32,
+                indices: 0,
+                palette: self.palette.len() as u32,
+                palette_len: 1,
+                index_bits: 0,
+            });
+        }
+        self.palette.push(NO_FACE);
+        self.fields.push(FieldRecord {
+            origin: voxmap.origin.map(|x| x as f32),
+            cell: cell as f32,
+            scale: cell as f32,
+            band: cell as f32,
+            brick_dims: dims.map(|d| d as u16),
+            format: FORMAT_OCCUPANCY,
+            first_grid,
+            first_brick,
+            brick_count: self.bricks.len() as u32 - first_brick,
+        });
+        self.fields.len() as u32 - 1
+    }
+
     fn brick(&mut self, solid: &dyn Solid, samples: &[f64], scale: f64, at: impl Fn([f64; 3]) -> [f64; 3]) {
         pad(&mut self.blob);
         let offset = self.blob.len() as u32;
@@ -218,6 +278,84 @@ impl Writer {
                 .map(|b| u32::from_le_bytes(b.try_into().unwrap()))
                 .collect(),
         )
+    }
+}
+
+/// Voxels of a solid, in double precision.
+pub struct Voxmap {
+    /// Corner of voxel (0, 0, 0), m.
+    pub origin: [f64; 3],
+    pub cell: f64,
+    /// Voxels along x, y, z: whole bricks.
+    pub size: [usize; 3],
+    voxels: Vec<Voxel>,
+}
+
+impl Voxmap {
+    /// A voxel is crossed when the distance changes its sign among 5³ places of it, corners included.
+    pub fn of(solid: &dyn Solid, cell: f64) -> Self {
+        const STEPS: usize = 5;
+        let half = solid.half_size();
+        let brick = cell * BRICK_CELLS as f64;
+        let dims = half.map(|h| (2.0 * (h + 3.0 * cell) / brick).ceil() as usize);
+        let size = dims.map(|d| d * BRICK_CELLS);
+        let origin = core::array::from_fn::<_, 3, _>(|a| -0.5 * brick * dims[a] as f64);
+        let place = |i: usize| [i % size[0], i / size[0] % size[1], i / size[0] / size[1]];
+        let mut voxels: Vec<Voxel> = (0..size.iter().product())
+            .map(|i| {
+                let (mut low, mut high) = (f64::MAX, f64::MIN);
+                for k in 0..STEPS.pow(3) {
+                    let step = [k % STEPS, k / STEPS % STEPS, k / STEPS / STEPS];
+                    let d = solid.distance(core::array::from_fn(|a| {
+                        origin[a] + cell * (place(i)[a] as f64 + step[a] as f64 / (STEPS - 1) as f64)
+                    }));
+                    low = low.min(d);
+                    high = high.max(d);
+                }
+                match (low < 0.0, high > 0.0) {
+                    (true, true) => Voxel::Surface,
+                    (true, false) => Voxel::Interior,
+                    _ => Voxel::Free,
+                }
+            })
+            .collect();
+        let crossed: Vec<bool> = voxels.iter().map(|&v| v == Voxel::Surface).collect();
+        let index = |at: [usize; 3]| at[0] + size[0] * (at[1] + size[1] * at[2]);
+        for (i, voxel) in voxels.iter_mut().enumerate() {
+            let at = place(i);
+            let near = (0..27).any(|k| {
+                let step = [k % 3, k / 3 % 3, k / 9];
+                let other = core::array::from_fn(|a| (at[a] + step[a]).wrapping_sub(1));
+                (0..3).all(|a| other[a] < size[a]) && crossed[index(other)]
+            });
+            if *voxel == Voxel::Free && near {
+                *voxel = Voxel::Proximity;
+            }
+        }
+        Self {
+            origin,
+            cell,
+            size,
+            voxels,
+        }
+    }
+
+    /// Free beyond the box.
+    pub fn at(&self, at: [usize; 3]) -> Voxel {
+        if (0..3).any(|a| at[a] >= self.size[a]) {
+            return Voxel::Free;
+        }
+        self.voxels[at[0] + self.size[0] * (at[1] + self.size[1] * at[2])]
+    }
+
+    /// The voxel at `p` (m, shape frame), and its centre.
+    pub fn look_up(&self, p: [f64; 3]) -> (Voxel, [f64; 3]) {
+        let g: [f64; 3] = core::array::from_fn(|a| ((p[a] - self.origin[a]) / self.cell).floor());
+        let center = core::array::from_fn(|a| self.origin[a] + self.cell * (g[a] + 0.5));
+        if g.iter().any(|&x| x < 0.0) {
+            return (Voxel::Free, center);
+        }
+        (self.at(g.map(|x| x as usize)), center)
     }
 }
 

@@ -19,7 +19,15 @@ pub const PEG_HALF: f64 = 15e-3;
 /// Fixed block (part 0) with the thesis' 18.75 mm hole and a peg (part 1) of the given diametral clearance, its lower end `engaged`
 /// below the block's top.
 pub fn hole_and_peg(clearance: f64, engaged: f64) -> Image {
-    let mut w = Writer::new(0.5e-3);
+    hole_and_peg_in(Writer::new(0.5e-3), clearance, engaged)
+}
+
+/// The same in voxmaps.
+pub fn hole_and_peg_in_voxels(clearance: f64, engaged: f64) -> Image {
+    hole_and_peg_in(Writer::voxmaps(0.5e-3), clearance, engaged)
+}
+
+fn hole_and_peg_in(mut w: Writer, clearance: f64, engaged: f64) -> Image {
     let block = w.shape(&Block {
         half: [15e-3, 15e-3, BLOCK_HALF],
         hole: HOLE,
@@ -42,23 +50,39 @@ pub fn hole_and_peg(clearance: f64, engaged: f64) -> Image {
     w.finish()
 }
 
+/// The slab of [`slab_and_box`], its top at 4 mm.
+pub const SLAB: Block = Block {
+    half: [20e-3, 20e-3, 4e-3],
+    hole: 0.0,
+    around: 0,
+    across: 5,
+};
+
 /// Fixed slab (part 0) with its top at z = 0 and a box of 20 × 20 × 10 mm (part 1) that hovers `height` above it; `across` squared
 /// points on each of the box's large faces.
 pub fn slab_and_box(height: f64, across: usize) -> Image {
-    let mut w = Writer::new(0.5e-3);
-    let slab = w.shape(&Block {
-        half: [20e-3, 20e-3, 4e-3],
-        hole: 0.0,
-        around: 0,
-        across: 5,
-    });
-    let moving = w.shape(&Block {
+    slab_and_box_in(Writer::new(0.5e-3), height, across)
+}
+
+/// The same in voxmaps of this edge, m.
+pub fn slab_and_box_in_voxels(cell: f64, height: f64, across: usize) -> Image {
+    slab_and_box_in(Writer::voxmaps(cell), height, across)
+}
+
+fn slab_and_box_in(mut w: Writer, height: f64, across: usize) -> Image {
+    let slab = w.shape(&SLAB);
+    let moving = w.shape(&box_of(across));
+    w.part(slab, false, [0.0, 0.0, -4e-3], UPRIGHT);
+    w.part(moving, true, [0.0, 0.0, (5e-3 + height) as f32], UPRIGHT);
+    w.finish()
+}
+
+/// The box of [`slab_and_box`].
+pub fn box_of(across: usize) -> Block {
+    Block {
         half: [10e-3, 10e-3, 5e-3],
         hole: 0.0,
         around: 0,
         across,
-    });
-    w.part(slab, false, [0.0, 0.0, -4e-3], UPRIGHT);
-    w.part(moving, true, [0.0, 0.0, (5e-3 + height) as f32], UPRIGHT);
-    w.finish()
+    }
 }

@@ -1,0 +1,151 @@
+//! Contact of a pointshell with a voxmap: tangent planes.
+//!
+//! The textbook method (McNeely, Puterbaugh & Troy 1999, tangent-plane force model), kept beside the distance field to be compared with. A point of the
+//! held part in a *surface* voxel meets a plane through the voxel's centre with the point's own normal; with n the point's inward normal, p the point
+//! and c the centre, the gap is φ = (p − c)·n, and it is pushed along n. So a contact carries the same numbers as one from a distance field, and both
+//! integrators take both. The depth is wrong by up to half a voxel's diagonal, and jumps where a point goes from voxel to voxel.
+//!
+//! As in the paper: points of the held part only, none of the other's; *interior* voxels push nothing, they are flagged [`Flags::DEEP`]; *proximity*
+//! voxels only brake, and only with [`crate::Integrator::Explicit`]. Unlike it, the force layer is where the surface is, not two voxels outside.
+
+use glam::Vec3;
+use mortise_protocol::image::{PointRecord, Shape, Voxel, VoxelSample, oct_decode};
+
+use crate::contact::Phase;
+use crate::io::{Flags, Work};
+use crate::probe::Nearest;
+use crate::proximity::{Job, Leaf, Walk, inverse_sqrt};
+
+/// The plane a point meets.
+struct TangentPlane {
+    /// Of the point, m: negative when it is through.
+    gap: f32,
+    /// Inward normal of the point: where it is pushed to, world.
+    push: Vec3,
+}
+
+impl TangentPlane {
+    /// Through the centre of the voxel that `p` (field frame) lies in.
+    #[inline]
+    fn of(job: &Job<'_>, point: &PointRecord, p: Vec3, voxel: &VoxelSample) -> Self {
+        let code = Vec3::from_array(oct_decode(point.normal));
+        // The code is no shorter than 1/√3 (the octahedron's faces).
+        let inward = code * -inverse_sqrt(code.length_squared());
+        let in_field = job.to_field.turn(inward);
+        Self {
+            gap: (p - Vec3::from_array(voxel.center)).dot(in_field),
+            push: job.to_arm.turn(inward),
+        }
+    }
+}
+
+impl Job<'_> {
+    /// Whether this way round is not part of the method: points of the other part against a voxmap of the held one.
+    pub fn left_out(&self) -> bool {
+        self.backward && self.field.is_occupancy()
+    }
+}
+
+impl Walk<'_, '_, '_> {
+    /// Looks one point up and offers it as a contact; how far it is from any surface voxel at least, m.
+    pub fn voxel(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
+        let p = job.to_field.apply(point.position);
+        let sample = job.field.voxel(p.to_array());
+        let braking_m = self.search.braking_m;
+        match sample.voxel {
+            Voxel::Free => return sample.bound,
+            Voxel::Interior => {
+                self.work.flags.insert(Flags::DEEP);
+                return 0.0;
+            }
+            Voxel::Proximity if braking_m <= 0.0 => return 0.0,
+            Voxel::Proximity | Voxel::Surface => {}
+        }
+        self.near += 1;
+        let plane = TangentPlane::of(job, point, p, &sample);
+        let arm = job.to_arm.apply(point.position);
+        let n = plane.push;
+        let turn = arm.cross(n) * self.search.inverse_length;
+        let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
+        let approach = self.search.approach(&row);
+        let (gap, wanted) = if sample.voxel == Voxel::Surface {
+            (plane.gap, plane.gap < self.search.slack + approach)
+        } else {
+            // As near as braking begins, for all the method knows; wanted while it comes nearer.
+            (braking_m, approach > 0.0)
+        };
+        if !wanted {
+            return 0.0;
+        }
+        self.work.candidates = self.work.candidates.saturating_add(1);
+        let reach_gap = gap - self.search.swing * arm.length_squared();
+        if let Some(contact) = self.contacts.offer(gap, reach_gap) {
+            contact.row = row;
+            contact.arm = arm;
+            contact.rate = 0.0;
+            contact.phase = Phase::Free;
+            (contact.moving_face, contact.static_face) = (point.face, sample.face);
+            contact.leaf = leaf;
+        }
+        0.0
+    }
+}
+
+/// The deepest point of a job against a voxmap, as the method has it: depth to a tangent plane, else no more than a lower bound of the gap.
+///
+/// Looks at every point that is not known to be farther from all surface voxels than the nearest so far.
+pub(crate) fn nearest_voxel(
+    job: &Job<'_>,
+    shape: &Shape<'_>,
+    mut best: Nearest,
+    mut work: Work,
+) -> (Nearest, Work) {
+    let mut index = 0;
+    while let Some(node) = job.nodes.get(index) {
+        work.nodes += 1;
+        let center = job.to_field.apply(node.center);
+        if shape.field.bound(center.to_array()) - node.radius > best.distance_m {
+            index = node.skip as usize;
+            continue;
+        }
+        index += 1;
+        if node.skip as usize != index {
+            continue;
+        }
+        let first = node.first_point as usize;
+        let points = job.points.get(first..first + node.point_count as usize);
+        for point in points.unwrap_or(&[]) {
+            work.points += 1;
+            let p = job.to_field.apply(point.position);
+            let sample = shape.field.voxel(p.to_array());
+            let (distance_m, in_band) = match sample.voxel {
+                Voxel::Free => (sample.bound, false),
+                Voxel::Proximity => (0.0, false),
+                Voxel::Interior => {
+                    work.flags.insert(Flags::DEEP);
+                    (0.0, false)
+                }
+                Voxel::Surface => {
+                    let gap = TangentPlane::of(job, point, p, &sample).gap;
+                    if gap < best.field_distance_m {
+                        best.field_distance_m = gap;
+                    }
+                    // Short of the plane the point need not be apart: the surface is somewhere in the voxel.
+                    if gap < 0.0 { (gap, true) } else { (0.0, false) }
+                }
+            };
+            if distance_m < best.distance_m {
+                best = Nearest {
+                    distance_m,
+                    field_distance_m: best.field_distance_m,
+                    exact: false,
+                    in_band,
+                    arm: job.to_arm.apply(point.position),
+                    moving_face: point.face,
+                    fixed_face: sample.face,
+                };
+            }
+        }
+    }
+    (best, work)
+}
