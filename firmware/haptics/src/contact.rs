@@ -23,6 +23,8 @@ pub(crate) struct Contact {
     pub rate: f32,
     /// Part of the force law the last solution assumed.
     pub phase: Phase,
+    /// Between faces that a target guides.
+    pub guided: bool,
     /// Face of the held part.
     pub moving_face: u16,
     /// Face of the other part.
@@ -40,6 +42,7 @@ impl Contact {
         reach_gap: 0.0,
         rate: 0.0,
         phase: Phase::Free,
+        guided: false,
         moving_face: 0,
         static_face: 0,
         leaf: Leaf::FIRST,

@@ -15,7 +15,7 @@
 use glam::Vec3;
 
 use crate::contact::{Contact, Phase};
-use crate::coupling::{Coupling, Slip};
+use crate::coupling::Coupling;
 use crate::pose::{Twist, Wrench};
 use crate::settings::ContactSettings;
 use crate::step::{Solution, Step, dot};
@@ -34,10 +34,8 @@ pub(crate) fn shared_stiffness(contact: &ContactSettings, touching: f32) -> f32 
 
 /// The step without contacts.
 pub(crate) fn free(step: &Step<'_>) -> Solution {
-    let (pull, slip) = coupling(step);
     Solution {
-        twist: accelerated(step, pull),
-        slip,
+        twist: accelerated(step, pulls(step)),
         contact: Wrench::ZERO,
         solves: 0,
         settled: true,
@@ -53,7 +51,6 @@ pub(crate) fn with_contacts(
     braking_m: f32,
     allowed: impl Fn(Twist) -> Twist,
 ) -> Solution {
-    let (pull, slip) = coupling(step);
     let before = step.scale(step.twist);
     let brake = braking(step, contacts, braking_m, &before);
     let mut contact = Wrench::ZERO;
@@ -69,30 +66,33 @@ pub(crate) fn with_contacts(
         contact.force += n;
         contact.torque += c.arm.cross(n);
     }
-    let twist = accelerated(step, pull + contact);
+    let twist = accelerated(step, pulls(step) + contact);
     let after = step.scale(allowed(twist));
     for c in contacts.iter_mut() {
         c.rate = dot(&c.row, &after);
     }
     Solution {
         twist,
-        slip,
         contact,
         solves: 0,
         settled: true,
     }
 }
 
-/// Wrench of the coupling at the tick's start, eqs. 1–2, as far as it does not slip.
-fn coupling(step: &Step<'_>) -> (Wrench, Slip) {
+/// Wrench of the coupling at the tick's start, eqs. 1–2, as far as it does not slip, and of what targets pull with.
+fn pulls(step: &Step<'_>) -> Wrench {
     // With no time ahead the pull is k·d − b·v.
     let pull = step.coupling.pull(step.settings, 0.0, step.twist);
     let slip = Coupling::slip(pull, step.settings);
-    let pull = Wrench {
+    let mut wrench = Wrench {
         force: pull.force * slip.translation,
         torque: pull.torque * slip.rotation,
     };
-    (pull, slip)
+    let before = step.scale(step.twist);
+    for pull in step.pulls {
+        wrench = wrench + pull.wrench(&before, step.length);
+    }
+    wrench
 }
 
 /// Rate of a gap that closes and is to be braked, else 0, m/s.

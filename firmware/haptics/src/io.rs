@@ -4,6 +4,7 @@ use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::limits::MAX_PAIRS;
 
+use crate::guidance::GuidanceState;
 use crate::pose::{Pose, Twist, Wrench};
 
 /// What the mechanism measured.
@@ -30,6 +31,8 @@ pub struct Output {
     pub object_twist: Twist,
     /// Touching faces, deepest first.
     pub pairs: FacePairs,
+    /// How constraint targets stand.
+    pub guidance: GuidanceState,
     /// What the tick had to do.
     pub work: Work,
 }

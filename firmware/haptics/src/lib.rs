@@ -15,6 +15,7 @@
 //! | `occupancy` | the same with a voxmap in place of the field: the textbook method, to be compared with |
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
 //! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
+//! | `guidance`, `constraint` | constraint targets: in force, engaged, pulling; errors and their rows |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
 //! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
@@ -26,9 +27,11 @@
 mod analytic;
 mod body;
 mod coherence;
+mod constraint;
 mod contact;
 mod coupling;
 mod explicit;
+mod guidance;
 mod io;
 mod limits;
 mod linear;
@@ -45,12 +48,13 @@ mod tick;
 mod touching;
 
 pub use glam::{Quat, Vec3};
+pub use guidance::{GuidanceState, TargetError};
 pub use io::{FacePair, FacePairs, Flags, Input, Output, Work};
 pub use pose::{Pose, Twist, Wrench};
 pub use probe::{ContactPoint, Nearest, Probe, ProbeError, Prober};
 pub use settings::{
-    ContactSettings, CouplingSettings, Integrator, LimitSettings, ObjectSettings, Range, Settings,
-    SettingsError, ranges,
+    ContactSettings, CouplingSettings, GuidanceMethod, GuidanceSettings, Integrator, LimitSettings,
+    ObjectSettings, Range, Settings, SettingsError, ranges,
 };
 pub use state::{GrabError, State};
 pub use tick::tick;

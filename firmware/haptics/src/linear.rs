@@ -41,6 +41,16 @@ impl Symmetric6 {
         }
     }
 
+    /// Adds `weight` times another matrix.
+    #[inline]
+    pub fn add_scaled(&mut self, weight: f32, other: &Self) {
+        for i in 0..6 {
+            for j in 0..=i {
+                self.rows[i][j] += weight * other.rows[i][j];
+            }
+        }
+    }
+
     /// `self · x`.
     #[cfg(test)]
     pub fn times(&self, x: &[f32; 6]) -> [f32; 6] {

@@ -12,13 +12,14 @@ use mortise_protocol::image::SceneImage;
 use crate::body::Body;
 use crate::coherence::Coherence;
 use crate::contact::{Contacts, Phase};
+use crate::guidance::Guidance;
 use crate::io::{Flags, Work};
 use crate::nearest::NearestSearch;
 use crate::occupancy::nearest_voxel;
 use crate::pose::{Pose, Wrench};
 use crate::proximity::{Job, Search};
-use crate::settings::ContactSettings;
-use crate::step::total_force;
+use crate::settings::{ContactSettings, Settings};
+use crate::step::{Stiffness, total_force};
 use crate::tick::usable_pose;
 
 /// What was found at one pose.
@@ -182,7 +183,8 @@ impl Prober {
                 // At rest: no rate, so neither period nor damping counts.
                 contact.phase = Phase::Parting;
             }
-            wrench = total_force(self.contacts.as_slice(), k, 0.0, 0.0);
+            let k = Stiffness { point: k, guided: k };
+            wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0);
             work.contacts = touching as u16;
         }
         Ok(Probe {
@@ -230,6 +232,8 @@ impl Prober {
             thinning: 0,
             budget: u32::MAX,
             braking_m: 0.0,
+            guidance: &Guidance::new(),
+            guidance_settings: &Settings::default().guidance,
         }
         .run_all(jobs, &mut self.coherence, &mut self.contacts, work);
         work.flags

@@ -13,12 +13,16 @@
 //! Cost: see [`crate::tick()`]; the look-ups in [`Field`] are two thirds of it.
 
 use glam::{Mat3, Vec3};
-use mortise_protocol::image::{Field, FieldSample, Lookup, NodeRecord, PointRecord, SceneImage, Shape};
+use mortise_protocol::image::{
+    Field, FieldSample, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage, Shape,
+};
 
 use crate::coherence::{Coherence, Key, Known};
 use crate::contact::{Contacts, Phase};
+use crate::guidance::{Guidance, Mating};
 use crate::io::{Flags, Work};
 use crate::pose::Pose;
+use crate::settings::GuidanceSettings;
 use crate::state::Placed;
 use crate::step::dot;
 
@@ -83,12 +87,17 @@ pub(crate) struct Search<'s, 'i> {
     pub budget: u32,
     /// Points that come this near are braked, m; 0 for no braking. Then points in proximity voxels are wanted too.
     pub braking_m: f32,
+    /// Where guided faces meet, contact makes room.
+    pub guidance: &'s Guidance,
+    pub guidance_settings: &'s GuidanceSettings,
 }
 
 /// Trees and fields of one job, and the way between their frames.
 pub(crate) struct Job<'i> {
     index: u16,
     pub backward: bool,
+    /// A target guides to this part.
+    guided: bool,
     pub nodes: &'i [NodeRecord],
     pub points: &'i [PointRecord],
     pub field: Field<'i>,
@@ -187,12 +196,14 @@ impl<'i> Search<'_, 'i> {
         }
         let held_shape = self.scene.shape_of_part(usize::from(self.held));
         let other_shape = self.scene.shape_of_part(usize::from(part));
-        Some(Job::new(
+        let mut job = Job::new(
             index,
             (&held_shape, self.pose),
             (&other_shape, other.pose),
             self.center,
-        ))
+        );
+        job.guided = self.guidance.concerns(part);
+        Some(job)
     }
 
     /// Fills `contacts` from all of `jobs`, whatever the budget and the spheres say.
@@ -236,6 +247,7 @@ impl<'i> Job<'i> {
         Self {
             index,
             backward,
+            guided: false,
             nodes: tree.nodes,
             points: tree.points,
             field: field.field,
@@ -418,26 +430,35 @@ impl Walk<'_, '_, '_> {
             return sample.distance;
         }
         let n = job.to_push * (gradient * inverse_sqrt(squared));
+        let (moving, fixed) = {
+            let (own, other) = ([point.face, point.edge_face], [sample.face, NO_FACE]);
+            if job.backward { (other, own) } else { (own, other) }
+        };
+        let mating = if job.guided {
+            self.search
+                .guidance
+                .mating(leaf.part(), moving, fixed, self.search.guidance_settings)
+        } else {
+            Mating::NONE
+        };
+        let gap = sample.distance + mating.room;
         let arm = job.to_arm.apply(point.position);
         let turn = arm.cross(n) * self.search.inverse_length;
         let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
-        if sample.distance >= self.search.slack + self.search.approach(&row) {
+        if gap >= self.search.slack + self.search.approach(&row) {
             return sample.distance;
         }
         self.work.candidates = self.work.candidates.saturating_add(1);
-        let reach_gap = sample.distance - self.search.swing * arm.length_squared();
-        let Some(contact) = self.contacts.offer(sample.distance, reach_gap) else {
+        let reach_gap = gap - self.search.swing * arm.length_squared();
+        let Some(contact) = self.contacts.offer(gap, reach_gap) else {
             return sample.distance;
         };
         contact.row = row;
         contact.arm = arm;
         contact.rate = 0.0;
         contact.phase = Phase::Free;
-        (contact.moving_face, contact.static_face) = if job.backward {
-            (sample.face, point.face)
-        } else {
-            (point.face, sample.face)
-        };
+        contact.guided = mating.guided;
+        (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
         contact.leaf = leaf;
         sample.distance
     }

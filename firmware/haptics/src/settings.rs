@@ -14,6 +14,8 @@ pub struct Settings {
     pub contact: ContactSettings,
     /// The simulated object.
     pub object: ObjectSettings,
+    /// How constraint targets guide.
+    pub guidance: GuidanceSettings,
     /// What may reach the motors.
     pub limits: LimitSettings,
     /// Time from tick to tick (h in the notation), s. Default 1 ms.
@@ -94,6 +96,28 @@ pub struct ObjectSettings {
     pub speed_max_m_per_s: f32,
 }
 
+/// How constraint targets guide; see `guidance` in the sources.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidanceSettings {
+    /// Default [`GuidanceMethod::Capped`].
+    pub method: GuidanceMethod,
+    /// Room that contact between guided faces makes, m. Default 0.1 mm.
+    pub allowance_m: f32,
+    /// τ: time in which the way left falls to 1/e, s. Default 20 ms.
+    pub time_s: f32,
+}
+
+/// How a target pulls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GuidanceMethod {
+    /// Not at all: what was engaged fades.
+    Off,
+    /// Stiff up to a cap.
+    Capped,
+    /// The blend of Faas 2010, for comparison.
+    Thesis,
+}
+
 /// Last limits before the mechanism.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitSettings {
@@ -130,6 +154,11 @@ impl Default for Settings {
                 gyration_min_m: 3e-3,
                 gyration_max_m: 20e-3,
                 speed_max_m_per_s: 1.0,
+            },
+            guidance: GuidanceSettings {
+                method: GuidanceMethod::Capped,
+                allowance_m: 0.1e-3,
+                time_s: 20e-3,
             },
             limits: LimitSettings {
                 force_n: 12.0,
@@ -196,6 +225,10 @@ pub mod ranges {
     pub const GYRATION_M: Range = Range { min: 1e-3, max: 1.0 };
     /// [`super::ObjectSettings::speed_max_m_per_s`].
     pub const SPEED_MAX_M_PER_S: Range = Range { min: 0.01, max: 10.0 };
+    /// [`super::GuidanceSettings::allowance_m`].
+    pub const ALLOWANCE_M: Range = Range { min: 0.0, max: 1e-3 };
+    /// [`super::GuidanceSettings::time_s`].
+    pub const GUIDANCE_TIME_S: Range = Range { min: 1e-3, max: 1.0 };
     /// [`super::LimitSettings::force_n`].
     pub const FORCE_N: Range = Range { min: 0.0, max: 100.0 };
     /// [`super::LimitSettings::torque_nm`].
@@ -238,6 +271,7 @@ impl Settings {
             coupling,
             contact,
             object,
+            guidance,
             limits,
             period_s,
             integrator: Integrator::Implicit | Integrator::Explicit,
@@ -286,6 +320,8 @@ impl Settings {
                 object.speed_max_m_per_s,
                 ranges::SPEED_MAX_M_PER_S,
             ),
+            ("guidance.allowance_m", guidance.allowance_m, ranges::ALLOWANCE_M),
+            ("guidance.time_s", guidance.time_s, ranges::GUIDANCE_TIME_S),
             ("limits.force_n", limits.force_n, ranges::FORCE_N),
             ("limits.torque_nm", limits.torque_nm, ranges::TORQUE_NM),
             (

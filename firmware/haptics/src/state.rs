@@ -6,15 +6,17 @@ use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::image::{PART_GRABBABLE, SceneImage, Shape};
 use mortise_protocol::limits::MAX_PARTS;
+use mortise_protocol::message::ConstraintTarget;
 
 use crate::body::{Body, Grabbed};
 use crate::coherence::Coherence;
 use crate::contact::Contacts;
+use crate::guidance::{Guidance, TargetError};
 use crate::pose::{Pose, Twist, Wrench};
 use crate::proximity::Leaf;
 use crate::tick::usable_pose;
 
-/// Placements, the grabbed object, and what carries over. About 60 KiB; lives in a static on a board.
+/// Placements, the grabbed object, and what carries over. About 62 KiB; lives in a static on a board.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Every part's placement.
@@ -38,6 +40,8 @@ pub struct State {
     pub(crate) finest_cell_m: f32,
     /// Smallest voxel of any voxmap in the scene, m; 0 when there is none.
     pub(crate) finest_voxel_m: f32,
+    /// Constraint targets.
+    pub(crate) guidance: Guidance,
     /// Nodes that need not be looked at yet.
     pub(crate) coherence: Coherence,
     /// Scratch of one tick; kept here because a board's stack is small.
@@ -114,6 +118,7 @@ impl State {
             overruns: 0,
             finest_cell_m: 0.0,
             finest_voxel_m: 0.0,
+            guidance: Guidance::new(),
             coherence: Coherence::new(),
             contacts: Contacts::new(),
         }
@@ -194,6 +199,20 @@ impl State {
         self.grabbed.as_ref().map(|g| g.part)
     }
 
+    /// Guides the part in hand towards `target` from the next tick on; a target of the same id is refreshed or replaced, one older than that does
+    /// nothing. Grabbing and releasing end all guidance.
+    ///
+    /// # Errors
+    /// [`TargetError`]; nothing changed.
+    pub fn set_target(&mut self, target: &ConstraintTarget) -> Result<(), TargetError> {
+        self.guidance.set(target, self.parts.len(), self.grabbed())
+    }
+
+    /// Lets the target of this id fade; none of it is no error.
+    pub fn clear_target(&mut self, id: u16) {
+        self.guidance.clear(id);
+    }
+
     /// Number of placed parts.
     pub fn part_count(&self) -> usize {
         self.parts.len()
@@ -230,6 +249,7 @@ impl State {
         self.busy = false;
         self.thinning = 0;
         self.overruns = 0;
+        self.guidance.forget();
         self.contacts.clear();
         self.coherence.forget();
     }
@@ -259,6 +279,6 @@ mod tests {
     /// The smallest board keeps it in 128 KiB of tightly coupled memory with its stack.
     #[test]
     fn fits_a_board() {
-        assert!(size_of::<State>() <= 64 * 1024, "{}", size_of::<State>());
+        assert!(size_of::<State>() <= 68 * 1024, "{}", size_of::<State>());
     }
 }

@@ -16,9 +16,11 @@
 //! passes over it together.
 
 use glam::{Mat3, Vec3};
+use heapless::Vec;
 
 use crate::contact::{Contact, Phase};
 use crate::coupling::{Coupling, Slip};
+use crate::guidance::{MAX_PULLS, Pull, Secant};
 use crate::linear::Symmetric6;
 use crate::pose::{Twist, Wrench};
 use crate::settings::CouplingSettings;
@@ -35,6 +37,9 @@ const RATE_BAND_M_PER_S: f32 = 1e-6;
 /// A slip that changes by less than this is settled.
 const SLIP_BAND: f32 = 1e-3;
 
+/// A pull that changes by less than this share is settled.
+const PULL_BAND: f32 = 0.01;
+
 /// The object and its coupling at the tick's start.
 pub(crate) struct Step<'a> {
     pub coupling: &'a Coupling,
@@ -47,6 +52,31 @@ pub(crate) struct Step<'a> {
     pub length: f32,
     /// V.
     pub twist: Twist,
+    /// What constraint targets pull with.
+    pub pulls: &'a [Pull],
+}
+
+/// Everything in the step that saturates, as the springs that pull as hard at one solution.
+#[derive(Clone, Debug)]
+struct Secants {
+    slip: Slip,
+    pulls: Vec<Secant, MAX_PULLS>,
+}
+
+/// Stiffness of contacts, N/m.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stiffness {
+    /// Of a point.
+    pub point: f32,
+    /// Of a point between guided faces.
+    pub guided: f32,
+}
+
+impl Stiffness {
+    #[inline]
+    fn of(&self, c: &Contact) -> f32 {
+        if c.guided { self.guided } else { self.point }
+    }
 }
 
 /// A solution of the step.
@@ -54,8 +84,6 @@ pub(crate) struct Step<'a> {
 pub(crate) struct Solution {
     /// V', at the step's end.
     pub twist: Twist,
-    /// How far the coupling slipped.
-    pub slip: Slip,
     /// Sum of contact forces on the object at its centre of mass.
     pub contact: Wrench,
     /// Solves it took.
@@ -67,27 +95,27 @@ pub(crate) struct Solution {
 impl Step<'_> {
     /// The step without contacts.
     pub fn free(&self) -> Solution {
-        let mut slip = Slip::NONE;
+        let mut secants = self.secants(&self.scale(self.twist));
+        secants.slip = Slip::NONE;
         let mut solves = 0;
         loop {
-            let (matrix, right) = self.without_contact(slip);
-            let twist = self.unscale(&matrix.solve(&right));
+            let (matrix, right) = self.without_contact(&secants);
+            let x = matrix.solve(&right);
             solves += 1;
-            let next = self.slip(twist);
-            if settled(slip, next) || solves == MAX_FREE_SOLVES {
+            let next = self.secants(&x);
+            if settled(&secants, &next) || solves == MAX_FREE_SOLVES {
                 return Solution {
-                    twist,
-                    slip,
+                    twist: self.unscale(&x),
                     contact: Wrench::ZERO,
                     solves,
                     settled: true,
                 };
             }
-            slip = next;
+            secants = next;
         }
     }
 
-    /// The step with `contacts` of stiffness `k` (N/m) and approach damping `damping_s` (τ), starting from the motion so far, or from the
+    /// The step with `contacts` of stiffness `k` and approach damping `damping_s` (τ), starting from the motion so far, or from the
     /// `free` solution when that touches nothing.
     ///
     /// On return each contact's rate and phase are those of the solution.
@@ -95,23 +123,23 @@ impl Step<'_> {
         &self,
         free: &Solution,
         contacts: &mut [Contact],
-        k: f32,
+        k: &Stiffness,
         damping_s: f32,
     ) -> Solution {
         let h = self.period_s;
-        let weight = |phase| match phase {
+        let reach = |phase| match phase {
             Phase::Free => 0.0,
-            Phase::Parting => h * k * h,
-            Phase::Closing => h * k * (h + damping_s),
+            Phase::Parting => h,
+            Phase::Closing => h + damping_s,
         };
-        let band = FORCE_BAND_N / k;
+        let band = FORCE_BAND_N / k.point;
         // A ten-thousandth more than the force law's own, so that rounding (some 10⁻⁷ of the gap) cannot decide otherwise than it does.
         let closing_s = 1.0001 * (h + damping_s);
         // Where the object rests or slides, its motion up to now already tells which points touch.
         let mut x = self.scale(self.twist);
         // Whether `x` solves the step with some set of touching points.
         let mut solved = false;
-        let mut slip = free.slip;
+        let mut secants = self.secants(&self.scale(free.twist));
         let mut stiffness = Symmetric6::ZERO;
         let mut push = [0.0f32; 6];
         let mut solves = 0;
@@ -126,7 +154,8 @@ impl Step<'_> {
                 let phase = next_phase(c, h, damping_s, band);
                 if phase != c.phase {
                     changed = true;
-                    stiffness.add_outer(weight(phase) - weight(c.phase), &c.row);
+                    let k = k.of(c);
+                    stiffness.add_outer(h * k * (reach(phase) - reach(c.phase)), &c.row);
                     let sign = f32::from(phase != Phase::Free) - f32::from(c.phase != Phase::Free);
                     let impulse = -h * k * c.gap * sign;
                     for (p, j) in push.iter_mut().zip(&c.row) {
@@ -140,15 +169,15 @@ impl Step<'_> {
                 solved = true;
                 continue;
             }
-            let next = self.slip(self.unscale(&x));
-            if solved && !changed && settled(slip, next) {
+            let next = self.secants(&x);
+            if solved && !changed && settled(&secants, &next) {
                 break true;
             }
             if solves == MAX_SOLVES {
                 break false;
             }
-            slip = next;
-            let (mut matrix, mut right) = self.without_contact(slip);
+            secants = next;
+            let (mut matrix, mut right) = self.without_contact(&secants);
             matrix.add_matrix(&stiffness);
             for (r, p) in right.iter_mut().zip(&push) {
                 *r += p;
@@ -160,20 +189,28 @@ impl Step<'_> {
         let contact = total_force(contacts, k, h, damping_s);
         Solution {
             twist: self.unscale(&x),
-            slip,
             contact,
             solves: free.solves + solves,
             settled: is_settled,
         }
     }
 
-    fn slip(&self, twist: Twist) -> Slip {
-        let pull = self.coupling.pull(self.settings, self.period_s, twist);
-        Coupling::slip(pull, self.settings)
+    fn secants(&self, x: &[f32; 6]) -> Secants {
+        let pull = self.coupling.pull(self.settings, self.period_s, self.unscale(x));
+        let mut secants = Secants {
+            slip: Coupling::slip(pull, self.settings),
+            pulls: Vec::new(),
+        };
+        for pull in self.pulls {
+            // No more than there is room for pulls.
+            let _ = secants.pulls.push(pull.secant(x));
+        }
+        secants
     }
 
     /// Matrix and right side of mass and coupling, scaled: (M + h·B + h²·K)·V' = M·V + h·(K·d + (B + h·K)·V_hand).
-    fn without_contact(&self, slip: Slip) -> (Symmetric6, [f32; 6]) {
+    fn without_contact(&self, secants: &Secants) -> (Symmetric6, [f32; 6]) {
+        let slip = secants.slip;
         let h = self.period_s;
         let m = self.mass_kg;
         let s = self.settings;
@@ -197,7 +234,10 @@ impl Step<'_> {
             + (c.stretch * s.k_t_n_per_m + c.target.linear * b_t) * (h * slip.translation);
         let angular = (self.gyration2 * self.twist.angular) * (m * inverse_length)
             + (c.angle * s.k_r + c.target.angular * b_r) * (h * slip.rotation * inverse_length);
-        let right = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
+        let mut right = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
+        for (pull, secant) in self.pulls.iter().zip(&secants.pulls) {
+            pull.add(*secant, h, &mut matrix, &mut right);
+        }
         (matrix, right)
     }
 
@@ -216,10 +256,10 @@ impl Step<'_> {
 }
 
 /// Sum of the forces of `contacts` on the object, at its centre of mass.
-pub(crate) fn total_force(contacts: &[Contact], k: f32, period_s: f32, damping_s: f32) -> Wrench {
+pub(crate) fn total_force(contacts: &[Contact], k: &Stiffness, period_s: f32, damping_s: f32) -> Wrench {
     let mut total = Wrench::ZERO;
     for c in contacts {
-        let force = force(c, k, period_s, damping_s);
+        let force = force(c, k.of(c), period_s, damping_s);
         if force > 0.0 {
             let n = Vec3::new(c.row[0], c.row[1], c.row[2]) * force;
             total.force += n;
@@ -263,6 +303,9 @@ pub(crate) fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 }
 
-fn settled(a: Slip, b: Slip) -> bool {
-    (a.translation - b.translation).abs() < SLIP_BAND && (a.rotation - b.rotation).abs() < SLIP_BAND
+fn settled(a: &Secants, b: &Secants) -> bool {
+    let (s, t) = (a.slip, b.slip);
+    (s.translation - t.translation).abs() < SLIP_BAND
+        && (s.rotation - t.rotation).abs() < SLIP_BAND
+        && a.pulls.iter().zip(&b.pulls).all(|(p, q)| p.is_near(q, PULL_BAND))
 }

@@ -1,10 +1,13 @@
 //! One tick of the force law.
 
+use heapless::Vec;
 use mortise_protocol::image::SceneImage;
 
 use crate::body::Grabbed;
+use crate::contact::Phase;
 use crate::coupling::Coupling;
 use crate::explicit;
+use crate::guidance::{At, GuidanceState};
 use crate::io::{FacePairs, Flags, Input, Output, Work};
 use crate::limits::{length, limit};
 use crate::pose::{Pose, Twist, Wrench, renormalize};
@@ -12,7 +15,7 @@ use crate::proximity::{Leaf, Search};
 use crate::rotation;
 use crate::settings::{Integrator, Settings};
 use crate::state::State;
-use crate::step::{Solution, Step};
+use crate::step::{Solution, Step, Stiffness};
 use crate::touching::touching_faces;
 
 /// Positions beyond this are an encoder's fault, not a place, m.
@@ -75,6 +78,20 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     let (gyration2, scale) = grabbed
         .body
         .gyration2_in_world(grabbed.orientation, &settings.object);
+    state.guidance.step(&settings.guidance);
+    let at = At {
+        scene,
+        parts: &state.parts,
+        object: grabbed.pose(),
+        center: grabbed.center,
+        length: scale,
+        period_s: settings.period_s,
+        settings: &settings.guidance,
+        coupling_stiffness: settings.coupling.k_t_n_per_m,
+    };
+    let mut pulls = Vec::new();
+    state.guidance.add_pulls(&at, &mut pulls);
+    let guided_share = state.guidance.share(&at);
     let step = Step {
         coupling: &coupling,
         settings: &settings.coupling,
@@ -83,6 +100,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         gyration2,
         length: scale,
         twist: grabbed.twist,
+        pulls: &pulls,
     };
     let mut free = match settings.integrator {
         Integrator::Implicit => step.free(),
@@ -96,7 +114,16 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     let margin = settings.contact.margin_m
         + state.braking_margin(settings)
         + settings.period_s * smaller(likely, point_speed(free.twist, reach));
-    let solution = state.meet(scene, settings, &grabbed, &step, &free, margin, &mut work);
+    let solution = state.meet(
+        scene,
+        settings,
+        &grabbed,
+        &step,
+        &free,
+        margin,
+        guided_share,
+        &mut work,
+    );
 
     let mut twist = solution.twist;
     // Nothing beyond the margin was looked at, so nothing may move farther.
@@ -116,6 +143,11 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         &mut work.flags,
     );
     let wanted = coupling.reaction(pull);
+    let guided = (state.contacts.as_slice().iter())
+        .filter(|c| c.guided && c.phase != Phase::Free)
+        .map(|c| c.arm);
+    state.guidance.observe(guided, &state.parts);
+    let guidance = state.guidance.state(&pulls, &step.scale(twist), scale);
     let pairs = touching_faces(state.contacts.as_slice(), grabbed.center, settings.period_s);
     state
         .coherence
@@ -129,6 +161,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         object: state.last_object.unwrap_or_default(),
         object_twist: twist,
         pairs,
+        guidance,
         work,
     }
 }
@@ -144,6 +177,7 @@ impl State {
         step: &Step<'_>,
         free: &Solution,
         margin: f32,
+        guided_share: f32,
         work: &mut Work,
     ) -> Solution {
         let explicit = settings.integrator == Integrator::Explicit;
@@ -163,6 +197,8 @@ impl State {
             thinning: self.thinning,
             budget: settings.contact.point_budget,
             braking_m,
+            guidance: &self.guidance,
+            guidance_settings: &settings.guidance,
         };
         let (stopped, used) = search.run(self.resume, &mut self.coherence, &mut self.contacts, work);
         self.resume = stopped.unwrap_or(Leaf::FIRST);
@@ -191,7 +227,11 @@ impl State {
             })
         } else {
             let k = contact.shared_stiffness(self.sharing);
-            step.with_contacts(free, contacts, k, contact.damping_s)
+            let k = Stiffness {
+                point: k,
+                guided: k * guided_share,
+            };
+            step.with_contacts(free, contacts, &k, contact.damping_s)
         };
         work.contacts = self.contacts.pushing() as u16;
         work.solves = solution.solves;
@@ -249,6 +289,7 @@ impl State {
             object: self.last_object.unwrap_or_default(),
             object_twist: Twist::ZERO,
             pairs: FacePairs::new(),
+            guidance: GuidanceState::default(),
             work,
         }
     }

@@ -1,0 +1,502 @@
+//! Constraint targets: which are in force, how far engaged, and how they pull.
+//!
+//! The desktop sends a target; the board holds it until it expires, is cleared or replaced. Nothing about a target is ever switched: its
+//! *engagement* a rises from 0 to 1 and falls again by steps so small that the cap on its force, a·F, changes by less than 0.05 N a tick and that
+//! on its torque by less than 2 mN m. Within its cap it is stiff,
+//!
+//! f = −a·F·u/√((a·F/k)² + |u|²),   u = e + (h + τ)·J·V'
+//!
+//! taken at the step's end like every other force of the step: near the goal a spring k with damping k·τ that holds micrometres, far from it a
+//! pull of constant length, so that a hand stronger than the cap always gets away. The damping makes the way there exponential (τ = 20 ms).
+//!
+//! A target that ends leaves a part that the hand pulled against it: it would fly off. So a damper takes over where the pull falls, 200 N s/m up to
+//! 1 N, and fades in half a second: 0.4 N move the part at 2 mm/s.
+//!
+//! Where the target's faces meet, contact makes room: gaps between them count for larger by a·[`GuidanceSettings::allowance_m`]. The axis holds
+//! what the wall held before, an exact fit goes in, and a part pulled off its axis against the cap finds the wall again. All other contacts
+//! stay as they are.
+//!
+//! [`GuidanceMethod::Thesis`] is the blend of Faas 2010 (eqs. 13–19), for comparison: a spring of 0.8·k_T without a cap, weighted with
+//! x = ½e^(−θ/θ₀) + ½e^(−d/d₀), θ₀ = voxel/insertion depth, d₀ = voxel, and the contacts of those faces weighted with 1 − x.
+
+use glam::Vec3;
+use heapless::Vec;
+use mortise_protocol::image::{NO_FACE, SceneImage};
+use mortise_protocol::limits::MAX_TARGETS;
+use mortise_protocol::message::ConstraintTarget;
+
+use crate::constraint::{Alignment, Rows};
+use crate::linear::Symmetric6;
+use crate::pose::{Pose, Wrench};
+use crate::settings::{GuidanceMethod, GuidanceSettings};
+use crate::state::Placed;
+use crate::step::dot;
+
+/// Engagement grows and falls by this a tick at most.
+const STEP: f32 = 1.0 / 64.0;
+/// The cap on the force changes by less than this a tick, N.
+const FORCE_STEP_N: f32 = 0.045;
+/// The cap on the torque likewise, N m.
+const TORQUE_STEP_NM: f32 = 1.8e-3;
+/// Damping of what a target that ends lets go, N s/m.
+const LETTING_GO: f32 = 200.0;
+/// Its largest force, N.
+const LETTING_GO_N: f32 = 1.0;
+/// Its fading a tick.
+const LETTING_GO_STEP: f32 = 1.0 / 512.0;
+/// Two pulls for each target: offset and angle.
+pub(crate) const MAX_PULLS: usize = 2 * MAX_TARGETS;
+/// Stiffness of the thesis' constraint spring over the coupling's.
+const THESIS_SHARE: f32 = 0.8;
+
+/// Why a target was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TargetError {
+    /// A number in it is not finite or out of range, or a direction is not of unit length.
+    BadNumber,
+    /// Its part is not in the scene, or is the one in hand.
+    NoSuchPart,
+    /// No room: as many targets as there may be are in force or fading.
+    Full,
+}
+
+/// A target in force or fading.
+#[derive(Clone, Debug)]
+struct Slot {
+    target: ConstraintTarget,
+    /// a.
+    engagement: f32,
+    /// Ticks until it expires; 0: fading.
+    left: u16,
+    /// How much of the damper is there that lets the part go slowly, 0 to 1.
+    letting_go: f32,
+}
+
+/// All targets.
+#[derive(Clone, Debug)]
+pub(crate) struct Guidance {
+    slots: Vec<Slot, MAX_TARGETS>,
+    /// How far apart contacts of guided faces lay along the fixed feature's direction in the last tick, m.
+    insertion_m: f32,
+}
+
+/// What contact between two faces has to know of guidance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Mating {
+    /// Whether a target owns the pair.
+    pub guided: bool,
+    /// Gaps count for larger by this, m.
+    pub room: f32,
+}
+
+impl Mating {
+    /// No target.
+    pub const NONE: Self = Self {
+        guided: false,
+        room: 0.0,
+    };
+}
+
+/// One saturating spring of a target, within a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Pull {
+    rows: Rows,
+    /// Σ JᵀJ.
+    product: Symmetric6,
+    /// Σ e·Jᵀ.
+    along: [f32; 6],
+    law: Law,
+    /// Largest force of the damper that lets go, N.
+    damper_n: f32,
+}
+
+/// The spring (N/m) and the damper (N s/m) that pull as hard as a saturating pull does at one solution.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Secant {
+    spring: f32,
+    damper: f32,
+}
+
+impl Secant {
+    /// Whether another is the same but for this share.
+    pub fn is_near(&self, other: &Self, share: f32) -> bool {
+        (self.spring - other.spring).abs() <= share * other.spring
+            && (self.damper - other.damper).abs() <= share * other.damper
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Law {
+    /// Stiff up to a cap: k (N/m), cap (N), h + τ (s).
+    Capped { stiffness: f32, cap: f32, ahead: f32 },
+    /// A plain spring: k (N/m), h (s).
+    Spring { stiffness: f32, ahead: f32 },
+}
+
+/// How targets stand, for telemetry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GuidanceState {
+    /// Targets in force (fading ones not counted).
+    pub active: u8,
+    /// Largest engagement of any.
+    pub engagement: f32,
+    /// Their sum on the object at its centre of mass, world axes.
+    pub wrench: Wrench,
+}
+
+impl Guidance {
+    pub const fn new() -> Self {
+        Self {
+            slots: Vec::new(),
+            insertion_m: 0.0,
+        }
+    }
+
+    /// Takes a target: new, refreshed, or replacing the one of its id, which fades while the new one engages. One older than what is known of its id
+    /// changes nothing.
+    pub fn set(
+        &mut self,
+        target: &ConstraintTarget,
+        parts: usize,
+        held: Option<u16>,
+    ) -> Result<(), TargetError> {
+        check(target)?;
+        if usize::from(target.static_part) >= parts || held == Some(target.static_part) {
+            return Err(TargetError::NoSuchPart);
+        }
+        let mut same = None;
+        for (i, slot) in self.slots.iter().enumerate() {
+            if slot.target.id != target.id {
+                continue;
+            }
+            if !newer(target.sequence, slot.target.sequence) {
+                return Ok(());
+            }
+            if same_constraint(&slot.target, target) {
+                same = Some(i);
+            }
+        }
+        if let Some(slot) = same.and_then(|i| self.slots.get_mut(i)) {
+            slot.target.sequence = target.sequence;
+            slot.left = target.expiry_ticks;
+            return Ok(());
+        }
+        if self.slots.is_full() {
+            return Err(TargetError::Full);
+        }
+        self.clear(target.id);
+        let _ = self.slots.push(Slot {
+            target: target.clone(),
+            engagement: 0.0,
+            left: target.expiry_ticks,
+            letting_go: 0.0,
+        });
+        Ok(())
+    }
+
+    /// The target of this id fades.
+    pub fn clear(&mut self, id: u16) {
+        for slot in self.slots.iter_mut().filter(|slot| slot.target.id == id) {
+            slot.left = 0;
+        }
+    }
+
+    /// All targets are gone at once. For when nothing is held.
+    pub fn forget(&mut self) {
+        self.slots.clear();
+        self.insertion_m = 0.0;
+    }
+
+    /// A tick passes: targets engage, expire, fade and vanish.
+    pub fn step(&mut self, settings: &GuidanceSettings) {
+        for slot in &mut self.slots {
+            slot.left = slot.left.saturating_sub(1);
+            let step = slot.step();
+            let wanted = slot.left > 0 && settings.method != GuidanceMethod::Off;
+            if wanted {
+                slot.engagement = (slot.engagement + step).min(1.0);
+                slot.letting_go = (slot.letting_go - LETTING_GO_STEP).max(0.0);
+            } else if slot.engagement > 0.0 {
+                slot.engagement = (slot.engagement - step).max(0.0);
+                slot.letting_go = (slot.letting_go + step).min(1.0);
+            } else {
+                slot.letting_go = (slot.letting_go - LETTING_GO_STEP).max(0.0);
+            }
+        }
+        self.slots
+            .retain(|slot| slot.left > 0 || slot.engagement > 0.0 || slot.letting_go > 0.0);
+    }
+
+    /// What the targets pull with in this tick, appended to `pulls`: too large to be handed about by value.
+    pub fn add_pulls(&self, at: &At<'_, '_>, pulls: &mut Vec<Pull, MAX_PULLS>) {
+        for slot in &self.slots {
+            let Some(alignment) = slot.alignment(at) else {
+                continue;
+            };
+            let target = &slot.target;
+            // A turn as seen at the distance L: k·L² for the angle, torque cap over L.
+            let (offset, angle) = match at.settings.method {
+                GuidanceMethod::Thesis => {
+                    let stiffness = THESIS_SHARE * at.coupling_stiffness * self.weight(slot, &alignment, at);
+                    let law = Law::Spring {
+                        stiffness,
+                        ahead: at.period_s,
+                    };
+                    (law, law)
+                }
+                GuidanceMethod::Off | GuidanceMethod::Capped => {
+                    let law = |cap: f32| Law::Capped {
+                        stiffness: target.stiffness,
+                        cap: cap * slot.engagement,
+                        ahead: at.period_s + at.settings.time_s,
+                    };
+                    (law(target.force_cap), law(target.torque_cap / at.length))
+                }
+            };
+            for (rows, law) in [(alignment.offset, offset), (alignment.angle, angle)] {
+                if !rows.rows.is_empty() {
+                    // Two a target: there is room.
+                    let _ = pulls.push(Pull::new(rows, law, LETTING_GO_N * slot.letting_go));
+                }
+            }
+        }
+    }
+
+    /// Of contact between these faces: `moving` and `fixed` name the face, and the other one where the point lies on an edge.
+    pub fn mating(
+        &self,
+        part: u16,
+        moving: [u16; 2],
+        fixed: [u16; 2],
+        settings: &GuidanceSettings,
+    ) -> Mating {
+        let mut engagement = 0.0f32;
+        for slot in &self.slots {
+            let target = &slot.target;
+            let of_these = target.static_part == part
+                && (target.faces.iter()).any(|(m, s)| holds(moving, *m) && holds(fixed, *s));
+            if of_these && slot.engagement > engagement {
+                engagement = slot.engagement;
+            }
+        }
+        let room = match settings.method {
+            GuidanceMethod::Thesis => 0.0,
+            GuidanceMethod::Off | GuidanceMethod::Capped => engagement * settings.allowance_m,
+        };
+        Mating {
+            guided: engagement > 0.0,
+            room,
+        }
+    }
+
+    /// What is left of the stiffness of contacts between guided faces: all of it, except in the thesis' blend.
+    pub fn share(&self, at: &At<'_, '_>) -> f32 {
+        if at.settings.method != GuidanceMethod::Thesis {
+            return 1.0;
+        }
+        let mut most = 0.0f32;
+        for slot in &self.slots {
+            if let Some(alignment) = slot.alignment(at) {
+                most = most.max(self.weight(slot, &alignment, at));
+            }
+        }
+        1.0 - most
+    }
+
+    /// Takes note of how deep the guided faces are in each other: `arms` of the touching points, from the centre of mass.
+    pub fn observe(&mut self, arms: impl Iterator<Item = Vec3> + Clone, parts: &[Placed]) {
+        self.insertion_m = 0.0;
+        for slot in &self.slots {
+            let Some(fixed) = parts.get(usize::from(slot.target.static_part)) else {
+                continue;
+            };
+            let axis = fixed
+                .pose
+                .transform_vector(Vec3::from_array(slot.target.fixed.direction));
+            let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+            for along in arms.clone().map(|arm| arm.dot(axis)) {
+                least = least.min(along);
+                most = most.max(along);
+            }
+            if most > least {
+                self.insertion_m = self.insertion_m.max(most - least);
+            }
+        }
+    }
+
+    /// x of the thesis, times engagement: ½e^(−θ/θ₀) + ½e^(−d/d₀), d₀ the cell of the fixed part's field, θ₀ that over the insertion depth.
+    fn weight(&self, slot: &Slot, alignment: &Alignment, at: &At<'_, '_>) -> f32 {
+        let still = [0.0; 6];
+        let d = alignment.offset.error(&still, 0.0);
+        let theta = alignment.angle.error(&still, 0.0) / at.length;
+        let voxel = at
+            .scene
+            .shape_of_part(usize::from(slot.target.static_part))
+            .field
+            .record()
+            .cell;
+        let theta_0 = voxel / self.insertion_m.max(voxel);
+        slot.engagement * (0.5 * libm::expf(-theta / theta_0) + 0.5 * libm::expf(-d / voxel))
+    }
+
+    /// Whether any target makes room at this part.
+    pub fn concerns(&self, part: u16) -> bool {
+        self.slots
+            .iter()
+            .any(|slot| slot.target.static_part == part && slot.engagement > 0.0)
+    }
+
+    /// How the targets stand, with the pulls of the tick at its end `x`.
+    pub fn state(&self, pulls: &[Pull], x: &[f32; 6], length: f32) -> GuidanceState {
+        let mut state = GuidanceState::default();
+        for slot in &self.slots {
+            state.active += u8::from(slot.left > 0);
+            if slot.engagement > state.engagement {
+                state.engagement = slot.engagement;
+            }
+        }
+        for pull in pulls {
+            state.wrench = state.wrench + pull.wrench(x, length);
+        }
+        state
+    }
+}
+
+/// Where things stand when pulls are made.
+pub(crate) struct At<'a, 'i> {
+    pub scene: &'a SceneImage<'i>,
+    pub parts: &'a [Placed],
+    pub object: Pose,
+    pub center: Vec3,
+    /// L, m.
+    pub length: f32,
+    pub period_s: f32,
+    pub settings: &'a GuidanceSettings,
+    /// k_T, N/m.
+    pub coupling_stiffness: f32,
+}
+
+impl Slot {
+    fn step(&self) -> f32 {
+        STEP.min(FORCE_STEP_N / self.target.force_cap.max(FORCE_STEP_N))
+            .min(TORQUE_STEP_NM / self.target.torque_cap.max(TORQUE_STEP_NM))
+    }
+
+    /// How far the target is from being met, if it pulls at all.
+    fn alignment(&self, at: &At<'_, '_>) -> Option<Alignment> {
+        let part = usize::from(self.target.static_part);
+        let fixed = at.parts.get(part).filter(|_| part < at.scene.parts().len())?;
+        (self.engagement > 0.0 || self.letting_go > 0.0)
+            .then(|| Alignment::of(&self.target, &at.object, at.center, &fixed.pose, at.length))
+    }
+}
+
+impl Pull {
+    fn new(rows: Rows, law: Law, damper_n: f32) -> Self {
+        let mut product = Symmetric6::ZERO;
+        let mut along = [0.0; 6];
+        for (row, error) in &rows.rows {
+            product.add_outer(1.0, row);
+            for (a, j) in along.iter_mut().zip(row) {
+                *a += error * j;
+            }
+        }
+        Self {
+            rows,
+            product,
+            along,
+            law,
+            damper_n,
+        }
+    }
+
+    /// At the step's end `x`.
+    pub fn secant(&self, x: &[f32; 6]) -> Secant {
+        let spring = match self.law {
+            Law::Spring { stiffness, .. } => stiffness,
+            Law::Capped {
+                stiffness,
+                cap,
+                ahead,
+            } => saturating(stiffness, cap, self.rows.error(x, ahead)),
+        };
+        let damper = if self.damper_n > 0.0 {
+            saturating(LETTING_GO, self.damper_n, self.rows.speed(x))
+        } else {
+            0.0
+        };
+        Secant { spring, damper }
+    }
+
+    /// Adds what the spring and the damper add to the step's matrix and right side.
+    pub fn add(&self, secant: Secant, period_s: f32, matrix: &mut Symmetric6, right: &mut [f32; 6]) {
+        let impulse = secant.spring * period_s;
+        matrix.add_scaled(impulse * self.ahead() + secant.damper * period_s, &self.product);
+        for (r, a) in right.iter_mut().zip(&self.along) {
+            *r -= impulse * a;
+        }
+    }
+
+    fn ahead(&self) -> f32 {
+        match self.law {
+            Law::Capped { ahead, .. } | Law::Spring { ahead, .. } => ahead,
+        }
+    }
+
+    /// On the object at its centre of mass.
+    pub fn wrench(&self, x: &[f32; 6], length: f32) -> Wrench {
+        let secant = self.secant(x);
+        let mut wrench = Wrench::ZERO;
+        for (row, error) in &self.rows.rows {
+            let rate = dot(row, x);
+            let f = -secant.spring * (error + self.ahead() * rate) - secant.damper * rate;
+            wrench.force += Vec3::new(row[0], row[1], row[2]) * f;
+            wrench.torque += Vec3::new(row[3], row[4], row[5]) * (f * length);
+        }
+        wrench
+    }
+}
+
+/// Force over u of a pull that is k·u at first and never more than `cap`: cap/√((cap/k)² + u²).
+fn saturating(k: f32, cap: f32, u: f32) -> f32 {
+    let slack = cap / k;
+    let length = libm::sqrtf(slack * slack + u * u);
+    if length > 0.0 { cap / length } else { 0.0 }
+}
+
+fn holds(faces: [u16; 2], face: u16) -> bool {
+    face != NO_FACE && (faces[0] == face || faces[1] == face)
+}
+
+/// Whether sequence number `a` came after `b`, across the wrap.
+fn newer(a: u16, b: u16) -> bool {
+    (a.wrapping_sub(b) as i16) > 0
+}
+
+/// Whether two targets ask for the same, sequence and expiry apart.
+fn same_constraint(a: &ConstraintTarget, b: &ConstraintTarget) -> bool {
+    a.kind == b.kind
+        && a.moving == b.moving
+        && a.static_part == b.static_part
+        && a.fixed == b.fixed
+        && a.stiffness == b.stiffness
+        && a.force_cap == b.force_cap
+        && a.torque_cap == b.torque_cap
+        && a.faces == b.faces
+}
+
+/// Refuses numbers that make no constraint.
+fn check(target: &ConstraintTarget) -> Result<(), TargetError> {
+    let unit = |d: [f32; 3]| (Vec3::from_array(d).length_squared() - 1.0).abs() < 1e-3;
+    let near = |p: [f32; 3]| p.iter().all(|x| x.abs() < 100.0);
+    let within = |x: f32, most: f32| (0.0..=most).contains(&x);
+    let good = unit(target.moving.direction)
+        && unit(target.fixed.direction)
+        && near(target.moving.point)
+        && near(target.fixed.point)
+        && (1.0..=1e7).contains(&target.stiffness)
+        && within(target.force_cap, 100.0)
+        && within(target.torque_cap, 10.0)
+        && target.expiry_ticks > 0;
+    if good { Ok(()) } else { Err(TargetError::BadNumber) }
+}
