@@ -395,8 +395,6 @@ pub enum Refusal {
     Lockstep,
     /// A number that is not finite or not possible.
     BadNumber,
-    /// This firmware has no such function (see [`Capabilities`]).
-    Unsupported,
     /// The board's queue is full: try again.
     Busy,
     /// The frame was sound but no message of this version.
@@ -463,8 +461,21 @@ pub struct Telemetry {
     pub missed: u32,
     /// Telemetry messages dropped since start because the link was slower.
     pub dropped: u32,
+    /// How constraint targets stand.
+    pub guidance: Guidance,
     /// Touching face pairs, deepest first.
     pub pairs: Vec<TouchingPair, MAX_PAIRS>,
+}
+
+/// How constraint targets stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Guidance {
+    /// Targets in force; those that fade are not counted.
+    pub active: u8,
+    /// Largest engagement of any, 0 to 1.
+    pub engagement: f32,
+    /// What they pull with, on the object about its centre of mass.
+    pub wrench: WireWrench,
 }
 
 /// Bits of [`Telemetry::flags`].

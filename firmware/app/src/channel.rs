@@ -8,7 +8,9 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use heapless::spsc::{Consumer, Producer, Queue};
 use mortise_haptics::State as LawState;
 use mortise_protocol::image::SceneImage;
-use mortise_protocol::message::{DeviceState, Fault, HandScript, Refusal, Statistics, Telemetry};
+use mortise_protocol::message::{
+    ConstraintTarget, DeviceState, Fault, HandScript, Refusal, Statistics, Telemetry,
+};
 
 use crate::parameters::ControlSettings;
 
@@ -55,6 +57,10 @@ pub enum CommandKind<'s> {
     Release,
     /// Parts back to their places, hash and mechanism to their start.
     ResetScene,
+    /// Set, refresh or replace a constraint target.
+    SetTarget(ConstraintTarget),
+    /// Let a constraint target fade.
+    ClearTarget(u16),
     /// Use this scene, all checks passed. Answered by [`Event::SceneTaken`]; valid in every session.
     UseScene(SceneImage<'s>),
     /// The scene did not pass its check when read again: a fault. Not answered; valid in every session.

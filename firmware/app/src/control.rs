@@ -10,9 +10,9 @@
 
 mod report;
 
-use mortise_haptics::{self as haptics, GrabError, Input, Output, Pose, Twist, Wrench};
+use mortise_haptics::{self as haptics, GrabError, Input, Output, Pose, TargetError, Twist, Wrench};
 use mortise_protocol::image::SceneImage;
-use mortise_protocol::message::{Fault, HandScript, Refusal, Statistics};
+use mortise_protocol::message::{ConstraintTarget, Fault, HandScript, Refusal, Statistics};
 use mortise_protocol::parameter::ParameterId;
 
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
@@ -245,6 +245,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             CommandKind::Grab(part) => self.grab(part),
             CommandKind::Release => self.request(SafetyEvent::Release),
             CommandKind::ResetScene => self.reset_scene(),
+            CommandKind::SetTarget(target) => self.set_target(&target),
+            CommandKind::ClearTarget(id) => {
+                self.ends.law.clear_target(id);
+                Ok(())
+            }
             CommandKind::UseScene(scene) => {
                 let taken = self.use_scene(scene);
                 self.send(Event::SceneTaken(taken));
@@ -304,6 +309,19 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 GrabError::BadHandle => Refusal::BadNumber,
             })?;
         self.request(SafetyEvent::Grab)
+    }
+
+    fn set_target(&mut self, target: &ConstraintTarget) -> Result<(), Refusal> {
+        let Some(scene) = &self.scene else {
+            return Err(Refusal::NoScene);
+        };
+        self.ends.law.set_target(target).map_err(|error| match error {
+            TargetError::BadNumber => Refusal::BadNumber,
+            TargetError::NoSuchPart => Refusal::NoSuchPart {
+                parts: scene.parts().len() as u16,
+            },
+            TargetError::Full => Refusal::Busy,
+        })
     }
 
     fn reset_scene(&mut self) -> Result<(), Refusal> {

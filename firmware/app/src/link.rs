@@ -7,7 +7,7 @@
 use heapless::String;
 use mortise_protocol::frame::{Decoder, FrameError, encode};
 use mortise_protocol::image::LAYOUT_VERSION;
-use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME};
+use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS};
 use mortise_protocol::message::{
     Capabilities, DeviceState, Fault, FromDevice, Refusal, Statistics, ToDevice, Version,
 };
@@ -241,7 +241,6 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             }
             ToDevice::SceneAbort if self.store.abort() => return ack,
             ToDevice::SceneAbort => return Err(Refusal::NoUpload),
-            ToDevice::SetTarget(_) | ToDevice::ClearTarget { .. } => return Err(Refusal::Unsupported),
             ToDevice::SimulatedHand(_) | ToDevice::Lockstep(_) | ToDevice::Run { .. } if !self.simulated => {
                 return Err(Refusal::NotSimulated);
             }
@@ -259,6 +258,8 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                 self.parameters = parameters;
                 return Ok(None);
             }
+            ToDevice::SetTarget(target) => CommandKind::SetTarget(target),
+            ToDevice::ClearTarget { id } => CommandKind::ClearTarget(id),
             ToDevice::Disarm => CommandKind::Disarm,
             ToDevice::ClearFault => CommandKind::ClearFault,
             ToDevice::Grab { part } => CommandKind::Grab(part),
@@ -418,7 +419,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             simulated: self.simulated,
             cost_unit: self.identity.cost_unit,
             cost_budget: self.identity.cost_budget,
-            max_targets: 0,
+            max_targets: MAX_TARGETS as u8,
             reset: self.identity.reset,
             state: self.state,
         }

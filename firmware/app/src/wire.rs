@@ -2,9 +2,9 @@
 
 use glam::{Quat, Vec3};
 use heapless::Vec;
-use mortise_haptics::{FacePair, Flags, LimitSettings, Pose, Wrench};
+use mortise_haptics::{FacePair, Flags, GuidanceState, LimitSettings, Pose, Wrench};
 use mortise_protocol::limits::MAX_PAIRS;
-use mortise_protocol::message::{TouchingPair, WirePose, WireWrench, flag};
+use mortise_protocol::message::{Guidance, TouchingPair, WirePose, WireWrench, flag};
 
 /// A pose for the wire.
 pub fn pose_to_wire(pose: &Pose) -> WirePose {
@@ -32,6 +32,15 @@ pub fn wrench_to_wire(wrench: &Wrench) -> WireWrench {
     WireWrench {
         force: wrench.force.to_array(),
         torque: wrench.torque.to_array(),
+    }
+}
+
+/// How targets stand, for the wire.
+pub fn guidance_to_wire(state: &GuidanceState) -> Guidance {
+    Guidance {
+        active: state.active,
+        engagement: state.engagement,
+        wrench: wrench_to_wire(&state.wrench),
     }
 }
 

@@ -114,7 +114,6 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
         Refusal::NotSimulated,
         Refusal::Lockstep,
         Refusal::BadNumber,
-        Refusal::Unsupported,
         Refusal::Busy,
         Refusal::Undecodable,
     ];
@@ -201,12 +200,6 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
                 let mut script = hand();
                 script.stiffness = f32::NAN;
                 Bench::ready().request(&ToDevice::SimulatedHand(script))
-            }
-            Refusal::Unsupported => {
-                let mut bench = Bench::ready();
-                assert_eq!(bench.capabilities().max_targets, 0);
-                assert_eq!(bench.request(&ToDevice::ClearTarget { id: 1 }), Err(reason));
-                bench.request(&ToDevice::SetTarget(target()))
             }
             Refusal::Busy => {
                 let mut bench = Bench::ready();
@@ -416,6 +409,51 @@ fn logs_are_sent_in_pieces_that_fit() {
 }
 
 #[test]
+fn targets_are_taken_and_told_of() {
+    let mut bench: Bench = Bench::new(TestFlash::leaked());
+    bench.ticks(1);
+    bench.greet();
+    assert_eq!(
+        bench.request(&ToDevice::SetTarget(target())),
+        Err(Refusal::NoScene)
+    );
+    let mut bench = Bench::ready();
+    assert!(bench.capabilities().max_targets > 0);
+    bench.request(&ToDevice::Arm).unwrap();
+    bench.request(&ToDevice::Grab { part: 1 }).unwrap();
+    bench.request(&ToDevice::SetTarget(target())).unwrap();
+    let with = |change: fn(&mut ConstraintTarget)| {
+        let mut target = target();
+        change(&mut target);
+        ToDevice::SetTarget(target)
+    };
+    let nan = with(|t| t.stiffness = f32::NAN);
+    assert_eq!(bench.request(&nan), Err(Refusal::BadNumber));
+    for part in [1, 9] {
+        let mut target = target();
+        target.static_part = part;
+        let refused = bench.request(&ToDevice::SetTarget(target));
+        assert_eq!(refused, Err(Refusal::NoSuchPart { parts: 2 }));
+    }
+    bench.request(&ToDevice::SetTelemetry { every_ticks: 1 }).unwrap();
+    bench.forget();
+    bench.ticks(20);
+    let guided = |bench: &Bench| {
+        let active = bench.heard.iter().filter_map(|m| match m {
+            FromDevice::Telemetry(t) => Some(t.guidance.active),
+            _ => None,
+        });
+        active.last()
+    };
+    assert_eq!(guided(&bench), Some(1));
+    bench.request(&ToDevice::ClearTarget { id: 1 }).unwrap();
+    bench.request(&ToDevice::ClearTarget { id: 1 }).unwrap();
+    bench.forget();
+    bench.ticks(20);
+    assert_eq!(guided(&bench), Some(0));
+}
+
+#[test]
 fn the_largest_messages_fit() {
     let mut telemetry = Telemetry {
         tick: u32::MAX,
@@ -429,6 +467,10 @@ fn the_largest_messages_fit() {
         flags: u16::MAX,
         missed: u32::MAX,
         dropped: u32::MAX,
+        guidance: Guidance {
+            active: u8::MAX,
+            ..Guidance::default()
+        },
         pairs: heapless::Vec::new(),
     };
     while telemetry

@@ -146,6 +146,7 @@ mod tests {
             flags: 0,
             missed: 0,
             dropped: 0,
+            guidance: Default::default(),
             pairs: Default::default(),
         }))
     }

@@ -68,6 +68,7 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::SceneBegin { .. }
         | ToDevice::SceneChunk { .. }
         | ToDevice::SceneAbort
+        | ToDevice::SetTarget(_)
         | ToDevice::ClearTarget { .. }
         | ToDevice::SetTelemetry { .. }
         | ToDevice::GetStatistics { reset: false }
@@ -76,7 +77,6 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::ClearFault
         | ToDevice::Grab { .. }
         | ToDevice::SceneCommit
-        | ToDevice::SetTarget(_)
         | ToDevice::GetStatistics { reset: true }
         | ToDevice::SimulatedHand(_)
         | ToDevice::Run { .. }

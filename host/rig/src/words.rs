@@ -90,7 +90,6 @@ impl Words for Refusal {
             Self::NotSimulated => "only a simulated mechanism can do this, this one is real".into(),
             Self::Lockstep => "the board is not in lockstep, or still has ticks to run: switch lockstep on and wait for the last run".into(),
             Self::BadNumber => "a number is not finite or not possible".into(),
-            Self::Unsupported => "this firmware has no such function: flash a newer one".into(),
             Self::Busy => "the board's queue is full: try again".into(),
             Self::Undecodable => "the board did not understand the message: flash the firmware of this release".into(),
         }
@@ -202,7 +201,6 @@ mod tests {
             Refusal::NotSimulated,
             Refusal::Lockstep,
             Refusal::BadNumber,
-            Refusal::Unsupported,
             Refusal::Busy,
             Refusal::Undecodable,
         ] {

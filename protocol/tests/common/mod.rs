@@ -163,8 +163,7 @@ impl Random {
             14 => Refusal::NotSimulated,
             15 => Refusal::Lockstep,
             16 => Refusal::BadNumber,
-            17 => Refusal::Unsupported,
-            18 => Refusal::Busy,
+            17 => Refusal::Busy,
             _ => Refusal::Undecodable,
         }
     }
@@ -243,6 +242,11 @@ impl Random {
             flags: self.u16(),
             missed: self.u32(),
             dropped: self.u32(),
+            guidance: Guidance {
+                active: self.u8(),
+                engagement: self.f32(),
+                wrench: self.wrench(),
+            },
             pairs: self.list(Self::pair),
         }
     }

@@ -6,7 +6,7 @@ use mortise_protocol::message::{Statistics, Telemetry, flag};
 use super::ControlPlane;
 use crate::board::{Clock, Mechanism};
 use crate::channel::{EVENTS_AT_ONCE, Event, Reply};
-use crate::wire::{flags_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire};
+use crate::wire::{flags_to_wire, guidance_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     pub(super) fn lockstep_has_room(&self) -> bool {
@@ -105,6 +105,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             flags,
             missed: self.missed_total,
             dropped: self.ends.shared.dropped(),
+            guidance: output.map(|o| guidance_to_wire(&o.guidance)).unwrap_or_default(),
             pairs: output.map(|o| pairs_to_wire(&o.pairs)).unwrap_or_default(),
             // Last, so that it covers what comes before it.
             cost: self.clock.cost(),
