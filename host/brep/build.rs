@@ -41,6 +41,7 @@ fn main() {
         "src/kernel.cc",
         "src/kernel_shape.cc",
         "src/kernel_oracle.cc",
+        "src/kernel_spline.cc",
         "build.rs",
     ] {
         println!("cargo:rerun-if-changed={file}");
@@ -59,6 +60,7 @@ fn main() {
         .file("src/kernel.cc")
         .file("src/kernel_shape.cc")
         .file("src/kernel_oracle.cc")
+        .file("src/kernel_spline.cc")
         .include("src")
         .include(&include)
         .std("c++17")

@@ -2,8 +2,9 @@
 //!
 //! The tessellation only points the way. A tree of boxes gives the nearest triangle at distance t; the nearest point of the exact shape then
 //! belongs to a face or boundary piece with a triangle within t + 2·chord. Those are few, and each is answered in closed form: projection
-//! onto the face's surface where that falls inside the face's trim, and the exact line or arc of its boundary. Spline faces are their
-//! tessellation, so their error is the tessellation's chord error.
+//! onto the face's surface where that falls inside the face's trim, and the exact line or arc of its boundary. Free-form faces are
+//! searched by Newton steps from the near triangles, their edges followed by dense points; see [`ExactSurface::surface_error_mm`] for what
+//! that leaves open. A free-form face whose surface the kernel did not hand out is its tessellation.
 //!
 //! Sign: from the exact outward normals at the nearest point (Bærentzen & Aanæs 2005: the face's, the sum of two at an edge, angle-weighted
 //! at a vertex), so that a point between a facet and the true cylinder is on the right side. Where the shell is open, and wherever the two
@@ -43,6 +44,7 @@ pub struct ExactSurface {
     winding: WindingTree,
     /// Most any analytic face's tessellation leaves the face, mm.
     pub(crate) chord: f64,
+    error: f64,
     /// Whether the winding number decides signs away from the surface.
     by_winding: bool,
 }
@@ -86,6 +88,7 @@ impl ExactSurface {
         Self {
             triangles: TriangleTree::new(&shape.mesh),
             winding: WindingTree::new(&shape.mesh),
+            error: topology.error(&shape),
             topology,
             chord,
             by_winding,
@@ -98,9 +101,16 @@ impl ExactSurface {
         &self.shape
     }
 
-    /// Most the tessellation of any analytic face leaves that face, mm.
+    /// Most the tessellation of any face leaves that face, mm: not an error of distances, but how far the nearest triangle may mislead.
     pub fn chord_error_mm(&self) -> f64 {
         self.chord
+    }
+
+    /// Stated bound of the error of distances, mm; 0 when every face is analytic and every edge a line or circle. Else
+    /// [`mortise_brep::EDGE_TOLERANCE_MM`] for other edges, the deviation of splines made from offset surfaces, and the tessellation's own
+    /// measured deflection where a free-form face or edge is known by that only.
+    pub fn surface_error_mm(&self) -> f64 {
+        self.error
     }
 
     /// Whether signs away from the surface come from the winding number, because the shell is not closed or not consistent.
@@ -181,7 +191,32 @@ impl ExactSurface {
             let Some(nearest) = of_face.min_by(|a, b| a.distance.total_cmp(&b.distance)) else {
                 continue;
             };
-            if matches!(self.shape.faces[f as usize].surface, Surface::Spline) {
+            let surface = &self.shape.faces[f as usize].surface;
+            let is_spline = matches!(surface, Surface::Spline);
+            if is_spline && self.topology.free_forms.patch(f).is_some() {
+                if nearest.distance > best + self.topology.chord[f as usize] + SAME_MM {
+                    continue;
+                }
+                let chord = self.topology.chord[f as usize];
+                let triangles = &self.shape.mesh.triangles;
+                self.topology.free_forms.feet(f, p, chord, triangles, near, |q| {
+                    let d = p.distance(q.point);
+                    if d <= best + SAME_MM && self.in_trim(f, q.point, near) {
+                        (best, at, face) = (d, q.point, f);
+                        let normal = q.normal * self.topology.sense[f as usize];
+                        // At a pole, and at a crease inside the surface, the way to the foot is not along the normal there.
+                        let along = (p - q.point).dot(normal).abs() >= 0.7 * d;
+                        feature = Some(if along || d <= SAME_MM {
+                            Feature::Face { normal }
+                        } else {
+                            Feature::Facet {
+                                triangle: nearest.triangle,
+                                feature: nearest.on.feature,
+                            }
+                        });
+                    }
+                });
+            } else if is_spline {
                 if nearest.distance < best {
                     (best, at, face) = (nearest.distance, nearest.on.point, f);
                     feature = Some(Feature::Facet {
@@ -190,7 +225,7 @@ impl ExactSurface {
                     });
                 }
             } else if nearest.distance <= best + 2.0 * self.chord + SAME_MM
-                && let Some(q) = project(&self.shape.faces[f as usize].surface, p, nearest.on.point)
+                && let Some(q) = project(surface, p, nearest.on.point)
             {
                 let d = p.distance(q.point);
                 // A face is preferred to its own boundary: its normal gives the sign without a tie.

@@ -1,7 +1,7 @@
 //! Pieces of the exact boundary between faces: one for each mesh side where the face changes.
 //!
 //! A piece carries the exact curve between the side's ends: a straight segment, or an arc when the B-rep edge is a circle. Other curves are
-//! followed by their tessellation.
+//! followed by points so dense that their chords are within [`mortise_brep::EDGE_TOLERANCE_MM`], where the model has them.
 
 use glam::DVec3;
 
@@ -32,10 +32,12 @@ pub(crate) struct PieceSide {
 }
 
 /// Exact curve of a piece.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum PieceCurve {
     /// The straight segment between the ends.
     Segment,
+    /// Points from end to end, both included.
+    Dense(Box<[DVec3]>),
     /// The shorter arc between the ends.
     Arc {
         /// Centre, mm.
@@ -118,6 +120,18 @@ impl Piece {
                     }
                 }
             }
+            PieceCurve::Dense(ref points) => {
+                let mut best = (f64::INFINITY, self.points[0]);
+                for pair in points.windows(2) {
+                    let q = on_segment(pair[0], pair[1], p);
+                    let d2 = q.distance_squared(p);
+                    if d2 < best.0 {
+                        best = (d2, q);
+                    }
+                }
+                let end = self.points.iter().position(|&end| end == best.1);
+                OnPiece { point: best.1, end }
+            }
             PieceCurve::Arc {
                 center,
                 axis,
@@ -153,6 +167,13 @@ impl Piece {
         let chord = self.points[1] - self.points[0];
         match self.curve {
             PieceCurve::Segment => chord.normalize_or_zero(),
+            PieceCurve::Dense(ref points) => {
+                let off = |pair: &&[DVec3]| on_segment(pair[0], pair[1], at).distance_squared(at);
+                let nearest = points.windows(2).min_by(|a, b| off(a).total_cmp(&off(b)));
+                nearest
+                    .map_or(chord, |pair| pair[1] - pair[0])
+                    .normalize_or_zero()
+            }
             PieceCurve::Arc { center, axis, .. } => {
                 let t = axis.cross(at - center).normalize_or_zero();
                 if t.dot(chord) < 0.0 { -t } else { t }
@@ -164,6 +185,7 @@ impl Piece {
     pub fn length(&self) -> f64 {
         match self.curve {
             PieceCurve::Segment => self.points[0].distance(self.points[1]),
+            PieceCurve::Dense(ref points) => points.windows(2).map(|pair| pair[0].distance(pair[1])).sum(),
             PieceCurve::Arc { radius, cos_half, .. } => 2.0 * radius * cos_half.clamp(-1.0, 1.0).acos(),
         }
     }
@@ -172,6 +194,15 @@ impl Piece {
     pub fn turn(&self) -> f64 {
         match self.curve {
             PieceCurve::Segment => 0.0,
+            PieceCurve::Dense(ref points) => {
+                let turns = points
+                    .windows(3)
+                    .map(|w| (w[1] - w[0]).angle_between(w[2] - w[1]));
+                let turns: f64 = turns.filter(|t| t.is_finite()).sum();
+                // Half a side is lost at each end.
+                let sides = points.len() as f64 - 1.0;
+                turns * sides / (sides - 1.0).max(1.0)
+            }
             PieceCurve::Arc { cos_half, .. } => 2.0 * cos_half.clamp(-1.0, 1.0).acos(),
         }
     }
@@ -181,6 +212,17 @@ impl Piece {
         let [a, b] = self.points;
         match self.curve {
             PieceCurve::Segment => a + (b - a) * t,
+            PieceCurve::Dense(ref points) => {
+                let mut left = t * self.length();
+                for pair in points.windows(2) {
+                    let length = pair[0].distance(pair[1]);
+                    if left <= length && length > 0.0 {
+                        return pair[0] + (pair[1] - pair[0]) * (left / length);
+                    }
+                    left -= length;
+                }
+                b
+            }
             PieceCurve::Arc {
                 center,
                 radius,
@@ -199,7 +241,30 @@ impl Piece {
     pub fn sagitta(&self) -> f64 {
         match self.curve {
             PieceCurve::Segment => 0.0,
+            PieceCurve::Dense(ref points) => {
+                let [a, b] = self.points;
+                let off = points.iter().map(|&p| on_segment(a, b, p).distance(p));
+                off.fold(0.0, f64::max)
+            }
             PieceCurve::Arc { radius, cos_half, .. } => radius * (1.0 - cos_half),
         }
+    }
+}
+
+/// Nearest point of the segment from `a` to `b`; its ends to the bit.
+pub(crate) fn on_segment(a: DVec3, b: DVec3, p: DVec3) -> DVec3 {
+    let along = b - a;
+    let length2 = along.length_squared();
+    let t = if length2 > 0.0 {
+        (p - a).dot(along) / length2
+    } else {
+        0.0
+    };
+    if t <= 0.0 {
+        a
+    } else if t >= 1.0 {
+        b
+    } else {
+        a + along * t
     }
 }

@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
-use mortise_brep::{Curve, Edge, Shape, Surface};
+use mortise_brep::{Curve, EDGE_TOLERANCE_MM, Edge, Shape, Surface};
+use rayon::prelude::*;
 
-use crate::piece::{Piece, PieceCurve, PieceSide};
+use crate::free_form::FreeForms;
+use crate::piece::{Piece, PieceCurve, PieceSide, on_segment};
 use crate::surface::{natural_normal, project};
 
 /// No piece, no neighbour.
@@ -29,6 +31,8 @@ pub(crate) struct Topology {
     pub vertex_pieces: HashMap<u32, Vec<u32>>,
     /// Unit outward facet normals; zero for a degenerate triangle.
     pub facet_normals: Vec<DVec3>,
+    /// Free-form faces.
+    pub free_forms: FreeForms,
 }
 
 impl Topology {
@@ -44,9 +48,10 @@ impl Topology {
                 (b - a).cross(c - a).normalize_or_zero()
             })
             .collect();
-        let sense = senses(shape);
+        let free_forms = FreeForms::new(shape);
+        let sense = senses(shape, &free_forms);
         let (pieces, triangle_pieces, neighbors) = split_sides(shape);
-        let chord = chords(shape, &pieces);
+        let chord = chords(shape, &free_forms, &pieces);
         let mut vertex_pieces: HashMap<u32, Vec<u32>> = HashMap::new();
         for (i, piece) in pieces.iter().enumerate() {
             for end in piece.ends {
@@ -62,6 +67,7 @@ impl Topology {
             vertex_normals: vec![DVec3::ZERO; mesh.vertices.len()],
             vertex_pieces,
             facet_normals,
+            free_forms,
         };
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for i in 0..3 {
@@ -77,13 +83,39 @@ impl Topology {
         topology
     }
 
-    /// Outward unit normal at `q` of the face that triangle `t` belongs to: exact where the face has a closed form, else the facet's.
+    /// Outward unit normal at `q`, a point at triangle `t`, of the face that the triangle belongs to: exact where the face is analytic or
+    /// its patch is known, else the facet's.
     pub fn outward(&self, shape: &Shape, t: u32, q: DVec3) -> DVec3 {
-        let face = shape.mesh.triangle_face[t as usize] as usize;
-        match natural_normal(&shape.faces[face].surface, q) {
-            Some(n) => n * self.sense[face],
+        let face = shape.mesh.triangle_face[t as usize];
+        let natural = natural_normal(&shape.faces[face as usize].surface, q)
+            .or_else(|| self.free_forms.beside(face, t, q).map(|on| on.normal))
+            .filter(|&n| n != DVec3::ZERO);
+        match natural {
+            Some(n) => n * self.sense[face as usize],
             None => self.facet_normals[t as usize],
         }
+    }
+
+    /// Bound of the error of distances, mm: see [`crate::ExactSurface::surface_error_mm`].
+    pub fn error(&self, shape: &Shape) -> f64 {
+        let faces = shape
+            .faces
+            .iter()
+            .enumerate()
+            .filter(|(_, f)| f.surface == Surface::Spline);
+        let of_faces = faces.map(|(f, _)| match self.free_forms.patch(f as u32) {
+            Some(patch) => patch.deviation,
+            None => shape.deflection_mm,
+        });
+        let of_pieces = self.pieces.iter().map(|piece| {
+            let curve = piece.edge.map(|e| shape.edges[e as usize].curve);
+            match (curve, &piece.curve) {
+                (Some(Curve::Line { .. }), PieceCurve::Segment) | (_, PieceCurve::Arc { .. }) => 0.0,
+                (_, PieceCurve::Dense(_)) => EDGE_TOLERANCE_MM,
+                (_, PieceCurve::Segment) => shape.deflection_mm,
+            }
+        });
+        of_faces.chain(of_pieces).fold(0.0, f64::max)
     }
 
     /// Sum of the outward normals of the faces that meet at `q` on a piece.
@@ -97,14 +129,20 @@ impl Topology {
 }
 
 /// Sense of each face from its own triangles; where it has no (non-degenerate) triangle, from the B-rep.
-fn senses(shape: &Shape) -> Vec<f64> {
+fn senses(shape: &Shape, free_forms: &FreeForms) -> Vec<f64> {
     let mesh = &shape.mesh;
     let mut agree = vec![0.0; shape.faces.len()];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
         let face = mesh.triangle_face[t] as usize;
         let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
         let area = (b - a).cross(c - a);
-        if let Some(n) = natural_normal(&shape.faces[face].surface, (a + b + c) / 3.0) {
+        let middle = (a + b + c) / 3.0;
+        let natural = natural_normal(&shape.faces[face].surface, middle).or_else(|| {
+            free_forms
+                .beside(face as u32, t as u32, middle)
+                .map(|on| on.normal)
+        });
+        if let Some(n) = natural {
             agree[face] += area.dot(n);
         }
     }
@@ -137,6 +175,11 @@ fn split_sides(shape: &Shape) -> Sides {
         }
     }
     let edge_of = edges_by_side(shape);
+    let fine: HashMap<u32, &[Vec<DVec3>]> = shape
+        .curves
+        .iter()
+        .map(|c| (c.edge, c.between.as_slice()))
+        .collect();
     let mut triangle_pieces = vec![[NONE; 3]; mesh.triangles.len()];
     let mut neighbors = vec![[NONE; 3]; mesh.triangles.len()];
     let mut pieces = Vec::new();
@@ -160,7 +203,7 @@ fn split_sides(shape: &Shape) -> Sides {
                 forward: mesh.triangles[t as usize][i] == key.0,
             })
             .collect();
-        let (edge, curve) = exact_curve(shape, &edge_of, ends, points, &sides);
+        let (edge, curve) = exact_curve(shape, &edge_of, &fine, ends, points, &sides);
         for &(t, i) in list {
             triangle_pieces[t as usize][i] = pieces.len() as u32;
         }
@@ -175,8 +218,11 @@ fn split_sides(shape: &Shape) -> Sides {
     (pieces, triangle_pieces, neighbors)
 }
 
+/// A mesh side of an edge: the edge, which side of its polyline, and whether that runs from the lower vertex to the higher.
+type SideOfEdge = (u32, usize, bool);
+
 /// Mesh sides that an edge's polyline runs along: vertices are matched by position to a millionth of the shape's size.
-fn edges_by_side(shape: &Shape) -> HashMap<(u32, u32), u32> {
+fn edges_by_side(shape: &Shape) -> HashMap<(u32, u32), SideOfEdge> {
     let size = shape
         .mesh
         .vertices
@@ -206,9 +252,9 @@ fn edges_by_side(shape: &Shape) -> HashMap<(u32, u32), u32> {
     let mut sides = HashMap::new();
     for (e, edge) in shape.edges.iter().enumerate() {
         let on: Vec<Option<u32>> = edge.polyline.iter().map(|&p| find(p)).collect();
-        for pair in on.windows(2) {
+        for (i, pair) in on.windows(2).enumerate() {
             if let &[Some(a), Some(b)] = pair {
-                sides.entry((a.min(b), a.max(b))).or_insert(e as u32);
+                sides.entry((a.min(b), a.max(b))).or_insert((e as u32, i, a < b));
             }
         }
     }
@@ -218,16 +264,28 @@ fn edges_by_side(shape: &Shape) -> HashMap<(u32, u32), u32> {
 /// The edge a mesh side lies on and its exact curve: by the edge's own polyline, else the edge of its faces that fits its ends best.
 fn exact_curve(
     shape: &Shape,
-    edge_of: &HashMap<(u32, u32), u32>,
+    edge_of: &HashMap<(u32, u32), SideOfEdge>,
+    fine: &HashMap<u32, &[Vec<DVec3>]>,
     ends: [u32; 2],
     points: [DVec3; 2],
     sides: &[PieceSide],
 ) -> (Option<u32>, PieceCurve) {
     // Half of STEP's customary accuracy of 1e-3 mm: nearer is the same place.
     const TOLERANCE_MM: f64 = 5e-4;
-    if let Some(&e) = edge_of.get(&(ends[0], ends[1])) {
+    if let Some(&(e, side, forward)) = edge_of.get(&(ends[0], ends[1])) {
         let curve = curve_through(&shape.edges[e as usize], points, TOLERANCE_MM);
-        return (Some(e), curve.unwrap_or(PieceCurve::Segment));
+        let dense = || {
+            let between = fine.get(&e)?.get(side)?;
+            let mut all = vec![points[0]];
+            if forward {
+                all.extend(between);
+            } else {
+                all.extend(between.iter().rev());
+            }
+            all.push(points[1]);
+            Some(PieceCurve::Dense(all.into()))
+        };
+        return (Some(e), curve.or_else(dense).unwrap_or(PieceCurve::Segment));
     }
     let mut candidates: Vec<u32> = sides
         .iter()
@@ -243,7 +301,7 @@ fn exact_curve(
         let beside = |p: DVec3| {
             edge.polyline
                 .windows(2)
-                .map(|w| segment_distance(w[0], w[1], p))
+                .map(|w| on_segment(w[0], w[1], p).distance(p))
                 .fold(f64::INFINITY, f64::min)
         };
         if beside(middle) < 0.1 * length
@@ -269,31 +327,19 @@ fn curve_through(edge: &Edge, points: [DVec3; 2], tolerance: f64) -> Option<Piec
     }
 }
 
-fn segment_distance(a: DVec3, b: DVec3, p: DVec3) -> f64 {
-    let ab = b - a;
-    let t = if ab == DVec3::ZERO {
-        0.0
-    } else {
-        ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0)
-    };
-    (a + ab * t).distance(p)
-}
-
 /// Most each face's triangles leave its exact surface, with its boundary's sagitta.
 ///
 /// Measured at the centroid and at the middles of the sides, where the deviation of a chord from a surface of constant curvature is
-/// largest, times 1.5 for the surfaces whose curvature changes (cone, torus). Splines: 0, they are their tessellation here.
-fn chords(shape: &Shape, pieces: &[Piece]) -> Vec<f64> {
+/// largest, times 1.5 for the surfaces whose curvature changes (cone, torus, free forms). Splines without a patch: 0, they are their
+/// tessellation here.
+fn chords(shape: &Shape, free_forms: &FreeForms, pieces: &[Piece]) -> Vec<f64> {
     let mesh = &shape.mesh;
     let mut chord = vec![0.0f64; shape.faces.len()];
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        let face = mesh.triangle_face[t] as usize;
-        let surface = &shape.faces[face].surface;
-        if matches!(surface, Surface::Spline) {
-            continue;
-        }
-        let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
-        for p in [
+    let of_triangle = |t: usize| -> f64 {
+        let face = mesh.triangle_face[t];
+        let surface = &shape.faces[face as usize].surface;
+        let [a, b, c] = mesh.triangles[t].map(|v| mesh.vertices[v as usize]);
+        let places = [
             a,
             b,
             c,
@@ -301,11 +347,22 @@ fn chords(shape: &Shape, pieces: &[Piece]) -> Vec<f64> {
             (a + b) / 2.0,
             (b + c) / 2.0,
             (c + a) / 2.0,
-        ] {
-            if let Some(q) = project(surface, p, p) {
-                chord[face] = chord[face].max(1.5 * q.point.distance(p));
-            }
-        }
+        ];
+        let off = |p: DVec3| {
+            let foot = project(surface, p, p)
+                .map(|q| q.point)
+                .or_else(|| free_forms.beside(face, t as u32, p).map(|on| on.point));
+            foot.map_or(0.0, |q| q.distance(p))
+        };
+        1.5 * places.map(off).into_iter().fold(0.0, f64::max)
+    };
+    let all: Vec<f64> = (0..mesh.triangles.len())
+        .into_par_iter()
+        .map(of_triangle)
+        .collect();
+    for (&face, off) in mesh.triangle_face.iter().zip(all) {
+        let c = &mut chord[face as usize];
+        *c = c.max(off);
     }
     for piece in pieces {
         for side in &piece.sides {

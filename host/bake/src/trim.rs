@@ -9,12 +9,11 @@ use glam::DVec3;
 
 use crate::distance::{ExactSurface, NearTriangle, SAME_MM};
 use crate::piece::Piece;
-use crate::surface::natural_normal;
 use crate::topology::NONE;
 use crate::triangles::nearest_on_triangle;
 
 impl ExactSurface {
-    /// Whether `q`, a point of the untrimmed analytic surface of `face`, lies in the face. `near` must hold all triangles within a few
+    /// Whether `q`, a point of the untrimmed surface of `face`, lies in the face. `near` must hold all triangles within a few
     /// chord errors of `q`.
     pub(crate) fn in_trim(&self, face: u32, q: DVec3, near: &[NearTriangle]) -> bool {
         let chord = self.topology.chord[face as usize];
@@ -78,29 +77,28 @@ impl ExactSurface {
         self.in_trim(face, q, &near)
     }
 
-    fn normal_at(&self, face: u32, at: DVec3) -> DVec3 {
-        natural_normal(&self.shape.faces[face as usize].surface, at)
-            .map_or(DVec3::ZERO, |n| n * self.topology.sense[face as usize])
-    }
-
     /// Left of the direction in which the face runs along the piece is inside.
     fn on_inner_side(&self, face: u32, piece: &Piece, at: DVec3, q: DVec3) -> bool {
         let Some(side) = piece.sides.iter().find(|s| s.face == face) else {
             return true;
         };
         let tangent = piece.tangent(at) * if side.forward { 1.0 } else { -1.0 };
-        let inward = self.normal_at(face, at).cross(tangent);
+        let inward = self
+            .topology
+            .outward(&self.shape, side.triangle, at)
+            .cross(tangent);
         (q - at).dot(inward) >= 0.0
     }
 
     /// At a corner of the boundary: the inside is the sector from the outgoing piece anticlockwise to the incoming one.
     fn in_sector(&self, face: u32, vertex: u32, at: DVec3, q: DVec3) -> bool {
-        let normal = self.normal_at(face, at);
         let mut out = None;
         let mut back = None;
+        let mut triangle = None;
         for &i in self.topology.vertex_pieces.get(&vertex).into_iter().flatten() {
             let piece = &self.topology.pieces[i as usize];
             for side in piece.sides.iter().filter(|s| s.face == face) {
+                triangle = Some(side.triangle);
                 let starts_here = (piece.ends[0] == vertex) == side.forward;
                 let away = piece.tangent(at) * if piece.ends[0] == vertex { 1.0 } else { -1.0 };
                 if starts_here {
@@ -110,9 +108,10 @@ impl ExactSurface {
                 }
             }
         }
-        let (Some(out), Some(back)) = (out, back) else {
+        let (Some(out), Some(back), Some(triangle)) = (out, back, triangle) else {
             return true;
         };
+        let normal = self.topology.outward(&self.shape, triangle, at);
         let angle = |v: DVec3| {
             let a = normal.dot(out.cross(v)).atan2(out.dot(v));
             if a < 0.0 { a + TAU } else { a }

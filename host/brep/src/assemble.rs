@@ -4,7 +4,7 @@
 use crate::kernel::{self, RawPart, RawResult};
 use crate::part21::check::{self, Content};
 use crate::part21::{self, Exchange, Part21Error, operators, render, text, units};
-use crate::{BrepError, CadModel, LoadOptions, Part, shape};
+use crate::{BrepError, CadModel, EDGE_TOLERANCE_MM, LoadOptions, Part, free_form, shape};
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
 
@@ -117,7 +117,12 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
             )
             .map_err(|e| kernel_error(path, &e))?;
         let mut notes = Vec::new();
-        shapes.push(shape::convert(raw, &mut notes));
+        let free = document
+            .free_forms(index, EDGE_TOLERANCE_MM)
+            .map_err(|e| kernel_error(path, &e))?;
+        let mut shape = shape::convert(raw, &mut notes);
+        free_form::add(&mut shape, free);
+        shapes.push(shape);
         let owner = parts.iter().find(|p| p.shape == index).map_or("?", |p| &p.name);
         warnings.extend(notes.into_iter().map(|note| format!("{owner}: {note}")));
     }

@@ -33,6 +33,7 @@ namespace brep {
 struct RawPart;
 struct RawResult;
 struct RawShape;
+struct RawFreeForms;
 
 // A STEP file after transfer: its distinct shapes and where they are placed.
 class Document {
@@ -44,6 +45,7 @@ class Document {
   rust::Vec<RawResult> results() const;
   std::size_t shape_count() const;
   RawShape shape(std::size_t index, double linear_mm, double relative, double angular_rad) const;
+  RawFreeForms free_forms(std::size_t index, double tolerance_mm) const;
   rust::Vec<std::uint8_t> sides(std::size_t index, rust::Slice<const double> points, double tolerance_mm) const;
   rust::Vec<double> feet(std::size_t index, rust::Slice<const double> points) const;
 

@@ -108,6 +108,35 @@ mod ffi {
         deflection_asked: f64,
     }
 
+    /// A face that is none of the closed forms, as a B-spline surface cut to the face's parameter box.
+    #[derive(Clone, Debug)]
+    struct RawSpline {
+        face: u32,
+        degrees: [u32; 2],
+        /// Each knot as often as its multiplicity.
+        knots_u: Vec<f64>,
+        knots_v: Vec<f64>,
+        /// x, y, z, weight; v runs fastest.
+        poles: Vec<f64>,
+        /// Largest distance seen from the face's own surface, mm.
+        deviation: f64,
+    }
+
+    /// Points of an edge that is neither line nor circle, between the points of its polyline.
+    #[derive(Clone, Debug)]
+    struct RawCurve {
+        edge: u32,
+        /// For each side of the polyline how many points lie within it; empty when the edge has no parameters.
+        counts: Vec<u32>,
+        points: Vec<f64>,
+    }
+
+    #[derive(Clone, Debug)]
+    struct RawFreeForms {
+        splines: Vec<RawSpline>,
+        curves: Vec<RawCurve>,
+    }
+
     unsafe extern "C++" {
         include!("kernel.h");
 
@@ -125,6 +154,8 @@ mod ffi {
             angular_rad: f64,
         ) -> Result<RawShape>;
 
+        /// Faces and edges without a closed form, of a shape that [`Document::shape`] has tessellated; edges within the tolerance.
+        fn free_forms(self: &Document, index: usize, tolerance_mm: f64) -> Result<RawFreeForms>;
         /// Side of each point (x, y, z in turn) of the shape's solid by the kernel's own classifier: 0 inside, 1 outside, 2 within
         /// the tolerance of the surface, 3 it cannot tell.
         fn sides(self: &Document, index: usize, points: &[f64], tolerance_mm: f64) -> Result<Vec<u8>>;

@@ -21,6 +21,7 @@
 mod assemble;
 pub mod child;
 mod error;
+mod free_form;
 mod kernel;
 mod model;
 mod options;

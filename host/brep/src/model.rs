@@ -43,6 +43,12 @@ pub struct Shape {
     pub edges: Vec<Edge>,
     /// Tessellation, welded by topology.
     pub mesh: Mesh,
+    /// What lies under the faces that are [`Surface::Spline`], where the kernel could tell.
+    pub splines: Vec<SplineSurface>,
+    /// Finer points of the edges that are [`Curve::Other`].
+    pub curves: Vec<FineCurve>,
+    /// Largest distance measured between the tessellation and what it stands for, mm.
+    pub deflection_mm: f64,
     /// Volume from the exact B-rep, mm³.
     pub volume_mm3: f64,
     /// Surface area from the exact B-rep, mm².
@@ -56,6 +62,34 @@ pub struct Shape {
     /// Mesh edges not used exactly twice (0 when closed).
     pub open_edges: usize,
 }
+
+/// A tensor-product (rational) B-spline surface under a face, cut to the face's box of parameters (Piegl & Tiller, "The NURBS Book", 4.4):
+/// S(u, v) = Σ Nᵢ(u) Nⱼ(v) wᵢⱼ Pᵢⱼ / Σ Nᵢ(u) Nⱼ(v) wᵢⱼ.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SplineSurface {
+    /// Face it belongs to: an index into [`Shape::faces`].
+    pub face: u32,
+    /// Degree in u and in v.
+    pub degrees: [u32; 2],
+    /// Knots in u and in v, not falling, each as often as its multiplicity: poles + degree + 1 of them.
+    pub knots: [Vec<f64>; 2],
+    /// x, y, z (mm) and weight of each pole; v runs fastest.
+    pub poles: Vec<[f64; 4]>,
+    /// Largest distance seen from the face's own surface, mm: 0 for a spline, rounding for an extrusion or revolution, more for an offset.
+    pub deviation_mm: f64,
+}
+
+/// Points along an edge that is neither line nor circle, dense enough that their chords are within [`EDGE_TOLERANCE_MM`] of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FineCurve {
+    /// Edge it belongs to: an index into [`Shape::edges`].
+    pub edge: u32,
+    /// For each side of the edge's polyline the points strictly between its ends, mm.
+    pub between: Vec<Vec<DVec3>>,
+}
+
+/// How closely [`FineCurve`] follows its edge, mm: a quarter of a micrometre, well below the micrometre asked of distances.
+pub const EDGE_TOLERANCE_MM: f64 = 2.5e-4;
 
 /// A B-rep face.
 #[derive(Clone, Debug, Serialize, Deserialize)]

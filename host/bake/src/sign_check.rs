@@ -1,0 +1,266 @@
+//! Inside or outside, held against the CAD kernel's own classifier.
+//!
+//! Random points in a box a tenth larger than the shape, and as many again close to its surface, are classified three ways: by the kernel,
+//! by [`ExactSurface`], and by a field baked from it and looked up as the board does. Left out, and counted, are points so near the surface
+//! that the approximation's stated error decides:
+//! - for the exact surface, within its stated error and the model's own accuracy;
+//! - for the field, within √3/2 of a cell and half a step. A trilinear sample is Σ wᵢ dᵢ of distances at the corners xᵢ of a cell, and
+//!   distance grows no faster than the way: |Σ wᵢ dᵢ − d(p)| ≤ Σ wᵢ |xᵢ − p| ≤ √Σ wᵢ |xᵢ − p|² = h √Σ t(1 − t) ≤ h √3/2 (Jensen).
+//!
+//! Cost: one ray of the kernel a point, 10 to 500 µs, in a process of its own.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+use mortise_brep::oracle::{Side, classify};
+use mortise_brep::{BrepError, LoadOptions, Shape};
+use mortise_protocol::image::{Lookup, SceneImage};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::distance::ExactSurface;
+use crate::error::BakeError;
+use crate::field::{FieldOptions, SampleFormat, bake_field};
+use crate::grid::bounding_box;
+use crate::image::{ImageBuilder, PartPlacement};
+use crate::pointshell::Pointshell;
+
+/// STEP's customary accuracy, mm: what the file itself leaves open about where its faces meet.
+const MODEL_MM: f64 = 1e-3;
+
+/// What to compare.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SignOptions {
+    /// Points in the box; half as many again are close to the surface.
+    pub points: usize,
+    /// Cells of the field along the shape's longest side.
+    pub cells: f64,
+    /// Longest time for the kernel, seconds.
+    pub time_limit_s: u64,
+}
+
+/// A point on the wrong side.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WrongSide {
+    /// In the shape's frame, mm.
+    pub point: [f64; 3],
+    /// The kernel: inside.
+    pub inside: bool,
+    /// Signed distance found, mm.
+    pub distance_mm: f64,
+    /// Found by the field; else by the exact surface.
+    pub field: bool,
+}
+
+/// Signs of one shape.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SignCheck {
+    /// Closed by count of mesh edges. For others the kernel's answer means as little as ours.
+    pub closed: bool,
+    /// Signs away from the surface come from the winding number.
+    pub by_winding: bool,
+    /// Points the kernel decided.
+    pub points: usize,
+    /// Points the kernel could not decide, or put on the surface.
+    pub undecided: usize,
+    /// Nearer than this the sign of the exact surface is not asked, mm.
+    pub tolerance_mm: f64,
+    /// Points that near.
+    pub near: usize,
+    /// Points on the wrong side of the exact surface.
+    pub wrong: usize,
+    /// Cell of the field, mm.
+    pub cell_mm: f64,
+    /// Nearer than this the sign of the field is not asked, mm.
+    pub field_tolerance_mm: f64,
+    /// Points that near.
+    pub field_near: usize,
+    /// Of those, points with the other sign all the same: next to sharp edges and in walls thinner than a cell.
+    pub field_near_wrong: usize,
+    /// Points farther away on the wrong side of the field.
+    pub field_wrong: usize,
+    /// The first few of all that are wrong.
+    pub examples: Vec<WrongSide>,
+}
+
+/// Why signs could not be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SignError {
+    /// The kernel gave no answer.
+    #[error(transparent)]
+    Kernel(#[from] BrepError),
+    /// No field.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    /// The field was baked into an image that does not open.
+    #[error("the baked field does not open: {0}")]
+    Image(String),
+}
+
+/// Compares signs of `shape`, which is number `index` in the file at `path` read with `load`.
+///
+/// # Errors
+/// When the kernel gives no answer within the time limit, or the field cannot be baked.
+pub fn check_signs(
+    path: &Path,
+    load: &LoadOptions,
+    index: usize,
+    shape: &Shape,
+    options: &SignOptions,
+) -> Result<SignCheck, SignError> {
+    let (lo, hi) = bounding_box(shape);
+    let longest = (hi - lo).max_element();
+    let cell_mm = longest / options.cells;
+    let points = sample_points(shape, options.points, 2.0 * cell_mm);
+    let load = LoadOptions {
+        time_limit_s: options.time_limit_s,
+        ..load.clone()
+    };
+    let sides = classify(path, &load, index, &points, 1e-7)?;
+
+    let mut surface = ExactSurface::new(shape);
+    let field = FieldOptions {
+        cell_mm,
+        band_cells: 2.0,
+        format: SampleFormat::Int16,
+    };
+    let baked = bake_field(&mut surface, &field, "part", &|_, _| ControlFlow::Continue(()))?;
+    let cell_mm = f64::from(baked.record.cell) * 1000.0;
+    let step_mm = f64::from(baked.record.scale) * 1000.0;
+    let mut image = ImageBuilder::new();
+    let (number, _) = image.add_shape(shape, baked, &Pointshell::default());
+    image.add_part(&PartPlacement {
+        shape: number,
+        placement: DAffine3::IDENTITY,
+        grabbable: true,
+    });
+    let image = image.finish();
+    // Aligned as flash is.
+    let mut words = vec![0u32; image.len().div_ceil(4)];
+    bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..image.len()].copy_from_slice(&image);
+    let image = SceneImage::open(&bytemuck::cast_slice(&words)[..image.len()])
+        .map_err(|e| SignError::Image(format!("{e:?}")))?;
+    let board = image.shape(0).field;
+
+    let tolerance_mm = MODEL_MM + surface.surface_error_mm();
+    let field_tolerance_mm = tolerance_mm + 0.75f64.sqrt() * cell_mm + step_mm;
+    let count = |(&p, &side): (&DVec3, &Side)| -> SignCheck {
+        let mut one = SignCheck {
+            closed: shape.closed,
+            by_winding: surface.sign_by_winding(),
+            points: 1,
+            undecided: 0,
+            tolerance_mm,
+            near: 0,
+            wrong: 0,
+            cell_mm,
+            field_tolerance_mm,
+            field_near: 0,
+            field_near_wrong: 0,
+            field_wrong: 0,
+            examples: Vec::new(),
+        };
+        let inside = match side {
+            Side::In => true,
+            Side::Out => false,
+            Side::On | Side::Unknown => {
+                (one.points, one.undecided) = (0, 1);
+                return one;
+            }
+        };
+        let Some(exact) = surface.nearest(p).map(|n| n.distance) else {
+            return one;
+        };
+        let stored = match board.lookup((p / 1000.0).as_vec3().to_array()) {
+            Lookup::Near(sample) => f64::from(sample.distance) * 1000.0,
+            Lookup::Far { inside, bound } => f64::from(bound) * if inside { -1000.0 } else { 1000.0 },
+        };
+        let example = |distance_mm, field| WrongSide {
+            point: p.to_array(),
+            inside,
+            distance_mm,
+            field,
+        };
+        if exact.abs() <= tolerance_mm {
+            one.near = 1;
+        } else if (exact < 0.0) != inside {
+            one.wrong = 1;
+            one.examples.push(example(exact, false));
+        }
+        let other = (stored < 0.0 || (stored == 0.0 && exact < 0.0)) != inside;
+        if exact.abs() <= field_tolerance_mm {
+            one.field_near = 1;
+            one.field_near_wrong = usize::from(other);
+        } else if other {
+            one.field_wrong = 1;
+            one.examples.push(example(stored, true));
+        }
+        one
+    };
+    let all = points.par_iter().zip(&sides).map(count).reduce_with(add);
+    all.ok_or_else(|| BakeError::NothingToBake { parts: 1 }.into())
+}
+
+fn add(mut a: SignCheck, b: SignCheck) -> SignCheck {
+    /// Enough to find the cause, not enough to flood a report.
+    const EXAMPLES: usize = 8;
+    a.points += b.points;
+    a.undecided += b.undecided;
+    a.near += b.near;
+    a.wrong += b.wrong;
+    a.field_near += b.field_near;
+    a.field_near_wrong += b.field_near_wrong;
+    a.field_wrong += b.field_wrong;
+    let room = EXAMPLES.saturating_sub(a.examples.len());
+    a.examples.extend(b.examples.into_iter().take(room));
+    a
+}
+
+/// `count` points in the box a tenth larger than the shape, then half as many up to `reach` mm off the triangles, each triangle as often as
+/// its area asks.
+fn sample_points(shape: &Shape, count: usize, reach: f64) -> Vec<DVec3> {
+    let mut random = SplitMix(1);
+    let (lo, hi) = bounding_box(shape);
+    let (center, half) = ((lo + hi) / 2.0, (hi - lo) * 0.55);
+    let mut points: Vec<DVec3> = (0..count)
+        .map(|_| center + half * DVec3::from_array([0; 3].map(|_| 2.0 * random.unit() - 1.0)))
+        .collect();
+    let mesh = &shape.mesh;
+    let mut total = 0.0;
+    let areas: Vec<f64> = mesh
+        .triangles
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+            total += (b - a).cross(c - a).length();
+            total
+        })
+        .collect();
+    for _ in 0..count / 2 {
+        let at = areas.partition_point(|&sum| sum < total * random.unit());
+        let Some(t) = mesh.triangles.get(at) else { continue };
+        let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+        let (mut x, mut y) = (random.unit(), random.unit());
+        if x + y > 1.0 {
+            (x, y) = (1.0 - x, 1.0 - y);
+        }
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        points.push(a + (b - a) * x + (c - a) * y + normal * reach * (2.0 * random.unit() - 1.0));
+    }
+    points
+}
+
+/// Steele, Lea, Flood 2014, "Fast splittable pseudorandom number generators": the same points on every machine.
+struct SplitMix(u64);
+
+impl SplitMix {
+    /// In [0, 1).
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) as f64 / 2f64.powi(64)
+    }
+}
