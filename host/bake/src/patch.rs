@@ -89,6 +89,52 @@ impl Patch {
 
     /// The local minimum of the distance to `p` that `start` leads to.
     pub fn project(&self, p: DVec3, start: [f64; 2]) -> OnPatch {
+        let (mut at, mut jet) = self.descend(p, start);
+        if let Some(side) = self.collapsed(&jet) {
+            // The tip of a cone: every parameter along the side is the same point, and only some lead down from it.
+            let (off, there) = self.descend(p, self.best_beside(side, at, p));
+            if there.s.distance_squared(p) < jet.s.distance_squared(p) {
+                (at, jet) = (off, there);
+            }
+        }
+        let normal = match self.collapsed(&jet) {
+            Some(_) => DVec3::ZERO,
+            None => jet.first[0].cross(jet.first[1]).normalize_or_zero(),
+        };
+        OnPatch {
+            uv: at,
+            point: jet.s,
+            normal,
+        }
+    }
+
+    /// The parameter along which the surface does not move there (or hardly, for its size).
+    fn collapsed(&self, jet: &Jet) -> Option<usize> {
+        let moves = [0, 1].map(|k| jet.first[k].length() * (self.bounds[k][1] - self.bounds[k][0]));
+        (0..2).find(|&k| moves[k] < 1e-6 * moves[1 - k])
+    }
+
+    /// Of points a thousandth of the other parameter's range away from a collapsed side, the nearest to `p`.
+    fn best_beside(&self, side: usize, at: [f64; 2], p: DVec3) -> [f64; 2] {
+        const SAMPLES: usize = 32;
+        let [lo, hi] = self.bounds[1 - side];
+        let inward = if at[1 - side] - lo < hi - at[1 - side] {
+            1e-3
+        } else {
+            -1e-3
+        };
+        let [first, last] = self.bounds[side];
+        let candidates = (0..SAMPLES).map(|i| {
+            let mut uv = at;
+            uv[1 - side] += inward * (hi - lo);
+            uv[side] = first + (last - first) * (i as f64 + 0.5) / SAMPLES as f64;
+            uv
+        });
+        let far = |uv: &[f64; 2]| self.jet(*uv).s.distance_squared(p);
+        candidates.min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(at)
+    }
+
+    fn descend(&self, p: DVec3, start: [f64; 2]) -> ([f64; 2], Jet) {
         let mut at = self.inside(start);
         let mut jet = self.jet(at);
         let mut best = jet.s.distance_squared(p);
@@ -120,21 +166,7 @@ impl Patch {
                 break;
             }
         }
-        let [du, dv] = jet.first;
-        let across = du.cross(dv);
-        // Parallel or vanishing derivatives have no normal.
-        let normal = if across.length()
-            > 1e-9 * (du.length() * dv.length()).max(du.length_squared().max(dv.length_squared()) * 1e-6)
-        {
-            across.normalize_or_zero()
-        } else {
-            DVec3::ZERO
-        };
-        OnPatch {
-            uv: at,
-            point: jet.s,
-            normal,
-        }
+        (at, jet)
     }
 
     /// Points all over the patch, `(uv, point)`: `degree + 1` in each span of knots.

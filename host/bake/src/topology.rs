@@ -10,6 +10,9 @@ use crate::free_form::FreeForms;
 use crate::piece::{Piece, PieceCurve, PieceSide, on_segment};
 use crate::surface::{natural_normal, project};
 
+/// Cosine of 170°: outward normals that far apart are as good as opposite.
+const OPPOSITE: f64 = -0.985;
+
 /// No piece, no neighbour.
 pub(crate) const NONE: u32 = u32::MAX;
 
@@ -27,6 +30,8 @@ pub(crate) struct Topology {
     pub chord: Vec<f64>,
     /// Angle-weighted outward normal of each vertex (exact face normals; not unit length).
     pub vertex_normals: Vec<DVec3>,
+    /// Whether faces with almost opposite normals meet at a vertex.
+    pub is_cusp: Vec<bool>,
     /// Pieces that end at each vertex that has any.
     pub vertex_pieces: HashMap<u32, Vec<u32>>,
     /// Unit outward facet normals; zero for a degenerate triangle.
@@ -65,10 +70,12 @@ impl Topology {
             sense,
             chord,
             vertex_normals: vec![DVec3::ZERO; mesh.vertices.len()],
+            is_cusp: vec![false; mesh.vertices.len()],
             vertex_pieces,
             facet_normals,
             free_forms,
         };
+        let mut normals_at: Vec<Vec<DVec3>> = vec![Vec::new(); mesh.vertices.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for i in 0..3 {
                 let [at, next, last] =
@@ -76,7 +83,10 @@ impl Topology {
                 let angle = (next - at).angle_between(last - at);
                 if angle.is_finite() {
                     let normal = topology.outward(shape, t as u32, at);
-                    topology.vertex_normals[triangle[i] as usize] += normal * angle;
+                    let vertex = triangle[i] as usize;
+                    topology.vertex_normals[vertex] += normal * angle;
+                    topology.is_cusp[vertex] |= normals_at[vertex].iter().any(|n| n.dot(normal) < OPPOSITE);
+                    normals_at[vertex].push(normal);
                 }
             }
         }
