@@ -343,3 +343,114 @@ fn basis(knots: &[f64], degree: usize, span: usize, t: f64) -> [[f64; MAX_DEGREE
     };
     [values, first, second]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A quarter of a cylinder of radius 5 about z, from z = 0 to 20: linear along u, a rational arc along v.
+    fn quarter() -> Patch {
+        let w = 0.5f64.sqrt();
+        let arc = [([5.0, 0.0], 1.0), ([5.0, 5.0], w), ([0.0, 5.0], 1.0)];
+        let poles = [0.0, 20.0]
+            .iter()
+            .flat_map(|&z| arc.iter().map(move |&([x, y], w)| [x, y, z, w]))
+            .collect();
+        Patch::new(&SplineSurface {
+            face: 0,
+            degrees: [1, 2],
+            knots: [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]],
+            poles,
+            deviation_mm: 0.0,
+        })
+        .unwrap()
+    }
+
+    /// A wavy cubic sheet over 30 × 30 mm with a double knot in u.
+    fn sheet() -> Patch {
+        let (nu, nv) = (7, 6);
+        let height = |i: usize, j: usize| 2.0 * ((i * 7 + j * 5) % 4) as f64 - 3.0;
+        let poles = (0..nu * nv)
+            .map(|k| {
+                let (i, j) = (k / nv, k % nv);
+                let weight = 1.0 + 0.2 * ((i + j) % 3) as f64;
+                [5.0 * i as f64, 6.0 * j as f64, height(i, j), weight]
+            })
+            .collect();
+        Patch::new(&SplineSurface {
+            face: 0,
+            degrees: [3, 3],
+            knots: [
+                vec![0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0],
+                vec![-1.0, -1.0, -1.0, -1.0, 0.5, 1.0, 2.0, 2.0, 2.0, 2.0],
+            ],
+            poles,
+            deviation_mm: 0.0,
+        })
+        .unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+
+        /// The foot on a cylinder spelt as a spline is that on the cylinder, or on the patch's border.
+        #[test]
+        fn a_rational_arc_is_a_circle(rho in 0.5f64..12.0, a in 0.05f64..1.52, z in 0.5f64..19.5, start in prop::array::uniform2(0.0f64..1.0)) {
+            let p = DVec3::new(rho * a.cos(), rho * a.sin(), z);
+            let on = quarter().project(p, start);
+            let foot = DVec3::new(5.0 * a.cos(), 5.0 * a.sin(), z);
+            prop_assert!(on.point.distance(foot) < 1e-6, "{on:?} {foot}");
+            prop_assert!((on.point.distance(p) - (rho - 5.0).abs()).abs() < 1e-12);
+            prop_assert!((on.normal.dot(foot.with_z(0.0)) / 5.0).abs() > 1.0 - 1e-9);
+        }
+
+        /// Derivatives are those of differences, off the knots.
+        #[test]
+        fn derivatives_are_limits_of_differences(u in 0.01f64..2.99, v in -0.99f64..1.99) {
+            const H: f64 = 1e-4;
+            prop_assume!([1.0, 2.0].iter().all(|k| (u - k).abs() > 3.0 * H));
+            prop_assume!([0.5, 1.0].iter().all(|k| (v - k).abs() > 3.0 * H));
+            let patch = sheet();
+            let at = |i: f64, j: f64| patch.jet([u + i * H, v + j * H]).s;
+            let jet = patch.jet([u, v]);
+            // Central differences err by H²/6 and H²/12 times derivatives of up to some hundred mm, second ones by rounding over H² as well.
+            prop_assert!(jet.first[0].distance((at(1.0, 0.0) - at(-1.0, 0.0)) / (2.0 * H)) < 1e-4);
+            prop_assert!(jet.first[1].distance((at(0.0, 1.0) - at(0.0, -1.0)) / (2.0 * H)) < 1e-4);
+            prop_assert!(jet.second[0].distance((at(1.0, 0.0) + at(-1.0, 0.0) - 2.0 * jet.s) / (H * H)) < 1e-2);
+            let mixed = at(1.0, 1.0) + at(-1.0, -1.0) - at(1.0, -1.0) - at(-1.0, 1.0);
+            prop_assert!(jet.second[1].distance(mixed / (4.0 * H * H)) < 1e-2);
+            prop_assert!(jet.second[2].distance((at(0.0, 1.0) + at(0.0, -1.0) - 2.0 * jet.s) / (H * H)) < 1e-2);
+        }
+
+        /// Started at the nearest of many samples, no sample is nearer than the foot, and inside the patch the way there is along the normal.
+        #[test]
+        fn no_sample_is_nearer_than_the_foot(p in (-5.0f64..35.0, -5.0f64..35.0, -8.0f64..8.0)) {
+            let p = DVec3::new(p.0, p.1, p.2);
+            let patch = sheet();
+            let samples = (0..3600).map(|k| [f64::from(k / 60) * 3.0 / 59.0, f64::from(k % 60) * 3.0 / 59.0 - 1.0]);
+            let far = |uv: &[f64; 2]| patch.jet(*uv).s.distance(p);
+            let start = samples.min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+            let on = patch.project(p, start);
+            let d = on.point.distance(p);
+            prop_assert!(d <= far(&start) + 1e-12);
+            let inside = on.uv[0] > 0.0 && on.uv[0] < 3.0 && on.uv[1] > -1.0 && on.uv[1] < 2.0;
+            // The double knot is a crease of curvature only: the normal has no jump there.
+            if inside && d > 1e-3 {
+                prop_assert!((p - on.point).dot(on.normal).abs() > d * (1.0 - 1e-9), "{on:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn counts_that_do_not_fit_are_refused() {
+        let surface = SplineSurface {
+            face: 0,
+            degrees: [1, 1],
+            knots: [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]],
+            poles: vec![[0.0, 0.0, 0.0, 1.0]; 3],
+            deviation_mm: 0.0,
+        };
+        assert!(Patch::new(&surface).is_none());
+    }
+}
