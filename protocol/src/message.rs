@@ -166,6 +166,10 @@ pub enum ToDevice {
 }
 
 /// Board to host.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nothing to allocate from; one is made at a time, and most are telemetry"
+)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum FromDevice {
     /// Answer to Hello: the board's version.
