@@ -237,7 +237,7 @@ fn sweep(path: &Path, model: &CadModel, seconds: f64) -> (Scenario, String) {
 }
 
 /// Every STEP file below `folder`, sorted.
-fn step_files(folder: &Path) -> Result<Vec<PathBuf>, LabError> {
+pub(crate) fn step_files(folder: &Path) -> Result<Vec<PathBuf>, LabError> {
     let unreadable = |path: &Path| {
         let path = path.to_owned();
         move |source| LabError::Unreadable { path, source }

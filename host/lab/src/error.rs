@@ -13,6 +13,14 @@ pub enum LabError {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A file could not be written.
+    #[error("{}: {source}; check the path and its permissions", .path.display())]
+    Unwritable {
+        /// File or folder.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
     /// A scenario is not written as it should be.
     #[error("{name}: {what}")]
     Scenario {

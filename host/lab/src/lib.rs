@@ -3,12 +3,22 @@
 //! A [`scenario`] is data (TOML): a STEP file, a part to grab, what the simulated hand does, and what must hold. [`scenario::run`] bakes,
 //! uploads, plays it on a rig in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and [`figures::figures`] are all
 //! this one function. [`figures::figures`] measures every row of a named table.
+//! [`clearance`] finds the smallest clearance that assembles, [`pareto`] holds accuracy against cost; [`chart`] and [`table`] write what sweeps find.
 //! [`probe`] asks a scene for gap and contacts at given poses.
 
+pub mod chart;
+pub mod clearance;
 pub mod corpus;
 mod error;
 pub mod figures;
+pub mod fit;
+pub mod motion;
+pub mod pareto;
+pub mod peer;
 pub mod probe;
 pub mod scenario;
+pub mod scene_p;
+pub mod table;
+pub mod variant;
 
 pub use error::LabError;

@@ -167,25 +167,16 @@ impl ProbeScene {
         };
         let bytes = std::fs::read(path).map_err(unreadable)?;
         if !bytes.starts_with(&MAGIC) {
-            let model = load_step(path)?;
-            let options = BakeOptions {
-                cell_mm,
-                // A probe is asked for accuracy: the shell is to err no more than the field does on the radii of common parts.
-                epsilon_mm: cell_mm.map(|cell| cell / 100.0),
-                grabbable: Grabbable::All,
-                ..BakeOptions::default()
-            };
-            let baked =
-                bake(&model, &options, &|_| ControlFlow::Continue(())).map_err(|source| LabError::Bake {
-                    step: name.clone(),
-                    source,
-                })?;
-            let parts = baked.report.parts.into_iter().map(|part| part.name).collect();
-            return Ok(Self {
-                name,
-                image: words(&baked.image),
-                parts,
-            });
+            return Self::bake(
+                path,
+                &BakeOptions {
+                    cell_mm,
+                    // A probe is asked for accuracy: the shell is to err no more than the field does on the radii of common parts.
+                    epsilon_mm: cell_mm.map(|cell| cell / 100.0),
+                    grabbable: Grabbable::All,
+                    ..BakeOptions::default()
+                },
+            );
         }
         let bad = |what: String| LabError::Input {
             name: name.clone(),
@@ -201,6 +192,26 @@ impl ProbeScene {
             .map_err(|error| bad(format!("{error}; bake it again")))?;
         let parts = (0..scene.parts().len()).map(|index| index.to_string()).collect();
         Ok(Self { name, image, parts })
+    }
+
+    /// Reads the STEP file at `path` and bakes it as `options` say.
+    ///
+    /// # Errors
+    /// `Unreadable`, `Brep`, `Bake`.
+    pub fn bake(path: &Path, options: &BakeOptions) -> Result<Self, LabError> {
+        let name = path.display().to_string();
+        let model = load_step(path)?;
+        let baked =
+            bake(&model, options, &|_| ControlFlow::Continue(())).map_err(|source| LabError::Bake {
+                step: name.clone(),
+                source,
+            })?;
+        let parts = baked.report.parts.into_iter().map(|part| part.name).collect();
+        Ok(Self {
+            name,
+            image: words(&baked.image),
+            parts,
+        })
     }
 
     /// Bytes of the image, to the next four.

@@ -34,6 +34,38 @@ pub struct Measured {
     pub success: bool,
 }
 
+/// A sweep that belongs to a table: the experiment of `mortise lab` that makes it, and the charts it leaves in `docs/figures`.
+struct Sweep {
+    table: &'static str,
+    experiment: &'static str,
+    charts: &'static [(&'static str, &'static str)],
+}
+
+const SWEEPS: &[Sweep] = &[
+    Sweep {
+        table: "contact",
+        experiment: "clearance",
+        charts: &[(
+            "clearance",
+            "Smallest clearance that assembles, by method and cell",
+        )],
+    },
+    Sweep {
+        table: "contact",
+        experiment: "pareto",
+        charts: &[
+            (
+                "pareto-ticks",
+                "Accuracy against instructions of the longest tick on the board",
+            ),
+            (
+                "pareto-time",
+                "Accuracy against nanoseconds of a query, parry3d beside it",
+            ),
+        ],
+    },
+];
+
 /// `cargo xtask figures NAME [--quick]`.
 pub fn command(arguments: &[String]) -> Result<ExitCode> {
     let root = shell::root()?;
@@ -62,9 +94,17 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     let quick = !options.is_empty();
     let measured = measure(&root, &program, name, quick)?;
 
-    let page = page(name, quick, &measured.rows, &today());
-    let file = root.join("docs/figures").join(format!("{name}.md"));
-    std::fs::create_dir_all(root.join("docs/figures"))?;
+    let mut page = page(name, quick, &measured.rows, &today());
+    let folder = root.join("docs/figures");
+    std::fs::create_dir_all(&folder)?;
+    for sweep in SWEEPS.iter().filter(|sweep| sweep.table == name) {
+        // The shorter form leaves the charts as they are: it would show a part of them.
+        if !quick {
+            run_sweep(&root, &program, sweep)?;
+        }
+        page.push_str(&charts(sweep));
+    }
+    let file = folder.join(format!("{name}.md"));
     std::fs::write(&file, page).with_context(|| format!("writing {}", file.display()))?;
     eprintln!("written: docs/figures/{name}.md");
     let all_hold = measured.success && measured.rows.iter().all(|row| row.holds);
@@ -73,6 +113,27 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+fn run_sweep(root: &Path, program: &Path, sweep: &Sweep) -> Result<()> {
+    let experiment = sweep.experiment;
+    let mut command = Command::new(program);
+    command
+        .current_dir(root)
+        .args(["lab", experiment, "--out", "docs/figures"]);
+    shell::run(&mut command).with_context(|| format!("`mortise lab {experiment}` made no charts"))
+}
+
+/// The charts of a sweep as a page shows them.
+fn charts(sweep: &Sweep) -> String {
+    let experiment = sweep.experiment;
+    let mut text = format!(
+        "\n`mortise lab {experiment} --out docs/figures` makes the following from [{experiment}.csv]({experiment}.csv).\n"
+    );
+    for (file, title) in sweep.charts {
+        text.push_str(&format!("\n![{title}]({file}.svg)\n"));
+    }
+    text
 }
 
 /// Runs `mortise lab figures NAME --json` and prints each row as it comes.
@@ -201,6 +262,14 @@ fn civil_from_days(days: u64) -> (u64, u64, u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_page_shows_the_charts_of_its_sweeps() {
+        let page: String = SWEEPS.iter().map(charts).collect();
+        for (file, _) in SWEEPS.iter().flat_map(|sweep| sweep.charts) {
+            assert!(page.contains(&format!("({file}.svg)")), "{page}");
+        }
+    }
 
     #[test]
     fn dates() {

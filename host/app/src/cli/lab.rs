@@ -1,10 +1,13 @@
 //! `mortise lab`: experiments and figures.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::Subcommand;
 use mortise_lab::figures::{self, Plan, Value};
+use mortise_lab::table::write_csv;
+use mortise_lab::{clearance, pareto};
 
 use super::output;
 use crate::sample;
@@ -30,15 +33,85 @@ enum Experiment {
         #[arg(long)]
         json: bool,
     },
+    /// Find the smallest clearance that assembles, by method and cell
+    Clearance(Sweep),
+    /// Hold accuracy against cost: error, smallest clearance, instructions, nanoseconds, bytes
+    Pareto(Sweep),
+}
+
+/// How a sweep is made and where it goes.
+#[derive(Debug, clap::Args)]
+struct Sweep {
+    /// One cell size only
+    #[arg(long)]
+    quick: bool,
+    /// One JSON object a trial
+    #[arg(long)]
+    json: bool,
+    /// Folder for the table (CSV) and the chart (SVG and PNG)
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+impl Sweep {
+    fn tell(&self, row: &(impl serde::Serialize + std::fmt::Display)) -> anyhow::Result<()> {
+        if self.json {
+            output::json(row)
+        } else {
+            output::line(&row.to_string())
+        }
+    }
 }
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let Experiment::Figures { name, quick, json } = &args.experiment;
+    match &args.experiment {
+        Experiment::Figures { name, quick, json } => figures(name, *quick, *json),
+        Experiment::Clearance(sweep) => clearance(sweep),
+        Experiment::Pareto(sweep) => pareto(sweep),
+    }
+}
+
+fn clearance(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+    let mut trials = Vec::new();
+    let mut written = Ok(());
+    for variant in clearance::variants(sweep.quick) {
+        clearance::smallest(&variant, &clearance::CLEARANCES_MM, &mut |trial| {
+            if written.is_ok() {
+                written = sweep.tell(&trial);
+            }
+            trials.push(trial);
+        })?;
+    }
+    written?;
+    if let Some(folder) = &sweep.out {
+        write_csv(&trials, folder, "clearance")?;
+        clearance::chart(&trials).write(folder, "clearance")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn pareto(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+    let mut written = Ok(());
+    let entries = pareto::sweep(sweep.quick, &mut |entry| {
+        if written.is_ok() {
+            written = sweep.tell(entry);
+        }
+    })?;
+    written?;
+    if let Some(folder) = &sweep.out {
+        write_csv(&entries, folder, "pareto")?;
+        pareto::ticks_chart(&entries).write(folder, "pareto-ticks")?;
+        pareto::time_chart(&entries).write(folder, "pareto-time")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn figures(name: &str, quick: bool, json: bool) -> anyhow::Result<ExitCode> {
     let program = std::env::current_exe().context("finding this program")?;
     let sample = sample::File::write().context("writing the sample to a temporary file")?;
     let plan = Plan {
-        quick: *quick,
+        quick,
         program: &program,
         pair: sample.path(),
     };
@@ -46,7 +119,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
     figures::figures(name, &plan, &mut |row| {
         holds &= row.holds;
-        let line = if *json {
+        let line = if json {
             output::json(&row)
         } else {
             let mark = if row.holds { "ok  " } else { "FAIL" };

@@ -1,5 +1,6 @@
 //! Figures: the tables the product is measured by, every row measured when it is asked for.
 
+mod contact;
 mod end_to_end;
 mod link;
 mod parts;
@@ -36,7 +37,7 @@ pub enum Value {
 }
 
 /// Names of the tables there are.
-pub const NAMES: &[&str] = &["end-to-end"];
+pub const NAMES: &[&str] = &["end-to-end", "contact"];
 
 /// How a table is measured.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +57,7 @@ pub struct Plan<'a> {
 pub fn figures(name: &str, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     match name {
         "end-to-end" => end_to_end::measure(plan, out),
+        "contact" => contact::measure(plan, out),
         _ => Err(LabError::NoSuchFigures {
             name: name.to_owned(),
             known: NAMES.join(", "),
@@ -102,6 +104,17 @@ impl Row {
             value: Value::Text(value.to_owned()),
             unit: String::new(),
             bound: format!("= {wanted}"),
+        }
+    }
+
+    /// A row without a bound, told for its value. It does not hold when nothing was measured.
+    pub(crate) fn told(what: impl Into<String>, value: f64, unit: &str) -> Self {
+        Self {
+            what: what.into(),
+            holds: value.is_finite(),
+            value: Value::Number(value),
+            unit: unit.to_owned(),
+            bound: "told".into(),
         }
     }
 

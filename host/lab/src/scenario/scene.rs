@@ -12,10 +12,11 @@ use mortise_brep::{CadModel, load_step};
 use super::Scenario;
 use crate::error::LabError;
 
-/// Chord error of the points that penetration is measured at, mm: a tenth of the 0.05 mm that matter.
-const EPSILON_MM: f64 = 0.005;
-/// Their largest spacing, mm.
-const SPACING_MM: f64 = 4.0;
+/// Chord error of the points that penetration is measured at, as a share of the part's radius: 5 µm on a part of 100 mm, a tenth of the 0.05 mm that
+/// matter there.
+const EPSILON: f64 = 1e-4;
+/// Their largest spacing, likewise: 4 mm.
+const SPACING: f64 = 0.08;
 
 /// A baked scene with its geometry.
 pub struct PreparedScene {
@@ -52,8 +53,16 @@ impl PreparedScene {
             grabbable: Grabbable::Named(vec![scenario.scene.part.clone()]),
             ..BakeOptions::default()
         };
+        Self::with(scenario, &options)
+    }
+
+    /// As [`Self::of`], baked as `options` say, whatever the scenario does.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn with(scenario: &Scenario, options: &BakeOptions) -> Result<Self, LabError> {
         let model = load_step(&scenario.scene.step)?;
-        Self::bake(&scenario.scene.step, model, &scenario.scene.part, &options)
+        Self::bake(&scenario.scene.step, model, &scenario.scene.part, options)
     }
 
     fn bake(step: &Path, model: CadModel, part: &str, options: &BakeOptions) -> Result<Self, LabError> {
@@ -101,10 +110,6 @@ impl PreparedScene {
 fn body(model: &CadModel, part: usize) -> Body {
     let part = &model.parts[part];
     let surface = ExactSurface::new(&model.shapes[part.shape]);
-    let options = PointshellOptions::everywhere(EPSILON_MM, SPACING_MM);
-    let points: Vec<DVec3> = (sample_pointshell(&surface, &options).points.iter())
-        .map(|point| point.position)
-        .collect();
     let vertices = &surface.shape().mesh.vertices;
     let (low, high) = vertices
         .iter()
@@ -113,6 +118,10 @@ fn body(model: &CadModel, part: usize) -> Body {
         });
     let center = 0.5 * (low + high);
     let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f64::max);
+    let options = PointshellOptions::everywhere(EPSILON * radius, SPACING * radius);
+    let points: Vec<DVec3> = (sample_pointshell(&surface, &options).points.iter())
+        .map(|point| point.position)
+        .collect();
     Body {
         surface,
         points,

@@ -1,0 +1,403 @@
+//! Drawing a chart on any of plotters' backends.
+
+use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::coord::Shift;
+use plotters::coord::combinators::{BindKeyPoints as _, IntoLogRange as _, LogCoord, WithKeyPoints};
+use plotters::element::DashedPathElement;
+use plotters::prelude::{
+    Cartesian2d, Circle, DrawingArea, DrawingBackend, IntoFont as _, PathElement, Polygon, RGBColor,
+    Rectangle, Text, WHITE,
+};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color as _, ShapeStyle, TextStyle};
+
+use super::labels::{Box4, place};
+use super::{Axis, Chart, Line, Look, Point, Series};
+
+const INK: RGBColor = RGBColor(36, 41, 47);
+const GREY: RGBColor = RGBColor(101, 109, 118);
+const GRID: RGBColor = RGBColor(225, 228, 232);
+
+/// Room above the plot for title and legend, and below for the note, pixels.
+const HEAD: u32 = 34;
+const LEGEND_ROW: u32 = 24;
+const NOTE: u32 = 26;
+
+type Area<DB> = DrawingArea<DB, Shift>;
+type Coordinate = WithKeyPoints<LogCoord<f64>>;
+type Context<'a, DB> = ChartContext<'a, DB, Cartesian2d<Coordinate, Coordinate>>;
+
+/// Lengths in pixels of what is drawn on.
+#[derive(Clone, Copy)]
+struct Scale(u32);
+
+impl Scale {
+    fn of(self, pixels: u32) -> i32 {
+        (pixels * self.0).cast_signed()
+    }
+
+    fn text(self, size: u32, colour: &RGBColor) -> TextStyle<'_> {
+        TextStyle::from(("sans-serif", f64::from(size * self.0)).into_font()).color(colour)
+    }
+
+    fn stroke(self, colour: RGBColor, width: u32) -> ShapeStyle {
+        colour.stroke_width(width * self.0)
+    }
+}
+
+/// Errors as words.
+fn told(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}
+
+impl Chart {
+    /// Draws it; every length is multiplied by `scale`. Errors are words.
+    pub(super) fn draw<DB: DrawingBackend>(&self, area: &Area<DB>, scale: u32) -> Result<(), String> {
+        let scale = Scale(scale);
+        let drawn = || self.series.iter().flat_map(Series::drawn);
+        let x = self
+            .x
+            .range(drawn().map(|point| point.x))
+            .ok_or("it has no point")?;
+        let y = self
+            .y
+            .range(drawn().map(|point| point.y))
+            .ok_or("it has no point")?;
+        area.fill(&WHITE).map_err(told)?;
+        let (head, rest) = area.split_vertically(scale.of(HEAD));
+        head.draw(&Text::new(
+            self.title.as_str(),
+            (scale.of(16), scale.of(14)),
+            scale.text(21, &INK),
+        ))
+        .map_err(told)?;
+        let rows = self.legend(&rest, scale)?;
+        let (_, rest) = rest.split_vertically(scale.of(LEGEND_ROW * rows + 6));
+        let height = rest.dim_in_pixel().1.cast_signed();
+        let (plot, foot) = rest.split_vertically(height - scale.of(NOTE));
+        foot.draw(&Text::new(
+            self.note.as_str(),
+            (scale.of(16), scale.of(4)),
+            scale.text(14, &GREY),
+        ))
+        .map_err(told)?;
+
+        let mut context: Context<'_, DB> = ChartBuilder::on(&plot)
+            .margin_left(scale.of(14))
+            .margin_right(scale.of(24))
+            .margin_top(scale.of(4))
+            .x_label_area_size(scale.of(52))
+            .y_label_area_size(scale.of(78))
+            .build_cartesian_2d(
+                (x.0..x.1).log_scale().with_key_points(self.x.marks(x)),
+                (y.0..y.1).log_scale().with_key_points(self.y.marks(y)),
+            )
+            .map_err(told)?;
+        context
+            .configure_mesh()
+            .bold_line_style(scale.stroke(GRID, 1))
+            .light_line_style(WHITE.stroke_width(0))
+            .axis_style(scale.stroke(GREY, 1))
+            .x_desc(self.x.title.as_str())
+            .y_desc(self.y.title.as_str())
+            .axis_desc_style(scale.text(16, &INK))
+            .label_style(scale.text(15, &INK))
+            .set_all_tick_mark_size(scale.of(4))
+            .x_label_formatter(&|value| number(*value))
+            .y_label_formatter(&|value| number(*value))
+            .draw()
+            .map_err(told)?;
+        self.plot(&context, &plot, scale)
+    }
+
+    /// Names and marks in rows above the plot; gives the number of rows.
+    fn legend<DB: DrawingBackend>(&self, area: &Area<DB>, scale: Scale) -> Result<u32, String> {
+        let style = scale.text(16, &INK);
+        let width = area.dim_in_pixel().0.cast_signed();
+        let start = scale.of(24);
+        let (mut x, mut row) = (start, 0);
+        for series in self.series.iter().filter(|series| !series.name.is_empty()) {
+            let (words, _) = area.estimate_text_size(&series.name, &style).map_err(told)?;
+            let taken = scale.of(26) + words.cast_signed() + scale.of(26);
+            if x + taken > width && x > start {
+                (x, row) = (start, row + 1);
+            }
+            let y = scale.of(LEGEND_ROW * row + LEGEND_ROW / 2);
+            if series.line != Line::None {
+                let ends = [(x - scale.of(11), y), (x + scale.of(11), y)];
+                stroke(area, &ends, series, scale)?;
+            }
+            mark(area, (x, y), series.look, false, scale)?;
+            let level = style.pos(Pos::new(HPos::Left, VPos::Center));
+            area.draw(&Text::new(
+                series.name.as_str(),
+                (x + scale.of(18), y + scale.of(2)),
+                level,
+            ))
+            .map_err(told)?;
+            x += taken;
+        }
+        Ok(row + 1)
+    }
+
+    /// Lines below marks below words.
+    fn plot<DB: DrawingBackend>(
+        &self,
+        context: &Context<'_, DB>,
+        area: &Area<DB>,
+        scale: Scale,
+    ) -> Result<(), String> {
+        // Everything is drawn in the pixels of `area`, because words are.
+        let (left, top) = area.get_base_pixel();
+        let pixel = |x: f64, y: f64| {
+            let (px, py) = context.backend_coord(&(x, y));
+            (px - left, py - top)
+        };
+        let (across, up) = context.plotting_area().get_pixel_range();
+        let frame = Box4 {
+            left: across.start - left,
+            top: up.start - top,
+            right: across.end - left,
+            bottom: up.end - top,
+        };
+        let mut taken = Vec::new();
+        for series in self.series.iter().filter(|series| series.line != Line::None) {
+            let corners: Vec<(i32, i32)> = series.corners().iter().map(|&(x, y)| pixel(x, y)).collect();
+            stroke(area, &corners, series, scale)?;
+            taken.extend(along(&corners, scale));
+        }
+        for series in &self.series {
+            for point in series.drawn() {
+                let at = pixel(point.x, point.y);
+                mark(area, at, series.look, point.at_least, scale)?;
+                let (x, y) = at;
+                let above = if point.at_least { 20 } else { 6 };
+                taken.push(Box4 {
+                    top: y - scale.of(above),
+                    ..Box4::about((x, y), scale.of(6))
+                });
+            }
+        }
+        let mut written: Vec<(&str, (i32, i32))> = Vec::new();
+        for series in &self.series {
+            let colour = series.look.colour();
+            let style = scale.text(15, &colour);
+            for point in series.drawn().filter(|point| !point.label.is_empty()) {
+                let at = pixel(point.x, point.y);
+                // Two kinds that come to the same say so once.
+                if written.contains(&(point.label.as_str(), at)) {
+                    continue;
+                }
+                let (width, height) = area.estimate_text_size(&point.label, &style).map_err(told)?;
+                let size = (width.cast_signed(), height.cast_signed() + scale.of(3));
+                if let Some(corner) = place(at, size, scale.of(9), &frame, &mut taken) {
+                    written.push((point.label.as_str(), at));
+                    area.draw(&Text::new(point.label.as_str(), corner, style.clone()))
+                        .map_err(told)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Series {
+    /// The points that can be drawn on logarithmic axes.
+    fn drawn(&self) -> impl Iterator<Item = &Point> {
+        let can = |value: f64| value > 0.0 && value.is_finite();
+        self.points
+            .iter()
+            .filter(move |point| can(point.x) && can(point.y))
+    }
+
+    /// Corners of its line.
+    fn corners(&self) -> Vec<(f64, f64)> {
+        let mut corners: Vec<(f64, f64)> = Vec::new();
+        for point in self.drawn() {
+            if self.line == Line::Stair
+                && let Some(&(_, y)) = corners.last()
+            {
+                corners.push((point.x, y));
+            }
+            corners.push((point.x, point.y));
+        }
+        corners
+    }
+}
+
+impl Axis {
+    /// From a little below the smallest to a little above the largest.
+    fn range(&self, values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+        let ticks = self.ticks.iter().flatten().copied();
+        let (low, high) = values
+            .chain(ticks)
+            .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| {
+                (low.min(value), high.max(value))
+            });
+        // A fifteenth of the span either way, and at least a quarter of a power of ten altogether.
+        let room = ((high / low).ln() / 15.0).max(0.12).exp();
+        (low.is_finite() && high > 0.0).then_some((low / room, high * room))
+    }
+
+    fn marks(&self, (low, high): (f64, f64)) -> Vec<f64> {
+        if let Some(ticks) = &self.ticks {
+            return ticks.clone();
+        }
+        let decades = (high / low).log10();
+        let steps: &[f64] = if decades < 3.2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
+        (first..=last)
+            .flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)))
+            .filter(|value| (low..=high).contains(value))
+            .collect()
+    }
+}
+
+/// A number as people write it: thousands apart, no more digits than it has.
+fn number(value: f64) -> String {
+    if value < 1000.0 {
+        // Three digits are more than any mark has; what rounding left behind them goes.
+        let digits = (2 - value.log10().floor() as i32).max(0) as usize;
+        let text = format!("{value:.digits$}");
+        if text.contains('.') {
+            return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+        }
+        return text;
+    }
+    if value >= 1e6 {
+        return format!("{} M", number(value / 1e6));
+    }
+    let whole = value.round() as u64;
+    if whole < 1000 {
+        return whole.to_string();
+    }
+    format!("{},{:03}", whole / 1000, whole % 1000)
+}
+
+impl Look {
+    fn colour(self) -> RGBColor {
+        match self {
+            Self::BlueDisc => RGBColor(0, 114, 178),
+            Self::VermilionSquare => RGBColor(213, 94, 0),
+            Self::GreenTriangle => RGBColor(0, 158, 115),
+            Self::PurpleDiamond => RGBColor(204, 121, 167),
+            Self::OrangeCross => RGBColor(230, 159, 0),
+            Self::SkyRing => RGBColor(86, 180, 233),
+            Self::Black => INK,
+        }
+    }
+}
+
+/// Small boxes along a line, for words to keep clear of.
+fn along(corners: &[(i32, i32)], scale: Scale) -> Vec<Box4> {
+    let step = scale.of(5);
+    let mut boxes = Vec::new();
+    for ends in corners.windows(2) {
+        let [(x0, y0), (x1, y1)] = [ends[0], ends[1]];
+        let count = ((x1 - x0).abs().max((y1 - y0).abs()) / step).max(1);
+        boxes.extend((0..=count).map(|i| {
+            let at = (x0 + (x1 - x0) * i / count, y0 + (y1 - y0) * i / count);
+            Box4::about(at, scale.of(3))
+        }));
+    }
+    boxes
+}
+
+fn stroke<DB: DrawingBackend>(
+    area: &Area<DB>,
+    corners: &[(i32, i32)],
+    series: &Series,
+    scale: Scale,
+) -> Result<(), String> {
+    let style = scale.stroke(series.look.colour(), 2);
+    if series.line == Line::Dashed {
+        let dashed = DashedPathElement::new(corners.iter().copied(), scale.of(7), scale.of(5), style);
+        area.draw(&dashed).map_err(told)
+    } else {
+        area.draw(&PathElement::new(corners.to_vec(), style))
+            .map_err(told)
+    }
+}
+
+/// The mark of `look`; one that stands for "at least" has an arrow upwards.
+fn mark<DB: DrawingBackend>(
+    area: &Area<DB>,
+    at: (i32, i32),
+    look: Look,
+    at_least: bool,
+    scale: Scale,
+) -> Result<(), String> {
+    let colour = look.colour();
+    let filled = colour.filled();
+    let (x, y) = at;
+    let corner = |dx: i32, dy: i32| (x + dx * scale.of(1), y + dy * scale.of(1));
+    let line = |from: (i32, i32), to: (i32, i32)| {
+        let element = PathElement::new(vec![from, to], scale.stroke(colour, 2));
+        area.draw(&element).map_err(told)
+    };
+    if at_least {
+        line(corner(0, -5), corner(0, -18))?;
+        line(corner(-4, -13), corner(0, -18))?;
+        line(corner(4, -13), corner(0, -18))?;
+    }
+    match look {
+        Look::BlueDisc => area.draw(&Circle::new(at, scale.of(5), filled)),
+        Look::SkyRing => {
+            area.draw(&Circle::new(at, scale.of(5), WHITE.filled()))
+                .map_err(told)?;
+            area.draw(&Circle::new(at, scale.of(5), scale.stroke(colour, 2)))
+        }
+        Look::VermilionSquare => area.draw(&Rectangle::new([corner(-5, -5), corner(5, 5)], filled)),
+        Look::GreenTriangle => {
+            let corners = vec![corner(0, -6), corner(6, 5), corner(-6, 5)];
+            area.draw(&Polygon::new(corners, filled))
+        }
+        Look::PurpleDiamond => {
+            let corners = vec![corner(0, -7), corner(7, 0), corner(0, 7), corner(-7, 0)];
+            area.draw(&Polygon::new(corners, filled))
+        }
+        Look::OrangeCross => {
+            line(corner(-5, -5), corner(5, 5))?;
+            return line(corner(-5, 5), corner(5, -5));
+        }
+        Look::Black => return Ok(()),
+    }
+    .map_err(told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let pairs = [
+            (0.02, "0.02"),
+            (0.5, "0.5"),
+            (0.30000000000000004, "0.3"),
+            (1.0, "1"),
+            (200.0, "200"),
+            (50_000.0, "50,000"),
+            (2e6, "2 M"),
+        ];
+        for (value, text) in pairs {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn a_stair_goes_level_first() {
+        let point = |x, y| Point {
+            x,
+            y,
+            ..Point::default()
+        };
+        let series = Series {
+            name: String::new(),
+            look: Look::Black,
+            line: Line::Stair,
+            points: vec![point(1.0, 9.0), point(3.0, 4.0)],
+        };
+        assert_eq!(series.corners(), [(1.0, 9.0), (3.0, 9.0), (3.0, 4.0)]);
+    }
+}

@@ -1,0 +1,251 @@
+//! Charts as SVG and PNG: points and lines over two logarithmic axes, each told apart by colour, mark and a label of its own.
+//!
+//! Colours are Okabe and Ito's (2008), which people with any kind of colour blindness tell apart. Letters come from a font in the program,
+//! so a machine needs none.
+
+mod draw;
+mod labels;
+
+use std::io::BufWriter;
+use std::path::Path;
+use std::sync::Once;
+
+use plotters::backend::{BitMapBackend, SVGBackend};
+use plotters::drawing::IntoDrawingArea as _;
+use plotters::style::{FontStyle, register_font};
+
+use crate::error::LabError;
+
+/// Size as shown on a page, pixels.
+const SIZE: (u32, u32) = (960, 600);
+/// The PNG has so many pixels to each of these, for sharp screens.
+const SHARPNESS: u32 = 2;
+/// It is drawn finer by so much and then averaged, which smooths every edge.
+const SMOOTHING: u32 = 2;
+
+/// A chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chart {
+    /// What it shows, one line.
+    pub title: String,
+    /// How it was measured, in small letters below; may be empty.
+    pub note: String,
+    /// Across.
+    pub x: Axis,
+    /// Up.
+    pub y: Axis,
+    /// What is drawn.
+    pub series: Vec<Series>,
+}
+
+/// A logarithmic axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Quantity and unit.
+    pub title: String,
+    /// Where marks are; `None`: at 1, 2 and 5 times the powers of ten, or at the powers alone where there are many.
+    pub ticks: Option<Vec<f64>>,
+}
+
+/// Points of one kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Its name in the legend.
+    pub name: String,
+    /// How it looks.
+    pub look: Look,
+    /// Whether lines join its points.
+    pub line: Line,
+    /// Its points; those that are not positive and finite are left out.
+    pub points: Vec<Point>,
+}
+
+/// One of the colours and marks that can be told apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// Blue disc.
+    BlueDisc,
+    /// Vermilion square.
+    VermilionSquare,
+    /// Green triangle.
+    GreenTriangle,
+    /// Purple diamond.
+    PurpleDiamond,
+    /// Orange cross.
+    OrangeCross,
+    /// Sky-blue ring.
+    SkyRing,
+    /// No marks, black.
+    Black,
+}
+
+/// How points are joined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// Not at all.
+    None,
+    /// From each to the next.
+    Solid,
+    /// Likewise, broken.
+    Dashed,
+    /// As a stair of what no point beats: level until the next point, then down.
+    Stair,
+}
+
+/// A point, with words beside it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Point {
+    /// Across.
+    pub x: f64,
+    /// Up.
+    pub y: f64,
+    /// Words beside it; may be empty.
+    pub label: String,
+    /// Drawn open, with an arrow upwards: the true value is at least so high.
+    pub at_least: bool,
+}
+
+impl Axis {
+    /// With marks chosen by the values.
+    pub fn new(title: impl Into<String>) -> Self {
+        let title = title.into();
+        Self { title, ticks: None }
+    }
+
+    /// With marks at the given values.
+    pub fn with_ticks(self, ticks: &[f64]) -> Self {
+        let ticks = Some(ticks.to_vec());
+        Self { ticks, ..self }
+    }
+}
+
+impl Chart {
+    /// Writes `NAME.svg` and `NAME.png` to `folder`.
+    ///
+    /// # Errors
+    /// `Unwritable`; `Input` for a chart without a point.
+    pub fn write(&self, folder: &Path, name: &str) -> Result<(), LabError> {
+        static FONT: Once = Once::new();
+        FONT.call_once(|| {
+            for style in [FontStyle::Normal, FontStyle::Bold] {
+                // The only error is a font that cannot be read, and this one is part of the program (and of the test below).
+                let _ = register_font("sans-serif", style, epaint_default_fonts::UBUNTU_LIGHT);
+            }
+        });
+        let svg = folder.join(format!("{name}.svg"));
+        let mut text = String::new();
+        self.draw(&SVGBackend::with_string(&mut text, SIZE).into_drawing_area(), 1)
+            .map_err(|what| self.cannot(what))?;
+        let unwritable = |path: &Path| {
+            let path = path.to_owned();
+            move |source| LabError::Unwritable { path, source }
+        };
+        std::fs::write(&svg, text).map_err(unwritable(&svg))?;
+
+        let png = folder.join(format!("{name}.png"));
+        let pixels = self.pixels()?;
+        let file = std::fs::File::create(&png).map_err(unwritable(&png))?;
+        let mut encoder = png::Encoder::new(BufWriter::new(file), SIZE.0 * SHARPNESS, SIZE.1 * SHARPNESS);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_compression(png::Compression::High);
+        (encoder.write_header())
+            .and_then(|mut writer| writer.write_image_data(&pixels))
+            .map_err(|error| unwritable(&png)(error.into()))
+    }
+
+    /// Red, green and blue of each pixel of the PNG, row by row.
+    fn pixels(&self) -> Result<Vec<u8>, LabError> {
+        let fine = SHARPNESS * SMOOTHING;
+        let (width, height) = (SIZE.0 * fine, SIZE.1 * fine);
+        let mut drawn = vec![255u8; 3 * (width * height) as usize];
+        self.draw(
+            &BitMapBackend::with_buffer(&mut drawn, (width, height)).into_drawing_area(),
+            fine,
+        )
+        .map_err(|what| self.cannot(what))?;
+        let (step, row) = (SMOOTHING as usize, 3 * width as usize);
+        let mut pixels = Vec::with_capacity(drawn.len() / (step * step));
+        for y in (0..height as usize).step_by(step) {
+            for x in (0..width as usize).step_by(step) {
+                for channel in 0..3 {
+                    let block = (0..step * step)
+                        .map(|i| u32::from(drawn[(y + i / step) * row + 3 * (x + i % step) + channel]));
+                    pixels.push((block.sum::<u32>() / (SMOOTHING * SMOOTHING)) as u8);
+                }
+            }
+        }
+        Ok(pixels)
+    }
+
+    fn cannot(&self, what: String) -> LabError {
+        LabError::Input {
+            name: format!("chart `{}`", self.title),
+            what,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(points: &[(f64, f64)]) -> Chart {
+        let point = |&(x, y): &(f64, f64)| Point {
+            x,
+            y,
+            label: format!("{x} here"),
+            ..Point::default()
+        };
+        Chart {
+            title: "Test".into(),
+            note: String::new(),
+            x: Axis::new("x, mm"),
+            y: Axis::new("y, µm"),
+            series: vec![Series {
+                name: "one".into(),
+                look: Look::BlueDisc,
+                line: Line::Stair,
+                points: points.iter().map(point).collect(),
+            }],
+        }
+    }
+
+    #[test]
+    fn both_files_are_written_and_read_back() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        chart(&[(1.0, 20.0), (10.0, 2.0)])
+            .write(folder.path(), "test")
+            .expect("two points");
+        let svg = std::fs::read_to_string(folder.path().join("test.svg")).expect("written");
+        for words in ["<svg", "x, mm", "y, µm", "10 here", "one"] {
+            assert!(svg.contains(words), "{words}");
+        }
+        let png = std::fs::File::open(folder.path().join("test.png")).expect("written");
+        let mut reader = (png::Decoder::new(std::io::BufReader::new(png)).read_info()).expect("a PNG");
+        let mut pixels = vec![0; reader.output_buffer_size().expect("fits")];
+        let info = reader.next_frame(&mut pixels).expect("whole");
+        assert_eq!(
+            (info.width, info.height),
+            (SIZE.0 * SHARPNESS, SIZE.1 * SHARPNESS)
+        );
+        // White paper, the first series' blue somewhere, and letters, which need the font.
+        assert_eq!(pixels[..3], [255; 3]);
+        assert!(pixels.chunks(3).any(|pixel| pixel == [0, 114, 178]));
+        let title = &pixels[..3 * (info.width * 40 * SHARPNESS) as usize];
+        assert!(
+            title.iter().filter(|&&value| value < 100).count() > 100,
+            "no letters"
+        );
+    }
+
+    #[test]
+    fn a_chart_without_points_says_so() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for points in [&[][..], &[(0.0, 1.0), (1.0, f64::NAN), (-1.0, 2.0)]] {
+            let error = chart(points)
+                .write(folder.path(), "none")
+                .expect_err("nothing to draw");
+            assert!(error.to_string().contains("no point"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! How near distances come to closed form, and what a query takes here.
+
+use glam::{DQuat, DVec3};
+use mortise_bake::Grabbable;
+
+use super::{CELL_MM, TIGHT_MM};
+use crate::LabError;
+use crate::figures::{Plan, Row};
+use crate::fit::Fit;
+use crate::peer;
+use crate::probe::{NamedPose, ProbeScene};
+use crate::scene_p::{self, By};
+use crate::variant::Variant;
+
+/// The peer's meshes leave the surfaces by at most what our gaps may err, mm.
+const PEER_DEFLECTION_MM: f64 = 0.005;
+
+/// Gap, penetration and time on scene P.
+pub(super) fn scene_p(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let asked = scene_p::ask(&Variant::field(CELL_MM))?;
+    let what = |what: &str| format!("scene P, {} poses, {CELL_MM} mm cells: {what}", asked.rows.len());
+    for (by, of) in [
+        (By::Probe, "as probed"),
+        (
+            By::Field,
+            "by the field, which a tick acts on, 0.1 mm apart or nearer",
+        ),
+    ] {
+        for (gaps, name, bound) in [(true, "gap", 5.0), (false, "penetration", 10.0)] {
+            let (error, at) = asked.worst(by, gaps);
+            let what = what(&format!("largest {name} error {of} (at {at})"));
+            out(Row::at_most(what, 1e3 * error, "µm", bound));
+        }
+    }
+    let (rounded, at) = asked.worst(By::FieldWithin { mm: 1.0 }, true);
+    let what_rounded = what(&format!(
+        "largest gap error by the field, 1 mm apart or nearer (at {at})"
+    ));
+    out(Row::told(what_rounded, 1e3 * rounded, "µm"));
+    out(Row::told(what("image"), asked.image_bytes as f64, "bytes"));
+    let ns = asked.median_ns();
+    let time = what("median query on this computer");
+    // A time is held to a bound where a person runs it, not in a test that other programs may slow down.
+    out(if plan.quick {
+        Row::told(time, ns, "ns")
+    } else {
+        Row::at_most(time, ns, "ns", 15_000.0)
+    });
+    let peer = peer::ask(PEER_DEFLECTION_MM)?;
+    let of = format!("parry3d, {} triangles", peer.triangles);
+    out(Row::told(
+        what(&format!("{of}: median query over ours")),
+        peer.median_ns / ns,
+        "",
+    ));
+    out(Row::told(
+        what(&format!("{of}: median gap query over our median")),
+        peer.gap_ns / ns,
+        "",
+    ));
+    out(Row::told(
+        what(&format!("{of}: median depth query over our median")),
+        peer.depth_ns / ns,
+        "",
+    ));
+    out(Row::told(
+        what(&format!("{of}: largest gap error")),
+        1e3 * peer.gap_error_mm,
+        "µm",
+    ));
+    out(Row::told(
+        what(&format!("{of}: largest penetration error")),
+        1e3 * peer.depth_error_mm,
+        "µm",
+    ));
+    Ok(())
+}
+
+/// A peg in the middle of its hole touches nothing.
+pub(super) fn centred(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let fit = Fit::thesis(TIGHT_MM);
+    let pose = NamedPose {
+        name: "centred".into(),
+        // The peg's frame is at its upper end, upside down.
+        position_mm: DVec3::new(0.0, 0.0, 0.5 * (fit.height_mm + fit.length_mm)),
+        orientation: DQuat::from_rotation_x(std::f64::consts::PI),
+    };
+    let variant = Variant::field(CELL_MM);
+    let scene = ProbeScene::bake(fit.file()?.path(), &variant.options(Grabbable::All))?;
+    let row = scene.probe(scene.pair("peg", Some("block"))?, &pose)?;
+    let what = |what: &str| {
+        format!(
+            "centred peg, {} µm diametral clearance, {variant}: {what}",
+            1e3 * TIGHT_MM
+        )
+    };
+    out(Row::exactly(
+        what("contacts reported"),
+        f64::from(row.contacts),
+        "contacts",
+        0.0,
+    ));
+    // Half the clearance, within what gaps may err: it is in the hole.
+    let gap = 500.0 * TIGHT_MM;
+    out(Row::within(
+        what("gap"),
+        1e3 * row.distance_mm,
+        "µm",
+        gap - 5.0,
+        gap + 5.0,
+    ));
+    Ok(())
+}

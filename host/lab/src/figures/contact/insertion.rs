@@ -1,0 +1,35 @@
+//! What goes into what, in the closed loop.
+
+use super::{CELL_MM, TIGHT_MM};
+use crate::LabError;
+use crate::clearance::{CLEARANCES_MM, smallest};
+use crate::figures::{Plan, Row};
+use crate::fit::Fit;
+use crate::motion::report;
+use crate::variant::Variant;
+
+/// The smallest clearance that assembles, and the image that takes.
+pub(super) fn tight(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    // Below what is asked for too, to tell where it ends.
+    let clearances: Vec<f64> = (CLEARANCES_MM.into_iter())
+        .filter(|&clearance| clearance <= 1.0 && (!plan.quick || clearance == 1.0 || clearance <= 0.1))
+        .collect();
+    let variant = Variant::field(CELL_MM);
+    let smallest = smallest(&variant, &clearances, &mut |trial| eprintln!("{trial}"))?;
+    out(Row::at_most(
+        format!(
+            "insertion without guidance, 1 mm engaged, hand 0.5° off with 0.1 mm tremor at 10 Hz, {variant}: smallest clearance"
+        ),
+        1e3 * smallest.unwrap_or(f64::NAN),
+        "µm",
+        1e3 * TIGHT_MM,
+    ));
+    let bytes = report(&variant, &Fit::thesis(TIGHT_MM))?.image_bytes as f64;
+    out(Row::at_most(
+        format!("image of the {} µm pair, {variant}", 1e3 * TIGHT_MM),
+        bytes,
+        "bytes",
+        512.0 * 1024.0,
+    ));
+    Ok(())
+}

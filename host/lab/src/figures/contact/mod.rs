@@ -1,0 +1,26 @@
+//! Contact: exact to micrometres, and cheap enough for the board.
+
+mod accuracy;
+mod baking;
+mod insertion;
+mod ticks;
+
+use super::{Plan, Row};
+use crate::LabError;
+
+/// Cells of the accuracy that is claimed, mm.
+const CELL_MM: f64 = 0.5;
+/// The tightest fit asked for, mm.
+const TIGHT_MM: f64 = 0.02;
+
+/// Measures every row.
+pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    accuracy::scene_p(plan, out)?;
+    accuracy::centred(out)?;
+    insertion::tight(plan, out)?;
+    ticks::tight(plan, out)?;
+    ticks::large(plan, out)?;
+    ticks::more_points(plan, out)?;
+    baking::motor(plan, out)?;
+    baking::real_parts(plan, out)
+}

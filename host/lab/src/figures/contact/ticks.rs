@@ -1,0 +1,166 @@
+//! What a tick costs on the emulated board, counted in instructions.
+
+use mortise_haptics::Flags;
+use mortise_rig::{EmulatedMode, RigSpec};
+
+use super::{CELL_MM, TIGHT_MM};
+use crate::LabError;
+use crate::figures::{Plan, Row};
+use crate::fit::Fit;
+use crate::motion::{Motion, play, report};
+use crate::scenario::Outcome;
+use crate::variant::Variant;
+
+/// Instructions a tick in contact may take.
+const CONTACT: f64 = 120_000.0;
+/// Instructions a tick in free motion may take.
+const FREE: f64 = 20_000.0;
+/// Times the points of the dense shell at least.
+const DENSER: f64 = 10.0;
+/// Most that ten times the points may cost.
+const DENSER_COST: f64 = 1.5;
+
+fn emulated() -> RigSpec {
+    RigSpec::Emulated {
+        mode: EmulatedMode::Lockstep,
+        firmware: None,
+    }
+}
+
+fn most(outcome: &Outcome) -> f64 {
+    outcome.instructions_per_tick_max.map_or(f64::NAN, f64::from)
+}
+
+/// Plays `motion` and tells its dearest tick, whether it degraded, and whether it did what it says.
+fn count(
+    what: &str,
+    variant: &Variant,
+    fit: &Fit,
+    motion: Motion,
+    bound: f64,
+    out: &mut dyn FnMut(Row),
+) -> Result<Outcome, LabError> {
+    let (outcome, broken) = play(variant, fit, motion, &emulated())?;
+    out(Row::at_most(
+        format!("{what}: instructions in the longest tick"),
+        most(&outcome),
+        "instructions",
+        bound,
+    ));
+    out(Row::same(
+        format!("{what}: what was degraded"),
+        &degraded(outcome.flags),
+        "nothing",
+    ));
+    out(Row::same(
+        format!("{what}: pressed or moved as meant, no tick missed"),
+        if broken.is_empty() { "yes" } else { "no" },
+        "yes",
+    ));
+    for broken in broken {
+        eprintln!("{what}: {broken}");
+    }
+    Ok(outcome)
+}
+
+/// Flags of ticks that did less than they should have.
+fn degraded(flags: u16) -> String {
+    let seen = Flags::from_bits(flags);
+    let lost = [Flags::BUDGET_EXCEEDED, Flags::CONTACTS_DROPPED];
+    let names: Vec<&str> = (Flags::NAMES.iter())
+        .filter(|(flag, _)| lost.contains(flag) && seen.contains(*flag))
+        .map(|&(_, name)| name)
+        .collect();
+    if names.is_empty() {
+        "nothing".into()
+    } else {
+        names.join(", ")
+    }
+}
+
+/// The tight fit at the wall, and the same peg in the air.
+pub(super) fn tight(_: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let (fit, variant) = (Fit::thesis(TIGHT_MM), Variant::field(CELL_MM));
+    count(
+        "20 µm fit fully inserted, pressed to the wall with 5 N, slid at 10 mm/s",
+        &variant,
+        &fit,
+        Motion::Pressed { mm_per_s: 10.0 },
+        CONTACT,
+        out,
+    )?;
+    count(
+        "the same peg in free motion",
+        &variant,
+        &fit,
+        Motion::Free,
+        FREE,
+        out,
+    )?;
+    Ok(())
+}
+
+/// The thesis' 0.7 m block, with the shell of a bounded error, at any speed.
+pub(super) fn large(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let variant = Variant::field(10.0).epsilon_mm(0.05);
+    let speeds: &[f64] = if plan.quick {
+        &[20.0]
+    } else {
+        &[20.0, 200.0, 1000.0]
+    };
+    for peg_mm in [690.0, 699.8] {
+        for &mm_per_s in speeds {
+            count(
+                &format!(
+                    "hole of 700 mm, peg of {peg_mm} mm, {variant}, pressed to the wall with 5 N, slid at {mm_per_s} mm/s"
+                ),
+                &variant,
+                &Fit::large(peg_mm),
+                Motion::Pressed { mm_per_s },
+                CONTACT,
+                out,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Ten times the points, where few of them touch.
+pub(super) fn more_points(_: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let fit = Fit::thesis(1.0);
+    let sparse = Variant::field(CELL_MM).epsilon_mm(0.05);
+    let points = |variant: &Variant| -> Result<usize, LabError> {
+        let shapes = report(variant, &fit)?.shapes;
+        Ok(shapes
+            .iter()
+            .map(|shape| shape.points.iter().sum::<usize>())
+            .sum())
+    };
+    let base = points(&sparse)?;
+    // Points grow with the root of the bound at most.
+    let mut dense = sparse;
+    let mut ratio = 1.0;
+    while ratio < DENSER {
+        dense = dense.epsilon_mm(0.5 * dense.epsilon_mm.unwrap_or(CELL_MM));
+        ratio = points(&dense)? as f64 / base as f64;
+    }
+    for (name, motion) in [
+        ("in free motion", Motion::Free),
+        (
+            "in sparse contact, slid at 20 mm/s",
+            Motion::Pressed { mm_per_s: 20.0 },
+        ),
+    ] {
+        let few = most(&play(&sparse, &fit, motion, &emulated())?.0);
+        let many = most(&play(&dense, &fit, motion, &emulated())?.0);
+        out(Row::at_most(
+            format!(
+                "{ratio:.1} times the shell points ({base} before), 1 mm clearance, {name}: times the instructions of the longest tick"
+            ),
+            many / few,
+            "",
+            DENSER_COST,
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,26 @@
+//! Results as CSV: one line a row, names of the fields first.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::error::LabError;
+
+/// Writes rows, plain structs of numbers, words and booleans, to `NAME.csv` in `folder`; what is absent is an empty cell.
+///
+/// # Errors
+/// `Unwritable`.
+pub fn write_csv<T: Serialize>(rows: &[T], folder: &Path, name: &str) -> Result<(), LabError> {
+    let path = folder.join(format!("{name}.csv"));
+    let write = || -> std::io::Result<()> {
+        let mut writer = csv::Writer::from_path(&path)?;
+        for row in rows {
+            writer.serialize(row)?;
+        }
+        writer.flush()
+    };
+    write().map_err(|source| LabError::Unwritable {
+        path: path.clone(),
+        source,
+    })
+}
