@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let took = start.elapsed();
     for shape in &baked.report.shapes {
         println!(
-            "{:24} cell {:6.3} step {:8.5} bricks {:5} of {:6} in {:?} points {:?} bytes {} signs {}/{}{} chord {:.4} splines {}",
+            "{:24} cell {:6.3} step {:8.5} bricks {:5} of {:6} in {:?} points {:?} bytes {} signs {}/{}{} error {:.5} splines {}",
             shape.name,
             shape.cell_mm,
             shape.scale_mm,
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             shape.sign_disagreements,
             shape.sign_tests,
             if shape.sign_by_winding { " by winding" } else { "" },
-            shape.chord_error_mm,
+            shape.surface_error_mm,
             shape.spline_faces,
         );
     }

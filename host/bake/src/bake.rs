@@ -336,6 +336,7 @@ fn shape_report(
         sign_tests: field.sign_tests,
         sign_disagreements: field.sign_disagreements,
         chord_error_mm: surface.chord_error_mm(),
+        surface_error_mm: surface.surface_error_mm(),
         spline_faces: shape
             .faces
             .iter()

@@ -74,9 +74,12 @@ pub struct ShapeReport {
     pub sign_tests: usize,
     /// See [`Self::sign_tests`].
     pub sign_disagreements: usize,
-    /// Most the tessellation leaves the analytic faces, mm (taken out again by exact projection).
+    /// Most the tessellation leaves the faces, mm (taken out again by exact projection).
     pub chord_error_mm: f64,
-    /// Faces without closed form, which are their tessellation here.
+    /// Stated bound of the exact distance's error, mm: 0 when all is analytic; see [`crate::ExactSurface::surface_error_mm`].
+    #[serde(default)]
+    pub surface_error_mm: f64,
+    /// Faces without closed form.
     pub spline_faces: usize,
 }
 

@@ -1,4 +1,5 @@
-//! Points inside spline faces: on the tessellation, as dense as its own curvature asks in each direction.
+//! Points inside spline faces: above the tessellation, as dense as its own curvature asks in each direction, moved onto the exact surface
+//! where that is known.
 //!
 //! The curvature of each triangle comes from how the normals turn between its corners (Rusinkiewicz 2004, "Estimating Curvatures and Their
 //! Derivatives on Triangle Meshes"): a cylinder written as a spline gets few points along its generators, as a true one does.
@@ -50,10 +51,21 @@ pub(crate) fn sample_spline(
             } else {
                 cover(i)
             };
-            let normal = at_corners[0] * (1.0 - x - y) + at_corners[1] * x + at_corners[2] * y;
+            let flat = a + (b - a) * x + (c - a) * y;
+            let foot = surface.topology.free_forms.beside(face, t as u32, flat);
+            // A foot farther off than the facets are is not this facet's.
+            let chord = surface.topology.chord[face as usize];
+            let foot = foot.filter(|on| on.normal != DVec3::ZERO && on.point.distance(flat) <= chord + 1e-6);
+            let (position, normal) = match foot {
+                Some(on) => (on.point, on.normal * surface.topology.sense[face as usize]),
+                None => {
+                    let normal = at_corners[0] * (1.0 - x - y) + at_corners[1] * x + at_corners[2] * y;
+                    (flat, normal.try_normalize().unwrap_or(facet))
+                }
+            };
             out.push(ShellPoint {
-                position: a + (b - a) * x + (c - a) * y,
-                normal: normal.try_normalize().unwrap_or(facet),
+                position,
+                normal,
                 face: face as u16,
                 edge_face: NO_FACE,
             });

@@ -2,11 +2,13 @@
 //!
 //! Files are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; where they are absent the test says so and passes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use mortise_bake::ExactSurface;
-use mortise_brep::{LoadOptions, Shape, Surface, load_step_with, oracle};
+use mortise_bake::{ExactSurface, PointshellOptions, sample_pointshell};
+use mortise_brep::oracle::{self, Side};
+use mortise_brep::{LoadOptions, Shape, Surface, load_step_with};
+use mortise_protocol::image::NO_FACE;
 
 /// One micrometre over what the model itself states, mm.
 const TOLERANCE_MM: f64 = 1e-3;
@@ -28,6 +30,42 @@ fn points_near_free_forms(shape: &Shape, count: usize) -> Vec<DVec3> {
             a * (1.0 - x) + (b * (1.0 - y) + c * y) * x + normal * (4.0 * r(0.381_966) - 2.0)
         })
         .collect()
+}
+
+/// Samples of free-form faces lie where the kernel has the face, and their normals point out of the solid.
+fn shell_is_on_the_surface(
+    file: &Path,
+    load: &LoadOptions,
+    index: usize,
+    surface: &ExactSurface,
+    tolerance: f64,
+) {
+    /// More than the tolerance, less than any wall.
+    const STEP_MM: f64 = 0.01;
+    let shell = sample_pointshell(surface, &PointshellOptions::everywhere(0.01, 5.0));
+    let own: Vec<_> = shell
+        .points
+        .iter()
+        // At an edge the normal is a mean, and a fillet that runs out into a wall leaves it no side of its own.
+        .filter(|p| p.edge_face == NO_FACE)
+        .filter(|p| surface.shape().faces[usize::from(p.face)].surface == Surface::Spline)
+        .collect();
+    let step = own.len().div_ceil(60).max(1);
+    let own: Vec<_> = own.into_iter().step_by(step).collect();
+    let at = |by: f64| -> Vec<DVec3> { own.iter().map(|p| p.position + p.normal * by).collect() };
+    for foot in oracle::nearest(file, load, index, &at(0.0))
+        .unwrap()
+        .into_iter()
+        .flatten()
+    {
+        assert!(foot.distance < tolerance, "{foot:?}");
+    }
+    for (by, side) in [(STEP_MM, Side::Out), (-STEP_MM, Side::In)] {
+        let sides = oracle::classify(file, load, index, &at(by), 1e-7).unwrap();
+        for (p, found) in own.iter().zip(sides) {
+            assert_eq!(found, side, "{p:?}");
+        }
+    }
 }
 
 /// No point the kernel finds is nearer than ours, and ours is on the kernel's surface.
@@ -58,7 +96,7 @@ fn free_forms_agree_with_the_kernel() {
                 continue;
             }
             let surface = ExactSurface::new(shape);
-            let points = points_near_free_forms(shape, 200);
+            let points = points_near_free_forms(shape, 100);
             let ours: Vec<_> = points.iter().map(|&p| surface.nearest(p).unwrap()).collect();
             let feet: Vec<DVec3> = ours.iter().map(|n| n.point).collect();
             let theirs = oracle::nearest(&file, &load, index, &points).unwrap();
@@ -86,6 +124,7 @@ fn free_forms_agree_with_the_kernel() {
                 surface.surface_error_mm() * 1e3
             );
             assert!(farther < tolerance && off < tolerance, "{name}");
+            shell_is_on_the_surface(&file, &load, index, &surface, tolerance);
         }
     }
     println!("skipped: {skipped} of {} files are not there", files.len());
