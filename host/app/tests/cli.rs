@@ -137,6 +137,38 @@ fn bake_writes_an_image_a_board_would_take() {
 }
 
 #[test]
+fn bake_plans_for_an_accuracy() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("pair.image");
+    let path = out.to_string_lossy().into_owned();
+    let ask = |more: &[&str]| {
+        let arguments = ["bake", SAMPLE, "-o", &path, "--accuracy", "5um"];
+        mortise(&[&arguments, more].concat())
+    };
+    let met = json(&ask(&["--flash", "1MiB", "--tick", "120000", "--json"]));
+    assert_eq!((&met["met"], &met["fits"]), (&true.into(), &true.into()));
+    assert_eq!(
+        met["plan"]["report"]["image_bytes"],
+        std::fs::read(&out).expect("written").len()
+    );
+    for shape in met["plan"]["shapes"].as_array().expect("shapes") {
+        assert!(shape["field_error_in_fits_mm"].as_f64().expect("a number") <= 0.005);
+        assert!(shape["why"].as_str().expect("words").contains("fits"));
+    }
+    std::fs::remove_file(&out).expect("there");
+    let missed = ask(&["--flash", "100KiB"]);
+    assert_eq!(missed.status.code(), Some(1));
+    let text = String::from_utf8_lossy(&missed.stdout);
+    assert!(
+        text.contains("cannot be met; the best that fits is about"),
+        "{text}"
+    );
+    assert!(!out.exists(), "nothing is written");
+    assert_eq!(ask(&["--cell", "0.5"]).status.code(), Some(2));
+    assert_eq!(ask(&["--flash", "1MB"]).status.code(), Some(2));
+}
+
+#[test]
 fn ports_lists_the_simulated_rigs_first() {
     let rigs = json(&mortise(&["ports", "--json"]));
     let rigs = rigs.as_array().expect("array");

@@ -60,24 +60,33 @@ pub fn bake(
         .collect();
     scene.find_partners(&prepared);
     let first = scene.cells(model, options);
+    let each = vec![options.clone(); scene.shapes.len()];
     let made = match options.cell_mm {
-        Some(_) => scene.fields_and_shells(options, &mut prepared, first, progress)?,
-        None => scene.fit(model, options, &mut prepared, &first, progress)?,
+        Some(_) => scene.fields_and_shells(&each, &mut prepared, first, progress)?,
+        None => scene.fit(model, &each, &mut prepared, &first, progress)?,
     };
-    let baked = scene.assemble(model, options, &prepared, made)?;
-    let _ = progress(Progress {
-        stage: Stage::Image,
-        part: "",
-        shape: (scene.shapes.len(), scene.shapes.len()),
-        fraction: 1.0,
-    });
+    let baked = scene.assemble(model, &each, &prepared, made)?;
+    let bytes = baked.image.len() as u64;
+    if bytes > options.image_limit_bytes {
+        let cell = baked.report.shapes.iter().map(|s| s.cell_mm).fold(0.0, f64::max);
+        return Err(too_large(bytes, options.image_limit_bytes, cell));
+    }
+    scene.done(progress);
     Ok(baked)
 }
 
+fn too_large(bytes: u64, limit: u64, cell_mm: f64) -> BakeError {
+    BakeError::TooLarge {
+        bytes,
+        limit,
+        enough_mm: cell_mm * (bytes as f64 / limit.max(1) as f64).sqrt() * 1.05,
+    }
+}
+
 /// What is made of each shape.
-struct Made {
-    fields: Vec<BakedField>,
-    shells: Vec<Pointshell>,
+pub(crate) struct Made {
+    pub fields: Vec<BakedField>,
+    pub shells: Vec<Pointshell>,
 }
 
 impl Made {
@@ -98,21 +107,35 @@ fn field_bytes(field: &BakedField) -> u64 {
 }
 
 impl Scene {
-    /// Fields and pointshells with cells of about these sizes (a size too small for the layout is made larger when the choice is free).
-    fn fields_and_shells(
+    /// Fields and pointshells, each shape by its own options, with cells of about these sizes (a size too small for the layout is made larger when the choice is free).
+    pub fn fields_and_shells(
         &self,
-        options: &BakeOptions,
+        each: &[BakeOptions],
         prepared: &mut [ExactSurface],
         cells: Vec<f64>,
         progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
     ) -> Result<Made, BakeError> {
         let mut fields = Vec::new();
         let mut shells = Vec::new();
-        for (i, mut cell) in cells.into_iter().enumerate() {
+        for (i, (mut cell, options)) in cells.into_iter().zip(each).enumerate() {
             fields.push(self.field(i, &mut prepared[i], &mut cell, options, progress)?);
             shells.push(self.shell(i, &prepared[i], &self.partners[i], cell, options, progress)?);
         }
         Ok(Made { fields, shells })
+    }
+
+    /// Other pointshells for fields there are.
+    pub fn shells_again(&self, each: &[BakeOptions], prepared: &[ExactSurface], made: &mut Made) {
+        let cells = made
+            .fields
+            .iter()
+            .map(|field| f64::from(field.record.cell) * 1000.0);
+        let shells = cells.zip(each).enumerate();
+        made.shells = shells
+            .map(|(i, (cell, options))| {
+                sample_pointshell(&prepared[i], &shell_options(options, cell, &self.partners[i]))
+            })
+            .collect();
     }
 
     /// The finest scale, not finer than `first`, whose image fits: from coarse to fine, as bytes grow at most with the inverse square of
@@ -120,7 +143,7 @@ impl Scene {
     fn fit(
         &self,
         model: &CadModel,
-        options: &BakeOptions,
+        each: &[BakeOptions],
         prepared: &mut [ExactSurface],
         first: &[f64],
         progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
@@ -148,11 +171,12 @@ impl Scene {
             };
             // Only the finest attempt there can be moves the bar; the ones before take a fraction of its time.
             let made = if scale <= 1.0 {
-                self.fields_and_shells(options, prepared, cells, progress)?
+                self.fields_and_shells(each, prepared, cells, progress)?
             } else {
-                self.fields_and_shells(options, prepared, cells, &quiet)?
+                self.fields_and_shells(each, prepared, cells, &quiet)?
             };
-            let room = options.image_limit_bytes as f64 / (made.bytes() + fixed) as f64;
+            let limit = each.iter().map(|o| o.image_limit_bytes).min().unwrap_or(u64::MAX);
+            let room = limit as f64 / (made.bytes() + fixed) as f64;
             if room >= 1.0 {
                 if let Some((coarser, before)) = &best {
                     let grown = (made.bytes() as f64 / before.bytes() as f64).ln();
@@ -183,7 +207,7 @@ impl Scene {
             Some((_, made)) => Ok(made),
             None => {
                 let cells = first.iter().map(|c| c * scale).collect();
-                self.fields_and_shells(options, prepared, cells, progress)
+                self.fields_and_shells(each, prepared, cells, progress)
             }
         }
     }
@@ -244,23 +268,27 @@ impl Scene {
         if progress(step).is_break() {
             return Err(BakeError::Cancelled);
         }
-        let epsilon_mm = options.epsilon_mm.unwrap_or(cell_mm / EPSILON_PER_CELL);
         Ok(sample_pointshell(
             surface,
-            &PointshellOptions {
-                epsilon_mm,
-                // The field shows nothing sharper than a cell: what is, is sampled as if it were a cell's radius.
-                least_spacing_mm: (4.0 * epsilon_mm * cell_mm).sqrt(),
-                max_spacing_mm: options.max_spacing_mm.unwrap_or(MAX_SPACING_CELLS * cell_mm),
-                partners: partners.clone(),
-            },
+            &shell_options(options, cell_mm, partners),
         ))
     }
 
-    fn assemble(
+    /// The last word to `progress`.
+    pub fn done(&self, progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync)) {
+        let _ = progress(Progress {
+            stage: Stage::Image,
+            part: "",
+            shape: (self.shapes.len(), self.shapes.len()),
+            fraction: 1.0,
+        });
+    }
+
+    /// The image, however large, as long as its offsets fit 32 bits.
+    pub fn assemble(
         &self,
         model: &CadModel,
-        options: &BakeOptions,
+        each: &[BakeOptions],
         prepared: &[ExactSurface],
         Made { fields, shells }: Made,
     ) -> Result<Baked, BakeError> {
@@ -271,7 +299,7 @@ impl Scene {
         };
         for (i, field) in fields.into_iter().enumerate() {
             let shape = prepared[i].shape();
-            let mut entry = shape_report(&self.names[i], &prepared[i], &field, options, &shells[i]);
+            let mut entry = shape_report(&self.names[i], &prepared[i], &field, &each[i], &shells[i]);
             report.warnings.extend(doubts(&entry));
             (_, entry.bytes) = builder.add_shape(shape, field, &shells[i]);
             report.bytes = add(&report.bytes, &entry.bytes);
@@ -297,18 +325,26 @@ impl Scene {
             });
         }
         let bytes = builder.len();
-        let limit = options.image_limit_bytes.min(u64::from(u32::MAX));
+        let limit = u64::from(u32::MAX);
         if bytes > limit {
             let cell = report.shapes.iter().map(|s| s.cell_mm).fold(0.0, f64::max);
-            return Err(BakeError::TooLarge {
-                bytes,
-                limit,
-                enough_mm: cell * (bytes as f64 / limit.max(1) as f64).sqrt() * 1.05,
-            });
+            return Err(too_large(bytes, limit, cell));
         }
         let image = builder.finish();
         report.image_bytes = image.len();
         Ok(Baked { image, report })
+    }
+}
+
+fn shell_options(options: &BakeOptions, cell_mm: f64, partners: &Partners) -> PointshellOptions {
+    let epsilon_mm = options.epsilon_mm.unwrap_or(cell_mm / EPSILON_PER_CELL);
+    PointshellOptions {
+        epsilon_mm,
+        crossing_epsilon_mm: options.crossing_epsilon_mm.unwrap_or(epsilon_mm),
+        // The field shows nothing sharper than a cell: what is, is sampled as if it were a cell's radius.
+        least_spacing_mm: (4.0 * epsilon_mm * cell_mm).sqrt(),
+        max_spacing_mm: options.max_spacing_mm.unwrap_or(MAX_SPACING_CELLS * cell_mm),
+        partners: partners.clone(),
     }
 }
 

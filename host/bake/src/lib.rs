@@ -9,14 +9,18 @@
 //!
 //! Work and bytes grow with the surface, not the volume. The bytes do not depend on the number of threads.
 
+mod accuracy;
 mod bake;
 mod bounds;
 mod bricks;
+mod choice;
+mod cost;
 mod distance;
 mod edge_samples;
 mod error;
 mod face_samples;
 mod field;
+mod fits;
 mod free_form;
 mod grid;
 mod image;
@@ -25,6 +29,7 @@ mod options;
 mod partners;
 mod patch;
 mod piece;
+mod planner;
 mod pointshell;
 mod report;
 mod scene;
@@ -35,9 +40,12 @@ mod topology;
 mod tree;
 mod triangles;
 mod trim;
+mod voids;
 mod winding;
 
 pub use bake::{Baked, bake};
+pub use choice::ELSEWHERE;
+pub use cost::{FIXED, MOST_CONTACTS, NEAR_LOOKUPS, PER_LOOKUP, TOUCHING_LOOKUPS, TickCost};
 pub use distance::{ExactSurface, Nearest};
 pub use error::BakeError;
 pub use field::{BakedField, FieldOptions, SampleFormat, bake_field};
@@ -45,6 +53,7 @@ pub use image::{ImageBuilder, PartPlacement};
 pub use occupancy::{CROSSING_TOLERANCE_CELLS, PROXIMITY_LAYERS, bake_occupancy};
 pub use options::{BakeOptions, Grabbable, Method, Progress, Stage};
 pub use partners::{CurvatureRange, Partners};
+pub use planner::{PartTick, Plan, Planned, Request, ShapePlan, plan};
 pub use pointshell::{Pointshell, PointshellOptions, ShellPoint, sample_pointshell};
 pub use report::{BakeReport, ByteCount, PartReport, ShapeReport};
 pub use sign_check::{SignCheck, SignError, SignOptions, WrongSide, check_signs};

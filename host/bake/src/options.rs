@@ -19,6 +19,8 @@ pub struct BakeOptions {
     pub format: SampleFormat,
     /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a tenth of the cell.
     pub epsilon_mm: Option<f64>,
+    /// That bound where only convex faces touch each other away from edges, crossed shafts above all, mm. `None`: the same.
+    pub crossing_epsilon_mm: Option<f64>,
     /// Largest spacing of pointshell points along edges, mm: two flat strips narrower than this, across each other, can miss each other.
     /// `None`: four cells.
     pub max_spacing_mm: Option<f64>,
@@ -36,6 +38,7 @@ impl Default for BakeOptions {
             band_cells: 2.0,
             format: SampleFormat::Int16,
             epsilon_mm: None,
+            crossing_epsilon_mm: None,
             max_spacing_mm: None,
             grabbable: Grabbable::AllButLargest,
             image_limit_bytes: 1 << 20,
@@ -62,7 +65,7 @@ impl BakeOptions {
         }
         // Below one diagonal the cells next to the surface would not all be stored.
         within("band_cells", self.band_cells, 1.0, 64.0, "1 to 64 cells")?;
-        if let Some(epsilon) = self.epsilon_mm {
+        for epsilon in [self.epsilon_mm, self.crossing_epsilon_mm].into_iter().flatten() {
             within("epsilon_mm", epsilon, 1e-6, 1e3, "0.000001 to 1000 mm")?;
         }
         if let Some(spacing) = self.max_spacing_mm {

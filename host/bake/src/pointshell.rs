@@ -9,7 +9,8 @@
 //! | inside faces convex in some direction | √(4ε/(κᵢ + κ')) in each principal direction i; none where κᵢ + κ' ≤ 0 |
 //! | along convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from what touches it |
 //!
-//! Two directions of a face share ε, an edge has it alone. So a cylinder that only flats and bores can meet has its two rims and nothing
+//! Two directions of a face share ε, an edge has it alone. Inside faces that do not bend both ways outward, cylinders above all, samples serve
+//! nothing but contact of convex with convex away from every edge, and are many: they may have a bound of their own. So a cylinder that only flats and bores can meet has its two rims and nothing
 //! between; a peg's rim in its hole errs by s²/8 times the *difference* of the two curvatures, and on a flat at tilt α by ε·sin α.
 //!
 //! No such bound holds where two sharp edges cross: a sample s/2 from the crossing lies up to (s/2)·sin(θ/2) less deep, θ the angle between
@@ -28,6 +29,8 @@ use crate::partners::Partners;
 pub struct PointshellOptions {
     /// Bound on how much deeper a contact can be than its deepest sample, mm.
     pub epsilon_mm: f64,
+    /// That bound inside faces that are not convex in both directions, where only another convex face can touch, mm.
+    pub crossing_epsilon_mm: f64,
     /// No spacing need be smaller than this, mm: where the bound asks for less, the error is that of this spacing, s²·κ/8 in each direction.
     pub least_spacing_mm: f64,
     /// Largest spacing along edges, mm; inside faces too where nothing is known of the partners.
@@ -44,6 +47,7 @@ impl PointshellOptions {
     pub fn everywhere(epsilon_mm: f64, max_spacing_mm: f64) -> Self {
         Self {
             epsilon_mm,
+            crossing_epsilon_mm: epsilon_mm,
             least_spacing_mm: 0.0,
             max_spacing_mm,
             partners: Partners::Unknown,
@@ -69,9 +73,14 @@ impl PointshellOptions {
         }
         let other = self.partners.no_sharper_than(sharper);
         let relative = own.map(|k| k + other);
+        let epsilon = if own[0].min(own[1]) > 0.0 {
+            self.epsilon_mm
+        } else {
+            self.crossing_epsilon_mm
+        };
         // Equal and opposite to rounding is a fit, which rims and edges find.
         (relative[0].min(relative[1]) > 1e-9 * sharper)
-            .then(|| relative.map(|k| (4.0 * self.epsilon_mm / k).sqrt().max(self.least_spacing_mm)))
+            .then(|| relative.map(|k| (4.0 * epsilon / k).sqrt().max(self.least_spacing_mm)))
     }
 }
 

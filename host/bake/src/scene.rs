@@ -1,5 +1,7 @@
 //! Which shapes and parts of a model go into the image, and the first choice of their cells.
 
+use std::collections::BTreeSet;
+
 use mortise_brep::{CadModel, Shape};
 use mortise_protocol::image::NO_FACE;
 use mortise_protocol::limits::MAX_PARTS;
@@ -89,18 +91,28 @@ impl Scene {
     pub fn find_partners(&mut self, prepared: &[ExactSurface]) {
         let ranges: Vec<Vec<CurvatureRange>> = prepared.par_iter().map(shape_ranges).collect();
         let of = |shape: usize| {
-            let mut met: Vec<CurvatureRange> = Vec::new();
-            for (i, &(_, own)) in self.parts.iter().enumerate() {
-                for (j, &(_, other)) in self.parts.iter().enumerate() {
-                    if own == shape && i != j && (self.grabbable[i] || self.grabbable[j]) {
-                        met.extend(&ranges[other]);
-                    }
-                }
-            }
+            let mut met: Vec<CurvatureRange> = self
+                .met_by(shape)
+                .into_iter()
+                .flat_map(|other| ranges[other].clone())
+                .collect();
             tidy(&mut met);
             Partners::Known(met)
         };
         self.partners = (0..self.shapes.len()).map(of).collect();
+    }
+
+    /// Shapes that parts of this shape can meet.
+    pub fn met_by(&self, shape: usize) -> BTreeSet<usize> {
+        let mut met = BTreeSet::new();
+        for (i, &(_, own)) in self.parts.iter().enumerate() {
+            for (j, &(_, other)) in self.parts.iter().enumerate() {
+                if own == shape && i != j && (self.grabbable[i] || self.grabbable[j]) {
+                    met.insert(other);
+                }
+            }
+        }
+        met
     }
 
     fn choose_grabbable(&self, model: &CadModel, rule: &Grabbable) -> Result<Vec<bool>, BakeError> {

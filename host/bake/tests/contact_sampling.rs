@@ -28,6 +28,7 @@ fn pair(a: &Shape, b: &Shape) -> [Sampled; 2] {
     let shell = |own: usize| {
         let options = PointshellOptions {
             epsilon_mm: EPSILON,
+            crossing_epsilon_mm: EPSILON,
             // As if nothing were sharper than half a millimetre; of the kinds below only a cone's tip is.
             least_spacing_mm: (4.0 * EPSILON * 0.5f64).sqrt(),
             max_spacing_mm: MAX_SPACING,
@@ -369,6 +370,7 @@ fn no_shape_is_left_without_points() {
     for surface in [&ball, &ring] {
         let options = PointshellOptions {
             epsilon_mm: 5.0,
+            crossing_epsilon_mm: 5.0,
             least_spacing_mm: 0.0,
             max_spacing_mm: 100.0,
             partners: Partners::Known(Vec::new()),

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use mortise_bake::{BakeOptions, Grabbable, Progress};
+use mortise_bake::{BakeOptions, BakeReport, Grabbable, Planned, Progress, Request};
 
-use super::output;
+use super::{output, units};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -19,11 +19,17 @@ pub struct Args {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Cell edge, mm [default: chosen so that the image fits]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", conflicts_with = "accuracy")]
     cell: Option<f64>,
-    /// Most bytes the image may have
-    #[arg(long, value_name = "BYTES")]
-    limit: Option<u64>,
+    /// Most that gaps and depths may err where parts fit, such as 5um (ten times that elsewhere): plans the coarsest model that does
+    #[arg(long, value_name = "LENGTH", value_parser = units::length_mm)]
+    accuracy: Option<f64>,
+    /// Most bytes the image may have, such as 512KiB [default: 1MiB]
+    #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes)]
+    flash: Option<u64>,
+    /// Most instructions of a tick, by estimate
+    #[arg(long, value_name = "INSTRUCTIONS", requires = "accuracy")]
+    tick: Option<u64>,
     /// Part that may be grabbed, by name; can be given several times [default: all but the largest]
     #[arg(long, value_name = "NAME")]
     grabbable: Vec<String>,
@@ -39,7 +45,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         cell_mm: args.cell,
         ..BakeOptions::default()
     };
-    if let Some(limit) = args.limit {
+    if let Some(limit) = args.flash {
         options.image_limit_bytes = limit;
     }
     if !args.grabbable.is_empty() {
@@ -62,25 +68,29 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         }
         ControlFlow::Continue(())
     };
-    let result = mortise_bake::bake(&model, &options, &progress);
-    if terminal {
-        eprint!("\r\x1b[K");
+    let in_file = || args.file.display().to_string();
+    if let Some(accuracy_mm) = args.accuracy {
+        let request = Request {
+            accuracy_mm,
+            flash_bytes: options.image_limit_bytes,
+            tick_instructions: args.tick,
+            grabbable: options.grabbable,
+        };
+        let result = mortise_bake::plan(&model, &request, &progress);
+        clear(terminal);
+        let planned = result.with_context(in_file)?;
+        return tell_plan(args, &request, &planned, &model.warnings);
     }
-    let baked = result.with_context(|| args.file.display().to_string())?;
-    write(&args.output, &baked.image)
-        .with_context(|| format!("cannot write the scene image to {}", args.output.display()))?;
+    let result = mortise_bake::bake(&model, &options, &progress);
+    clear(terminal);
+    let baked = result.with_context(in_file)?;
+    write(args, &baked.image)?;
     if args.json {
         output::json(&baked.report)?;
         return Ok(ExitCode::SUCCESS);
     }
     let report = &baked.report;
-    output::line(&format!(
-        "{}: {} bytes, {} parts, {} shapes",
-        args.output.display(),
-        report.image_bytes,
-        report.parts.len(),
-        report.shapes.len()
-    ))?;
+    tell_image(args, report)?;
     for shape in &report.shapes {
         output::line(&format!(
             "  {}: cells of {:.3} mm, {} bricks, {} points, {} bytes",
@@ -91,14 +101,128 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             shape.bytes.total()
         ))?;
     }
-    for warning in model.warnings.iter().chain(&report.warnings) {
-        output::line(&format!("  warning: {warning}"))?;
-    }
+    tell_warnings(&model.warnings, report)?;
     Ok(ExitCode::SUCCESS)
 }
 
+fn clear(terminal: bool) {
+    if terminal {
+        eprint!("\r\x1b[K");
+    }
+}
+
+fn tell_image(args: &Args, report: &BakeReport) -> anyhow::Result<()> {
+    output::line(&format!(
+        "{}: {} bytes, {} parts, {} shapes",
+        args.output.display(),
+        report.image_bytes,
+        report.parts.len(),
+        report.shapes.len()
+    ))
+}
+
+fn tell_warnings(model: &[String], report: &BakeReport) -> anyhow::Result<()> {
+    for warning in model.iter().chain(&report.warnings) {
+        output::line(&format!("  warning: {warning}"))?;
+    }
+    Ok(())
+}
+
+/// What was planned, in words or as JSON; writes the image when the request is met.
+fn tell_plan(
+    args: &Args,
+    request: &Request,
+    planned: &Planned,
+    warnings: &[String],
+) -> anyhow::Result<ExitCode> {
+    let plan = &planned.plan;
+    if planned.met {
+        write(args, &planned.image)?;
+    }
+    let code = if planned.met {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    };
+    if args.json {
+        output::json(&serde_json::json!({
+            "met": planned.met,
+            "fits": planned.fits,
+            "request": request,
+            "plan": plan,
+        }))?;
+        return Ok(code);
+    }
+    let um = |mm: f64| 1000.0 * mm;
+    if planned.met {
+        tell_image(args, &plan.report)?;
+    } else {
+        let verdict = if planned.fits {
+            format!(
+                "the best that fits is about {:.1} µm where parts fit, with {} bytes",
+                um(plan.accuracy_mm),
+                plan.report.image_bytes
+            )
+        } else {
+            format!(
+                "nothing fits: even at {:.1} µm it takes {} bytes",
+                um(plan.accuracy_mm),
+                plan.report.image_bytes
+            )
+        };
+        output::line(&format!(
+            "{}: {:.3} µm cannot be met; {verdict}. Nothing was written.",
+            args.file.display(),
+            um(request.accuracy_mm)
+        ))?;
+    }
+    for (shape, made) in plan.shapes.iter().zip(&plan.report.shapes) {
+        output::line(&format!(
+            "  {}: cells of {:.3} mm, {:?}, because of {}; errs {:.2} µm in fits ({:.2} field, {:.2} shell), {:.1} µm elsewhere",
+            shape.name,
+            shape.cell_mm,
+            shape.format,
+            shape.why,
+            um(shape.field_error_in_fits_mm + shape.shell_error_in_fits_mm),
+            um(shape.field_error_in_fits_mm),
+            um(shape.shell_error_in_fits_mm),
+            um(shape.error_elsewhere_mm),
+        ))?;
+        output::line(&format!(
+            "    {} points, {} bricks, {} bytes{}{}",
+            made.points.iter().sum::<usize>(),
+            made.bricks,
+            made.bytes.total(),
+            count(", taken as edges", shape.faces_taken_as_edges.len()),
+            count(", out of reach and left out", shape.faces_left_out.len()),
+        ))?;
+    }
+    for tick in plan.ticks.iter().take(3) {
+        let cost = tick.cost;
+        output::line(&format!(
+            "  holding {}: about {} instructions at worst, {} points near, {} touching",
+            tick.name, cost.instructions, cost.points, cost.contacts
+        ))?;
+    }
+    tell_warnings(warnings, &plan.report)?;
+    Ok(code)
+}
+
+fn count(what: &str, faces: usize) -> String {
+    match faces {
+        0 => String::new(),
+        n => format!("{what}: {n} faces"),
+    }
+}
+
+/// The image, all or nothing.
+fn write(args: &Args, image: &[u8]) -> anyhow::Result<()> {
+    replace(&args.output, image)
+        .with_context(|| format!("cannot write the scene image to {}", args.output.display()))
+}
+
 /// All or nothing: written beside, then moved into place.
-fn write(path: &std::path::Path, bytes: &[u8]) -> std::io::Result<()> {
+fn replace(path: &std::path::Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(".part");
     let beside = PathBuf::from(beside);

@@ -10,6 +10,7 @@ mod lab;
 mod output;
 mod ports;
 mod probe;
+mod units;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

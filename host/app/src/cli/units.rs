@@ -1,0 +1,61 @@
+//! Lengths and sizes with their units, as written on the command line.
+
+/// Millimetres of `5um`, `5µm` or `0.005mm`.
+pub fn length_mm(text: &str) -> Result<f64, String> {
+    let units = [("um", 1e-3), ("µm", 1e-3), ("μm", 1e-3), ("mm", 1.0)];
+    number(text, &units).ok_or_else(|| format!("`{text}` is no length; give one such as 5um or 0.005mm"))
+}
+
+/// Bytes of `1MiB`, `512KiB` or `300000`.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let units = [
+        ("KiB", 1024.0),
+        ("MiB", 1024.0 * 1024.0),
+        ("bytes", 1.0),
+        ("B", 1.0),
+        ("", 1.0),
+    ];
+    let value = number(text, &units).filter(|v| (1.0..=f64::from(u32::MAX)).contains(v));
+    let value =
+        value.ok_or_else(|| format!("`{text}` is no size; give one such as 1MiB, 512KiB or 300000"))?;
+    // In range, and whole bytes are all there is.
+    Ok(value as u64)
+}
+
+/// The value of a number followed by one of `units`.
+fn number(text: &str, units: &[(&str, f64)]) -> Option<f64> {
+    let text = text.trim();
+    units.iter().find_map(|(unit, scale)| {
+        let digits = text.strip_suffix(unit)?.trim_end();
+        let value: f64 = digits.parse().ok()?;
+        value.is_finite().then_some(value * scale)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths() {
+        for text in ["5um", "5 µm", "0.005mm", "5e-3 mm"] {
+            assert!((length_mm(text).unwrap() - 0.005).abs() < 1e-12, "{text}");
+        }
+        for text in ["5", "um", "5 m", "NaNmm", "infmm", ""] {
+            assert!(length_mm(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!(bytes("1MiB"), Ok(1 << 20));
+        assert_eq!(bytes("512 KiB"), Ok(512 << 10));
+        assert_eq!(
+            (bytes("300000"), bytes("300000B"), bytes("300000 bytes")),
+            (Ok(300_000), Ok(300_000), Ok(300_000))
+        );
+        for text in ["", "MiB", "-1", "0", "1e99", "1 MB", "NaN"] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Which faces of two shapes can fit into one another: a round one in a hollow one of nearly its radius.
+//!
+//! Known from the shapes alone, wherever they are placed. There the surfaces run along each other, so the least error is felt; flats, which
+//! fit flats, are exact in any field and need no rule.
+
+use mortise_brep::Surface;
+
+use crate::distance::ExactSurface;
+
+/// A bore this much larger than what goes into it, in its own radius, is no fit but room.
+const LOOSEST: f64 = 0.15;
+/// A pin this much larger than its bore, in the bore's radius, is another pin's.
+const TIGHTEST: f64 = 0.02;
+/// Cones of half angles closer than this are a fit, rad.
+const SAME_ANGLE: f64 = 0.02;
+
+/// A face of one shape in, or round, a face of another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Fit {
+    /// Face of the first and of the second shape.
+    pub faces: [u32; 2],
+    /// The face of the first is the hollow one.
+    pub hollow: bool,
+    /// (bore's radius − pin's)/bore's radius, at least 0: relative difference of their curvatures. 1 when one of them bends in a direction
+    /// in which the other does not.
+    pub difference: f64,
+}
+
+/// Kind, radius and cone's half angle of a face that bends, negative radius for a hollow one.
+fn bend(surface: &ExactSurface, face: u32) -> Option<(Round, f64, f64)> {
+    let sense = surface.topology.sense[face as usize];
+    match surface.shape().faces[face as usize].surface {
+        Surface::Cylinder { radius, .. } => Some((Round::Cylinder, sense * radius, 0.0)),
+        Surface::Sphere { radius, .. } => Some((Round::Sphere, sense * radius, 0.0)),
+        Surface::Cone {
+            radius, half_angle, ..
+        } => Some((Round::Cone, sense * radius.abs().max(1e-9), half_angle.abs())),
+        _ => None,
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Round {
+    Cylinder,
+    Sphere,
+    Cone,
+}
+
+/// All fits between two shapes.
+pub(crate) fn fits(a: &ExactSurface, b: &ExactSurface) -> Vec<Fit> {
+    let of = |s: &ExactSurface| -> Vec<(u32, (Round, f64, f64))> {
+        (0..s.shape().faces.len() as u32)
+            .filter_map(|face| Some((face, bend(s, face)?)))
+            .collect()
+    };
+    let (a, b) = (of(a), of(b));
+    let mut found = Vec::new();
+    for &(i, own) in &a {
+        for &(j, other) in &b {
+            // The hollow one second.
+            let difference = if own.1 > 0.0 {
+                difference(own, other)
+            } else {
+                difference(other, own)
+            };
+            found.extend(difference.map(|difference| Fit {
+                faces: [i, j],
+                hollow: own.1 < 0.0,
+                difference,
+            }));
+        }
+    }
+    found
+}
+
+fn difference(pin: (Round, f64, f64), bore: (Round, f64, f64)) -> Option<f64> {
+    let ((pin, r, a), (bore, hollow, b)) = (pin, bore);
+    let bore_radius = -hollow;
+    if r <= 0.0 || bore_radius <= 0.0 {
+        return None;
+    }
+    if pin == Round::Cone && bore == Round::Cone {
+        return ((a - b).abs() <= SAME_ANGLE).then_some(0.0);
+    }
+    let room = (bore_radius - r) / bore_radius;
+    let fit = (-TIGHTEST..=LOOSEST).contains(&room);
+    match (pin, bore) {
+        (Round::Cylinder, Round::Cylinder) | (Round::Sphere, Round::Sphere) if fit => Some(room.max(0.0)),
+        (Round::Sphere, Round::Cylinder) if fit => Some(1.0),
+        _ => None,
+    }
+}

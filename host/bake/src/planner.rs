@@ -1,0 +1,464 @@
+//! The coarsest scene image that meets a request, what was chosen and why, and what it costs.
+//!
+//! For each shape the cell, number format and shell bound come from the accuracy asked, in closed form ([`crate::accuracy`], [`crate::choice`]).
+//! The image is then made and counted. When it does not fit the flash, or the dearest tick not its budget, the accuracy is lowered until both
+//! fit, and that is told as the best there is. Cost: one bake; when the request cannot be met, a few coarser ones.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use mortise_brep::{CadModel, Surface};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::bake::{Baked, Made};
+use crate::choice::Demand;
+use crate::cost::TickCost;
+use crate::distance::ExactSurface;
+use crate::error::BakeError;
+use crate::field::SampleFormat;
+use crate::fits::{Fit, fits};
+use crate::options::{BakeOptions, Grabbable, Progress};
+use crate::pointshell::Pointshell;
+use crate::report::BakeReport;
+use crate::scene::Scene;
+use crate::voids::{others, without_hollows};
+
+/// What is asked of a scene image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Request {
+    /// Most that gaps and depths may err where parts fit into one another, mm; elsewhere [`crate::choice::ELSEWHERE`] times that.
+    pub accuracy_mm: f64,
+    /// Most bytes of the image.
+    pub flash_bytes: u64,
+    /// Most instructions of the dearest tick; `None`: any.
+    pub tick_instructions: Option<u64>,
+    /// Which parts may be grabbed.
+    pub grabbable: Grabbable,
+}
+
+/// Model chosen for a shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShapePlan {
+    /// First part that places it.
+    pub name: String,
+    /// Cell edge, mm.
+    pub cell_mm: f64,
+    /// Number format.
+    pub format: SampleFormat,
+    /// Depth and height to which the surface's neighbourhood is stored, cells.
+    pub band_cells: f64,
+    /// The shell's bound, mm.
+    pub epsilon_mm: f64,
+    /// Its bound where convex faces touch each other away from every edge, mm: larger only where the tick asked leaves no choice.
+    pub crossing_epsilon_mm: f64,
+    /// Most the field errs where the shape fits another, mm.
+    pub field_error_in_fits_mm: f64,
+    /// Most the shell misses there, mm.
+    pub shell_error_in_fits_mm: f64,
+    /// Most field and shell err together elsewhere, mm; within a cell of sharp edges the field errs up to half a cell.
+    pub error_elsewhere_mm: f64,
+    /// Faces that fit something.
+    pub faces_that_fit: Vec<u32>,
+    /// Faces that bend too sharply to be worth resolving: the field errs there as at sharp edges.
+    pub faces_taken_as_edges: Vec<u32>,
+    /// Faces nothing can reach.
+    pub faces_left_out: Vec<u32>,
+    /// What forbids a larger cell.
+    pub why: String,
+}
+
+/// Cost of holding a part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartTick {
+    /// The part.
+    pub name: String,
+    /// Its dearest tick.
+    pub cost: TickCost,
+}
+
+/// What was chosen for an accuracy.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Accuracy it is for, mm.
+    pub accuracy_mm: f64,
+    /// In the image's order.
+    pub shapes: Vec<ShapePlan>,
+    /// Parts that may be grabbed, dearest first.
+    pub ticks: Vec<PartTick>,
+    /// Bytes by part and kind.
+    pub report: BakeReport,
+}
+
+/// A request's answer.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// Whether the request is met: if not, this is the finest that fits, or, if nothing does, the last tried.
+    pub met: bool,
+    /// Whether it fits flash and tick.
+    pub fits: bool,
+    /// What was chosen.
+    pub plan: Plan,
+    /// Its image.
+    pub image: Vec<u8>,
+}
+
+/// Attempts at an accuracy that fits, and at one between that and the last that did not.
+const ATTEMPTS: usize = 12;
+const REFINEMENTS: usize = 3;
+/// A scout this many times coarser in accuracy costs a sixteenth; its bytes tell whether the attempt itself is hopeless.
+const SCOUT: f64 = 16.0;
+/// Times the bound of crossings may be made four times larger.
+const COARSER_CROSSINGS: usize = 4;
+/// No use in looking for a coarser one than this.
+const COARSEST_MM: f64 = 100.0;
+
+/// Plans and bakes `model`. `progress` as for [`crate::bake`]; it starts anew with each attempt.
+///
+/// # Errors
+/// See [`BakeError`]. A request that cannot be met is none.
+pub fn plan(
+    model: &CadModel,
+    request: &Request,
+    progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+) -> Result<Planned, BakeError> {
+    if !(request.accuracy_mm >= 1e-5 && request.accuracy_mm <= 100.0) {
+        return Err(BakeError::Option {
+            option: "accuracy",
+            value: request.accuracy_mm,
+            expected: "0.01 µm to 100 mm",
+        });
+    }
+    let mut planner = Planner::new(model, request, progress)?;
+    let scout = planner.attempt(SCOUT * request.accuracy_mm)?;
+    let mut over = scout
+        .as_ref()
+        .map_or(HOPELESS, |s| planner.expected(s, request.accuracy_mm));
+    let mut last = None;
+    if over.bytes <= 1.0
+        && let Some(asked) = planner.attempt(request.accuracy_mm)?
+    {
+        over = planner.over(&asked);
+        if over.fits() {
+            return Ok(asked.into_planned(true, true));
+        }
+        last = Some(asked);
+    }
+    let (mut failed, mut accuracy) = (request.accuracy_mm, request.accuracy_mm);
+    let mut best = None;
+    for _ in 0..ATTEMPTS {
+        failed = accuracy;
+        accuracy *= over.coarser();
+        let attempt = planner.attempt(accuracy)?;
+        over = attempt.as_ref().map_or(HOPELESS, |a| planner.over(a));
+        if over.fits() {
+            best = attempt;
+            break;
+        }
+        let cells = |a: &Attempt| a.plan.shapes.iter().map(|s| s.cell_mm).collect::<Vec<_>>();
+        // Walls and slots hold the cells: no accuracy, however low, makes them larger.
+        let stuck = attempt
+            .as_ref()
+            .zip(last.as_ref())
+            .is_some_and(|(a, b)| cells(a) == cells(b));
+        last = attempt.or(last);
+        if stuck || accuracy > COARSEST_MM {
+            break;
+        }
+    }
+    for _ in 0..REFINEMENTS {
+        if best.is_none() || accuracy < 1.1 * failed {
+            break;
+        }
+        let between = (accuracy * failed).sqrt();
+        let attempt = planner.attempt(between)?;
+        if attempt.as_ref().is_some_and(|a| planner.over(a).fits()) {
+            (accuracy, best) = (between, attempt);
+        } else {
+            failed = between;
+        }
+    }
+    let fits = best.is_some();
+    let told = best.or(last).or(scout).ok_or(BakeError::TooLarge {
+        bytes: u64::from(u32::MAX),
+        limit: request.flash_bytes,
+        enough_mm: accuracy,
+    })?;
+    Ok(told.into_planned(false, fits))
+}
+
+/// How much larger than allowed an attempt is.
+#[derive(Clone, Copy)]
+struct Over {
+    bytes: f64,
+    instructions: f64,
+}
+
+/// Of what the layout cannot even hold.
+const HOPELESS: Over = Over {
+    bytes: 4.0,
+    instructions: 1.0,
+};
+
+impl Over {
+    fn fits(self) -> bool {
+        self.bytes <= 1.0 && self.instructions <= 1.0
+    }
+
+    /// By how much the accuracy is to be lowered: bytes go at most with its inverse, points with the inverse of its root.
+    fn coarser(self) -> f64 {
+        (1.05 * self.bytes)
+            .max(1.1 * self.instructions * self.instructions)
+            .clamp(1.25, 8.0)
+    }
+}
+
+/// What does not change from attempt to attempt.
+struct Planner<'a> {
+    model: &'a CadModel,
+    request: &'a Request,
+    progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    scene: Scene,
+    prepared: Vec<ExactSurface>,
+    demands: Vec<Demand>,
+    /// Fits of shapes that can meet.
+    fits: Vec<((usize, usize), Vec<Fit>)>,
+}
+
+struct Attempt {
+    baked: Baked,
+    plan: Plan,
+}
+
+impl Attempt {
+    fn into_planned(self, met: bool, fits: bool) -> Planned {
+        Planned {
+            met,
+            fits,
+            plan: self.plan,
+            image: self.baked.image,
+        }
+    }
+}
+
+impl<'a> Planner<'a> {
+    fn new(
+        model: &'a CadModel,
+        request: &'a Request,
+        progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    ) -> Result<Self, BakeError> {
+        let options = BakeOptions {
+            grabbable: request.grabbable.clone(),
+            ..BakeOptions::default()
+        };
+        let mut scene = Scene::new(model, &options)?;
+        let reached: Vec<(ExactSurface, Vec<u32>)> = (0..scene.shapes.len())
+            .into_par_iter()
+            .map(|number| {
+                let shape = &model.shapes[scene.shapes[number]];
+                let beside = || {
+                    let own = scene.parts.iter().filter(|part| part.1 == number);
+                    own.flat_map(|part| others(model, part.0)).collect()
+                };
+                match without_hollows(shape, beside) {
+                    Some((filled, left_out)) => (ExactSurface::new(&filled), left_out),
+                    None => (ExactSurface::new(shape), Vec::new()),
+                }
+            })
+            .collect();
+        let (prepared, left_out): (Vec<_>, Vec<_>) = reached.into_iter().unzip();
+        scene.find_partners(&prepared);
+        let mut all = Vec::new();
+        for a in 0..prepared.len() {
+            for b in scene.met_by(a) {
+                let found = fits(&prepared[a], &prepared[b]);
+                if !found.is_empty() {
+                    all.push(((a, b), found));
+                }
+            }
+        }
+        let demands = (left_out.into_iter().enumerate())
+            .map(|(i, left_out)| {
+                let own: Vec<(u32, f64, String)> = all
+                    .iter()
+                    .filter(|((a, _), _)| *a == i)
+                    .flat_map(|((_, b), found)| {
+                        let name = &scene.names[*b];
+                        found
+                            .iter()
+                            .map(move |fit| (fit.faces[0], fit.difference, name.clone()))
+                    })
+                    .collect();
+                Demand::new(&scene.names[i], &prepared[i], &own, left_out)
+            })
+            .collect();
+        Ok(Self {
+            model,
+            request,
+            progress,
+            scene,
+            prepared,
+            demands,
+            fits: all,
+        })
+    }
+
+    /// Bakes for `accuracy_mm`; `None` when the layout cannot hold what that takes.
+    fn attempt(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
+        let mut shapes: Vec<ShapePlan> = self.demands.iter().map(|d| d.choose(accuracy_mm)).collect();
+        let mut each: Vec<BakeOptions> = shapes.iter().map(|shape| self.options(shape)).collect();
+        let cells: Vec<f64> = shapes.iter().map(|shape| shape.cell_mm).collect();
+        if cells.iter().any(|&cell| cell < 1e-3) {
+            return Ok(None);
+        }
+        let mut made = match self
+            .scene
+            .fields_and_shells(&each, &mut self.prepared, cells, self.progress)
+        {
+            Err(BakeError::CellTooSmall { .. }) => return Ok(None),
+            made => made?,
+        };
+        let mut ticks = self.ticks(&made);
+        // Points inside cylinders and cones serve crossed shafts only, and weigh most in a fit: they go first.
+        for _ in 0..COARSER_CROSSINGS {
+            if ticks
+                .first()
+                .is_none_or(|t| t.cost.instructions <= self.request.tick_instructions.unwrap_or(u64::MAX))
+            {
+                break;
+            }
+            for (shape, options) in shapes.iter_mut().zip(&mut each) {
+                shape.crossing_epsilon_mm *= 4.0;
+                options.crossing_epsilon_mm = Some(shape.crossing_epsilon_mm);
+            }
+            self.scene.shells_again(&each, &self.prepared, &mut made);
+            ticks = self.ticks(&made);
+        }
+        let baked = match self.scene.assemble(self.model, &each, &self.prepared, made) {
+            Err(BakeError::TooLarge { .. }) => return Ok(None),
+            baked => baked?,
+        };
+        self.scene.done(self.progress);
+        let plan = Plan {
+            accuracy_mm,
+            shapes,
+            ticks,
+            report: baked.report.clone(),
+        };
+        Ok(Some(Attempt { baked, plan }))
+    }
+
+    fn options(&self, shape: &ShapePlan) -> BakeOptions {
+        BakeOptions {
+            cell_mm: Some(shape.cell_mm),
+            band_cells: shape.band_cells,
+            format: shape.format,
+            epsilon_mm: Some(shape.epsilon_mm),
+            crossing_epsilon_mm: Some(shape.crossing_epsilon_mm),
+            grabbable: self.request.grabbable.clone(),
+            ..BakeOptions::default()
+        }
+    }
+
+    fn over(&self, attempt: &Attempt) -> Over {
+        let dearest = attempt.plan.ticks.first().map_or(0, |t| t.cost.instructions);
+        let allowed = self.request.tick_instructions;
+        Over {
+            bytes: attempt.baked.image.len() as f64 / self.request.flash_bytes.max(1) as f64,
+            instructions: allowed.map_or(0.0, |most| dearest as f64 / most.max(1) as f64),
+        }
+    }
+
+    /// What an attempt at `accuracy_mm` will at least need, from a coarser one: the bricks of a prism repeat along it, so bytes grow at least with the
+    /// inverse of the cell. A fifth is taken off for good measure.
+    fn expected(&self, coarser: &Attempt, accuracy_mm: f64) -> Over {
+        let shapes = coarser.plan.report.shapes.iter().zip(&coarser.plan.shapes);
+        let bytes: f64 = shapes
+            .zip(&self.demands)
+            .map(|((made, before), demand)| {
+                let after = demand.choose(accuracy_mm);
+                let samples = made.bytes.samples as f64 * (before.cell_mm / after.cell_mm).max(1.0);
+                samples * after.format.bytes() as f64 / before.format.bytes() as f64
+            })
+            .sum();
+        Over {
+            bytes: 0.8 * bytes / self.request.flash_bytes.max(1) as f64,
+            ..self.over(coarser)
+        }
+    }
+
+    /// The dearest tick of each part that may be grabbed: it sits in everything it fits into, or lies flat, whichever has more points near.
+    fn ticks(&self, made: &Made) -> Vec<PartTick> {
+        let scene = &self.scene;
+        let mut ticks: Vec<PartTick> = (0..scene.parts.len())
+            .filter(|&i| scene.grabbable[i])
+            .map(|i| {
+                let (part, own) = scene.parts[i];
+                let met: Vec<usize> = (0..scene.parts.len())
+                    .filter(|&j| j != i)
+                    .map(|j| scene.parts[j].1)
+                    .collect();
+                let flats = met
+                    .iter()
+                    .map(|&other| self.flats(made, own) + self.flats(made, other))
+                    .max();
+                let all = made.shells[own].points.len()
+                    + met.iter().map(|&o| made.shells[o].points.len()).sum::<usize>();
+                let near = self.fitted(made, own, &met).max(flats.unwrap_or(0)).min(all);
+                PartTick {
+                    name: self.model.parts[part].name.clone(),
+                    cost: TickCost::of(near as u64, all as u64),
+                }
+            })
+            .collect();
+        ticks.sort_by_key(|t| std::cmp::Reverse(t.cost.instructions));
+        ticks
+    }
+
+    /// Points near when a part of shape `own` sits in all of the parts of shapes `met` it fits: each bore holds one pin, a pin may be in a bore of
+    /// each other part.
+    fn fitted(&self, made: &Made, own: usize, met: &[usize]) -> usize {
+        // For each own face, whether it is hollow, and the points of each partner's face with most.
+        let mut held: BTreeMap<u32, (bool, Vec<usize>)> = BTreeMap::new();
+        for &other in met {
+            let fits = self.fits.iter().find(|(pair, _)| *pair == (own, other));
+            let mut most: BTreeMap<u32, (bool, usize)> = BTreeMap::new();
+            for fit in fits.map_or(&[][..], |(_, fits)| fits) {
+                let points = points_on(&made.shells[other], fit.faces[1]);
+                let entry = most.entry(fit.faces[0]).or_insert((fit.hollow, 0));
+                entry.1 = entry.1.max(points);
+            }
+            for (face, (hollow, points)) in most {
+                held.entry(face).or_insert((hollow, Vec::new())).1.push(points);
+            }
+        }
+        let near = |(face, (hollow, theirs)): (u32, (bool, Vec<usize>))| {
+            let own = points_on(&made.shells[own], face);
+            if hollow {
+                own + theirs.iter().max().unwrap_or(&0)
+            } else {
+                theirs.len() * own + theirs.iter().sum::<usize>()
+            }
+        };
+        held.into_iter().map(near).sum()
+    }
+
+    /// Points round the flat that has most.
+    fn flats(&self, made: &Made, shape: usize) -> usize {
+        let faces = self.prepared[shape].shape().faces.iter().enumerate();
+        let flats = faces.filter(|(_, f)| matches!(f.surface, Surface::Plane { .. }));
+        flats
+            .map(|(i, _)| points_on(&made.shells[shape], i as u32))
+            .max()
+            .unwrap_or(0)
+    }
+}
+
+fn points_on(shell: &Pointshell, face: u32) -> usize {
+    let of = |f: u16| u32::from(f) == face;
+    shell
+        .points
+        .iter()
+        .filter(|p| of(p.face) || of(p.edge_face))
+        .count()
+}
