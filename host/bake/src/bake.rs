@@ -8,12 +8,13 @@ use mortise_protocol::image::{
 };
 use rayon::prelude::*;
 
+use crate::classic::classic_pointshell;
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, FieldOptions, bake_field};
 use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement};
 use crate::occupancy::bake_occupancy;
-use crate::options::{BakeOptions, Method, Progress, Stage};
+use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::partners::Partners;
 use crate::pointshell::{Pointshell, PointshellOptions, sample_pointshell};
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
@@ -268,10 +269,32 @@ impl Scene {
         if progress(step).is_break() {
             return Err(BakeError::Cancelled);
         }
-        Ok(sample_pointshell(
-            surface,
-            &shell_options(options, cell_mm, partners),
-        ))
+        match options.shell {
+            PointshellKind::ErrorBounded => Ok(sample_pointshell(
+                surface,
+                &shell_options(options, cell_mm, partners),
+            )),
+            PointshellKind::Classic {
+                voxel_mm,
+                shrink_percent,
+            } => {
+                let mut own = self
+                    .parts
+                    .iter()
+                    .zip(&self.grabbable)
+                    .filter(|(part, _)| part.1 == index);
+                if own.any(|(_, &grabbable)| grabbable) {
+                    classic_pointshell(
+                        surface,
+                        voxel_mm.unwrap_or(cell_mm),
+                        shrink_percent,
+                        &self.names[index],
+                    )
+                } else {
+                    Ok(Pointshell::default())
+                }
+            }
+        }
     }
 
     /// The last word to `progress`.

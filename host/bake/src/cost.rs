@@ -1,7 +1,6 @@
 //! What a tick costs on the board, estimated from the model.
 //!
-//! Work is counted as the board's own budget counts it, in look-ups. On the pair with 20 µm clearance the estimate is 68,000 instructions; 52,000 at
-//! worst were counted on the emulated board (see the force law's `tick`). An estimate, no bound: that is the budget, at which a tick thins its points.
+//! Work is counted as the board's own budget counts it, in look-ups. An estimate, no bound: that is the budget, at which a tick thins its points.
 
 use serde::{Deserialize, Serialize};
 

@@ -229,7 +229,7 @@ fn too_small(part: &str, cell_mm: f64, what: String, ratio: f64) -> BakeError {
     }
 }
 
-fn positions(grid: &Grid) -> impl Iterator<Item = [u32; 3]> {
+pub(crate) fn positions(grid: &Grid) -> impl Iterator<Item = [u32; 3]> {
     let [w, h, d] = grid.dims;
     (0..d).flat_map(move |z| (0..h).flat_map(move |y| (0..w).map(move |x| [x, y, z])))
 }

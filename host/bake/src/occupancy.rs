@@ -33,8 +33,8 @@ const HALVINGS: u32 = 5;
 pub const CROSSING_TOLERANCE_CELLS: f64 = 1.733 / (1 << HALVINGS) as f64;
 
 /// Voxels of one brick, x fastest.
-struct Voxels {
-    kinds: [Voxel; CELLS_PER_BRICK],
+pub(crate) struct Voxels {
+    pub kinds: [Voxel; CELLS_PER_BRICK],
     /// The face nearest to all its surface voxels, if it is one.
     face: u16,
 }
@@ -79,7 +79,7 @@ pub fn bake_occupancy(
 }
 
 /// Crossed, inside or outside (as yet free), for each voxel of brick `at`.
-fn voxels(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Voxels {
+pub(crate) fn voxels(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Voxels {
     let mut scratch = Scratch::default();
     let mut kinds = [Voxel::Free; CELLS_PER_BRICK];
     let mut face = None;
@@ -142,7 +142,7 @@ fn crosses(surface: &ExactSurface, center: DVec3, half: f64, halvings: u32, scra
 }
 
 /// Place in the brick of voxel `i`.
-fn place(i: usize) -> [usize; 3] {
+pub(crate) fn place(i: usize) -> [usize; 3] {
     [
         i % BRICK_CELLS,
         i / BRICK_CELLS % BRICK_CELLS,

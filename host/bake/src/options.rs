@@ -17,6 +17,8 @@ pub struct BakeOptions {
     pub band_cells: f64,
     /// Number format of samples.
     pub format: SampleFormat,
+    /// What the pointshells are made of.
+    pub shell: PointshellKind,
     /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a tenth of the cell.
     pub epsilon_mm: Option<f64>,
     /// That bound where only convex faces touch each other away from edges, crossed shafts above all, mm. `None`: the same.
@@ -37,6 +39,7 @@ impl Default for BakeOptions {
             cell_mm: None,
             band_cells: 2.0,
             format: SampleFormat::Int16,
+            shell: PointshellKind::ErrorBounded,
             epsilon_mm: None,
             crossing_epsilon_mm: None,
             max_spacing_mm: None,
@@ -67,6 +70,22 @@ impl BakeOptions {
         within("band_cells", self.band_cells, 1.0, 64.0, "1 to 64 cells")?;
         for epsilon in [self.epsilon_mm, self.crossing_epsilon_mm].into_iter().flatten() {
             within("epsilon_mm", epsilon, 1e-6, 1e3, "0.000001 to 1000 mm")?;
+        }
+        if let PointshellKind::Classic {
+            voxel_mm,
+            shrink_percent,
+        } = self.shell
+        {
+            if let Some(voxel) = voxel_mm {
+                within("voxel_mm", voxel, 1e-3, 1e3, "0.001 to 1000 mm")?;
+            }
+            within(
+                "shrink_percent",
+                shrink_percent,
+                0.0,
+                100.0,
+                "0 to 100 % of a voxel",
+            )?;
         }
         if let Some(spacing) = self.max_spacing_mm {
             within("max_spacing_mm", spacing, 1e-3, 1e6, "0.001 to 1000000 mm")?;
@@ -118,6 +137,22 @@ impl std::str::FromStr for Method {
                 )
             })
     }
+}
+
+/// What a pointshell is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PointshellKind {
+    /// Points on the exact surface, as dense as an error bound asks, on every part.
+    #[default]
+    ErrorBounded,
+    /// One point for each voxel the surface crosses, on the parts that may be grabbed (McNeely, Puterbaugh & Troy 1999): the textbook baseline.
+    Classic {
+        /// Voxel edge, mm. `None`: the cell.
+        voxel_mm: Option<f64>,
+        /// How far points are moved inward, percent of a voxel.
+        shrink_percent: f64,
+    },
 }
 
 /// Which parts may be grabbed and moved; the others are fixed.

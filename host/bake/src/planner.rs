@@ -398,9 +398,11 @@ impl<'a> Planner<'a> {
                     .filter(|&j| j != i)
                     .map(|j| scene.parts[j].1)
                     .collect();
+                // On a larger flat no more of its border is near than of the smaller one's.
+                let flat = self.flats(made, own);
                 let flats = met
                     .iter()
-                    .map(|&other| self.flats(made, own) + self.flats(made, other))
+                    .map(|&other| 2 * flat.min(self.flats(made, other)))
                     .max();
                 let all = made.shells[own].points.len()
                     + met.iter().map(|&o| made.shells[o].points.len()).sum::<usize>();

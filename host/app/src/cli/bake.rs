@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use mortise_bake::{BakeOptions, BakeReport, Grabbable, Planned, Progress, Request};
+use mortise_bake::{BakeOptions, BakeReport, Grabbable, Method, Planned, PointshellKind, Progress, Request};
 
 use super::{output, units};
 
@@ -30,6 +30,15 @@ pub struct Args {
     /// Most instructions of a tick, by estimate
     #[arg(long, value_name = "INSTRUCTIONS", requires = "accuracy")]
     tick: Option<u64>,
+    /// Contact method: distance-field or occupancy (the textbook's)
+    #[arg(long, value_name = "METHOD", default_value_t = Method::DistanceField, conflicts_with = "accuracy")]
+    method: Method,
+    /// Pointshell: error-bounded, or classic (the textbook's: one point for each voxel, as large as a cell)
+    #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"], conflicts_with = "accuracy")]
+    shell: String,
+    /// How far points of the classic shell are moved inward, percent of a voxel
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0)]
+    shrink: f64,
     /// Part that may be grabbed, by name; can be given several times [default: all but the largest]
     #[arg(long, value_name = "NAME")]
     grabbable: Vec<String>,
@@ -42,7 +51,15 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let model = mortise_brep::load_step(&args.file)?;
     let mut options = BakeOptions {
+        method: args.method,
         cell_mm: args.cell,
+        shell: match args.shell.as_str() {
+            "classic" => PointshellKind::Classic {
+                voxel_mm: None,
+                shrink_percent: args.shrink,
+            },
+            _ => PointshellKind::ErrorBounded,
+        },
         ..BakeOptions::default()
     };
     if let Some(limit) = args.flash {
