@@ -1,9 +1,9 @@
-//! Bakes a STEP file and prints what came of it: `cargo run --release -p mortise-bake --example bake -- FILE [CELL_MM] [int8|int16]`.
+//! Bakes a STEP file and prints what came of it: `cargo run --release -p mortise-bake --example bake -- FILE [CELL_MM] [int8|int16] [classic]`.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use mortise_bake::{BakeOptions, SampleFormat, bake};
+use mortise_bake::{BakeOptions, PointshellKind, SampleFormat, bake};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     mortise_brep::child::init();
@@ -16,6 +16,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         match argument.as_str() {
             "int8" => (options.format, options.band_cells) = (SampleFormat::Int8, 1.0),
             "int16" => options.format = SampleFormat::Int16,
+            "classic" => {
+                options.shell = PointshellKind::Classic {
+                    voxel_mm: None,
+                    shrink_percent: 0.0,
+                };
+            }
             cell => {
                 options.cell_mm = Some(cell.parse()?);
                 options.image_limit_bytes = u64::from(u32::MAX);

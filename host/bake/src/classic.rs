@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DVec3, I64Vec3};
+use glam::DVec3;
 use mortise_protocol::image::{BRICK_CELLS, NO_FACE, Voxel};
 use rayon::prelude::*;
 
@@ -18,6 +18,9 @@ use crate::field::positions;
 use crate::grid::Grid;
 use crate::occupancy::{place, voxels};
 use crate::pointshell::{Pointshell, ShellPoint};
+
+/// A voxel, counted from the grid's origin.
+type Place = [i64; 3];
 
 /// Most grid entries: beyond, a shell would have millions of points.
 const MAX_ENTRIES: u64 = 1 << 20;
@@ -49,17 +52,20 @@ pub fn classic_pointshell(
     let near: Vec<[u32; 3]> = positions(&grid)
         .filter(|&at| classes[grid.index(at)] == Class::Stored)
         .collect();
-    let bricks: Vec<Vec<(I64Vec3, Voxel)>> = near
+    let bricks: Vec<Vec<(Place, Voxel)>> = near
         .par_iter()
         .map(|&at| {
-            let first = DVec3::from_array(at.map(f64::from)).as_i64vec3() * BRICK_CELLS as i64;
             let kinds = voxels(surface, &grid, at).kinds;
-            let of = |(i, kind)| (first + I64Vec3::from_array(place(i).map(|x| x as i64)), kind);
+            let of = |(i, kind)| {
+                let own = place(i);
+                let along = |axis: usize| i64::from(at[axis]) * BRICK_CELLS as i64 + own[axis] as i64;
+                ([along(0), along(1), along(2)], kind)
+            };
             kinds.into_iter().enumerate().map(of).collect()
         })
         .collect();
-    let kinds: HashMap<I64Vec3, Voxel> = bricks.iter().flatten().copied().collect();
-    let crossed: Vec<I64Vec3> = bricks
+    let kinds: HashMap<Place, Voxel> = bricks.iter().flatten().copied().collect();
+    let crossed: Vec<Place> = bricks
         .into_iter()
         .flatten()
         .filter(|&(_, kind)| kind == Voxel::Surface)
@@ -69,7 +75,7 @@ pub fn classic_pointshell(
     let points: Vec<ShellPoint> = crossed
         .par_iter()
         .filter_map(|&at| {
-            let center = grid.at(at.as_dvec3() + 0.5);
+            let center = grid.at(DVec3::from_array(at.map(|x| x as f64 + 0.5)));
             let nearest = surface.nearest(center)?;
             let exact = (center - nearest.point) * nearest.distance.signum();
             let normal = voxel_normal(&kinds, at).or(exact.try_normalize())?;
@@ -89,18 +95,17 @@ pub fn classic_pointshell(
 }
 
 /// Away from the solid voxels, towards the free ones, each by the inverse square of its distance; none where they cancel (a wall of one voxel).
-fn voxel_normal(kinds: &HashMap<I64Vec3, Voxel>, at: I64Vec3) -> Option<DVec3> {
+fn voxel_normal(kinds: &HashMap<Place, Voxel>, at: Place) -> Option<DVec3> {
     let mut sum = DVec3::ZERO;
     for z in -1..=1 {
         for y in -1..=1 {
             for x in -1..=1 {
-                let step = I64Vec3::new(x, y, z);
-                let weight = match kinds.get(&(at + step)) {
+                let weight = match kinds.get(&[at[0] + x, at[1] + y, at[2] + z]) {
                     Some(Voxel::Interior) => -1.0,
                     Some(Voxel::Surface) => 0.0,
                     _ => 1.0,
                 };
-                let step = step.as_dvec3();
+                let step = DVec3::new(x as f64, y as f64, z as f64);
                 sum += step * (weight / step.length_squared().max(1.0));
             }
         }
