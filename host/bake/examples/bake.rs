@@ -1,9 +1,9 @@
-//! Bakes a STEP file and prints what came of it: `cargo run --release -p mortise-bake --example bake -- FILE [CELL_MM] [int8|int16] [classic]`.
+//! Bakes a STEP file and prints what came of it: `cargo run --release -p mortise-bake --example bake -- FILE [CELL_MM] [int8|int16] [classic] [all]`.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use mortise_bake::{BakeOptions, PointshellKind, SampleFormat, bake};
+use mortise_bake::{BakeOptions, Grabbable, PointshellKind, SampleFormat, bake};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     mortise_brep::child::init();
@@ -22,6 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     shrink_percent: 0.0,
                 };
             }
+            "all" => options.grabbable = Grabbable::All,
             cell => {
                 options.cell_mm = Some(cell.parse()?);
                 options.image_limit_bytes = u64::from(u32::MAX);

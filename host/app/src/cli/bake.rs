@@ -33,9 +33,12 @@ pub struct Args {
     /// Contact method: distance-field or occupancy (the textbook's)
     #[arg(long, value_name = "METHOD", default_value_t = Method::DistanceField, conflicts_with = "accuracy")]
     method: Method,
-    /// Pointshell: error-bounded, or classic (the textbook's: one point for each voxel, as large as a cell)
+    /// Pointshell: error-bounded, or classic (the textbook's: one point for each voxel)
     #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"], conflicts_with = "accuracy")]
     shell: String,
+    /// Voxel edge of the classic shell, mm [default: the cell]
+    #[arg(long, value_name = "MM")]
+    voxel: Option<f64>,
     /// How far points of the classic shell are moved inward, percent of a voxel
     #[arg(long, value_name = "PERCENT", default_value_t = 0.0)]
     shrink: f64,
@@ -55,7 +58,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         cell_mm: args.cell,
         shell: match args.shell.as_str() {
             "classic" => PointshellKind::Classic {
-                voxel_mm: None,
+                voxel_mm: args.voxel,
                 shrink_percent: args.shrink,
             },
             _ => PointshellKind::ErrorBounded,
