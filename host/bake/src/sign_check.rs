@@ -7,13 +7,16 @@
 //! - for the field, within √3/2 of a cell and half a step. A trilinear sample is Σ wᵢ dᵢ of distances at the corners xᵢ of a cell, and
 //!   distance grows no faster than the way: |Σ wᵢ dᵢ − d(p)| ≤ Σ wᵢ |xᵢ − p| ≤ √Σ wᵢ |xᵢ − p|² = h √Σ t(1 − t) ≤ h √3/2 (Jensen).
 //!
+//! The kernel's classifier shoots one ray a point, and a ray that grazes an edge may go astray. So where it differs from ours it is asked again
+//! about a ball that by its own distance holds no surface; only what it then says by more than three quarters counts.
+//!
 //! Cost: one ray of the kernel a point, 10 to 500 µs, in a process of its own.
 
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
-use mortise_brep::oracle::{Side, classify};
+use mortise_brep::oracle::{Side, classify, nearest};
 use mortise_brep::{BrepError, LoadOptions, Shape};
 use mortise_protocol::image::{Lookup, SceneImage};
 use rayon::prelude::*;
@@ -28,6 +31,13 @@ use crate::pointshell::Pointshell;
 
 /// STEP's customary accuracy, mm: what the file itself leaves open about where its faces meet.
 const MODEL_MM: f64 = 1e-3;
+
+/// What the kernel calls on the surface, mm.
+const KERNEL_MM: f64 = 1e-7;
+/// Points of a ball by which a doubtful answer of the kernel is checked; more than three quarters of them decide.
+const BALL: usize = 16;
+/// Most points checked so: the kernel's rays miss one in ten thousand, so more are not its fault.
+const MOST_DOUBTED: usize = 200;
 
 /// What to compare.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +78,9 @@ pub struct SignCheck {
     pub tolerance_mm: f64,
     /// Points that near.
     pub near: usize,
+    /// Points at which the kernel contradicts itself: it puts most of a ball about the point, which by its own distance holds no surface, on
+    /// the other side. That side is taken.
+    pub contradictions: usize,
     /// Points on the wrong side of the exact surface.
     pub wrong: usize,
     /// Cell of the field, mm.
@@ -117,7 +130,7 @@ pub fn check_signs(
         time_limit_s: options.time_limit_s,
         ..load.clone()
     };
-    let sides = classify(path, &load, index, &points, 1e-7)?;
+    let mut sides = classify(path, &load, index, &points, KERNEL_MM)?;
 
     let mut surface = ExactSurface::new(shape);
     let field = FieldOptions {
@@ -153,6 +166,7 @@ pub fn check_signs(
             undecided: 0,
             tolerance_mm,
             near: 0,
+            contradictions: 0,
             wrong: 0,
             cell_mm,
             field_tolerance_mm,
@@ -198,8 +212,61 @@ pub fn check_signs(
         }
         one
     };
+    let doubted: Vec<usize> = (points.par_iter().zip(&sides).enumerate())
+        .filter(|(_, pair)| {
+            let one = count(*pair);
+            one.wrong + one.field_wrong > 0
+        })
+        .map(|(i, _)| i)
+        .collect();
+    let contradictions = doubted.len().min(MOST_DOUBTED);
+    let contradictions = reconsider(
+        path,
+        &load,
+        index,
+        &points,
+        &mut sides,
+        &doubted[..contradictions],
+    )?;
     let all = points.par_iter().zip(&sides).map(count).reduce_with(add);
-    all.ok_or_else(|| BakeError::NothingToBake { parts: 1 }.into())
+    let mut all = all.ok_or(BakeError::NothingToBake { parts: 1 })?;
+    all.contradictions = contradictions;
+    Ok(all)
+}
+
+/// Asks the kernel again about the points `doubted`, in a ball about each that by the kernel's own distance holds no surface: all of the ball
+/// is on one side. Puts the side of most into `sides` and returns how many that changed.
+fn reconsider(
+    path: &Path,
+    load: &LoadOptions,
+    index: usize,
+    points: &[DVec3],
+    sides: &mut [Side],
+    doubted: &[usize],
+) -> Result<usize, BrepError> {
+    let centers: Vec<DVec3> = doubted.iter().map(|&i| points[i]).collect();
+    let feet = nearest(path, load, index, &centers)?;
+    let mut random = SplitMix(2);
+    let mut around = Vec::with_capacity(doubted.len() * BALL);
+    for (&center, foot) in centers.iter().zip(feet) {
+        // In a cube inside the ball.
+        let reach = foot.map_or(0.0, |f| 0.5 * f.distance);
+        around.extend(
+            (0..BALL).map(|_| center + DVec3::from_array([0; 3].map(|_| 2.0 * random.unit() - 1.0)) * reach),
+        );
+    }
+    let answers = classify(path, load, index, &around, KERNEL_MM)?;
+    let mut changed = 0;
+    for (&i, ball) in doubted.iter().zip(answers.chunks(BALL)) {
+        for side in [Side::In, Side::Out] {
+            let agree = ball.iter().filter(|&&s| s == side).count();
+            if 4 * agree > 3 * BALL && sides[i] != side {
+                sides[i] = side;
+                changed += 1;
+            }
+        }
+    }
+    Ok(changed)
 }
 
 fn add(mut a: SignCheck, b: SignCheck) -> SignCheck {
@@ -208,6 +275,7 @@ fn add(mut a: SignCheck, b: SignCheck) -> SignCheck {
     a.points += b.points;
     a.undecided += b.undecided;
     a.near += b.near;
+    a.contradictions += b.contradictions;
     a.wrong += b.wrong;
     a.field_near += b.field_near;
     a.field_near_wrong += b.field_near_wrong;

@@ -118,10 +118,11 @@ fn signs_of(file: &Path) -> Result<(), Failed> {
 
 fn line(check: &SignCheck, start: Instant) -> String {
     format!(
-        "{} points, {} undecided; surface: {} wrong, {} within {:.1} um; field of {:.2} mm cells: {} wrong, {} within {:.2} mm ({} there with \
+        "{} points, {} undecided, the kernel contradicts itself at {}; surface: {} wrong, {} within {:.1} um; field of {:.2} mm cells: {} wrong, {} within {:.2} mm ({} there with \
          the other sign); {:.1} s{}{}",
         check.points,
         check.undecided,
+        check.contradictions,
         check.wrong,
         check.near,
         check.tolerance_mm * 1e3,
