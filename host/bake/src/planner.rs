@@ -111,7 +111,7 @@ const SCOUT: f64 = 16.0;
 /// Times the bound of crossings may be made four times larger.
 const COARSER_CROSSINGS: usize = 4;
 /// No use in looking for a coarser one than this.
-const COARSEST_MM: f64 = 100.0;
+const COARSEST_MM: f64 = 2.0;
 
 /// Plans and bakes `model`. `progress` as for [`crate::bake`]; it starts anew with each attempt.
 ///

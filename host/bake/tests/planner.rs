@@ -148,7 +148,7 @@ fn edge_distance(shape: &mortise_brep::Shape, p: DVec3) -> f64 {
 #[test]
 fn a_pair_is_as_accurate_as_asked() {
     let model = pair();
-    for accuracy in [20.0, 5.0, 2.0] {
+    for accuracy in [20.0, 4.0] {
         let planned = run(&model, &request(accuracy, 4096));
         assert!(planned.met && planned.fits);
         for shape in &planned.plan.shapes {
@@ -156,20 +156,20 @@ fn a_pair_is_as_accurate_as_asked() {
             assert!(shape.error_elsewhere_mm <= 10.0 * accuracy / 1000.0 + 1e-12);
             assert!(shape.why.contains("fits"), "{}", shape.why);
         }
-        let found = check_promise(&model, &planned, 20_000);
+        let found = check_promise(&model, &planned, 10_000);
         println!("{accuracy} µm: {} bytes, {found:?}", planned.image.len());
         // The promise is no empty one: a good part of it is used.
-        assert!(found.points > 5_000 && found.in_fits > 0.5, "{found:?}");
+        assert!(found.points > 4_000 && found.in_fits > 0.5, "{found:?}");
     }
 }
 
 #[test]
 fn scene_p_is_as_accurate_as_asked() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../lab/tests/data/scene_p.step");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../lab/data/scene_p.step");
     let model = load_step(file).unwrap();
     let planned = run(&model, &request(5.0, 1024));
     assert!(planned.met && planned.image.len() <= 512 << 10);
-    let found = check_promise(&model, &planned, 20_000);
+    let found = check_promise(&model, &planned, 10_000);
     println!("{} bytes, {found:?}", planned.image.len());
     assert!(found.points > 5_000);
 }
@@ -304,12 +304,12 @@ fn shared_parts_are_as_accurate_as_asked() {
         }
         let model = load_step(file).unwrap();
         let planned = run(&model, &request(accuracy, 16384));
-        let found = check_promise(&model, &planned, 4_000);
+        let found = check_promise(&model, &planned, 2_000);
         println!(
             "{name} at {accuracy} µm: {} bytes, {found:?}",
             planned.image.len()
         );
-        assert!(planned.met && found.points > 200, "{name}: {found:?}");
+        assert!(planned.met && found.points > 100, "{name}: {found:?}");
     }
     if skipped > 0 {
         println!("skipped: {skipped} of 7 files are not there");

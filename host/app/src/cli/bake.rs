@@ -185,9 +185,10 @@ fn tell_plan(
             )
         } else {
             format!(
-                "nothing fits: even at {:.1} µm it takes {} bytes",
+                "nothing fits: even at {:.1} µm it takes {} bytes and about {} instructions",
                 um(plan.accuracy_mm),
-                plan.report.image_bytes
+                plan.report.image_bytes,
+                plan.ticks.first().map_or(0, |tick| tick.cost.instructions)
             )
         };
         output::line(&format!(
