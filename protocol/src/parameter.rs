@@ -70,7 +70,7 @@ parameters! {
     /// Host silence while armed that counts as a fault.
     HostTimeout = "s", 0.05, 5.0, 0.5;
     /// Most work of a tick, in field look-ups; a point that may touch counts six.
-    PointBudget = "look-ups", 16.0, 65_535.0, 500.0;
+    PointBudget = "look-ups", 16.0, 65_535.0, 380.0;
 }
 
 impl ParameterId {

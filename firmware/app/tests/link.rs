@@ -443,7 +443,7 @@ fn targets_are_taken_and_told_of() {
             FromDevice::Telemetry(t) => Some(t.guidance.active),
             _ => None,
         });
-        active.last()
+        active.fold(None, |_, active| Some(active))
     };
     assert_eq!(guided(&bench), Some(1));
     bench.request(&ToDevice::ClearTarget { id: 1 }).unwrap();

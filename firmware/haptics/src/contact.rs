@@ -197,6 +197,11 @@ impl Contacts {
         }
     }
 
+    /// How many of the last tick's were put aside.
+    pub fn put_aside(&self) -> usize {
+        self.carried_len
+    }
+
     fn list(&self) -> &[Contact; MAX_CONTACTS] {
         &self.lists[self.current]
     }

@@ -4,12 +4,12 @@
 //! once by the nearer child.
 
 use glam::Vec3;
-use mortise_protocol::image::{Lookup, NO_FACE, PointRecord, Shape};
+use mortise_protocol::image::{EDGE_ERROR_CELLS, Lookup, NO_FACE, Nearby, PointRecord, Shape};
 
-use crate::analytic::{agreeing, unsigned_distance};
+use crate::analytic::{agreeing, exact, unsigned_distance};
 use crate::io::Work;
 use crate::probe::Nearest;
-use crate::proximity::{EDGE_ERROR_CELLS, Job};
+use crate::proximity::Job;
 
 /// The diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
@@ -116,16 +116,24 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     fn point(&mut self, point: &PointRecord) {
         self.work.points += 1;
         let p = self.job.to_field.apply(point.position);
-        let found = self.job.field.lookup(p.to_array());
-        if let Lookup::Near(s) = found
-            && s.distance < self.best.field_distance_m
-        {
-            self.best.field_distance_m = s.distance;
+        let mut found = self.job.field.lookup(p.to_array());
+        let mut edge_error = self.edge_error;
+        if let Lookup::Near(s) = &mut found {
+            // As the tick has it.
+            if let Some(exact) = exact(self.shape.faces, s, p) {
+                s.distance = exact.distance;
+                if !matches!(s.nearby, Nearby::Reentrant(_)) {
+                    edge_error = 0.0;
+                }
+            }
+            if s.distance < self.best.field_distance_m {
+                self.best.field_distance_m = s.distance;
+            }
         }
         // (field's distance, no more than the distance, inside, nearest face if known)
         let (field, least, inside, face) = match found {
             Lookup::Near(s) if s.distance >= -self.resolved => {
-                (s.distance, s.distance - self.edge_error, s.distance < 0.0, s.face)
+                (s.distance, s.distance - edge_error, s.distance < 0.0, s.face)
             }
             Lookup::Near(s) => (s.distance, f32::NEG_INFINITY, true, s.face),
             Lookup::Far { inside: false, bound } => (bound, bound, false, NO_FACE),

@@ -6,7 +6,7 @@
 //!
 //! When the budget runs out, work is left undone in this order. For a tick or two, as after a grab, the contacts of leaves not reached are carried over
 //! with the gaps the last motion left them, and the next tick goes on where this one stopped, round and round. When that does not catch up,
-//! points are left out evenly: each second, fourth or eighth of a leaf that is near is looked at, always the same ones, until there is room
+//! points are left out evenly: each second, fourth, … 128th of those that are near is looked at, always the same ones, until there is room
 //! again; the error bound of the pointshell grows by four at each step, all else stays as it was. Carrying is prepared for once a tick needed
 //! half the budget.
 //!
@@ -14,9 +14,11 @@
 
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{
-    Field, FieldSample, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage, Shape,
+    EDGE_ERROR_CELLS, FaceRecord, Field, FieldSample, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage,
+    Shape,
 };
 
+use crate::analytic::{Exact, exact};
 use crate::coherence::{Coherence, Key, Known};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mating};
@@ -26,19 +28,20 @@ use crate::settings::GuidanceSettings;
 use crate::state::Placed;
 use crate::step::dot;
 
-/// Trilinear interpolation can overstate the distance next to a sharp edge: by 0.2 cells at a right angle along the grid, which this covers. It is
-/// no upper bound: 0.30 cells were measured at an edge across the grid, 0.50 at a corner.
-pub(crate) const EDGE_ERROR_CELLS: f32 = 0.25;
 /// A gradient shorter than this (squared) tells no direction: the field is clamped there, or between two surfaces. Within a cell of a sharp edge
 /// it shrinks to about 0.3 while its direction is still good.
 const LEAST_GRADIENT2: f32 = 0.01;
 /// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
 /// the other end moves half as fast again. So the approach by either is taken this many times.
 const APPROACH: f32 = 2.0;
+/// Thinning up to which some point of every leaf is looked at: leaves have 8 points.
+const LEAF_THINNING: u8 = 3;
 /// The budget counts what a look-up costs, 150 instructions. Passing over a node of which enough is known costs an eighth of that.
 const PASSED_OVER_PER_LOOKUP: u32 = 8;
-/// A point within the margin costs as much again.
+/// A point within the margin costs as much again: exact surfaces, direction, lever.
 const NEAR: u32 = 1;
+/// A contact that may have to be carried over costs twice as much.
+const CARRIED: u32 = 2;
 /// And a candidate, with its share of the step, four times as much on top.
 const CANDIDATE: u32 = 4;
 
@@ -101,6 +104,8 @@ pub(crate) struct Job<'i> {
     pub nodes: &'i [NodeRecord],
     pub points: &'i [PointRecord],
     pub field: Field<'i>,
+    /// Exact surfaces of the field's shape.
+    pub faces: &'i [FaceRecord],
     /// Tree frame to field frame.
     pub to_field: Affine,
     /// Tree frame to cells from the corner of the field's grid.
@@ -157,9 +162,10 @@ impl<'i> Search<'_, 'i> {
             search: self,
             horizon: coherence.horizon(self.margin),
             coherence,
+            // What may have to be carried over costs its share of the step too.
+            passed_over: CARRIED * PASSED_OVER_PER_LOOKUP * contacts.put_aside() as u32,
             contacts,
             work,
-            passed_over: 0,
             near: 0,
         };
         let stop = walk
@@ -251,6 +257,7 @@ impl<'i> Job<'i> {
             nodes: tree.nodes,
             points: tree.points,
             field: field.field,
+            faces: field.faces,
             to_cells: Affine {
                 linear: to_field.linear * per_metre,
                 offset: Vec3::from_array(field.field.in_cells(to_field.offset.to_array())),
@@ -344,6 +351,11 @@ impl Walk<'_, '_, '_> {
             index += 1;
             if node.skip == index {
                 let first = node.first_point as usize;
+                // When one point of each leaf is too many, whole leaves are left out, evenly too.
+                let leaves = (1usize << self.search.thinning.saturating_sub(LEAF_THINNING)) - 1;
+                if (first >> LEAF_THINNING) & leaves != 0 {
+                    continue;
+                }
                 let points = job
                     .points
                     .get(first..first + node.point_count as usize)
@@ -365,7 +377,7 @@ impl Walk<'_, '_, '_> {
     /// All points of a leaf, as far as the budget goes; `VOXELS`: against a voxmap.
     fn points<const VOXELS: bool>(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) {
         let most = (self.left() as usize).min(points.len());
-        let stride = 1 << self.search.thinning;
+        let stride = 1 << self.search.thinning.min(LEAF_THINNING);
         let mut nearest = self.some::<VOXELS>(job, leaf, points[..most].iter().step_by(stride));
         if stride > 1 && nearest > self.search.margin {
             // None of these is near: with the others, too, it is known for how long the leaf can be left alone.
@@ -422,16 +434,26 @@ impl Walk<'_, '_, '_> {
     /// Offers a point within the margin as a contact; its gap.
     fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, sample: &FieldSample) -> f32 {
         self.near += 1;
-        let gradient = Vec3::from_array(sample.gradient);
-        let squared = gradient.length_squared();
-        if squared < LEAST_GRADIENT2 {
-            let deep = sample.distance < -job.field.record().cell;
-            self.work.flags.insert_if(deep, Flags::DEEP);
-            return sample.distance;
-        }
-        let n = job.to_push * (gradient * inverse_sqrt(squared));
+        let exact = exact(job.faces, sample, job.to_field.apply(point.position));
+        let found = if let Some(exact) = exact {
+            exact
+        } else {
+            let gradient = Vec3::from_array(sample.gradient);
+            let squared = gradient.length_squared();
+            if squared < LEAST_GRADIENT2 {
+                let deep = sample.distance < -job.field.record().cell;
+                self.work.flags.insert_if(deep, Flags::DEEP);
+                return sample.distance;
+            }
+            Exact {
+                distance: sample.distance,
+                normal: gradient * inverse_sqrt(squared),
+                face: sample.face,
+            }
+        };
+        let n = job.to_push * found.normal;
         let (moving, fixed) = {
-            let (own, other) = ([point.face, point.edge_face], [sample.face, NO_FACE]);
+            let (own, other) = ([point.face, point.edge_face], [found.face, NO_FACE]);
             if job.backward { (other, own) } else { (own, other) }
         };
         let mating = if job.guided {
@@ -441,17 +463,17 @@ impl Walk<'_, '_, '_> {
         } else {
             Mating::NONE
         };
-        let gap = sample.distance + mating.room;
+        let gap = found.distance + mating.room;
         let arm = job.to_arm.apply(point.position);
         let turn = arm.cross(n) * self.search.inverse_length;
         let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
         if gap >= self.search.slack + self.search.approach(&row) {
-            return sample.distance;
+            return found.distance;
         }
         self.work.candidates = self.work.candidates.saturating_add(1);
         let reach_gap = gap - self.search.swing * arm.length_squared();
         let Some(contact) = self.contacts.offer(gap, reach_gap) else {
-            return sample.distance;
+            return found.distance;
         };
         contact.row = row;
         contact.arm = arm;
@@ -460,7 +482,7 @@ impl Walk<'_, '_, '_> {
         contact.guided = mating.guided;
         (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
         contact.leaf = leaf;
-        sample.distance
+        found.distance
     }
 
     /// What was done so far, in look-ups.

@@ -36,10 +36,10 @@ const FASTER: f32 = 2.0;
 
 /// Ticks in a row whose budget runs out before points are left out: what is looked at for the first time needs one or two.
 const OVERRUNS_BORNE: u8 = 2;
-/// Of a leaf's points each eighth is looked at in any case.
-const MOST_THINNING: u8 = 3;
-/// Twice the points cost up to twice as much, and the next tick may need more: they are looked at again once this share of the budget was enough.
-const ROOM_TO_THICKEN: u32 = 3;
+/// Of the points that are near each 128th is looked at in any case.
+const MOST_THINNING: u8 = 7;
+/// Twice the points cost up to twice as much, and the next tick may need more: they are looked at again once four ninths of the budget were enough.
+const ROOM_TO_THICKEN: u32 = 9;
 /// The diagonal of a cell, cells.
 const DIAGONAL_CELLS: f32 = 1.733;
 
@@ -208,7 +208,7 @@ impl State {
         if self.overruns > OVERRUNS_BORNE {
             self.overruns = 0;
             self.thinning = (self.thinning + 1).min(MOST_THINNING);
-        } else if self.thinning > 0 && used < settings.contact.point_budget / ROOM_TO_THICKEN {
+        } else if self.thinning > 0 && used * ROOM_TO_THICKEN < settings.contact.point_budget * 4 {
             self.thinning -= 1;
         }
         work.flags

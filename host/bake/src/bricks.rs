@@ -1,11 +1,13 @@
-//! One brick: 9³ exact samples and the nearest face of each of its 8³ cells.
+//! One brick: 9³ exact samples, and for each of its 8³ cells what lies nearest.
 
 use glam::DVec3;
-use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE};
+use mortise_brep::Surface;
+use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby};
 
 use crate::distance::{ExactSurface, Scratch};
 use crate::field::{FieldOptions, SampleFormat, brick_bytes};
 use crate::grid::Grid;
+use crate::nearby::{CellNearby, ExactSample};
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {
@@ -15,8 +17,10 @@ pub(crate) struct Brick {
     pub index_bits: u16,
     /// Palette indices as stored; empty for 0 bits.
     pub indices: Vec<u8>,
-    /// Faces, ascending.
+    /// Entries, ascending, then the groups of faces they refer to.
     pub palette: Vec<u16>,
+    /// Entries, groups apart.
+    pub palette_len: u16,
 }
 
 /// Samples brick `at` of `grid`.
@@ -24,7 +28,11 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
     let mut scratch = Scratch::default();
     let units_per_mm = options.units_per_cell() / grid.cell();
     let mut samples = Vec::with_capacity(brick_bytes(options.format));
-    let mut faces = [NO_FACE; BRICK_SAMPLES * BRICK_SAMPLES * BRICK_SAMPLES];
+    let unknown = ExactSample {
+        distance: f64::NAN,
+        face: NO_FACE,
+    };
+    let mut exact = [unknown; BRICK_SAMPLES * BRICK_SAMPLES * BRICK_SAMPLES];
     let mut within = f64::INFINITY;
     let mut i = 0;
     for z in 0..BRICK_SAMPLES {
@@ -34,7 +42,10 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
                 let mut value = options.format.max();
                 if let Some(nearest) = surface.query(p, within, &mut scratch) {
                     value = quantise(nearest.distance * units_per_mm, options.format);
-                    faces[i] = nearest.face as u16;
+                    exact[i] = ExactSample {
+                        distance: nearest.distance,
+                        face: nearest.face as u16,
+                    };
                     // The next sample along x is one cell away; a new row starts afresh.
                     within = if x + 1 < BRICK_SAMPLES {
                         nearest.distance.abs() + grid.cell() * (1.0 + 1e-9)
@@ -50,13 +61,19 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
             }
         }
     }
-    let cells = cell_faces(surface, grid, at, &faces, &mut scratch);
-    let (palette, index_bits, indices) = pack_faces(&cells);
+    let cells = cells(surface, grid, at, &exact, &mut scratch);
+    let Packed {
+        palette,
+        palette_len,
+        index_bits,
+        indices,
+    } = pack(&cells);
     Brick {
         samples,
         index_bits,
         indices,
         palette,
+        palette_len,
     }
 }
 
@@ -67,25 +84,34 @@ fn quantise(units: f64, format: SampleFormat) -> f64 {
     snapped.round().clamp(-format.max(), format.max())
 }
 
-/// Nearest face of each cell: that of its corners where they agree, else that of its centre.
-fn cell_faces(
+/// What lies nearest to each cell: the face of its corners where they agree, else that of its centre, and what exact surfaces say.
+fn cells(
     surface: &ExactSurface,
     grid: &Grid,
     at: [u32; 3],
-    samples: &[u16],
+    samples: &[ExactSample],
     scratch: &mut Scratch,
-) -> [u16; CELLS_PER_BRICK] {
-    let mut cells = [NO_FACE; CELLS_PER_BRICK];
+) -> [Nearby; CELLS_PER_BRICK] {
+    let faces: Vec<(Surface, f64)> = (surface.shape().faces.iter())
+        .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
+        .collect();
+    let nearby = CellNearby {
+        faces: &faces,
+        samples,
+        origin: grid.sample(at, [0; 3]),
+        cell: grid.cell(),
+    };
+    let mut cells = [Nearby::Unknown; CELLS_PER_BRICK];
     let mut i = 0;
     for z in 0..BRICK_CELLS {
         for y in 0..BRICK_CELLS {
             for x in 0..BRICK_CELLS {
                 let corner = |c: usize| {
                     let (x, y, z) = (x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
-                    samples[x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)]
+                    samples[x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)].face
                 };
                 let first = corner(0);
-                cells[i] = if (1..8).all(|c| corner(c) == first) {
+                let nearest = if (1..8).all(|c| corner(c) == first) {
                     first
                 } else {
                     let center = grid.sample(at, [x, y, z]) + DVec3::splat(grid.cell() / 2.0);
@@ -93,6 +119,7 @@ fn cell_faces(
                         .query(center, f64::INFINITY, scratch)
                         .map_or(NO_FACE, |n| n.face as u16)
                 };
+                cells[i] = nearby.of([x, y, z], nearest);
                 i += 1;
             }
         }
@@ -100,34 +127,56 @@ fn cell_faces(
     cells
 }
 
-/// Palette, bits and packed indices. More than 256 faces in one brick: the most frequent 255 keep theirs, the others become
-/// [`NO_FACE`].
-fn pack_faces(cells: &[u16; CELLS_PER_BRICK]) -> (Vec<u16>, u16, Vec<u8>) {
-    let mut palette = cells.to_vec();
-    palette.sort_unstable();
-    palette.dedup();
-    if palette.len() > 256 {
-        let count = |face: u16| cells.iter().filter(|&&c| c == face).count();
-        palette.sort_by_key(|&face| (std::cmp::Reverse(count(face)), face));
-        palette.truncate(255);
-        palette.push(NO_FACE);
-        palette.sort_unstable();
-        palette.dedup();
+struct Packed {
+    palette: Vec<u16>,
+    palette_len: u16,
+    index_bits: u16,
+    indices: Vec<u8>,
+}
+
+/// More than 256 entries in one brick: the most frequent 255 stay, the others become
+/// [`Nearby::Unknown`].
+fn pack(cells: &[Nearby; CELLS_PER_BRICK]) -> Packed {
+    let mut entries = cells.to_vec();
+    entries.sort_unstable();
+    entries.dedup();
+    if entries.len() > 256 {
+        let count = |entry: Nearby| cells.iter().filter(|&&c| c == entry).count();
+        entries.sort_by_key(|&entry| (std::cmp::Reverse(count(entry)), entry));
+        entries.truncate(255);
+        entries.push(Nearby::Unknown);
+        entries.sort_unstable();
+        entries.dedup();
     }
-    let index = |face: u16| palette.binary_search(&face).unwrap_or(palette.len() - 1) as u8;
-    match palette.len() {
-        0 | 1 => (palette, 0, Vec::new()),
+    let unknown = entries.binary_search(&Nearby::Unknown).unwrap_or(0);
+    let index = |cell: Nearby| entries.binary_search(&cell).unwrap_or(unknown) as u8;
+    let (index_bits, indices) = match entries.len() {
+        0 | 1 => (0, Vec::new()),
         2..=16 => {
             let indices = cells
                 .chunks_exact(2)
                 .map(|pair| index(pair[0]) | index(pair[1]) << 4)
                 .collect();
-            (palette, 4, indices)
+            (4, indices)
         }
-        _ => {
-            let indices = cells.iter().map(|&face| index(face)).collect();
-            (palette, 8, indices)
+        _ => (8, cells.iter().map(|&cell| index(cell)).collect()),
+    };
+    let mut palette = Vec::new();
+    let mut groups: Vec<u16> = Vec::new();
+    for entry in &entries {
+        let at = (entries.len() + groups.len()) as u16;
+        palette.push(entry.to_bits(at));
+        if let Nearby::Convex(group) | Nearby::Reentrant(group) = entry {
+            groups.extend(group);
         }
+    }
+    let palette_len = palette.len() as u16;
+    palette.extend(groups);
+    Packed {
+        palette,
+        palette_len,
+        index_bits,
+        indices,
     }
 }
 
@@ -137,22 +186,44 @@ mod tests {
 
     #[test]
     fn many_faces_keep_the_frequent_ones() {
-        let mut cells = [0u16; CELLS_PER_BRICK];
+        let mut cells = [Nearby::Face(0); CELLS_PER_BRICK];
         for (i, c) in cells.iter_mut().enumerate() {
-            *c = if i < 200 { 7 } else { 1000 + i as u16 };
+            *c = Nearby::Face(if i < 200 { 7 } else { 1000 + i as u16 });
         }
-        let (palette, bits, indices) = pack_faces(&cells);
-        assert_eq!((palette.len(), bits, indices.len()), (256, 8, 512));
-        assert_eq!(palette[usize::from(indices[0])], 7);
-        assert_eq!(palette[usize::from(indices[511])], NO_FACE);
+        let p = pack(&cells);
+        assert_eq!((p.palette.len(), p.index_bits, p.indices.len()), (256, 8, 512));
+        assert_eq!(p.palette[usize::from(p.indices[0])], 7);
+        assert_eq!(p.palette[usize::from(p.indices[511])], NO_FACE);
     }
 
     #[test]
     fn four_bits_put_the_first_cell_low() {
-        let mut cells = [3u16; CELLS_PER_BRICK];
-        cells[1] = 9;
-        let (palette, bits, indices) = pack_faces(&cells);
-        assert_eq!((palette, bits), (vec![3, 9], 4));
-        assert_eq!((indices.len(), indices[0], indices[1]), (256, 0x10, 0));
+        let mut cells = [Nearby::Face(3); CELLS_PER_BRICK];
+        cells[1] = Nearby::Face(9);
+        let p = pack(&cells);
+        assert_eq!((p.palette, p.index_bits), (vec![3, 9], 4));
+        assert_eq!((p.indices.len(), p.indices[0], p.indices[1]), (256, 0x10, 0));
+    }
+
+    #[test]
+    fn groups_stand_behind_the_entries() {
+        let edge = Nearby::Convex([3, 9, NO_FACE]);
+        let corner = Nearby::Reentrant([1, 2, 3]);
+        let mut cells = [Nearby::Face(3); CELLS_PER_BRICK];
+        (cells[1], cells[2]) = (edge, corner);
+        let Packed {
+            palette,
+            palette_len,
+            indices,
+            ..
+        } = pack(&cells);
+        let read = |cell: usize| {
+            let index = usize::from(indices[cell / 2] >> (4 * (cell & 1)) & 15);
+            Nearby::from_bits(palette[index], |at| {
+                palette.get(usize::from(at)..)?.first_chunk().copied()
+            })
+        };
+        assert_eq!((read(0), read(1), read(2)), (Nearby::Face(3), edge, corner));
+        assert_eq!((palette.len(), palette_len), (9, 3));
     }
 }

@@ -285,7 +285,7 @@ fn pack(
     let mut by_palette: HashMap<Vec<u16>, u32> = HashMap::new();
     let mut sample_bytes = 0;
     for (&at, brick) in stored.iter().zip(bricks) {
-        let palette_len = brick.palette.len() as u16;
+        let palette_len = brick.palette_len;
         let palette_at = *by_palette.entry(brick.palette).or_insert_with_key(|run| {
             palette.extend_from_slice(run);
             (palette.len() - run.len()) as u32

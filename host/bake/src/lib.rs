@@ -25,6 +25,7 @@ mod fits;
 mod free_form;
 mod grid;
 mod image;
+mod nearby;
 mod occupancy;
 mod options;
 mod partners;

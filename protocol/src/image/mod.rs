@@ -18,7 +18,7 @@ mod open;
 mod records;
 
 pub use error::ImageError;
-pub use field::{Field, FieldSample, Lookup};
+pub use field::{EDGE_ERROR_CELLS, Field, FieldSample, Lookup};
 pub use occupancy::{VOXEL_BRICK_BYTES, Voxel, VoxelSample};
 pub use open::{CRC, SceneImage, Shape};
 pub use records::*;

@@ -84,7 +84,7 @@ impl Field<'_> {
                 VoxelSample {
                     voxel,
                     center: [center(0), center(1), center(2)],
-                    face: self.face(brick, cell),
+                    face: self.nearby(brick, cell).face(),
                     bound: if voxel == Voxel::Free {
                         self.record.band
                     } else {

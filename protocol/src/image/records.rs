@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// First eight bytes of every scene image.
 pub const MAGIC: [u8; 8] = *b"MORTISE\0";
 /// Version of this layout. Any change to a record or its meaning counts it up.
-pub const LAYOUT_VERSION: u32 = 1;
+pub const LAYOUT_VERSION: u32 = 2;
 /// Cells along a brick's edge.
 pub const BRICK_CELLS: usize = 8;
 /// Samples along a brick's edge: the last layer repeats the neighbour's first (shared apron).
@@ -195,6 +195,70 @@ impl GridEntry {
                 0x8000 | if inside { 0x4000 } else { 0 } | cells
             }
         }
+    }
+}
+
+/// Which faces lie nearest to a cell, and whether their exact surfaces give the distance there: a palette entry.
+///
+/// In 16 bits, the upper two tell which: 00 [`Self::Face`], 01 [`Self::Roughly`], 10 [`Self::Convex`], 11 [`Self::Reentrant`]; the others are the
+/// face, or where in the brick's palette its three faces stand ([`NO_FACE`] for none). [`NO_FACE`] as a whole is [`Self::Unknown`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Nearby {
+    /// Not known.
+    Unknown,
+    /// All over the cell the distance is that to this face's surface.
+    Face(u16),
+    /// This face is nearest; the distance is as interpolated.
+    Roughly(u16),
+    /// At a convex edge or corner of these faces the largest of the distances to their surfaces has the distance's sign and is no larger in
+    /// amount; inside, and at the faces, it is the distance.
+    Convex([u16; 3]),
+    /// At a re-entrant one the smallest, likewise; outside, and at the faces, it is the distance.
+    Reentrant([u16; 3]),
+}
+
+impl Nearby {
+    /// Most faces a shape can have whose palettes say more than [`Self::Unknown`].
+    pub const MAX_FACES: u16 = 0x3fff;
+    const KIND: u16 = 0xc000;
+
+    /// From a palette entry; `group` reads three entries of the brick's palette from a place in it.
+    #[inline]
+    pub fn from_bits(bits: u16, group: impl FnOnce(u16) -> Option<[u16; 3]>) -> Self {
+        let rest = bits & Self::MAX_FACES;
+        match bits & Self::KIND {
+            0 => Self::Face(rest),
+            0x4000 => Self::Roughly(rest),
+            0x8000 => group(rest).map_or(Self::Unknown, Self::Convex),
+            _ if bits == NO_FACE => Self::Unknown,
+            _ => group(rest).map_or(Self::Unknown, Self::Reentrant),
+        }
+    }
+
+    /// To a palette entry; `at` is where in the brick's palette the three faces stand, for those that have three.
+    pub const fn to_bits(self, at: u16) -> u16 {
+        match self {
+            Self::Unknown => NO_FACE,
+            Self::Face(face) => face & Self::MAX_FACES,
+            Self::Roughly(face) => 0x4000 | face & Self::MAX_FACES,
+            Self::Convex(_) => 0x8000 | at & Self::MAX_FACES,
+            Self::Reentrant(_) => 0xc000 | at & Self::MAX_FACES,
+        }
+    }
+
+    /// One of the nearest faces, or [`NO_FACE`].
+    pub const fn face(self) -> u16 {
+        match self {
+            Self::Unknown => NO_FACE,
+            Self::Face(face) | Self::Roughly(face) => face,
+            Self::Convex(faces) | Self::Reentrant(faces) => faces[0],
+        }
+    }
+
+    /// Whether it is an edge or corner: there interpolation may overstate the distance, by up to 0.9 cells.
+    #[inline]
+    pub const fn is_edge(self) -> bool {
+        matches!(self, Self::Convex(_) | Self::Reentrant(_))
     }
 }
 
