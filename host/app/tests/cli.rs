@@ -60,6 +60,47 @@ fn inspect_says_what_is_in_the_file() {
 }
 
 #[test]
+fn contacts_of_two_pins_in_their_holes() {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../mating/tests/data/two_pin_exact.step"
+    );
+    let report = json(&mortise(&["contacts", file, "--json"]));
+    assert_eq!(
+        report["parts"],
+        serde_json::json!(["socket-plate", "two-pin-link"])
+    );
+    let contacts = report["contacts"].as_array().expect("contacts");
+    let told = |c: &Value| serde_json::json!([c["kind"], c["a"], c["b"], c["count"]]);
+    assert_eq!(
+        contacts.iter().map(told).collect::<Value>(),
+        serde_json::json!([
+            ["planar", "socket-plate", "two-pin-link", 1],
+            ["cylindrical", "socket-plate", "two-pin-link", 2]
+        ])
+    );
+    // Two pins of 6 mm, 12 mm long; unrolled walls are exact.
+    let area = contacts[1]["area_mm2"].as_f64().expect("number");
+    assert!(
+        (area / (2.0 * std::f64::consts::PI * 6.0 * 12.0) - 1.0).abs() < 1e-9,
+        "{area}"
+    );
+    assert_eq!(
+        (&contacts[1]["radius_mm"], &contacts[1]["fit_um"]),
+        (&3.0.into(), &0.0.into())
+    );
+    let text = String::from_utf8(mortise(&["contacts", file]).stdout).expect("UTF-8");
+    assert!(
+        text.starts_with("2 parts, 2 pairs of surfaces in contact\n"),
+        "{text}"
+    );
+    // Of the pair as delivered, nothing touches.
+    let apart = json(&mortise(&["contacts", SAMPLE, "--json"]));
+    assert_eq!(apart["contacts"], Value::Array(vec![]));
+    refused(&["contacts", "no-such-file.step", "--json"], "no-such-file.step");
+}
+
+#[test]
 fn what_cannot_be_read_is_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let write = |name: &str, bytes: &[u8]| {

@@ -249,6 +249,7 @@ fn three_quarter_disc() -> Shape {
     finish(Shape {
         faces: vec![Face {
             surface: Surface::Plane { frame: world() },
+            fit_mm: None,
             reversed: false,
             area_mm2: 1.0,
             edges: vec![0, 1, 2],

@@ -120,7 +120,7 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
         let free = document
             .free_forms(index, EDGE_TOLERANCE_MM)
             .map_err(|e| kernel_error(path, &e))?;
-        let mut shape = shape::convert(raw, &mut notes);
+        let mut shape = shape::convert(raw, options.recognise_mm, &mut notes);
         free_form::add(&mut shape, free);
         shapes.push(shape);
         let owner = parts.iter().find(|p| p.shape == index).map_or("?", |p| &p.name);

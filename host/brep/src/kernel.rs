@@ -71,6 +71,8 @@ mod ffi {
         /// A point of the surface near the middle of the face, and the face's outward normal there.
         point: [f64; 3],
         normal: [f64; 3],
+        /// Kind 5: points of the face, each followed by the outward unit normal there.
+        samples: Vec<f64>,
         area: f64,
         edges: Vec<u32>,
         has_color: bool,
@@ -86,6 +88,8 @@ mod ffi {
         z: [f64; 3],
         radius: f64,
         length: f64,
+        /// Kind 2: points along the exact curve, first to last.
+        samples: Vec<f64>,
         faces: Vec<u32>,
         polyline: Vec<f64>,
     }

@@ -171,6 +171,15 @@ class Describer {
       raw.x = numbers(circle.XAxis().Direction().XYZ());
       raw.z = numbers(circle.Axis().Direction().XYZ());
       raw.radius = circle.Radius();
+    } else {
+      // Odd, so that a closed curve's samples do not repeat by symmetry.
+      constexpr int kPieces = 31;
+      first = adaptor.FirstParameter();
+      last = adaptor.LastParameter();
+      for (int i = 0; i <= kPieces; ++i) {
+        const gp_Pnt point = adaptor.Value(first + (last - first) * i / kPieces);
+        for (int k = 1; k <= 3; ++k) raw.samples.push_back(point.Coord(k));
+      }
     }
     raw.length = GCPnts_AbscissaPoint::Length(adaptor);
     return raw;
@@ -218,7 +227,8 @@ class Describer {
     gp_Vec du, dv;
     adaptor.D1(u, v, point, du, dv);
     gp_Vec normal = du.Crossed(dv);
-    if (normal.Magnitude() > 0) normal.Normalize();
+    // Where one derivative all but vanishes (a pole), their product says nothing.
+    normal = normal.Magnitude() > 1e-9 * du.Magnitude() * dv.Magnitude() ? normal.Normalized() : gp_Vec(0, 0, 0);
     if (face.Orientation() == TopAbs_REVERSED) normal.Reverse();
     raw.point = numbers(point.XYZ());
     raw.normal = numbers(normal.XYZ());
@@ -271,7 +281,32 @@ class Describer {
       triangles(face, number, mesh, place, vertex_of_node);
     }
     sample(face, adaptor, u, v, raw);
+    if (raw.kind == 5 && meshed && has_uv(mesh)) samples(face, adaptor, mesh, raw);
     out_.faces.push_back(std::move(raw));
+  }
+
+  // Points and outward normals over the whole face, some hundreds at most: nodes, middles of triangles, and middles of
+  // sides where there are few.
+  static void samples(const TopoDS_Face& face, const BRepAdaptor_Surface& adaptor, const Handle(Poly_Triangulation) & mesh,
+                      RawFace& raw) {
+    constexpr int kMost = 256;
+    const auto add = [&](const gp_XY& uv) {
+      RawFace at{};
+      sample(face, adaptor, uv.X(), uv.Y(), at);
+      // No normal where the parametrisation is singular.
+      if (gp_XYZ(at.normal[0], at.normal[1], at.normal[2]).Modulus() < 0.5) return;
+      for (double x : at.point) raw.samples.push_back(x);
+      for (double x : at.normal) raw.samples.push_back(x);
+    };
+    for (int i = 1, step = 1 + mesh->NbNodes() / kMost; i <= mesh->NbNodes(); i += step) add(uv_node(mesh, i).XY());
+    for (int i = 1, step = 1 + mesh->NbTriangles() / kMost; i <= mesh->NbTriangles(); i += step) {
+      int corners[3];
+      triangle(mesh, i, corners);
+      const gp_XY uv[3] = {uv_node(mesh, corners[0]).XY(), uv_node(mesh, corners[1]).XY(), uv_node(mesh, corners[2]).XY()};
+      add((uv[0] + uv[1] + uv[2]) / 3);
+      if (mesh->NbTriangles() > kMost / 4) continue;
+      for (int k = 0; k < 3; ++k) add((uv[k] + uv[(k + 1) % 3]) / 2);
+    }
   }
 
   std::uint32_t add(const gp_Pnt& local, const TopLoc_Location& place) {

@@ -27,6 +27,8 @@ mod model;
 mod options;
 pub mod oracle;
 mod part21;
+mod recognise;
+mod recognise_curve;
 mod shape;
 mod topology;
 

@@ -94,8 +94,10 @@ pub const EDGE_TOLERANCE_MM: f64 = 2.5e-4;
 /// A B-rep face.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Face {
-    /// The exact surface it lies on.
+    /// The exact surface it lies on, or one recognised in a spline (see `fit_mm`).
     pub surface: Surface,
+    /// Largest distance seen between the file's spline and `surface`, which was recognised in it, mm; `None`: as written.
+    pub fit_mm: Option<f64>,
     /// The face's outward normal is the surface's natural normal turned round.
     pub reversed: bool,
     /// Area, mm².
@@ -164,10 +166,48 @@ pub enum Surface {
     Spline,
 }
 
+impl Surface {
+    /// Signed distance of `p` from the untrimmed surface, positive on the side of the natural normal, mm, and that unit normal
+    /// at the point of the surface beside `p`. `None` for a spline, and where there is no such normal (on an axis, at a centre).
+    pub fn distance(&self, p: DVec3) -> Option<(f64, DVec3)> {
+        let radial = |frame: &Frame| {
+            let d = p - frame.origin;
+            let across = d.reject_from_normalized(frame.z);
+            Some((across.try_normalize()?, across.length(), d.dot(frame.z)))
+        };
+        Some(match self {
+            Self::Plane { frame } => ((p - frame.origin).dot(frame.z), frame.z),
+            Self::Cylinder { frame, radius } => {
+                let (out, rho, _) = radial(frame)?;
+                (rho - radius, out)
+            }
+            Self::Cone {
+                frame,
+                radius,
+                half_angle,
+            } => {
+                let (out, rho, z) = radial(frame)?;
+                let (sin, cos) = half_angle.sin_cos();
+                ((rho - radius) * cos - z * sin, out * cos - frame.z * sin)
+            }
+            Self::Sphere { frame, radius } => {
+                let d = p - frame.origin;
+                (d.length() - radius, d.try_normalize()?)
+            }
+            Self::Torus { frame, major, minor } => {
+                let (out, ..) = radial(frame)?;
+                let tube = p - frame.origin - out * *major;
+                (tube.length() - minor, tube.try_normalize()?)
+            }
+            Self::Spline => return None,
+        })
+    }
+}
+
 /// A B-rep edge.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Edge {
-    /// The exact curve it lies on.
+    /// The exact curve it lies on; a spline that is a line or circle to the tolerance of recognition is given as such.
     pub curve: Curve,
     /// mm.
     pub length_mm: f64,

@@ -15,6 +15,10 @@ pub struct LoadOptions {
     pub relative_deflection: f64,
     /// Largest angle between neighbouring segments, radians: 0.2 gives a circle at least 32 segments.
     pub angular_deflection_rad: f64,
+    /// A spline face within this distance of a plane, cylinder, cone, sphere or torus becomes that surface, and a spline
+    /// edge within it of a line or circle that curve, mm; 0: never.
+    /// The default, a tenth of a micrometre, is what modellers call the same place: nothing downstream can tell.
+    pub recognise_mm: f64,
     /// Longest time for reading and tessellation, seconds (child process only).
     pub time_limit_s: u64,
     /// Largest address space of the reading process, bytes (child process on Linux only; 0 for none).
@@ -31,6 +35,7 @@ impl Default for LoadOptions {
             linear_deflection_mm: None,
             relative_deflection: 5e-4,
             angular_deflection_rad: 0.2,
+            recognise_mm: 1e-4,
             time_limit_s: 300,
             memory_limit_bytes: 8 << 30,
             max_parts: 100_000,

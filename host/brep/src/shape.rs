@@ -1,11 +1,14 @@
 //! One shape from the kernel's numbers: frames made right-handed, orientation made ours, closedness counted.
 
 use crate::kernel::{RawEdge, RawFace, RawShape};
+use crate::recognise::{self, Sample};
+use crate::recognise_curve;
 use crate::{Curve, Edge, Face, Frame, Mesh, Shape, Surface, topology};
 use glam::DVec3;
 
-/// Turns a kernel shape into a [`Shape`]; notes go to `notes`.
-pub fn convert(raw: RawShape, notes: &mut Vec<String>) -> Shape {
+/// Turns a kernel shape into a [`Shape`]; spline faces within `recognise_mm` of a simpler surface get that one. Notes go to
+/// `notes`.
+pub fn convert(raw: RawShape, recognise_mm: f64, notes: &mut Vec<String>) -> Shape {
     let triangles = raw.triangles.as_chunks().0.to_vec();
     let mut mesh = Mesh {
         vertices: points(&raw.vertices),
@@ -43,8 +46,12 @@ pub fn convert(raw: RawShape, notes: &mut Vec<String>) -> Shape {
     }
     let i = raw.inertia.map(|v| v * sign);
     Shape {
-        faces: raw.faces.into_iter().map(|f| face(f, sign)).collect(),
-        edges: raw.edges.into_iter().map(edge).collect(),
+        faces: raw
+            .faces
+            .into_iter()
+            .map(|f| face(f, sign, recognise_mm))
+            .collect(),
+        edges: raw.edges.into_iter().map(|e| edge(e, recognise_mm)).collect(),
         mesh,
         splines: Vec::new(),
         curves: Vec::new(),
@@ -62,23 +69,32 @@ fn points(coordinates: &[f64]) -> Vec<DVec3> {
     coordinates.as_chunks::<3>().0.iter().map(|&p| p.into()).collect()
 }
 
-fn face(raw: RawFace, sign: f64) -> Face {
+fn face(raw: RawFace, sign: f64, recognise_mm: f64) -> Face {
     let point = DVec3::from(raw.point);
-    let surface = surface(&raw, point);
+    let recognised = recognise::surface(&samples(&raw.samples), recognise_mm);
+    let fit_mm = recognised.map(|(_, fit)| fit);
+    let surface = recognised.map_or_else(|| surface(&raw, point), |(surface, _)| surface);
     let outward = DVec3::from(raw.normal) * sign;
-    let reversed = match natural_normal(&surface, point) {
-        Some(natural) => natural.dot(outward) < 0.0,
+    let reversed = match surface.distance(point) {
+        Some((_, natural)) => natural.dot(outward) < 0.0,
         // A spline's natural normal is the kernel's own; only its sign against the face is known here.
         None => false,
     };
     let color = raw.has_color.then_some(raw.color);
     Face {
         surface,
+        fit_mm,
         reversed,
         area_mm2: raw.area,
         edges: raw.edges,
         color,
     }
+}
+
+fn samples(numbers: &[f64]) -> Vec<Sample> {
+    let vectors = points(numbers);
+    let pairs = vectors.as_chunks::<2>().0.iter();
+    pairs.map(|&[point, normal]| Sample { point, normal }).collect()
 }
 
 /// Right-handed whatever the kernel's frame is: y is z × x.
@@ -135,28 +151,7 @@ fn cone(frame: Frame, radius: f64, half_angle: f64, point: DVec3) -> Surface {
     }
 }
 
-/// Natural normal of an analytic surface at a point on it, as [`Surface`] defines it.
-fn natural_normal(surface: &Surface, point: DVec3) -> Option<DVec3> {
-    let radial = |frame: &Frame| {
-        (point - frame.origin)
-            .reject_from_normalized(frame.z)
-            .normalize_or_zero()
-    };
-    match surface {
-        Surface::Plane { frame } => Some(frame.z),
-        Surface::Cylinder { frame, .. } => Some(radial(frame)),
-        Surface::Cone {
-            frame, half_angle, ..
-        } => Some(radial(frame) * half_angle.cos() - frame.z * half_angle.sin()),
-        Surface::Sphere { frame, .. } => Some((point - frame.origin).normalize_or_zero()),
-        Surface::Torus { frame, major, .. } => {
-            Some((point - frame.origin - radial(frame) * *major).normalize_or_zero())
-        }
-        Surface::Spline => None,
-    }
-}
-
-fn edge(raw: RawEdge) -> Edge {
+fn edge(raw: RawEdge, recognise_mm: f64) -> Edge {
     let curve = match raw.kind {
         0 => Curve::Line {
             origin: raw.origin.into(),
@@ -166,7 +161,7 @@ fn edge(raw: RawEdge) -> Edge {
             frame: frame(raw.origin, raw.x, raw.z),
             radius: raw.radius,
         },
-        _ => Curve::Other,
+        _ => recognise_curve::curve(&points(&raw.samples), recognise_mm).unwrap_or(Curve::Other),
     };
     Edge {
         curve,

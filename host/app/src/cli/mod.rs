@@ -4,6 +4,7 @@
 //! standard error that says why.
 
 mod bake;
+mod contacts;
 mod demo;
 mod inspect;
 mod lab;
@@ -38,6 +39,8 @@ struct Cli {
 enum Command {
     /// Say what a STEP file holds: parts, faces, volumes, and what was lost
     Inspect(inspect::Args),
+    /// Find which faces of which parts touch, and how
+    Contacts(contacts::Args),
     /// Turn a STEP file into a scene image for the board
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
@@ -96,6 +99,7 @@ pub fn main() -> ExitCode {
         } => match command {
             Command::Open(open) => window(open),
             Command::Inspect(args) => inspect::run(&args),
+            Command::Contacts(args) => contacts::run(&args),
             Command::Bake(args) => bake::run(&args),
             Command::Demo(args) => demo::run(args),
             Command::Lab(args) => lab::run(&args),

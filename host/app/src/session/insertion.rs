@@ -231,6 +231,7 @@ mod tests {
         Shape {
             faces: vec![Face {
                 surface: Surface::Cylinder { frame, radius },
+                fit_mm: None,
                 reversed: inner,
                 area_mm2: 1.0,
                 edges: vec![],

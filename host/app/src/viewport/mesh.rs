@@ -163,6 +163,7 @@ mod tests {
     fn face(surface: Surface, reversed: bool) -> Face {
         Face {
             surface,
+            fit_mm: None,
             reversed,
             area_mm2: 1.0,
             edges: vec![0],

@@ -28,6 +28,7 @@ pub fn frame_at(origin: DVec3, z: DVec3) -> Frame {
 fn face(surface: Surface, reversed: bool) -> Face {
     Face {
         surface,
+        fit_mm: None,
         reversed,
         area_mm2: 1.0,
         edges: Vec::new(),

@@ -1,0 +1,31 @@
+//! A ball in a bore of the same diameter: they touch along a circle.
+
+use std::f64::consts::TAU;
+
+use mortise_brep::Frame;
+
+use crate::overlap::{Chart, Drawing};
+use crate::sphere::SphereDrawing;
+
+/// Directions looked at: the length is right to one of 360 parts.
+const STEPS: u32 = 360;
+
+/// Length of the circle about the bore's axis at `height` that lies in both faces, mm.
+pub(crate) fn length(
+    chart: &Chart,
+    bore: &Drawing,
+    ball: &SphereDrawing,
+    frame: &Frame,
+    radius: f64,
+    height: f64,
+) -> f64 {
+    let touching = (0..STEPS)
+        .filter(|&i| {
+            // Off the multiples of a degree, where modellers put seams.
+            let angle = TAU * (f64::from(i) + 0.381_966) / f64::from(STEPS) - TAU / 2.0;
+            let direction = frame.x * angle.cos() + frame.y * angle.sin();
+            chart.holds(bore, angle, height) && ball.holds(direction)
+        })
+        .count();
+    TAU * radius * touching as f64 / f64::from(STEPS)
+}
