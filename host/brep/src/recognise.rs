@@ -437,7 +437,7 @@ mod tests {
             origin in prop::array::uniform3(-80.0f64..80.0),
             radius in 1.0f64..40.0,
             start in -3.0f64..3.0,
-            span in 0.5f64..6.28,
+            span in 0.5f64..std::f64::consts::TAU,
             inward in any::<bool>(),
         ) {
             let z = DVec3::from(axis).try_normalize().unwrap_or(DVec3::Z);

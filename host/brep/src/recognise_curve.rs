@@ -75,7 +75,7 @@ mod tests {
             axis in prop::array::uniform3(-1.0f64..1.0),
             center in prop::array::uniform3(-50.0f64..50.0),
             radius in 0.5f64..80.0,
-            turn in 0.3f64..6.28,
+            turn in 0.3f64..std::f64::consts::TAU,
         ) {
             let z = DVec3::from(axis).try_normalize().unwrap_or(DVec3::Z);
             let (x, c) = (z.any_orthonormal_vector(), DVec3::from(center));

@@ -16,6 +16,7 @@ mod contact;
 mod identify;
 mod merge;
 mod overlap;
+pub mod recognise;
 mod same;
 mod sphere;
 mod tiles;

@@ -12,9 +12,11 @@ use mortise_brep::{CadModel, load_step};
 use mortise_mating::{Contact, ContactKind, Tolerances, identify};
 use proptest::prelude::*;
 
-/// Each file with its contacts: kind, count, and area (of a ball in a bore: length) by arithmetic.
-fn samples() -> &'static [(CadModel, Vec<(ContactKind, usize, f64)>)] {
-    static SAMPLES: OnceLock<Vec<(CadModel, Vec<(ContactKind, usize, f64)>)>> = OnceLock::new();
+/// A file with its contacts: kind, count, and area (of a ball in a bore: length) by arithmetic.
+type Sample = (CadModel, Vec<(ContactKind, usize, f64)>);
+
+fn samples() -> &'static [Sample] {
+    static SAMPLES: OnceLock<Vec<Sample>> = OnceLock::new();
     SAMPLES.get_or_init(|| {
         let load = |name: &str| {
             load_step(

@@ -1,0 +1,340 @@
+//! From touching faces to constraints worth keeping.
+//!
+//! Given which faces touch and where the parts are, the recogniser keeps a list of targets: concentric, coplanar, conical,
+//! spherical, annular. A pair of merged surfaces that mate becomes a candidate when its faces touch and it is near: diameters,
+//! distance and angle within the thresholds. All that are near are solved together; one that contradicts those before it waits,
+//! and names them. Looser thresholds to leave than to enter, and some updates of patience, keep the list from flickering. The
+//! operator may pin an entry (it stays while it can be kept) or switch it off.
+//!
+//! The list after an update is a function of the list before, the observation and the operator's choices: no clock, no chance.
+
+mod solve;
+mod target;
+
+use std::collections::BTreeMap;
+
+use glam::{DAffine3, DVec3};
+use mortise_brep::{CadModel, Shape};
+
+pub use solve::{Freedom, Solution};
+pub use target::{Misfit, Target, TargetId, TargetKind};
+
+use crate::merge::{MergedSurface, merge};
+use crate::tolerances::Tolerances;
+use solve::solve;
+
+/// How near a target must be, and for how long it is remembered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    /// Largest d at which a target is taken up, mm.
+    pub distance_mm: f64,
+    /// Largest θ at which it is taken up, radians.
+    pub angle_rad: f64,
+    /// Largest difference of diameters, mm.
+    pub diameter_mm: f64,
+    /// Largest diameter of what goes in beyond that of its hole, mm: a press fit is felt, a wrong part is not pulled in.
+    pub interference_mm: f64,
+    /// A target taken up is let go when d or θ is this many times larger.
+    pub release: f64,
+    /// Updates without touch after which it is let go.
+    pub patience: u32,
+}
+
+impl Default for Thresholds {
+    /// As far as a hand is off when it tries a fit: 3 mm and 6°; the loosest fit of the thesis is 2.5 mm on the diameter.
+    fn default() -> Self {
+        Self {
+            distance_mm: 3.0,
+            angle_rad: 0.1,
+            diameter_mm: 2.6,
+            interference_mm: 0.1,
+            release: 1.5,
+            patience: 30,
+        }
+    }
+}
+
+/// Two faces that touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchingFaces {
+    /// Face id of the moving part.
+    pub moving_face: u32,
+    /// The other part.
+    pub fixed_part: usize,
+    /// Its face id.
+    pub fixed_face: u32,
+    /// Largest depth, mm.
+    pub depth_mm: f64,
+}
+
+/// What is known at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a> {
+    /// The part in the hand.
+    pub moving_part: usize,
+    /// Where each part is, in the order of [`CadModel::parts`].
+    pub poses: &'a [DAffine3],
+    /// Faces that touch, or are near enough to count.
+    pub touching: &'a [TouchingFaces],
+}
+
+/// What holds of an entry.
+#[derive(Clone, Debug, PartialEq)]
+pub enum State {
+    /// Kept.
+    Active,
+    /// Touches, but is too far off to be taken up.
+    Far,
+    /// Contradicts these targets, which came first.
+    Conflict(Vec<TargetId>),
+    /// Switched off by the operator.
+    Off,
+}
+
+/// One line of the list.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// The constraint.
+    pub target: Target,
+    /// Whether it is kept, and why not.
+    pub state: State,
+    /// How far it is from being kept now.
+    pub misfit: Misfit,
+    /// Largest depth at which its faces touch, mm; 0 when they do not now.
+    pub depth_mm: f64,
+    /// The operator wants it to stay.
+    pub pinned: bool,
+    /// The operator does not want it.
+    pub off: bool,
+    /// Updates since its faces touched.
+    idle: u32,
+}
+
+/// The list of targets. See the [module's page](self).
+pub struct Recogniser<'a> {
+    model: &'a CadModel,
+    surfaces: Vec<ShapeSurfaces>,
+    thresholds: Thresholds,
+    entries: BTreeMap<TargetId, Entry>,
+    freedom: Freedom,
+}
+
+struct ShapeSurfaces {
+    merged: Vec<MergedSurface>,
+    /// Of each merged surface, the middle of its mesh.
+    middles: Vec<DVec3>,
+    /// Of each face, its merged surface.
+    of_face: Vec<Option<usize>>,
+    /// Half the diagonal of the mesh's box, mm.
+    size: f64,
+}
+
+impl<'a> Recogniser<'a> {
+    /// With an empty list.
+    pub fn new(model: &'a CadModel, tolerances: &Tolerances, thresholds: Thresholds) -> Self {
+        Self {
+            model,
+            surfaces: model
+                .shapes
+                .iter()
+                .map(|s| ShapeSurfaces::new(s, tolerances))
+                .collect(),
+            thresholds,
+            entries: BTreeMap::new(),
+            freedom: Freedom::default(),
+        }
+    }
+
+    /// Brings the list up to date. Touching faces with numbers that do not exist are passed over.
+    pub fn update(&mut self, seen: &Observation<'_>) {
+        for entry in self.entries.values_mut() {
+            entry.idle = entry.idle.saturating_add(1);
+            entry.depth_mm = 0.0;
+        }
+        for touch in seen.touching {
+            let Some(target) = self.candidate(seen.moving_part, touch) else {
+                continue;
+            };
+            let entry = self.entries.entry(target.id).or_insert(Entry {
+                target,
+                state: State::Far,
+                misfit: Misfit {
+                    distance_mm: 0.0,
+                    angle_rad: 0.0,
+                },
+                depth_mm: 0.0,
+                pinned: false,
+                off: false,
+                idle: 0,
+            });
+            entry.idle = 0;
+            entry.depth_mm = entry.depth_mm.max(touch.depth_mm);
+        }
+        let patience = self.thresholds.patience;
+        self.entries.retain(|id, e| {
+            let known =
+                id.moving_part == seen.moving_part && seen.poses.len() > id.fixed_part.max(id.moving_part);
+            known && (e.idle <= patience || e.pinned || e.off)
+        });
+        self.decide(seen);
+    }
+
+    /// All entries, in order of their surfaces.
+    pub fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.values()
+    }
+
+    /// Targets that are kept.
+    pub fn active(&self) -> impl Iterator<Item = &Target> {
+        self.entries
+            .values()
+            .filter(|e| e.state == State::Active)
+            .map(|e| &e.target)
+    }
+
+    /// Motion that the targets kept leave to the moving part.
+    pub fn freedom(&self) -> &Freedom {
+        &self.freedom
+    }
+
+    /// Keeps an entry in the list and before others, or no longer; from the next update on. `false`: there is none.
+    pub fn pin(&mut self, id: TargetId, pinned: bool) -> bool {
+        self.entries.get_mut(&id).map(|e| e.pinned = pinned).is_some()
+    }
+
+    /// Switches an entry off or on again, from the next update on. `false`: there is none.
+    pub fn switch_off(&mut self, id: TargetId, off: bool) -> bool {
+        self.entries.get_mut(&id).map(|e| e.off = off).is_some()
+    }
+
+    /// The target two touching faces could keep, when their sizes agree.
+    fn candidate(&self, moving_part: usize, touch: &TouchingFaces) -> Option<Target> {
+        let of = |part: usize, face: u32| {
+            let surfaces = self.surfaces.get(self.model.parts.get(part)?.shape)?;
+            let surface = (*surfaces.of_face.get(face as usize)?)?;
+            Some((surfaces, surface))
+        };
+        let (a, i) = of(moving_part, touch.moving_face)?;
+        let (b, j) = of(touch.fixed_part, touch.fixed_face)?;
+        let id = TargetId {
+            moving_part,
+            moving_surface: i,
+            fixed_part: touch.fixed_part,
+            fixed_surface: j,
+        };
+        let target = Target::between(id, &a.merged[i], &b.merged[j], a.middles[i])?;
+        let sizes = -self.thresholds.interference_mm..=self.thresholds.diameter_mm;
+        (sizes.contains(&(2.0 * target.play_mm)) && moving_part != touch.fixed_part).then_some(target)
+    }
+
+    /// Takes targets up one by one, as long as they can be kept together: pinned ones first, then those kept before, then the
+    /// nearest to being kept.
+    fn decide(&mut self, seen: &Observation<'_>) {
+        let limits = self.thresholds;
+        let Some(pose) = seen.poses.get(seen.moving_part) else {
+            self.entries.clear();
+            return;
+        };
+        let shape = self.model.parts.get(seen.moving_part).map_or(0, |p| p.shape);
+        let size = self.surfaces.get(shape).map_or(1.0, |s| s.size).max(1e-6);
+        let mut order = Vec::new();
+        for (id, entry) in &mut self.entries {
+            entry.misfit = entry.target.misfit(pose, &seen.poses[id.fixed_part]);
+            let was_active = entry.state == State::Active;
+            let factor = if was_active || entry.pinned {
+                limits.release
+            } else {
+                1.0
+            };
+            let near = entry.misfit.distance_mm <= factor * limits.distance_mm
+                && entry.misfit.angle_rad <= factor * limits.angle_rad;
+            entry.state = match (entry.off, near) {
+                (true, _) => State::Off,
+                (false, false) => State::Far,
+                (false, true) => {
+                    let off = entry.misfit.distance_mm / limits.distance_mm
+                        + entry.misfit.angle_rad / limits.angle_rad;
+                    order.push((!entry.pinned, !was_active, off, *id));
+                    State::Conflict(Vec::new())
+                }
+            };
+        }
+        order.sort_by(|a, b| {
+            (a.0, a.1)
+                .cmp(&(b.0, b.1))
+                .then(a.2.total_cmp(&b.2))
+                .then(a.3.cmp(&b.3))
+        });
+        let mut kept: Vec<TargetId> = Vec::new();
+        let mut freedom = solve(&[], pose, size).freedom;
+        for (.., id) in order {
+            let together = |ids: &[TargetId]| {
+                let targets: Vec<_> = (ids.iter().chain([&id]))
+                    .map(|i| (&self.entries[i].target, seen.poses[i.fixed_part]))
+                    .collect();
+                let solution = solve(&targets, pose, size);
+                let fits = targets
+                    .iter()
+                    .zip(&solution.misfits)
+                    .all(|((t, _), m)| keeps(t, m, size));
+                fits.then_some(solution)
+            };
+            let state = match together(&kept) {
+                Some(solution) => {
+                    freedom = solution.freedom;
+                    kept.push(id);
+                    State::Active
+                }
+                None => {
+                    let alone: Vec<TargetId> = kept
+                        .iter()
+                        .copied()
+                        .filter(|k| together(&[*k]).is_none())
+                        .collect();
+                    State::Conflict(if alone.is_empty() { kept.clone() } else { alone })
+                }
+            };
+            if let Some(entry) = self.entries.get_mut(&id) {
+                entry.state = state;
+            }
+        }
+        self.freedom = freedom;
+    }
+}
+
+/// Whether a target is kept: within its play, and what a fit of 1 µm over the part allows.
+fn keeps(target: &Target, misfit: &Misfit, size: f64) -> bool {
+    const FIT_MM: f64 = 1e-3;
+    let play = target.play_mm.max(0.0) + FIT_MM;
+    misfit.distance_mm <= play && misfit.angle_rad <= play / size
+}
+
+impl ShapeSurfaces {
+    fn new(shape: &Shape, tolerances: &Tolerances) -> Self {
+        let merged = merge(shape, tolerances);
+        let mut of_face = vec![None; shape.faces.len()];
+        for (i, m) in merged.iter().enumerate() {
+            for &f in &m.faces {
+                of_face[f as usize] = Some(i);
+            }
+        }
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (mut boxes, mut whole) = (vec![nothing; merged.len()], nothing);
+        for (triangle, &face) in shape.mesh.triangles.iter().zip(&shape.mesh.triangle_face) {
+            for &v in triangle {
+                let p = shape.mesh.vertices[v as usize];
+                whole = (whole.0.min(p), whole.1.max(p));
+                if let Some(b) = of_face[face as usize].map(|i| &mut boxes[i]) {
+                    *b = (b.0.min(p), b.1.max(p));
+                }
+            }
+        }
+        let size = whole.0.distance(whole.1) / 2.0;
+        Self {
+            merged,
+            middles: boxes.into_iter().map(|(low, high)| (low + high) / 2.0).collect(),
+            of_face,
+            size: if size.is_finite() { size } else { 1.0 },
+        }
+    }
+}

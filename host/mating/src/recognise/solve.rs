@@ -1,0 +1,223 @@
+//! All targets at once: can they be kept together, and what motion do they leave?
+//!
+//! Each target gives rows of a 6-column Jacobian: a displacement along e at point p of the moving part is
+//! e·v + ((p − c) × e)·ω, a turn about e is e·ω, about the reference point c; lengths divide ω by the part's size L so that both
+//! compare. Gauss–Newton with the pseudo-inverse (singular value decomposition) moves the part to the least-squares pose. Where
+//! a misfit stays beyond its play, the targets contradict each other. The null space at that pose is the freedom that is left,
+//! split into pure slides and turns.
+//!
+//! Cost: a decomposition of a 6-column matrix with at most five rows a target, a few times.
+
+use std::fmt;
+
+use glam::{DAffine3, DQuat, DVec3};
+use nalgebra::{DMatrix, DVector};
+
+use super::target::{Misfit, Target, TargetKind, placed};
+use crate::contact::Axis;
+
+/// Singular values below this share of the largest are none: 1 mm over a part of 1 m.
+const RANK: f64 = 1e-3;
+/// Gauss–Newton converges quadratically; targets that are still far apart after this contradict.
+const STEPS: usize = 12;
+
+/// Outcome of solving targets together.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Where the moving part keeps all targets as well as it can.
+    pub pose: DAffine3,
+    /// What is left of each target's misfit there.
+    pub misfits: Vec<Misfit>,
+    /// Independent conditions, 0 to 6.
+    pub rank: usize,
+    /// Motion that is left.
+    pub freedom: Freedom,
+}
+
+/// Motion that targets leave, in the assembly's frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Freedom {
+    /// Directions of free slides, orthonormal.
+    pub slides: Vec<DVec3>,
+    /// Axes of free turns.
+    pub turns: Vec<Axis>,
+}
+
+impl Freedom {
+    /// Degrees of freedom.
+    pub fn count(&self) -> usize {
+        self.slides.len() + self.turns.len()
+    }
+
+    /// The lower pair with this freedom, or a count.
+    pub fn name(&self) -> &'static str {
+        match (self.slides.len(), self.turns.len()) {
+            (0, 0) => "fixed",
+            (0, 1) => "revolute",
+            (1, 0) => "prismatic",
+            (1, 1) => "cylindrical",
+            (2, 1) => "planar",
+            (0, 3) => "spherical",
+            (1, 3) => "ball in cylinder",
+            (3, 3) => "free",
+            _ => "partly free",
+        }
+    }
+}
+
+impl fmt::Display for Freedom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+        let (slides, turns) = (self.slides.len(), self.turns.len());
+        write!(
+            f,
+            "{}: {}, {}",
+            self.name(),
+            plural(slides, "slide"),
+            plural(turns, "turn")
+        )
+    }
+}
+
+/// A target with where its fixed part is.
+pub(crate) type Placed<'a> = (&'a Target, DAffine3);
+
+/// Moves the part from `pose` until it keeps all `targets`. `size` is the part's, mm.
+pub(crate) fn solve(targets: &[Placed<'_>], pose: &DAffine3, size: f64) -> Solution {
+    let mut pose = *pose;
+    for _ in 0..STEPS {
+        let center = reference(targets, &pose);
+        let (jacobian, misfit) = rows(targets, &pose, center, size);
+        if jacobian.nrows() == 0 {
+            break;
+        }
+        let svd = jacobian.svd(true, true);
+        let floor = RANK * svd.singular_values.max();
+        let Ok(step) = svd.solve(&misfit, floor) else {
+            break;
+        };
+        let by = DVec3::new(step[0], step[1], step[2]);
+        let turn = DQuat::from_scaled_axis(DVec3::new(step[3], step[4], step[5]) / size);
+        let about = DAffine3::from_translation(center + by)
+            * DAffine3::from_quat(turn)
+            * DAffine3::from_translation(-center);
+        pose = about * pose;
+        if step.norm() < 1e-12 * size {
+            break;
+        }
+    }
+    let center = reference(targets, &pose);
+    let (jacobian, _) = rows(targets, &pose, center, size);
+    let (rank, freedom) = freedom(jacobian, center, size);
+    Solution {
+        pose,
+        misfits: targets.iter().map(|(t, fixed)| t.misfit(&pose, fixed)).collect(),
+        rank,
+        freedom,
+    }
+}
+
+/// Middle of the targets on the moving part.
+fn reference(targets: &[Placed<'_>], pose: &DAffine3) -> DVec3 {
+    let sum: DVec3 = targets.iter().map(|(t, _)| placed(&t.moving, pose).origin).sum();
+    sum / targets.len().max(1) as f64
+}
+
+/// Jacobian, and the motion each row asks for, mm.
+fn rows(targets: &[Placed<'_>], pose: &DAffine3, center: DVec3, size: f64) -> (DMatrix<f64>, DVector<f64>) {
+    let (mut rows, mut asked): (Vec<[f64; 6]>, Vec<f64>) = (Vec::new(), Vec::new());
+    for (target, fixed) in targets {
+        let (a, b) = (placed(&target.moving, pose), placed(&target.fixed, fixed));
+        let mut slide = |e: DVec3| {
+            let turn = (a.origin - center).cross(e) / size;
+            rows.push([e.x, e.y, e.z, turn.x, turn.y, turn.z]);
+            asked.push((b.origin - a.origin).dot(e));
+        };
+        let across = |z: DVec3| {
+            let x = z.any_orthonormal_vector();
+            [x, z.cross(x)]
+        };
+        let turned = match target.kind {
+            TargetKind::Concentric => {
+                across(b.direction).into_iter().for_each(&mut slide);
+                Some(b.direction * a.direction.dot(b.direction).signum())
+            }
+            TargetKind::Coplanar => {
+                slide(b.direction);
+                Some(-b.direction)
+            }
+            TargetKind::Conical => {
+                DVec3::AXES.into_iter().for_each(&mut slide);
+                Some(b.direction)
+            }
+            TargetKind::Spherical => {
+                DVec3::AXES.into_iter().for_each(&mut slide);
+                None
+            }
+            TargetKind::Annular => {
+                across(target.bore(&a, &b)).into_iter().for_each(&mut slide);
+                None
+            }
+        };
+        if let Some(goal) = turned {
+            let sine = a.direction.cross(goal);
+            // The whole angle, so that a quarter turn is not taken for a small one.
+            let angle = sine.length().atan2(a.direction.dot(goal));
+            let by = sine.normalize_or_zero() * angle;
+            for e in across(goal) {
+                rows.push([0.0, 0.0, 0.0, e.x, e.y, e.z]);
+                asked.push(by.dot(e) * size);
+            }
+        }
+    }
+    let jacobian = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
+    (jacobian, DVector::from_vec(asked))
+}
+
+/// Rank and null space, as slides and turns.
+fn freedom(jacobian: DMatrix<f64>, center: DVec3, size: f64) -> (usize, Freedom) {
+    // Six rows at least, so that the decomposition has all six right singular vectors.
+    let count = jacobian.nrows().max(6);
+    let svd = jacobian.resize(count, 6, 0.0).svd(false, true);
+    let Some(v_t) = svd.v_t else {
+        return (0, Freedom::default());
+    };
+    let floor = RANK * svd.singular_values.max();
+    let null: Vec<usize> = (0..6).filter(|&i| svd.singular_values[i] <= floor).collect();
+    let rank = 6 - null.len();
+    if null.is_empty() {
+        return (rank, Freedom::default());
+    }
+    let basis = DMatrix::from_fn(6, null.len(), |i, j| v_t[(null[j], i)]);
+    // Combinations whose turning part vanishes are slides; the others, turns.
+    let turning = basis
+        .rows(3, 3)
+        .clone_owned()
+        .resize(3.max(null.len()), null.len(), 0.0)
+        .svd(false, true);
+    let Some(w_t) = turning.v_t else {
+        return (rank, Freedom::default());
+    };
+    let motion = |k: usize| {
+        let m = &basis * w_t.row(k).transpose();
+        (DVec3::new(m[0], m[1], m[2]), DVec3::new(m[3], m[4], m[5]) / size)
+    };
+    let mut freedom = Freedom::default();
+    let turns = |k: &usize| turning.singular_values[*k] > RANK;
+    for k in (0..null.len()).filter(|k| !turns(k)) {
+        freedom.slides.extend(motion(k).0.try_normalize());
+    }
+    for k in (0..null.len()).filter(turns) {
+        let (v, w) = motion(k);
+        // A turn may be mixed with slides that are free anyway.
+        let v = freedom.slides.iter().fold(v, |v, s| v - *s * v.dot(*s));
+        let Some(direction) = w.try_normalize() else {
+            continue;
+        };
+        freedom.turns.push(Axis {
+            origin: center + w.cross(v) / w.length_squared(),
+            direction,
+        });
+    }
+    (rank, freedom)
+}
