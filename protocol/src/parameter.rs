@@ -4,7 +4,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 macro_rules! parameters {
-    ($($(#[doc = $doc:literal])+ $name:ident = $unit:literal, $min:expr, $max:expr, $default:expr;)+) => {
+    ($($(#[doc = $doc:literal])+ $name:ident = $unit:literal, $min:expr, $max:expr, $default:expr $(, [$($choice:literal),+])?;)+) => {
         /// Names a parameter.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
         pub enum ParameterId { $($(#[doc = $doc])+ $name,)+ }
@@ -14,7 +14,7 @@ macro_rules! parameters {
             id: ParameterId::$name,
             name: stringify!($name),
             description: concat!($($doc),+),
-            unit: $unit, min: $min, max: $max, default: $default,
+            unit: $unit, min: $min, max: $max, default: $default, choices: &[$($($choice),+)?],
         },)+];
     };
 }
@@ -36,6 +36,16 @@ pub struct Parameter {
     pub max: f32,
     /// Value at start.
     pub default: f32,
+    /// What 0, 1, … stand for, when it is a choice (the nearest counts); empty for a quantity.
+    pub choices: &'static [&'static str],
+}
+
+impl Parameter {
+    /// What `value` stands for, when it is a choice.
+    pub fn choice(&self, value: f32) -> Option<&'static str> {
+        // A float that is negative or not a number becomes 0, a huge one the largest number.
+        self.choices.get((value + 0.5) as usize).copied()
+    }
 }
 
 parameters! {
@@ -71,6 +81,8 @@ parameters! {
     HostTimeout = "s", 0.05, 5.0, 0.5;
     /// Most work of a tick, in field look-ups; a point that may touch counts six.
     PointBudget = "look-ups", 16.0, 65_535.0, 380.0;
+    /// How the object is moved: 0 implicit, 1 explicit (the textbook's, which trembles on stiff contact).
+    Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];
 }
 
 impl ParameterId {
@@ -85,11 +97,31 @@ mod tests {
     use super::*;
 
     #[test]
+    fn choices_are_told_by_the_nearest_number() {
+        let row = ParameterId::Integrator.row();
+        for (value, choice) in [
+            (0.0, "implicit"),
+            (0.4, "implicit"),
+            (0.6, "explicit"),
+            (1.0, "explicit"),
+        ] {
+            assert_eq!(row.choice(value), Some(choice));
+        }
+        assert_eq!(ParameterId::ForceLimit.row().choice(1.0), None);
+    }
+
+    #[test]
     fn every_default_lies_in_its_range() {
         for (i, p) in PARAMETERS.iter().enumerate() {
             assert_eq!(p.id as usize, i);
             assert!(
                 p.min < p.max && p.min <= p.default && p.default <= p.max,
+                "{}",
+                p.name
+            );
+            let choices = p.choices.len();
+            assert!(
+                choices == 0 || (p.min == 0.0 && p.max == (choices - 1) as f32),
                 "{}",
                 p.name
             );

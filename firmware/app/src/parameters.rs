@@ -1,6 +1,6 @@
 //! The parameters' values, and the settings the tick uses, made from them at low priority.
 
-use mortise_haptics::Settings;
+use mortise_haptics::{Integrator, Settings};
 use mortise_protocol::message::Refusal;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
@@ -73,6 +73,11 @@ impl Parameters {
         law.limits.force_slew_n_per_s = self.get(P::ForceSlew);
         law.limits.torque_slew_nm_per_s = self.get(P::TorqueSlew);
         law.period_s = TICK_S;
+        law.integrator = if self.get(P::Integrator) < 0.5 {
+            Integrator::Implicit
+        } else {
+            Integrator::Explicit
+        };
         law.validate().map_err(|_| Refusal::BadNumber)?;
         Ok(ControlSettings {
             law,
@@ -102,6 +107,16 @@ mod tests {
     fn a_board_starts_with_the_force_laws_own_defaults() {
         let started = Parameters::default().settings().map(|settings| settings.law);
         assert_eq!(started, Ok(Settings::default()));
+    }
+
+    #[test]
+    fn the_integrator_can_be_chosen() {
+        for (value, integrator) in [(0.0, Integrator::Implicit), (1.0, Integrator::Explicit)] {
+            let settings = Parameters::default()
+                .with(ParameterId::Integrator, value)
+                .and_then(|p| p.settings());
+            assert_eq!(settings.map(|s| s.law.integrator), Ok(integrator));
+        }
     }
 
     #[test]

@@ -84,6 +84,8 @@ impl Walk<'_, '_, '_> {
             contact.arm = arm;
             contact.rate = 0.0;
             contact.phase = Phase::Free;
+            // Faces are known too seldom for guidance to make room between them.
+            contact.guided = false;
             (contact.moving_face, contact.static_face) = (point.face, sample.face);
             contact.leaf = leaf;
         }

@@ -367,7 +367,11 @@ fn shell_options(options: &BakeOptions, cell_mm: f64, partners: &Partners) -> Po
         // The field shows nothing sharper than a cell: what is, is sampled as if it were a cell's radius.
         least_spacing_mm: (4.0 * epsilon_mm * cell_mm).sqrt(),
         max_spacing_mm: options.max_spacing_mm.unwrap_or(MAX_SPACING_CELLS * cell_mm),
-        partners: partners.clone(),
+        // A voxmap is asked by one part's points only, so they must lie everywhere.
+        partners: match options.method {
+            Method::DistanceField => partners.clone(),
+            Method::Occupancy => Partners::Unknown,
+        },
     }
 }
 

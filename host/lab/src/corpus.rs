@@ -6,12 +6,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use mortise_bake::Method;
 use mortise_brep::{BrepError, CadModel, load_step};
 use mortise_rig::RigSpec;
 use serde::Deserialize;
 
 use crate::LabError;
-use crate::scenario::{self, Bounds, Hand, Key, Run, Scenario, Scene};
+use crate::scenario::{self, Bounds, Hand, Key, Run, Scenario, Scene, Shell};
 
 /// How far the hand takes a part along each axis, mm.
 const SWEEP_MM: f64 = 30.0;
@@ -200,10 +201,14 @@ fn sweep(path: &Path, model: &CadModel, seconds: f64) -> (Scenario, String) {
     let scenario = Scenario {
         name: "sweep".into(),
         what: "A part of a real assembly is moved against the others".into(),
+        integrator: None,
         scene: Scene {
             step: path.to_owned(),
             part: part.name.clone(),
             cell_mm: None,
+            method: Method::default(),
+            shell: Shell::default(),
+            shrink_percent: 0.0,
         },
         parameters: BTreeMap::new(),
         hand: Hand {

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use glam::{DQuat, DVec3};
-use mortise_bake::{BakeOptions, Grabbable, bake};
+use mortise_bake::{BakeOptions, Grabbable, Method, PointshellKind, bake};
 use mortise_brep::load_step;
 use mortise_haptics::{Flags, Pose, Prober, Quat, Settings, Vec3};
 use mortise_protocol::image::{MAGIC, NO_FACE, SceneImage};
@@ -145,6 +145,17 @@ pub struct ProbeScene {
     parts: Vec<String>,
 }
 
+/// How a STEP file is to be baked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Model {
+    /// Cell edge, mm; `None`: as [`BakeOptions`] chooses.
+    pub cell_mm: Option<f64>,
+    /// How contact is found; `None`: as [`BakeOptions`] chooses, or as the image has it.
+    pub method: Option<Method>,
+    /// What the pointshells are made of.
+    pub shell: PointshellKind,
+}
+
 /// A moving part and a fixed one, by their places in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {
@@ -160,6 +171,19 @@ impl ProbeScene {
     /// # Errors
     /// `Unreadable`, `Brep`, `Bake`; `Input` for a damaged image, or one given a cell size.
     pub fn load(path: &Path, cell_mm: Option<f64>) -> Result<Self, LabError> {
+        let model = Model {
+            cell_mm,
+            ..Model::default()
+        };
+        Self::load_by(path, &model)
+    }
+
+    /// As [`Self::load`], a STEP file as `model` says.
+    ///
+    /// # Errors
+    /// As [`Self::load`]; `Input` for an image of another method.
+    pub fn load_by(path: &Path, model: &Model) -> Result<Self, LabError> {
+        let cell_mm = model.cell_mm;
         let name = path.display().to_string();
         let unreadable = |source| LabError::Unreadable {
             path: path.to_owned(),
@@ -170,10 +194,18 @@ impl ProbeScene {
             return Self::bake(
                 path,
                 &BakeOptions {
+                    method: model.method.unwrap_or_default(),
+                    shell: model.shell,
                     cell_mm,
                     // A probe is asked for accuracy: the shell is to err no more than the field does on the radii of common parts.
                     epsilon_mm: cell_mm.map(|cell| cell / 100.0),
                     grabbable: Grabbable::All,
+                    // What is asked for here need not fit a board.
+                    image_limit_bytes: if cell_mm.is_some() {
+                        u64::from(u32::MAX)
+                    } else {
+                        1 << 20
+                    },
                     ..BakeOptions::default()
                 },
             );
@@ -190,6 +222,15 @@ impl ProbeScene {
         let image = words(&bytes);
         let scene = SceneImage::open(bytemuck::cast_slice(&image))
             .map_err(|error| bad(format!("{error}; bake it again")))?;
+        let voxels = (0..scene.shape_count()).any(|shape| scene.shape(shape).field.is_occupancy());
+        if model
+            .method
+            .is_some_and(|method| (method == Method::Occupancy) != voxels)
+        {
+            return Err(bad(
+                "an image has its method already, and it is the other one; bake the STEP file again".into(),
+            ));
+        }
         let parts = (0..scene.parts().len()).map(|index| index.to_string()).collect();
         Ok(Self { name, image, parts })
     }
@@ -293,6 +334,7 @@ impl ProbeScene {
         let mm = |arm: Vec3| (center + arm).to_array().map(|x| 1e3 * f64::from(x));
         let face = |face: u16| (face != NO_FACE).then_some(face);
         let nearest = found.nearest;
+        let voxels = scene.shape_of_part(usize::from(pair.fixed)).field.is_occupancy();
         Ok(ProbeRow {
             name: named.name.clone(),
             distance_mm: 1e3 * f64::from(nearest.distance_m),
@@ -300,6 +342,7 @@ impl ProbeScene {
                 .then(|| 1e3 * f64::from(nearest.field_distance_m)),
             resolution: match (nearest.exact, nearest.in_band) {
                 (true, _) => Resolution::Exact,
+                (false, true) if voxels => Resolution::TangentPlane,
                 (false, true) => Resolution::Field,
                 (false, false) => Resolution::Bound,
             },
@@ -338,12 +381,14 @@ fn words(bytes: &[u8]) -> Vec<u32> {
 
 /// What a distance is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Resolution {
     /// To an analytic face or edge.
     Exact,
     /// Interpolated in the field.
     Field,
+    /// To the plane through a voxel's centre: all a voxmap has.
+    TangentPlane,
     /// At least so far apart, or at least so deep: the field ends nearer than that.
     Bound,
 }
@@ -355,7 +400,7 @@ pub struct ProbeRow {
     pub name: String,
     /// Gap positive, deepest penetration negative, mm.
     pub distance_mm: f64,
-    /// The same as the field interpolates it, mm: what the force law acts on; none beyond the field's band.
+    /// The same as the field interpolates it, or as the voxmap's tangent planes have it, mm: what the force law acts on; none beyond them.
     pub field_distance_mm: Option<f64>,
     /// What `distance_mm` is worth.
     pub resolution: Resolution,
@@ -403,6 +448,7 @@ impl fmt::Display for ProbeRow {
         let worth = match self.resolution {
             Resolution::Exact => "exact",
             Resolution::Field => "by the field",
+            Resolution::TangentPlane => "to a tangent plane",
             Resolution::Bound => "at least",
         };
         let [x, y, z] = self.force_n;

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use mortise_lab::probe::{self, ProbeScene};
+use mortise_bake::{Method, PointshellKind};
+use mortise_lab::probe::{self, Model, ProbeScene};
 
 use super::output;
 
@@ -24,6 +25,15 @@ pub struct Args {
     /// Cell edge of a STEP file's scene, mm [default: chosen so that the image fits]
     #[arg(long, value_name = "MM")]
     cell: Option<f64>,
+    /// How contact is found in a STEP file's scene: distance-field or occupancy [default: distance-field]
+    #[arg(long, value_name = "METHOD")]
+    method: Option<Method>,
+    /// Pointshell of a STEP file's scene: error-bounded, or classic (the textbook's: one point for each voxel)
+    #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"])]
+    shell: String,
+    /// How far points of the classic shell are moved inward, percent of a voxel
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0)]
+    shrink: f64,
     /// One JSON object a pose
     #[arg(long)]
     json: bool,
@@ -33,7 +43,18 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     // Cheap first: a mistake in the poses need not wait for a bake.
     let poses = probe::read_poses(&args.poses)?;
-    let scene = ProbeScene::load(&args.scene, args.cell)?;
+    let model = Model {
+        cell_mm: args.cell,
+        method: args.method,
+        shell: match args.shell.as_str() {
+            "classic" => PointshellKind::Classic {
+                voxel_mm: None,
+                shrink_percent: args.shrink,
+            },
+            _ => PointshellKind::ErrorBounded,
+        },
+    };
+    let scene = ProbeScene::load_by(&args.scene, &model)?;
     let pair = scene.pair(&args.moving, args.against.as_deref())?;
     for pose in &poses {
         let row = scene.probe(pair, pose)?;

@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 
+use mortise_bake::Method;
 use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
@@ -22,6 +23,8 @@ pub enum Intent {
     OpenSample,
     /// Bake the scene (again).
     Bake,
+    /// Choose how contact is found; bakes the open scene again.
+    ChooseMethod(Method),
     /// End the reading or baking under way.
     CancelWork,
     /// Look for rigs again.
@@ -93,6 +96,10 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(_) if armed => no("The rig is armed: disarm it first"),
             Some(_) => None,
         },
+        Intent::ChooseMethod(_) if session.is_busy() => no("Work is under way"),
+        Intent::ChooseMethod(_) => {
+            armed.then(|| "The rig is armed: disarm it before the scene is baked again".to_owned())
+        }
         Intent::CancelWork => (!session.is_busy()).then(|| "Nothing is under way".to_owned()),
         Intent::ChooseRig(_) => match session.link {
             Link::None => None,

@@ -20,6 +20,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use glam::DAffine3;
+use mortise_bake::{BakeOptions, Method};
 use mortise_protocol::message::{DeviceState, HandScript, Telemetry, ToDevice};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
@@ -65,6 +66,8 @@ pub struct Session {
     pub parameters: Vec<f32>,
     /// Messages.
     pub notes: Notes,
+    /// How contact is found in what is baked next.
+    pub method: Method,
     /// There is no file dialog here: a path is wanted instead.
     pub wants_path: bool,
     tour: Option<Tour>,
@@ -93,6 +96,7 @@ impl Session {
             history: History::default(),
             parameters: PARAMETERS.iter().map(|row| row.default).collect(),
             notes: Notes::default(),
+            method: Method::default(),
             wants_path: false,
             tour: None,
             grip: None,
@@ -131,6 +135,12 @@ impl Session {
             Intent::Open(path) => self.open(Some(path)),
             Intent::OpenSample => self.open(None),
             Intent::Bake => self.bake(),
+            Intent::ChooseMethod(method) => {
+                let changed = std::mem::replace(&mut self.method, method) != method;
+                if changed {
+                    self.bake();
+                }
+            }
             Intent::CancelWork => {
                 if let Some(job) = self.job.take() {
                     job.cancel.set();
@@ -203,7 +213,12 @@ impl Session {
             connection.refused_scene_of = None;
         }
         let cancel = self.start_job("Baking the scene".to_owned(), generation);
-        work::bake(&self.outbox, model, generation, limit, cancel);
+        let options = BakeOptions {
+            method: self.method,
+            image_limit_bytes: limit,
+            ..BakeOptions::default()
+        };
+        work::bake(&self.outbox, model, generation, options, cancel);
     }
 
     fn start_job(&mut self, doing: String, generation: u64) -> Cancel {

@@ -109,13 +109,9 @@ pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64) {
 }
 
 /// Bakes a model.
-pub fn bake(outbox: &Outbox, model: Arc<CadModel>, generation: u64, limit_bytes: u64, cancel: Cancel) {
+pub fn bake(outbox: &Outbox, model: Arc<CadModel>, generation: u64, options: BakeOptions, cancel: Cancel) {
     let outbox = outbox.clone();
     spawn("mortise-bake", move || {
-        let options = BakeOptions {
-            image_limit_bytes: limit_bytes,
-            ..BakeOptions::default()
-        };
         let throttle = std::sync::Mutex::new((std::time::Instant::now(), 0.0f32));
         let progress = |progress: Progress| {
             if cancel.is_set() {

@@ -1,13 +1,15 @@
 //! The board's adjustable numbers as sliders, with unit and range.
 
-use egui::{RichText, Slider, Ui, Vec2};
+use egui::{ComboBox, RichText, Slider, Ui, Vec2};
+use mortise_bake::Method;
 use mortise_protocol::parameter::{PARAMETERS, Parameter};
 
 use super::{control, theme};
 use crate::session::{Intent, Session, obstacle};
 
 /// First word of a name, and the heading of those that begin with it.
-const GROUPS: [(&str, &str); 4] = [
+const GROUPS: [(&str, &str); 5] = [
+    ("Integrator", "Method"),
     ("Coupling", "Coupling of hand and part"),
     ("Contact", "Contact"),
     ("Object", "Part in hand"),
@@ -39,14 +41,76 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             continue;
         }
         egui::CollapsingHeader::new(*heading)
-            .default_open(index < 2)
+            .default_open(index < 3)
             .show_unindented(ui, |ui| {
+                if index == 0 {
+                    method(ui, session, wanted);
+                }
                 for row in rows {
-                    slider(ui, session, wanted, row);
+                    if row.choices.is_empty() {
+                        slider(ui, session, wanted, row);
+                    } else {
+                        choice(ui, session, wanted, row);
+                    }
                 }
                 ui.add_space(4.0);
             });
     }
+}
+
+/// How contact is found: bakes the scene again.
+fn method(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let reason = obstacle(session, &Intent::ChooseMethod(session.method));
+    let hover = "Distance field: exact to micrometres.\nOccupancy: the textbook's two bits a voxel, off by up to a voxel.\nThe scene is baked again.";
+    let names = Method::ALL.map(Method::name);
+    let known = Method::ALL.iter().position(|&m| m == session.method).unwrap_or(0);
+    if let Some(chosen) = combo(ui, "Contact by", &names, known, hover, reason) {
+        wanted.push(Intent::ChooseMethod(Method::ALL[chosen]));
+    }
+}
+
+/// A parameter that is a choice.
+fn choice(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
+    let known = session.parameters[row.id as usize].round() as usize;
+    let reason = obstacle(session, &Intent::SetParameter(row.id, row.default));
+    if let Some(chosen) = combo(
+        ui,
+        &words(row.name),
+        row.choices,
+        known,
+        row.description.trim(),
+        reason,
+    ) {
+        wanted.push(Intent::SetParameter(row.id, chosen as f32));
+    }
+}
+
+/// A list to choose from, greyed out for a `reason`; what was chosen anew.
+fn combo(
+    ui: &mut Ui,
+    name: &str,
+    names: &[&str],
+    known: usize,
+    hover: &str,
+    reason: Option<String>,
+) -> Option<usize> {
+    let mut chosen = known;
+    let hint = match &reason {
+        Some(reason) => format!("{hover}\n{reason}"),
+        None => hover.to_owned(),
+    };
+    ui.add_enabled_ui(reason.is_none(), |ui| {
+        ui.horizontal(|ui| {
+            let label = ui.label(RichText::new(name).small().color(theme::TEXT_WEAK));
+            let list = ComboBox::from_id_salt(name)
+                .selected_text(names.get(known).copied().unwrap_or_default())
+                .show_index(ui, &mut chosen, names.len(), |i| names[i].to_owned());
+            list.labelled_by(label.id);
+        });
+    })
+    .response
+    .on_hover_text(hint);
+    (chosen != known).then_some(chosen)
 }
 
 fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {

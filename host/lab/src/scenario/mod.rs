@@ -11,6 +11,7 @@ mod scene;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mortise_bake::{Method, PointshellKind};
 use mortise_protocol::limits::MAX_KEYFRAMES;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use serde::Deserialize;
@@ -31,6 +32,8 @@ pub struct Scenario {
     pub what: String,
     /// What is on the table.
     pub scene: Scene,
+    /// How the object is moved: `implicit` or `explicit`; the board's default when absent. The same as the parameter `Integrator`, in words.
+    pub integrator: Option<Integrator>,
     /// Parameters that differ from their defaults, by name.
     #[serde(default)]
     pub parameters: BTreeMap<String, f32>,
@@ -56,6 +59,59 @@ pub struct Scene {
     pub part: String,
     /// Edge of the field's cells, mm; the baker's choice when absent.
     pub cell_mm: Option<f64>,
+    /// `distance-field` or `occupancy`.
+    #[serde(default)]
+    pub method: Method,
+    /// `error-bounded` or `classic`.
+    #[serde(default)]
+    pub shell: Shell,
+    /// How far points of a classic shell are moved inward, percent of a voxel.
+    #[serde(default)]
+    pub shrink_percent: f64,
+}
+
+/// What the pointshells are made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shell {
+    /// Points where an error bound needs them.
+    #[default]
+    ErrorBounded,
+    /// A point for each voxel of the surface, voxels as large as cells.
+    Classic,
+}
+
+impl Scene {
+    /// The shell as the baker knows it.
+    pub fn pointshell(&self) -> PointshellKind {
+        match self.shell {
+            Shell::ErrorBounded => PointshellKind::ErrorBounded,
+            Shell::Classic => PointshellKind::Classic {
+                voxel_mm: None,
+                shrink_percent: self.shrink_percent,
+            },
+        }
+    }
+}
+
+/// How the object is moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integrator {
+    /// Backward Euler.
+    Implicit,
+    /// Newton–Euler, the textbook's.
+    Explicit,
+}
+
+impl Integrator {
+    /// Value of the parameter [`ParameterId::Integrator`].
+    pub fn value(self) -> f32 {
+        match self {
+            Self::Implicit => 0.0,
+            Self::Explicit => 1.0,
+        }
+    }
 }
 
 /// The simulated hand: a spring-damper, and where it goes.
@@ -228,6 +284,14 @@ impl Scenario {
                 return wrong(format!("parameters.{parameter} is none of {}", known.join(", ")));
             }
         }
+        if self.integrator.is_some() && self.parameters.contains_key(ParameterId::Integrator.row().name) {
+            return wrong("the integrator is given twice: as `integrator` and among the parameters".into());
+        }
+        if self.scene.shell == Shell::ErrorBounded && self.scene.shrink_percent != 0.0 {
+            return wrong(
+                "scene.shrink_percent is for the classic shell only; set shell = \"classic\"".into(),
+            );
+        }
         let count = self.hand.keyframes.len();
         if count == 0 || count > MAX_KEYFRAMES {
             return wrong(format!(
@@ -287,5 +351,9 @@ mod tests {
         );
         assert!(said("[hand]", "[parameters]\nSpring = 3.0\n[hand]").contains("Spring"));
         assert!(said("part =", "piece =").contains("piece"));
+        assert!(said("part =", "method = \"voxels\"\npart =").contains("occupancy"));
+        let twice = "integrator = \"explicit\"\n[parameters]\nIntegrator = 1.0\n[scene]";
+        assert!(said("[scene]", twice).contains("twice"));
+        assert!(said("part =", "shrink_percent = 5\npart =").contains("classic"));
     }
 }

@@ -80,6 +80,10 @@ impl Play<'_> {
                 client.request(ToDevice::SetParameter { id, value })?;
             }
         }
+        if let Some(integrator) = scenario.integrator {
+            let (id, value) = (ParameterId::Integrator, integrator.value());
+            client.request(ToDevice::SetParameter { id, value })?;
+        }
         client.request(ToDevice::ResetScene)?;
         client.request(ToDevice::SimulatedHand(reach(&scenario.hand)))?;
         self.run(REACH_TICKS + REST_TICKS)?;

@@ -49,6 +49,8 @@ impl PreparedScene {
     /// `Brep`, `Bake`, `NoSuchPart`.
     pub fn of(scenario: &Scenario) -> Result<Self, LabError> {
         let options = BakeOptions {
+            method: scenario.scene.method,
+            shell: scenario.scene.pointshell(),
             cell_mm: scenario.scene.cell_mm,
             grabbable: Grabbable::Named(vec![scenario.scene.part.clone()]),
             ..BakeOptions::default()
