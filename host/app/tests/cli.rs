@@ -210,6 +210,45 @@ fn bake_plans_for_an_accuracy() {
 }
 
 #[test]
+fn bake_by_the_textbooks_method() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("voxels.scene");
+    let out = out.to_str().expect("UTF-8");
+    let report = json(&mortise(&[
+        "bake",
+        SAMPLE,
+        "-o",
+        out,
+        "--cell",
+        "1",
+        "--method",
+        "occupancy",
+        "--json",
+    ]));
+    assert_eq!(report["shapes"][0]["method"], "occupancy");
+    let poses = folder.path().join("poses.csv");
+    std::fs::write(&poses, "name,x,y,z,qw,qx,qy,qz\nas drawn,0,0,0,1,0,0,0\n").expect("written");
+    let poses = poses.to_str().expect("UTF-8");
+    // An image says itself what it is.
+    refused(
+        &[
+            "probe",
+            out,
+            "--moving",
+            "1",
+            "--poses",
+            poses,
+            "--method",
+            "distance-field",
+        ],
+        "it is the other one",
+    );
+    let unknown = mortise(&["bake", SAMPLE, "-o", out, "--method", "voxels"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("distance-field or occupancy"));
+}
+
+#[test]
 fn ports_lists_the_simulated_rigs_first() {
     let rigs = json(&mortise(&["ports", "--json"]));
     let rigs = rigs.as_array().expect("array");

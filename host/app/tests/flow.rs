@@ -11,6 +11,7 @@ use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::{Window, theme};
 use mortise::viewport::gesture::on_screen;
+use mortise_bake::Method;
 use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
@@ -264,6 +265,35 @@ fn a_file_that_is_none_is_refused_in_one_line_and_the_old_one_stays() {
     let text = &session.notes.newest().expect("one").text;
     assert!(!text.contains('\n') && text.contains("notes.step"), "{text}");
     assert!(session.document.as_ref().is_some_and(|d| d.baked.is_some()));
+}
+
+#[test]
+fn another_method_bakes_the_scene_again() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let voxmap = |s: &Session| {
+        let baked = s.document.as_ref().and_then(|d| d.baked.as_ref())?;
+        Some(
+            baked
+                .report
+                .shapes
+                .iter()
+                .all(|shape| shape.method == Method::Occupancy),
+        )
+    };
+    assert_eq!(voxmap(&harness.state().session), Some(false));
+    harness
+        .state_mut()
+        .session
+        .act(Intent::ChooseMethod(Method::Occupancy));
+    until(&mut harness, "baked again", |s| !s.is_busy());
+    assert_eq!(voxmap(&harness.state().session), Some(true));
+    // The same once more changes nothing, so nothing is baked.
+    harness
+        .state_mut()
+        .session
+        .act(Intent::ChooseMethod(Method::Occupancy));
+    assert!(!harness.state().session.is_busy());
 }
 
 #[test]
