@@ -83,6 +83,8 @@ parameters! {
     PointBudget = "look-ups", 16.0, 65_535.0, 380.0;
     /// How the object is moved: 0 implicit, 1 explicit (the textbook's, which trembles on stiff contact).
     Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];
+    /// How constraint targets guide: 0 not at all, 1 stiff up to their cap, 2 the blend of the thesis.
+    Guidance = "choice", 0.0, 2.0, 1.0, ["off", "capped", "thesis"];
 }
 
 impl ParameterId {

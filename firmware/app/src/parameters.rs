@@ -1,6 +1,6 @@
 //! The parameters' values, and the settings the tick uses, made from them at low priority.
 
-use mortise_haptics::{Integrator, Settings};
+use mortise_haptics::{GuidanceMethod, Integrator, Settings};
 use mortise_protocol::message::Refusal;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
@@ -77,6 +77,14 @@ impl Parameters {
             Integrator::Implicit
         } else {
             Integrator::Explicit
+        };
+        let guidance = self.get(P::Guidance);
+        law.guidance.method = if guidance < 0.5 {
+            GuidanceMethod::Off
+        } else if guidance < 1.5 {
+            GuidanceMethod::Capped
+        } else {
+            GuidanceMethod::Thesis
         };
         law.validate().map_err(|_| Refusal::BadNumber)?;
         Ok(ControlSettings {
