@@ -52,7 +52,7 @@ fn shell_is_on_the_surface(
         .iter()
         // At an edge the normal is a mean, and a fillet that runs out into a wall leaves it no side of its own.
         .filter(|p| p.edge_face == NO_FACE)
-        .filter(|p| surface.shape().faces[usize::from(p.face)].surface == Surface::Spline)
+        .filter(|p| is_written_as_spline(&surface.shape().faces[usize::from(p.face)]))
         .collect();
     let step = own.len().div_ceil(60).max(1);
     let own: Vec<_> = own.into_iter().step_by(step).collect();
