@@ -12,6 +12,7 @@ pub mod corpus;
 mod error;
 pub mod figures;
 pub mod fit;
+pub mod guide;
 pub mod motion;
 pub mod pareto;
 pub mod peer;

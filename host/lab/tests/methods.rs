@@ -21,7 +21,7 @@ const GAP_MM: f64 = 0.01;
 
 /// The peg on the hole's axis, its lower end this far below the block's top, turned about itself.
 fn poses() -> Vec<NamedPose> {
-    let model = load_step(&file()).expect("the file is part of the sources");
+    let model = load_step(file()).expect("the file is part of the sources");
     let part = |name: &str| {
         model
             .parts

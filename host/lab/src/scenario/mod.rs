@@ -166,6 +166,9 @@ pub struct Run {
     pub telemetry_every_ticks: u16,
     /// Ticks between parameter messages, for load; none when absent.
     pub parameter_every_ticks: Option<u32>,
+    /// Whether the desktop recognises constraints from telemetry and sends them.
+    #[serde(default)]
+    pub guidance: bool,
     /// The last so much of the run counts as settled.
     #[serde(default = "half")]
     pub settled_s: f64,

@@ -11,6 +11,7 @@ use super::outcome::Outcome;
 use super::scene::PreparedScene;
 use super::{Hand, Key, Scenario, measure, parameter_named};
 use crate::error::LabError;
+use crate::guide::{Guide, GuideSettings};
 
 /// Ticks in a second of every simulated rig.
 const TICK_HZ: f64 = 1000.0;
@@ -50,7 +51,7 @@ pub fn run_on(client: &Client, scenario: &Scenario, scene: &PreparedScene) -> Re
         messages: 0,
     };
     play.prepare(scenario, scene)?;
-    let ran = play.perform(scenario)?;
+    let ran = play.perform(scenario, scene)?;
     let statistics = client.statistics(false)?;
     client.request(ToDevice::SetTelemetry { every_ticks: 0 })?;
     // The last sample may come behind the answer to the last run, but not behind these.
@@ -92,13 +93,16 @@ impl Play<'_> {
         Ok(())
     }
 
-    fn perform(&mut self, scenario: &Scenario) -> Result<Ran, LabError> {
+    fn perform(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<Ran, LabError> {
         let client = self.client;
         client.statistics(true)?;
         let every_ticks = scenario.run.telemetry_every_ticks;
         client.request(ToDevice::SetTelemetry { every_ticks })?;
         client.request(ToDevice::SimulatedHand(script(&scenario.hand)))?;
         let ticks = (scenario.run.duration_s * TICK_HZ).round() as u32;
+        if scenario.run.guidance {
+            return self.guided(scene, ticks, u32::from(every_ticks.max(1)));
+        }
         let Some(every) = scenario.run.parameter_every_ticks else {
             return self.run(ticks);
         };
@@ -130,6 +134,27 @@ impl Play<'_> {
         match ran {
             Some(ran) => Ok(ran),
             None => self.run(0),
+        }
+    }
+
+    /// Lets ticks run from sample to sample, answering each with what the recogniser makes of it.
+    fn guided(&mut self, scene: &PreparedScene, ticks: u32, every: u32) -> Result<Ran, LabError> {
+        let parts = scene.report.parts.iter().map(|part| part.model_part).collect();
+        let mut guide = Guide::new(&scene.model, parts, GuideSettings::default());
+        let mut left = ticks;
+        loop {
+            let batch = left.min(every);
+            let heard = self.samples.len();
+            let ran = self.run(batch)?;
+            for sample in &self.samples[heard..] {
+                for message in guide.hear(sample) {
+                    self.client.request(message)?;
+                }
+            }
+            left -= batch;
+            if left == 0 {
+                return Ok(ran);
+            }
         }
     }
 
