@@ -184,7 +184,7 @@ fn bake_plans_for_an_accuracy() {
     let path = out.to_string_lossy().into_owned();
     let ask = |more: &[&str]| {
         let arguments = ["bake", SAMPLE, "-o", &path, "--accuracy", "5um"];
-        mortise(&[&arguments, more].concat())
+        mortise(&[&arguments[..], more].concat())
     };
     let met = json(&ask(&["--flash", "1MiB", "--tick", "120000", "--json"]));
     assert_eq!((&met["met"], &met["fits"]), (&true.into(), &true.into()));
