@@ -79,11 +79,12 @@ fn every_file_has_the_contacts_the_checker_found() {
 }
 
 #[test]
-fn real_assemblies_have_the_contacts_others_counted() {
+fn assemblies_have_the_contacts_others_counted() {
     let Some(cad) = shared("real contacts") else {
         return;
     };
     for (file, planar, cylindrical) in [
+        ("../05_motor/motor_flat.step", 14, 21),
         ("as1-oc-214.stp", 16, 22),
         ("chrono_assembly.stp", 1, 1),
         ("o2ac_fixture_diagonal.step", 10, 1),
