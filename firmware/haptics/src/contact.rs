@@ -178,13 +178,14 @@ impl Contacts {
         self.dropped = false;
     }
 
-    /// Takes the last tick's contacts over into this one where their leaf was not looked at: the gap as the object's `motion` since (scaled as the
+    /// Takes what pushed in the last tick over into this one where its leaf was not looked at: the gap as the object's `motion` since (scaled as the
     /// rows) has changed it, the normal as it was.
     pub fn carry(&mut self, motion: &[f32; 6], unseen: impl Fn(Leaf) -> bool) {
         for i in 0..self.carried_len {
             let old = self.lists[1 - self.current][i];
             let gap = old.gap + dot(&old.row, motion);
-            if unseen(old.leaf)
+            if old.phase != Phase::Free
+                && unseen(old.leaf)
                 && let Some(new) = self.offer(gap, old.reach_gap)
             {
                 *new = Contact {
@@ -195,11 +196,6 @@ impl Contacts {
                 };
             }
         }
-    }
-
-    /// How many of the last tick's were put aside.
-    pub fn put_aside(&self) -> usize {
-        self.carried_len
     }
 
     fn list(&self) -> &[Contact; MAX_CONTACTS] {

@@ -120,8 +120,8 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         let mut edge_error = self.edge_error;
         if let Lookup::Near(s) = &mut found {
             // As the tick has it.
-            if let Some(exact) = exact(self.shape.faces, s, p) {
-                s.distance = exact.distance;
+            if let Some((distance, face)) = exact(self.shape.faces, s, p) {
+                (s.distance, s.face) = (distance, face);
                 if !matches!(s.nearby, Nearby::Reentrant(_)) {
                     edge_error = 0.0;
                 }

@@ -4,7 +4,7 @@
 //! or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every sphere that the
 //! field's distance at its centre puts farther off than the margin.
 //!
-//! When the budget runs out, work is left undone in this order. For a tick or two, as after a grab, the contacts of leaves not reached are carried over
+//! When the budget runs out, work is left undone in this order. For a tick or two, as after a grab, what pushed in leaves not reached is carried over
 //! with the gaps the last motion left them, and the next tick goes on where this one stopped, round and round. When that does not catch up,
 //! points are left out evenly: each second, fourth, … 128th of those that are near is looked at, always the same ones, until there is room
 //! again; the error bound of the pointshell grows by four at each step, all else stays as it was. Carrying is prepared for once a tick needed
@@ -18,7 +18,7 @@ use mortise_protocol::image::{
     Shape,
 };
 
-use crate::analytic::{Exact, exact};
+use crate::analytic::{exact, normal};
 use crate::coherence::{Coherence, Key, Known};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mating};
@@ -38,12 +38,10 @@ const APPROACH: f32 = 2.0;
 const LEAF_THINNING: u8 = 3;
 /// The budget counts what a look-up costs, 150 instructions. Passing over a node of which enough is known costs an eighth of that.
 const PASSED_OVER_PER_LOOKUP: u32 = 8;
-/// A point within the margin costs as much again: exact surfaces, direction, lever.
-const NEAR: u32 = 1;
-/// A contact that may have to be carried over costs twice as much.
-const CARRIED: u32 = 2;
-/// And a candidate, with its share of the step, four times as much on top.
-const CANDIDATE: u32 = 4;
+/// A point within the margin costs three times as much again: exact surfaces, direction, lever.
+const NEAR: u32 = 3;
+/// And a candidate, with its share of the step, three times as much on top.
+const CANDIDATE: u32 = 3;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -162,10 +160,9 @@ impl<'i> Search<'_, 'i> {
             search: self,
             horizon: coherence.horizon(self.margin),
             coherence,
-            // What may have to be carried over costs its share of the step too.
-            passed_over: CARRIED * PASSED_OVER_PER_LOOKUP * contacts.put_aside() as u32,
             contacts,
             work,
+            passed_over: 0,
             near: 0,
         };
         let stop = walk
@@ -270,6 +267,15 @@ impl<'i> Job<'i> {
             to_push: field_pose.rotation() * if backward { -1.0 } else { 1.0 },
         }
     }
+}
+
+/// The other part at a point.
+struct Found {
+    /// Signed, m.
+    distance: f32,
+    /// Unit gradient, field frame.
+    normal: Vec3,
+    face: u16,
 }
 
 /// A search under way.
@@ -434,10 +440,23 @@ impl Walk<'_, '_, '_> {
     /// Offers a point within the margin as a contact; its gap.
     fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, sample: &FieldSample) -> f32 {
         self.near += 1;
-        let exact = exact(job.faces, sample, job.to_field.apply(point.position));
-        let found = if let Some(exact) = exact {
-            exact
+        let in_field = job.to_field.apply(point.position);
+        let found = if let Some((distance, face)) = exact(job.faces, sample, in_field) {
+            if distance >= self.search.margin {
+                return distance;
+            }
+            let Some(normal) = normal(job.faces, face, in_field) else {
+                return distance;
+            };
+            Found {
+                distance,
+                normal,
+                face,
+            }
         } else {
+            if sample.distance >= self.search.margin {
+                return sample.distance;
+            }
             let gradient = Vec3::from_array(sample.gradient);
             let squared = gradient.length_squared();
             if squared < LEAST_GRADIENT2 {
@@ -445,7 +464,7 @@ impl Walk<'_, '_, '_> {
                 self.work.flags.insert_if(deep, Flags::DEEP);
                 return sample.distance;
             }
-            Exact {
+            Found {
                 distance: sample.distance,
                 normal: gradient * inverse_sqrt(squared),
                 face: sample.face,

@@ -45,7 +45,7 @@ fn inside(clearance: f64, push: [f64; 3], sway: f64) -> Seen {
 fn centred_in_a_loose_hole() {
     let seen = inside(1e-3, [0.0; 3], 1e-3);
     // The gap of 0.5 mm is used up by 20 mm/s in 11 to 22 ticks, each node at its own time.
-    assert!(seen.nodes + seen.points < 400, "{seen:?}");
+    assert!(seen.nodes + seen.points < 500, "{seen:?}");
     assert_eq!(seen.contacts, 0);
 }
 

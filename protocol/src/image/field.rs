@@ -95,7 +95,7 @@ impl<'a> Field<'a> {
                 let distance = value(&corners, f) * self.record.scale;
                 if distance < enough + EDGE_ERROR_CELLS * self.record.cell {
                     let nearby = self.nearby(brick, cell);
-                    if distance < enough || nearby.is_edge() {
+                    if distance < enough + nearby.overstated() * self.record.cell {
                         let gradient = gradient(&corners, f);
                         let per_cell = self.record.scale * self.inverse_cell;
                         return Lookup::Near(FieldSample {

