@@ -19,7 +19,7 @@ use crate::variant::Variant;
 const SCENARIO: &str = include_str!("../data/tight_insertion.toml");
 
 /// Diametral clearances tried, mm, descending.
-pub const CLEARANCES_MM: [f64; 11] = [5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
+pub const CLEARANCES_MM: [f64; 12] = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
 /// Cells tried, mm, descending.
 pub const CELLS_MM: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
 
@@ -119,7 +119,7 @@ pub fn smallest(
 /// The ways to model the scene that the chart compares; `quick` has one cell of each kind.
 pub fn variants(quick: bool) -> Vec<Variant> {
     let cells: &[f64] = if quick { &[1.0] } else { &CELLS_MM };
-    let kinds: [fn(f64) -> Variant; 2] = [Variant::field, |cell| {
+    let kinds: [fn(f64) -> Variant; 3] = [Variant::textbook, Variant::field, |cell| {
         Variant::field(cell).format(SampleFormat::Int8)
     }];
     (kinds.iter())
@@ -129,19 +129,13 @@ pub fn variants(quick: bool) -> Vec<Variant> {
 
 /// Smallest clearance over cell, one line for each kind.
 pub fn chart(trials: &[Trial]) -> Chart {
-    const LOOKS: [Look; 4] = [
-        Look::BlueDisc,
-        Look::GreenTriangle,
-        Look::VermilionSquare,
-        Look::PurpleDiamond,
-    ];
     let mut series: Vec<Series> = Vec::new();
     for trial in trials {
         let place = series.iter().position(|series| series.name == trial.kind);
         let place = place.unwrap_or_else(|| {
             series.push(Series {
                 name: trial.kind.to_owned(),
-                look: LOOKS[series.len() % LOOKS.len()],
+                look: Look::nth(series.len()),
                 line: Line::Solid,
                 points: Vec::new(),
             });
@@ -153,7 +147,7 @@ pub fn chart(trials: &[Trial]) -> Chart {
             points.push(Point {
                 x: trial.cell_mm,
                 y: 1e3 * trial.clearance_mm,
-                label: "none goes".into(),
+                label: format!("not even {} mm", trial.clearance_mm),
                 at_least: true,
             });
         }

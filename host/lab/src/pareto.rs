@@ -67,7 +67,9 @@ fn variants(quick: bool) -> Vec<(Variant, bool)> {
     } else {
         &[4.0, 2.0, 1.0, 0.5, 0.25]
     };
-    let mut variants = Vec::new();
+    let mut variants: Vec<(Variant, bool)> = (cells.iter())
+        .map(|&cell| (Variant::textbook(cell), !quick))
+        .collect();
     for &cell in cells {
         for format in [SampleFormat::Int16, SampleFormat::Int8] {
             for share in EPSILONS {
@@ -204,19 +206,13 @@ pub fn time_chart(entries: &[Entry]) -> Chart {
 }
 
 fn series(entries: &[Entry], x: impl Fn(&Entry) -> f64, bytes: bool) -> Vec<Series> {
-    const LOOKS: [Look; 4] = [
-        Look::BlueDisc,
-        Look::GreenTriangle,
-        Look::VermilionSquare,
-        Look::PurpleDiamond,
-    ];
     let mut series: Vec<Series> = Vec::new();
     for entry in entries {
         let place = series.iter().position(|series| series.name == entry.kind);
         let place = place.unwrap_or_else(|| {
             series.push(Series {
                 name: entry.kind.clone(),
-                look: LOOKS[series.len() % LOOKS.len()],
+                look: Look::nth(series.len()),
                 line: Line::None,
                 points: Vec::new(),
             });

@@ -198,7 +198,11 @@ impl Asked {
             By::Probe => Some((row.distance_mm - exact).abs()),
             By::Field if exact > NEAR_MM + 1e-6 => None,
             By::FieldWithin { mm } if exact > mm => None,
-            By::Field | By::FieldWithin { .. } => row.field_distance_mm.map(|field| (field - exact).abs()),
+            By::Field | By::FieldWithin { .. } => match row.field_distance_mm {
+                Some(field) => Some((field - exact).abs()),
+                // A depth that is not seen is wrong by all of it; a gap that is not seen is right.
+                None => (exact < 0.0).then_some(-exact),
+            },
         };
         (self.rows.iter())
             .filter(|(exact, _)| (*exact >= 0.0) == gaps)

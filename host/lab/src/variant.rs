@@ -1,40 +1,50 @@
-//! What the sweeps vary: method, cell, number format, bound on the pointshell's error.
+//! What the sweeps vary: method, shell, cell, number format, bound on the pointshell's error.
 
 use std::fmt;
 
-use mortise_bake::{BakeOptions, Grabbable, SampleFormat};
-use serde::Serialize;
-
-/// How contact is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// Interpolated signed distance, points by an error bound.
-    DistanceField,
-}
+use mortise_bake::{BakeOptions, Grabbable, Method, PointshellKind, SampleFormat};
 
 /// One way to model a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Variant {
-    /// How contact is computed.
+    /// How contact finds depth and direction.
     pub method: Method,
+    /// What the pointshells are made of.
+    pub shell: PointshellKind,
     /// Cell edge, mm.
     pub cell_mm: f64,
     /// Number format of samples.
     pub format: SampleFormat,
-    /// Bound on the pointshell's chord error, mm; `None`: as [`BakeOptions`] chooses.
+    /// Bound on the pointshell's error, mm; `None`: as [`BakeOptions`] chooses.
     pub epsilon_mm: Option<f64>,
 }
 
+/// The textbook's pointshell: a point for each voxel of the surface, not moved inward.
+const CLASSIC: PointshellKind = PointshellKind::Classic {
+    voxel_mm: None,
+    shrink_percent: 0.0,
+};
+
 impl Variant {
-    /// The distance field in 16 bit, its points' error a hundredth of the cell: no more than the field's own, cell²/(8·R), up to
-    /// radii of twelve cells.
+    /// The distance field in 16 bit, its points' error a hundredth of the cell: no more than the field's own, cell²/(8·R), up to radii of twelve
+    /// cells.
     pub const fn field(cell_mm: f64) -> Self {
         Self {
             method: Method::DistanceField,
+            shell: PointshellKind::ErrorBounded,
             cell_mm,
             format: SampleFormat::Int16,
             epsilon_mm: Some(cell_mm / 100.0),
+        }
+    }
+
+    /// Voxmap and pointshell as in McNeely, Puterbaugh & Troy 1999 and Faas 2010.
+    pub const fn textbook(cell_mm: f64) -> Self {
+        Self {
+            method: Method::Occupancy,
+            shell: CLASSIC,
+            epsilon_mm: None,
+            ..Self::field(cell_mm)
         }
     }
 
@@ -49,9 +59,23 @@ impl Variant {
         Self { epsilon_mm, ..self }
     }
 
+    /// The same with the textbook's pointshell, a point for each voxel of `voxel_mm`.
+    pub const fn classic_shell(self, voxel_mm: f64) -> Self {
+        Self {
+            shell: PointshellKind::Classic {
+                voxel_mm: Some(voxel_mm),
+                shrink_percent: 0.0,
+            },
+            epsilon_mm: None,
+            ..self
+        }
+    }
+
     /// How to bake it. The image may be as large as layouts allow: what it costs is measured, not limited.
     pub fn options(&self, grabbable: Grabbable) -> BakeOptions {
         BakeOptions {
+            method: self.method,
+            shell: self.shell,
             cell_mm: Some(self.cell_mm),
             format: self.format,
             epsilon_mm: self.epsilon_mm,
@@ -63,9 +87,11 @@ impl Variant {
 
     /// Its kind, without the cell.
     pub fn kind(&self) -> &'static str {
-        match (self.method, self.format) {
-            (Method::DistanceField, SampleFormat::Int16) => "distance field, 16 bit",
-            (Method::DistanceField, SampleFormat::Int8) => "distance field, 8 bit",
+        match (self.method, self.shell, self.format) {
+            (Method::Occupancy, ..) => "textbook voxmap",
+            (_, PointshellKind::Classic { .. }, _) => "distance field, classic shell",
+            (_, _, SampleFormat::Int16) => "distance field, 16 bit",
+            (_, _, SampleFormat::Int8) => "distance field, 8 bit",
         }
     }
 }

@@ -79,6 +79,21 @@ pub enum Look {
     Black,
 }
 
+impl Look {
+    /// A look for each kind, in the order they come.
+    pub fn nth(index: usize) -> Self {
+        const ALL: [Look; 6] = [
+            Look::VermilionSquare,
+            Look::BlueDisc,
+            Look::GreenTriangle,
+            Look::PurpleDiamond,
+            Look::OrangeCross,
+            Look::SkyRing,
+        ];
+        ALL[index % ALL.len()]
+    }
+}
+
 /// How points are joined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {

@@ -118,6 +118,17 @@ impl Row {
         }
     }
 
+    /// A row without a bound whose value is a word.
+    pub(crate) fn noted(what: impl Into<String>, value: &str) -> Self {
+        Self {
+            what: what.into(),
+            value: Value::Text(value.to_owned()),
+            unit: String::new(),
+            bound: "told".into(),
+            holds: true,
+        }
+    }
+
     /// A row that cannot be measured here, because something that is not part of the repository is absent.
     pub(crate) fn skipped(what: impl Into<String>, why: &str) -> Self {
         Self {

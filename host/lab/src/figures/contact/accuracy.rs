@@ -8,7 +8,7 @@ use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::peer;
-use crate::probe::{NamedPose, ProbeScene};
+use crate::probe::{NamedPose, ProbeRow, ProbeScene};
 use crate::scene_p::{self, By};
 use crate::variant::Variant;
 
@@ -85,17 +85,20 @@ pub(super) fn centred(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         position_mm: DVec3::new(0.0, 0.0, 0.5 * (fit.height_mm + fit.length_mm)),
         orientation: DQuat::from_rotation_x(std::f64::consts::PI),
     };
-    let variant = Variant::field(CELL_MM);
-    let scene = ProbeScene::bake(fit.file()?.path(), &variant.options(Grabbable::All))?;
-    let row = scene.probe(scene.pair("peg", Some("block"))?, &pose)?;
-    let what = |what: &str| {
+    let ask = |variant: &Variant| -> Result<ProbeRow, LabError> {
+        let scene = ProbeScene::bake(fit.file()?.path(), &variant.options(Grabbable::All))?;
+        scene.probe(scene.pair("peg", Some("block"))?, &pose)
+    };
+    let what = |variant: &Variant, what: &str| {
         format!(
             "centred peg, {} µm diametral clearance, {variant}: {what}",
             1e3 * TIGHT_MM
         )
     };
+    let (field, textbook) = (Variant::field(CELL_MM), Variant::textbook(CELL_MM));
+    let row = ask(&field)?;
     out(Row::exactly(
-        what("contacts reported"),
+        what(&field, "contacts reported"),
         f64::from(row.contacts),
         "contacts",
         0.0,
@@ -103,11 +106,18 @@ pub(super) fn centred(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     // Half the clearance, within what gaps may err: it is in the hole.
     let gap = 500.0 * TIGHT_MM;
     out(Row::within(
-        what("gap"),
+        what(&field, "gap"),
         1e3 * row.distance_mm,
         "µm",
         gap - 5.0,
         gap + 5.0,
+    ));
+    out(Row::within(
+        what(&textbook, "contacts reported"),
+        f64::from(ask(&textbook)?.contacts),
+        "contacts",
+        1.0,
+        f64::INFINITY,
     ));
     Ok(())
 }

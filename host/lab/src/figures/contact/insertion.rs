@@ -24,6 +24,18 @@ pub(super) fn tight(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
         "µm",
         1e3 * TIGHT_MM,
     ));
+    let textbook = Variant::textbook(CELL_MM);
+    let wide: &[f64] = if plan.quick {
+        &[2.0, 1.0, 0.5]
+    } else {
+        &CLEARANCES_MM
+    };
+    let beside = crate::clearance::smallest(&textbook, wide, &mut |trial| eprintln!("{trial}"))?;
+    let what = format!("the same insertion, {textbook}: smallest clearance of those tried");
+    out(match beside {
+        Some(mm) => Row::told(what, 1e3 * mm, "µm"),
+        None => Row::noted(what, &format!("none; {} mm does not go", wide[0])),
+    });
     let bytes = report(&variant, &Fit::thesis(TIGHT_MM))?.image_bytes as f64;
     out(Row::at_most(
         format!("image of the {} µm pair, {variant}", 1e3 * TIGHT_MM),

@@ -19,6 +19,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     accuracy::centred(out)?;
     insertion::tight(plan, out)?;
     ticks::tight(plan, out)?;
+    ticks::large_classic(plan, out)?;
     ticks::large(plan, out)?;
     ticks::more_points(plan, out)?;
     baking::motor(plan, out)?;
