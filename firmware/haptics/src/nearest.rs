@@ -118,16 +118,25 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         let p = self.job.to_field.apply(point.position);
         let mut found = self.job.field.lookup(p.to_array());
         let mut edge_error = self.edge_error;
+        // Where an edge itself is nearest, the surfaces give a bound only.
+        let mut edge_nearest = false;
         if let Lookup::Near(s) = &mut found {
-            // As the tick has it.
+            let mut rendered = s.distance;
             if let Some((distance, face)) = exact(self.shape.faces, s, p) {
-                (s.distance, s.face) = (distance, face);
-                if !matches!(s.nearby, Nearby::Reentrant(_)) {
+                rendered = distance;
+                edge_nearest = match s.nearby {
+                    Nearby::Convex(_) => distance > 0.0,
+                    Nearby::Reentrant(_) => distance < 0.0,
+                    _ => false,
+                };
+                if !edge_nearest {
+                    (s.distance, s.face) = (distance, face);
                     edge_error = 0.0;
                 }
             }
-            if s.distance < self.best.field_distance_m {
-                self.best.field_distance_m = s.distance;
+            // As the tick has it.
+            if rendered < self.best.field_distance_m {
+                self.best.field_distance_m = rendered;
             }
         }
         // (field's distance, no more than the distance, inside, nearest face if known)
@@ -144,7 +153,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
         let in_band = face != NO_FACE && field.abs() <= self.resolved;
         let edge = point.edge_face != NO_FACE;
-        let refined = self.refined(p, edge, field, inside, face, in_band);
+        let refined = self.refined(p, edge, edge_nearest, field, inside, face, in_band);
         let distance_m = refined.unwrap_or(field);
         if distance_m < self.best.distance_m {
             let (moving_face, fixed_face) = if self.job.backward {
@@ -165,16 +174,21 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     }
 
     /// Distance by the analytic faces, if it can be had and does not contradict the field.
+    #[expect(clippy::too_many_arguments, reason = "what one look-up found")]
     fn refined(
         &self,
         p: Vec3,
         edge: bool,
+        edge_nearest: bool,
         field: f32,
         inside: bool,
         face: u16,
         in_band: bool,
     ) -> Option<f32> {
-        if in_band && let Some(exact) = agreeing(self.shape, face, p, field) {
+        if in_band
+            && !edge_nearest
+            && let Some(exact) = agreeing(self.shape, face, p, field)
+        {
             return Some(exact);
         }
         // Outside, what is no nearer than the nearest so far need not be known.

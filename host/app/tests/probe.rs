@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn scene() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../lab/tests/data/scene_p.step")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../lab/data/scene_p.step")
 }
 
 fn probe(scene: &Path, moving: &str, poses: &Path) -> Output {

@@ -98,11 +98,14 @@ fn the_classic_shell_is_no_better() {
         voxel_mm: None,
         shrink_percent: 0.0,
     };
-    for row in rows(Method::Occupancy, classic) {
+    let rows = rows(Method::Occupancy, classic);
+    for row in &rows {
         assert!(row.contacts > 0, "{row}");
         let diagonal = CELL_MM * 3f64.sqrt();
-        assert!(row.distance_mm < -0.1 && row.distance_mm > -diagonal, "{row}");
+        assert!(row.distance_mm <= 0.0 && row.distance_mm > -diagonal, "{row}");
     }
+    // Where the grids lie alike the planes just touch; turned, they do not.
+    assert!(rows.iter().any(|row| row.distance_mm < -0.1));
 }
 
 #[test]
