@@ -8,7 +8,7 @@ use mortise_rig::{Client, RigSpec};
 
 use crate::error::LabError;
 use crate::fit::Fit;
-use crate::scenario::{Key, Outcome, PreparedScene, Scenario, run_on};
+use crate::scenario::{Bounds, Key, Outcome, PreparedScene, Press, Scenario, run_on};
 use crate::variant::Variant;
 
 const PRESSED: &str = include_str!("../data/pressed.toml");
@@ -22,6 +22,10 @@ const SLIDE_S: f64 = 0.25;
 /// Slides.
 const SLIDES: usize = 4;
 
+/// Tilt of the peg on its rim, and how far the hand pushes on from where it touches: 2 N through 286 N/m.
+const RIM_DEG: f64 = 10.0;
+const RIM_PRESS_MM: f64 = 7.0;
+
 /// What the peg does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
@@ -32,6 +36,8 @@ pub enum Motion {
     },
     /// 20 mm and more above the block, moved at 100 mm/s.
     Free,
+    /// Ten degrees tilted, set down with its lower rim on the block's top, 2 N, and slid along it: it touches at a point.
+    Rim,
 }
 
 /// The fit, placed for a motion, and the motion's scenario; its STEP file is not yet named.
@@ -61,6 +67,35 @@ fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabError> {
                 scenario.hand.keyframes.push(key(t, [aside, 0.0, z]));
             }
             scenario.run.duration_s = t + 0.2;
+            Ok((fit, scenario))
+        }
+        Motion::Rim => {
+            let fit = fit.engaged(-5.0);
+            scenario.hand.grip_mm = [0.0, 0.0, 5.0 + 0.5 * fit.length_mm];
+            // Outwards along the diagonal, where the top is whole, and lowest there.
+            let over = |t: f64, aside: f64, z: f64| Key {
+                turn_deg: [-RIM_DEG / f64::sqrt(2.0), RIM_DEG / f64::sqrt(2.0), 0.0],
+                ..key(t, [aside, aside, z])
+            };
+            let (sin, cos) = RIM_DEG.to_radians().sin_cos();
+            let lowest = 5.0 + 0.5 * fit.length_mm * (1.0 - cos) - 0.5 * fit.peg_mm * sin;
+            scenario.hand.keyframes = vec![
+                key(0.0, [0.0; 3]),
+                over(0.3, 14.0, 0.0),
+                over(0.6, 14.0, -lowest - RIM_PRESS_MM),
+                over(0.9, 11.0, -lowest - RIM_PRESS_MM),
+                over(1.2, 14.0, -lowest - RIM_PRESS_MM),
+            ];
+            scenario.run.duration_s = 1.4;
+            scenario.press = Some(Press {
+                direction: [0.0, 0.0, -1.0],
+            });
+            let felt = Bounds {
+                min: 1.0,
+                max: 3.0,
+                only_on: None,
+            };
+            scenario.holds.insert("press_hand_n".into(), felt);
             Ok((fit, scenario))
         }
         Motion::Free => {
@@ -138,6 +173,9 @@ mod tests {
         let pressed = played(Fit::thesis(0.5), Motion::Pressed { mm_per_s: 10.0 });
         assert!((4.5..5.5).contains(&pressed.press_hand_n.expect("measured")));
         assert!(pressed.board_penetration_mm > 0.0);
+        let rim = played(Fit::thesis(0.5), Motion::Rim);
+        assert!((1.5..2.5).contains(&rim.press_hand_n.expect("measured")));
+        assert!(rim.board_penetration_mm > 0.0);
         let free = played(Fit::thesis(0.5), Motion::Free);
         assert_eq!((free.board_penetration_mm, free.penetration_mm), (0.0, 0.0));
     }

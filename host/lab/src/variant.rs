@@ -89,7 +89,10 @@ impl Variant {
     pub fn kind(&self) -> &'static str {
         match (self.method, self.shell, self.format) {
             (Method::Occupancy, ..) => "textbook voxmap",
-            (_, PointshellKind::Classic { .. }, _) => "distance field, classic shell",
+            (_, PointshellKind::Classic { .. }, SampleFormat::Int16) => {
+                "distance field, 16 bit, classic shell"
+            }
+            (_, PointshellKind::Classic { .. }, SampleFormat::Int8) => "distance field, 8 bit, classic shell",
             (_, _, SampleFormat::Int16) => "distance field, 16 bit",
             (_, _, SampleFormat::Int8) => "distance field, 8 bit",
         }

@@ -112,6 +112,8 @@ fn refusal(path: &Path) -> impl Fn(BakeError) -> LabError {
 /// Random points over all real parts together, and of the shorter form.
 const SIGN_POINTS: usize = 100_000;
 const SIGN_POINTS_QUICK: usize = 5_000;
+/// Files of the shorter form, bytes at most.
+const SMALL_BYTES: u64 = 80 << 10;
 /// Cells of the field whose signs are compared, along a part's longest side.
 const SIGN_CELLS: f64 = 32.0;
 /// Longest time of the CAD kernel for one part, s.
@@ -125,12 +127,18 @@ struct RealFile {
 
 /// Every real file is baked, or refused in one line; inside and outside of every closed part against the CAD kernel's own classifier.
 pub(super) fn real_parts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let what = "real files by others";
+    let what = if plan.quick {
+        "real files by others, the small ones"
+    } else {
+        "real files by others"
+    };
     let Some(cad) = corpus::folder() else {
         out(Row::skipped(what, ABSENT));
         return Ok(());
     };
-    let paths = corpus::step_files(&cad.join("real"))?;
+    let small = |path: &PathBuf| path.metadata().is_ok_and(|data| data.len() <= SMALL_BYTES);
+    let mut paths = corpus::step_files(&cad.join("real"))?;
+    paths.retain(|path| !plan.quick || small(path));
     let mut files = Vec::new();
     let (mut baked, mut long) = (0usize, 0usize);
     let mut refused = |path: &Path, error: &LabError| {
@@ -164,10 +172,10 @@ pub(super) fn real_parts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<()
         "files",
         0.0,
     ));
-    signs(plan, &files, out)
+    signs(plan, what, &files, out)
 }
 
-fn signs(plan: &Plan<'_>, files: &[RealFile], out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+fn signs(plan: &Plan<'_>, of: &str, files: &[RealFile], out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let shapes: usize = files.iter().map(|file| file.model.shapes.len()).sum();
     let all = if plan.quick {
         SIGN_POINTS_QUICK
@@ -202,9 +210,8 @@ fn signs(plan: &Plan<'_>, files: &[RealFile], out: &mut dyn FnMut(Row)) -> Resul
             }
         }
     }
-    let what = |what: &str| {
-        format!("real files by others, {closed} closed parts, {points} points the CAD kernel decides: {what}")
-    };
+    let what =
+        |what: &str| format!("{of}, {closed} closed parts, {points} points the CAD kernel decides: {what}");
     out(Row::exactly(
         what("on the wrong side of the exact surface"),
         wrong as f64,
