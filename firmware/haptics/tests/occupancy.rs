@@ -113,7 +113,8 @@ proptest! {
         let mut prober = Prober::new();
         let found = prober.probe(&scene, 1, 0, &pose, &settings().contact).unwrap();
         let touching: Vec<_> = expected.iter().filter(|(_, gap)| *gap < 0.0).collect();
-        let sure = touching.iter().all(|(_, gap)| *gap < -ROUNDING_M);
+        // Whether a point within rounding of its plane touches single precision may see otherwise.
+        let sure = expected.iter().all(|(_, gap)| gap.abs() > ROUNDING_M);
         prop_assume!(sure);
         prop_assert_eq!(usize::from(found.contacts), touching.len());
         let sum: DVec3 = touching.iter().map(|(n, gap)| -*n * *gap).sum();
