@@ -146,6 +146,9 @@ impl Play<'_> {
             let batch = left.min(every);
             let heard = self.samples.len();
             let ran = self.run(batch)?;
+            // The sample may come behind the answer to the run, but not behind this one: what is heard when must not depend on timing.
+            self.client.parameter(ParameterId::Guidance)?;
+            self.listen()?;
             for sample in &self.samples[heard..] {
                 for message in guide.hear(sample) {
                     self.client.request(message)?;
