@@ -12,7 +12,6 @@ pub mod corpus;
 mod error;
 pub mod figures;
 pub mod fit;
-pub mod guide;
 pub mod motion;
 pub mod pareto;
 pub mod peer;
@@ -23,3 +22,4 @@ pub mod table;
 pub mod variant;
 
 pub use error::LabError;
+pub use mortise_guide as guide;

@@ -37,6 +37,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("firmware", &["mortise-haptics", "mortise-protocol"]),
     ("protocol", &[]),
     ("host/mating", &["mortise-brep"]),
+    (
+        "host/guide",
+        &["mortise-brep", "mortise-mating", "mortise-protocol"],
+    ),
 ];
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
