@@ -230,6 +230,7 @@ fn sweep(path: &Path, model: &CadModel, seconds: f64) -> (Scenario, String) {
         },
         depth: None,
         press: None,
+        faults: None,
         holds: BTreeMap::from([(
             "missed_ticks".into(),
             Bounds {

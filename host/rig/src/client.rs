@@ -11,6 +11,7 @@ use mortise_protocol::parameter::ParameterId;
 use crate::error::RigError;
 use crate::event::Events;
 use crate::exchange::{Patience, greet, no_answer, obtain, patience_for};
+use crate::faults::FaultLine;
 use crate::heartbeat::{HEARTBEAT, HEARTBEAT_COUNTED, Heartbeat};
 use crate::link::{Answer, Link, Reader};
 use crate::spec::{EmulatedMode, RigSpec};
@@ -50,6 +51,7 @@ pub struct Client {
     asking: Mutex<()>,
     heartbeat: Option<Heartbeat>,
     reader: Option<Reader>,
+    fault_line: Option<FaultLine>,
 }
 
 impl Client {
@@ -58,21 +60,39 @@ impl Client {
     /// # Errors
     /// Everything [`RigError`] lists up to and with `VersionMismatch`.
     pub fn connect(spec: &RigSpec) -> Result<Self, RigError> {
+        Self::connect_through(spec, Ok)
+    }
+
+    /// As [`Self::connect`], through a line whose faults begin when asked: [`Client::fault_line`].
+    ///
+    /// # Errors
+    /// As [`Self::connect`].
+    pub fn connect_with_faults(spec: &RigSpec) -> Result<Self, RigError> {
+        let line = FaultLine::default();
+        let mut client = Self::connect_through(spec, |stream| line.into_stream(stream))?;
+        client.fault_line = Some(line);
+        Ok(client)
+    }
+
+    fn connect_through(
+        spec: &RigSpec,
+        through: impl FnOnce(Transport) -> Result<Transport, RigError>,
+    ) -> Result<Self, RigError> {
         let name = spec.to_string();
         match spec {
             RigSpec::Simulated { realtime } => {
-                let transport = simulated::simulate(&simulated::Flash::default(), *realtime)?;
+                let transport = through(simulated::simulate(&simulated::Flash::default(), *realtime)?)?;
                 let client = Self::over(transport, &name, Patience::long(), None)?;
                 client.in_lockstep(!realtime)
             }
             RigSpec::Emulated { mode, firmware } => {
                 let elf = emulator::firmware_path(firmware.as_deref())?;
-                let transport = emulator::start(*mode, &elf)?;
+                let transport = through(emulator::start(*mode, &elf)?)?;
                 let client = Self::over_paced(transport, &name, Patience::long(), Some(elf), *mode)?;
                 client.in_lockstep(*mode == EmulatedMode::Lockstep)
             }
             RigSpec::Serial { port } => {
-                let transport = serial::open(port)?;
+                let transport = through(serial::open(port)?)?;
                 Self::over(transport, &name, Patience::default(), None)
             }
         }
@@ -124,6 +144,7 @@ impl Client {
             asking: Mutex::new(()),
             heartbeat: Some(heartbeat),
             reader: guard.disarm(),
+            fault_line: None,
         })
     }
 
@@ -135,6 +156,11 @@ impl Client {
     /// What was connected to, as written.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The faults in this link, where it was made with any.
+    pub fn fault_line(&self) -> Option<&FaultLine> {
+        self.fault_line.as_ref()
     }
 
     /// What the board says unasked.

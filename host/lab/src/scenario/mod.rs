@@ -14,12 +14,13 @@ use std::path::{Path, PathBuf};
 use mortise_bake::{Method, PointshellKind};
 use mortise_protocol::limits::MAX_KEYFRAMES;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_rig::Faults;
 use serde::Deserialize;
 
 use crate::error::LabError;
 
 pub use outcome::{Outcome, Verdict};
-pub use run::{run, run_on};
+pub use run::{Listener, Recording, connect, record, run, run_on};
 pub use scene::PreparedScene;
 
 /// A scenario.
@@ -45,6 +46,8 @@ pub struct Scenario {
     pub depth: Option<Depth>,
     /// Where the hand presses, where that matters.
     pub press: Option<Press>,
+    /// What goes wrong on the link while the hand moves.
+    pub faults: Option<Faults>,
     /// What must hold: a measured quantity's name and its bounds; see [`Outcome::quantity`].
     pub holds: BTreeMap<String, Bounds>,
 }
@@ -281,6 +284,9 @@ impl Scenario {
                 ));
             }
         }
+        if let Some(Err(what)) = self.faults.as_ref().map(Faults::check) {
+            return wrong(format!("faults.{what}"));
+        }
         for parameter in self.parameters.keys() {
             if parameter_named(parameter).is_none() {
                 let known: Vec<&str> = PARAMETERS.iter().map(|row| row.name).collect();
@@ -353,6 +359,7 @@ mod tests {
             said("telemetry_every_ticks = 5", "telemetry_every_ticks = 0").contains("telemetry_every_ticks")
         );
         assert!(said("[hand]", "[parameters]\nSpring = 3.0\n[hand]").contains("Spring"));
+        assert!(said("[hand]", "[faults]\ndrop = 2\n[hand]").contains("faults.drop"));
         assert!(said("part =", "piece =").contains("piece"));
         assert!(said("part =", "method = \"voxels\"\npart =").contains("occupancy"));
         let twice = "integrator = \"explicit\"\n[parameters]\nIntegrator = 1.0\n[scene]";

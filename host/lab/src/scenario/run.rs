@@ -1,17 +1,18 @@
 //! Playing a scenario on a rig.
 
 use glam::{DQuat, DVec3};
+use mortise_guide::GuideSettings;
 use mortise_protocol::message::{
-    Capabilities, CostUnit, DeviceState, HandScript, Keyframe, Statistics, Telemetry, ToDevice, WirePose,
+    Capabilities, CostUnit, DeviceState, FromDevice, HandScript, Keyframe, Statistics, Telemetry, ToDevice,
+    WirePose,
 };
 use mortise_protocol::parameter::ParameterId;
-use mortise_rig::{Client, Event, Ran, RigSpec, describe};
+use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe};
 
 use super::outcome::Outcome;
 use super::scene::PreparedScene;
 use super::{Hand, Key, Scenario, measure, parameter_named};
 use crate::error::LabError;
-use crate::guide::{Guide, GuideSettings};
 
 /// Ticks in a second of every simulated rig.
 const TICK_HZ: f64 = 1000.0;
@@ -29,15 +30,59 @@ const FADE_TICKS: u32 = 150;
 /// Everything [`LabError`] lists but `NoSuchFigures`. A bound that does not hold is not an error: see [`Outcome::verdicts`].
 pub fn run(scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
     let scene = PreparedScene::of(scenario)?;
-    let client = Client::connect(&spec.lockstep())?;
+    let client = connect(scenario, spec)?;
     run_on(&client, scenario, &scene)
 }
 
-/// Plays `scenario` on a rig that is connected already and in lockstep, with a scene prepared before.
+/// Connects to the rig `spec` in lockstep, through a line that can fail where `scenario` has faults.
+///
+/// # Errors
+/// `Rig`.
+pub fn connect(scenario: &Scenario, spec: &RigSpec) -> Result<Client, LabError> {
+    let spec = spec.lockstep();
+    Ok(match scenario.faults {
+        Some(_) => Client::connect_with_faults(&spec)?,
+        None => Client::connect(&spec)?,
+    })
+}
+
+/// Plays `scenario` on a rig that is connected already and in lockstep ([`connect`]), with a scene prepared before.
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_on(client: &Client, scenario: &Scenario, scene: &PreparedScene) -> Result<Outcome, LabError> {
+    if !scenario.run.guidance {
+        return Ok(record(client, scenario, scene, None)?.outcome);
+    }
+    let mut guide = scene.guide(GuideSettings::default());
+    let mut listener = |sample: &Telemetry| guide.hear(sample);
+    Ok(record(client, scenario, scene, Some(&mut listener))?.outcome)
+}
+
+/// Hears each sample the link lets through, before the next tick; says what to send.
+pub type Listener<'l> = dyn FnMut(&Telemetry) -> Vec<ToDevice> + 'l;
+
+/// A run and all that was heard.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// What it measured.
+    pub outcome: Outcome,
+    /// Every sample the board sent from the hand's start on, also those a faulty link lost.
+    pub samples: Vec<Telemetry>,
+    /// What the link did to the frames.
+    pub faults: FaultCounts,
+}
+
+/// As [`run_on`], with a listener of the caller's instead of the scenario's guidance.
+///
+/// # Errors
+/// As [`run`].
+pub fn record(
+    client: &Client,
+    scenario: &Scenario,
+    scene: &PreparedScene,
+    listener: Option<&mut Listener<'_>>,
+) -> Result<Recording, LabError> {
     let capabilities = client.capabilities();
     if !capabilities.simulated {
         return Err(LabError::NeedsSimulatedHand {
@@ -51,14 +96,57 @@ pub fn run_on(client: &Client, scenario: &Scenario, scene: &PreparedScene) -> Re
         messages: 0,
     };
     play.prepare(scenario, scene)?;
-    let ran = play.perform(scenario, scene)?;
+    let line = line_of(client, scenario)?;
+    let before = client.fault_line().map(FaultLine::counts).unwrap_or_default();
+    let ran = play.perform(scenario, line, listener)?;
+    let mut faults = FaultCounts::default();
+    if let Some(line) = line {
+        // Anything still on its way.
+        client.run(0)?;
+        play.listen()?;
+        play.samples = overheard(line)?;
+        faults = line.counts().since(&before);
+        line.end();
+    }
     let statistics = client.statistics(false)?;
     client.request(ToDevice::SetTelemetry { every_ticks: 0 })?;
     // The last sample may come behind the answer to the last run, but not behind these.
     play.listen()?;
     client.request(ToDevice::Disarm)?;
     client.run(FADE_TICKS)?;
-    Ok(outcome(scenario, scene, client, &play, &statistics, ran))
+    Ok(Recording {
+        outcome: outcome(scenario, scene, client, &play, &statistics, ran),
+        samples: play.samples,
+        faults,
+    })
+}
+
+/// The line the scenario's faults are for.
+fn line_of<'c>(client: &'c Client, scenario: &Scenario) -> Result<Option<&'c FaultLine>, LabError> {
+    match (&scenario.faults, client.fault_line()) {
+        (Some(_), None) => Err(LabError::Scenario {
+            name: scenario.name.clone(),
+            what: "it has [faults], but the connection is one without: connect with faults".into(),
+        }),
+        (Some(_), line) => Ok(line),
+        (None, _) => Ok(None),
+    }
+}
+
+/// The samples the board sent, whatever became of them; a fault it told of is an error.
+fn overheard(line: &FaultLine) -> Result<Vec<Telemetry>, LabError> {
+    let mut samples = Vec::new();
+    for told in line.overheard() {
+        match told {
+            FromDevice::Telemetry(sample) => samples.push(sample),
+            FromDevice::Fault { tick, fault } => {
+                let what = describe(fault);
+                return Err(LabError::Fault { tick, what });
+            }
+            _ => {}
+        }
+    }
+    Ok(samples)
 }
 
 struct Play<'c> {
@@ -93,32 +181,50 @@ impl Play<'_> {
         Ok(())
     }
 
-    fn perform(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<Ran, LabError> {
+    fn perform(
+        &mut self,
+        scenario: &Scenario,
+        line: Option<&FaultLine>,
+        listener: Option<&mut Listener<'_>>,
+    ) -> Result<Ran, LabError> {
         let client = self.client;
         client.statistics(true)?;
         let every_ticks = scenario.run.telemetry_every_ticks;
         client.request(ToDevice::SetTelemetry { every_ticks })?;
         client.request(ToDevice::SimulatedHand(script(&scenario.hand)))?;
-        let ticks = (scenario.run.duration_s * TICK_HZ).round() as u32;
-        if scenario.run.guidance {
-            return self.guided(scene, ticks, u32::from(every_ticks.max(1)));
+        let faulty = scenario.faults.is_some();
+        if let (Some(line), Some(faults)) = (line, &scenario.faults) {
+            line.begin(faults);
         }
-        let Some(every) = scenario.run.parameter_every_ticks else {
-            return self.run(ticks);
-        };
+        let ticks = (scenario.run.duration_s * TICK_HZ).round() as u32;
+        match (listener, scenario.run.parameter_every_ticks) {
+            (Some(listener), _) => self.heeding(listener, ticks, u32::from(every_ticks.max(1)), faulty),
+            (None, Some(every)) => self.loaded(scenario, ticks, every.max(1)),
+            (None, None) => self.run(ticks),
+        }
+    }
+
+    /// Sends a parameter each `every` ticks.
+    fn loaded(&mut self, scenario: &Scenario, ticks: u32, every: u32) -> Result<Ran, LabError> {
+        let client = self.client;
         // The limit goes to and fro well above the forces that occur, so that each message changes a setting and none the outcome.
         let id = ParameterId::ForceLimit;
-        let start = client.parameter(id)?;
+        let start = (scenario.parameters.get(id.row().name).copied()).unwrap_or(id.row().default);
         let mut value = start;
-        let mut ran = None;
         let mut left = ticks;
-        while left > 0 {
+        let ran = loop {
             value = if value == start { id.row().max } else { start };
             client.send(ToDevice::SetParameter { id, value })?;
             self.messages += 1;
-            let batch = left.min(every.max(1));
-            ran = Some(self.run(batch)?);
+            let batch = left.min(every);
+            let ran = self.run(batch)?;
             left -= batch;
+            if left == 0 {
+                break ran;
+            }
+        };
+        if scenario.faults.is_some() {
+            return Ok(ran);
         }
         // All of them arrived when the last did: they are taken in order.
         let found = client.parameter(id)?;
@@ -131,27 +237,33 @@ impl Play<'_> {
                 ),
             });
         }
-        match ran {
-            Some(ran) => Ok(ran),
-            None => self.run(0),
-        }
+        Ok(ran)
     }
 
-    /// Lets ticks run from sample to sample, answering each with what the recogniser makes of it.
-    fn guided(&mut self, scene: &PreparedScene, ticks: u32, every: u32) -> Result<Ran, LabError> {
-        let parts = scene.report.parts.iter().map(|part| part.model_part).collect();
-        let mut guide = Guide::new(&scene.model, parts, GuideSettings::default());
+    /// Lets ticks run from sample to sample, answering each with what the listener makes of it.
+    fn heeding(
+        &mut self,
+        listener: &mut Listener<'_>,
+        ticks: u32,
+        every: u32,
+        faulty: bool,
+    ) -> Result<Ran, LabError> {
         let mut left = ticks;
         loop {
             let batch = left.min(every);
             let heard = self.samples.len();
             let ran = self.run(batch)?;
             // The sample may come behind the answer to the run, but not behind this one: what is heard when must not depend on timing.
-            self.client.parameter(ParameterId::Guidance)?;
+            self.client.run(0)?;
             self.listen()?;
             for sample in &self.samples[heard..] {
-                for message in guide.hear(sample) {
-                    self.client.request(message)?;
+                for message in listener(sample) {
+                    // An answer may be lost too: nobody waits for one then.
+                    if faulty {
+                        self.client.send(message)?;
+                    } else {
+                        self.client.request(message)?;
+                    }
                 }
             }
             left -= batch;

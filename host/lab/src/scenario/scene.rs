@@ -8,6 +8,7 @@ use mortise_bake::{
     BakeOptions, BakeReport, ExactSurface, Grabbable, PointshellOptions, bake, sample_pointshell,
 };
 use mortise_brep::{CadModel, load_step};
+use mortise_guide::{Guide, GuideSettings};
 
 use super::Scenario;
 use crate::error::LabError;
@@ -97,6 +98,12 @@ impl PreparedScene {
             part: index,
             bodies,
         })
+    }
+
+    /// What recognises and sends constraints in this scene.
+    pub fn guide(&self, settings: GuideSettings) -> Guide<'_> {
+        let parts = self.report.parts.iter().map(|part| part.model_part).collect();
+        Guide::new(&self.model, parts, settings)
     }
 
     pub(crate) fn bodies(&self) -> &[Body] {

@@ -1,0 +1,341 @@
+//! One direction of a faulty link: takes frames, harms them, hands them on.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use fastrand::Rng;
+use mortise_firmware::board::TICK_HZ;
+use mortise_protocol::frame::{Decoder, encode};
+use mortise_protocol::limits::MAX_FRAME;
+use mortise_protocol::message::{FromDevice, ToDevice};
+use serde::de::DeserializeOwned;
+
+use super::{Faults, Shared, read_some};
+use crate::transport::write_whole;
+
+/// A frame that lets others pass waits no longer than this, ms.
+const REORDER_MS: u64 = 50;
+/// Frames made up at once, at most.
+const FLOOD_AT_ONCE: f64 = 1000.0;
+/// Wait for input while something is held back, by the wall clock.
+const SOON: Duration = Duration::from_millis(1);
+/// Milliseconds in a tick.
+const TICK_MS: u64 = 1000 / TICK_HZ as u64;
+
+/// What a frame is to the line.
+pub(super) enum Kind {
+    /// So many ticks run behind this one.
+    Run(u32),
+    /// The board has run what was released.
+    Ran,
+    /// Lockstep begins or ends.
+    Lockstep(bool),
+    /// Worth overhearing.
+    Telling(Box<FromDevice>),
+    /// Anything else.
+    Other,
+}
+
+fn message<M: DeserializeOwned>(frame: &[u8]) -> Option<M> {
+    let mut decoder = Decoder::new();
+    let read = frame.iter().find_map(|&byte| decoder.push::<M>(byte))?;
+    read.ok().map(|(_, message)| message)
+}
+
+/// Of a frame to the board.
+pub(super) fn to_board(frame: &[u8]) -> Kind {
+    match message::<ToDevice>(frame) {
+        Some(ToDevice::Run { ticks }) => Kind::Run(ticks),
+        Some(ToDevice::Lockstep(on)) => Kind::Lockstep(on),
+        _ => Kind::Other,
+    }
+}
+
+/// Of a frame from the board.
+pub(super) fn from_board(frame: &[u8]) -> Kind {
+    match message::<FromDevice>(frame) {
+        Some(FromDevice::Ran { .. }) => Kind::Ran,
+        Some(told @ (FromDevice::Telemetry(_) | FromDevice::Fault { .. })) => Kind::Telling(Box::new(told)),
+        _ => Kind::Other,
+    }
+}
+
+type Read<'r> = dyn FnMut(&mut [u8], Duration) -> io::Result<usize> + 'r;
+
+pub(super) struct Pump {
+    shared: Arc<Shared>,
+    to: Box<dyn Write + Send>,
+    kind: fn(&[u8]) -> Kind,
+    /// 0 to the board, 1 from it.
+    direction: u64,
+    random: Rng,
+    faults: Faults,
+    epoch: u32,
+    started: Instant,
+    ticks: u64,
+    /// Time at which faults began, ms.
+    begun: u64,
+    /// Bytes of a frame whose end has not come.
+    part: Vec<u8>,
+    /// Frames by when they are due and in which order they came.
+    waiting: BTreeMap<(u64, u64), Vec<u8>>,
+    order: u64,
+    /// A frame that lets the next one pass, and since when.
+    held: Option<(u64, Vec<u8>)>,
+    /// Frames of a flood that are owed, and up to when they are counted.
+    owed: f64,
+    owed_until: u64,
+}
+
+fn count(counter: &AtomicU64) {
+    counter.fetch_add(1, Ordering::Relaxed);
+}
+
+impl Pump {
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        to: Box<dyn Write + Send>,
+        kind: fn(&[u8]) -> Kind,
+        direction: u64,
+    ) -> Self {
+        Self {
+            shared,
+            to,
+            kind,
+            direction,
+            random: Rng::with_seed(0),
+            faults: Faults::default(),
+            epoch: 0,
+            started: Instant::now(),
+            ticks: 0,
+            begun: 0,
+            part: Vec::new(),
+            waiting: BTreeMap::new(),
+            order: 0,
+            held: None,
+            owed: 0.0,
+            owed_until: 0,
+        }
+    }
+
+    /// Until the stream ends on either side.
+    pub(super) fn run(mut self, read: &mut Read<'_>) {
+        let mut bytes = [0u8; 4096];
+        while !self.shared.closing.load(Ordering::Relaxed) {
+            let idle = self.waiting.is_empty() && self.held.is_none() && self.faults.flood_per_s == 0;
+            let wait = if idle { crate::READ_WAIT } else { SOON };
+            let Some(got) = read_some(read(&mut bytes, wait)) else {
+                return;
+            };
+            if self.take(&bytes[..got]).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn take(&mut self, bytes: &[u8]) -> io::Result<()> {
+        for &byte in bytes {
+            self.part.push(byte);
+            // What is too long to be a frame is none of ours to judge.
+            if byte == 0 || self.part.len() > 2 * MAX_FRAME {
+                let frame = std::mem::take(&mut self.part);
+                self.frame(frame)?;
+            }
+        }
+        if !self.lockstep() {
+            self.follow()?;
+            self.flood()?;
+            self.release(false)?;
+        }
+        Ok(())
+    }
+
+    fn lockstep(&self) -> bool {
+        self.shared.lockstep.load(Ordering::SeqCst)
+    }
+
+    fn acting(&self) -> bool {
+        self.epoch % 2 == 1
+    }
+
+    /// Since faults began, ms.
+    fn now(&self) -> u64 {
+        self.clock().saturating_sub(self.begun)
+    }
+
+    fn clock(&self) -> u64 {
+        if self.lockstep() {
+            self.ticks * TICK_MS
+        } else {
+            self.started.elapsed().as_millis() as u64
+        }
+    }
+
+    /// Notices that faults began or ended.
+    fn follow(&mut self) -> io::Result<()> {
+        let epoch = self.shared.epoch.load(Ordering::SeqCst);
+        if epoch == self.epoch {
+            return Ok(());
+        }
+        self.release(true)?;
+        self.epoch = epoch;
+        self.faults = if self.acting() {
+            self.shared
+                .faults
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .clone()
+        } else {
+            Faults::default()
+        };
+        self.random = Rng::with_seed(self.faults.seed.wrapping_mul(2).wrapping_add(self.direction));
+        self.begun = self.clock();
+        self.owed = 0.0;
+        self.owed_until = 0;
+        Ok(())
+    }
+
+    fn frame(&mut self, frame: Vec<u8>) -> io::Result<()> {
+        self.follow()?;
+        match (self.kind)(&frame) {
+            Kind::Run(ticks) => {
+                self.flood()?;
+                self.release(false)?;
+                self.ticks += u64::from(ticks);
+                self.shared.released.store(self.ticks, Ordering::SeqCst);
+                write_whole(&mut *self.to, &frame)
+            }
+            Kind::Ran => {
+                // A client waits for one run's end before it asks for the next.
+                self.ticks = self.shared.released.load(Ordering::SeqCst);
+                self.flood()?;
+                self.release(false)?;
+                write_whole(&mut *self.to, &frame)
+            }
+            Kind::Lockstep(on) => {
+                self.release(true)?;
+                self.shared.lockstep.store(on, Ordering::SeqCst);
+                write_whole(&mut *self.to, &frame)
+            }
+            _ if !self.acting() => write_whole(&mut *self.to, &frame),
+            kind => {
+                if let Kind::Telling(told) = kind {
+                    let overheard = &self.shared.overheard;
+                    overheard
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .push(*told);
+                }
+                self.harm(frame);
+                self.release(false)
+            }
+        }
+    }
+
+    fn harm(&mut self, mut frame: Vec<u8>) {
+        let shared = self.shared.clone();
+        count(&shared.frames);
+        let now = self.now();
+        // Each is drawn whatever comes of the others: one share changed leaves the others' draws as they are.
+        let [lost, damaged, twice, passed] = [
+            self.faults.drop,
+            self.faults.corrupt,
+            self.faults.repeat,
+            self.faults.reorder,
+        ]
+        .map(|share| self.random.f64() < share);
+        let [from, to] = self.faults.delay_ms;
+        let delay = u64::from(self.random.u32(from..=to));
+        if lost || self.faults.is_cut(now) {
+            return count(&shared.lost);
+        }
+        if damaged {
+            count(&shared.corrupted);
+            self.damage(&mut frame);
+        }
+        let before = self.held.take();
+        if twice {
+            count(&shared.repeated);
+            self.queue(now + delay, frame.clone());
+        }
+        if delay > 0 || self.faults.stalled(now) {
+            count(&shared.late);
+        }
+        if passed && before.is_none() {
+            count(&shared.reordered);
+            self.held = Some((now, frame));
+        } else {
+            self.queue(now + delay, frame);
+        }
+        if let Some((_, held)) = before {
+            self.queue(now + delay, held);
+        }
+    }
+
+    /// Up to three bits, the delimiter spared: joined to the next frame it would take that one with it.
+    fn damage(&mut self, frame: &mut [u8]) {
+        let Some(body) = frame.len().checked_sub(1).filter(|&body| body > 0) else {
+            return;
+        };
+        for _ in 0..self.random.u32(1..=3) {
+            frame[self.random.usize(..body)] ^= 1 << self.random.u32(..8);
+        }
+    }
+
+    fn queue(&mut self, due: u64, frame: Vec<u8>) {
+        self.order += 1;
+        self.waiting.insert((due, self.order), frame);
+    }
+
+    /// Hands on what is due, or everything.
+    fn release(&mut self, all: bool) -> io::Result<()> {
+        let now = self.now();
+        if let Some((since, _)) = &self.held
+            && (all || since + REORDER_MS <= now)
+            && let Some((since, frame)) = self.held.take()
+        {
+            self.queue(since, frame);
+        }
+        while let Some(next) = self.waiting.first_entry() {
+            if !all && (next.key().0 > now || self.faults.stalled(now)) {
+                break;
+            }
+            let frame = next.remove();
+            if !all && self.faults.is_cut(now) {
+                count(&self.shared.lost);
+                continue;
+            }
+            write_whole(&mut *self.to, &frame)?;
+        }
+        Ok(())
+    }
+
+    /// Makes up what a flood owes by now.
+    fn flood(&mut self) -> io::Result<()> {
+        if self.faults.flood_per_s == 0 {
+            return Ok(());
+        }
+        let now = self.now();
+        let passed_s = 1e-3 * now.saturating_sub(self.owed_until) as f64;
+        self.owed_until = now;
+        self.owed = (self.owed + f64::from(self.faults.flood_per_s) * passed_s).min(FLOOD_AT_ONCE);
+        while self.owed >= 1.0 {
+            self.owed -= 1.0;
+            count(&self.shared.flooded);
+            let mut room = [0u8; MAX_FRAME];
+            let made_up = if self.direction == 0 && self.random.bool() {
+                // No client awaits an answer to number 0 but once in 65,536 messages.
+                encode(0, &ToDevice::Heartbeat, &mut room).unwrap_or(&[0])
+            } else {
+                let length = self.random.usize(1..64);
+                room[..length].fill_with(|| self.random.u8(1..));
+                &room[..=length]
+            };
+            write_whole(&mut *self.to, made_up)?;
+        }
+        Ok(())
+    }
+}
