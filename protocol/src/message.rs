@@ -476,6 +476,8 @@ pub struct Telemetry {
 pub struct Guidance {
     /// Targets in force; those that fade are not counted.
     pub active: u8,
+    /// Of those, the joints: the part is so near to where they want it that their faces cannot touch, and have left the work.
+    pub joints: u8,
     /// Largest engagement of any, 0 to 1.
     pub engagement: f32,
     /// What they pull with, on the object about its centre of mass.

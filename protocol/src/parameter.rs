@@ -85,6 +85,8 @@ parameters! {
     Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];
     /// How constraint targets guide: 0 not at all, 1 stiff up to their cap, 2 the blend of the thesis.
     Guidance = "choice", 0.0, 2.0, 1.0, ["off", "capped", "thesis"];
+    /// Whether mating faces that an engaged target keeps apart leave the work: 0 no, 1 yes. Nothing is felt of it; for comparing what ticks cost.
+    Joints = "choice", 0.0, 1.0, 1.0, ["off", "on"];
 }
 
 impl ParameterId {

@@ -86,6 +86,7 @@ impl Parameters {
         } else {
             GuidanceMethod::Thesis
         };
+        law.guidance.joints = self.get(P::Joints) >= 0.5;
         law.validate().map_err(|_| Refusal::BadNumber)?;
         Ok(ControlSettings {
             law,

@@ -469,6 +469,7 @@ fn the_largest_messages_fit() {
         dropped: u32::MAX,
         guidance: Guidance {
             active: u8::MAX,
+            joints: u8::MAX,
             ..Guidance::default()
         },
         pairs: heapless::Vec::new(),

@@ -25,12 +25,13 @@ use mortise_protocol::image::{NO_FACE, SceneImage};
 use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::ConstraintTarget;
 
-use crate::constraint::{Alignment, Rows};
-use crate::linear::Symmetric6;
+use crate::constraint::Alignment;
+use crate::joint::{Fit, Joined};
 use crate::pose::{Pose, Wrench};
+use crate::proximity::APPROACH;
+use crate::pull::{LETTING_GO_N, Law, MAX_PULLS, Pull};
 use crate::settings::{GuidanceMethod, GuidanceSettings};
 use crate::state::Placed;
-use crate::step::dot;
 
 /// Engagement grows and falls by this a tick at most.
 const STEP: f32 = 1.0 / 64.0;
@@ -38,14 +39,8 @@ const STEP: f32 = 1.0 / 64.0;
 const FORCE_STEP_N: f32 = 0.045;
 /// The cap on the torque likewise, N m.
 const TORQUE_STEP_NM: f32 = 1.8e-3;
-/// Damping of what a target that ends lets go, N s/m.
-const LETTING_GO: f32 = 200.0;
-/// Its largest force, N.
-const LETTING_GO_N: f32 = 1.0;
 /// Its fading a tick.
 const LETTING_GO_STEP: f32 = 1.0 / 512.0;
-/// Two pulls for each target: offset and angle.
-pub(crate) const MAX_PULLS: usize = 2 * MAX_TARGETS;
 /// Stiffness of the thesis' constraint spring over the coupling's.
 const THESIS_SHARE: f32 = 0.8;
 
@@ -70,6 +65,10 @@ struct Slot {
     left: u16,
     /// How much of the damper is there that lets the part go slowly, 0 to 1.
     letting_go: f32,
+    /// How its faces fit; none until it is first fully engaged.
+    fit: Option<Fit>,
+    /// Whether it keeps them apart now.
+    joined: bool,
 }
 
 /// All targets.
@@ -97,47 +96,13 @@ impl Mating {
     };
 }
 
-/// One saturating spring of a target, within a step.
-#[derive(Clone, Debug)]
-pub(crate) struct Pull {
-    rows: Rows,
-    /// Σ JᵀJ.
-    product: Symmetric6,
-    /// Σ e·Jᵀ.
-    along: [f32; 6],
-    law: Law,
-    /// Largest force of the damper that lets go, N.
-    damper_n: f32,
-}
-
-/// The spring (N/m) and the damper (N s/m) that pull as hard as a saturating pull does at one solution.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Secant {
-    spring: f32,
-    damper: f32,
-}
-
-impl Secant {
-    /// Whether another is the same but for this share.
-    pub fn is_near(&self, other: &Self, share: f32) -> bool {
-        (self.spring - other.spring).abs() <= share * other.spring
-            && (self.damper - other.damper).abs() <= share * other.damper
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Law {
-    /// Stiff up to a cap: k (N/m), cap (N), h + τ (s).
-    Capped { stiffness: f32, cap: f32, ahead: f32 },
-    /// A plain spring: k (N/m), h (s).
-    Spring { stiffness: f32, ahead: f32 },
-}
-
 /// How targets stand, for telemetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuidanceState {
     /// Targets in force (fading ones not counted).
     pub active: u8,
+    /// Of those, whose mating faces have left the work.
+    pub joints: u8,
     /// Largest engagement of any.
     pub engagement: f32,
     /// Their sum on the object at its centre of mass, world axes.
@@ -190,6 +155,8 @@ impl Guidance {
             engagement: 0.0,
             left: target.expiry_ticks,
             letting_go: 0.0,
+            fit: None,
+            joined: false,
         });
         Ok(())
     }
@@ -229,7 +196,7 @@ impl Guidance {
 
     /// What the targets pull with in this tick, appended to `pulls`: too large to be handed about by value.
     pub fn add_pulls(&self, at: &At<'_, '_>, pulls: &mut Vec<Pull, MAX_PULLS>) {
-        for slot in &self.slots {
+        for (i, slot) in self.slots.iter().enumerate() {
             let Some(alignment) = slot.alignment(at) else {
                 continue;
             };
@@ -253,13 +220,54 @@ impl Guidance {
                     (law(target.force_cap), law(target.torque_cap / at.length))
                 }
             };
-            for (rows, law) in [(alignment.offset, offset), (alignment.angle, angle)] {
+            for (turns, rows, law) in [(false, alignment.offset, offset), (true, alignment.angle, angle)] {
                 if !rows.rows.is_empty() {
                     // Two a target: there is room.
-                    let _ = pulls.push(Pull::new(rows, law, LETTING_GO_N * slot.letting_go));
+                    let _ = pulls.push(Pull::new(
+                        (i as u8, turns),
+                        rows,
+                        law,
+                        LETTING_GO_N * slot.letting_go,
+                    ));
                 }
             }
         }
+    }
+
+    /// Forms and ends joints, given what the targets pull with and how far the object may move in this tick: `motions` of one period, scaled as the
+    /// step's unknowns, and the `slack` within which points are wanted. Whether any ended.
+    pub fn join(&mut self, at: &At<'_, '_>, pulls: &[Pull], motions: &[[f32; 6]; 2], slack: f32) -> bool {
+        let mut ended = false;
+        for (i, slot) in self.slots.iter_mut().enumerate() {
+            let was = slot.joined;
+            slot.joined = slot.left > 0
+                && slot.engagement == 1.0
+                && at.settings.joints
+                && at.settings.method == GuidanceMethod::Capped
+                && slot.keeps_apart(
+                    at,
+                    pulls.iter().filter(|p| usize::from(p.slot) == i),
+                    motions,
+                    slack,
+                );
+            ended |= was && !slot.joined;
+        }
+        ended
+    }
+
+    /// Pairs of faces that joints to this part keep apart: those of the tree's shape first, which is the moving one unless `backward`.
+    pub fn joined(&self, part: u16, backward: bool) -> Joined {
+        let mut all = Joined::new();
+        for slot in (self.slots.iter()).filter(|slot| slot.joined && slot.target.static_part == part) {
+            let Some(fit) = &slot.fit else { continue };
+            for (i, &(m, s)) in slot.target.faces.iter().enumerate() {
+                if fit.pairs >> i & 1 != 0 {
+                    // Beyond what there is room for, points are looked at.
+                    let _ = all.push(if backward { [s, m] } else { [m, s] });
+                }
+            }
+        }
+        all
     }
 
     /// Of contact between these faces: `moving` and `fixed` name the face, and the other one where the point lies on an edge.
@@ -351,6 +359,7 @@ impl Guidance {
         let mut state = GuidanceState::default();
         for slot in &self.slots {
             state.active += u8::from(slot.left > 0);
+            state.joints += u8::from(slot.joined);
             if slot.engagement > state.engagement {
                 state.engagement = slot.engagement;
             }
@@ -366,6 +375,8 @@ impl Guidance {
 pub(crate) struct At<'a, 'i> {
     pub scene: &'a SceneImage<'i>,
     pub parts: &'a [Placed],
+    /// Index of the part in hand.
+    pub held: u16,
     pub object: Pose,
     pub center: Vec3,
     /// L, m.
@@ -382,6 +393,40 @@ impl Slot {
             .min(TORQUE_STEP_NM / self.target.torque_cap.max(TORQUE_STEP_NM))
     }
 
+    /// Whether the part is so near to where the target wants it, and will be after this tick, that the mating faces cannot touch.
+    fn keeps_apart<'p>(
+        &mut self,
+        at: &At<'_, '_>,
+        pulls: impl Iterator<Item = &'p Pull>,
+        motions: &[[f32; 6]; 2],
+        slack: f32,
+    ) -> bool {
+        let (held, fixed) = (usize::from(at.held), usize::from(self.target.static_part));
+        if held.max(fixed) >= at.scene.parts().len() {
+            return false;
+        }
+        let fit = *self.fit.get_or_insert_with(|| {
+            Fit::of(
+                &self.target,
+                &at.scene.shape_of_part(held),
+                &at.scene.shape_of_part(fixed),
+            )
+        });
+        if fit.pairs == 0 {
+            return false;
+        }
+        let mut off = slack;
+        for pull in pulls {
+            // Seen at the part's farthest point, not at L.
+            let lever = if pull.turns { fit.lever_m / at.length } else { 1.0 };
+            let [a, b] = motions.map(|motion| pull.rows.speed(&motion));
+            off += lever * (pull.rows.error(&[0.0; 6], 0.0) + APPROACH * if a > b { a } else { b });
+        }
+        // Forms with half the room to spare, so that it does not come and go.
+        let share = if self.joined { 1.0 } else { 2.0 };
+        share * off <= at.settings.allowance_m + fit.gap_m
+    }
+
     /// How far the target is from being met, if it pulls at all.
     fn alignment(&self, at: &At<'_, '_>) -> Option<Alignment> {
         let part = usize::from(self.target.static_part);
@@ -391,80 +436,7 @@ impl Slot {
     }
 }
 
-impl Pull {
-    fn new(rows: Rows, law: Law, damper_n: f32) -> Self {
-        let mut product = Symmetric6::ZERO;
-        let mut along = [0.0; 6];
-        for (row, error) in &rows.rows {
-            product.add_outer(1.0, row);
-            for (a, j) in along.iter_mut().zip(row) {
-                *a += error * j;
-            }
-        }
-        Self {
-            rows,
-            product,
-            along,
-            law,
-            damper_n,
-        }
-    }
-
-    /// At the step's end `x`.
-    pub fn secant(&self, x: &[f32; 6]) -> Secant {
-        let spring = match self.law {
-            Law::Spring { stiffness, .. } => stiffness,
-            Law::Capped {
-                stiffness,
-                cap,
-                ahead,
-            } => saturating(stiffness, cap, self.rows.error(x, ahead)),
-        };
-        let damper = if self.damper_n > 0.0 {
-            saturating(LETTING_GO, self.damper_n, self.rows.speed(x))
-        } else {
-            0.0
-        };
-        Secant { spring, damper }
-    }
-
-    /// Adds what the spring and the damper add to the step's matrix and right side.
-    pub fn add(&self, secant: Secant, period_s: f32, matrix: &mut Symmetric6, right: &mut [f32; 6]) {
-        let impulse = secant.spring * period_s;
-        matrix.add_scaled(impulse * self.ahead() + secant.damper * period_s, &self.product);
-        for (r, a) in right.iter_mut().zip(&self.along) {
-            *r -= impulse * a;
-        }
-    }
-
-    fn ahead(&self) -> f32 {
-        match self.law {
-            Law::Capped { ahead, .. } | Law::Spring { ahead, .. } => ahead,
-        }
-    }
-
-    /// On the object at its centre of mass.
-    pub fn wrench(&self, x: &[f32; 6], length: f32) -> Wrench {
-        let secant = self.secant(x);
-        let mut wrench = Wrench::ZERO;
-        for (row, error) in &self.rows.rows {
-            let rate = dot(row, x);
-            let f = -secant.spring * (error + self.ahead() * rate) - secant.damper * rate;
-            wrench.force += Vec3::new(row[0], row[1], row[2]) * f;
-            wrench.torque += Vec3::new(row[3], row[4], row[5]) * (f * length);
-        }
-        wrench
-    }
-}
-
-/// Force over u of a pull that is k·u at first and never more than `cap`: cap/√((cap/k)² + u²).
-fn saturating(k: f32, cap: f32, u: f32) -> f32 {
-    let slack = cap / k;
-    let length = libm::sqrtf(slack * slack + u * u);
-    if length > 0.0 { cap / length } else { 0.0 }
-}
-
-fn holds(faces: [u16; 2], face: u16) -> bool {
+pub(crate) fn holds(faces: [u16; 2], face: u16) -> bool {
     face != NO_FACE && (faces[0] == face || faces[1] == face)
 }
 

@@ -15,7 +15,8 @@
 //! | `occupancy` | the same with a voxmap in place of the field: the textbook method, to be compared with |
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
 //! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
-//! | `guidance`, `constraint` | constraint targets: in force, engaged, pulling; errors and their rows |
+//! | `guidance`, `constraint`, `pull` | constraint targets: in force, engaged; errors and their rows; how they pull in a step |
+//! | `joint` | what an engaged target keeps apart leaves the work |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
 //! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
@@ -33,6 +34,7 @@ mod coupling;
 mod explicit;
 mod guidance;
 mod io;
+mod joint;
 mod limits;
 mod linear;
 mod nearest;
@@ -40,6 +42,7 @@ mod occupancy;
 mod pose;
 mod probe;
 mod proximity;
+mod pull;
 pub mod rotation;
 mod settings;
 mod state;

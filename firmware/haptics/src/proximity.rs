@@ -23,6 +23,7 @@ use crate::coherence::{Coherence, Key, Known};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mating};
 use crate::io::{Flags, Work};
+use crate::joint::Joined;
 use crate::pose::Pose;
 use crate::settings::GuidanceSettings;
 use crate::state::Placed;
@@ -33,7 +34,7 @@ use crate::step::dot;
 const LEAST_GRADIENT2: f32 = 0.01;
 /// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
 /// the other end moves half as fast again. So the approach by either is taken this many times.
-const APPROACH: f32 = 2.0;
+pub(crate) const APPROACH: f32 = 2.0;
 /// Thinning up to which some point of every leaf is looked at: leaves have 8 points.
 const LEAF_THINNING: u8 = 3;
 /// The budget counts what a look-up costs, 150 instructions. Passing over a node of which enough is known costs an eighth of that.
@@ -99,6 +100,8 @@ pub(crate) struct Job<'i> {
     pub backward: bool,
     /// A target guides to this part.
     guided: bool,
+    /// Faces that joints keep apart.
+    pub joined: Joined,
     pub nodes: &'i [NodeRecord],
     pub points: &'i [PointRecord],
     pub field: Field<'i>,
@@ -206,6 +209,9 @@ impl<'i> Search<'_, 'i> {
             self.center,
         );
         job.guided = self.guidance.concerns(part);
+        if job.guided && !job.field.is_occupancy() {
+            job.joined = self.guidance.joined(part, job.backward);
+        }
         Some(job)
     }
 
@@ -234,6 +240,11 @@ impl<'i> Search<'_, 'i> {
 }
 
 impl<'i> Job<'i> {
+    /// A point of the tree in cells from the corner of the field's grid.
+    pub fn in_cells(&self, point: &PointRecord) -> [f32; 3] {
+        self.to_cells.apply(point.position).to_array()
+    }
+
     /// Job `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
     /// the world.
     pub fn new(index: u16, held: (&Shape<'i>, Pose), other: (&Shape<'i>, Pose), center: Vec3) -> Self {
@@ -251,6 +262,7 @@ impl<'i> Job<'i> {
             index,
             backward,
             guided: false,
+            joined: Joined::new(),
             nodes: tree.nodes,
             points: tree.points,
             field: field.field,
@@ -335,6 +347,7 @@ impl Walk<'_, '_, '_> {
                 return Some(here);
             }
             let key = Key::new(job.index, index);
+            let mut asked = false;
             match self.coherence.ask(key, self.horizon) {
                 Known::Far => {
                     self.passed_over += 1;
@@ -352,6 +365,7 @@ impl Walk<'_, '_, '_> {
                         continue;
                     }
                     self.coherence.set_near(key);
+                    asked = true;
                 }
             }
             index += 1;
@@ -369,6 +383,14 @@ impl Walk<'_, '_, '_> {
                 // A leaf is looked at as a whole, unless even the whole budget would not do.
                 if (self.left() as usize) < points.len() && self.work.points > 0 {
                     return Some(here);
+                }
+                // Asked as seldom as the field is: it costs about as much as looking the points up.
+                if asked
+                    && !job.joined.is_empty()
+                    && let Some(clear) = self.joined(job, points)
+                {
+                    self.coherence.set_joined(key, clear);
+                    continue;
                 }
                 if job.field.is_occupancy() {
                     self.points::<true>(job, here, points);
@@ -502,6 +524,11 @@ impl Walk<'_, '_, '_> {
         (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
         contact.leaf = leaf;
         found.distance
+    }
+
+    /// A point's surroundings were looked at for a joint: as much as a look-up.
+    pub fn count_clearing(&mut self) {
+        self.passed_over += PASSED_OVER_PER_LOOKUP;
     }
 
     /// What was done so far, in look-ups.

@@ -105,6 +105,8 @@ pub struct GuidanceSettings {
     pub allowance_m: f32,
     /// τ: time in which the way left falls to 1/e, s. Default 20 ms.
     pub time_s: f32,
+    /// Whether mating faces that an engaged target keeps apart leave the work: nothing is felt of it. Default yes.
+    pub joints: bool,
 }
 
 /// How a target pulls.
@@ -159,6 +161,7 @@ impl Default for Settings {
                 method: GuidanceMethod::Capped,
                 allowance_m: 0.1e-3,
                 time_s: 20e-3,
+                joints: true,
             },
             limits: LimitSettings {
                 force_n: 12.0,

@@ -20,9 +20,9 @@ use heapless::Vec;
 
 use crate::contact::{Contact, Phase};
 use crate::coupling::{Coupling, Slip};
-use crate::guidance::{MAX_PULLS, Pull, Secant};
 use crate::linear::Symmetric6;
 use crate::pose::{Twist, Wrench};
+use crate::pull::{MAX_PULLS, Pull, Secant};
 use crate::settings::CouplingSettings;
 
 /// Solves allowed with contacts.

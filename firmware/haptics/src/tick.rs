@@ -82,6 +82,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     let at = At {
         scene,
         parts: &state.parts,
+        held: grabbed.part,
         object: grabbed.pose(),
         center: grabbed.center,
         length: scale,
@@ -114,12 +115,17 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     let margin = settings.contact.margin_m
         + state.braking_margin(settings)
         + settings.period_s * smaller(likely, point_speed(free.twist, reach));
+    let motions = [grabbed.twist, free.twist].map(|t| step.scale(t).map(|x| x * settings.period_s));
+    if (state.guidance).join(&at, &pulls, &motions, state.slack(settings)) {
+        state.coherence.end_joints();
+    }
     let solution = state.meet(
         scene,
         settings,
         &grabbed,
         &step,
         &free,
+        &motions,
         margin,
         guided_share,
         &mut work,
@@ -176,6 +182,7 @@ impl State {
         grabbed: &Grabbed,
         step: &Step<'_>,
         free: &Solution,
+        motions: &[[f32; 6]; 2],
         margin: f32,
         guided_share: f32,
         work: &mut Work,
@@ -189,8 +196,8 @@ impl State {
             pose: grabbed.pose(),
             center: grabbed.center,
             margin,
-            slack: larger(settings.contact.margin_m, braking_m),
-            motions: [grabbed.twist, free.twist].map(|t| step.scale(t).map(|x| x * settings.period_s)),
+            slack: self.slack(settings),
+            motions: *motions,
             swing: margin / (grabbed.body.reach * grabbed.body.reach),
             inverse_length: 1.0 / step.length,
             busy: self.busy,
@@ -250,6 +257,14 @@ impl State {
             smaller(0.5 * cell / settings.period_s, settings.object.speed_max_m_per_s)
         } else {
             settings.object.speed_max_m_per_s
+        }
+    }
+
+    /// Points that come this near are wanted, m: for the step, or for braking.
+    fn slack(&self, settings: &Settings) -> f32 {
+        match settings.integrator {
+            Integrator::Implicit => settings.contact.margin_m,
+            Integrator::Explicit => larger(settings.contact.margin_m, self.finest_cell_m),
         }
     }
 

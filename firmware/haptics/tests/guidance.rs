@@ -3,37 +3,11 @@
 mod support;
 
 use mortise_haptics::{Flags, GuidanceMethod, Output, Quat, Settings, State, TargetError, Vec3, Wrench};
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
+use mortise_protocol::message::{ConstraintTarget, Feature};
 use support::hand::{Hand, Seen, run};
-use support::{BLOCK_HALF, PEG_HALF};
+use support::{BLOCK_HALF, CAP_N, PEG_HALF, axis_on_axis};
 
-const BLOCK: u16 = 0;
 const PEG: u16 = 1;
-/// Face of the hole in the block, of the peg's side.
-const FACES: (u16, u16) = (0, 3);
-const CAP_N: f32 = 3.0;
-
-fn axis_on_axis(sequence: u16, expiry_ticks: u16) -> ConstraintTarget {
-    ConstraintTarget {
-        id: 7,
-        sequence,
-        kind: ConstraintKind::Concentric,
-        moving: Feature {
-            point: [0.0; 3],
-            direction: [0.0, 0.0, 1.0],
-        },
-        static_part: BLOCK,
-        fixed: Feature {
-            point: [0.0; 3],
-            direction: [0.0, 0.0, 1.0],
-        },
-        stiffness: 1e6,
-        force_cap: CAP_N,
-        torque_cap: 0.1,
-        expiry_ticks,
-        faces: heapless::Vec::from_slice(&[FACES]).unwrap(),
-    }
-}
 
 fn scene(clearance: f64, engaged: f64) -> support::image::Image {
     support::hole_and_peg(clearance, engaged)

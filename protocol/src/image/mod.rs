@@ -16,6 +16,7 @@ mod field;
 mod occupancy;
 mod open;
 mod records;
+mod region;
 
 pub use error::ImageError;
 pub use field::{EDGE_ERROR_CELLS, Field, FieldSample, Lookup};

@@ -244,6 +244,7 @@ impl Random {
             dropped: self.u32(),
             guidance: Guidance {
                 active: self.u8(),
+                joints: self.u8(),
                 engagement: self.f32(),
                 wrench: self.wrench(),
             },

@@ -16,6 +16,8 @@ pub struct Writer {
     cell: f64,
     /// Voxmaps instead of distance fields.
     voxmaps: bool,
+    /// Exact surfaces of faces, where solids have them.
+    surfaces: bool,
     parts: Vec<PartRecord>,
     shapes: Vec<ShapeRecord>,
     fields: Vec<FieldRecord>,
@@ -48,6 +50,7 @@ impl Writer {
         Self {
             cell,
             voxmaps: false,
+            surfaces: false,
             parts: Vec::new(),
             shapes: Vec::new(),
             fields: Vec::new(),
@@ -65,6 +68,14 @@ impl Writer {
     pub fn voxmaps(cell: f64) -> Self {
         Self {
             voxmaps: true,
+            ..Self::new(cell)
+        }
+    }
+
+    /// With exact surfaces, which cells name where they are the nearest.
+    pub fn exact(cell: f64) -> Self {
+        Self {
+            surfaces: true,
             ..Self::new(cell)
         }
     }
@@ -89,8 +100,11 @@ impl Writer {
             edge_face: p.edge_face.unwrap_or(NO_FACE),
         }));
         let first_face = self.faces.len() as u32;
-        self.faces
-            .extend((0..solid.face_count()).map(|_| FaceRecord::zeroed()));
+        let surfaces = self.surfaces;
+        self.faces.extend((0..solid.face_count()).map(|face| {
+            let surface = solid.surface(face as u16).filter(|_| surfaces);
+            surface.unwrap_or_else(FaceRecord::zeroed)
+        }));
         let half = solid.half_size();
         let mass = solid.mass_properties();
         self.shapes.push(ShapeRecord {
@@ -234,18 +248,34 @@ impl Writer {
         }
         pad(&mut self.blob);
         let indices = self.blob.len() as u32;
+        let mut entries: Vec<u16> = Vec::new();
         for i in 0..CELLS_PER_BRICK {
             let (n, n2) = (BRICK_CELLS, BRICK_CELLS * BRICK_CELLS);
             let center = [(i % n) as f64, (i / n % n) as f64, (i / n2) as f64].map(|c| c + 0.5);
-            self.blob.push(solid.face(at(center)) as u8);
+            let face = solid.face(at(center));
+            if !self.surfaces {
+                self.blob.push(face as u8);
+                continue;
+            }
+            let entry = match solid.surface(face) {
+                Some(surface) if exact_in_cell(solid, &surface, center, &at) => Nearby::Face(face),
+                _ => Nearby::Roughly(face),
+            };
+            let known = entries.iter().position(|&e| e == entry.to_bits(0));
+            self.blob.push(known.unwrap_or(entries.len()) as u8);
+            if known.is_none() {
+                entries.push(entry.to_bits(0));
+            }
         }
         let palette = self.palette.len() as u32;
-        self.palette.extend(0..256u16);
+        let palette_len = if self.surfaces { entries.len() as u16 } else { 256 };
+        entries.extend(entries.len() as u16..256);
+        self.palette.extend(entries);
         self.bricks.push(BrickRecord {
             samples: offset,
             indices,
             palette,
-            palette_len: 256,
+            palette_len,
             index_bits: 8,
         });
     }
@@ -357,6 +387,30 @@ impl Voxmap {
         }
         (self.at(g.map(|x| x as usize)), center)
     }
+}
+
+/// Whether `surface` has the solid's distance at all corners of the cell with this centre.
+fn exact_in_cell(
+    solid: &dyn Solid,
+    surface: &FaceRecord,
+    center: [f64; 3],
+    at: &impl Fn([f64; 3]) -> [f64; 3],
+) -> bool {
+    (0..8).all(|corner| {
+        let p = at(core::array::from_fn(|a| {
+            center[a] + f64::from(corner >> a & 1) - 0.5
+        }));
+        let from: [f64; 3] = core::array::from_fn(|a| p[a] - f64::from(surface.origin[a]));
+        let along: f64 = (0..3).map(|a| from[a] * f64::from(surface.axis[a])).sum();
+        let natural = match surface.kind {
+            surface_kind::PLANE => along,
+            surface_kind::CYLINDER => {
+                (from.iter().map(|x| x * x).sum::<f64>() - along * along).sqrt() - f64::from(surface.radius)
+            }
+            _ => return false,
+        };
+        (natural * f64::from(surface.sense) - solid.distance(p)).abs() < 1e-8
+    })
 }
 
 fn section<T: Pod>(bytes: &mut Vec<u8>, records: &[T]) -> Section {

@@ -6,6 +6,7 @@ pub mod image;
 pub mod solids;
 
 use image::{Image, Writer};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 use solids::{Block, Peg};
 
 pub const UPRIGHT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
@@ -20,6 +21,11 @@ pub const PEG_HALF: f64 = 15e-3;
 /// below the block's top.
 pub fn hole_and_peg(clearance: f64, engaged: f64) -> Image {
     hole_and_peg_in(Writer::new(0.5e-3), clearance, engaged)
+}
+
+/// The same with exact surfaces.
+pub fn exact_hole_and_peg(clearance: f64, engaged: f64) -> Image {
+    hole_and_peg_in(Writer::exact(0.5e-3), clearance, engaged)
 }
 
 /// The same in voxmaps.
@@ -84,5 +90,30 @@ pub fn box_of(across: usize) -> Block {
         hole: 0.0,
         around: 0,
         across,
+    }
+}
+
+/// Largest force of [`axis_on_axis`], N.
+pub const CAP_N: f32 = 3.0;
+
+/// A target that keeps the peg of [`hole_and_peg`] on the axis of the hole.
+pub fn axis_on_axis(sequence: u16, expiry_ticks: u16) -> ConstraintTarget {
+    let axis = Feature {
+        point: [0.0; 3],
+        direction: [0.0, 0.0, 1.0],
+    };
+    ConstraintTarget {
+        id: 7,
+        sequence,
+        kind: ConstraintKind::Concentric,
+        moving: axis,
+        static_part: 0,
+        fixed: axis,
+        stiffness: 1e6,
+        force_cap: CAP_N,
+        torque_cap: 0.1,
+        expiry_ticks,
+        // The peg's side, the hole.
+        faces: heapless::Vec::from_slice(&[(0, 3)]).unwrap(),
     }
 }

@@ -2,6 +2,29 @@
 
 use core::f64::consts::TAU;
 
+use mortise_protocol::image::{FaceRecord, surface_kind};
+
+/// A plane across z at `z`, its outward normal along `sense`·z.
+fn plane(z: f64, sense: f32) -> FaceRecord {
+    FaceRecord {
+        kind: surface_kind::PLANE,
+        sense,
+        origin: [0.0, 0.0, z as f32],
+        axis: [0.0, 0.0, 1.0],
+        radius: 0.0,
+        second: 0.0,
+    }
+}
+
+/// A cylinder about z.
+fn cylinder(radius: f64, sense: f32) -> FaceRecord {
+    FaceRecord {
+        kind: surface_kind::CYLINDER,
+        radius: radius as f32,
+        ..plane(0.0, sense)
+    }
+}
+
 /// A sample of a surface.
 #[derive(Clone, Copy)]
 pub struct SurfacePoint {
@@ -17,6 +40,10 @@ pub trait Solid {
     /// Nearest face.
     fn face(&self, p: [f64; 3]) -> u16;
     fn face_count(&self) -> u32;
+    /// The exact surface under a face, where it has one.
+    fn surface(&self, _face: u16) -> Option<FaceRecord> {
+        None
+    }
     fn half_size(&self) -> [f64; 3];
     fn points(&self) -> Vec<SurfacePoint>;
     /// Volume, and diagonal of the inertia at unit density.
@@ -56,6 +83,14 @@ impl Solid for Peg {
 
     fn face_count(&self) -> u32 {
         3
+    }
+
+    fn surface(&self, face: u16) -> Option<FaceRecord> {
+        Some(match face {
+            0 => cylinder(self.radius, 1.0),
+            1 => plane(-self.half_length, -1.0),
+            _ => plane(self.half_length, 1.0),
+        })
     }
 
     fn half_size(&self) -> [f64; 3] {
@@ -158,6 +193,16 @@ impl Solid for Block {
 
     fn face_count(&self) -> u32 {
         4
+    }
+
+    fn surface(&self, face: u16) -> Option<FaceRecord> {
+        match face {
+            0 => Some(plane(self.half[2], 1.0)),
+            1 => Some(plane(-self.half[2], -1.0)),
+            3 => Some(cylinder(self.hole, -1.0)),
+            // Four planes in one.
+            _ => None,
+        }
     }
 
     fn half_size(&self) -> [f64; 3] {

@@ -1,0 +1,136 @@
+//! One pull of a target within a step: stiff at first, never more than its cap, and damped while it lets go.
+//!
+//! A cap makes the step's equations nonlinear. Each solve takes the spring and the damper that pull as hard at the last solution (the secant) in its
+//! place; a few solves settle it.
+
+use glam::Vec3;
+use mortise_protocol::limits::MAX_TARGETS;
+
+use crate::constraint::Rows;
+use crate::linear::Symmetric6;
+use crate::pose::Wrench;
+use crate::step::dot;
+
+/// Damping of what a target that ends lets go, N s/m.
+const LETTING_GO: f32 = 200.0;
+/// Its largest force, N.
+pub(crate) const LETTING_GO_N: f32 = 1.0;
+/// Two pulls for each target: offset and angle.
+pub(crate) const MAX_PULLS: usize = 2 * MAX_TARGETS;
+/// One saturating spring of a target, within a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Pull {
+    /// Place of its target among all.
+    pub slot: u8,
+    /// Of the angle, not the offset.
+    pub turns: bool,
+    /// What must vanish.
+    pub rows: Rows,
+    /// Σ JᵀJ.
+    product: Symmetric6,
+    /// Σ e·Jᵀ.
+    along: [f32; 6],
+    law: Law,
+    /// Largest force of the damper that lets go, N.
+    damper_n: f32,
+}
+
+/// The spring (N/m) and the damper (N s/m) that pull as hard as a saturating pull does at one solution.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Secant {
+    spring: f32,
+    damper: f32,
+}
+
+impl Secant {
+    /// Whether another is the same but for this share.
+    pub fn is_near(&self, other: &Self, share: f32) -> bool {
+        (self.spring - other.spring).abs() <= share * other.spring
+            && (self.damper - other.damper).abs() <= share * other.damper
+    }
+}
+
+/// How a pull grows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Law {
+    /// Stiff up to a cap: k (N/m), cap (N), h + τ (s).
+    Capped { stiffness: f32, cap: f32, ahead: f32 },
+    /// A plain spring: k (N/m), h (s).
+    Spring { stiffness: f32, ahead: f32 },
+}
+
+impl Pull {
+    /// Of which target, and whether of its angle; `damper_n`: largest force of the damper that lets go.
+    pub fn new((slot, turns): (u8, bool), rows: Rows, law: Law, damper_n: f32) -> Self {
+        let mut product = Symmetric6::ZERO;
+        let mut along = [0.0; 6];
+        for (row, error) in &rows.rows {
+            product.add_outer(1.0, row);
+            for (a, j) in along.iter_mut().zip(row) {
+                *a += error * j;
+            }
+        }
+        Self {
+            slot,
+            turns,
+            rows,
+            product,
+            along,
+            law,
+            damper_n,
+        }
+    }
+
+    /// At the step's end `x`.
+    pub fn secant(&self, x: &[f32; 6]) -> Secant {
+        let spring = match self.law {
+            Law::Spring { stiffness, .. } => stiffness,
+            Law::Capped {
+                stiffness,
+                cap,
+                ahead,
+            } => saturating(stiffness, cap, self.rows.error(x, ahead)),
+        };
+        let damper = if self.damper_n > 0.0 {
+            saturating(LETTING_GO, self.damper_n, self.rows.speed(x))
+        } else {
+            0.0
+        };
+        Secant { spring, damper }
+    }
+
+    /// Adds what the spring and the damper add to the step's matrix and right side.
+    pub fn add(&self, secant: Secant, period_s: f32, matrix: &mut Symmetric6, right: &mut [f32; 6]) {
+        let impulse = secant.spring * period_s;
+        matrix.add_scaled(impulse * self.ahead() + secant.damper * period_s, &self.product);
+        for (r, a) in right.iter_mut().zip(&self.along) {
+            *r -= impulse * a;
+        }
+    }
+
+    fn ahead(&self) -> f32 {
+        match self.law {
+            Law::Capped { ahead, .. } | Law::Spring { ahead, .. } => ahead,
+        }
+    }
+
+    /// On the object at its centre of mass.
+    pub fn wrench(&self, x: &[f32; 6], length: f32) -> Wrench {
+        let secant = self.secant(x);
+        let mut wrench = Wrench::ZERO;
+        for (row, error) in &self.rows.rows {
+            let rate = dot(row, x);
+            let f = -secant.spring * (error + self.ahead() * rate) - secant.damper * rate;
+            wrench.force += Vec3::new(row[0], row[1], row[2]) * f;
+            wrench.torque += Vec3::new(row[3], row[4], row[5]) * (f * length);
+        }
+        wrench
+    }
+}
+
+/// Force over u of a pull that is k·u at first and never more than `cap`: cap/√((cap/k)² + u²).
+fn saturating(k: f32, cap: f32, u: f32) -> f32 {
+    let slack = cap / k;
+    let length = libm::sqrtf(slack * slack + u * u);
+    if length > 0.0 { cap / length } else { 0.0 }
+}
