@@ -107,7 +107,13 @@ fn curvature(face: &FaceRecord, p: Vec3) -> f32 {
 /// be taken. Outside an edge or corner it is no more than the distance. About 50 instructions a face on a Cortex-M7; [`normal`] as much again.
 #[inline]
 pub(crate) fn exact(faces: &[FaceRecord], sample: &FieldSample, p: Vec3) -> Option<(f32, u16)> {
-    match sample.nearby {
+    exact_by(faces, sample.nearby, p)
+}
+
+/// As [`exact`], by what a sample has nearby.
+#[inline(always)]
+pub(crate) fn exact_by(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
+    match nearby {
         Nearby::Face(face) => distance(faces, face, p).map(|d| (d, face)),
         Nearby::Convex(group) => extreme(faces, group, p, 1.0),
         Nearby::Reentrant(group) => extreme(faces, group, p, -1.0),
@@ -162,19 +168,27 @@ pub(crate) fn agreeing(shape: &Shape<'_>, face: u16, p: Vec3, distance: f32) -> 
     ((exact - distance).abs() <= tolerance).then_some(exact)
 }
 
-/// Distance from `p` to the shape's faces and edges, and with `corners` to samples of edges and corners too (one corner against another is
-/// found in no other way), never negative; none when a face without closed form could be nearer, or no foot was found.
+/// Whether every face has a closed form, so that [`unsigned_distance`] can be had at all.
+pub(crate) fn closed_form(shape: &Shape<'_>) -> bool {
+    shape.faces.iter().all(|face| face.kind != surface_kind::OTHER)
+}
+
+/// Distance from `p` to a shape's faces and edges, all of [`closed_form`], and with `corners` to samples of edges and corners too (one corner
+/// against another is found in no other way), never negative; none when no foot was found.
 ///
 /// Where it is no less than `enough`, it is given as `enough`.
 pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, corners: bool, enough: f32) -> Option<f32> {
-    if shape.faces.iter().any(|face| face.kind == surface_kind::OTHER) {
-        return None;
-    }
     let near_edge = NEAR_EDGE_CELLS * shape.field.record().cell;
     let mut best = enough;
+    // Faces that are near; one whose foot is not unique may be.
+    let mut near = 0;
     for (a, face) in shape.faces.iter().enumerate() {
-        let Some(foot_a) = foot(face, p) else { continue };
+        let Some(foot_a) = foot(face, p) else {
+            near += 1;
+            continue;
+        };
         let distance = foot_a.distance.abs();
+        near += usize::from(distance < enough);
         if distance < best && on_surface(shape, foot_a.point) {
             let beyond = shape.faces.iter().enumerate().any(|(b, other)| {
                 a != b
@@ -185,6 +199,10 @@ pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, corners: bool, enoug
                 best = distance;
             }
         }
+    }
+    // An edge or corner lies on two faces at least, and is no nearer than they.
+    if near < 2 {
+        return best.is_finite().then_some(best);
     }
     for (a, face) in shape.faces.iter().enumerate() {
         let nearer = |face, best| foot(face, p).is_some_and(|f| f.distance.abs() < best);
@@ -204,28 +222,39 @@ pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, corners: bool, enoug
         }
     }
     if corners {
-        let nearest = nearest_edge_point(shape, p, best);
-        if nearest < best {
-            best = nearest;
-        }
+        best = nearest_edge_point(shape, p, best);
     }
     best.is_finite().then_some(best)
 }
 
-/// Distance from `p` to the nearest sample of an edge or corner, never less than that to the surface; infinite when none can be nearer than
-/// `enough`: each lies on two faces at least, and is no nearer than they.
+/// Distance from `p` to the nearest sample of an edge or corner, never less than that to the surface, or `enough` when all are farther.
 fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
-    let near = (shape.faces.iter())
-        .filter(|face| foot(face, p).is_none_or(|f| f.distance.abs() < enough))
-        .count();
-    if near < 2 {
-        return f32::INFINITY;
+    let mut best = enough;
+    let mut index = 0;
+    while let Some(node) = shape.nodes.get(index) {
+        let reach = best + node.radius;
+        if (Vec3::from_array(node.center) - p).length_squared() > reach * reach {
+            index = node.skip as usize;
+            continue;
+        }
+        index += 1;
+        if node.skip as usize != index {
+            continue;
+        }
+        let first = node.first_point as usize;
+        let points = shape.points.get(first..first + node.point_count as usize);
+        for point in points
+            .unwrap_or(&[])
+            .iter()
+            .filter(|point| point.edge_face != NO_FACE)
+        {
+            let squared = (Vec3::from_array(point.position) - p).length_squared();
+            if squared < best * best {
+                best = libm::sqrtf(squared);
+            }
+        }
     }
-    let squared = (shape.points.iter())
-        .filter(|point| point.edge_face != NO_FACE)
-        .map(|point| (Vec3::from_array(point.position) - p).length_squared())
-        .fold(f32::INFINITY, |a, b| if b < a { b } else { a });
-    libm::sqrtf(squared)
+    best
 }
 
 /// Whether the field has the surface at `p`, as well as it can tell.

@@ -1,60 +1,203 @@
 //! The smallest gap or largest depth of two parts: branch and bound over the same trees and fields the search for contacts walks.
 //!
-//! A sphere whose lower bound exceeds the smallest gap found so far holds nothing nearer. To have a good first one, the walk goes down
-//! once by the nearer child.
+//! A sphere whose lower bound exceeds the smallest gap found so far holds nothing nearer. One walk each way takes all that a look-up settles by
+//! an analytic face, and offers what overlaps as contacts; until it has found something in the band, leaves beyond the band wait, for their bounds
+//! are loose and seldom needed after. A last walk each way takes what waited, and measures against all faces the points left over that could still
+//! be nearest; when the band held nothing, it goes down by the nearer child first, for a first gap to compare with.
 
 use glam::Vec3;
-use mortise_protocol::image::{EDGE_ERROR_CELLS, Lookup, NO_FACE, Nearby, PointRecord, Shape};
+use mortise_protocol::image::{EDGE_ERROR_CELLS, NO_FACE, Nearby, NodeRecord, PointRecord, Shape};
 
-use crate::analytic::{agreeing, exact, unsigned_distance};
+use crate::analytic::{agreeing, closed_form, exact_by, normal, unsigned_distance};
 use crate::io::Work;
 use crate::probe::Nearest;
-use crate::proximity::Job;
+use crate::proximity::{Found, Job, Walk};
 
 /// The diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
 
-/// A search under way.
-pub(crate) struct NearestSearch<'s, 'i> {
-    /// The job.
-    pub job: &'s Job<'i>,
-    /// The shape whose field it looks up.
-    pub shape: &'s Shape<'i>,
-    /// The smallest so far.
+/// What was found so far, both ways.
+pub(crate) struct SoFar {
+    /// The smallest.
     pub best: Nearest,
     /// What was looked at.
     pub work: Work,
+}
+
+impl SoFar {
+    /// What is farther than this is neither nearest nor overlaps, m.
+    #[inline]
+    fn limit(&self) -> f32 {
+        if self.best.distance_m > 0.0 {
+            self.best.distance_m
+        } else {
+            0.0
+        }
+    }
+}
+
+/// One way of a search.
+pub(crate) struct NearestSearch<'s, 'i> {
+    job: &'s Job<'i>,
+    /// The shape whose field it looks up.
+    shape: &'s Shape<'i>,
+    /// Distances are stored up to here, m.
+    band: f32,
     /// Interpolated distances are good up to here, m.
     resolved: f32,
     /// What interpolation may overstate, m.
     edge_error: f32,
+    /// All faces of the shape have a closed form: what the field leaves open can be measured.
+    measurable: bool,
+    /// None of the points left over is nearer than this, m.
+    left_over: f32,
+    /// Leaves beyond the band wait before this node.
+    waiting: u32,
+    /// None in the leaves that wait is nearer than this, m.
+    waits_beyond: f32,
+}
+
+/// A leaf that is to be looked at.
+struct Leaf<'i> {
+    node: u32,
+    points: &'i [PointRecord],
+    /// No point of it is nearer, m.
+    bound: f32,
+    /// Its centre lies beyond the band: its points are not expected to be nearest.
+    beyond: bool,
+}
+
+/// Points of a leaf.
+fn points<'i>(job: &Job<'i>, leaf: &NodeRecord) -> &'i [PointRecord] {
+    let first = leaf.first_point as usize;
+    (job.points.get(first..first + leaf.point_count as usize)).unwrap_or(&[])
+}
+
+/// A point as one look-up has it.
+struct Seen {
+    /// Its distance: that to the face where it is `settled`, else as interpolated or a bound, m.
+    distance: f32,
+    /// It is no nearer than this, m.
+    least: f32,
+    /// As the tick has it, m; infinite where nothing is stored.
+    rendered: f32,
+    /// The tick may push it.
+    overlaps: bool,
+    inside: bool,
+    /// Nearest face, if known.
+    face: u16,
+    in_band: bool,
+    /// An edge itself is nearest: the surfaces give a bound only.
+    edge_nearest: bool,
+    /// `distance` is that to an analytic face.
+    settled: bool,
+}
+
+impl Seen {
+    /// Neither inside nor in the band.
+    const NOTHING: Self = Self {
+        distance: f32::INFINITY,
+        least: f32::INFINITY,
+        rendered: f32::INFINITY,
+        overlaps: false,
+        inside: false,
+        face: NO_FACE,
+        in_band: false,
+        edge_nearest: false,
+        settled: false,
+    };
 }
 
 impl<'s, 'i> NearestSearch<'s, 'i> {
-    /// Walks the whole job.
-    pub fn run(job: &'s Job<'i>, shape: &'s Shape<'i>, best: Nearest, work: Work) -> (Nearest, Work) {
+    /// About to begin.
+    pub fn new(job: &'s Job<'i>, shape: &'s Shape<'i>) -> Self {
         let record = shape.field.record();
-        let mut search = Self {
+        Self {
             job,
             shape,
-            best,
-            work,
+            band: record.band,
             resolved: record.band - DIAGONAL_CELLS * record.cell,
             edge_error: EDGE_ERROR_CELLS * record.cell,
-        };
-        search.first();
-        search.all();
-        (search.best, search.work)
+            measurable: closed_form(shape),
+            left_over: f32::INFINITY,
+            waiting: 0,
+            waits_beyond: f32::INFINITY,
+        }
     }
 
-    /// Down by the nearer child, to one leaf. Every step goes forward, so it ends.
-    fn first(&mut self) {
+    /// All leaves that could hold the nearest point or one that overlaps, as far as a look-up settles their points. What overlaps goes to
+    /// `contacts`. Leaves beyond the band wait as long as nothing in the band was found.
+    pub fn walk(&mut self, so_far: &mut SoFar, contacts: &mut Walk<'_, '_, '_>) {
+        self.leaves(so_far, u32::MAX, |search, so_far, leaf| {
+            if so_far.best.distance_m > search.band {
+                search.waiting = leaf.node + 1;
+                if leaf.beyond {
+                    search.waits_beyond = search.waits_beyond.min(leaf.bound);
+                    return;
+                }
+            }
+            for point in leaf.points {
+                let seen = search.see(point);
+                if seen.overlaps {
+                    contacts.one(search.job, leaf.node, point, search.found(&seen, point));
+                }
+                if !search.settle(&seen, point, so_far) {
+                    search.left_over = search.left_over.min(seen.least);
+                }
+            }
+            so_far.work.points += leaf.points.len() as u32;
+        });
+    }
+
+    /// What [`Self::walk`] left over: leaves that waited, and points to be measured.
+    pub fn rest(&mut self, so_far: &mut SoFar, contacts: &mut Walk<'_, '_, '_>) {
+        let needed = |least: f32, limit: f32| least < f32::INFINITY && least <= limit;
+        if needed(self.waits_beyond, so_far.limit()) && so_far.best.distance_m > self.band {
+            self.first(so_far);
+        }
+        let measure = needed(self.left_over, so_far.best.distance_m);
+        let end = match (measure, needed(self.waits_beyond, so_far.limit())) {
+            (true, _) => u32::MAX,
+            (false, true) => self.waiting,
+            (false, false) => return,
+        };
+        self.leaves(so_far, end, |search, so_far, leaf| {
+            let waited = leaf.beyond && leaf.node < search.waiting;
+            if !waited && !measure {
+                return;
+            }
+            for point in leaf.points {
+                let seen = search.see(point);
+                if waited && seen.overlaps {
+                    contacts.one(search.job, leaf.node, point, search.found(&seen, point));
+                }
+                if waited || !seen.settled {
+                    search.measure(&seen, point, so_far);
+                }
+            }
+            so_far.work.points += leaf.points.len() as u32;
+        });
+    }
+
+    /// Down by the nearer child, to one leaf; measures the point of it that seems nearest. Every step goes forward, so it ends.
+    fn first(&mut self, so_far: &mut SoFar) {
         let nodes = self.job.nodes;
         let mut index = 0;
         while let Some(node) = nodes.get(index) {
             let end = node.skip as usize;
             if end == index + 1 {
-                self.leaf(index);
+                let mut nearest = None;
+                for point in points(self.job, node) {
+                    so_far.work.points += 1;
+                    let seen = self.see(point);
+                    if (nearest.as_ref()).is_none_or(|(other, _): &(Seen, _)| seen.distance < other.distance)
+                    {
+                        nearest = Some((seen, point));
+                    }
+                }
+                if let Some((seen, point)) = nearest {
+                    self.measure(&seen, point, so_far);
+                }
                 return;
             }
             let mut child = index + 1;
@@ -62,7 +205,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             while child < end
                 && let Some(node) = nodes.get(child)
             {
-                let bound = self.bound(child);
+                let (bound, _) = self.bound(node, so_far);
                 if bound < nearest.0 {
                     nearest = (bound, child);
                 }
@@ -72,100 +215,188 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
     }
 
-    fn all(&mut self) {
-        let nodes = self.job.nodes;
+    /// Gives `look` every leaf before node `end` in which a point could be nearer than the nearest so far, or overlap.
+    #[inline]
+    fn leaves(
+        &mut self,
+        so_far: &mut SoFar,
+        end: u32,
+        mut look: impl FnMut(&mut Self, &mut SoFar, Leaf<'i>),
+    ) {
+        let nodes = self.job.nodes.get(..end as usize).unwrap_or(self.job.nodes);
         let mut index = 0;
         while let Some(node) = nodes.get(index) {
-            if self.bound(index) > self.best.distance_m {
+            let (bound, beyond) = self.bound(node, so_far);
+            if bound > so_far.limit() {
                 index = node.skip as usize;
                 continue;
             }
             if node.skip as usize == index + 1 {
-                self.leaf(index);
+                let points = points(self.job, node);
+                look(
+                    self,
+                    so_far,
+                    Leaf {
+                        node: index as u32,
+                        points,
+                        bound,
+                        beyond,
+                    },
+                );
             }
             index += 1;
         }
     }
 
-    /// Lower bound of the signed distance of any point below a node, m.
-    fn bound(&mut self, index: usize) -> f32 {
-        self.work.nodes += 1;
-        let Some(node) = self.job.nodes.get(index) else {
-            return f32::INFINITY;
-        };
-        let center = self.job.to_field.apply(node.center);
-        let distance = self.job.field.bound(center.to_array());
+    /// Lower bound of the signed distance of any point below a node, m; and whether its centre lies beyond the band.
+    #[inline(always)]
+    fn bound(&self, node: &NodeRecord, so_far: &mut SoFar) -> (f32, bool) {
+        so_far.work.nodes += 1;
+        let center = self.job.to_cells.apply(node.center);
+        let distance = self.job.field.bound_at(center.to_array());
         // Inside, a clamped distance and a bound beyond the band say how deep at least, not at most.
         if distance < -self.resolved {
-            return f32::NEG_INFINITY;
+            return (f32::NEG_INFINITY, false);
         }
-        distance - (node.radius + self.edge_error)
+        // No sample is larger than the band: this is no interpolation.
+        let beyond = distance > self.band + self.edge_error;
+        let error = if beyond { 0.0 } else { self.edge_error };
+        (distance - (node.radius + error), beyond)
     }
 
-    fn leaf(&mut self, index: usize) {
-        let Some(node) = self.job.nodes.get(index) else {
-            return;
-        };
-        let first = node.first_point as usize;
-        let points = self.job.points.get(first..first + node.point_count as usize);
-        for point in points.unwrap_or(&[]) {
-            self.point(point);
-        }
+    #[inline(always)]
+    fn in_field(&self, point: &PointRecord) -> Vec3 {
+        self.job.to_field.apply(point.position)
     }
 
-    fn point(&mut self, point: &PointRecord) {
-        self.work.points += 1;
-        let p = self.job.to_field.apply(point.position);
-        let mut found = self.job.field.lookup(p.to_array());
-        let mut edge_error = self.edge_error;
-        // Where an edge itself is nearest, the surfaces give a bound only.
-        let mut edge_nearest = false;
-        if let Lookup::Near(s) = &mut found {
-            let mut rendered = s.distance;
-            if let Some((distance, face)) = exact(self.shape.faces, s, p) {
-                rendered = distance;
-                edge_nearest = match s.nearby {
-                    Nearby::Convex(_) => distance > 0.0,
-                    Nearby::Reentrant(_) => distance < 0.0,
-                    _ => false,
-                };
-                if !edge_nearest {
-                    (s.distance, s.face) = (distance, face);
-                    edge_error = 0.0;
+    /// Looks a point up.
+    #[inline(always)]
+    fn see(&self, point: &PointRecord) -> Seen {
+        let in_cells = self.job.to_cells.apply(point.position).to_array();
+        match self.job.field.nearby_at(in_cells) {
+            Ok(nearby) => {
+                let exact = exact_by(self.shape.faces, nearby, self.in_field(point));
+                if let Some((distance, face)) = exact
+                    && distance.abs() <= self.resolved
+                    && match nearby {
+                        Nearby::Convex(_) => distance <= 0.0,
+                        Nearby::Reentrant(_) => distance >= 0.0,
+                        _ => true,
+                    }
+                {
+                    return Seen {
+                        distance,
+                        least: distance,
+                        rendered: distance,
+                        overlaps: distance < 0.0,
+                        inside: distance < 0.0,
+                        face,
+                        in_band: true,
+                        edge_nearest: false,
+                        settled: true,
+                    };
+                }
+                self.interpolated(in_cells, nearby, exact)
+            }
+            Err(bound) => {
+                // Inside a bound says how deep at least, not at most.
+                let inside = bound < 0.0;
+                Seen {
+                    distance: bound,
+                    least: if inside { f32::NEG_INFINITY } else { bound },
+                    overlaps: inside,
+                    inside,
+                    ..Seen::NOTHING
                 }
             }
-            // As the tick has it.
-            if rendered < self.best.field_distance_m {
-                self.best.field_distance_m = rendered;
-            }
         }
-        // (field's distance, no more than the distance, inside, nearest face if known)
-        let (field, least, inside, face) = match found {
-            Lookup::Near(s) if s.distance >= -self.resolved => {
-                (s.distance, s.distance - edge_error, s.distance < 0.0, s.face)
-            }
-            Lookup::Near(s) => (s.distance, f32::NEG_INFINITY, true, s.face),
-            Lookup::Far { inside: false, bound } => (bound, bound, false, NO_FACE),
-            Lookup::Far { inside: true, bound } => (-bound, f32::NEG_INFINITY, true, NO_FACE),
+    }
+
+    /// Looks up what its cell's faces do not settle; `exact` is what they give.
+    fn interpolated(&self, in_cells: [f32; 3], nearby: Nearby, exact: Option<(f32, u16)>) -> Seen {
+        let interpolated = self.job.field.bound_at(in_cells);
+        let mut seen = Seen {
+            distance: interpolated,
+            least: interpolated - self.edge_error,
+            rendered: interpolated,
+            face: nearby.face(),
+            ..Seen::NOTHING
         };
-        if least > self.best.distance_m {
-            return;
-        }
-        let in_band = face != NO_FACE && field.abs() <= self.resolved;
-        let edge = point.edge_face != NO_FACE;
-        let refined = self.refined(p, edge, edge_nearest, field, inside, face, in_band);
-        let distance_m = refined.unwrap_or(field);
-        if distance_m < self.best.distance_m {
-            let (moving_face, fixed_face) = if self.job.backward {
-                (face, point.face)
-            } else {
-                (point.face, face)
+        if let Some((distance, face)) = exact {
+            seen.rendered = distance;
+            seen.edge_nearest = match nearby {
+                Nearby::Convex(_) => distance > 0.0,
+                Nearby::Reentrant(_) => distance < 0.0,
+                _ => false,
             };
-            self.best = Nearest {
+            if !seen.edge_nearest {
+                (seen.distance, seen.least, seen.face) = (distance, distance, face);
+            } else if distance > seen.least && distance > 0.0 {
+                // Outside a convex edge the surfaces give no more than the distance.
+                seen.least = distance;
+            }
+        }
+        seen.overlaps = seen.rendered < 0.0;
+        seen.inside = seen.distance < 0.0;
+        seen.in_band = seen.face != NO_FACE && seen.distance.abs() <= self.resolved;
+        if seen.distance < -self.resolved {
+            seen.least = f32::NEG_INFINITY;
+        }
+        seen
+    }
+
+    /// What pushes a settled point.
+    fn found(&self, seen: &Seen, point: &PointRecord) -> Option<Found> {
+        if !seen.settled {
+            return None;
+        }
+        let (distance, face) = (seen.distance, seen.face);
+        let normal = normal(self.shape.faces, face, self.in_field(point))?;
+        Some(Found {
+            distance,
+            normal,
+            face,
+        })
+    }
+
+    /// Takes a point if what was seen settles it; whether it is done with.
+    #[inline(always)]
+    fn settle(&self, seen: &Seen, point: &PointRecord, so_far: &mut SoFar) -> bool {
+        if seen.rendered < so_far.best.field_distance_m {
+            so_far.best.field_distance_m = seen.rendered;
+        }
+        if seen.least > so_far.best.distance_m {
+            return true;
+        }
+        let exact = self.at_face(seen, point);
+        if exact.is_none() && self.measurable {
+            return false;
+        }
+        self.take(seen, exact, point, so_far);
+        true
+    }
+
+    /// Takes a point by what tells its distance best.
+    fn measure(&self, seen: &Seen, point: &PointRecord, so_far: &mut SoFar) {
+        if !self.settle(seen, point, so_far) {
+            let exact = self.measured(seen, point, so_far.best.distance_m);
+            self.take(seen, exact, point, so_far);
+        }
+    }
+
+    fn take(&self, seen: &Seen, exact: Option<f32>, point: &PointRecord, so_far: &mut SoFar) {
+        let distance_m = exact.unwrap_or(seen.distance);
+        if distance_m < so_far.best.distance_m {
+            let (moving_face, fixed_face) = if self.job.backward {
+                (seen.face, point.face)
+            } else {
+                (point.face, seen.face)
+            };
+            so_far.best = Nearest {
                 distance_m,
-                field_distance_m: self.best.field_distance_m,
-                exact: refined.is_some(),
-                in_band,
+                field_distance_m: so_far.best.field_distance_m,
+                exact: exact.is_some(),
+                in_band: seen.in_band,
                 arm: self.job.to_arm.apply(point.position),
                 moving_face,
                 fixed_face,
@@ -173,40 +404,34 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
     }
 
-    /// Distance by the analytic faces, if it can be had and does not contradict the field.
-    #[expect(clippy::too_many_arguments, reason = "what one look-up found")]
-    fn refined(
-        &self,
-        p: Vec3,
-        edge: bool,
-        edge_nearest: bool,
-        field: f32,
-        inside: bool,
-        face: u16,
-        in_band: bool,
-    ) -> Option<f32> {
-        if in_band
-            && !edge_nearest
-            && let Some(exact) = agreeing(self.shape, face, p, field)
-        {
-            return Some(exact);
+    /// Distance to the nearest face's surface, where that is the distance.
+    #[inline(always)]
+    fn at_face(&self, seen: &Seen, point: &PointRecord) -> Option<f32> {
+        if seen.settled {
+            return Some(seen.distance);
         }
+        if seen.in_band && !seen.edge_nearest {
+            return agreeing(self.shape, seen.face, self.in_field(point), seen.distance);
+        }
+        None
+    }
+
+    /// Distance by all faces, if it can be had and does not contradict the field; `best`, or more, where it is no less.
+    fn measured(&self, seen: &Seen, point: &PointRecord, best: f32) -> Option<f32> {
+        let field = seen.distance;
         // Outside, what is no nearer than the nearest so far need not be known.
-        let outside = if in_band { field >= 0.0 } else { !inside };
-        let enough = if outside {
-            self.best.distance_m
-        } else {
-            f32::INFINITY
-        };
-        let distance = unsigned_distance(self.shape, p, edge, enough)?;
+        let outside = if seen.in_band { field >= 0.0 } else { !seen.inside };
+        let enough = if outside { best } else { f32::INFINITY };
+        let edge = point.edge_face != NO_FACE;
+        let distance = unsigned_distance(self.shape, self.in_field(point), edge, enough)?;
         if outside && distance >= enough {
             return Some(distance);
         }
-        if in_band {
+        if seen.in_band {
             // Next to an edge the sign is the field's only where that is sure of it.
             let signed = if field < 0.0 { -distance } else { distance };
             ((signed - field).abs() <= self.edge_error).then_some(signed)
-        } else if inside {
+        } else if seen.inside {
             (distance >= -field - self.edge_error).then_some(-distance)
         } else {
             (distance >= field - self.edge_error).then_some(distance)

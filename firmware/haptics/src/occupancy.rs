@@ -9,10 +9,11 @@
 //! voxels only brake, and only with [`crate::Integrator::Explicit`]. Unlike it, the force layer is where the surface is, not two voxels outside.
 
 use glam::Vec3;
-use mortise_protocol::image::{PointRecord, Shape, Voxel, VoxelSample, oct_decode};
+use mortise_protocol::image::{PointRecord, Voxel, VoxelSample, oct_decode};
 
 use crate::contact::Phase;
-use crate::io::{Flags, Work};
+use crate::io::Flags;
+use crate::nearest::SoFar;
 use crate::probe::Nearest;
 use crate::proximity::{Job, Leaf, Walk, inverse_sqrt};
 
@@ -96,17 +97,13 @@ impl Walk<'_, '_, '_> {
 /// The deepest point of a job against a voxmap, as the method has it: depth to a tangent plane, else no more than a lower bound of the gap.
 ///
 /// Looks at every point that is not known to be farther from all surface voxels than the nearest so far.
-pub(crate) fn nearest_voxel(
-    job: &Job<'_>,
-    shape: &Shape<'_>,
-    mut best: Nearest,
-    mut work: Work,
-) -> (Nearest, Work) {
+pub(crate) fn nearest_voxel(job: &Job<'_>, so_far: &mut SoFar) {
+    let SoFar { best, work } = so_far;
     let mut index = 0;
     while let Some(node) = job.nodes.get(index) {
         work.nodes += 1;
         let center = job.to_field.apply(node.center);
-        if shape.field.bound(center.to_array()) - node.radius > best.distance_m {
+        if job.field.bound(center.to_array()) - node.radius > best.distance_m {
             index = node.skip as usize;
             continue;
         }
@@ -119,7 +116,7 @@ pub(crate) fn nearest_voxel(
         for point in points.unwrap_or(&[]) {
             work.points += 1;
             let p = job.to_field.apply(point.position);
-            let sample = shape.field.voxel(p.to_array());
+            let sample = job.field.voxel(p.to_array());
             let (distance_m, in_band) = match sample.voxel {
                 Voxel::Free => (sample.bound, false),
                 Voxel::Proximity => (0.0, false),
@@ -137,7 +134,7 @@ pub(crate) fn nearest_voxel(
                 }
             };
             if distance_m < best.distance_m {
-                best = Nearest {
+                *best = Nearest {
                     distance_m,
                     field_distance_m: best.field_distance_m,
                     exact: false,
@@ -149,5 +146,4 @@ pub(crate) fn nearest_voxel(
             }
         }
     }
-    (best, work)
 }

@@ -14,7 +14,7 @@ use crate::coherence::Coherence;
 use crate::contact::{Contacts, Phase};
 use crate::guidance::Guidance;
 use crate::io::{Flags, Work};
-use crate::nearest::NearestSearch;
+use crate::nearest::{NearestSearch, SoFar};
 use crate::occupancy::nearest_voxel;
 use crate::pose::{Pose, Wrench};
 use crate::proximity::{Job, Search};
@@ -125,8 +125,8 @@ impl Prober {
 
     /// Gap and contacts of part `moving`, placed at `pose` in the frame of part `fixed`.
     ///
-    /// Cost: a look-up for every tree node and point that could be the nearest, both ways; when parts overlap a second walk
-    /// for the contacts. Unbounded by a budget: not for the tick.
+    /// Cost: a look-up for every tree node and point that could be the nearest or overlaps, both ways; one projection a face, or two, for every point
+    /// next to an edge or beyond the band that could be. Unbounded by a budget: not for the tick.
     ///
     /// # Errors
     /// [`ProbeError`].
@@ -153,40 +153,78 @@ impl Prober {
         let center = pose.transform_point(body.center_of_mass);
         let jobs = [0, 1].map(|way| Job::new(way, (&held, pose), (&other, Pose::IDENTITY), center));
 
-        let mut nearest = Nearest {
-            distance_m: f32::INFINITY,
-            field_distance_m: f32::INFINITY,
-            exact: false,
-            in_band: false,
-            arm: Vec3::ZERO,
-            moving_face: mortise_protocol::image::NO_FACE,
-            fixed_face: mortise_protocol::image::NO_FACE,
+        let mut so_far = SoFar {
+            best: Nearest {
+                distance_m: f32::INFINITY,
+                field_distance_m: f32::INFINITY,
+                exact: false,
+                in_band: false,
+                arm: Vec3::ZERO,
+                moving_face: mortise_protocol::image::NO_FACE,
+                fixed_face: mortise_protocol::image::NO_FACE,
+            },
+            work: Work::default(),
         };
-        let mut work = Work::default();
-        for (job, shape) in jobs.iter().zip([&other, &held]) {
-            if job.left_out() {
-                continue;
-            }
-            (nearest, work) = if shape.field.is_occupancy() {
-                nearest_voxel(job, shape, nearest, work)
-            } else {
-                NearestSearch::run(job, shape, nearest, work)
-            };
+        let mut touched = Work::default();
+        let guidance = Guidance::new();
+        let search = Search {
+            scene,
+            parts: &[],
+            held: moving,
+            pose,
+            center,
+            margin: 0.0,
+            slack: 0.0,
+            motions: [[0.0; 6]; 2],
+            swing: 0.0,
+            inverse_length: 1.0,
+            busy: false,
+            thinning: 0,
+            budget: u32::MAX,
+            braking_m: 0.0,
+            guidance: &guidance,
+            guidance_settings: &Settings::default().guidance,
+        };
+        let voxmaps = jobs.iter().any(|job| job.field.is_occupancy());
+        if voxmaps {
+            self.coherence.forget();
         }
-        self.contacts.clear();
-        let mut wrench = Wrench::ZERO;
-        if nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0 {
-            self.touch(scene, moving, &jobs, center, pose, &mut work);
-            let touching = self.contacts.as_slice().len();
-            let k = settings.shared_stiffness(if touching == 0 { 1.0 } else { touching as f32 });
-            for contact in self.contacts.as_mut_slice() {
-                // At rest: no rate, so neither period nor damping counts.
-                contact.phase = Phase::Parting;
+        let mut touching = search.walk(&mut self.coherence, &mut self.contacts, &mut touched);
+        let mut searches = [0, 1].map(|way| NearestSearch::new(&jobs[way], [&other, &held][way]));
+        for (search, job) in searches.iter_mut().zip(&jobs) {
+            if !job.field.is_occupancy() {
+                search.walk(&mut so_far, &mut touching);
+            } else if !job.left_out() {
+                nearest_voxel(job, &mut so_far);
             }
-            let k = Stiffness { point: k, guided: k };
-            wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0);
-            work.contacts = touching as u16;
         }
+        for search in &mut searches {
+            search.rest(&mut so_far, &mut touching);
+        }
+        let SoFar {
+            best: nearest,
+            mut work,
+        } = so_far;
+        if voxmaps && (nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0) {
+            for job in jobs.iter().filter(|job| job.field.is_occupancy()) {
+                touching.all(job);
+            }
+        }
+        work.nodes += touched.nodes;
+        work.points += touched.points;
+        work.candidates = touched.candidates;
+        work.flags.insert(touched.flags);
+        work.flags
+            .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
+        let pushing = self.contacts.as_slice().len();
+        let k = settings.shared_stiffness(if pushing == 0 { 1.0 } else { pushing as f32 });
+        for contact in self.contacts.as_mut_slice() {
+            // At rest: no rate, so neither period nor damping counts.
+            contact.phase = Phase::Parting;
+        }
+        let k = Stiffness { point: k, guided: k };
+        let wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0);
+        work.contacts = pushing as u16;
         Ok(Probe {
             nearest,
             wrench,
@@ -204,39 +242,5 @@ impl Prober {
             moving_face: c.moving_face,
             fixed_face: c.static_face,
         })
-    }
-
-    /// Everything that overlaps, into the store.
-    fn touch(
-        &mut self,
-        scene: &SceneImage<'_>,
-        moving: u16,
-        jobs: &[Job<'_>],
-        center: Vec3,
-        pose: Pose,
-        work: &mut Work,
-    ) {
-        self.coherence.forget();
-        Search {
-            scene,
-            parts: &[],
-            held: moving,
-            pose,
-            center,
-            margin: 0.0,
-            slack: 0.0,
-            motions: [[0.0; 6]; 2],
-            swing: 0.0,
-            inverse_length: 1.0,
-            busy: false,
-            thinning: 0,
-            budget: u32::MAX,
-            braking_m: 0.0,
-            guidance: &Guidance::new(),
-            guidance_settings: &Settings::default().guidance,
-        }
-        .run_all(jobs, &mut self.coherence, &mut self.contacts, work);
-        work.flags
-            .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
     }
 }

@@ -110,7 +110,7 @@ pub(crate) struct Job<'i> {
     /// Tree frame to field frame.
     pub to_field: Affine,
     /// Tree frame to cells from the corner of the field's grid.
-    to_cells: Affine,
+    pub to_cells: Affine,
     /// Tree frame to arm (from the held part's centre of mass, world axes).
     pub to_arm: Affine,
     /// Field gradient to the direction, in the world, that pushes the held part away.
@@ -215,16 +215,15 @@ impl<'i> Search<'_, 'i> {
         Some(job)
     }
 
-    /// Fills `contacts` from all of `jobs`, whatever the budget and the spheres say.
-    pub fn run_all(
-        &self,
-        jobs: &[Job<'_>],
-        coherence: &mut Coherence,
-        contacts: &mut Contacts,
-        work: &mut Work,
-    ) {
+    /// A walk that has not begun, into an empty store.
+    pub fn walk<'w>(
+        &'w self,
+        coherence: &'w mut Coherence,
+        contacts: &'w mut Contacts,
+        work: &'w mut Work,
+    ) -> Walk<'w, 'w, 'i> {
         contacts.begin(false);
-        let mut walk = Walk {
+        Walk {
             search: self,
             horizon: coherence.horizon(self.margin),
             coherence,
@@ -232,9 +231,6 @@ impl<'i> Search<'_, 'i> {
             work,
             passed_over: 0,
             near: 0,
-        };
-        for job in jobs {
-            let _ = walk.nodes(job, 0, u32::MAX);
         }
     }
 }
@@ -282,12 +278,12 @@ impl<'i> Job<'i> {
 }
 
 /// The other part at a point.
-struct Found {
+pub(crate) struct Found {
     /// Signed, m.
-    distance: f32,
+    pub distance: f32,
     /// Unit gradient, field frame.
-    normal: Vec3,
-    face: u16,
+    pub normal: Vec3,
+    pub face: u16,
 }
 
 /// A search under way.
@@ -305,6 +301,20 @@ pub(crate) struct Walk<'w, 's, 'i> {
 }
 
 impl Walk<'_, '_, '_> {
+    /// All of a job.
+    pub fn all(&mut self, job: &Job<'_>) {
+        let _ = self.nodes(job, 0, u32::MAX);
+    }
+
+    /// One point of the leaf `node`: as `found`, or looked up.
+    pub fn one(&mut self, job: &Job<'_>, node: u32, point: &PointRecord, found: Option<Found>) {
+        let leaf = Leaf { job: job.index, node };
+        let _ = match found {
+            Some(found) => self.found(job, leaf, point, found),
+            None => self.point::<false>(job, leaf, point),
+        };
+    }
+
     /// Everything from `start` to before `end` (or the last); where it stopped when the budget ran out.
     fn jobs(&mut self, start: Leaf, end: Option<Leaf>) -> Option<Leaf> {
         let jobs = 2 * self.search.parts.len() as u16;
@@ -492,6 +502,12 @@ impl Walk<'_, '_, '_> {
                 face: sample.face,
             }
         };
+        self.found(job, leaf, point, found)
+    }
+
+    /// Offers a point as a contact; its gap.
+    #[inline(always)]
+    fn found(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: Found) -> f32 {
         let n = job.to_push * found.normal;
         let (moving, fixed) = {
             let (own, other) = ([point.face, point.edge_face], [found.face, NO_FACE]);

@@ -118,6 +118,28 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// What is nearest to the cell at `g` cells from the grid's corner, without looking at its samples; where none are stored, as [`Self::bound_at`].
+    #[inline(always)]
+    pub fn nearby_at(&self, g: [f32; 3]) -> Result<Nearby, f32> {
+        if !self.holds(g) {
+            return Err(self.beyond(g));
+        }
+        let (entry, cell, _) = self.entry(g);
+        match entry {
+            GridEntry::Brick(number) => {
+                let brick = &self.bricks[number as usize];
+                if self.is_occupancy() {
+                    return Err(self.voxel_bound(brick, cell));
+                }
+                Ok(self.nearby(brick, cell))
+            }
+            GridEntry::Empty { inside, cells } => {
+                let bound = f32::from(cells) * self.record.cell;
+                Err(if inside { -bound } else { bound })
+            }
+        }
+    }
+
     /// [`Self::bound`] at `g` cells from the grid's corner.
     #[inline]
     pub fn bound_at(&self, g: [f32; 3]) -> f32 {
