@@ -1,0 +1,111 @@
+//! The probe's branch and bound against every point in closed form: scene P at any pose, near and far, upright and tumbled.
+//!
+//! Both parts have their origin at their centre and the hole along z. Distances here are of the solids themselves, in double precision; the points are
+//! those of the image, so that the shells' own error bound plays no part.
+
+use std::ops::ControlFlow;
+use std::sync::LazyLock;
+
+use glam::{DQuat, DVec3};
+use mortise_bake::{Grabbable, bake};
+use mortise_brep::LoadOptions;
+use mortise_haptics::{Pose, Prober, Quat, Settings, Vec3};
+use mortise_lab::scene_p;
+use mortise_lab::variant::Variant;
+use mortise_protocol::image::SceneImage;
+use proptest::prelude::*;
+
+const BLOCK: u16 = 0;
+const PEG: u16 = 1;
+/// Single precision over a tenth of a metre, through three sums, mm.
+const ROUNDING_MM: f64 = 1e-4;
+/// Deeper than this a point lies beyond what the field resolves (band less a diagonal, 2.3 cells), and near an edge may not be measured, mm.
+const RESOLVED_MM: f64 = 1.1;
+
+/// Of ø20 × 50.
+fn to_peg(p: DVec3) -> f64 {
+    let (side, end) = (p.truncate().length() - 10.0, p.z.abs() - 25.0);
+    if side <= 0.0 && end <= 0.0 {
+        side.max(end)
+    } else {
+        f64::hypot(side.max(0.0), end.max(0.0))
+    }
+}
+
+/// Of 60 × 60 × 40 with a hole ø20.2.
+fn to_block(p: DVec3) -> f64 {
+    let half = DVec3::new(30.0, 30.0, 20.0);
+    let (r, hole, beyond) = (p.truncate().length(), 10.1, p.z.abs() - 20.0);
+    let wall = f64::hypot(r - hole, beyond.max(0.0));
+    let flats = if r < hole {
+        f64::hypot(hole - r, beyond)
+    } else {
+        f64::hypot((p - p.clamp(-half, half)).truncate().length(), beyond)
+    };
+    let side = |along: f64, across: f64| {
+        DVec3::new(
+            along.abs() - 30.0,
+            (across.abs() - 30.0).max(0.0),
+            beyond.max(0.0),
+        )
+        .length()
+    };
+    let least = wall.min(flats).min(side(p.x, p.y)).min(side(p.y, p.x));
+    let inside = p.abs().cmple(half).all() && r > hole;
+    if inside { -least } else { least }
+}
+
+/// The smallest over all points, both ways, mm.
+fn brute_force(scene: &SceneImage<'_>, position: Vec3, turn: Quat) -> f64 {
+    let position = 1e3 * DVec3::from_array(position.to_array().map(f64::from));
+    let turn = DQuat::from_array(turn.to_array().map(f64::from)).normalize();
+    let points = |part: u16| {
+        (scene.shape_of_part(usize::from(part)).points.iter())
+            .map(|point| 1e3 * DVec3::from_array(point.position.map(f64::from)))
+    };
+    let forward = points(PEG).map(|p| to_block(turn * p + position));
+    let backward = points(BLOCK).map(|p| to_peg(turn.inverse() * (p - position)));
+    forward.chain(backward).fold(f64::INFINITY, f64::min)
+}
+
+/// Metres and a turn.
+fn poses() -> impl Strategy<Value = (Vec3, Quat)> {
+    let any_turn = (prop::array::uniform4(-1.0f32..1.0))
+        .prop_filter("no direction", |q| q.iter().map(|x| x * x).sum::<f32>() > 0.1)
+        .prop_map(|[x, y, z, w]| Quat::from_xyzw(x, y, z, w).normalize());
+    let tilt =
+        prop::array::uniform3(-0.03f32..0.03).prop_map(|[x, y, z]| Quat::from_xyzw(x, y, z, 1.0).normalize());
+    let anywhere = prop::array::uniform3(-0.09f32..0.09).prop_map(Vec3::from_array);
+    let in_the_hole =
+        (prop::array::uniform2(-1e-3f32..1e-3), -0.08f32..0.08).prop_map(|([x, y], z)| Vec3::new(x, y, z));
+    prop_oneof![(anywhere, any_turn), (in_the_hole, tilt)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn as_every_point_in_closed_form((position, turn) in poses()) {
+        static IMAGE: LazyLock<Vec<u32>> = LazyLock::new(|| {
+            let model = scene_p::model(&LoadOptions::default()).expect("part of the sources");
+            let options = Variant::field(0.5).options(Grabbable::All);
+            let baked = bake(&model, &options, &|_| ControlFlow::Continue(())).expect("it bakes");
+            let mut words = vec![0; baked.image.len().div_ceil(size_of::<u32>())];
+            bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..baked.image.len()].copy_from_slice(&baked.image);
+            words
+        });
+        let scene = SceneImage::open(bytemuck::cast_slice(&IMAGE)).expect("just written");
+        let found = Prober::new()
+            .probe(&scene, PEG, BLOCK, &Pose::new(position, turn), &Settings::default().contact)
+            .expect("a good pose");
+        let least = brute_force(&scene, position, turn);
+        let probed = 1e3 * f64::from(found.nearest.distance_m);
+        if least > -RESOLVED_MM {
+            prop_assert!((probed - least).abs() <= ROUNDING_MM, "{probed} {least} {found:?}");
+            prop_assert!(found.nearest.exact, "{found:?}");
+        } else {
+            prop_assert!(probed < -RESOLVED_MM + ROUNDING_MM, "{probed} {least} {found:?}");
+        }
+        prop_assert_eq!(found.contacts > 0, least < 0.0, "{} {:?}", least, found);
+    }
+}
