@@ -15,7 +15,7 @@ const TIGHT_MM: f64 = 0.02;
 
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    accuracy::scene_p(plan, out)?;
+    accuracy::scene_p(out)?;
     accuracy::centred(out)?;
     insertion::tight(plan, out)?;
     ticks::tight(plan, out)?;
