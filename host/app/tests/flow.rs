@@ -2,90 +2,22 @@
 //! Controls are found by what a screen reader would find.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+mod common;
+
+use common::{arm, click, connect, harness, open_sample, until, worst};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
-use mortise::ui::{Window, theme};
+use mortise::ui::Window;
 use mortise::viewport::gesture::on_screen;
 use mortise_bake::Method;
 use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
-
-/// A bound for what should take seconds: only a hang reaches it.
-const PATIENCE: Duration = Duration::from_secs(300);
-
-fn harness() -> Harness<'static, Window> {
-    Harness::builder()
-        .with_size(egui::vec2(1500.0, 940.0))
-        .with_max_steps(1)
-        .with_context_setup(theme::apply)
-        .build_ui_state(
-            |ui, window: &mut Window| window.show(ui, None),
-            Window::new(Session::new(Arc::new(|| {}))),
-        )
-}
-
-/// Draws pictures until `done`.
-fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Session) -> bool) {
-    let begun = Instant::now();
-    loop {
-        harness.step();
-        if done(&harness.state().session) {
-            return;
-        }
-        if begun.elapsed() > PATIENCE {
-            let notes: Vec<_> = harness
-                .state()
-                .session
-                .notes
-                .iter()
-                .map(|n| n.text.clone())
-                .collect();
-            panic!("never: {what}; messages: {notes:#?}");
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-}
-
-fn click(harness: &mut Harness<'_, Window>, label: &str) {
-    harness.get_by_label(label).click();
-    harness.step();
-    harness.step();
-}
-
-fn open_sample(harness: &mut Harness<'_, Window>) {
-    harness.step();
-    click(harness, "Open the sample");
-    until(harness, "the sample is baked", |s| {
-        s.document.as_ref().is_some_and(|d| d.baked.is_some())
-    });
-}
-
-fn connect(harness: &mut Harness<'_, Window>) {
-    until(harness, "rigs are listed", |s| !s.rigs.is_empty());
-    let simulation = RigSpec::Simulated { realtime: true };
-    let entry = |s: &Session| s.rigs.iter().find(|r| r.spec == simulation).cloned();
-    let entry = entry(&harness.state().session).expect("the simulation is in the list");
-    click(harness, "Rig");
-    click(harness, &entry.label);
-    assert_eq!(harness.state().session.chosen, simulation);
-    click(harness, "Connect");
-    until(harness, "the scene is on the board", Session::scene_is_on_board);
-}
-
-fn worst(session: &Session) -> Severity {
-    session
-        .notes
-        .iter()
-        .map(|n| n.severity)
-        .max()
-        .unwrap_or(Severity::Info)
-}
 
 #[test]
 fn from_an_empty_window_to_a_felt_insertion_and_stop() {
@@ -99,8 +31,7 @@ fn from_an_empty_window_to_a_felt_insertion_and_stop() {
 
     connect(&mut harness);
     assert_eq!(harness.state().session.device(), Some(DeviceState::Idle));
-    click(&mut harness, "Arm");
-    until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+    arm(&mut harness);
 
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
@@ -154,8 +85,7 @@ fn space_and_escape_stop() {
         let mut harness = harness();
         open_sample(&mut harness);
         connect(&mut harness);
-        click(&mut harness, "Arm");
-        until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+        arm(&mut harness);
         harness.key_press(key);
         until(&mut harness, "stopped", |s| {
             s.device() == Some(DeviceState::Stopped)
@@ -168,8 +98,7 @@ fn the_part_in_hand_follows_the_pointer() {
     let mut harness = harness();
     open_sample(&mut harness);
     connect(&mut harness);
-    click(&mut harness, "Arm");
-    until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+    arm(&mut harness);
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
     until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
@@ -201,8 +130,7 @@ fn a_press_that_is_over_within_one_picture_stops() {
     let mut harness = harness();
     open_sample(&mut harness);
     connect(&mut harness);
-    click(&mut harness, "Arm");
-    until(&mut harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+    arm(&mut harness);
     let pos = harness.get_by_label("STOP").rect().center();
     for pressed in [true, false] {
         harness.input_mut().events.push(egui::Event::PointerButton {

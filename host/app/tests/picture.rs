@@ -79,6 +79,7 @@ fn picture(document: &Document, camera: Camera) -> Picture {
             tint: [0.0; 4],
             line: [0.0, 0.0, 0.0, 1.0],
             lit: Vec::new(),
+            mates: Vec::new(),
         })
         .collect();
     Picture {
@@ -148,6 +149,27 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
     let (x, y) = at(DVec3::new(-20.0, 0.0, 68.0));
     let [r, g, _] = pixel(&pixels, x, y);
     assert!(g > r + 60, "the arrow is green: {r} {g}");
+
+    // A face that fits is green, in stripes, until it touches.
+    let (x, y) = at(DVec3::new(0.0, -25.0, -20.0));
+    told.items[0].lit = Vec::new();
+    told.items[0].mates = vec![front];
+    renderer.render(&told);
+    let (texture, _) = renderer.texture().expect("resized");
+    let pixels = read(&device, &queue, texture);
+    let along: Vec<[i32; 3]> = (x - 12..x + 12).map(|x| pixel(&pixels, x, y)).collect();
+    assert!(
+        along.iter().all(|[r, g, _]| g > r),
+        "the face that fits is green: {along:?}"
+    );
+    let blue = |[_, g, b]: &[i32; 3]| b - g;
+    let (low, high) = (along.iter().map(blue).min(), along.iter().map(blue).max());
+    assert!(high > low.map(|low| low + 30), "striped: {along:?}");
+    told.items[0].lit = vec![front];
+    renderer.render(&told);
+    let (texture, _) = renderer.texture().expect("resized");
+    let [r, _, b] = pixel(&read(&device, &queue, texture), x, y);
+    assert!(r > b + 60, "touching comes first: {r} {b}");
 }
 
 /// Face of the block under a point of its surface.
@@ -187,6 +209,7 @@ fn nothing_to_draw_is_no_trouble() {
                 tint: [0.0; 4],
                 line: [1.0; 4],
                 lit: vec![],
+                mates: vec![],
             },
             Item {
                 shape: 7,
@@ -196,6 +219,7 @@ fn nothing_to_draw_is_no_trouble() {
                 tint: [0.0; 4],
                 line: [1.0; 4],
                 lit: vec![],
+                mates: vec![],
             },
         ],
         arrows: vec![],

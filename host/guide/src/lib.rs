@@ -6,58 +6,47 @@
 //! near, and stays guided.
 //!
 //! Planes that face each other are not sent: they meet by contact, and a plane held could hold a part up. Cost: that of the recogniser, once for each
-//! message of telemetry.
+//! message of telemetry; when near counts, a distance for each pair of surfaces that could mate besides.
+
+mod nearby;
+mod row;
+mod settings;
+mod wire;
 
 use std::collections::BTreeMap;
 
 use glam::{DAffine3, DQuat, DVec3};
-use heapless::Vec as BoundedVec;
-use mortise_brep::{CadModel, Shape, Surface};
+use mortise_brep::CadModel;
 use mortise_mating::Tolerances;
 use mortise_mating::recognise::{
-    Observation, Recogniser, Target, TargetId, TargetKind, Thresholds, TouchingFaces,
+    Entry, Observation, Recogniser, State, Target, TargetId, TargetKind, Thresholds, TouchingFaces,
 };
 use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, Telemetry, ToDevice};
+use mortise_protocol::message::{Telemetry, ToDevice};
 
-/// How targets are sent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GuideSettings {
-    /// k_g, N/m.
-    pub stiffness_n_per_m: f32,
-    /// F_g, N.
-    pub force_cap_n: f32,
-    /// The same of torques, N m.
-    pub torque_cap_nm: f32,
-    /// A target fades this long after its last refresh, ticks.
-    pub expiry_ticks: u16,
-    /// Surfaces whose extents along the axis overlap by more than this are near, mm (negative: a gap).
-    pub near_mm: f64,
-}
+use nearby::Nearby;
+pub use row::{List, Row, Standing};
+pub use settings::{GuideSettings, When};
 
-impl Default for GuideSettings {
-    /// A cap well below the coupling's 10 N; an expiry of 0.3 s.
-    fn default() -> Self {
-        Self {
-            stiffness_n_per_m: 1e6,
-            force_cap_n: 3.0,
-            torque_cap_nm: 0.1,
-            expiry_ticks: 300,
-            near_mm: -0.5,
-        }
-    }
-}
+/// Most targets sent at a time: half of what a board holds, so that those that fade leave room for those that come.
+pub const MAX_SENT: usize = MAX_TARGETS / 2;
 
 /// Keeps a board's targets up to date.
 pub struct Guide<'a> {
     model: &'a CadModel,
     /// Model part of each part of the image.
     parts: Vec<usize>,
-    /// Of each shape, of each face: faces across an edge.
-    neighbours: Vec<Vec<Vec<u32>>>,
+    /// Where each part of the model is, mm.
+    poses: Vec<DAffine3>,
+    nearby: Nearby<'a>,
     recogniser: Recogniser<'a>,
     settings: GuideSettings,
+    /// Part in hand.
+    held: Option<usize>,
+    /// What the part in hand could ever keep; made when it is first asked for.
+    possible: Option<(usize, Vec<Target>)>,
     sent: BTreeMap<TargetId, Sent>,
+    tick: u32,
     ids: u16,
     sequence: u16,
 }
@@ -66,6 +55,8 @@ struct Sent {
     id: u16,
     /// Tick at which it is sent again.
     due: u32,
+    /// The board's last word, when it was no.
+    refused: Option<String>,
 }
 
 impl<'a> Guide<'a> {
@@ -74,10 +65,14 @@ impl<'a> Guide<'a> {
         Self {
             model,
             parts,
-            neighbours: model.shapes.iter().map(neighbours).collect(),
+            poses: placements(model),
+            nearby: Nearby::new(model),
             recogniser: Recogniser::new(model, &Tolerances::default(), Thresholds::default()),
             settings,
+            held: None,
+            possible: None,
             sent: BTreeMap::new(),
+            tick: 0,
             ids: 0,
             sequence: 0,
         }
@@ -88,30 +83,99 @@ impl<'a> Guide<'a> {
         &mut self.recogniser
     }
 
+    /// Changes how targets are found and sent, from the next sample on; those sent already are sent anew.
+    pub fn set(&mut self, settings: GuideSettings) {
+        self.settings = settings;
+        for sent in self.sent.values_mut() {
+            sent.due = self.tick;
+        }
+    }
+
+    /// Every part is back where the model has it.
+    pub fn put_back(&mut self) {
+        self.poses = placements(self.model);
+    }
+
+    /// The board's answer about the target it knows by `id`.
+    pub fn answered(&mut self, id: u16, result: Result<(), String>) {
+        if let Some(sent) = self.sent.values_mut().find(|sent| sent.id == id) {
+            sent.refused = result.err();
+        }
+    }
+
     /// What to send after this sample.
     pub fn hear(&mut self, sample: &Telemetry) -> Vec<ToDevice> {
-        let Some((held, pose)) = &sample.object else {
+        self.tick = sample.tick;
+        let held = (sample.object.as_ref())
+            .and_then(|(held, pose)| Some((*self.parts.get(usize::from(*held))?, pose)));
+        self.held = held.map(|(part, _)| part);
+        let Some((moving_part, pose)) = held else {
             // Letting go ends all guidance on the board.
             self.sent.clear();
+            self.recogniser.clear();
             return Vec::new();
         };
-        let Some(&moving_part) = self.parts.get(usize::from(*held)) else {
-            return Vec::new();
-        };
-        let mut poses: Vec<DAffine3> = self.model.parts.iter().map(|part| part.placement).collect();
         let orientation = DQuat::from_array(pose.orientation.map(f64::from)).normalize();
         let position = DVec3::from_array(pose.position.map(f64::from)) * 1000.0;
-        if let Some(place) = poses.get_mut(moving_part) {
+        if let Some(place) = self.poses.get_mut(moving_part) {
             *place = DAffine3::from_rotation_translation(orientation, position);
         }
         let mut touching = self.touched(moving_part, sample);
-        touching.extend(self.near(&poses));
+        touching.extend(self.kept());
+        if self.settings.when == When::Near {
+            touching.extend(self.approached(moving_part));
+        }
         self.recogniser.update(&Observation {
             moving_part,
-            poses: &poses,
+            poses: &self.poses,
             touching: &touching,
         });
-        self.messages(sample.tick)
+        self.messages()
+    }
+
+    /// The list as of the last sample.
+    pub fn list(&self) -> List {
+        let Some(held) = self.held else {
+            return List {
+                tick: self.tick,
+                ..List::default()
+            };
+        };
+        let row = |entry: &Entry| Row {
+            standing: self.standing(entry),
+            misfit: entry.misfit,
+            depth_mm: entry.depth_mm,
+            inside_mm: match entry.target.kind {
+                TargetKind::Concentric | TargetKind::Conical | TargetKind::Annular => {
+                    Some(self.inside(&entry.target)).filter(|x| x.is_finite())
+                }
+                TargetKind::Coplanar | TargetKind::Spherical => None,
+            },
+            pinned: entry.pinned,
+            target: entry.target.clone(),
+        };
+        List {
+            tick: self.tick,
+            held: Some(held),
+            rows: self.recogniser.entries().map(row).collect(),
+            freedom: self.recogniser.freedom().clone(),
+        }
+    }
+
+    fn standing(&self, entry: &Entry) -> Standing {
+        match &entry.state {
+            State::Off => Standing::Off,
+            State::Far => Standing::Candidate,
+            State::Conflict(with) => Standing::Conflict(with.clone()),
+            State::Active if wire::kind(&entry.target).is_none() => Standing::ByContact,
+            State::Active => match self.sent.get(&entry.target.id) {
+                None => Standing::Waiting,
+                Some(Sent { refused: None, .. }) => Standing::Sent,
+                Some(Sent {
+                    refused: Some(why), ..
+                }) => Standing::Refused(why.clone()),
+            },
+        }
     }
 
     /// Faces that touch, and those across an edge from them.
@@ -121,8 +185,8 @@ impl<'a> Guide<'a> {
             let Some(&fixed_part) = self.parts.get(usize::from(pair.static_part)) else {
                 continue;
             };
-            let moving = self.with_neighbours(moving_part, pair.moving_face);
-            let fixed = self.with_neighbours(fixed_part, pair.static_face);
+            let moving = self.nearby.with_neighbours(moving_part, pair.moving_face);
+            let fixed = self.nearby.with_neighbours(fixed_part, pair.static_face);
             for &moving_face in &moving {
                 for &fixed_face in &fixed {
                     let touches = moving_face == u32::from(pair.moving_face)
@@ -143,155 +207,99 @@ impl<'a> Guide<'a> {
         out
     }
 
-    fn with_neighbours(&self, part: usize, face: u16) -> Vec<u32> {
-        let mut faces = vec![u32::from(face)];
-        let of_shape = self
-            .model
-            .parts
-            .get(part)
-            .and_then(|p| self.neighbours.get(p.shape));
-        if let Some(more) = of_shape.and_then(|faces| faces.get(usize::from(face))) {
-            faces.extend(more);
-        }
-        faces
-    }
-
     /// Targets in force whose surfaces are still in or at each other.
-    fn near(&self, poses: &[DAffine3]) -> Vec<TouchingFaces> {
-        let near = |target: &&Target| {
-            let (a, b) = (target.id.moving_part, target.id.fixed_part);
-            let (Some(at), Some(fixed)) = (poses.get(a), poses.get(b)) else {
-                return false;
-            };
-            let axis = fixed.transform_vector3(target.fixed.direction);
-            let extent = |part: usize, faces: &[u32], at: &DAffine3| {
-                extent(&self.model.shapes[self.model.parts[part].shape], faces, at, axis)
-            };
-            let (low, high) = extent(a, &target.moving_faces, at);
-            let (from, to) = extent(b, &target.fixed_faces, fixed);
-            high.min(to) - low.max(from) > self.settings.near_mm
+    fn kept(&self) -> Vec<TouchingFaces> {
+        let limit = match self.settings.when {
+            When::Touching => self.settings.near_mm,
+            When::Near => self.settings.near_mm.min(-self.settings.approach_mm),
         };
-        (self.recogniser.active().filter(near))
-            .filter_map(|target| {
-                Some(TouchingFaces {
-                    moving_face: *target.moving_faces.first()?,
-                    fixed_part: target.id.fixed_part,
-                    fixed_face: *target.fixed_faces.first()?,
-                    depth_mm: 0.0,
-                })
-            })
+        (self.recogniser.active().filter(|t| self.inside(t) > limit))
+            .filter_map(faces_of)
             .collect()
     }
 
-    fn messages(&mut self, tick: u32) -> Vec<ToDevice> {
-        let active: Vec<Target> = (self.recogniser.active())
-            .filter(|target| self.kind(target).is_some())
-            .take(MAX_TARGETS / 2)
-            .cloned()
+    /// Surfaces that could mate, are lined up, and before each other.
+    fn approached(&mut self, moving_part: usize) -> Vec<TouchingFaces> {
+        if self
+            .possible
+            .as_ref()
+            .is_none_or(|(part, _)| *part != moving_part)
+        {
+            let mut targets = self.recogniser.possible(moving_part);
+            targets.retain(|target| wire::kind(target).is_some());
+            self.possible = Some((moving_part, targets));
+        }
+        let limits = self.recogniser.thresholds();
+        let near = |target: &&Target| {
+            let misfit = target.misfit(
+                &self.poses[target.id.moving_part],
+                &self.poses[target.id.fixed_part],
+            );
+            misfit.distance_mm <= limits.distance_mm
+                && misfit.angle_rad <= limits.angle_rad
+                && self.inside(target) > -self.settings.approach_mm
+        };
+        let targets = self.possible.iter().flat_map(|(_, targets)| targets);
+        targets.filter(near).filter_map(faces_of).collect()
+    }
+
+    /// How far a target's surfaces are in each other along its axis, mm; negative: apart.
+    fn inside(&self, target: &Target) -> f64 {
+        let (a, b) = (target.id.moving_part, target.id.fixed_part);
+        let (Some(at), Some(fixed)) = (self.poses.get(a), self.poses.get(b)) else {
+            return f64::NEG_INFINITY;
+        };
+        let axis = fixed.transform_vector3(target.fixed.direction);
+        let moving = (a, target.moving_faces.as_slice(), at);
+        self.nearby.overlap(moving, (b, &target.fixed_faces, fixed), axis)
+    }
+
+    fn messages(&mut self) -> Vec<ToDevice> {
+        let mut active: Vec<&Entry> = (self.recogniser.entries())
+            .filter(|e| e.state == State::Active && wire::kind(&e.target).is_some())
             .collect();
+        active.sort_by_key(|entry| !entry.pinned);
+        active.truncate(if self.settings.sending { MAX_SENT } else { 0 });
         let mut out = Vec::new();
         self.sent.retain(|id, sent| {
-            let kept = active.iter().any(|target| target.id == *id);
+            let kept = active.iter().any(|entry| entry.target.id == *id);
             if !kept {
                 out.push(ToDevice::ClearTarget { id: sent.id });
             }
             kept
         });
         let refresh = u32::from(self.settings.expiry_ticks / 3);
-        for target in &active {
-            let sent = self.sent.entry(target.id).or_insert_with(|| {
+        for entry in active {
+            let sent = self.sent.entry(entry.target.id).or_insert_with(|| {
                 self.ids = self.ids.wrapping_add(1);
                 Sent {
                     id: self.ids,
-                    due: tick,
+                    due: self.tick,
+                    refused: None,
                 }
             });
-            if (tick.wrapping_sub(sent.due) as i32) < 0 {
+            if (self.tick.wrapping_sub(sent.due) as i32) < 0 {
                 continue;
             }
-            sent.due = tick.wrapping_add(refresh);
-            let id = sent.id;
+            sent.due = self.tick.wrapping_add(refresh);
             self.sequence = self.sequence.wrapping_add(1);
-            out.extend(self.to_wire(target, id).map(ToDevice::SetTarget));
+            let message = wire::message(&entry.target, &self.parts, &self.settings, sent.id, self.sequence);
+            out.extend(message.map(ToDevice::SetTarget));
         }
         out
     }
-
-    /// The board's word for a target's kind, if it is sent at all.
-    fn kind(&self, target: &Target) -> Option<ConstraintKind> {
-        match target.kind {
-            TargetKind::Concentric => Some(ConstraintKind::Concentric),
-            TargetKind::Conical => Some(ConstraintKind::Conical),
-            TargetKind::Spherical => Some(ConstraintKind::Spherical),
-            // The board knows bores of fixed parts.
-            TargetKind::Annular => target.ball_moves.then_some(ConstraintKind::Annular),
-            TargetKind::Coplanar => None,
-        }
-    }
-
-    fn to_wire(&self, target: &Target, id: u16) -> Option<ConstraintTarget> {
-        let image_part = |part: usize| {
-            let index = self.parts.iter().position(|&p| p == part)?;
-            u16::try_from(index).ok()
-        };
-        let feature = |origin: DVec3, direction: DVec3| Feature {
-            point: (origin / 1000.0).as_vec3().to_array(),
-            direction: direction.normalize().as_vec3().to_array(),
-        };
-        let mut faces = BoundedVec::new();
-        for &moving in &target.moving_faces {
-            for &fixed in &target.fixed_faces {
-                if let (Ok(moving), Ok(fixed)) = (u16::try_from(moving), u16::try_from(fixed)) {
-                    // The first few are the surface's largest share; the rest is felt as contact.
-                    let _ = faces.push((moving, fixed));
-                }
-            }
-        }
-        Some(ConstraintTarget {
-            id,
-            sequence: self.sequence,
-            kind: self.kind(target)?,
-            moving: feature(target.moving.origin, target.moving.direction),
-            static_part: image_part(target.id.fixed_part)?,
-            fixed: feature(target.fixed.origin, target.fixed.direction),
-            stiffness: self.settings.stiffness_n_per_m,
-            force_cap: self.settings.force_cap_n,
-            torque_cap: self.settings.torque_cap_nm,
-            expiry_ticks: self.settings.expiry_ticks,
-            faces,
-        })
-    }
 }
 
-/// Of each face, the curved faces across its edges.
-fn neighbours(shape: &Shape) -> Vec<Vec<u32>> {
-    let mut all = vec![Vec::new(); shape.faces.len()];
-    let curved = |face: u32| {
-        let surface = shape.faces.get(face as usize).map(|f| f.surface);
-        !matches!(surface, None | Some(Surface::Plane { .. } | Surface::Spline))
-    };
-    for edge in &shape.edges {
-        for &a in &edge.faces {
-            for &b in edge.faces.iter().filter(|&&b| b != a && curved(b)) {
-                if let Some(list) = all.get_mut(a as usize)
-                    && !list.contains(&b)
-                {
-                    list.push(b);
-                }
-            }
-        }
-    }
-    all
+fn placements(model: &CadModel) -> Vec<DAffine3> {
+    model.parts.iter().map(|part| part.placement).collect()
 }
 
-/// From where to where the mesh of `faces` reaches along `axis`, placed at `at`.
-fn extent(shape: &Shape, faces: &[u32], at: &DAffine3, axis: DVec3) -> (f64, f64) {
-    let mesh = &shape.mesh;
-    let own = mesh.triangles.iter().zip(&mesh.triangle_face);
-    (own.filter(|(_, face)| faces.contains(face)))
-        .flat_map(|(triangle, _)| triangle)
-        .map(|&v| at.transform_point3(mesh.vertices[v as usize]).dot(axis))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-            (low.min(x), high.max(x))
-        })
+/// A pair of faces that stands for a target.
+fn faces_of(target: &Target) -> Option<TouchingFaces> {
+    Some(TouchingFaces {
+        moving_face: *target.moving_faces.first()?,
+        fixed_part: target.id.fixed_part,
+        fixed_face: *target.fixed_faces.first()?,
+        depth_mm: 0.0,
+    })
 }

@@ -5,6 +5,8 @@
 use std::path::PathBuf;
 
 use mortise_bake::Method;
+use mortise_guide::When;
+use mortise_mating::recognise::TargetId;
 use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
@@ -57,6 +59,14 @@ pub enum Intent {
     SetParameter(ParameterId, f32),
     /// Every parameter to its default.
     ResetParameters,
+    /// Keep a recognised target in the list and before others, or no longer.
+    PinTarget(TargetId, bool),
+    /// Switch a recognised target off, or on again.
+    SwitchTargetOff(TargetId, bool),
+    /// When targets may be taken up.
+    GuideWhen(When),
+    /// The force guidance never exceeds, N.
+    GuideCap(f32),
     /// Let the simulated hand put the peg in the hole.
     PlayInsertion,
     /// Everything from the sample to the insertion, by itself. `None`: the emulated board if it is there, else in-process.
@@ -72,6 +82,10 @@ impl Intent {
                 | Self::RefreshRigs
                 | Self::SetParameter(..)
                 | Self::ResetParameters
+                | Self::PinTarget(..)
+                | Self::SwitchTargetOff(..)
+                | Self::GuideWhen(_)
+                | Self::GuideCap(_)
                 | Self::Demo(_)
         )
     }
@@ -85,7 +99,11 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
     let no = |reason: &str| Some(reason.to_owned());
     let armed = session.is_armed();
     match intent {
-        Intent::Stop | Intent::RefreshRigs | Intent::Select(_) => None,
+        Intent::Stop
+        | Intent::RefreshRigs
+        | Intent::Select(_)
+        | Intent::GuideWhen(_)
+        | Intent::GuideCap(_) => None,
         Intent::Browse | Intent::Open(_) | Intent::OpenSample => {
             armed.then(|| "The rig is armed: disarm it before another file is opened".to_owned())
         }
@@ -136,6 +154,14 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         },
         Intent::SetParameter(..) | Intent::ResetParameters => {
             session.connection().is_none().then(|| NO_RIG.to_owned())
+        }
+        Intent::PinTarget(id, _) | Intent::SwitchTargetOff(id, _) => {
+            let listed = session.guidance.rows.iter().any(|row| row.target.id == *id);
+            match session.connection() {
+                None => no(NO_RIG),
+                Some(_) if !listed => no("This target is no longer in the list"),
+                Some(_) => None,
+            }
         }
         Intent::PlayInsertion => play(session),
     }

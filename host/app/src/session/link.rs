@@ -9,10 +9,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mortise_bake::Baked;
+use mortise_guide::GuideSettings;
 use mortise_protocol::message::{Capabilities, DeviceState, HandScript, Statistics, ToDevice};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 
+use super::document::Document;
+use super::guidance::Tap;
 use super::work::{Outbox, Update};
 
 /// Ticks between telemetry messages: some 60 a second, half of what an emulated UART carries.
@@ -45,6 +48,8 @@ pub enum LinkUpdate {
         client: Arc<Client>,
         /// The board's parameters.
         parameters: Vec<(ParameterId, f32)>,
+        /// Where guidance hears samples from.
+        tap: Tap,
     },
     /// Not connected, and why.
     Failed(String),
@@ -107,6 +112,8 @@ pub struct Connection {
     pub upload: Option<UploadProgress>,
     /// Counters, asked for now and then.
     pub statistics: Option<Statistics>,
+    /// To the thread that guides.
+    pub tap: Tap,
     client: Arc<Client>,
     commands: Sender<Command>,
     thread: Option<JoinHandle<()>>,
@@ -167,9 +174,11 @@ fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
         }
     };
     let events = client.events().clone();
+    let tap = Tap::default();
     if !say(LinkUpdate::Connected {
         client: Arc::clone(&client),
         parameters,
+        tap: tap.clone(),
     }) {
         return;
     }
@@ -177,7 +186,7 @@ fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
         let outbox = outbox.clone();
         std::thread::Builder::new()
             .name("mortise-events".into())
-            .spawn(move || pass_on(&outbox, id, &events))
+            .spawn(move || pass_on(&outbox, id, &events, &tap))
     };
     if let Err(error) = passing_on {
         say(LinkUpdate::Event(Event::LinkLost(
@@ -233,10 +242,13 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
 }
 
 /// Passes events on until there are no more.
-fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events) {
+fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap) {
     loop {
         match events.recv_timeout(Duration::from_secs(1)) {
             Ok(event) => {
+                if let Event::Telemetry(sample) = &event {
+                    tap.offer(sample);
+                }
                 let update = LinkUpdate::Event(event);
                 if !outbox.send(Update::Link { id, update }) {
                     return;
@@ -254,6 +266,7 @@ impl Connection {
         id: u64,
         spec: RigSpec,
         client: Arc<Client>,
+        tap: Tap,
         commands: Sender<Command>,
         thread: Option<JoinHandle<()>>,
     ) -> Self {
@@ -266,6 +279,7 @@ impl Connection {
             refused_scene_of: None,
             upload: None,
             statistics: None,
+            tap,
             client,
             commands,
             thread,
@@ -285,6 +299,20 @@ impl Connection {
     /// Has a message sent and its answer waited for.
     pub fn request(&self, message: ToDevice) {
         self.command(Command::Request(Box::new(message)));
+    }
+
+    /// Starts to guide in the scene that is on the board now.
+    pub fn guide(&self, document: &Document, settings: GuideSettings, outbox: &Outbox) {
+        let Some(baked) = &document.baked else { return };
+        let parts = baked.report.parts.iter().map(|part| part.model_part).collect();
+        self.tap.start(
+            Arc::clone(&document.model),
+            parts,
+            settings,
+            Arc::downgrade(&self.client),
+            outbox.clone(),
+            self.id,
+        );
     }
 
     /// Motors off, now: written from a thread of its own, past everything that waits.
@@ -360,7 +388,10 @@ impl Link {
         let (client, commands, thread) = match self {
             Self::None => return,
             Self::Connecting { commands, thread, .. } => (None, commands, thread),
-            Self::Connected(connection) => (Some(connection.client), connection.commands, connection.thread),
+            Self::Connected(connection) => {
+                connection.tap.end();
+                (Some(connection.client), connection.commands, connection.thread)
+            }
         };
         let end = move || {
             if let Some(client) = &client {

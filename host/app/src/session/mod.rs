@@ -4,6 +4,7 @@
 //! [`Session::poll`] takes in. [`intent::obstacle`] alone decides what is possible when.
 
 pub mod document;
+pub mod guidance;
 pub mod history;
 pub mod insertion;
 pub mod intent;
@@ -15,23 +16,29 @@ pub mod tree;
 mod update;
 pub mod work;
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use glam::DAffine3;
 use mortise_bake::{BakeOptions, Method};
+use mortise_guide::{GuideSettings, List};
 use mortise_protocol::message::{DeviceState, HandScript, Telemetry, ToDevice};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
 
 use self::document::Document;
+use self::guidance::Wish;
 use self::history::History;
 pub use self::intent::{Intent, obstacle};
 use self::link::{Command, Connection, Link};
 use self::notes::{Notes, Severity};
 use self::tour::Tour;
 use self::work::{Cancel, Outbox, Update};
+
+/// The force guidance may be limited to, N: from hardly felt to well below the coupling's.
+pub const GUIDE_CAP_N: RangeInclusive<f32> = 0.2..=8.0;
 
 /// Reading or baking under way.
 #[derive(Clone, Debug)]
@@ -64,6 +71,10 @@ pub struct Session {
     pub history: History,
     /// The board's parameters, in the order of [`PARAMETERS`].
     pub parameters: Vec<f32>,
+    /// How targets are found and sent.
+    pub guide: GuideSettings,
+    /// What could be kept, and what is.
+    pub guidance: List,
     /// Messages.
     pub notes: Notes,
     /// How contact is found in what is baked next.
@@ -95,6 +106,8 @@ impl Session {
             telemetry: None,
             history: History::default(),
             parameters: PARAMETERS.iter().map(|row| row.default).collect(),
+            guide: GuideSettings::default(),
+            guidance: List::default(),
             notes: Notes::default(),
             method: Method::default(),
             wants_path: false,
@@ -169,6 +182,18 @@ impl Session {
                     if self.parameters[row.id as usize] != row.default {
                         self.set_parameter(row.id, row.default);
                     }
+                }
+            }
+            Intent::PinTarget(id, pinned) => self.guide_wish(Wish::Pin(id, pinned)),
+            Intent::SwitchTargetOff(id, off) => self.guide_wish(Wish::SwitchOff(id, off)),
+            Intent::GuideWhen(when) => {
+                self.guide.when = when;
+                self.guide_wish(Wish::Set(self.guide));
+            }
+            Intent::GuideCap(newton) => {
+                if newton.is_finite() {
+                    self.guide.force_cap_n = newton.clamp(*GUIDE_CAP_N.start(), *GUIDE_CAP_N.end());
+                    self.guide_wish(Wish::Set(self.guide));
                 }
             }
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
@@ -254,6 +279,28 @@ impl Session {
         self.telemetry = None;
         self.grip = None;
         self.history.clear();
+        self.guidance = List::default();
+    }
+
+    /// Guides in the scene that is on the board now.
+    fn start_guidance(&mut self) {
+        self.guidance = List::default();
+        self.guide.sending = self.guides();
+        if let (Some(connection), Some(document)) = (self.connection(), &self.document) {
+            connection.guide(document, self.guide, &self.outbox);
+        }
+    }
+
+    /// The board guides, by whichever method.
+    pub fn guides(&self) -> bool {
+        self.parameters[ParameterId::Guidance as usize] >= 0.5
+    }
+
+    fn guide_wish(&mut self, wish: Wish) {
+        let taken = self.connection().is_none_or(|c| c.tap.wish(wish));
+        if !taken && self.scene_is_on_board() {
+            self.notes.add(Severity::Warning, "Guidance is busy: try again");
+        }
     }
 
     fn upload(&mut self) {
@@ -303,6 +350,10 @@ impl Session {
         }
         if let Some(connection) = self.connection_mut() {
             connection.set_parameter(id, value);
+        }
+        if id == ParameterId::Guidance {
+            self.guide.sending = self.guides();
+            self.guide_wish(Wish::Set(self.guide));
         }
     }
 

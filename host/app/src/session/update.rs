@@ -8,6 +8,7 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
 use super::document::Document;
+use super::guidance::{Tap, Wish};
 use super::history::Sample;
 use super::link::{Command, Connection, Link, LinkUpdate};
 use super::notes::Severity;
@@ -62,6 +63,11 @@ pub fn take(session: &mut Session, update: Update) {
             };
             if current {
                 link(session, update);
+            }
+        }
+        Update::Guidance { link, list } => {
+            if session.connection().is_some_and(|c| c.id == link) {
+                session.guidance = list;
             }
         }
         Update::Chosen(path) => session.act(Intent::Open(path)),
@@ -121,7 +127,11 @@ fn baked_of(session: &mut Session, baked: Arc<Baked>) {
 
 fn link(session: &mut Session, update: LinkUpdate) {
     match update {
-        LinkUpdate::Connected { client, parameters } => connected(session, client, parameters),
+        LinkUpdate::Connected {
+            client,
+            parameters,
+            tap,
+        } => connected(session, client, parameters, tap),
         LinkUpdate::Failed(why) => {
             std::mem::replace(&mut session.link, Link::None).close(false);
             session.tour = None;
@@ -143,7 +153,7 @@ fn link(session: &mut Session, update: LinkUpdate) {
     }
 }
 
-fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(ParameterId, f32)>) {
+fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(ParameterId, f32)>, tap: Tap) {
     let Link::Connecting {
         id,
         spec,
@@ -153,7 +163,7 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
     else {
         return;
     };
-    let connection = Connection::new(id, spec, client, commands, thread);
+    let connection = Connection::new(id, spec, client, tap, commands, thread);
     session.notes.add(
         Severity::Good,
         format!(
@@ -262,6 +272,7 @@ fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String
     }
     if let (ToDevice::ResetScene, Some(document)) = (message, &mut session.document) {
         document.reset_poses();
+        session.guide_wish(Wish::PutBack);
     }
 }
 
@@ -279,6 +290,7 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<(), String>) 
                 if let Some(document) = &mut session.document {
                     document.reset_poses();
                 }
+                session.start_guidance();
                 session.notes.add(Severity::Good, "The scene is on the board");
             }
         }

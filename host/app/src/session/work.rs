@@ -9,6 +9,7 @@ use std::thread;
 
 use mortise_bake::{BakeError, BakeOptions, Baked, Progress, Stage};
 use mortise_brep::CadModel;
+use mortise_guide::List;
 use mortise_rig::RigEntry;
 
 use super::document::Document;
@@ -51,6 +52,13 @@ pub enum Update {
         /// What.
         update: LinkUpdate,
     },
+    /// What guidance recognised.
+    Guidance {
+        /// Over which connection.
+        link: u64,
+        /// What.
+        list: List,
+    },
     /// A file was chosen in a dialog.
     Chosen(PathBuf),
     /// There is no file dialog on this computer: ask for a path instead.
@@ -76,6 +84,13 @@ impl Outbox {
         let sent = self.sender.send(update).is_ok();
         (self.wake)();
         sent
+    }
+
+    /// Sends, unless too much waits already.
+    pub fn offer(&self, update: Update) {
+        if self.sender.try_send(update).is_ok() {
+            (self.wake)();
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod app;
 mod control;
 mod drop;
+mod guidance;
 mod header;
 mod messages;
 mod open;

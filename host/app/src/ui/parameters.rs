@@ -4,7 +4,7 @@ use egui::{ComboBox, RichText, Slider, Ui, Vec2};
 use mortise_bake::Method;
 use mortise_protocol::parameter::{PARAMETERS, Parameter};
 
-use super::{control, theme};
+use super::{control, guidance, theme};
 use crate::session::{Intent, Session, obstacle};
 
 /// First word of a name, and the heading of those that begin with it.
@@ -36,6 +36,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         let mut rows = PARAMETERS
             .iter()
             .filter(|row| row.name.starts_with(word) && !earlier.iter().any(|(w, _)| row.name.starts_with(w)))
+            .filter(|row| !row.name.starts_with(guidance::WORD))
             .peekable();
         if rows.peek().is_none() {
             continue;
@@ -47,11 +48,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                     method(ui, session, wanted);
                 }
                 for row in rows {
-                    if row.choices.is_empty() {
-                        slider(ui, session, wanted, row);
-                    } else {
-                        choice(ui, session, wanted, row);
-                    }
+                    one(ui, session, wanted, row);
                 }
                 ui.add_space(4.0);
             });
@@ -69,8 +66,17 @@ fn method(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     }
 }
 
+/// A parameter, whatever it is.
+pub fn one(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
+    if row.choices.is_empty() {
+        slider(ui, session, wanted, row);
+    } else {
+        choice(ui, session, wanted, row);
+    }
+}
+
 /// A parameter that is a choice.
-fn choice(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
+pub fn choice(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
     let known = session.parameters[row.id as usize].round() as usize;
     let reason = obstacle(session, &Intent::SetParameter(row.id, row.default));
     if let Some(chosen) = combo(

@@ -41,6 +41,9 @@ pub const FAULT_TEXT: Color32 = Color32::from_rgb(255, 122, 112);
 /// Forces of contacts, in plots and as arrows.
 pub const CONTACT: Color32 = Color32::from_rgb(255, 112, 72);
 
+/// Surfaces that are guided onto each other: far from [`CONTACT`] for every kind of colour vision, and hatched in the picture.
+pub const MATES: Color32 = Color32::from_rgb(56, 204, 166);
+
 /// Sets everything.
 pub fn apply(ctx: &egui::Context) {
     ctx.set_theme(egui::Theme::Dark);

@@ -44,6 +44,7 @@ pub fn show(
     touching(ui, rect, session, view);
     triad(ui, rect, view);
     toolbar(ui, rect, session, view);
+    legend(ui, rect, session);
     readout(ui, rect, session);
     let hint = if view.drags_hand() {
         "Moving the hand · Ctrl turns it"
@@ -183,6 +184,47 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
     });
 }
 
+/// What the colours of faces mean, under the toolbar, while a part is in hand.
+fn legend(ui: &mut Ui, rect: Rect, session: &Session) {
+    if session.grabbed().is_none() {
+        return;
+    }
+    let place = Rect::from_min_size(rect.min + Vec2::new(14.0, 52.0), Vec2::new(240.0, 20.0));
+    ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
+        ui.horizontal(|ui| {
+            let touches = "Faces that touch now, in both parts";
+            swatch(ui, theme::CONTACT, false, "touches", touches);
+            let fits = "Faces that fit: guided onto each other, or kept together by contact (hatched)";
+            swatch(ui, theme::MATES, true, "fits", fits);
+        });
+    });
+}
+
+/// A square as faces look, and what it means.
+fn swatch(ui: &mut Ui, color: Color32, hatched: bool, text: &str, hint: &str) {
+    let (square, response) = ui.allocate_exact_size(Vec2::splat(12.0), Sense::hover());
+    let painter = ui.painter_at(square);
+    let fill = if hatched {
+        color.gamma_multiply(0.35)
+    } else {
+        color
+    };
+    painter.rect_filled(square, CornerRadius::same(2), fill);
+    if hatched {
+        for shift in [-6.0, 0.0, 6.0] {
+            let ends = [
+                square.left_bottom() + Vec2::new(shift, 0.0),
+                square.right_top() + Vec2::new(shift, 0.0),
+            ];
+            painter.line_segment(ends, Stroke::new(2.2, color));
+        }
+    }
+    response.on_hover_text(hint);
+    let label = ui.label(RichText::new(text).size(12.0).color(theme::TEXT));
+    label.on_hover_text(hint);
+    ui.add_space(6.0);
+}
+
 /// What the board reports of the tick, in words.
 const FLAGS: [(u16, &str); 7] = [
     (flag::FORCE_LIMIT, "force limit acts"),
@@ -223,6 +265,14 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         let other = other.map_or("?", |other| document.part_name(other));
         let text = format!("touches {other}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));
         lines.push((text, theme::CONTACT, 12.5));
+    }
+    if telemetry.guidance.active > 0 {
+        let [x, y, z] = telemetry.guidance.wrench.force.map(f64::from);
+        let pull = DVec3::new(x, y, z).length();
+        let targets = telemetry.guidance.active;
+        let word = if targets == 1 { "target" } else { "targets" };
+        let text = format!("guided by {targets} {word}, {pull:.2} N");
+        lines.push((text, theme::MATES, 12.5));
     }
     let painter = ui.painter_at(rect);
     let galleys: Vec<_> = lines

@@ -1,6 +1,7 @@
 //! From the session to the picture: colours, what is in hand, what touches, which way it pushes. Pure.
 
 use glam::{DAffine3, DVec3};
+use mortise_guide::Standing;
 use mortise_protocol::image::NO_FACE;
 use mortise_protocol::message::Telemetry;
 
@@ -58,6 +59,7 @@ pub fn compose(
                     _ => EDGE,
                 },
                 lit: touching.map_or_else(Vec::new, |t| lit(document, t, index, in_hand)),
+                mates: mates(session, index),
             }
         })
         .collect();
@@ -72,6 +74,7 @@ pub fn compose(
             tint: [0.0; 4],
             line: [GHOST[0], GHOST[1], GHOST[2], 0.55],
             lit: Vec::new(),
+            mates: Vec::new(),
         });
     }
     Picture {
@@ -102,6 +105,28 @@ fn lit(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -
             faces.push(face.into());
         }
     }
+    faces
+}
+
+/// Faces of a part that fit another's and are held there: guided, or kept by contact.
+fn mates(session: &Session, part: usize) -> Vec<u32> {
+    let held = session.grabbed();
+    let list = (held.is_some() && session.guidance.held == held).then_some(&session.guidance);
+    let mut faces: Vec<u32> = Vec::new();
+    for row in list.into_iter().flat_map(|list| &list.rows) {
+        let target = &row.target;
+        let own = match &row.standing {
+            Standing::Sent | Standing::ByContact if part == target.id.moving_part => &target.moving_faces,
+            Standing::Sent | Standing::ByContact if part == target.id.fixed_part => &target.fixed_faces,
+            _ => continue,
+        };
+        faces.extend(
+            own.iter()
+                .filter(|face| !faces.contains(face))
+                .collect::<Vec<_>>(),
+        );
+    }
+    faces.truncate(MAX_LIT);
     faces
 }
 

@@ -24,6 +24,8 @@ pub struct Item {
     pub line: [f32; 4],
     /// Faces that touch, at most [`MAX_LIT`].
     pub lit: Vec<u32>,
+    /// Faces that are guided onto another part's, at most [`MAX_LIT`].
+    pub mates: Vec<u32>,
 }
 
 /// A force, drawn as an arrow over everything.

@@ -40,6 +40,7 @@ struct Draw {
     tint: [f32; 4],
     line: [f32; 4],
     lit: [u32; MAX_LIT],
+    mates: [u32; MAX_LIT],
 }
 
 /// A shape on the graphics card.
@@ -235,10 +236,6 @@ fn matrix(m: DMat4) -> [f32; 16] {
 }
 
 fn draw_of(item: &Item, to_clip: DMat4) -> Draw {
-    let mut lit = [u32::MAX; MAX_LIT];
-    for (room, face) in lit.iter_mut().zip(&item.lit) {
-        *room = *face;
-    }
     let world = DMat4::from(item.pose);
     let [r, g, b] = item.color;
     Draw {
@@ -247,8 +244,14 @@ fn draw_of(item: &Item, to_clip: DMat4) -> Draw {
         color: [r, g, b, item.opacity],
         tint: item.tint,
         line: item.line,
-        lit,
+        lit: slots(&item.lit),
+        mates: slots(&item.mates),
     }
+}
+
+/// The first faces, and none for the rest.
+fn slots(faces: &[u32]) -> [u32; MAX_LIT] {
+    std::array::from_fn(|i| faces.get(i).copied().unwrap_or(u32::MAX))
 }
 
 fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
@@ -259,7 +262,8 @@ fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
         color,
         tint: [0.0; 4],
         line: [0.0; 4],
-        lit: [u32::MAX; MAX_LIT],
+        lit: slots(&[]),
+        mates: slots(&[]),
     }
 }
 

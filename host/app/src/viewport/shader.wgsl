@@ -24,12 +24,16 @@ struct Draw {
     // Faces lit up: up to 8 ids, unused ones 0xffffffff.
     lit_a: vec4<u32>,
     lit_b: vec4<u32>,
+    // Faces that are guided onto another part's, likewise.
+    mates_a: vec4<u32>,
+    mates_b: vec4<u32>,
 }
 
 @group(0) @binding(0) var<uniform> globals: Globals;
 @group(1) @binding(0) var<uniform> draw: Draw;
 
 const LIT: vec3<f32> = vec3<f32>(1.0, 0.36, 0.24);
+const MATES: vec3<f32> = vec3<f32>(0.22, 0.80, 0.65);
 
 fn linear(s: vec3<f32>) -> vec3<f32> {
     return select(pow((s + 0.055) / 1.055, vec3<f32>(2.4)), s / 12.92, s <= vec3<f32>(0.04045));
@@ -94,6 +98,13 @@ fn solid_fragment(in: Solid) -> @location(0) vec4<f32> {
     base = mix(base, linear(draw.tint.rgb), draw.tint.a);
     var alpha = draw.color.a;
     let lit = any(draw.lit_a == vec4<u32>(in.face)) || any(draw.lit_b == vec4<u32>(in.face));
+    let mates = any(draw.mates_a == vec4<u32>(in.face)) || any(draw.mates_b == vec4<u32>(in.face));
+    if mates && !lit {
+        // Hatched, so that it is told from what touches without colour too; stripes as wide as three edges.
+        let stripe = fract((in.position.x + in.position.y) / (8.0 * globals.screen.z));
+        base = mix(base, linear(MATES), select(0.35, 0.85, stripe < 0.5));
+        alpha = max(alpha, 0.6);
+    }
     if lit {
         base = mix(base, linear(LIT), 0.8);
         alpha = max(alpha, 0.75);

@@ -116,7 +116,15 @@ pub struct Recogniser<'a> {
     surfaces: Vec<ShapeSurfaces>,
     thresholds: Thresholds,
     entries: BTreeMap<TargetId, Entry>,
+    /// What the operator wants, also of targets that are not in the list now.
+    choices: BTreeMap<TargetId, Choice>,
     freedom: Freedom,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Choice {
+    pinned: bool,
+    off: bool,
 }
 
 struct ShapeSurfaces {
@@ -141,6 +149,7 @@ impl<'a> Recogniser<'a> {
                 .collect(),
             thresholds,
             entries: BTreeMap::new(),
+            choices: BTreeMap::new(),
             freedom: Freedom::default(),
         }
     }
@@ -155,6 +164,7 @@ impl<'a> Recogniser<'a> {
             let Some(target) = self.candidate(seen.moving_part, touch) else {
                 continue;
             };
+            let Choice { pinned, off } = self.choices.get(&target.id).copied().unwrap_or_default();
             let entry = self.entries.entry(target.id).or_insert(Entry {
                 target,
                 state: State::Far,
@@ -163,8 +173,8 @@ impl<'a> Recogniser<'a> {
                     angle_rad: 0.0,
                 },
                 depth_mm: 0.0,
-                pinned: false,
-                off: false,
+                pinned,
+                off,
                 idle: 0,
             });
             entry.idle = 0;
@@ -199,32 +209,81 @@ impl<'a> Recogniser<'a> {
 
     /// Keeps an entry in the list and before others, or no longer; from the next update on. `false`: there is none.
     pub fn pin(&mut self, id: TargetId, pinned: bool) -> bool {
-        self.entries.get_mut(&id).map(|e| e.pinned = pinned).is_some()
+        self.choose(id, |choice| choice.pinned = pinned)
     }
 
     /// Switches an entry off or on again, from the next update on. `false`: there is none.
     pub fn switch_off(&mut self, id: TargetId, off: bool) -> bool {
-        self.entries.get_mut(&id).map(|e| e.off = off).is_some()
+        self.choose(id, |choice| choice.off = off)
+    }
+
+    fn choose(&mut self, id: TargetId, change: impl FnOnce(&mut Choice)) -> bool {
+        let Some(entry) = self.entries.get_mut(&id) else {
+            return false;
+        };
+        let choice = self.choices.entry(id).or_default();
+        change(choice);
+        (entry.pinned, entry.off) = (choice.pinned, choice.off);
+        true
+    }
+
+    /// Empties the list, as when the part is let go. What the operator pinned or switched off is so again when it comes back.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+        self.freedom = Freedom::default();
+    }
+
+    /// Every target a part could keep with any other, near or not: surfaces that mate, of sizes that agree.
+    ///
+    /// Cost: one comparison of two surfaces for each of the part's and each of all others.
+    pub fn possible(&self, moving_part: usize) -> Vec<Target> {
+        let surfaces_of = |part: usize| self.surfaces.get(self.model.parts.get(part)?.shape);
+        let Some(a) = surfaces_of(moving_part) else {
+            return Vec::new();
+        };
+        let mut out = Vec::new();
+        for fixed_part in (0..self.model.parts.len()).filter(|&p| p != moving_part) {
+            let fixed = surfaces_of(fixed_part).map_or(0, |s| s.merged.len());
+            for (moving_surface, fixed_surface) in
+                (0..a.merged.len()).flat_map(|i| (0..fixed).map(move |j| (i, j)))
+            {
+                out.extend(self.between(TargetId {
+                    moving_part,
+                    moving_surface,
+                    fixed_part,
+                    fixed_surface,
+                }));
+            }
+        }
+        out
+    }
+
+    /// How near a target must be.
+    pub fn thresholds(&self) -> &Thresholds {
+        &self.thresholds
     }
 
     /// The target two touching faces could keep, when their sizes agree.
     fn candidate(&self, moving_part: usize, touch: &TouchingFaces) -> Option<Target> {
-        let of = |part: usize, face: u32| {
+        let surface_of = |part: usize, face: u32| {
             let surfaces = self.surfaces.get(self.model.parts.get(part)?.shape)?;
-            let surface = (*surfaces.of_face.get(face as usize)?)?;
-            Some((surfaces, surface))
+            *surfaces.of_face.get(face as usize)?
         };
-        let (a, i) = of(moving_part, touch.moving_face)?;
-        let (b, j) = of(touch.fixed_part, touch.fixed_face)?;
-        let id = TargetId {
+        self.between(TargetId {
             moving_part,
-            moving_surface: i,
+            moving_surface: surface_of(moving_part, touch.moving_face)?,
             fixed_part: touch.fixed_part,
-            fixed_surface: j,
-        };
-        let target = Target::between(id, &a.merged[i], &b.merged[j], a.middles[i])?;
+            fixed_surface: surface_of(touch.fixed_part, touch.fixed_face)?,
+        })
+    }
+
+    fn between(&self, id: TargetId) -> Option<Target> {
+        let of = |part: usize| self.surfaces.get(self.model.parts.get(part)?.shape);
+        let (a, b) = (of(id.moving_part)?, of(id.fixed_part)?);
+        let (moving, fixed) = (a.merged.get(id.moving_surface)?, b.merged.get(id.fixed_surface)?);
+        let target = Target::between(id, moving, fixed, *a.middles.get(id.moving_surface)?)?;
         let sizes = -self.thresholds.interference_mm..=self.thresholds.diameter_mm;
-        (sizes.contains(&(2.0 * target.play_mm)) && moving_part != touch.fixed_part).then_some(target)
+        (sizes.contains(&(2.0 * target.play_mm)) && id.moving_part != id.fixed_part).then_some(target)
     }
 
     /// Takes targets up one by one, as long as they can be kept together: pinned ones first, then those kept before, then the

@@ -1,0 +1,296 @@
+//! Targets in words: what goes where, how far it is off, what holds of it, and which motion is left.
+
+use glam::DVec3;
+use mortise_guide::{List, MAX_SENT, Row, Standing};
+use mortise_mating::recognise::{Freedom, Target, TargetId, TargetKind};
+
+use crate::session::document::Document;
+
+/// Kind and parts.
+pub fn title(document: &Document, target: &Target) -> String {
+    let (moving, fixed) = (
+        document.part_name(target.id.moving_part),
+        document.part_name(target.id.fixed_part),
+    );
+    let kind = target.kind.name();
+    let between = match target.kind {
+        TargetKind::Coplanar => "on",
+        _ if target.ball_moves => "in",
+        _ => "over",
+    };
+    let mut text = format!("{kind}: {moving} {between} {fixed}");
+    text[..1].make_ascii_uppercase();
+    text
+}
+
+/// Surfaces with their sizes, and by how much these differ.
+pub fn surfaces(target: &Target) -> String {
+    let (inner, outer) = match target.kind {
+        TargetKind::Concentric => ("shaft", "hole"),
+        TargetKind::Spherical => ("ball", "socket"),
+        TargetKind::Annular => ("ball", "bore"),
+        TargetKind::Conical => {
+            return match target.ball_moves {
+                true => "cone in tapered hole".to_owned(),
+                false => "tapered hole over cone".to_owned(),
+            };
+        }
+        TargetKind::Coplanar => return "flat face on flat face".to_owned(),
+    };
+    let what_goes_in = 2.0 * (target.radius_mm - target.play_mm.min(0.0));
+    let inner = format!("{inner} Ø {what_goes_in:.3}");
+    let outer = format!("{outer} Ø {:.3}", what_goes_in + 2.0 * target.play_mm);
+    let difference = match 2.0 * target.play_mm {
+        play if play.abs() < 5e-4 => "same size".to_owned(),
+        play if play > 0.0 => format!("{play:.3} mm clearance"),
+        play => format!("{:.3} mm too thick", -play),
+    };
+    match target.ball_moves {
+        true => format!("{inner} in {outer}: {difference}"),
+        false => format!("{outer} over {inner}: {difference}"),
+    }
+}
+
+/// How far it is from being kept, and how far in.
+pub fn misfit(row: &Row) -> String {
+    let (d, degrees) = (row.misfit.distance_mm, row.misfit.angle_rad.to_degrees());
+    let mut text = match row.target.kind {
+        TargetKind::Concentric => format!("axis off by {d:.3} mm, {degrees:.2}°"),
+        TargetKind::Coplanar => format!("gap {d:.3} mm, {degrees:.2}°"),
+        TargetKind::Conical => format!("off by {d:.3} mm, {degrees:.2}°"),
+        TargetKind::Spherical => format!("centres {d:.3} mm apart"),
+        TargetKind::Annular => format!("centre {d:.3} mm off the axis"),
+    };
+    match row.inside_mm {
+        Some(inside) if inside > 0.0 => text += &format!(", {inside:.1} mm in"),
+        Some(inside) => text += &format!(", {:.1} mm before it", -inside),
+        None => {}
+    }
+    text
+}
+
+/// What holds of a row.
+pub fn standing(document: &Document, list: &List, row: &Row, guides: bool) -> String {
+    let mut text = match &row.standing {
+        Standing::Candidate => "candidate: still too far off".to_owned(),
+        Standing::Conflict(with) => {
+            let names: Vec<String> = with.iter().map(|id| named(document, list, *id)).collect();
+            format!("contradicts {}", names.join(" and "))
+        }
+        Standing::Off => "switched off".to_owned(),
+        Standing::ByContact => "fits: kept by contact".to_owned(),
+        Standing::Waiting if guides => format!("fits: waits, {MAX_SENT} guide already"),
+        Standing::Waiting => "fits: guidance is off".to_owned(),
+        Standing::Sent => "guides".to_owned(),
+        Standing::Refused(why) => format!("fits, but the board refused: {why}"),
+    };
+    if row.pinned {
+        text += ", pinned";
+    }
+    text
+}
+
+/// Face numbers of both parts.
+pub fn faces(document: &Document, target: &Target) -> String {
+    let numbers = |faces: &[u32]| {
+        let shown: Vec<String> = faces.iter().take(6).map(u32::to_string).collect();
+        let more = faces.len().saturating_sub(shown.len());
+        let word = if faces.len() == 1 { "face" } else { "faces" };
+        let tail = if more > 0 {
+            format!(" and {more} more")
+        } else {
+            String::new()
+        };
+        format!("{word} {}{tail}", shown.join(", "))
+    };
+    format!(
+        "{}: {}\n{}: {}",
+        document.part_name(target.id.moving_part),
+        numbers(&target.moving_faces),
+        document.part_name(target.id.fixed_part),
+        numbers(&target.fixed_faces),
+    )
+}
+
+/// Motion that is left.
+pub fn freedom(freedom: &Freedom) -> String {
+    let slide = freedom.slides.first().copied();
+    let turn = freedom.turns.first().map(|axis| axis.direction);
+    match (freedom.slides.len(), freedom.turns.len()) {
+        (3, 3) => "everything".to_owned(),
+        (0, 0) => "nothing".to_owned(),
+        (1, 1) if slide.zip(turn).is_some_and(|(s, t)| s.cross(t).length() < 1e-6) => {
+            format!("slides and turns about one axis{}", along(slide))
+        }
+        (2, 1) => format!("slides and turns on a plane{}", across(turn)),
+        (0, 1) => format!("turns about one axis{}", along(turn)),
+        (1, 0) => format!("slides along one axis{}", along(slide)),
+        (0, 3) => "turns every way about a point".to_owned(),
+        (1, 3) => format!("slides along one axis{}, turns every way", along(slide)),
+        (slides, turns) => {
+            let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+            format!("{} and {}", count(slides, "slide"), count(turns, "turn"))
+        }
+    }
+}
+
+/// A target that another contradicts: as short as it can be told from the rest.
+fn named(document: &Document, list: &List, id: TargetId) -> String {
+    let target = list.rows.iter().map(|row| &row.target).find(|t| t.id == id);
+    match target {
+        Some(target) if target.radius_mm > 0.0 => {
+            let (what, size) = (title(document, target), 2.0 * target.radius_mm);
+            format!("“{what}”, Ø {size:.3}")
+        }
+        Some(target) => format!("“{}”", title(document, target)),
+        None => "another target".to_owned(),
+    }
+}
+
+/// Which of the assembly's axes a direction is, if one.
+fn along(direction: Option<DVec3>) -> String {
+    letter(direction).map_or_else(String::new, |name| format!(" ({name})"))
+}
+
+fn across(normal: Option<DVec3>) -> String {
+    letter(normal).map_or_else(String::new, |name| format!(" (across {name})"))
+}
+
+fn letter(direction: Option<DVec3>) -> Option<&'static str> {
+    let direction = direction?.try_normalize()?;
+    let axes = [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")];
+    (axes.into_iter())
+        .find(|(axis, _)| axis.cross(direction).length() < 1e-3)
+        .map(|(_, name)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use mortise_brep::{CadModel, Part};
+    use mortise_mating::Axis;
+    use mortise_mating::recognise::Misfit;
+
+    use super::*;
+
+    fn axis(direction: DVec3) -> Axis {
+        Axis {
+            origin: DVec3::ZERO,
+            direction,
+        }
+    }
+
+    fn row(kind: TargetKind, radius_mm: f64, play_mm: f64, ball_moves: bool) -> Row {
+        Row {
+            target: Target {
+                id: TargetId {
+                    moving_part: 1,
+                    moving_surface: 0,
+                    fixed_part: 0,
+                    fixed_surface: 0,
+                },
+                kind,
+                moving: axis(DVec3::Z),
+                fixed: axis(DVec3::Z),
+                play_mm,
+                radius_mm,
+                ball_moves,
+                moving_faces: vec![3],
+                fixed_faces: (0..9).collect(),
+            },
+            standing: Standing::Sent,
+            misfit: Misfit {
+                distance_mm: 0.25,
+                angle_rad: 0.5f64.to_radians(),
+            },
+            depth_mm: 0.0,
+            inside_mm: Some(-0.4),
+            pinned: false,
+        }
+    }
+
+    fn document() -> Document {
+        let part = |name: &str| Part {
+            name: name.into(),
+            path: vec![],
+            shape: 0,
+            placement: glam::DAffine3::IDENTITY,
+            color: None,
+        };
+        let model = CadModel {
+            shapes: vec![Default::default()],
+            parts: vec![part("block"), part("peg")],
+            ..CadModel::default()
+        };
+        Document::of(model, None, "test".into(), 1)
+    }
+
+    #[test]
+    fn sizes_are_those_of_both_surfaces_whichever_moves() {
+        let peg = row(TargetKind::Concentric, 8.875, 0.5, true).target;
+        assert_eq!(
+            surfaces(&peg),
+            "shaft Ø 17.750 in hole Ø 18.750: 1.000 mm clearance"
+        );
+        let ring = row(TargetKind::Concentric, 8.875, 0.5, false).target;
+        assert_eq!(
+            surfaces(&ring),
+            "hole Ø 18.750 over shaft Ø 17.750: 1.000 mm clearance"
+        );
+        // The smaller radius is then the hole's.
+        let press = row(TargetKind::Concentric, 9.0, -0.01, true).target;
+        assert_eq!(
+            surfaces(&press),
+            "shaft Ø 18.020 in hole Ø 18.000: 0.020 mm too thick"
+        );
+        assert_eq!(title(&document(), &peg), "Concentric: peg in block");
+        assert_eq!(title(&document(), &ring), "Concentric: peg over block");
+    }
+
+    #[test]
+    fn a_row_says_how_far_off_and_which_faces() {
+        let row = row(TargetKind::Concentric, 8.875, 0.5, true);
+        assert_eq!(misfit(&row), "axis off by 0.250 mm, 0.50°, 0.4 mm before it");
+        assert_eq!(
+            faces(&document(), &row.target),
+            "peg: face 3\nblock: faces 0, 1, 2, 3, 4, 5 and 3 more"
+        );
+    }
+
+    #[test]
+    fn a_conflict_names_what_came_first() {
+        let (document, first) = (document(), row(TargetKind::Concentric, 6.0, 0.1, true));
+        let mut other = row(TargetKind::Concentric, 4.0, 0.1, true);
+        other.standing = Standing::Conflict(vec![first.target.id]);
+        other.pinned = true;
+        let mut list = List {
+            rows: vec![first],
+            ..List::default()
+        };
+        assert_eq!(
+            standing(&document, &list, &other, true),
+            "contradicts “Concentric: peg in block”, Ø 12.000, pinned"
+        );
+        list.rows.clear();
+        let text = standing(&document, &list, &other, true);
+        assert_eq!(text, "contradicts another target, pinned");
+    }
+
+    #[test]
+    fn what_is_left_reads_as_motion() {
+        let told = |slides: &[DVec3], turns: &[DVec3]| {
+            freedom(&Freedom {
+                slides: slides.to_vec(),
+                turns: turns.iter().map(|&t| axis(t)).collect(),
+            })
+        };
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        assert_eq!(told(&[z], &[-z]), "slides and turns about one axis (z)");
+        assert_eq!(told(&[x], &[z]), "1 slide and 1 turn");
+        assert_eq!(told(&[x, y], &[z]), "slides and turns on a plane (across z)");
+        let lean = DVec3::new(1.0, 1.0, 0.0);
+        assert_eq!(told(&[], &[lean]), "turns about one axis");
+        assert_eq!(told(&[], &[x, y, z]), "turns every way about a point");
+        assert_eq!(told(&[], &[]), "nothing");
+        assert_eq!(told(&[x, y, z], &[x, y, z]), "everything");
+    }
+}

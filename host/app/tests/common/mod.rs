@@ -1,0 +1,94 @@
+//! What tests of the window share: a window without a display, and what an operator does first.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use mortise::session::Session;
+use mortise::session::notes::Severity;
+use mortise::ui::{Window, theme};
+use mortise_protocol::message::DeviceState;
+use mortise_rig::RigSpec;
+
+/// A bound for what should take seconds: only a hang reaches it.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// A window with nothing open.
+pub fn harness() -> Harness<'static, Window> {
+    Harness::builder()
+        .with_size(egui::vec2(1500.0, 940.0))
+        .with_max_steps(1)
+        .with_context_setup(theme::apply)
+        .build_ui_state(
+            |ui, window: &mut Window| window.show(ui, None),
+            Window::new(Session::new(Arc::new(|| {}))),
+        )
+}
+
+/// Draws pictures until `done`.
+pub fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Session) -> bool) {
+    let begun = Instant::now();
+    loop {
+        harness.step();
+        if done(&harness.state().session) {
+            return;
+        }
+        if begun.elapsed() > PATIENCE {
+            let notes: Vec<_> = harness
+                .state()
+                .session
+                .notes
+                .iter()
+                .map(|n| n.text.clone())
+                .collect();
+            panic!("never: {what}; messages: {notes:#?}");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Clicks what a screen reader calls so.
+pub fn click(harness: &mut Harness<'_, Window>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.step();
+    harness.step();
+}
+
+/// Opens the sample and waits until it is baked.
+pub fn open_sample(harness: &mut Harness<'_, Window>) {
+    harness.step();
+    click(harness, "Open the sample");
+    until(harness, "the sample is baked", |s| {
+        s.document.as_ref().is_some_and(|d| d.baked.is_some())
+    });
+}
+
+/// Chooses the simulation, connects, and waits until the scene is there.
+pub fn connect(harness: &mut Harness<'_, Window>) {
+    until(harness, "rigs are listed", |s| !s.rigs.is_empty());
+    let simulation = RigSpec::Simulated { realtime: true };
+    let entry = |s: &Session| s.rigs.iter().find(|r| r.spec == simulation).cloned();
+    let entry = entry(&harness.state().session).expect("the simulation is in the list");
+    click(harness, "Rig");
+    click(harness, &entry.label);
+    assert_eq!(harness.state().session.chosen, simulation);
+    click(harness, "Connect");
+    until(harness, "the scene is on the board", Session::scene_is_on_board);
+}
+
+/// The gravest message so far.
+pub fn worst(session: &Session) -> Severity {
+    session
+        .notes
+        .iter()
+        .map(|n| n.severity)
+        .max()
+        .unwrap_or(Severity::Info)
+}
+
+/// Motors on.
+pub fn arm(harness: &mut Harness<'_, Window>) {
+    click(harness, "Arm");
+    until(harness, "armed", |s| s.device() == Some(DeviceState::Armed));
+}

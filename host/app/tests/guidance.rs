@@ -1,0 +1,224 @@
+//! Guidance through the window without a display: targets appear by themselves, one is switched off and on, STOP ends all.
+
+use std::time::Duration;
+
+mod common;
+
+use common::{arm, click, connect, harness, open_sample, until, worst};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use glam::DVec3;
+use mortise::session::notes::Severity;
+use mortise::session::{Intent, Session, obstacle};
+use mortise::ui::Window;
+use mortise_guide::{GuideSettings, List, Row, Standing, When};
+use mortise_mating::Axis;
+use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId, TargetKind};
+use mortise_protocol::message::{DeviceState, Telemetry, TouchingPair};
+use mortise_protocol::parameter::ParameterId;
+
+fn row(session: &Session) -> Option<&Row> {
+    (session.guidance.rows.iter()).find(|row| row.target.kind == TargetKind::Concentric)
+}
+
+fn stands(session: &Session, standing: &Standing) -> bool {
+    row(session).is_some_and(|row| row.standing == *standing)
+}
+
+fn guided(session: &Session) -> u8 {
+    session.telemetry.as_ref().map_or(0, |t| t.guidance.active)
+}
+
+#[test]
+fn targets_appear_by_themselves_can_be_switched_off_and_end_with_stop() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    click(&mut harness, "Play insertion");
+    // The hand pushes the peg to the wall at the end: it touches, is recognised, sent, and held by the board.
+    until(&mut harness, "the peg is guided", |s| {
+        stands(s, &Standing::Sent) && guided(s) == 1
+    });
+    let session = &harness.state().session;
+    let found = row(session).expect("sent");
+    assert_eq!((found.target.id.moving_part, found.target.id.fixed_part), (1, 0));
+    assert!((2.0 * found.target.play_mm - 1.0).abs() < 1e-9, "1 mm clearance");
+    assert_eq!(session.guidance.freedom.count(), 2, "it slides and turns");
+    harness.get_by_label_contains("slides and turns about one axis (z)");
+    harness.get_by_label_contains("shaft Ø 17.750 in hole Ø 18.750");
+    until(&mut harness, "it is on the axis", |s| {
+        row(s).is_some_and(|row| row.misfit.distance_mm < 0.01)
+    });
+
+    let switch = |harness: &mut Harness<'_, Window>, on: &str| {
+        choose(harness, &format!("Switch {on} Concentric: peg in block"));
+    };
+    switch(&mut harness, "off");
+    until(&mut harness, "switched off", |s| {
+        stands(s, &Standing::Off) && guided(s) == 0
+    });
+    // Left to the contact, the hand's push takes it to the wall: half the clearance away.
+    until(&mut harness, "it is at the wall", |s| {
+        row(s).is_some_and(|row| row.misfit.distance_mm > 0.3)
+    });
+    switch(&mut harness, "on");
+    until(&mut harness, "guided again", |s| {
+        stands(s, &Standing::Sent) && guided(s) == 1
+    });
+
+    choose(&mut harness, "Pin Concentric: peg in block");
+    until(&mut harness, "pinned", |s| row(s).is_some_and(|row| row.pinned));
+
+    assert!(worst(&harness.state().session) < Severity::Warning);
+    click(&mut harness, "STOP");
+    until(&mut harness, "stopped", |s| {
+        s.device() == Some(DeviceState::Stopped) && s.guidance.rows.is_empty()
+    });
+}
+
+/// Clicks what may have to be scrolled to first.
+fn choose(harness: &mut Harness<'_, Window>, label: &str) {
+    harness.get_by_label(label).scroll_to_me();
+    for _ in 0..20 {
+        harness.step();
+    }
+    click(harness, label);
+}
+
+#[test]
+fn guidance_off_and_on_while_running() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    click(&mut harness, "Play insertion");
+    until(&mut harness, "guided", |s| guided(s) == 1);
+    let act = |harness: &mut Harness<'_, Window>, value| {
+        let wish = Intent::SetParameter(ParameterId::Guidance, value);
+        harness.state_mut().session.act(wish);
+    };
+    act(&mut harness, 0.0);
+    until(&mut harness, "off: recognised, not sent", |s| {
+        stands(s, &Standing::Waiting) && guided(s) == 0
+    });
+    act(&mut harness, 2.0);
+    until(&mut harness, "the thesis' blend", |s| {
+        stands(s, &Standing::Sent) && guided(s) == 1
+    });
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::GuideCap(1e9));
+    assert!(session.guide.force_cap_n <= 8.0);
+    session.act(Intent::GuideCap(f32::NAN));
+    assert!(session.guide.force_cap_n.is_finite());
+    assert!(worst(&harness.state().session) < Severity::Warning);
+}
+
+#[test]
+fn near_guides_before_anything_touches() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    harness.state_mut().session.act(Intent::GuideWhen(When::Near));
+    click(&mut harness, "Play insertion");
+    until(&mut harness, "guided from before the hole", |s| {
+        stands(s, &Standing::Sent)
+    });
+    let session = &harness.state().session;
+    let inside = row(session).and_then(|row| row.inside_mm).expect("along an axis");
+    assert!(inside < 10.0, "not only at the bottom: {inside} mm in");
+}
+
+#[test]
+fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let unknown = TargetId {
+        moving_part: 7,
+        moving_surface: 99,
+        fixed_part: 8,
+        fixed_surface: 99,
+    };
+    let session = &harness.state().session;
+    for intent in [
+        Intent::PinTarget(unknown, true),
+        Intent::SwitchTargetOff(unknown, true),
+    ] {
+        let reason = obstacle(session, &intent).expect("no rig");
+        assert!(reason.len() > 5);
+    }
+    connect(&mut harness);
+    arm(&mut harness);
+    click(&mut harness, "peg");
+    click(&mut harness, "Grab");
+    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    let session = &mut harness.state_mut().session;
+    assert!(obstacle(session, &Intent::SwitchTargetOff(unknown, true)).is_some());
+
+    // A list and touching pairs of another world.
+    let mut telemetry: Box<Telemetry> = session.telemetry.clone().expect("in hand");
+    let pair = TouchingPair {
+        moving_face: u16::MAX,
+        static_part: 400,
+        static_face: 4000,
+        count: 0,
+        depth: f32::NAN,
+        point: [f32::INFINITY; 3],
+    };
+    telemetry.pairs.push(pair).expect("room");
+    session.telemetry = Some(telemetry);
+    let mut odd = List {
+        held: Some(1),
+        freedom: Freedom::default(),
+        ..List::default()
+    };
+    for standing in [
+        Standing::Conflict(vec![unknown]),
+        Standing::Conflict(vec![]),
+        Standing::Refused("no".into()),
+        Standing::Candidate,
+        Standing::Sent,
+    ] {
+        odd.rows.push(Row {
+            target: Target {
+                id: unknown,
+                kind: TargetKind::Concentric,
+                moving: axis(),
+                fixed: axis(),
+                play_mm: f64::NAN,
+                radius_mm: f64::INFINITY,
+                ball_moves: true,
+                moving_faces: vec![],
+                fixed_faces: vec![u32::MAX],
+            },
+            standing,
+            misfit: Misfit {
+                distance_mm: f64::NAN,
+                angle_rad: f64::NAN,
+            },
+            depth_mm: 0.0,
+            inside_mm: None,
+            pinned: true,
+        });
+    }
+    session.guidance = odd;
+    let document = session.document.as_ref().expect("open");
+    let camera = mortise::viewport::camera::Camera::default();
+    let picture = mortise::viewport::compose::compose(session, document, camera, true, 1.0);
+    assert!(picture.items.iter().all(|item| item.mates.is_empty()));
+    harness.step();
+
+    // A link that is lost takes the list with it.
+    harness.state_mut().session.act(Intent::Disconnect);
+    until(&mut harness, "disconnected", |s| s.connection().is_none());
+    std::thread::sleep(Duration::from_millis(50));
+    harness.step();
+    let session = &harness.state().session;
+    assert_eq!(session.guidance, List::default());
+    assert_eq!(session.guide, GuideSettings::default());
+}
+
+fn axis() -> Axis {
+    Axis {
+        origin: DVec3::ZERO,
+        direction: DVec3::Z,
+    }
+}

@@ -1,0 +1,57 @@
+//! From a target in millimetres of the model to the board's message.
+
+use glam::DVec3;
+use heapless::Vec as BoundedVec;
+use mortise_mating::recognise::{Target, TargetKind};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
+
+use crate::GuideSettings;
+
+/// The board's word for a target's kind; `None` for what is left to contact.
+pub fn kind(target: &Target) -> Option<ConstraintKind> {
+    match target.kind {
+        TargetKind::Concentric => Some(ConstraintKind::Concentric),
+        TargetKind::Conical => Some(ConstraintKind::Conical),
+        TargetKind::Spherical => Some(ConstraintKind::Spherical),
+        // The board knows bores of fixed parts.
+        TargetKind::Annular => target.ball_moves.then_some(ConstraintKind::Annular),
+        TargetKind::Coplanar => None,
+    }
+}
+
+/// The message about a target. `parts` names the model part of each part of the image.
+pub fn message(
+    target: &Target,
+    parts: &[usize],
+    settings: &GuideSettings,
+    id: u16,
+    sequence: u16,
+) -> Option<ConstraintTarget> {
+    let image_part = parts.iter().position(|&p| p == target.id.fixed_part)?;
+    let feature = |origin: DVec3, direction: DVec3| Feature {
+        point: (origin / 1000.0).as_vec3().to_array(),
+        direction: direction.normalize().as_vec3().to_array(),
+    };
+    let mut faces = BoundedVec::new();
+    for &moving in &target.moving_faces {
+        for &fixed in &target.fixed_faces {
+            if let (Ok(moving), Ok(fixed)) = (u16::try_from(moving), u16::try_from(fixed)) {
+                // The first few are the surface's largest share; the rest is felt as contact.
+                let _ = faces.push((moving, fixed));
+            }
+        }
+    }
+    Some(ConstraintTarget {
+        id,
+        sequence,
+        kind: kind(target)?,
+        moving: feature(target.moving.origin, target.moving.direction),
+        static_part: u16::try_from(image_part).ok()?,
+        fixed: feature(target.fixed.origin, target.fixed.direction),
+        stiffness: settings.stiffness_n_per_m,
+        force_cap: settings.force_cap_n,
+        torque_cap: settings.torque_cap_nm,
+        expiry_ticks: settings.expiry_ticks,
+        faces,
+    })
+}
