@@ -113,10 +113,12 @@ fn let_go(tick: u32) -> Telemetry {
 }
 
 fn targets(messages: &[ToDevice]) -> Vec<&ConstraintTarget> {
-    let target = |m| match m {
-        &ToDevice::SetTarget(ref target) => Some(target),
-        _ => None,
-    };
+    fn target(message: &ToDevice) -> Option<&ConstraintTarget> {
+        match message {
+            ToDevice::SetTarget(target) => Some(target),
+            _ => None,
+        }
+    }
     messages.iter().filter_map(target).collect()
 }
 

@@ -100,10 +100,14 @@ fn run(mut guide: Guide<'_>, told: &Receiver<Told>, client: &Weak<Client>, outbo
         }
         let list = guide.list();
         let changed = (&list.held, &list.rows, &list.freedom) != (&last.held, &last.rows, &last.freedom);
-        if changed {
-            last = list.clone();
-            // A picture that is late sees the next list.
-            outbox.offer(Update::Guidance { link, list });
+        // A window that is behind hears of the next one instead.
+        if changed
+            && outbox.offer(Update::Guidance {
+                link,
+                list: list.clone(),
+            })
+        {
+            last = list;
         }
     }
 }

@@ -86,11 +86,13 @@ impl Outbox {
         sent
     }
 
-    /// Sends, unless too much waits already.
-    pub fn offer(&self, update: Update) {
-        if self.sender.try_send(update).is_ok() {
+    /// Sends, unless too much waits already; says whether it did.
+    pub fn offer(&self, update: Update) -> bool {
+        let sent = self.sender.try_send(update).is_ok();
+        if sent {
             (self.wake)();
         }
+        sent
     }
 }
 

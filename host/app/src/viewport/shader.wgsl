@@ -102,7 +102,7 @@ fn solid_fragment(in: Solid) -> @location(0) vec4<f32> {
     if mates && !lit {
         // Hatched, so that it is told from what touches without colour too; stripes as wide as three edges.
         let stripe = fract((in.position.x + in.position.y) / (8.0 * globals.screen.z));
-        base = mix(base, linear(MATES), select(0.35, 0.85, stripe < 0.5));
+        base = mix(base, linear(MATES), select(0.5, 0.85, stripe < 0.5));
         alpha = max(alpha, 0.6);
     }
     if lit {

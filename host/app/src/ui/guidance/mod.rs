@@ -18,6 +18,9 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     control::section(ui, "Guidance");
     ui.add_space(2.0);
     ui.horizontal(|ui| {
+        // Both lists beside each other.
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.spacing_mut().combo_width = 80.0;
         for row in PARAMETERS.iter().filter(|row| row.name == WORD) {
             parameters::choice(ui, session, wanted, row);
         }
