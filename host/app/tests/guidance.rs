@@ -1,5 +1,6 @@
 //! Guidance through the window without a display: targets appear by themselves, one is switched off and on, STOP ends all.
 
+use std::path::Path;
 use std::time::Duration;
 
 mod common;
@@ -221,4 +222,36 @@ fn axis() -> Axis {
         origin: DVec3::ZERO,
         direction: DVec3::Z,
     }
+}
+
+#[test]
+fn two_pins_in_two_holes_are_two_targets_and_leave_a_slide() {
+    let mut harness = harness();
+    harness.step();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../mating/tests/data/two_pin_exact.step");
+    // Assembled as delivered nothing is pressed together, so nothing touches.
+    harness.state_mut().session.act(Intent::GuideWhen(When::Near));
+    harness.state_mut().session.act(Intent::Open(file));
+    until(&mut harness, "it is baked", |s| {
+        s.document.as_ref().is_some_and(|d| d.baked.is_some())
+    });
+    connect(&mut harness);
+    arm(&mut harness);
+    let link = harness.state().session.document.as_ref().map(|d| {
+        let count = d.model.parts.len();
+        (0..count).find(|&part| d.is_grabbable(part))
+    });
+    let link = link.flatten().expect("one of both moves");
+    harness.state_mut().session.act(Intent::Grab(link));
+    let sent = |s: &Session| {
+        let rows = s.guidance.rows.iter();
+        rows.filter(|row| row.standing == Standing::Sent).count()
+    };
+    until(&mut harness, "both pins are guided", |s| {
+        sent(s) == 2 && guided(s) == 2
+    });
+    let freedom = &harness.state().session.guidance.freedom;
+    let left = (freedom.slides.len(), freedom.turns.len());
+    assert_eq!(left, (1, 0), "{freedom}");
+    assert!(worst(&harness.state().session) < Severity::Warning);
 }
