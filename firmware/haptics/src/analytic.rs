@@ -9,7 +9,7 @@
 //! that could be the nearest.
 
 use glam::Vec3;
-use mortise_protocol::image::{FaceRecord, FieldSample, Lookup, NO_FACE, Nearby, Shape, surface_kind};
+use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Nearby, Shape, surface_kind};
 
 use crate::limits::length;
 use crate::proximity::inverse_sqrt;
@@ -103,16 +103,32 @@ fn curvature(face: &FaceRecord, p: Vec3) -> f32 {
     1.0 / if radius > 1e-9 { radius } else { 1e-9 }
 }
 
-/// Signed distance (outside positive, m) at `p` by the surfaces that `sample` names, and whose it is; none where the interpolated distance is to
-/// be taken. Outside an edge or corner it is no more than the distance. About 50 instructions a face on a Cortex-M7; [`normal`] as much again.
-#[inline]
-pub(crate) fn exact(faces: &[FaceRecord], sample: &FieldSample, p: Vec3) -> Option<(f32, u16)> {
-    exact_by(faces, sample.nearby, p)
+/// What a face's exact surface says at a point.
+#[derive(Clone, Copy)]
+pub(crate) struct OnFace {
+    /// Signed distance, outside positive, m.
+    pub distance: f32,
+    /// Outward unit normal there.
+    pub normal: Vec3,
+    /// Whose surface it is.
+    pub face: u16,
 }
 
-/// As [`exact`], by what a sample has nearby.
+/// Distance and normal of one face's surface at `p`, if it has a closed form. About 60 instructions on a Cortex-M7.
 #[inline(always)]
-pub(crate) fn exact_by(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
+pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace> {
+    let (distance, normal) = signed(faces.get(usize::from(face))?, p)?;
+    Some(OnFace {
+        distance,
+        normal,
+        face,
+    })
+}
+
+/// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and whose it is; none where the interpolated distance is to
+/// be taken. Outside an edge or corner it is no more than the distance. About 50 instructions a face on a Cortex-M7.
+#[inline]
+pub(crate) fn exact(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
     match nearby {
         Nearby::Face(face) => distance(faces, face, p).map(|d| (d, face)),
         Nearby::Convex(group) => extreme(faces, group, p, 1.0),
@@ -135,11 +151,6 @@ fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<
         }
     }
     Some(found)
-}
-
-/// Outward unit normal of a face's surface at `p`.
-pub(crate) fn normal(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<Vec3> {
-    signed(faces.get(usize::from(face))?, p).map(|(_, normal)| normal)
 }
 
 #[inline]

@@ -6,12 +6,14 @@
 //! be nearest; when the band held nothing, it goes down by the nearer child first, for a first gap to compare with.
 
 use glam::Vec3;
-use mortise_protocol::image::{EDGE_ERROR_CELLS, NO_FACE, Nearby, NodeRecord, PointRecord, Shape};
+use mortise_protocol::image::{
+    Cell, EDGE_ERROR_CELLS, NO_FACE, Nearby, NodeRecord, Place, PointRecord, Shape,
+};
 
-use crate::analytic::{agreeing, closed_form, exact_by, normal, unsigned_distance};
+use crate::analytic::{OnFace, agreeing, closed_form, exact, on_face, unsigned_distance};
 use crate::io::Work;
 use crate::probe::Nearest;
-use crate::proximity::{Found, Job, Walk};
+use crate::proximity::{Job, Walk};
 
 /// The diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
@@ -252,8 +254,8 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     #[inline(always)]
     fn bound(&self, node: &NodeRecord, so_far: &mut SoFar) -> (f32, bool) {
         so_far.work.nodes += 1;
-        let center = self.job.to_cells.apply(node.center);
-        let distance = self.job.field.bound_at(center.to_array());
+        let center = self.job.to_field.apply(node.center);
+        let distance = self.job.field.bound(center.to_array());
         // Inside, a clamped distance and a bound beyond the band say how deep at least, not at most.
         if distance < -self.resolved {
             return (f32::NEG_INFINITY, false);
@@ -272,10 +274,11 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     /// Looks a point up.
     #[inline(always)]
     fn see(&self, point: &PointRecord) -> Seen {
-        let in_cells = self.job.to_cells.apply(point.position).to_array();
-        match self.job.field.nearby_at(in_cells) {
-            Ok(nearby) => {
-                let exact = exact_by(self.shape.faces, nearby, self.in_field(point));
+        let p = self.in_field(point);
+        match self.job.field.place(p.to_array()) {
+            Place::Cell(cell) => {
+                let nearby = self.job.field.nearby(&cell);
+                let exact = exact(self.shape.faces, nearby, p);
                 if let Some((distance, face)) = exact
                     && distance.abs() <= self.resolved
                     && match nearby {
@@ -296,13 +299,12 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                         settled: true,
                     };
                 }
-                self.interpolated(in_cells, nearby, exact)
+                self.interpolated(&cell, nearby, exact)
             }
-            Err(bound) => {
+            Place::Far { inside, bound } => {
                 // Inside a bound says how deep at least, not at most.
-                let inside = bound < 0.0;
                 Seen {
-                    distance: bound,
+                    distance: if inside { -bound } else { bound },
                     least: if inside { f32::NEG_INFINITY } else { bound },
                     overlaps: inside,
                     inside,
@@ -313,8 +315,8 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     }
 
     /// Looks up what its cell's faces do not settle; `exact` is what they give.
-    fn interpolated(&self, in_cells: [f32; 3], nearby: Nearby, exact: Option<(f32, u16)>) -> Seen {
-        let interpolated = self.job.field.bound_at(in_cells);
+    fn interpolated(&self, cell: &Cell<'_>, nearby: Nearby, exact: Option<(f32, u16)>) -> Seen {
+        let interpolated = self.job.field.distance(cell);
         let mut seen = Seen {
             distance: interpolated,
             least: interpolated - self.edge_error,
@@ -346,16 +348,14 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     }
 
     /// What pushes a settled point.
-    fn found(&self, seen: &Seen, point: &PointRecord) -> Option<Found> {
+    fn found(&self, seen: &Seen, point: &PointRecord) -> Option<OnFace> {
         if !seen.settled {
             return None;
         }
-        let (distance, face) = (seen.distance, seen.face);
-        let normal = normal(self.shape.faces, face, self.in_field(point))?;
-        Some(Found {
-            distance,
-            normal,
-            face,
+        let found = on_face(self.shape.faces, seen.face, self.in_field(point))?;
+        Some(OnFace {
+            distance: seen.distance,
+            ..found
         })
     }
 

@@ -181,6 +181,7 @@ impl Prober {
             busy: false,
             thinning: 0,
             budget: u32::MAX,
+            step_cost: 0,
             braking_m: 0.0,
             guidance: &guidance,
             guidance_settings: &Settings::default().guidance,

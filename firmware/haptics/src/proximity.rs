@@ -14,12 +14,11 @@
 
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{
-    EDGE_ERROR_CELLS, FaceRecord, Field, FieldSample, Lookup, NO_FACE, NodeRecord, PointRecord, SceneImage,
-    Shape,
+    Cell, EDGE_ERROR_CELLS, FaceRecord, Field, NO_FACE, NodeRecord, Place, PointRecord, SceneImage, Shape,
 };
 
-use crate::analytic::{exact, normal};
-use crate::coherence::{Coherence, Key, Known};
+use crate::analytic::{OnFace, exact, on_face};
+use crate::coherence::{Coherence, Due, Key, Known};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mating};
 use crate::io::{Flags, Work};
@@ -37,12 +36,13 @@ const LEAST_GRADIENT2: f32 = 0.01;
 pub(crate) const APPROACH: f32 = 2.0;
 /// Thinning up to which some point of every leaf is looked at: leaves have 8 points.
 const LEAF_THINNING: u8 = 3;
-/// The budget counts what a look-up costs, 150 instructions. Passing over a node of which enough is known costs an eighth of that.
-const PASSED_OVER_PER_LOOKUP: u32 = 8;
-/// A point within the margin costs three times as much again: exact surfaces, direction, lever.
-const NEAR: u32 = 3;
-/// And a candidate, with its share of the step, three times as much on top.
-const CANDIDATE: u32 = 3;
+/// The budget counts what a look-up costs, 170 instructions. Passing over a node of which enough is known costs half of that, asking the field
+/// about one four times that; a point at an edge or within the margin costs as much again, and a candidate as much and a half on top.
+const PASSED_OVER_PER_LOOKUP: u32 = 2;
+/// See [`PASSED_OVER_PER_LOOKUP`].
+const NODE: u32 = 4;
+/// See [`PASSED_OVER_PER_LOOKUP`].
+const TWO_CANDIDATES: u32 = 3;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -85,8 +85,10 @@ pub(crate) struct Search<'s, 'i> {
     pub busy: bool,
     /// Of the points of a leaf that is near only each 2ⁿth is looked at.
     pub thinning: u8,
-    /// Look-ups allowed.
+    /// Work allowed, look-ups.
     pub budget: u32,
+    /// What of it the step is expected to take.
+    pub step_cost: u32,
     /// Points that come this near are braked, m; 0 for no braking. Then points in proximity voxels are wanted too.
     pub braking_m: f32,
     /// Where guided faces meet, contact makes room.
@@ -109,8 +111,6 @@ pub(crate) struct Job<'i> {
     pub faces: &'i [FaceRecord],
     /// Tree frame to field frame.
     pub to_field: Affine,
-    /// Tree frame to cells from the corner of the field's grid.
-    pub to_cells: Affine,
     /// Tree frame to arm (from the held part's centre of mass, world axes).
     pub to_arm: Affine,
     /// Field gradient to the direction, in the world, that pushes the held part away.
@@ -167,6 +167,7 @@ impl<'i> Search<'_, 'i> {
             work,
             passed_over: 0,
             near: 0,
+            edges: 0,
         };
         let stop = walk
             .jobs(start, None)
@@ -231,6 +232,7 @@ impl<'i> Search<'_, 'i> {
             work,
             passed_over: 0,
             near: 0,
+            edges: 0,
         }
     }
 }
@@ -238,7 +240,22 @@ impl<'i> Search<'_, 'i> {
 impl<'i> Job<'i> {
     /// A point of the tree in cells from the corner of the field's grid.
     pub fn in_cells(&self, point: &PointRecord) -> [f32; 3] {
-        self.to_cells.apply(point.position).to_array()
+        let in_field = self.to_field.apply(point.position);
+        self.field.in_cells(in_field.to_array())
+    }
+
+    /// Signed distance of the field's shape from `p` (tree frame), or a bound: by exact surfaces where they are known.
+    #[inline(always)]
+    fn distance(&self, p: [f32; 3]) -> f32 {
+        let in_field = self.to_field.apply(p);
+        match self.field.place(in_field.to_array()) {
+            Place::Cell(cell) => match exact(self.faces, self.field.nearby(&cell), in_field) {
+                Some((distance, _)) => distance,
+                None => self.field.distance(&cell),
+            },
+            Place::Far { inside: false, bound } => bound,
+            Place::Far { inside: true, bound } => -bound,
+        }
     }
 
     /// Job `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
@@ -253,7 +270,6 @@ impl<'i> Job<'i> {
             linear: back * rotation,
             offset: back * apart,
         };
-        let per_metre = 1.0 / field.field.record().cell;
         Self {
             index,
             backward,
@@ -263,10 +279,6 @@ impl<'i> Job<'i> {
             points: tree.points,
             field: field.field,
             faces: field.faces,
-            to_cells: Affine {
-                linear: to_field.linear * per_metre,
-                offset: Vec3::from_array(field.field.in_cells(to_field.offset.to_array())),
-            },
             to_field,
             to_arm: Affine {
                 linear: rotation,
@@ -275,15 +287,6 @@ impl<'i> Job<'i> {
             to_push: field_pose.rotation() * if backward { -1.0 } else { 1.0 },
         }
     }
-}
-
-/// The other part at a point.
-pub(crate) struct Found {
-    /// Signed, m.
-    pub distance: f32,
-    /// Unit gradient, field frame.
-    pub normal: Vec3,
-    pub face: u16,
 }
 
 /// A search under way.
@@ -298,6 +301,46 @@ pub(crate) struct Walk<'w, 's, 'i> {
     passed_over: u32,
     /// Points within the margin.
     pub near: u32,
+    /// Points where one face did not tell all.
+    edges: u32,
+}
+
+/// Deepest tree whose inner nodes all learn when they are due: 2¹⁶ leaves in two halves each time.
+const DEEPEST: usize = 16;
+
+/// The nodes above the one that is looked at, and when the first below each is due.
+#[derive(Default)]
+struct Above(heapless::Vec<(Key, u32, Due), DEEPEST>);
+
+impl Above {
+    /// What follows, up to node `end`, is below `key`. In a deeper tree the last above has it all.
+    fn open(&mut self, key: Key, end: u32) {
+        let _ = self.0.push((key, end, Due::NEVER));
+    }
+
+    /// Something below is due.
+    #[inline]
+    fn hear(&mut self, due: Due) {
+        if let Some((_, _, first)) = self.0.last_mut()
+            && due < *first
+        {
+            *first = due;
+        }
+    }
+
+    /// All nodes before `index` were looked at or passed over.
+    #[inline]
+    fn close(&mut self, index: u32, walk: &mut Walk<'_, '_, '_>) {
+        while let Some(&(key, end, due)) = self.0.last()
+            && end <= index
+        {
+            self.0.pop();
+            if due != Due::NOW {
+                walk.coherence.set_due(key, due);
+            }
+            self.hear(due);
+        }
+    }
 }
 
 impl Walk<'_, '_, '_> {
@@ -307,12 +350,14 @@ impl Walk<'_, '_, '_> {
     }
 
     /// One point of the leaf `node`: as `found`, or looked up.
-    pub fn one(&mut self, job: &Job<'_>, node: u32, point: &PointRecord, found: Option<Found>) {
+    pub fn one(&mut self, job: &Job<'_>, node: u32, point: &PointRecord, found: Option<OnFace>) {
         let leaf = Leaf { job: job.index, node };
-        let _ = match found {
-            Some(found) => self.found(job, leaf, point, found),
-            None => self.point::<false>(job, leaf, point),
-        };
+        match found {
+            Some(found) => self.near(job, leaf, point, &found),
+            None => {
+                let _ = self.point::<false>(job, leaf, point);
+            }
+        }
     }
 
     /// Everything from `start` to before `end` (or the last); where it stopped when the budget ran out.
@@ -344,6 +389,7 @@ impl Walk<'_, '_, '_> {
             return None;
         }
         let edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
+        let mut above = Above::default();
         let mut index = from;
         while index < to {
             let Some(node) = job.nodes.get(index as usize) else {
@@ -356,21 +402,22 @@ impl Walk<'_, '_, '_> {
             if self.left() == 0 {
                 return Some(here);
             }
+            above.close(index, self);
             let key = Key::new(job.index, index);
             let mut asked = false;
-            match self.coherence.ask(key, self.horizon) {
-                Known::Far => {
+            match self.coherence.ask(key, self.horizon, node.skip == index + 1) {
+                Known::Far(due) => {
                     self.passed_over += 1;
+                    above.hear(due);
                     index = node.skip;
                     continue;
                 }
                 Known::Near => self.passed_over += 1,
                 Known::Nothing => {
                     self.work.nodes += 1;
-                    let center = job.to_cells.apply(node.center);
-                    let distance = job.field.bound_at(center.to_array()) - (node.radius + edge_error);
+                    let distance = job.distance(node.center) - (node.radius + edge_error);
                     if distance > self.search.margin {
-                        self.coherence.set_distance(key, distance);
+                        above.hear(self.coherence.set_distance(key, distance));
                         index = node.skip;
                         continue;
                     }
@@ -379,41 +426,46 @@ impl Walk<'_, '_, '_> {
                 }
             }
             index += 1;
-            if node.skip == index {
-                let first = node.first_point as usize;
-                // When one point of each leaf is too many, whole leaves are left out, evenly too.
-                let leaves = (1usize << self.search.thinning.saturating_sub(LEAF_THINNING)) - 1;
-                if (first >> LEAF_THINNING) & leaves != 0 {
-                    continue;
-                }
-                let points = job
-                    .points
-                    .get(first..first + node.point_count as usize)
-                    .unwrap_or(&[]);
-                // A leaf is looked at as a whole, unless even the whole budget would not do.
-                if (self.left() as usize) < points.len() && self.work.points > 0 {
-                    return Some(here);
-                }
-                // Asked as seldom as the field is: it costs about as much as looking the points up.
-                if asked
-                    && !job.joined.is_empty()
-                    && let Some(clear) = self.joined(job, points)
-                {
-                    self.coherence.set_joined(key, clear);
-                    continue;
-                }
-                if job.field.is_occupancy() {
-                    self.points::<true>(job, here, points);
-                } else {
-                    self.points::<false>(job, here, points);
-                }
+            if node.skip != index {
+                above.open(key, node.skip);
+                continue;
             }
+            let first = node.first_point as usize;
+            // When one point of each leaf is too many, whole leaves are left out, evenly too.
+            let leaves = (1usize << self.search.thinning.saturating_sub(LEAF_THINNING)) - 1;
+            if (first >> LEAF_THINNING) & leaves != 0 {
+                above.hear(Due::NOW);
+                continue;
+            }
+            let points = job
+                .points
+                .get(first..first + node.point_count as usize)
+                .unwrap_or(&[]);
+            // A leaf is looked at as a whole, unless even the whole budget would not do.
+            if (self.left() as usize) < points.len() && self.work.points > 0 {
+                return Some(here);
+            }
+            // Asked as seldom as the field is: it costs about as much as looking the points up.
+            if asked
+                && !job.joined.is_empty()
+                && let Some(clear) = self.joined(job, points)
+            {
+                self.coherence.set_joined(key, clear);
+                above.hear(Due::NOW);
+                continue;
+            }
+            above.hear(if job.field.is_occupancy() {
+                self.points::<true>(job, here, points)
+            } else {
+                self.points::<false>(job, here, points)
+            });
         }
+        above.close(index, self);
         None
     }
 
-    /// All points of a leaf, as far as the budget goes; `VOXELS`: against a voxmap.
-    fn points<const VOXELS: bool>(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) {
+    /// All points of a leaf, as far as the budget goes, and when it is due again; `VOXELS`: against a voxmap.
+    fn points<const VOXELS: bool>(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> Due {
         let most = (self.left() as usize).min(points.len());
         let stride = 1 << self.search.thinning.min(LEAF_THINNING);
         let mut nearest = self.some::<VOXELS>(job, leaf, points[..most].iter().step_by(stride));
@@ -426,8 +478,9 @@ impl Walk<'_, '_, '_> {
         }
         // What is not looked at could be anywhere.
         if nearest > self.search.margin && most == points.len() {
-            self.coherence
-                .set_distance(Key::new(leaf.job, leaf.node), nearest);
+            (self.coherence).set_distance(Key::new(leaf.job, leaf.node), nearest)
+        } else {
+            Due::NOW
         }
     }
 
@@ -458,56 +511,63 @@ impl Walk<'_, '_, '_> {
         if VOXELS {
             return self.voxel(job, leaf, point);
         }
-        let in_cells = job.to_cells.apply(point.position);
-        match job.field.lookup_within(in_cells.to_array(), self.search.margin) {
-            Lookup::Near(sample) => self.near(job, leaf, point, &sample),
-            Lookup::Far { inside: false, bound } => bound,
-            Lookup::Far { inside: true, .. } => {
+        let in_field = job.to_field.apply(point.position);
+        match job.field.place(in_field.to_array()) {
+            Place::Cell(cell) => {
+                let found = cell.face().and_then(|face| on_face(job.faces, face, in_field));
+                if let Some(found) = found {
+                    if found.distance < self.search.margin {
+                        self.near(job, leaf, point, &found);
+                    }
+                    return found.distance;
+                }
+                self.at_edge(job, leaf, point, &cell, in_field)
+            }
+            Place::Far { inside: false, bound } => bound,
+            Place::Far { inside: true, .. } => {
                 self.work.flags.insert(Flags::DEEP);
                 f32::NEG_INFINITY
             }
         }
     }
 
-    /// Offers a point within the margin as a contact; its gap.
-    fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, sample: &FieldSample) -> f32 {
-        self.near += 1;
-        let in_field = job.to_field.apply(point.position);
-        let found = if let Some((distance, face)) = exact(job.faces, sample, in_field) {
-            if distance >= self.search.margin {
-                return distance;
+    /// A point where more than one face is near, or none has a closed form.
+    #[inline(never)]
+    fn at_edge(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, cell: &Cell<'_>, p: Vec3) -> f32 {
+        self.edges += 1;
+        if let Some((distance, face)) = exact(job.faces, job.field.nearby(cell), p) {
+            if distance < self.search.margin
+                && let Some(found) = on_face(job.faces, face, p)
+            {
+                self.near(job, leaf, point, &found);
             }
-            let Some(normal) = normal(job.faces, face, in_field) else {
-                return distance;
-            };
-            Found {
-                distance,
-                normal,
-                face,
-            }
+            return distance;
+        }
+        let distance = job.field.distance(cell);
+        if distance >= self.search.margin {
+            return distance;
+        }
+        let sample = job.field.sample(cell);
+        let gradient = Vec3::from_array(sample.gradient);
+        let squared = gradient.length_squared();
+        if squared < LEAST_GRADIENT2 {
+            let deep = distance < -job.field.record().cell;
+            self.work.flags.insert_if(deep, Flags::DEEP);
         } else {
-            if sample.distance >= self.search.margin {
-                return sample.distance;
-            }
-            let gradient = Vec3::from_array(sample.gradient);
-            let squared = gradient.length_squared();
-            if squared < LEAST_GRADIENT2 {
-                let deep = sample.distance < -job.field.record().cell;
-                self.work.flags.insert_if(deep, Flags::DEEP);
-                return sample.distance;
-            }
-            Found {
-                distance: sample.distance,
+            let found = OnFace {
+                distance,
                 normal: gradient * inverse_sqrt(squared),
                 face: sample.face,
-            }
-        };
-        self.found(job, leaf, point, found)
+            };
+            self.near(job, leaf, point, &found);
+        }
+        distance
     }
 
-    /// Offers a point as a contact; its gap.
+    /// Offers a point within the margin as a contact.
     #[inline(always)]
-    fn found(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: Found) -> f32 {
+    fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: &OnFace) {
+        self.near += 1;
         let n = job.to_push * found.normal;
         let (moving, fixed) = {
             let (own, other) = ([point.face, point.edge_face], [found.face, NO_FACE]);
@@ -525,12 +585,12 @@ impl Walk<'_, '_, '_> {
         let turn = arm.cross(n) * self.search.inverse_length;
         let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
         if gap >= self.search.slack + self.search.approach(&row) {
-            return found.distance;
+            return;
         }
         self.work.candidates = self.work.candidates.saturating_add(1);
         let reach_gap = gap - self.search.swing * arm.length_squared();
         let Some(contact) = self.contacts.offer(gap, reach_gap) else {
-            return found.distance;
+            return;
         };
         contact.row = row;
         contact.arm = arm;
@@ -539,7 +599,6 @@ impl Walk<'_, '_, '_> {
         contact.guided = mating.guided;
         (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
         contact.leaf = leaf;
-        found.distance
     }
 
     /// A point's surroundings were looked at for a joint: as much as a look-up.
@@ -549,11 +608,13 @@ impl Walk<'_, '_, '_> {
 
     /// What was done so far, in look-ups.
     fn used(&self) -> u32 {
-        self.work.nodes
-            + self.work.points
+        self.search.step_cost
+            + NODE * self.work.nodes
             + self.passed_over / PASSED_OVER_PER_LOOKUP
-            + NEAR * self.near
-            + CANDIDATE * u32::from(self.work.candidates)
+            + self.work.points
+            + self.near
+            + 3 * self.edges / 2
+            + TWO_CANDIDATES * u32::from(self.work.candidates) / 2
     }
 
     /// Look-ups left.

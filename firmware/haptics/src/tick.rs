@@ -53,10 +53,9 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
-/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21, thesis pair with 20 µm clearance baked at 0.5 mm cells,
-/// 16-bit, 62 points on the peg, 350 on the block: 10,000 instructions centred in the hole and still; 52,000 at worst pressed to the wall with 5 N
-/// and twisted. A peg of 0.7 m with 0.2 mm clearance, 370 points on each rim pair, pressed with 10 N and moved at 20 mm/s needs more than the default
-/// budget, is thinned, and stays below 120,000.
+/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21, thesis pair with 20 µm clearance baked at 0.5 mm cells with a
+/// pointshell of 20 µm: 92,000 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; free motion 8,000. A peg of 0.7 m with 0.2 mm
+/// clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below 120,000.
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
@@ -172,6 +171,12 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     }
 }
 
+/// What a step took, in the look-ups of the budget (170 instructions): a solve 13, and past the third one half a look-up for each candidate.
+fn step_cost(solution: &Solution, candidates: u16) -> u32 {
+    let solves = u32::from(solution.solves);
+    13 * solves + solves.saturating_sub(3) * u32::from(candidates) / 2
+}
+
 impl State {
     /// The step with whatever is within `margin`.
     #[expect(clippy::too_many_arguments, reason = "one call; the parts of a tick")]
@@ -203,6 +208,7 @@ impl State {
             busy: self.busy,
             thinning: self.thinning,
             budget: settings.contact.point_budget,
+            step_cost: self.step_cost,
             braking_m,
             guidance: &self.guidance,
             guidance_settings: &settings.guidance,
@@ -242,6 +248,7 @@ impl State {
         };
         work.contacts = self.contacts.pushing() as u16;
         work.solves = solution.solves;
+        self.step_cost = step_cost(&solution, work.candidates);
         work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
         solution
     }

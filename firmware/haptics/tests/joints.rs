@@ -127,8 +127,9 @@ proptest! {
         let field = scene.shape_of_part(0).field;
         if field.only(g, reach, |face| face == 3) {
             for d in within {
-                let p = core::array::from_fn(|a| g[a] + reach * d[a]);
-                match field.lookup_within(p, f32::INFINITY) {
+                let record = field.record();
+                let p = core::array::from_fn(|a| record.origin[a] + record.cell * (g[a] + reach * d[a]));
+                match field.lookup(p) {
                     Lookup::Near(sample) => prop_assert_eq!(sample.nearby, Nearby::Face(3)),
                     Lookup::Far { inside, .. } => prop_assert!(!inside),
                 }

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use mortise_bake::{BakeReport, Grabbable, bake};
 use mortise_brep::load_step;
+use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, RigSpec};
 
 use crate::error::LabError;
@@ -13,7 +14,7 @@ use crate::variant::Variant;
 
 const PRESSED: &str = include_str!("../data/pressed.toml");
 
-/// When the peg is pressed to the wall, s.
+/// How long the press grows, s.
 const PRESSED_S: f64 = 0.3;
 /// Farthest it slides either way, mm.
 const SLIDE_MM: f64 = 40.0;
@@ -55,16 +56,20 @@ fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabError> {
             let over = 0.5 * (fit.length_mm - fit.height_mm);
             let fit = fit.engaged(fit.height_mm + over);
             scenario.hand.grip_mm = [0.0, 0.0, -0.5 * fit.height_mm];
-            let aside = scenario.hand.keyframes[1].offset_mm[0] + 0.5 * fit.clearance_mm();
+            let (gap, press) = (0.5 * fit.clearance_mm(), scenario.hand.keyframes[1].offset_mm[0]);
             // Both rims stay at the peg's side, whichever way.
             let slide = (mm_per_s * SLIDE_S).min(SLIDE_MM).min(0.8 * over);
-            let mut t = PRESSED_S;
-            scenario.hand.keyframes[1] = key(t, [aside, 0.0, 0.0]);
+            // To the wall no faster than along it.
+            let mut t = (gap / mm_per_s).max(0.01);
+            scenario.hand.keyframes.truncate(1);
+            scenario.hand.keyframes.push(key(t, [gap, 0.0, 0.0]));
+            t += PRESSED_S;
+            scenario.hand.keyframes.push(key(t, [gap + press, 0.0, 0.0]));
             for i in 0..SLIDES {
                 let z = if i % 2 == 0 { slide } else { -slide };
                 // The first slide is half as long as the others.
                 t += if i == 0 { slide } else { 2.0 * slide } / mm_per_s;
-                scenario.hand.keyframes.push(key(t, [aside, 0.0, z]));
+                (scenario.hand.keyframes).push(key(t, [gap + press, 0.0, z]));
             }
             scenario.run.duration_s = t + 0.2;
             Ok((fit, scenario))
@@ -118,7 +123,7 @@ fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabError> {
     }
 }
 
-/// Plays `motion` on the rig `spec`. What the scenario itself asks (it does press; no tick is missed) is the caller's to look at: the second of
+/// Plays `motion` on the rig `spec`, with look-ups for at most `point_budget` points a tick if that is said. What the scenario itself asks (it does press; no tick is missed) is the caller's to look at: the second of
 /// what is given says what did not hold.
 ///
 /// # Errors
@@ -127,9 +132,12 @@ pub fn play(
     variant: &Variant,
     fit: &Fit,
     motion: Motion,
+    point_budget: Option<f32>,
     spec: &RigSpec,
 ) -> Result<(Outcome, Vec<String>), LabError> {
     let (fit, mut scenario) = script(fit, motion)?;
+    let budget = point_budget.map(|budget| (ParameterId::PointBudget.row().name.to_owned(), budget));
+    scenario.parameters.extend(budget);
     let file = fit.file()?;
     scenario.scene.step = file.path().to_owned();
     let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
@@ -166,7 +174,8 @@ mod tests {
     fn pressed_is_at_the_wall_and_free_is_nowhere() {
         let simulated = RigSpec::Simulated { realtime: false };
         let played = |fit: Fit, motion| {
-            let (outcome, broken) = play(&Variant::field(1.0), &fit, motion, &simulated).expect("played");
+            let (outcome, broken) =
+                play(&Variant::field(1.0), &fit, motion, None, &simulated).expect("played");
             assert_eq!(broken, [""; 0]);
             outcome
         };

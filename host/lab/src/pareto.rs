@@ -123,7 +123,7 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
     let pressed = Motion::Pressed {
         mm_per_s: SLIDE_MM_PER_S,
     };
-    let instructions = match play(variant, &Fit::thesis(COUNTED_MM), pressed, &board) {
+    let instructions = match play(variant, &Fit::thesis(COUNTED_MM), pressed, None, &board) {
         Ok((outcome, _)) => outcome.instructions_per_tick_max,
         // A model too coarse for the fit pushes until the board gives up: it has no cost then.
         Err(LabError::Fault { .. }) => None,

@@ -34,7 +34,7 @@ impl Variant {
             shell: PointshellKind::ErrorBounded,
             cell_mm,
             format: SampleFormat::Int16,
-            epsilon_mm: Some(cell_mm / 100.0),
+            epsilon_mm: Some(cell_mm / 25.0),
         }
     }
 

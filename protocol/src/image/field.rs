@@ -32,6 +32,32 @@ pub enum Lookup {
     },
 }
 
+/// Where a position lies in a field, nothing interpolated yet.
+#[derive(Clone, Copy, Debug)]
+pub enum Place<'a> {
+    /// In a cell of a stored brick.
+    Cell(Cell<'a>),
+    /// As [`Lookup::Far`].
+    Far {
+        /// Whether it is inside the solid.
+        inside: bool,
+        /// Lower bound of the distance to the surface, m.
+        bound: f32,
+    },
+}
+
+/// A position in a cell of a stored brick.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell<'a> {
+    brick: &'a BrickRecord,
+    /// Palette entry: what lies nearest to the cell.
+    entry: u16,
+    /// Of the cell in the brick.
+    index: usize,
+    /// From the cell's least corner, 0 to 1.
+    within: [f32; 3],
+}
+
 /// Distance and gradient at a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldSample {
@@ -55,17 +81,23 @@ impl<'a> Field<'a> {
     /// distances: bounds everywhere, to its surface voxels.
     #[inline]
     pub fn lookup(&self, p: [f32; 3]) -> Lookup {
-        self.lookup_within(self.in_cells(p), f32::INFINITY)
+        match self.place(p) {
+            Place::Cell(cell) => Lookup::Near(self.sample(&cell)),
+            Place::Far { inside, bound } => Lookup::Far { inside, bound },
+        }
     }
 
     /// Signed distance at `p` (m, shape frame) if stored there, else the signed lower bound: what culling needs, without the gradient's cost.
     #[inline]
     pub fn bound(&self, p: [f32; 3]) -> f32 {
-        self.bound_at(self.in_cells(p))
+        match self.place(p) {
+            Place::Cell(cell) => self.distance(&cell),
+            Place::Far { inside: true, bound } => -bound,
+            Place::Far { inside: false, bound } => bound,
+        }
     }
 
-    /// `p` (m, shape frame) in cells from the grid's corner. Who looks up many positions folds this into their own transformation:
-    /// (p − origin)/cell.
+    /// `p` (m, shape frame) in cells from the grid's corner.
     #[inline(always)]
     pub fn in_cells(&self, p: [f32; 3]) -> [f32; 3] {
         let o = &self.record.origin;
@@ -73,93 +105,74 @@ impl<'a> Field<'a> {
         [(p[0] - o[0]) * k, (p[1] - o[1]) * k, (p[2] - o[2]) * k]
     }
 
-    /// [`Self::lookup`] at `g` cells from the grid's corner, for who wants to know only what is nearer than `enough` m: beyond that the stored
-    /// distance comes back as the bound, without gradient and face, for half the cost. Near an edge, where it may be overstated, a sample comes
-    /// back for what may be nearer.
+    /// Where `p` (m, shape frame) lies, without interpolating: for who knows the exact surfaces. A voxmap has no cells of distances: bounds
+    /// everywhere, as in [`Self::lookup`].
     #[inline(always)]
-    pub fn lookup_within(&self, g: [f32; 3], enough: f32) -> Lookup {
+    pub fn place(&self, p: [f32; 3]) -> Place<'a> {
+        let g = self.in_cells(p);
         if !self.holds(g) {
-            return Lookup::Far {
+            return Place::Far {
                 inside: false,
                 bound: self.beyond(g),
             };
         }
-        let (entry, cell, f) = self.entry(g);
+        let (entry, index, within) = self.entry(g);
         match entry {
             GridEntry::Brick(number) => {
                 let brick = &self.bricks[number as usize];
                 if self.is_occupancy() {
-                    return self.voxel_as_far(brick, cell);
+                    return self.voxel_as_far(brick, index);
                 }
-                let corners = self.corners(brick, cell);
-                let distance = value(&corners, f) * self.record.scale;
-                if distance < enough + EDGE_ERROR_CELLS * self.record.cell {
-                    let nearby = self.nearby(brick, cell);
-                    if distance < enough + nearby.overstated() * self.record.cell {
-                        let gradient = gradient(&corners, f);
-                        let per_cell = self.record.scale * self.inverse_cell;
-                        return Lookup::Near(FieldSample {
-                            distance,
-                            gradient: gradient.map(|x| x * per_cell),
-                            face: nearby.face(),
-                            nearby,
-                        });
-                    }
-                }
-                Lookup::Far {
-                    inside: false,
-                    bound: distance,
-                }
+                Place::Cell(Cell {
+                    brick,
+                    index,
+                    within,
+                    entry: self.palette_entry(brick, index),
+                })
             }
-            GridEntry::Empty { inside, cells } => Lookup::Far {
+            GridEntry::Empty { inside, cells } => Place::Far {
                 inside,
                 bound: f32::from(cells) * self.record.cell,
             },
         }
     }
 
-    /// What is nearest to the cell at `g` cells from the grid's corner, without looking at its samples; where none are stored, as [`Self::bound_at`].
+    /// What lies nearest to a cell.
     #[inline(always)]
-    pub fn nearby_at(&self, g: [f32; 3]) -> Result<Nearby, f32> {
-        if !self.holds(g) {
-            return Err(self.beyond(g));
-        }
-        let (entry, cell, _) = self.entry(g);
-        match entry {
-            GridEntry::Brick(number) => {
-                let brick = &self.bricks[number as usize];
-                if self.is_occupancy() {
-                    return Err(self.voxel_bound(brick, cell));
-                }
-                Ok(self.nearby(brick, cell))
-            }
-            GridEntry::Empty { inside, cells } => {
-                let bound = f32::from(cells) * self.record.cell;
-                Err(if inside { -bound } else { bound })
-            }
-        }
+    pub fn nearby(&self, cell: &Cell<'_>) -> Nearby {
+        self.decoded(cell.brick, cell.entry)
     }
 
-    /// [`Self::bound`] at `g` cells from the grid's corner.
+    /// What a palette entry of a brick means.
+    #[inline(always)]
+    fn decoded(&self, brick: &BrickRecord, entry: u16) -> Nearby {
+        let palette = &self.palette[brick.palette as usize..];
+        Nearby::from_bits(entry, |at| palette.get(usize::from(at)..)?.first_chunk().copied())
+    }
+
+    /// What lies nearest to the cell of this index in a brick.
     #[inline]
-    pub fn bound_at(&self, g: [f32; 3]) -> f32 {
-        if !self.holds(g) {
-            return self.beyond(g);
-        }
-        let (entry, cell, f) = self.entry(g);
-        match entry {
-            GridEntry::Brick(number) => {
-                let brick = &self.bricks[number as usize];
-                if self.is_occupancy() {
-                    return self.voxel_bound(brick, cell);
-                }
-                let corners = self.corners(brick, cell);
-                value(&corners, f) * self.record.scale
-            }
-            GridEntry::Empty { inside, cells } => {
-                let bound = f32::from(cells) * self.record.cell;
-                if inside { -bound } else { bound }
-            }
+    pub(super) fn nearby_in(&self, brick: &BrickRecord, index: usize) -> Nearby {
+        self.decoded(brick, self.palette_entry(brick, index))
+    }
+
+    /// Interpolated distance in a cell, m.
+    #[inline(always)]
+    pub fn distance(&self, cell: &Cell<'_>) -> f32 {
+        value(&self.corners(cell.brick, cell.index), cell.within) * self.record.scale
+    }
+
+    /// Interpolated distance and its gradient in a cell.
+    #[inline(always)]
+    pub fn sample(&self, cell: &Cell<'_>) -> FieldSample {
+        let corners = self.corners(cell.brick, cell.index);
+        let per_cell = self.record.scale * self.inverse_cell;
+        let nearby = self.nearby(cell);
+        FieldSample {
+            distance: value(&corners, cell.within) * self.record.scale,
+            gradient: gradient(&corners, cell.within).map(|x| x * per_cell),
+            face: nearby.face(),
+            nearby,
         }
     }
 
@@ -224,8 +237,8 @@ impl<'a> Field<'a> {
     }
 
     #[inline(always)]
-    pub(super) fn nearby(&self, brick: &BrickRecord, cell: usize) -> Nearby {
-        let entry = match brick.index_bits {
+    fn palette_entry(&self, brick: &BrickRecord, cell: usize) -> u16 {
+        let place = match brick.index_bits {
             0 => 0,
             4 => {
                 let byte = self.blob[brick.indices as usize + cell / 2];
@@ -233,10 +246,15 @@ impl<'a> Field<'a> {
             }
             _ => usize::from(self.blob[brick.indices as usize + cell]),
         };
-        let palette = &self.palette[brick.palette as usize..];
-        Nearby::from_bits(palette[entry], |at| {
-            palette.get(usize::from(at)..)?.first_chunk().copied()
-        })
+        self.palette[brick.palette as usize + place]
+    }
+}
+
+impl Cell<'_> {
+    /// The face whose surface gives the distance all over the cell, where it is one: [`Nearby::Face`], sooner known.
+    #[inline(always)]
+    pub fn face(&self) -> Option<u16> {
+        (self.entry <= Nearby::MAX_FACES).then_some(self.entry)
     }
 }
 

@@ -19,7 +19,7 @@ mod records;
 mod region;
 
 pub use error::ImageError;
-pub use field::{EDGE_ERROR_CELLS, Field, FieldSample, Lookup};
+pub use field::{Cell, EDGE_ERROR_CELLS, Field, FieldSample, Lookup, Place};
 pub use occupancy::{VOXEL_BRICK_BYTES, Voxel, VoxelSample};
 pub use open::{CRC, SceneImage, Shape};
 pub use records::*;

@@ -4,7 +4,7 @@
 //! proximity. It lies in the same grid of bricks as a distance field, 8³ voxels in 128 bytes, a voxel where a distance field has a cell.
 //! Cost: one load and a shift once the brick is known.
 
-use super::field::{Field, Lookup};
+use super::field::{Field, Place};
 use super::records::*;
 
 /// What a voxel holds, numbered as stored (and as in the paper).
@@ -84,7 +84,7 @@ impl Field<'_> {
                 VoxelSample {
                     voxel,
                     center: [center(0), center(1), center(2)],
-                    face: self.nearby(brick, cell).face(),
+                    face: self.nearby_in(brick, cell).face(),
                     bound: if voxel == Voxel::Free {
                         self.record.band
                     } else {
@@ -99,22 +99,17 @@ impl Field<'_> {
         }
     }
 
-    /// A voxmap's answer to [`Self::lookup`] inside a brick: it stores no distance.
+    /// A voxmap's answer to [`Self::place`] inside a brick: it stores no distance.
     #[cold]
-    pub(super) fn voxel_as_far(&self, brick: &BrickRecord, cell: usize) -> Lookup {
+    pub(super) fn voxel_as_far(&self, brick: &BrickRecord, cell: usize) -> Place<'static> {
         let voxel = self.voxel_of(brick, cell);
-        Lookup::Far {
+        Place::Far {
             inside: voxel == Voxel::Interior,
-            bound: self.voxel_bound(brick, cell),
-        }
-    }
-
-    /// A voxmap's answer to [`Self::bound`] inside a brick.
-    #[cold]
-    pub(super) fn voxel_bound(&self, brick: &BrickRecord, cell: usize) -> f32 {
-        match self.voxel_of(brick, cell) {
-            Voxel::Free => self.record.band,
-            _ => 0.0,
+            bound: if voxel == Voxel::Free {
+                self.record.band
+            } else {
+                0.0
+            },
         }
     }
 

@@ -72,7 +72,7 @@ impl Field<'_> {
         count <= MOST_CELLS
             && (from[2]..=to[2]).all(|z| {
                 (from[1]..=to[1]).all(|y| {
-                    (from[0]..=to[0]).all(|x| good(self.nearby(brick, (x | y << 3 | z << 6) as usize)))
+                    (from[0]..=to[0]).all(|x| good(self.nearby_in(brick, (x | y << 3 | z << 6) as usize)))
                 })
             })
     }

@@ -44,7 +44,7 @@ fn count(
     bound: f64,
     out: &mut dyn FnMut(Row),
 ) -> Result<Outcome, LabError> {
-    let (outcome, broken) = play(variant, fit, motion, &emulated())?;
+    let (outcome, broken) = play(variant, fit, motion, None, &emulated())?;
     out(Row::at_most(
         format!("{what}: instructions in the longest tick"),
         most(&outcome),
@@ -169,7 +169,7 @@ pub(super) fn large_classic(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result
     let speeds: &[f64] = if plan.quick { &[] } else { &[200.0, 1000.0] };
     for &mm_per_s in speeds {
         // Faster than it can be followed it may degrade, but not miss.
-        let (outcome, _) = play(&variant, &fit, Motion::Pressed { mm_per_s }, &emulated())?;
+        let (outcome, _) = play(&variant, &fit, Motion::Pressed { mm_per_s }, None, &emulated())?;
         let what = |of: &str| {
             what(&format!(
                 "pressed to the wall with 5 N, slid at {mm_per_s} mm/s: {of}"
@@ -220,7 +220,7 @@ pub(super) fn more_points(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(
         ("tilted by 10°, its rim on the block's top", Motion::Rim),
     ] {
         let longest =
-            |variant: &Variant| Ok::<_, LabError>(most(&play(variant, &fit, motion, &emulated())?.0));
+            |variant: &Variant| Ok::<_, LabError>(most(&play(variant, &fit, motion, None, &emulated())?.0));
         out(Row::at_most(
             what(name),
             longest(&dense)? / longest(&sparse)?,
