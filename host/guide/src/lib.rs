@@ -31,6 +31,9 @@ pub use settings::{GuideSettings, When};
 /// Most targets sent at a time: half of what a board holds, so that those that fade leave room for those that come.
 pub const MAX_SENT: usize = MAX_TARGETS / 2;
 
+/// Candidates are listed when they are off by at most this many times what takes a target up.
+const LISTED: f64 = 3.0;
+
 /// Keeps a board's targets up to date.
 pub struct Guide<'a> {
     model: &'a CadModel,
@@ -154,12 +157,30 @@ impl<'a> Guide<'a> {
             pinned: entry.pinned,
             target: entry.target.clone(),
         };
+        let mut rows: Vec<Row> = (self.recogniser.entries())
+            .filter(|entry| self.is_worth_reading(entry))
+            .map(row)
+            .collect();
+        // What guides or is chosen about comes first, whatever its state, so that a line stays where it was clicked.
+        rows.sort_by_key(|row| match row.standing {
+            Standing::ByContact => 1,
+            Standing::Candidate => 2,
+            _ => 0,
+        });
         List {
             tick: self.tick,
             held: Some(held),
-            rows: self.recogniser.entries().map(row).collect(),
+            rows,
             freedom: self.recogniser.freedom().clone(),
         }
+    }
+
+    /// Faces at right angles touch all the time: a candidate is listed when it could become a target by a movement of the hand.
+    fn is_worth_reading(&self, entry: &Entry) -> bool {
+        let limits = self.recogniser.thresholds();
+        let near = entry.misfit.distance_mm <= LISTED * limits.distance_mm
+            && entry.misfit.angle_rad <= LISTED * limits.angle_rad;
+        near || entry.state != State::Far || entry.pinned
     }
 
     fn standing(&self, entry: &Entry) -> Standing {

@@ -45,7 +45,7 @@ pub struct List {
     pub tick: u32,
     /// Part in hand, an index into [`mortise_brep::CadModel::parts`].
     pub held: Option<usize>,
-    /// In order of their surfaces.
+    /// What could be sent first, then what contact keeps, then candidates; each in order of their surfaces.
     pub rows: Vec<Row>,
     /// Motion that the targets taken up leave to the part in hand.
     pub freedom: Freedom,

@@ -116,9 +116,12 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, row: &Row, wanted: 
         choices(ui, session, row, &title, wanted);
         let small = |text: String, color| egui::Label::new(RichText::new(text).small().color(color));
         ui.add(small(words::surfaces(&row.target), theme::TEXT_WEAK).truncate());
-        ui.add(small(words::misfit(row), theme::TEXT_WEAK).truncate());
-        let standing = words::standing(document, &session.guidance, row, session.guides());
-        ui.add(small(standing, color).wrap());
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().interact_size.y = 0.0;
+            let standing = words::standing(document, &session.guidance, row, session.guides());
+            ui.add(small(standing, color).wrap());
+            ui.add(small(format!("· {}", words::misfit(row)), theme::TEXT_WEAK).wrap());
+        });
     });
     inside.response.on_hover_ui(|ui| {
         ui.label(words::title(document, &row.target));
