@@ -432,12 +432,19 @@ pub struct TouchingPair {
     pub static_part: u16,
     /// Its face.
     pub static_face: u16,
+    /// The grabbed part's other face where the deepest point lies on an edge, else [`crate::image::NO_FACE`].
+    pub moving_edge_face: u16,
+    /// The other part's, likewise.
+    pub static_edge_face: u16,
     /// Points in contact.
     pub count: u16,
     /// Deepest penetration, m.
     pub depth: f32,
     /// Where, world, m.
     pub point: [f32; 3],
+    /// Insertion depth: how far the touching points reach along the axis of the static face, or else the moving one, m; 0 where neither is round. Faces that
+    /// guidance keeps apart do not touch and have none.
+    pub insertion: f32,
 }
 
 /// One sample of the loop.
@@ -538,14 +545,16 @@ pub struct Statistics {
 pub enum ConstraintKind {
     /// Axis on axis (cylinder in cylinder).
     Concentric,
-    /// Plane on plane.
+    /// Plane on plane: turns the grabbed part until they are parallel, and leaves the distance to contact.
     Coplanar,
     /// Axis on axis and apex on apex (cone in cone).
     Conical,
     /// Centre on centre.
     Spherical,
-    /// Centre on axis (sphere in cylinder).
+    /// Centre on axis: sphere of the grabbed part in a cylinder of the other.
     Annular,
+    /// Axis on centre: cylinder of the grabbed part over a sphere of the other.
+    AnnularBore,
 }
 
 /// A point and a direction fixed to a part.

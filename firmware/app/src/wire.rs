@@ -54,9 +54,12 @@ pub fn pairs_to_wire(pairs: &[FacePair]) -> Vec<TouchingPair, MAX_PAIRS> {
             moving_face: pair.moving_face,
             static_part: pair.static_part,
             static_face: pair.static_face,
+            moving_edge_face: pair.moving_edge_face,
+            static_edge_face: pair.static_edge_face,
             count: pair.count,
             depth: pair.depth_m,
             point: pair.point.to_array(),
+            insertion: pair.insertion_m,
         })
         .collect()
 }

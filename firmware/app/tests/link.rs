@@ -480,9 +480,12 @@ fn the_largest_messages_fit() {
             moving_face: u16::MAX,
             static_part: u16::MAX,
             static_face: u16::MAX,
+            moving_edge_face: u16::MAX,
+            static_edge_face: u16::MAX,
             count: u16::MAX,
             depth: f32::MAX,
             point: [f32::MAX; 3],
+            insertion: f32::MAX,
         })
         .is_ok()
     {}

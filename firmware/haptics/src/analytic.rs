@@ -20,6 +20,8 @@ const ON_SURFACE_CELLS: f32 = 0.3;
 const NEAR_EDGE_CELLS: f32 = 2.0;
 /// Sine of the least angle between faces that makes an edge: below it one face goes on in the other.
 const LEAST_EDGE_SINE: f32 = 0.05;
+/// A point that touches as near as this to an edge touches the edge, m: some times the depth of a touch.
+const AT_EDGE_M: f32 = 10e-6;
 /// Newton steps to an edge: each squares the error, which starts below the radius of curvature.
 const EDGE_STEPS: usize = 6;
 
@@ -112,6 +114,8 @@ pub(crate) struct OnFace {
     pub normal: Vec3,
     /// Whose surface it is.
     pub face: u16,
+    /// The other face where it is at an edge, else [`NO_FACE`].
+    pub edge_face: u16,
 }
 
 /// Distance and normal of one face's surface at `p`, if it has a closed form. About 60 instructions on a Cortex-M7.
@@ -122,6 +126,7 @@ pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace
         distance,
         normal,
         face,
+        edge_face: NO_FACE,
     })
 }
 
@@ -151,6 +156,20 @@ fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<
         }
     }
     Some(found)
+}
+
+/// The other face of the edge that `p`, at the distance `at` from `face`, lies at: of those that `nearby` names the first whose surface is as far off to
+/// within [`AT_EDGE_M`], else [`NO_FACE`].
+pub(crate) fn edge_face(faces: &[FaceRecord], nearby: Nearby, face: u16, at: f32, p: Vec3) -> u16 {
+    let (Nearby::Convex(group) | Nearby::Reentrant(group)) = nearby else {
+        return NO_FACE;
+    };
+    let meets = |other: &u16| {
+        *other != NO_FACE
+            && *other != face
+            && distance(faces, *other, p).is_some_and(|d| (d - at).abs() < AT_EDGE_M)
+    };
+    group.iter().copied().find(meets).unwrap_or(NO_FACE)
 }
 
 #[inline]

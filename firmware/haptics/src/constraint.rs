@@ -6,10 +6,13 @@
 //! | kind | components of the offset | directions |
 //! |---|---|---|
 //! | concentric | across the fixed axis | parallel |
-//! | coplanar | along the fixed normal | parallel |
+//! | coplanar | none | parallel |
 //! | conical | all | parallel |
 //! | spherical | all | free |
 //! | annular | across the fixed axis | free |
+//! | annular, bore moving | across the moving axis | free |
+//!
+//! Of planes only the angle is guided: contact keeps the distance and pulls no part, and a plane that pulled could hold one up in the air.
 //!
 //! Each component is a row J of the step's scaled twist (v, ω·L) and an error e: e' = e + h·J·V'. The offset is taken between the moving point and
 //! the fixed feature, the angle as the sine of that between the directions.
@@ -46,10 +49,15 @@ impl Alignment {
         let arm = point - center;
         let (u, v) = across(axis);
         let mut offset = Rows::default();
-        let directions: &[Vec3] = match target.kind {
-            ConstraintKind::Concentric | ConstraintKind::Annular => &[u, v],
-            ConstraintKind::Coplanar => &[axis],
-            ConstraintKind::Conical | ConstraintKind::Spherical => &[u, v, axis],
+        // Fixed to the moving part, they turn with it.
+        let turning = across(Vec3::from_array(target.moving.direction));
+        let turning = [turning.0, turning.1].map(|n| object.transform_vector(n));
+        let (directions, arm): (&[Vec3], Vec3) = match target.kind {
+            ConstraintKind::Concentric | ConstraintKind::Annular => (&[u, v], arm),
+            // d(n·from) = n·v + (n·(ω × arm) + (ω × n)·from): the lever ends at the fixed point.
+            ConstraintKind::AnnularBore => (&turning, arm - from),
+            ConstraintKind::Coplanar => (&[], arm),
+            ConstraintKind::Conical | ConstraintKind::Spherical => (&[u, v, axis], arm),
         };
         for n in directions {
             let turn = arm.cross(*n) * (1.0 / length);
@@ -161,6 +169,7 @@ mod tests {
             ConstraintKind::Conical,
             ConstraintKind::Spherical,
             ConstraintKind::Annular,
+            ConstraintKind::AnnularBore,
         ] {
             let t = target(kind);
             let here = Alignment::of(&t, &pose(center, orientation), center, &fixed, length);

@@ -29,6 +29,10 @@ pub(crate) struct Contact {
     pub moving_face: u16,
     /// Face of the other part.
     pub static_face: u16,
+    /// The held part's other face where the point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
+    pub moving_edge_face: u16,
+    /// The other part's, likewise.
+    pub static_edge_face: u16,
     /// Where it was found; tells the other part.
     pub leaf: Leaf,
 }
@@ -45,6 +49,8 @@ impl Contact {
         guided: false,
         moving_face: 0,
         static_face: 0,
+        moving_edge_face: 0,
+        static_edge_face: 0,
         leaf: Leaf::FIRST,
     };
 }

@@ -1,8 +1,8 @@
 //! Constraint targets: which are in force, how far engaged, and how they pull.
 //!
 //! The desktop sends a target; the board holds it until it expires, is cleared or replaced. Nothing about a target is ever switched: its
-//! *engagement* a rises from 0 to 1 and falls again by steps so small that the cap on its force, a·F, changes by less than 0.05 N a tick and that
-//! on its torque by less than 2 mN m. Within its cap it is stiff,
+//! *engagement* a rises from 0 to 1 and falls again by steps so small that the caps on all forces, a·F, together change by less than 0.05 N a tick and those
+//! on torques by less than 2 mN m. Within its cap it is stiff,
 //!
 //! f = −a·F·u/√((a·F/k)² + |u|²),   u = e + (h + τ)·J·V'
 //!
@@ -14,7 +14,7 @@
 //!
 //! Where the target's faces meet, contact makes room: gaps between them count for larger by a·[`GuidanceSettings::allowance_m`]. The axis holds
 //! what the wall held before, an exact fit goes in, and a part pulled off its axis against the cap finds the wall again. All other contacts
-//! stay as they are.
+//! stay as they are, and so do planes and cones: they stop a part, and a push above the cap must not go 0.1 mm into a stop.
 //!
 //! [`GuidanceMethod::Thesis`] is the blend of Faas 2010 (eqs. 13–19), for comparison: a spring of 0.8·k_T without a cap, weighted with
 //! x = ½e^(−θ/θ₀) + ½e^(−d/d₀), θ₀ = voxel/insertion depth, d₀ = voxel, and the contacts of those faces weighted with 1 − x.
@@ -23,7 +23,7 @@ use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::image::{NO_FACE, SceneImage};
 use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::ConstraintTarget;
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget};
 
 use crate::constraint::Alignment;
 use crate::joint::{Fit, Joined};
@@ -174,13 +174,18 @@ impl Guidance {
         self.insertion_m = 0.0;
     }
 
-    /// A tick passes: targets engage, expire, fade and vanish.
+    /// A tick passes: targets engage, expire, fade and vanish. Those that change share what may change in a tick.
     pub fn step(&mut self, settings: &GuidanceSettings) {
+        let on = settings.method != GuidanceMethod::Off;
+        let mut changing = 0u8;
         for slot in &mut self.slots {
             slot.left = slot.left.saturating_sub(1);
-            let step = slot.step();
-            let wanted = slot.left > 0 && settings.method != GuidanceMethod::Off;
-            if wanted {
+            changing += u8::from(slot.engagement != slot.wanted(on));
+        }
+        let share = 1.0 / f32::from(changing.max(1));
+        for slot in &mut self.slots {
+            let step = slot.step() * share;
+            if slot.wanted(on) > 0.0 {
                 slot.engagement = (slot.engagement + step).min(1.0);
                 slot.letting_go = (slot.letting_go - LETTING_GO_STEP).max(0.0);
             } else if slot.engagement > 0.0 {
@@ -278,23 +283,22 @@ impl Guidance {
         fixed: [u16; 2],
         settings: &GuidanceSettings,
     ) -> Mating {
-        let mut engagement = 0.0f32;
+        let mut mating = Mating::NONE;
         for slot in &self.slots {
             let target = &slot.target;
-            let of_these = target.static_part == part
+            let of_these = slot.engagement > 0.0
+                && target.static_part == part
                 && (target.faces.iter()).any(|(m, s)| holds(moving, *m) && holds(fixed, *s));
-            if of_these && slot.engagement > engagement {
-                engagement = slot.engagement;
+            if !of_these {
+                continue;
+            }
+            mating.guided = true;
+            let room = slot.engagement * settings.allowance_m;
+            if settings.method != GuidanceMethod::Thesis && makes_room(target.kind) && room > mating.room {
+                mating.room = room;
             }
         }
-        let room = match settings.method {
-            GuidanceMethod::Thesis => 0.0,
-            GuidanceMethod::Off | GuidanceMethod::Capped => engagement * settings.allowance_m,
-        };
-        Mating {
-            guided: engagement > 0.0,
-            room,
-        }
+        mating
     }
 
     /// What is left of the stiffness of contacts between guided faces: all of it, except in the thesis' blend.
@@ -388,6 +392,11 @@ pub(crate) struct At<'a, 'i> {
 }
 
 impl Slot {
+    /// Where engagement goes.
+    fn wanted(&self, on: bool) -> f32 {
+        if on && self.left > 0 { 1.0 } else { 0.0 }
+    }
+
     fn step(&self) -> f32 {
         STEP.min(FORCE_STEP_N / self.target.force_cap.max(FORCE_STEP_N))
             .min(TORQUE_STEP_NM / self.target.torque_cap.max(TORQUE_STEP_NM))
@@ -434,6 +443,11 @@ impl Slot {
         (self.engagement > 0.0 || self.letting_go > 0.0)
             .then(|| Alignment::of(&self.target, &at.object, at.center, &fixed.pose, at.length))
     }
+}
+
+/// Whether contact between a target's faces makes room. Planes and cones stop a part, with more force than the target's cap: they stay where they are.
+fn makes_room(kind: ConstraintKind) -> bool {
+    !matches!(kind, ConstraintKind::Coplanar | ConstraintKind::Conical)
 }
 
 pub(crate) fn holds(faces: [u16; 2], face: u16) -> bool {

@@ -49,12 +49,19 @@ pub struct FacePair {
     pub static_part: u16,
     /// Face of the other part, counted from its shape's first; [`mortise_protocol::image::NO_FACE`] when unknown.
     pub static_face: u16,
+    /// The grabbed part's other face where the deepest point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
+    pub moving_edge_face: u16,
+    /// The other part's, likewise: where it is within 10 µm of an edge.
+    pub static_edge_face: u16,
     /// Points that touch.
     pub count: u16,
     /// Largest depth at the tick's end, m, positive when penetrating.
     pub depth_m: f32,
     /// Where that is, world, m.
     pub point: Vec3,
+    /// How far the touching points reach along the axis of the static face, or else the moving one, m; 0 where neither is a cylinder or a cone. The
+    /// insertion depth of Faas 2010.
+    pub insertion_m: f32,
 }
 
 /// What a tick had to do: for telemetry and for budgets in tests.

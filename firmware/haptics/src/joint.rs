@@ -15,7 +15,7 @@
 
 use glam::Vec3;
 use heapless::Vec;
-use mortise_protocol::image::{FaceRecord, NO_FACE, PointRecord, Shape, surface_kind};
+use mortise_protocol::image::{EDGE_ERROR_CELLS, FaceRecord, PointRecord, Shape, surface_kind};
 use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 
@@ -27,6 +27,9 @@ use crate::proximity::{Job, Walk};
 const MAX_JOINED: usize = 2 * MAX_TARGETS;
 /// Around each point, cells that must hold the mating face and no other: half a brick, or else the next.
 const CLEAR_CELLS: [f32; 2] = [4.0, 1.0];
+
+/// A way shorter than this is not worth remembering.
+const LEAST_CLEAR_CELLS: f32 = 0.5;
 
 /// Face pairs that joints to one part keep apart: of the tree's shape, of the field's.
 pub(crate) type Joined = Vec<[u16; 2], MAX_JOINED>;
@@ -79,7 +82,8 @@ fn mate(kind: ConstraintKind, moving: &FaceRecord, fixed: &FaceRecord) -> bool {
     let round = match kind {
         ConstraintKind::Concentric => kinds == (CYLINDER, CYLINDER),
         ConstraintKind::Spherical => kinds == (SPHERE, SPHERE),
-        ConstraintKind::Annular => kinds == (SPHERE, CYLINDER) || kinds == (CYLINDER, SPHERE),
+        ConstraintKind::Annular => kinds == (SPHERE, CYLINDER),
+        ConstraintKind::AnnularBore => kinds == (CYLINDER, SPHERE),
         ConstraintKind::Conical | ConstraintKind::Coplanar => false,
     };
     round && moving.sense * fixed.sense < 0.0
@@ -97,27 +101,38 @@ fn misfit(face: &FaceRecord, feature: &Feature, lever: f32) -> f32 {
 
 impl Walk<'_, '_, '_> {
     /// How far the object may travel before a point of the leaf at `points` could touch anything but what joints keep it from, m; none when that is
-    /// not known.
+    /// not known, or hardly any way.
     pub(crate) fn joined(&mut self, job: &Job<'_>, points: &[PointRecord]) -> Option<f32> {
-        let mut clear = CLEAR_CELLS[0];
+        let cell = job.field.record().cell;
+        // In cells; the first reach that is tried is that of the points before.
+        let mut clear = f32::INFINITY;
+        let mut tried = CLEAR_CELLS[0];
         for point in points {
-            let own = [point.face, point.edge_face];
-            let mates = |face: u16| {
-                face != NO_FACE
-                    && (job.joined.iter()).any(|[tree, field]| *field == face && holds(own, *tree))
-            };
-            if !job.joined.iter().any(|[tree, _]| holds(own, *tree)) {
-                return None;
-            }
             self.count_clearing();
+            let own = [point.face, point.edge_face];
+            let mates =
+                |face: u16| (job.joined.iter()).any(|[tree, field]| *field == face && holds(own, *tree));
             let at = job.in_cells(point);
             let reach = (CLEAR_CELLS.iter())
                 .copied()
-                .filter(|&reach| reach <= clear)
-                .find(|&reach| job.field.only(at, reach, mates))?;
-            clear = reach;
+                .filter(|&reach| reach <= tried && job.joined.iter().any(|[tree, _]| holds(own, *tree)))
+                .find(|&reach| job.field.only(at, reach, mates));
+            let far = match reach {
+                Some(reach) => {
+                    tried = reach;
+                    reach
+                }
+                // Not a mating face's, or near another: as far as it is from everything.
+                None => job.distance(point.position) / cell - EDGE_ERROR_CELLS,
+            };
+            if far < clear {
+                clear = far;
+            }
+            if clear < LEAST_CLEAR_CELLS {
+                return None;
+            }
         }
-        Some(clear * job.field.record().cell)
+        Some(clear * cell)
     }
 }
 

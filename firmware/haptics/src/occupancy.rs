@@ -9,7 +9,7 @@
 //! voxels only brake, and only with [`crate::Integrator::Explicit`]. Unlike it, the force layer is where the surface is, not two voxels outside.
 
 use glam::Vec3;
-use mortise_protocol::image::{PointRecord, Voxel, VoxelSample, oct_decode};
+use mortise_protocol::image::{NO_FACE, PointRecord, Voxel, VoxelSample, oct_decode};
 
 use crate::contact::Phase;
 use crate::io::Flags;
@@ -88,6 +88,7 @@ impl Walk<'_, '_, '_> {
             // Faces are known too seldom for guidance to make room between them.
             contact.guided = false;
             (contact.moving_face, contact.static_face) = (point.face, sample.face);
+            (contact.moving_edge_face, contact.static_edge_face) = (point.edge_face, NO_FACE);
             contact.leaf = leaf;
         }
         0.0

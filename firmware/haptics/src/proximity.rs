@@ -17,7 +17,7 @@ use mortise_protocol::image::{
     Cell, EDGE_ERROR_CELLS, FaceRecord, Field, NO_FACE, NodeRecord, Place, PointRecord, SceneImage, Shape,
 };
 
-use crate::analytic::{OnFace, exact, on_face};
+use crate::analytic::{OnFace, edge_face, exact, on_face};
 use crate::coherence::{Coherence, Due, Key, Known};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mating};
@@ -246,7 +246,7 @@ impl<'i> Job<'i> {
 
     /// Signed distance of the field's shape from `p` (tree frame), or a bound: by exact surfaces where they are known.
     #[inline(always)]
-    fn distance(&self, p: [f32; 3]) -> f32 {
+    pub fn distance(&self, p: [f32; 3]) -> f32 {
         let in_field = self.to_field.apply(p);
         match self.field.place(in_field.to_array()) {
             Place::Cell(cell) => match exact(self.faces, self.field.nearby(&cell), in_field) {
@@ -535,10 +535,14 @@ impl Walk<'_, '_, '_> {
     #[inline(never)]
     fn at_edge(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, cell: &Cell<'_>, p: Vec3) -> f32 {
         self.edges += 1;
-        if let Some((distance, face)) = exact(job.faces, job.field.nearby(cell), p) {
+        let nearby = job.field.nearby(cell);
+        if let Some((distance, face)) = exact(job.faces, nearby, p) {
             if distance < self.search.margin
-                && let Some(found) = on_face(job.faces, face, p)
+                && let Some(mut found) = on_face(job.faces, face, p)
             {
+                if distance < self.search.slack {
+                    found.edge_face = edge_face(job.faces, nearby, face, distance, p);
+                }
                 self.near(job, leaf, point, &found);
             }
             return distance;
@@ -558,6 +562,7 @@ impl Walk<'_, '_, '_> {
                 distance,
                 normal: gradient * inverse_sqrt(squared),
                 face: sample.face,
+                edge_face: NO_FACE,
             };
             self.near(job, leaf, point, &found);
         }
@@ -598,6 +603,11 @@ impl Walk<'_, '_, '_> {
         contact.phase = Phase::Free;
         contact.guided = mating.guided;
         (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
+        (contact.moving_edge_face, contact.static_edge_face) = if job.backward {
+            (found.edge_face, point.edge_face)
+        } else {
+            (point.edge_face, found.edge_face)
+        };
         contact.leaf = leaf;
     }
 

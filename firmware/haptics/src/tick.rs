@@ -16,7 +16,7 @@ use crate::rotation;
 use crate::settings::{Integrator, Settings};
 use crate::state::State;
 use crate::step::{Solution, Step, Stiffness};
-use crate::touching::touching_faces;
+use crate::touching::{Scenery, touching_faces};
 
 /// Positions beyond this are an encoder's fault, not a place, m.
 const FARTHEST_M: f32 = 100.0;
@@ -153,7 +153,15 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         .map(|c| c.arm);
     state.guidance.observe(guided, &state.parts);
     let guidance = state.guidance.state(&pulls, &step.scale(twist), scale);
-    let pairs = touching_faces(state.contacts.as_slice(), grabbed.center, settings.period_s);
+    let scenery = Scenery {
+        scene,
+        parts: &state.parts,
+        held: grabbed.part,
+        object: grabbed.pose(),
+        center: grabbed.center,
+        period_s: settings.period_s,
+    };
+    let pairs = touching_faces(state.contacts.as_slice(), &scenery);
     state
         .coherence
         .travelled(settings.period_s * point_speed(twist, reach));

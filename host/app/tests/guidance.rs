@@ -163,6 +163,9 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
         count: 0,
         depth: f32::NAN,
         point: [f32::INFINITY; 3],
+        moving_edge_face: u16::MAX,
+        static_edge_face: u16::MAX,
+        insertion: 0.0,
     };
     telemetry.pairs.push(pair).expect("room");
     session.telemetry = Some(telemetry);

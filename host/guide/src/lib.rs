@@ -5,7 +5,7 @@
 //! top with its end. A part that guidance holds off the walls touches nothing; as long as its surface is still in or at the other it is
 //! near, and stays guided.
 //!
-//! Planes that face each other are not sent: they meet by contact, and a plane held could hold a part up. Cost: that of the recogniser, once for each
+//! Planes that face each other are not sent: they meet by contact (`docs/notes/stop-planes.md`). Cost: that of the recogniser, once for each
 //! message of telemetry; when near counts, a distance for each pair of surfaces that could mate besides.
 
 mod nearby;

@@ -13,8 +13,8 @@ pub fn kind(target: &Target) -> Option<ConstraintKind> {
         TargetKind::Concentric => Some(ConstraintKind::Concentric),
         TargetKind::Conical => Some(ConstraintKind::Conical),
         TargetKind::Spherical => Some(ConstraintKind::Spherical),
-        // The board knows bores of fixed parts.
-        TargetKind::Annular => target.ball_moves.then_some(ConstraintKind::Annular),
+        TargetKind::Annular if target.ball_moves => Some(ConstraintKind::Annular),
+        TargetKind::Annular => Some(ConstraintKind::AnnularBore),
         TargetKind::Coplanar => None,
     }
 }

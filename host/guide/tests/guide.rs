@@ -86,6 +86,9 @@ fn sample(tick: u32, x: f64, z: f64, touches: bool) -> Telemetry {
         count: 3,
         depth: 1e-6,
         point: [0.0; 3],
+        moving_edge_face: u16::MAX,
+        static_edge_face: u16::MAX,
+        insertion: 0.0,
     };
     let place = pose(DVec3::new(x, 0.0, z));
     Telemetry {
@@ -266,7 +269,7 @@ proptest! {
             let mut sample = sample(tick, 0.0, -10.0, false);
             sample.object = Some((if known { PEG } else { held }, odd));
             for &(moving_face, static_part, static_face, depth) in &pairs {
-                let pair = TouchingPair { moving_face, static_part, static_face, count: 1, depth, point: position };
+                let pair = TouchingPair { moving_face, static_part, static_face, moving_edge_face: u16::MAX, static_edge_face: u16::MAX, count: 1, depth, point: position, insertion: 0.0 };
                 let _ = sample.pairs.push(pair);
             }
             for target in targets(&guide.hear(&sample)) {

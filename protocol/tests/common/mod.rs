@@ -182,6 +182,7 @@ impl Random {
             ConstraintKind::Conical,
             ConstraintKind::Spherical,
             ConstraintKind::Annular,
+            ConstraintKind::AnnularBore,
         ];
         ConstraintTarget {
             id: self.u16(),
@@ -219,9 +220,12 @@ impl Random {
             moving_face: self.u16(),
             static_part: self.u16(),
             static_face: self.u16(),
+            moving_edge_face: self.u16(),
+            static_edge_face: self.u16(),
             count: self.u16(),
             depth: self.f32(),
             point: self.floats(),
+            insertion: self.f32(),
         }
     }
 

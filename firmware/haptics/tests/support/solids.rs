@@ -140,6 +140,122 @@ impl Solid for Peg {
     }
 }
 
+/// Shaft with a head on top, about z; the middle of its height is the origin. Faces: 0 shaft, 1 its end, 2 under the head, 3 round the head, 4 top.
+#[derive(Clone, Copy)]
+pub struct Bolt {
+    pub radius: f64,
+    pub head: f64,
+    /// Half of the whole height.
+    pub half_length: f64,
+    /// Height of the head.
+    pub head_height: f64,
+    /// Points round each circle.
+    pub around: usize,
+}
+
+impl Bolt {
+    /// z of the head's underside.
+    pub fn seat(&self) -> f64 {
+        self.half_length - self.head_height
+    }
+
+    /// Half section, from the axis to the axis: an edge for each face.
+    fn section(&self) -> [([f64; 2], [f64; 2], u16); 5] {
+        let (low, seat, high) = (-self.half_length, self.seat(), self.half_length);
+        [
+            ([self.radius, low], [self.radius, seat], 0),
+            ([0.0, low], [self.radius, low], 1),
+            ([self.radius, seat], [self.head, seat], 2),
+            ([self.head, seat], [self.head, high], 3),
+            ([0.0, high], [self.head, high], 4),
+        ]
+    }
+
+    /// Distance to the nearest edge of the section, and its face.
+    fn nearest(&self, p: [f64; 3]) -> (f64, u16) {
+        let q = [p[0].hypot(p[1]), p[2]];
+        let edges = self.section().map(|(a, b, face)| {
+            let d = [b[0] - a[0], b[1] - a[1]];
+            let t = ((q[0] - a[0]) * d[0] + (q[1] - a[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1]);
+            let t = t.clamp(0.0, 1.0);
+            ((q[0] - a[0] - t * d[0]).hypot(q[1] - a[1] - t * d[1]), face)
+        });
+        edges.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
+    }
+}
+
+impl Solid for Bolt {
+    fn distance(&self, p: [f64; 3]) -> f64 {
+        let r = p[0].hypot(p[1]);
+        let radius = if p[2] > self.seat() {
+            self.head
+        } else {
+            self.radius
+        };
+        let inside = r < radius && p[2].abs() < self.half_length;
+        self.nearest(p).0 * if inside { -1.0 } else { 1.0 }
+    }
+
+    fn face(&self, p: [f64; 3]) -> u16 {
+        self.nearest(p).1
+    }
+
+    fn face_count(&self) -> u32 {
+        5
+    }
+
+    fn surface(&self, face: u16) -> Option<FaceRecord> {
+        Some(match face {
+            0 => cylinder(self.radius, 1.0),
+            1 => plane(-self.half_length, -1.0),
+            2 => plane(self.seat(), -1.0),
+            3 => cylinder(self.head, 1.0),
+            _ => plane(self.half_length, 1.0),
+        })
+    }
+
+    fn half_size(&self) -> [f64; 3] {
+        [self.head, self.head, self.half_length]
+    }
+
+    fn points(&self) -> Vec<SurfacePoint> {
+        let (low, seat, high) = (-self.half_length, self.seat(), self.half_length);
+        let circles = [
+            (self.radius, low, 0, Some(1)),
+            (self.radius, 0.5 * (low + seat), 0, None),
+            (0.5 * (self.radius + self.head), seat, 2, None),
+            (self.head, seat, 2, Some(3)),
+            (self.head, high, 4, Some(3)),
+        ];
+        let mut points = Vec::new();
+        for i in 0..self.around {
+            let (y, x) = (TAU * i as f64 / self.around as f64).sin_cos();
+            points.extend(circles.map(|(r, z, face, edge_face)| SurfacePoint {
+                position: [r * x, r * y, z],
+                normal: match face {
+                    0 => [x, y, 0.0],
+                    2 => [0.0, 0.0, -1.0],
+                    _ => [0.0, 0.0, 1.0],
+                },
+                face,
+                edge_face,
+            }));
+        }
+        points
+    }
+
+    fn mass_properties(&self) -> (f64, [f64; 3]) {
+        // Of the shaft at full length: an object's mass is chosen for the feel, and its inertia bounded.
+        Peg {
+            radius: self.radius,
+            half_length: self.half_length,
+            around: 0,
+            rings: 0,
+        }
+        .mass_properties()
+    }
+}
+
 /// Box with an optional through hole along z. Faces: 0 top, 1 bottom, 2 sides, 3 hole.
 #[derive(Clone, Copy)]
 pub struct Block {
