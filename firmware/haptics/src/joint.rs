@@ -20,8 +20,9 @@ use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 
 use crate::guidance::holds;
+use crate::job::Job;
 use crate::limits::length;
-use crate::proximity::{Job, Walk};
+use crate::proximity::Walk;
 
 /// Pairs of joints to one part; of more, the rest stay in the work.
 const MAX_JOINED: usize = 2 * MAX_TARGETS;

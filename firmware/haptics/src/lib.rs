@@ -11,7 +11,7 @@
 //! | `pose`, `rotation` | rigid motions, between rotation vectors and quaternions |
 //! | `settings`, `io`, `state` | what a tick reads, returns and remembers |
 //! | `coupling` | virtual coupling between handle and object |
-//! | `proximity`, `coherence`, `contact` | sphere tree against field; what is not due yet; bounded store of contacts |
+//! | `proximity`, `job`, `coherence`, `contact` | sphere tree against field; what is not due yet; bounded store of contacts |
 //! | `occupancy` | the same with a voxmap in place of the field: the textbook method, to be compared with |
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
 //! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
@@ -34,6 +34,7 @@ mod coupling;
 mod explicit;
 mod guidance;
 mod io;
+mod job;
 mod joint;
 mod limits;
 mod linear;

@@ -12,8 +12,9 @@ use mortise_protocol::image::{
 
 use crate::analytic::{OnFace, agreeing, closed_form, exact, on_face, unsigned_distance};
 use crate::io::Work;
+use crate::job::Job;
 use crate::probe::Nearest;
-use crate::proximity::{Job, Walk};
+use crate::proximity::Walk;
 
 /// The diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
