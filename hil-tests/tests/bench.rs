@@ -12,7 +12,7 @@ use libtest_mimic::{Arguments, Completion, Failed, Trial};
 use mortise_hil_tests::checks::{CHECKS, Check};
 use mortise_hil_tests::{PORT_VARIABLE, scenarios};
 use mortise_lab::LabError;
-use mortise_lab::scenario::{Outcome, PreparedScene, Scenario, run_on};
+use mortise_lab::scenario::{Outcome, PreparedScene, Scenario, connect, run_on};
 use mortise_rig::{Client, RigSpec, SERIAL_VARIABLE};
 
 fn main() -> ExitCode {
@@ -161,7 +161,7 @@ impl Bench {
 
     fn measure(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
         let scene = self.scene(scenario)?;
-        let client = Client::connect(spec)?;
+        let client = connect(scenario, spec)?;
         run_on(&client, scenario, &scene)
     }
 

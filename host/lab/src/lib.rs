@@ -8,6 +8,7 @@
 
 pub mod chart;
 pub mod clearance;
+pub mod contacts;
 pub mod corpus;
 mod error;
 pub mod figures;

@@ -42,7 +42,7 @@ pub enum Motion {
 }
 
 /// The fit, placed for a motion, and the motion's scenario; its STEP file is not yet named.
-fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabError> {
+pub(crate) fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabError> {
     let mut scenario = Scenario::parse(PRESSED, "pressed")?;
     let key = |t_s: f64, offset_mm: [f64; 3]| Key {
         t_s,

@@ -1,5 +1,6 @@
 //! Figures: the tables the product is measured by, every row measured when it is asked for.
 
+mod constraints;
 mod contact;
 mod end_to_end;
 mod link;
@@ -37,7 +38,7 @@ pub enum Value {
 }
 
 /// Names of the tables there are.
-pub const NAMES: &[&str] = &["end-to-end", "contact"];
+pub const NAMES: &[&str] = &["end-to-end", "contact", "constraints"];
 
 /// How a table is measured.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +59,7 @@ pub fn figures(name: &str, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<
     match name {
         "end-to-end" => end_to_end::measure(plan, out),
         "contact" => contact::measure(plan, out),
+        "constraints" => constraints::measure(plan, out),
         _ => Err(LabError::NoSuchFigures {
             name: name.to_owned(),
             known: NAMES.join(", "),

@@ -26,12 +26,14 @@ use solve::solve;
 /// How near a target must be, and for how long it is remembered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
-    /// Largest d at which a target is taken up, mm.
+    /// Largest d at which a target is taken up, beyond the play that the fit has anyway, mm.
     pub distance_mm: f64,
     /// Largest θ at which it is taken up, radians.
     pub angle_rad: f64,
     /// Largest difference of diameters, mm.
     pub diameter_mm: f64,
+    /// The same as a share of the larger diameter, where that is more.
+    pub diameter_share: f64,
     /// Largest diameter of what goes in beyond that of its hole, mm: a press fit is felt, a wrong part is not pulled in.
     pub interference_mm: f64,
     /// A target taken up is let go when d or θ is this many times larger.
@@ -41,12 +43,14 @@ pub struct Thresholds {
 }
 
 impl Default for Thresholds {
-    /// As far as a hand is off when it tries a fit: 3 mm and 6°; the loosest fit of the thesis is 2.5 mm on the diameter.
+    /// As far as a hand is off when it tries a fit: 3 mm and 6°; the loosest fit of the thesis is 2.5 mm on the diameter, of
+    /// its large parts a peg of 650 mm in a hole of 700 mm.
     fn default() -> Self {
         Self {
             distance_mm: 3.0,
             angle_rad: 0.1,
             diameter_mm: 2.6,
+            diameter_share: 0.075,
             interference_mm: 0.1,
             release: 1.5,
             patience: 30,
@@ -282,7 +286,9 @@ impl<'a> Recogniser<'a> {
         let (a, b) = (of(id.moving_part)?, of(id.fixed_part)?);
         let (moving, fixed) = (a.merged.get(id.moving_surface)?, b.merged.get(id.fixed_surface)?);
         let target = Target::between(id, moving, fixed, *a.middles.get(id.moving_surface)?)?;
-        let sizes = -self.thresholds.interference_mm..=self.thresholds.diameter_mm;
+        let larger = 2.0 * (target.radius_mm + target.play_mm.max(0.0));
+        let most = (self.thresholds.diameter_share * larger).max(self.thresholds.diameter_mm);
+        let sizes = -self.thresholds.interference_mm..=most;
         (sizes.contains(&(2.0 * target.play_mm)) && id.moving_part != id.fixed_part).then_some(target)
     }
 
@@ -305,14 +311,15 @@ impl<'a> Recogniser<'a> {
             } else {
                 1.0
             };
-            let near = entry.misfit.distance_mm <= factor * limits.distance_mm
+            let distance_mm = limits.distance_mm + entry.target.play_mm.max(0.0);
+            let near = entry.misfit.distance_mm <= factor * distance_mm
                 && entry.misfit.angle_rad <= factor * limits.angle_rad;
             entry.state = match (entry.off, near) {
                 (true, _) => State::Off,
                 (false, false) => State::Far,
                 (false, true) => {
-                    let off = entry.misfit.distance_mm / limits.distance_mm
-                        + entry.misfit.angle_rad / limits.angle_rad;
+                    let off =
+                        entry.misfit.distance_mm / distance_mm + entry.misfit.angle_rad / limits.angle_rad;
                     order.push((!entry.pinned, !was_active, off, *id));
                     State::Conflict(Vec::new())
                 }

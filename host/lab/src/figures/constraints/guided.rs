@@ -1,0 +1,170 @@
+//! A scene, a hand, and a guide that answers telemetry: what most rows play.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use glam::DVec3;
+use mortise_guide::{Guide, GuideSettings};
+use mortise_protocol::message::{Telemetry, ToDevice};
+use mortise_rig::{EmulatedMode, RigSpec};
+use tempfile::{Builder, NamedTempFile};
+
+use crate::LabError;
+use crate::fit::Fit;
+use crate::scenario::{Depth, Key, PreparedScene, Recording, Scenario, connect, depth, pose_mm, record};
+
+const GUIDED: &str = include_str!("../../../../../hil-tests/scenarios/guided_fit.toml");
+
+/// The in-process rig.
+pub(super) const SIM: RigSpec = RigSpec::Simulated { realtime: false };
+
+/// The emulated board.
+pub(super) fn emulated() -> RigSpec {
+    RigSpec::Emulated {
+        mode: EmulatedMode::Lockstep,
+        firmware: None,
+    }
+}
+
+/// `text` as a STEP file, removed when dropped: the CAD kernel reads files only.
+pub(super) fn file(text: &str) -> Result<NamedTempFile, LabError> {
+    let write = || {
+        let mut file = Builder::new().prefix("mortise-").suffix(".step").tempfile()?;
+        file.write_all(text.as_bytes())?;
+        Ok(file)
+    };
+    write().map_err(|source| LabError::Unwritable {
+        path: std::env::temp_dir(),
+        source,
+    })
+}
+
+/// One point of a hand's way.
+pub(super) fn key(t_s: f64, offset_mm: [f64; 3], turn_deg: [f64; 3]) -> Key {
+    Key {
+        t_s,
+        offset_mm,
+        turn_deg,
+        push_n: [0.0; 3],
+    }
+}
+
+/// The guided insertion, 1 mm and 2° off with a tremor of 0.2 mm at 10 Hz, with nothing on the table yet.
+pub(super) fn script(step: &Path) -> Result<Scenario, LabError> {
+    let mut scenario = Scenario::parse(GUIDED, "guided-fit")?;
+    scenario.scene.step = step.to_owned();
+    Ok(scenario)
+}
+
+/// The guided insertion of `fit`, from 20 mm above, 2 mm farther than through.
+pub(super) fn insertion(fit: &Fit, step: &Path) -> Result<Scenario, LabError> {
+    let mut scenario = script(step)?;
+    scenario.hand.grip_mm = [0.0, 0.0, 0.5 * fit.length_mm - fit.engaged_mm];
+    let through = fit.height_mm - fit.engaged_mm + 2.0;
+    for (key, down) in scenario
+        .hand
+        .keyframes
+        .iter_mut()
+        .zip([0.0, -fit.engaged_mm - 3.0, through])
+    {
+        key.offset_mm[2] = -down;
+    }
+    scenario.depth = Some(Depth {
+        fixed: "block".into(),
+        axis: [0.0, 0.0, -1.0],
+        through_mm: [0.0; 3],
+    });
+    Ok(scenario)
+}
+
+/// Plays `scenario` with a guide that hears every sample.
+pub(super) fn play(
+    scenario: &Scenario,
+    scene: &PreparedScene,
+    spec: &RigSpec,
+) -> Result<Recording, LabError> {
+    let mut guide = scene.guide(GuideSettings::default());
+    play_with(scenario, scene, spec, &mut guide)
+}
+
+/// As [`play`], with a guide whose list is looked at afterwards.
+pub(super) fn play_with(
+    scenario: &Scenario,
+    scene: &PreparedScene,
+    spec: &RigSpec,
+    guide: &mut Guide<'_>,
+) -> Result<Recording, LabError> {
+    let mut listener = |sample: &Telemetry| guide.hear(sample);
+    record(&connect(scenario, spec)?, scenario, scene, Some(&mut listener))
+}
+
+/// Plays `scenario` while `listener` says what to send.
+pub(super) fn play_to(
+    scenario: &Scenario,
+    scene: &PreparedScene,
+    spec: &RigSpec,
+    listener: &mut dyn FnMut(&Telemetry) -> Vec<ToDevice>,
+) -> Result<Recording, LabError> {
+    record(&connect(scenario, spec)?, scenario, scene, Some(listener))
+}
+
+/// Ticks after full engagement in which a part comes to its axis: 1 mm shrinks below 1 µm with τ = 20 ms.
+const SETTLING_TICKS: u32 = 150;
+
+/// How an insertion went.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inserted {
+    /// How deep at the end, and how deep the hole is, mm.
+    pub depth_mm: f64,
+    pub hole_mm: f64,
+    /// When it was through, from the hand's start, s; NaN: never.
+    pub after_s: f64,
+    /// Farthest off the axis once guidance had settled, mm; NaN: it never did.
+    pub off_axis_mm: f64,
+}
+
+/// Looks at an insertion's samples.
+pub(super) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Telemetry]) -> Inserted {
+    let mut seen = Inserted {
+        depth_mm: f64::NAN,
+        hole_mm: f64::NAN,
+        after_s: f64::NAN,
+        off_axis_mm: f64::NAN,
+    };
+    let first = samples.first().map_or(0, |sample| sample.tick);
+    let mut engaged_since = None;
+    for sample in samples {
+        let Some((_, pose)) = &sample.object else { continue };
+        let Some((deep, hole, off)) =
+            (scenario.depth.as_ref()).and_then(|of| depth(scene, of, &pose_mm(pose)))
+        else {
+            continue;
+        };
+        (seen.depth_mm, seen.hole_mm) = (deep, hole);
+        if deep >= hole && seen.after_s.is_nan() {
+            let every = u32::from(scenario.run.telemetry_every_ticks);
+            seen.after_s = 1e-3 * f64::from(sample.tick - first + every);
+        }
+        if sample.guidance.engagement < 1.0 {
+            engaged_since = None;
+        } else if sample.tick - *engaged_since.get_or_insert(sample.tick) > SETTLING_TICKS {
+            seen.off_axis_mm = seen.off_axis_mm.max(off);
+        }
+    }
+    seen
+}
+
+/// Largest change of the handle's force (N) and torque (N m) between two samples a tick apart.
+pub(super) fn largest_step(samples: &[Telemetry]) -> (f64, f64) {
+    let of = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+    (samples.windows(2))
+        .filter(|pair| pair[1].tick == pair[0].tick + 1)
+        .map(|pair| {
+            let force = of(pair[1].wrench.force) - of(pair[0].wrench.force);
+            let torque = of(pair[1].wrench.torque) - of(pair[0].wrench.torque);
+            (force.length(), torque.length())
+        })
+        .fold((0.0, 0.0), |(a, b), (force, torque)| {
+            (a.max(force), b.max(torque))
+        })
+}
