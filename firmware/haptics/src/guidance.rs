@@ -75,6 +75,8 @@ struct Slot {
 #[derive(Clone, Debug)]
 pub(crate) struct Guidance {
     slots: Vec<Slot, MAX_TARGETS>,
+    /// How they pull: as set, once all that pulled otherwise has faded.
+    method: GuidanceMethod,
     /// How far apart contacts of guided faces lay along the fixed feature's direction in the last tick, m.
     insertion_m: f32,
 }
@@ -96,6 +98,25 @@ impl Mating {
     };
 }
 
+/// Faces at a point, and what guidance says of them: points that follow each other mostly have the same.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mated {
+    part: u16,
+    moving: [u16; 2],
+    fixed: [u16; 2],
+    mating: Mating,
+}
+
+impl Mated {
+    /// No faces.
+    pub const NONE: Self = Self {
+        part: u16::MAX,
+        moving: [NO_FACE; 2],
+        fixed: [NO_FACE; 2],
+        mating: Mating::NONE,
+    };
+}
+
 /// How targets stand, for telemetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuidanceState {
@@ -113,6 +134,8 @@ impl Guidance {
     pub const fn new() -> Self {
         Self {
             slots: Vec::new(),
+            // All zero; the first tick takes what is set.
+            method: GuidanceMethod::Off,
             insertion_m: 0.0,
         }
     }
@@ -174,9 +197,13 @@ impl Guidance {
         self.insertion_m = 0.0;
     }
 
-    /// A tick passes: targets engage, expire, fade and vanish. Those that change share what may change in a tick.
+    /// A tick passes: targets engage, expire, fade and vanish. Those that change share what may change in a tick. Another method takes over when what
+    /// the one before held has faded.
     pub fn step(&mut self, settings: &GuidanceSettings) {
-        let on = settings.method != GuidanceMethod::Off;
+        if self.method != settings.method && self.slots.iter().all(|slot| slot.engagement == 0.0) {
+            self.method = settings.method;
+        }
+        let on = self.method == settings.method && self.method != GuidanceMethod::Off;
         let mut changing = 0u8;
         for slot in &mut self.slots {
             slot.left = slot.left.saturating_sub(1);
@@ -207,7 +234,7 @@ impl Guidance {
             };
             let target = &slot.target;
             // A turn as seen at the distance L: k·L² for the angle, torque cap over L.
-            let (offset, angle) = match at.settings.method {
+            let (offset, angle) = match self.method {
                 GuidanceMethod::Thesis => {
                     let stiffness = THESIS_SHARE * at.coupling_stiffness * self.weight(slot, &alignment, at);
                     let law = Law::Spring {
@@ -248,7 +275,7 @@ impl Guidance {
             slot.joined = slot.left > 0
                 && slot.engagement == 1.0
                 && at.settings.joints
-                && at.settings.method == GuidanceMethod::Capped
+                && self.method == GuidanceMethod::Capped
                 && slot.keeps_apart(
                     at,
                     pulls.iter().filter(|p| usize::from(p.slot) == i),
@@ -275,14 +302,29 @@ impl Guidance {
         all
     }
 
-    /// Of contact between these faces: `moving` and `fixed` name the face, and the other one where the point lies on an edge.
-    pub fn mating(
+    /// As [`Self::mating`], which is asked only when the faces differ from those of `last`.
+    #[inline]
+    pub fn mating_after(
         &self,
+        last: &mut Mated,
         part: u16,
         moving: [u16; 2],
         fixed: [u16; 2],
         settings: &GuidanceSettings,
     ) -> Mating {
+        if (last.part, last.moving, last.fixed) != (part, moving, fixed) {
+            *last = Mated {
+                part,
+                moving,
+                fixed,
+                mating: self.mating(part, moving, fixed, settings),
+            };
+        }
+        last.mating
+    }
+
+    /// Of contact between these faces: `moving` and `fixed` name the face, and the other one where the point lies on an edge.
+    fn mating(&self, part: u16, moving: [u16; 2], fixed: [u16; 2], settings: &GuidanceSettings) -> Mating {
         let mut mating = Mating::NONE;
         for slot in &self.slots {
             let target = &slot.target;
@@ -294,7 +336,7 @@ impl Guidance {
             }
             mating.guided = true;
             let room = slot.engagement * settings.allowance_m;
-            if settings.method != GuidanceMethod::Thesis && makes_room(target.kind) && room > mating.room {
+            if self.method != GuidanceMethod::Thesis && makes_room(target.kind) && room > mating.room {
                 mating.room = room;
             }
         }
@@ -303,7 +345,7 @@ impl Guidance {
 
     /// What is left of the stiffness of contacts between guided faces: all of it, except in the thesis' blend.
     pub fn share(&self, at: &At<'_, '_>) -> f32 {
-        if at.settings.method != GuidanceMethod::Thesis {
+        if self.method != GuidanceMethod::Thesis {
             return 1.0;
         }
         let mut most = 0.0f32;

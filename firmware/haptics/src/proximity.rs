@@ -18,7 +18,7 @@ use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecor
 use crate::analytic::{OnFace, edge_face, exact, on_face};
 use crate::coherence::{Coherence, Due, Key, Known};
 use crate::contact::{Contacts, Phase};
-use crate::guidance::{Guidance, Mating};
+use crate::guidance::{Guidance, Mated, Mating};
 use crate::io::{Flags, Work};
 use crate::job::Job;
 use crate::pose::Pose;
@@ -124,6 +124,7 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             passed_over: 0,
+            mated: Mated::NONE,
             near: 0,
             edges: 0,
         };
@@ -189,6 +190,7 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             passed_over: 0,
+            mated: Mated::NONE,
             near: 0,
             edges: 0,
         }
@@ -205,6 +207,8 @@ pub(crate) struct Walk<'w, 's, 'i> {
     pub work: &'w mut Work,
     /// Nodes known to be far or near.
     passed_over: u32,
+    /// What guidance said of the last point's faces.
+    mated: Mated,
     /// Points within the margin.
     pub near: u32,
     /// Points where one face did not tell all.
@@ -485,9 +489,14 @@ impl Walk<'_, '_, '_> {
             if job.backward { (other, own) } else { (own, other) }
         };
         let mating = if job.guided {
-            self.search
-                .guidance
-                .mating(leaf.part(), moving, fixed, self.search.guidance_settings)
+            let search = self.search;
+            (search.guidance).mating_after(
+                &mut self.mated,
+                leaf.part(),
+                moving,
+                fixed,
+                search.guidance_settings,
+            )
         } else {
             Mating::NONE
         };

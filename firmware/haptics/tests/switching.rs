@@ -176,6 +176,42 @@ proptest! {
     }
 }
 
+/// The method is chosen anew while a target holds the part: what pulled fades before another pulls.
+#[test]
+fn another_method_takes_over_without_a_step() {
+    use mortise_haptics::GuidanceMethod::{Capped, Off, Thesis};
+    let scene = IMAGE.open();
+    let (mut state, mut hand) = start(&IMAGE, 10e-3);
+    let mut settings = Settings::default();
+    hand.goal[0] = 0.4e-3;
+    run(&mut state, &scene, &settings, &mut hand, RESTED, |_, _, _| {});
+    let mut last: Option<Wrench> = None;
+    let methods = [Capped, Thesis, Capped, Off, Thesis, Off, Capped];
+    for t in 0..methods.len() as u32 * 400 {
+        settings.guidance.method = methods[t as usize / 400];
+        if t.is_multiple_of(100) {
+            state
+                .set_target(&axis_on_axis((t / 100 + 1) as u16, 300))
+                .unwrap();
+        }
+        let (out, _) = run(&mut state, &scene, &settings, &mut hand, 1, |_, _, _| {});
+        if let Some(last) = last {
+            let (force, torque) = (out.handle.force - last.force, out.handle.torque - last.torque);
+            assert!(force.length() <= STEP_N, "tick {t}: {} N", force.length());
+            assert!(torque.length() <= STEP_NM, "tick {t}: {} N m", torque.length());
+        }
+        last = Some(out.handle);
+        if t % 400 == 399 {
+            let engaged = if settings.guidance.method == Off { 0.0 } else { 1.0 };
+            assert_eq!(out.guidance.engagement, engaged, "{:?}", settings.guidance.method);
+            // Capped it holds the axis; the thesis' spring, softer than the coupling, does not.
+            let (pose, _) = state.object().unwrap();
+            let off = pose.position.x;
+            assert_eq!(off < 5e-6, settings.guidance.method == Capped, "{off}");
+        }
+    }
+}
+
 /// Power of the device on the handle, W.
 fn work(wrench: &Wrench, hand: &Hand) -> f64 {
     (0..3)
