@@ -466,16 +466,20 @@ impl Slot {
         if fit.pairs == 0 {
             return false;
         }
+        // Forms with half the room to spare, so that it does not come and go.
+        let share = if self.joined { 1.0 } else { 0.5 };
+        let most = share * (at.settings.allowance_m + fit.gap_m);
         let mut off = slack;
         for pull in pulls {
             // Seen at the part's farthest point, not at L.
             let lever = if pull.turns { fit.lever_m / at.length } else { 1.0 };
-            let [a, b] = motions.map(|motion| pull.rows.speed(&motion));
-            off += lever * (pull.rows.error(&[0.0; 6], 0.0) + APPROACH * if a > b { a } else { b });
+            off += lever * pull.rows.error(&[0.0; 6], 0.0);
+            if off <= most {
+                let [a, b] = motions.map(|motion| pull.rows.speed(&motion));
+                off += lever * APPROACH * if a > b { a } else { b };
+            }
         }
-        // Forms with half the room to spare, so that it does not come and go.
-        let share = if self.joined { 1.0 } else { 2.0 };
-        share * off <= at.settings.allowance_m + fit.gap_m
+        off <= most
     }
 
     /// How far the target is from being met, if it pulls at all.

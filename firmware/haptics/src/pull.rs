@@ -40,13 +40,17 @@ pub(crate) struct Pull {
 pub(crate) struct Secant {
     spring: f32,
     damper: f32,
+    /// |u| and its rate there, m and m/s.
+    reach: f32,
+    speed: f32,
 }
 
 impl Secant {
-    /// Whether another is the same but for this share.
-    pub fn is_near(&self, other: &Self, share: f32) -> bool {
-        (self.spring - other.spring).abs() <= share * other.spring
-            && (self.damper - other.damper).abs() <= share * other.damper
+    /// Whether this, in place of another that is right, pulls wrongly by no more than `force_n`.
+    pub fn is_near(&self, other: &Self, force_n: f32) -> bool {
+        let spring = (self.spring - other.spring).abs() * other.reach;
+        let damper = (self.damper - other.damper).abs() * other.speed;
+        spring + damper <= force_n
     }
 }
 
@@ -83,20 +87,23 @@ impl Pull {
 
     /// At the step's end `x`.
     pub fn secant(&self, x: &[f32; 6]) -> Secant {
-        let spring = match self.law {
-            Law::Spring { stiffness, .. } => stiffness,
+        let mut secant = Secant::default();
+        match self.law {
+            Law::Spring { stiffness, .. } => secant.spring = stiffness,
             Law::Capped {
                 stiffness,
                 cap,
                 ahead,
-            } => saturating(stiffness, cap, self.rows.error(x, ahead)),
-        };
-        let damper = if self.damper_n > 0.0 {
-            saturating(LETTING_GO, self.damper_n, self.rows.speed(x))
-        } else {
-            0.0
-        };
-        Secant { spring, damper }
+            } => {
+                secant.reach = self.rows.error(x, ahead);
+                secant.spring = saturating(stiffness, cap, secant.reach);
+            }
+        }
+        if self.damper_n > 0.0 {
+            secant.speed = self.rows.speed(x);
+            secant.damper = saturating(LETTING_GO, self.damper_n, secant.speed);
+        }
+        secant
     }
 
     /// Adds what the spring and the damper add to the step's matrix and right side.

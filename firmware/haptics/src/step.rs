@@ -37,8 +37,8 @@ const RATE_BAND_M_PER_S: f32 = 1e-6;
 /// A slip that changes by less than this is settled.
 const SLIP_BAND: f32 = 1e-3;
 
-/// A pull that changes by less than this share is settled.
-const PULL_BAND: f32 = 0.01;
+/// A pull that is wrong by less than this is settled, N: less than half of what may change in a tick.
+const PULL_BAND_N: f32 = 0.02;
 
 /// The object and its coupling at the tick's start.
 pub(crate) struct Step<'a> {
@@ -307,5 +307,8 @@ fn settled(a: &Secants, b: &Secants) -> bool {
     let (s, t) = (a.slip, b.slip);
     (s.translation - t.translation).abs() < SLIP_BAND
         && (s.rotation - t.rotation).abs() < SLIP_BAND
-        && a.pulls.iter().zip(&b.pulls).all(|(p, q)| p.is_near(q, PULL_BAND))
+        && a.pulls
+            .iter()
+            .zip(&b.pulls)
+            .all(|(p, q)| p.is_near(q, PULL_BAND_N))
 }
