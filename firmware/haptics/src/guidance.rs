@@ -1,16 +1,18 @@
 //! Constraint targets: which are in force, how far engaged, and how they pull.
 //!
 //! The desktop sends a target; the board holds it until it expires, is cleared or replaced. Nothing about a target is ever switched: its
-//! *engagement* a rises from 0 to 1 and falls again by steps so small that the caps on all forces, a·F, together change by less than 0.05 N a tick and those
-//! on torques by less than 2 mN m. Within its cap it is stiff,
+//! *engagement* a rises from 0 to 1 and falls again by steps so small that the caps on all forces, a·F, together change by 0.015 N a tick at most and those
+//! on torques by less than 2 mN m: a part on its way to the axis follows the cap's growth, and neither starts nor stops with a step of 0.05 N on the
+//! handle. Torque comes first, as fast as it may. Within its cap a target is stiff,
 //!
-//! f = −a·F·u/√((a·F/k)² + |u|²),   u = e + (h + τ)·J·V'
+//! f = −a·F·u/√((a·F/(a⁴·k))² + |u|²),   u = e + (h + τ)·J·V'
 //!
 //! taken at the step's end like every other force of the step: near the goal a spring k with damping k·τ that holds micrometres, far from it a
-//! pull of constant length, so that a hand stronger than the cap always gets away. The damping makes the way there exponential (τ = 20 ms).
+//! pull of constant length, so that a hand stronger than the cap always gets away. While it comes or goes it is softer (a⁴), so that it
+//! does not stop a part within a tick. The damping makes the way there exponential (τ = 20 ms).
 //!
 //! A target that ends leaves a part that the hand pulled against it: it would fly off. So a damper takes over where the pull falls, 200 N s/m up to
-//! 1 N, and fades in half a second: 0.4 N move the part at 2 mm/s.
+//! 1 N, and fades in a second: 0.4 N move the part at 2 mm/s.
 //!
 //! Where the target's faces meet, contact makes room: gaps between them count for larger by a·[`GuidanceSettings::allowance_m`]. The axis holds
 //! what the wall held before, an exact fit goes in, and a part pulled off its axis against the cap finds the wall again. All other contacts
@@ -35,12 +37,14 @@ use crate::state::Placed;
 
 /// Engagement grows and falls by this a tick at most.
 const STEP: f32 = 1.0 / 64.0;
-/// The cap on the force changes by less than this a tick, N.
-const FORCE_STEP_N: f32 = 0.045;
+/// The cap on the force changes by this a tick at most, N.
+const FORCE_STEP_N: f32 = 0.015;
 /// The cap on the torque likewise, N m.
 const TORQUE_STEP_NM: f32 = 1.8e-3;
-/// Its fading a tick.
-const LETTING_GO_STEP: f32 = 1.0 / 512.0;
+/// Fading of what lets go, a tick.
+const LETTING_GO_STEP: f32 = 1.0 / 1024.0;
+/// Share of the stiffness that is there at least, so that a target without any pull has a number for its slack.
+const LEAST_STIFF: f32 = 1e-6;
 /// Stiffness of the thesis' constraint spring over the coupling's.
 const THESIS_SHARE: f32 = 0.8;
 
@@ -244,12 +248,15 @@ impl Guidance {
                     (law, law)
                 }
                 GuidanceMethod::Off | GuidanceMethod::Capped => {
-                    let law = |cap: f32| Law::Capped {
-                        stiffness: target.stiffness,
-                        cap: cap * slot.engagement,
+                    let law = |cap: f32, a: f32| Law::Capped {
+                        stiffness: target.stiffness * (a * a * a * a).max(LEAST_STIFF),
+                        cap: cap * a,
                         ahead: at.period_s + at.settings.time_s,
                     };
-                    (law(target.force_cap), law(target.torque_cap / at.length))
+                    (
+                        law(target.force_cap, slot.engagement),
+                        law(target.torque_cap / at.length, slot.ahead()),
+                    )
                 }
             };
             for (turns, rows, law) in [(false, alignment.offset, offset), (true, alignment.angle, angle)] {
@@ -335,7 +342,7 @@ impl Guidance {
                 continue;
             }
             mating.guided = true;
-            let room = slot.engagement * settings.allowance_m;
+            let room = slot.ahead() * settings.allowance_m;
             if self.method != GuidanceMethod::Thesis && makes_room(target.kind) && room > mating.room {
                 mating.room = room;
             }
@@ -440,8 +447,18 @@ impl Slot {
     }
 
     fn step(&self) -> f32 {
-        STEP.min(FORCE_STEP_N / self.target.force_cap.max(FORCE_STEP_N))
-            .min(TORQUE_STEP_NM / self.target.torque_cap.max(TORQUE_STEP_NM))
+        self.torque_step()
+            .min(FORCE_STEP_N / self.target.force_cap.max(FORCE_STEP_N))
+    }
+
+    fn torque_step(&self) -> f32 {
+        STEP.min(TORQUE_STEP_NM / self.target.torque_cap.max(TORQUE_STEP_NM))
+    }
+
+    /// Engagement of the torque and of the room, which need not grow as slowly as the force: a part that comes upright first goes in, one that
+    /// comes to the axis first stands on the rim.
+    fn ahead(&self) -> f32 {
+        (self.engagement * self.torque_step() / self.step()).min(1.0)
     }
 
     /// Whether the part is so near to where the target wants it, and will be after this tick, that the mating faces cannot touch.

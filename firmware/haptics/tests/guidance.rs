@@ -141,9 +141,9 @@ fn engages_and_expires_without_a_step() {
         }
     }
     println!("{steps:?}");
-    assert_eq!(active[100], (1, 1.0));
+    assert_eq!(active[250], (1, 1.0));
     assert_eq!(active[499].0, 0);
-    assert_eq!(active[700], (0, 0.0));
+    assert_eq!(active[750], (0, 0.0));
     assert!(steps.force_n < 0.05 && steps.torque_nm < 2e-3, "{steps:?}");
     // Back at the wall.
     let (pose, _) = state.object().unwrap();

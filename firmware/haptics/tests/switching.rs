@@ -11,8 +11,8 @@ use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
 /// Largest change of the handle's wrench from tick to tick.
 const STEP_N: f32 = 0.05;
 const STEP_NM: f32 = 2e-3;
-/// Ticks in which a target fades and what it held is let go: up to 4 targets of 3 N at 0.045 N a tick between them, and half a second.
-const FADED: u32 = 4 * 67 + 512;
+/// Ticks in which a target fades and what it held is let go: up to 4 targets of 3 N at 0.015 N a tick between them, and a second.
+const FADED: u32 = 4 * 200 + 1024;
 /// Ticks after which the hand is at rest again: 20 of its time constant, 2·5/400 s.
 const RESTED: u32 = 500;
 
@@ -187,8 +187,8 @@ fn another_method_takes_over_without_a_step() {
     run(&mut state, &scene, &settings, &mut hand, RESTED, |_, _, _| {});
     let mut last: Option<Wrench> = None;
     let methods = [Capped, Thesis, Capped, Off, Thesis, Off, Capped];
-    for t in 0..methods.len() as u32 * 400 {
-        settings.guidance.method = methods[t as usize / 400];
+    for t in 0..methods.len() as u32 * 600 {
+        settings.guidance.method = methods[t as usize / 600];
         if t.is_multiple_of(100) {
             state
                 .set_target(&axis_on_axis((t / 100 + 1) as u16, 300))
@@ -201,7 +201,7 @@ fn another_method_takes_over_without_a_step() {
             assert!(torque.length() <= STEP_NM, "tick {t}: {} N m", torque.length());
         }
         last = Some(out.handle);
-        if t % 400 == 399 {
+        if t % 600 == 599 {
             let engaged = if settings.guidance.method == Off { 0.0 } else { 1.0 };
             assert_eq!(out.guidance.engagement, engaged, "{:?}", settings.guidance.method);
             // Capped it holds the axis; the thesis' spring, softer than the coupling, does not.
