@@ -66,7 +66,7 @@ pub struct ContactSettings {
     /// Points that come this near in a tick, by twice the motion so far or without contacts, are taken into the step, m. Default 5 µm.
     pub margin_m: f32,
     /// Most work a tick, in field look-ups of about 170 instructions: a tree node asked counts 4, a point out of reach 1, one within the margin 2, one that
-    /// may touch 3½, a solve 13. Default 480, which keeps a tick below 120,000 instructions.
+    /// may touch 4, a solve 13. Default 500, which keeps a tick below 120,000 instructions.
     pub point_budget: u32,
 }
 
@@ -149,7 +149,7 @@ impl Default for Settings {
                 total_stiffness_n_per_m: 20e6,
                 damping_s: 0.5e-3,
                 margin_m: 5e-6,
-                point_budget: 480,
+                point_budget: 500,
             },
             object: ObjectSettings {
                 mass_kg: 0.1,

@@ -34,7 +34,7 @@ impl Variant {
             shell: PointshellKind::ErrorBounded,
             cell_mm,
             format: SampleFormat::Int16,
-            epsilon_mm: Some(cell_mm / 25.0),
+            epsilon_mm: Some(cell_mm / 20.0),
         }
     }
 
@@ -64,7 +64,7 @@ impl Variant {
         Self {
             shell: PointshellKind::Classic {
                 voxel_mm: Some(voxel_mm),
-                shrink_percent: 0.0,
+                shrink_percent: 50.0,
             },
             epsilon_mm: None,
             ..self

@@ -59,6 +59,8 @@ pub struct Outcome {
     pub parameter_messages: u32,
     /// Telemetry flags seen, all together.
     pub flags: u16,
+    /// Share of the samples whose tick left out points or contacts, %.
+    pub degraded_percent: f64,
     /// Bytes of the scene image.
     pub image_bytes: usize,
     /// Deepest stack seen, bytes; 0 where not measured.
@@ -137,6 +139,7 @@ quantities! {
     bad_frames => |o| Some(f64::from(o.bad_frames));
     parameter_messages => |o| Some(f64::from(o.parameter_messages));
     flags => |o| Some(f64::from(o.flags));
+    degraded_percent => |o| Some(o.degraded_percent);
 }
 
 impl Outcome {

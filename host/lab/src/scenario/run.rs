@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{
     Capabilities, CostUnit, DeviceState, FromDevice, HandScript, Keyframe, Statistics, Telemetry, ToDevice,
-    WirePose,
+    WirePose, flag,
 };
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe};
@@ -401,6 +401,10 @@ fn outcome(
         bad_frames: statistics.bad_frames,
         parameter_messages: play.messages,
         flags: samples.iter().fold(0, |flags, sample| flags | sample.flags),
+        degraded_percent: {
+            let degraded = (samples.iter()).filter(|s| s.flags & (flag::BUDGET | flag::CONTACTS) != 0);
+            100.0 * degraded.count() as f64 / samples.len().max(1) as f64
+        },
         image_bytes: scene.image.len(),
         stack_bytes_max: statistics.stack_max,
         state_hash: format!("{:016x}", ran.state_hash),
