@@ -96,10 +96,10 @@ impl Key {
         (self.0 + 619 * job) as usize % SLOTS
     }
 
-    /// The node's share of its distance: one of eight, by three bits of a multiplicative hash (Knuth's 2³²/φ).
+    /// The node's share of its distance: one of 256, by eight bits of a multiplicative hash (Knuth's 2³²/φ).
     fn share(self) -> f32 {
-        let eighth = self.0.wrapping_mul(2_654_435_769) >> 29;
-        LONGEST_SHARE - (LONGEST_SHARE - SHORTEST_SHARE) * (1.0 / 7.0) * eighth as f32
+        let place = self.0.wrapping_mul(2_654_435_769) >> 24;
+        LONGEST_SHARE - (LONGEST_SHARE - SHORTEST_SHARE) * (1.0 / 255.0) * place as f32
     }
 }
 

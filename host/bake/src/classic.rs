@@ -72,24 +72,26 @@ pub fn classic_pointshell(
         .map(|(at, _)| at)
         .collect();
     let inward = shrink_percent / 100.0 * grid.cell();
-    let points: Vec<ShellPoint> = crossed
+    let (points, offsets): (Vec<ShellPoint>, Vec<f64>) = crossed
         .par_iter()
         .filter_map(|&at| {
             let center = grid.at(DVec3::from_array(at.map(|x| x as f64 + 0.5)));
             let nearest = surface.nearest(center)?;
             let exact = (center - nearest.point) * nearest.distance.signum();
             let normal = voxel_normal(&kinds, at).or(exact.try_normalize())?;
-            Some(ShellPoint {
+            let point = ShellPoint {
                 position: center - normal * inward,
                 normal,
                 face: nearest.face as u16,
                 edge_face: NO_FACE,
-            })
+            };
+            Some((point, nearest.distance - inward))
         })
-        .collect();
+        .unzip();
     Ok(Pointshell {
         face_points: points.len(),
         points,
+        offsets,
         ..Pointshell::default()
     })
 }

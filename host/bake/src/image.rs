@@ -56,7 +56,8 @@ impl ImageBuilder {
             .iter()
             .map(|p| (p.position / 1000.0).as_vec3().to_array())
             .collect();
-        let tree = build_tree(&positions);
+        let offsets: Vec<f32> = shell.offsets.iter().map(|mm| (mm / 1000.0) as f32).collect();
+        let tree = build_tree(&positions, &offsets);
         let (lo, hi) = bounding_box(shape);
         let center = ((lo + hi) / 2000.0).as_vec3();
         // Half the diagonal holds the tessellation; the exact surface may bulge past it, by less than the grid's own margin of a cell.

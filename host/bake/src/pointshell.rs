@@ -102,6 +102,8 @@ pub struct ShellPoint {
 pub struct Pointshell {
     /// The points.
     pub points: Vec<ShellPoint>,
+    /// How far each lies off the surface, mm, outside positive; empty where all lie on it.
+    pub offsets: Vec<f64>,
     /// Of them inside faces.
     pub face_points: usize,
     /// Of them along edges.
@@ -141,6 +143,7 @@ fn sample(surface: &ExactSurface, options: &PointshellOptions, flat_mm: f64) -> 
     let corner_points = points.len() - face_points - edge_points;
     Pointshell {
         points,
+        offsets: Vec::new(),
         face_points,
         edge_points,
         corner_points,

@@ -15,15 +15,21 @@ pub struct SphereTree {
     pub order: Vec<u32>,
 }
 
+/// A point's offset from the surface counts so many times in the choice of the axis to halve.
+const OFFSET_WEIGHT: f32 = 128.0;
+
 /// Builds the tree over `positions` as they will be stored: halves along the longest axis down to leaves of at most 16. Every sphere holds
 /// all points below it, also in the board's `f32`. Cost: n log² n.
-pub fn build_tree(positions: &[[f32; 3]]) -> SphereTree {
+///
+/// `offsets` (same unit; empty for none) tell how far points lie off the surface. They count as a fourth axis, so that points of one depth share a leaf:
+/// they come near together, and a leaf of which one point is near is looked at as a whole.
+pub fn build_tree(positions: &[[f32; 3]], offsets: &[f32]) -> SphereTree {
     let mut tree = SphereTree {
         nodes: Vec::new(),
         order: (0..positions.len() as u32).collect(),
     };
     if !positions.is_empty() {
-        split(positions, &mut tree, 0, positions.len());
+        split(positions, offsets, &mut tree, 0, positions.len());
     }
     tree
 }
@@ -37,7 +43,7 @@ pub(crate) fn node_count(points: usize) -> usize {
     }
 }
 
-fn split(positions: &[[f32; 3]], tree: &mut SphereTree, first: usize, count: usize) {
+fn split(positions: &[[f32; 3]], offsets: &[f32], tree: &mut SphereTree, first: usize, count: usize) {
     let at = |i: u32| DVec3::from_array(positions[i as usize].map(f64::from));
     let run = &mut tree.order[first..first + count];
     let points: Vec<DVec3> = run.iter().map(|&i| at(i)).collect();
@@ -51,17 +57,22 @@ fn split(positions: &[[f32; 3]], tree: &mut SphereTree, first: usize, count: usi
         skip: 0,
     });
     if count > LEAF_POINTS {
-        let lo = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let hi = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-        let extent = hi - lo;
-        let axis = (0..3)
-            .max_by(|&a, &b| extent[a].total_cmp(&extent[b]))
+        let along = |i: u32, axis: usize| match axis {
+            3 => OFFSET_WEIGHT * offsets.get(i as usize).copied().unwrap_or(0.0),
+            _ => positions[i as usize][axis],
+        };
+        let extent: [f32; 4] = std::array::from_fn(|axis| {
+            let range = run.iter().map(|&i| along(i, axis));
+            range.clone().fold(f32::NEG_INFINITY, f32::max) - range.fold(f32::INFINITY, f32::min)
+        });
+        let axis = (0..4)
+            .max_by(|&a, &b| extent[a].total_cmp(&extent[b]).then(b.cmp(&a)))
             .unwrap_or(0);
         // The index breaks ties, so the order is one and the same everywhere.
-        run.sort_unstable_by(|&a, &b| at(a)[axis].total_cmp(&at(b)[axis]).then(a.cmp(&b)));
+        run.sort_unstable_by(|&a, &b| along(a, axis).total_cmp(&along(b, axis)).then(a.cmp(&b)));
         let half = count / 2;
-        split(positions, tree, first, half);
-        split(positions, tree, first + half, count - half);
+        split(positions, offsets, tree, first, half);
+        split(positions, offsets, tree, first + half, count - half);
     }
     tree.nodes[index].skip = tree.nodes.len() as u32;
 }
@@ -111,7 +122,7 @@ mod tests {
         /// Preorder, skip links, leaf size, containment, and every point exactly once.
         #[test]
         fn tree_is_sound(positions in prop::collection::vec(prop::array::uniform3(-1.0f32..1.0), 0..400)) {
-            let tree = build_tree(&positions);
+            let tree = build_tree(&positions, &[]);
             let mut seen = tree.order.clone();
             seen.sort_unstable();
             prop_assert_eq!(seen, (0..positions.len() as u32).collect::<Vec<_>>());
