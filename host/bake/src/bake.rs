@@ -36,7 +36,7 @@ const ATTEMPTS: usize = 12;
 const SCOUT: f64 = 4.0;
 /// Cells in the pointshell's default error bound. It is met only where a lone convex edge or a curved face touches something unlike itself; in
 /// a fit the error is smaller by the ratio of the radii to their difference.
-const EPSILON_PER_CELL: f64 = 10.0;
+const EPSILON_PER_CELL: f64 = 20.0;
 /// Default of the largest spacing along edges, in cells.
 const MAX_SPACING_CELLS: f64 = 4.0;
 

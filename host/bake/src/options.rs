@@ -19,7 +19,7 @@ pub struct BakeOptions {
     pub format: SampleFormat,
     /// What the pointshells are made of.
     pub shell: PointshellKind,
-    /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a tenth of the cell.
+    /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a twentieth of the cell.
     pub epsilon_mm: Option<f64>,
     /// That bound where only convex faces touch each other away from edges, crossed shafts above all, mm. `None`: the same.
     pub crossing_epsilon_mm: Option<f64>,

@@ -34,8 +34,13 @@ impl Variant {
             shell: PointshellKind::ErrorBounded,
             cell_mm,
             format: SampleFormat::Int16,
-            epsilon_mm: Some(cell_mm / 20.0),
+            epsilon_mm: Some(cell_mm / 100.0),
         }
+    }
+
+    /// The same with the bound on the points' error that a scene is baked with when nothing else is asked for, a twentieth of the cell.
+    pub const fn board(cell_mm: f64) -> Self {
+        Self::field(cell_mm).epsilon_mm(cell_mm / 20.0)
     }
 
     /// Voxmap and pointshell as in McNeely, Puterbaugh & Troy 1999 and Faas 2010.
@@ -59,7 +64,7 @@ impl Variant {
         Self { epsilon_mm, ..self }
     }
 
-    /// The same with the textbook's pointshell, a point for each voxel of `voxel_mm`.
+    /// The same with the textbook's pointshell, a point for each voxel of `voxel_mm`, shrunk by half a voxel: else points stand out by as much.
     pub const fn classic_shell(self, voxel_mm: f64) -> Self {
         Self {
             shell: PointshellKind::Classic {

@@ -14,7 +14,7 @@ pub(super) fn tight(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     let clearances: Vec<f64> = (CLEARANCES_MM.into_iter())
         .filter(|&clearance| clearance <= 1.0 && (!plan.quick || clearance == 1.0 || clearance <= 0.1))
         .collect();
-    let variant = Variant::field(CELL_MM);
+    let variant = Variant::board(CELL_MM);
     let smallest = smallest(&variant, &clearances, &mut |trial| eprintln!("{trial}"))?;
     out(Row::at_most(
         format!(
@@ -36,9 +36,13 @@ pub(super) fn tight(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
         Some(mm) => Row::told(what, 1e3 * mm, "µm"),
         None => Row::noted(what, &format!("none; {} mm does not go", wide[0])),
     });
+    let variant = Variant::field(CELL_MM);
     let bytes = report(&variant, &Fit::thesis(TIGHT_MM))?.image_bytes as f64;
     out(Row::at_most(
-        format!("image of the {} µm pair, {variant}", 1e3 * TIGHT_MM),
+        format!(
+            "image of the {} µm pair at the accuracy above, {variant}",
+            1e3 * TIGHT_MM
+        ),
         bytes,
         "bytes",
         512.0 * 1024.0,
