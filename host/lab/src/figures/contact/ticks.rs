@@ -19,7 +19,7 @@ const CLASSIC: f64 = 240_000.0;
 /// The budget that stays within that, look-ups.
 const CLASSIC_BUDGET: f32 = 1300.0;
 /// Ticks that may leave something out, %: the first look at everything round the peg takes more than one.
-const FIRST_LOOK_PERCENT: f64 = 2.0;
+const FIRST_LOOK_PERCENT: f64 = 5.0;
 /// Instructions a tick in free motion may take.
 const FREE: f64 = 20_000.0;
 /// Times the points of the dense shell at least.
