@@ -35,14 +35,12 @@ pub(crate) const APPROACH: f32 = 2.0;
 /// Thinning up to which some point of every leaf is looked at: leaves have 8 points.
 const LEAF_THINNING: u8 = 3;
 /// The budget counts what a look-up costs, 170 instructions. Passing over a node of which enough is known costs half of that, asking the field
-/// about one four times that; a point at an edge costs twice as much again, one within the margin as much again, and a candidate twice as much on top.
+/// about one four times that; a point at an edge or within the margin costs as much again, and a candidate twice as much on top.
 const PASSED_OVER_PER_LOOKUP: u32 = 2;
 /// See [`PASSED_OVER_PER_LOOKUP`].
 const NODE: u32 = 4;
 /// See [`PASSED_OVER_PER_LOOKUP`].
 const CANDIDATE: u32 = 2;
-/// See [`PASSED_OVER_PER_LOOKUP`].
-const EDGE: u32 = 2;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -540,7 +538,7 @@ impl Walk<'_, '_, '_> {
             + self.passed_over / PASSED_OVER_PER_LOOKUP
             + self.work.points
             + self.near
-            + EDGE * self.edges
+            + self.edges
             + CANDIDATE * u32::from(self.work.candidates)
     }
 
