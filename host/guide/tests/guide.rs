@@ -157,8 +157,8 @@ fn touch_sends_a_target_that_is_refreshed_before_it_expires_and_cleared_when_far
     // The peg's end is 10 mm deep in the hole.
     assert!((row.inside_mm.expect("along an axis") - 10.0).abs() < 1e-4);
     assert_eq!(list.freedom.count(), 2);
-    let cleared = guide.hear(&sample(2016, 5.0, -10.0, false));
-    assert_eq!(cleared, [ToDevice::ClearTarget { id }], "5 mm is another place");
+    let cleared = guide.hear(&sample(2016, 6.0, -10.0, false));
+    assert_eq!(cleared, [ToDevice::ClearTarget { id }], "6 mm is another place");
     assert_eq!(guide.list().rows[0].standing, Standing::Candidate);
     guide.hear(&sample(2032, 15.0, -10.0, false));
     assert_eq!(guide.list().rows, [], "15 mm is none to read about");
