@@ -179,10 +179,11 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     }
 }
 
-/// What a step took, in the look-ups of the budget (170 instructions): a solve 13, and past the third one half a look-up for each candidate.
-fn step_cost(solution: &Solution, candidates: u16) -> u32 {
+/// What a step took, in the look-ups of the budget (170 instructions): a solve 13 and each target's pull in it 8, and past the third one half a look-up for
+/// each candidate.
+fn step_cost(solution: &Solution, candidates: u16, pulls: usize) -> u32 {
     let solves = u32::from(solution.solves);
-    13 * solves + solves.saturating_sub(3) * u32::from(candidates) / 2
+    (13 + 8 * pulls as u32) * solves + solves.saturating_sub(3) * u32::from(candidates) / 2
 }
 
 impl State {
@@ -256,7 +257,7 @@ impl State {
         };
         work.contacts = self.contacts.pushing() as u16;
         work.solves = solution.solves;
-        self.step_cost = step_cost(&solution, work.candidates);
+        self.step_cost = step_cost(&solution, work.candidates, step.pulls.len());
         work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
         solution
     }
