@@ -133,7 +133,7 @@ impl FaultCounts {
     }
 }
 
-/// Handle of the faults in a link; see the [module's page](self). Clones are the same line.
+/// Handle of the faults in a link. Clones are the same line.
 #[derive(Clone, Debug, Default)]
 pub struct FaultLine(Arc<Shared>);
 
