@@ -271,13 +271,8 @@ fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
         if node.skip as usize != index {
             continue;
         }
-        let first = node.first_point as usize;
-        let points = shape.points.get(first..first + node.point_count as usize);
-        for point in points
-            .unwrap_or(&[])
-            .iter()
-            .filter(|point| point.edge_face != NO_FACE)
-        {
+        let edges = node.points(shape.points).iter();
+        for point in edges.filter(|point| point.edge_face != NO_FACE) {
             let squared = (Vec3::from_array(point.position) - p).length_squared();
             if squared < best * best {
                 best = libm::sqrtf(squared);

@@ -49,6 +49,13 @@ struct Slot {
     due_nm: u32,
 }
 
+impl Slot {
+    const EMPTY: Self = Self {
+        key: Key::NONE,
+        due_nm: 0,
+    };
+}
+
 /// Due time of a node that was near.
 const NEAR: u32 = 0;
 
@@ -105,21 +112,19 @@ impl Key {
 
 impl Coherence {
     pub const fn new() -> Self {
-        const EMPTY: Slot = Slot {
-            key: Key::NONE,
-            due_nm: 0,
-        };
         Self {
             travel_nm: 0,
             round: 0,
             epoch: 0,
-            slots: [EMPTY; SLOTS],
+            slots: [Slot::EMPTY; SLOTS],
         }
     }
 
     /// Everything is due. For a jump of the object, or other parts.
     pub fn forget(&mut self) {
-        *self = Self::new();
+        // In place: made anew it would pass over the stack, which has not room for many such.
+        (self.travel_nm, self.round, self.epoch) = (0, 0, 0);
+        self.slots.fill(Slot::EMPTY);
     }
 
     /// The object moved, no point of it by more than `distance` m.

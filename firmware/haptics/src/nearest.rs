@@ -70,12 +70,6 @@ struct Leaf<'i> {
     beyond: bool,
 }
 
-/// Points of a leaf.
-fn points<'i>(job: &Job<'i>, leaf: &NodeRecord) -> &'i [PointRecord] {
-    let first = leaf.first_point as usize;
-    (job.points.get(first..first + leaf.point_count as usize)).unwrap_or(&[])
-}
-
 /// A point as one look-up has it.
 struct Seen {
     /// Its distance: that to the face where it is `settled`, else as interpolated or a bound, m.
@@ -190,7 +184,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             let end = node.skip as usize;
             if end == index + 1 {
                 let mut nearest = None;
-                for point in points(self.job, node) {
+                for point in node.points(self.job.points) {
                     so_far.work.points += 1;
                     let seen = self.see(point);
                     if (nearest.as_ref()).is_none_or(|(other, _): &(Seen, _)| seen.distance < other.distance)
@@ -235,7 +229,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                 continue;
             }
             if node.skip as usize == index + 1 {
-                let points = points(self.job, node);
+                let points = node.points(self.job.points);
                 look(
                     self,
                     so_far,

@@ -113,9 +113,7 @@ pub(crate) fn nearest_voxel(job: &Job<'_>, so_far: &mut SoFar) {
         if node.skip as usize != index {
             continue;
         }
-        let first = node.first_point as usize;
-        let points = job.points.get(first..first + node.point_count as usize);
-        for point in points.unwrap_or(&[]) {
+        for point in node.points(job.points) {
             work.points += 1;
             let p = job.to_field.apply(point.position);
             let sample = job.field.voxel(p.to_array());

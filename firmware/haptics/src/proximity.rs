@@ -347,10 +347,7 @@ impl Walk<'_, '_, '_> {
                 above.hear(Due::NOW);
                 continue;
             }
-            let points = job
-                .points
-                .get(first..first + node.point_count as usize)
-                .unwrap_or(&[]);
+            let points = node.points(job.points);
             // A leaf is looked at as a whole, unless even the whole budget would not do.
             if (self.left() as usize) < points.len() && self.work.points > 0 {
                 return Some(here);

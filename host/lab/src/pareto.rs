@@ -7,7 +7,8 @@
 use std::fmt;
 
 use mortise_bake::SampleFormat;
-use mortise_rig::{EmulatedMode, RigSpec};
+use mortise_protocol::message::Refusal;
+use mortise_rig::{EmulatedMode, RigError, RigSpec};
 use serde::Serialize;
 
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
@@ -127,6 +128,11 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
         Ok((outcome, _)) => outcome.instructions_per_tick_max,
         // A model too coarse for the fit pushes until the board gives up: it has no cost then.
         Err(LabError::Fault { .. }) => None,
+        // One too large for the board is never looked at there.
+        Err(LabError::Rig(RigError::Refused {
+            reason: Refusal::SceneTooLarge { .. },
+            ..
+        })) => None,
         Err(error) => return Err(error),
     };
     let smallest = if looked_for {

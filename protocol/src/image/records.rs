@@ -254,22 +254,6 @@ impl Nearby {
             Self::Convex(faces) | Self::Reentrant(faces) => faces[0],
         }
     }
-
-    /// By how many cells interpolation may overstate the distance here, where exact surfaces tell better: 0.30 were measured at a right-angled edge
-    /// across the grid, 0.87 at a corner.
-    #[inline]
-    pub const fn overstated(self) -> f32 {
-        match self {
-            Self::Convex([_, _, third]) | Self::Reentrant([_, _, third]) => {
-                if third == NO_FACE {
-                    0.4
-                } else {
-                    0.9
-                }
-            }
-            _ => 0.0,
-        }
-    }
 }
 
 /// One brick of a field.
@@ -304,6 +288,15 @@ pub struct NodeRecord {
     pub point_count: u32,
     /// Next node when culled, counted from the shape's first node; larger than own index.
     pub skip: u32,
+}
+
+impl NodeRecord {
+    /// The points below it, of all its shape's. None for a record that leads beyond them, which no image that was opened has.
+    #[inline]
+    pub fn points<'a>(&self, all: &'a [PointRecord]) -> &'a [PointRecord] {
+        let first = self.first_point as usize;
+        all.get(first..first + self.point_count as usize).unwrap_or(&[])
+    }
 }
 
 /// A sample of the exact surface.
