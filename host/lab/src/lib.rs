@@ -4,6 +4,7 @@
 //! uploads, plays it on a rig in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and [`figures::figures`] are all
 //! this one function. [`figures::figures`] measures every row of a named table.
 //! [`clearance`] finds the smallest clearance that assembles, [`pareto`] holds accuracy against cost; [`chart`] and [`table`] write what sweeps find.
+//! [`stability`] closes loops on one axis and finds where they become unstable.
 //! [`probe`] asks a scene for gap and contacts at given poses.
 
 pub mod chart;
@@ -19,6 +20,7 @@ pub mod peer;
 pub mod probe;
 pub mod scenario;
 pub mod scene_p;
+pub mod stability;
 pub mod table;
 pub mod variant;
 

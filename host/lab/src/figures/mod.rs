@@ -5,6 +5,7 @@ mod contact;
 mod end_to_end;
 mod link;
 mod parts;
+mod stability;
 
 use std::path::Path;
 
@@ -38,7 +39,7 @@ pub enum Value {
 }
 
 /// Names of the tables there are.
-pub const NAMES: &[&str] = &["end-to-end", "contact", "constraints"];
+pub const NAMES: &[&str] = &["end-to-end", "contact", "constraints", "stability"];
 
 /// How a table is measured.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +61,7 @@ pub fn figures(name: &str, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<
         "end-to-end" => end_to_end::measure(plan, out),
         "contact" => contact::measure(plan, out),
         "constraints" => constraints::measure(plan, out),
+        "stability" => stability::measure(plan, out),
         _ => Err(LabError::NoSuchFigures {
             name: name.to_owned(),
             known: NAMES.join(", "),

@@ -1,0 +1,195 @@
+//! A closed loop on one axis: a handle on a sampled force law, which is the product's own tick with a part in hand.
+//!
+//! The handle moves along z and does not turn. m·v̇ = F_device(held) + F_hand − b·v − f_c·sign(v), F_hand = k_h·(x_w − x) + b_h·(v_w − v) + push, integrated by
+//! Runge and Kutta's fourth order in [`SUBSTEPS`] steps a tick in double precision; where dry friction can hold the handle, it does. The encoder rounds, the speed comes
+//! from its differences, and the force is given out so many ticks late. The work of the device is exact, because its force is held.
+
+use mortise_haptics::{Input, Output, Pose, Quat, Settings, State, Twist, Vec3, tick};
+use mortise_protocol::image::SceneImage;
+
+use super::oracle::Plant;
+
+/// Steps of integration a tick.
+const SUBSTEPS: u32 = 4;
+
+/// How the handle is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensor {
+    /// Δ of the encoder, m; 0: exact.
+    pub resolution_m: f64,
+    /// Time constant of the low-pass behind the difference quotient, s.
+    pub filter_s: f64,
+    /// What the tick is told of the speed found: 1, unless a wall's damping is set by it.
+    pub share: f64,
+}
+
+impl Sensor {
+    /// Exact positions, their difference quotient.
+    pub const EXACT: Self = Self {
+        resolution_m: 0.0,
+        filter_s: 0.0,
+        share: 1.0,
+    };
+}
+
+/// The loop's fixed parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rig {
+    /// Handle and hand; the hand's spring pulls to where the wish is.
+    pub plant: Plant,
+    /// Of `plant.damping` so much is the hand's, N s/m.
+    pub hand_damping: f64,
+    /// f_c, N.
+    pub coulomb_n: f64,
+    /// See there.
+    pub sensor: Sensor,
+    /// Ticks from measuring to giving the force out, beyond none.
+    pub delay_ticks: usize,
+}
+
+/// What the hand does in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wish {
+    /// Where it wants the handle, m.
+    pub position: f64,
+    /// And how fast that moves, m/s.
+    pub speed: f64,
+    /// Added force, N.
+    pub push: f64,
+}
+
+/// The loop at work.
+pub struct Bench<'a> {
+    /// What it consists of; may be changed between ticks.
+    pub rig: Rig,
+    /// Of the force law.
+    pub settings: Settings,
+    scene: &'a SceneImage<'a>,
+    state: Box<State>,
+    /// x, m.
+    pub position: f64,
+    /// v, m/s.
+    pub speed: f64,
+    last_read: f64,
+    estimate: f64,
+    under_way: Vec<f64>,
+    /// Work of the device on the handle, J.
+    pub energy: Energy,
+    /// Work of contacts on the object, J.
+    pub contact: Energy,
+}
+
+/// Work through a port, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Net so far: positive is made by what is behind the port.
+    pub net: f64,
+    /// Largest net at any time.
+    pub made: f64,
+    /// All that went through, either way.
+    pub passed: f64,
+}
+
+impl Energy {
+    /// Takes one tick's work.
+    pub fn add(&mut self, work: f64) {
+        self.net += work;
+        self.made = self.made.max(self.net);
+        self.passed += work.abs();
+    }
+}
+
+impl<'a> Bench<'a> {
+    /// Part `part` in hand where it stands, the handle at z = 0 and at rest.
+    ///
+    /// # Panics
+    /// Never with a scene whose part may be moved, as all of this crate's are.
+    pub fn new(scene: &'a SceneImage<'a>, part: u16, settings: Settings, rig: Rig) -> Self {
+        let mut state = Box::new(State::new());
+        state.load_scene(scene);
+        let grabbed = state.grab(scene, part, &Pose::IDENTITY);
+        debug_assert_eq!(grabbed, Ok(()));
+        Self {
+            rig,
+            settings,
+            scene,
+            state,
+            position: 0.0,
+            speed: 0.0,
+            last_read: 0.0,
+            estimate: 0.0,
+            under_way: vec![0.0; rig.delay_ticks],
+            energy: Energy::default(),
+            contact: Energy::default(),
+        }
+    }
+
+    /// One tick, and the period after it.
+    pub fn step(&mut self, wish: &Wish) -> Output {
+        let period = f64::from(self.settings.period_s);
+        let sensor = self.rig.sensor;
+        let read = if sensor.resolution_m > 0.0 {
+            (self.position / sensor.resolution_m).round() * sensor.resolution_m
+        } else {
+            self.position
+        };
+        let gain = period / (sensor.filter_s + period);
+        self.estimate += gain * ((read - self.last_read) / period - self.estimate);
+        self.last_read = read;
+        let along = |z: f64| Vec3::new(0.0, 0.0, z as f32);
+        let input = Input {
+            handle: Pose::new(along(read), Quat::IDENTITY),
+            handle_twist: Twist {
+                linear: along(self.estimate * sensor.share),
+                angular: Vec3::ZERO,
+            },
+            enabled: true,
+        };
+        let out = tick(&mut self.state, self.scene, &self.settings, &input);
+        let object = out.object_twist;
+        let pushed = out.contact.force.dot(object.linear) + out.contact.torque.dot(object.angular);
+        self.contact.add(f64::from(pushed) * period);
+        self.under_way.push(f64::from(out.handle.force.z));
+        let force = self.under_way.remove(0);
+        self.advance(force, wish, period);
+        out
+    }
+
+    /// Moves the handle for a period under the device's force.
+    fn advance(&mut self, force: f64, wish: &Wish, period: f64) {
+        let Rig {
+            plant,
+            hand_damping,
+            coulomb_n,
+            ..
+        } = self.rig;
+        let h = period / f64::from(SUBSTEPS);
+        let start = self.position;
+        for i in 0..SUBSTEPS {
+            // The wish goes on within the tick, as a hand does.
+            let wished = |t: f64| wish.position + wish.speed * (f64::from(i) * h + t);
+            let smooth = |t: f64, x: f64, v: f64| {
+                force + wish.push + plant.stiffness * (wished(t) - x) + hand_damping * wish.speed
+                    - plant.damping * v
+            };
+            let (x, v) = (self.position, self.speed);
+            let load = smooth(0.0, x, v);
+            if v == 0.0 && load.abs() <= coulomb_n {
+                continue;
+            }
+            let against = coulomb_n * if v == 0.0 { load.signum() } else { v.signum() };
+            let rate = |t: f64, x: f64, v: f64| (v, (smooth(t, x, v) - against) / plant.mass_kg);
+            let a = rate(0.0, x, v);
+            let b = rate(0.5 * h, x + 0.5 * h * a.0, v + 0.5 * h * a.1);
+            let c = rate(0.5 * h, x + 0.5 * h * b.0, v + 0.5 * h * b.1);
+            let d = rate(h, x + h * c.0, v + h * c.1);
+            self.position += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
+            self.speed += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
+            // Dry friction brings to rest; what is left over starts anew in the next step.
+            if coulomb_n > 0.0 && v != 0.0 && self.speed.signum() != v.signum() {
+                self.speed = 0.0;
+            }
+        }
+        self.energy.add(force * (self.position - start));
+    }
+}

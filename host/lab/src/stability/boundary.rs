@@ -1,0 +1,129 @@
+//! Where a wall becomes unstable, found by experiment on the product's own tick.
+//!
+//! The hand presses the part on a slab until it lies still, lets go of all damping of its own but the plant's, and flicks the handle. Whether the trembling that
+//! follows dies out or grows is what is looked at: linear theory's own question, asked of the whole loop with its encoder, its coupling and its contacts.
+
+use mortise_haptics::Settings;
+use mortise_protocol::image::SceneImage;
+
+use super::bench::{Bench, Energy, Rig, Sensor, Wish};
+use super::oracle::{Plant, Wall, limit};
+
+/// Pressed with this force, N.
+const PRESS_N: f64 = 5.0;
+/// Damping of the hand while it presses, N s/m, and how long that takes, s.
+const CALM_N_S_PER_M: f64 = 20.0;
+const CALM_S: f64 = 1.0;
+/// The flick, m/s.
+const FLICK_M_PER_S: f64 = 2e-3;
+/// How long trembling is watched, s, and the parts of it at its beginning and end that are compared.
+const WATCH_S: f64 = 8.0;
+const PART: f64 = 0.2;
+/// Trembling beyond this multiple of what the flick gave ends the watch: it has grown.
+const GROWN: f64 = 20.0;
+
+/// A wall rendered by the product's coupling, its object pinned by contact: settings, and what the sensor tells of the speed.
+///
+/// The coupling looks a period ahead: it gives K·x + (b_T + T·K)·v̂. A wall of damping B is one with b_T = 0 that is told B/(T·K) of the speed.
+pub fn settings(wall: &Wall) -> (Settings, Sensor) {
+    let mut settings = open(wall.period_s);
+    settings.coupling.k_t_n_per_m = wall.stiffness as f32;
+    settings.coupling.b_t = 0.0;
+    let sensor = Sensor {
+        filter_s: wall.filter_s,
+        share: wall.damping / (wall.period_s * wall.stiffness),
+        ..Sensor::EXACT
+    };
+    (settings, sensor)
+}
+
+/// Default settings at another period with every limit out of the way, and contacts that give way by less than a thousandth of what a wall here does.
+pub fn open(period_s: f64) -> Settings {
+    let mut settings = Settings {
+        period_s: period_s as f32,
+        ..Settings::default()
+    };
+    settings.coupling.force_max_n = 100.0;
+    settings.contact.stiffness_n_per_m = 10e6;
+    settings.contact.total_stiffness_n_per_m = 1e9;
+    settings.limits.force_n = 100.0;
+    settings.limits.force_slew_n_per_s = 1e6;
+    settings
+}
+
+/// What a flick led to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flick {
+    /// Largest deviation at the beginning and at the end, m.
+    pub first_m: f64,
+    /// See `first_m`.
+    pub last_m: f64,
+    /// Work of the device on the handle since the flick.
+    pub energy: Energy,
+}
+
+impl Flick {
+    /// Whether the trembling died out.
+    pub fn dies_out(&self) -> bool {
+        self.last_m < self.first_m
+    }
+}
+
+/// Presses part `part` on what it stands on, flicks, and watches.
+pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) -> Flick {
+    let mut bench = Bench::new(scene, part, *settings, *rig);
+    let ticks = |s: f64| (s / f64::from(settings.period_s)).round() as u32;
+    let calm = ticks(CALM_S);
+    bench.rig.plant.damping += CALM_N_S_PER_M;
+    // The push grows in half of that time.
+    for i in 0..calm {
+        let push = -PRESS_N * f64::from(2 * i).min(f64::from(calm)) / f64::from(calm);
+        bench.step(&Wish {
+            push,
+            ..Wish::default()
+        });
+    }
+    let press = Wish {
+        push: -PRESS_N,
+        ..Wish::default()
+    };
+    bench.rig.plant.damping = rig.plant.damping;
+    bench.energy = Energy::default();
+    let rest = bench.position;
+    bench.speed += FLICK_M_PER_S;
+    let watch = ticks(WATCH_S);
+    let part = (PART * f64::from(watch)) as u32;
+    let (mut first_m, mut last_m) = (0.0f64, 0.0f64);
+    for i in 0..watch {
+        bench.step(&press);
+        let off = (bench.position - rest).abs();
+        if i < part {
+            first_m = first_m.max(off);
+        } else if i >= watch - part || off > GROWN * first_m {
+            last_m = last_m.max(off);
+            if off > GROWN * first_m {
+                break;
+            }
+        }
+    }
+    Flick {
+        first_m,
+        last_m,
+        energy: bench.energy,
+    }
+}
+
+/// Largest stiffness, N/m, at which the flick dies out, with a wall that is otherwise `wall`; looked for between a quarter and four times `near`.
+pub fn stiffness_limit(scene: &SceneImage<'_>, part: u16, plant: Plant, wall: &Wall, near: f64) -> f64 {
+    limit(0.25 * near, 4.0 * near, |stiffness| {
+        let (settings, sensor) = settings(&Wall { stiffness, ..*wall });
+        let rig = Rig {
+            plant,
+            hand_damping: 0.0,
+            coulomb_n: 0.0,
+            sensor,
+            delay_ticks: wall.delay_ticks,
+        };
+        flick(scene, part, &settings, &rig).dies_out()
+    })
+}
