@@ -7,6 +7,7 @@
 //! [`stability`] closes loops on one axis and finds where they become unstable.
 //! [`probe`] asks a scene for gap and contacts at given poses.
 
+pub mod blend;
 pub mod chart;
 pub mod clearance;
 pub mod contacts;
@@ -14,6 +15,7 @@ pub mod corpus;
 mod error;
 pub mod figures;
 pub mod fit;
+mod guided;
 pub mod motion;
 pub mod pareto;
 pub mod peer;

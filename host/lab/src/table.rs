@@ -24,3 +24,9 @@ pub fn write_csv<T: Serialize>(rows: &[T], folder: &Path, name: &str) -> Result<
         source,
     })
 }
+
+/// `value` with so many digits behind the point: what a table shows, and no more than was measured.
+pub fn rounded(value: f64, digits: i32) -> f64 {
+    let unit = 10f64.powi(digits);
+    (value * unit).round() / unit
+}

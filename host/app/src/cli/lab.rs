@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use clap::Subcommand;
 use mortise_lab::figures::{self, Plan, Value};
 use mortise_lab::table::write_csv;
-use mortise_lab::{clearance, pareto};
+use mortise_lab::{blend, clearance, pareto};
 
 use super::output;
 use crate::sample;
@@ -37,18 +37,20 @@ enum Experiment {
     Clearance(Sweep),
     /// Hold accuracy against cost: error, smallest clearance, instructions, nanoseconds, bytes
     Pareto(Sweep),
+    /// Show force and engagement over an insertion, the thesis' blend beside the default guidance
+    Blend(Sweep),
 }
 
 /// How a sweep is made and where it goes.
 #[derive(Debug, clap::Args)]
 struct Sweep {
-    /// One cell size only
+    /// The shorter form: one cell size, or one clearance
     #[arg(long)]
     quick: bool,
     /// One JSON object a trial
     #[arg(long)]
     json: bool,
-    /// Folder for the table (CSV) and the chart (SVG and PNG)
+    /// Folder for tables (CSV) and charts (SVG and PNG)
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 }
@@ -69,6 +71,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Experiment::Figures { name, quick, json } => figures(name, *quick, *json),
         Experiment::Clearance(sweep) => clearance(sweep),
         Experiment::Pareto(sweep) => pareto(sweep),
+        Experiment::Blend(sweep) => blend(sweep),
     }
 }
 
@@ -103,6 +106,22 @@ fn pareto(sweep: &Sweep) -> anyhow::Result<ExitCode> {
         write_csv(&entries, folder, "pareto")?;
         pareto::ticks_chart(&entries).write(folder, "pareto-ticks")?;
         pareto::time_chart(&entries).write(folder, "pareto-time")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn blend(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+    let mut written = Ok(());
+    let courses = blend::sweep(sweep.quick, &mut |course| {
+        if written.is_ok() {
+            written = sweep.tell(course);
+        }
+    })?;
+    written?;
+    if let Some(folder) = &sweep.out {
+        let moments: Vec<&blend::Moment> = courses.iter().flat_map(|course| &course.moments).collect();
+        write_csv(&moments, folder, "blend")?;
+        blend::draw(&courses, folder)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -2,7 +2,6 @@
 
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
-use plotters::coord::combinators::{BindKeyPoints as _, IntoLogRange as _, LogCoord, WithKeyPoints};
 use plotters::element::DashedPathElement;
 use plotters::prelude::{
     Cartesian2d, Circle, DrawingArea, DrawingBackend, IntoFont as _, PathElement, Polygon, RGBColor,
@@ -11,8 +10,9 @@ use plotters::prelude::{
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, ShapeStyle, TextStyle};
 
+use super::axis::{Coordinate, number};
 use super::labels::{Box4, place};
-use super::{Axis, Chart, Line, Look, Point, Series};
+use super::{Chart, Line, Look, Point, Series};
 
 const INK: RGBColor = RGBColor(36, 41, 47);
 const GREY: RGBColor = RGBColor(101, 109, 118);
@@ -24,7 +24,6 @@ const LEGEND_ROW: u32 = 24;
 const NOTE: u32 = 26;
 
 type Area<DB> = DrawingArea<DB, Shift>;
-type Coordinate = WithKeyPoints<LogCoord<f64>>;
 type Context<'a, DB> = ChartContext<'a, DB, Cartesian2d<Coordinate, Coordinate>>;
 
 /// Lengths in pixels of what is drawn on.
@@ -54,7 +53,7 @@ impl Chart {
     /// Draws it; every length is multiplied by `scale`. Errors are words.
     pub(super) fn draw<DB: DrawingBackend>(&self, area: &Area<DB>, scale: u32) -> Result<(), String> {
         let scale = Scale(scale);
-        let drawn = || self.series.iter().flat_map(Series::drawn);
+        let drawn = || self.series.iter().flat_map(|series| self.drawn(series));
         let x = self
             .x
             .range(drawn().map(|point| point.x))
@@ -64,7 +63,7 @@ impl Chart {
             .range(drawn().map(|point| point.y))
             .ok_or("it has no point")?;
         area.fill(&WHITE).map_err(told)?;
-        let (head, rest) = area.split_vertically(scale.of(HEAD));
+        let (head, rest) = area.split_vertically(if self.title.is_empty() { 0 } else { scale.of(HEAD) });
         head.draw(&Text::new(
             self.title.as_str(),
             (scale.of(16), scale.of(14)),
@@ -74,7 +73,8 @@ impl Chart {
         let rows = self.legend(&rest, scale)?;
         let (_, rest) = rest.split_vertically(scale.of(LEGEND_ROW * rows + 6));
         let height = rest.dim_in_pixel().1.cast_signed();
-        let (plot, foot) = rest.split_vertically(height - scale.of(NOTE));
+        let note = if self.note.is_empty() { 0 } else { scale.of(NOTE) };
+        let (plot, foot) = rest.split_vertically(height - note);
         foot.draw(&Text::new(
             self.note.as_str(),
             (scale.of(16), scale.of(4)),
@@ -88,10 +88,7 @@ impl Chart {
             .margin_top(scale.of(4))
             .x_label_area_size(scale.of(52))
             .y_label_area_size(scale.of(78))
-            .build_cartesian_2d(
-                (x.0..x.1).log_scale().with_key_points(self.x.marks(x)),
-                (y.0..y.1).log_scale().with_key_points(self.y.marks(y)),
-            )
+            .build_cartesian_2d(self.x.coordinate(x), self.y.coordinate(y))
             .map_err(told)?;
         context
             .configure_mesh()
@@ -116,7 +113,15 @@ impl Chart {
         let width = area.dim_in_pixel().0.cast_signed();
         let start = scale.of(24);
         let (mut x, mut row) = (start, 0);
-        for series in self.series.iter().filter(|series| !series.name.is_empty()) {
+        let mut named = self
+            .series
+            .iter()
+            .filter(|series| !series.name.is_empty())
+            .peekable();
+        if named.peek().is_none() {
+            return Ok(0);
+        }
+        for series in named {
             let (words, _) = area.estimate_text_size(&series.name, &style).map_err(told)?;
             let taken = scale.of(26) + words.cast_signed() + scale.of(26);
             if x + taken > width && x > start {
@@ -127,7 +132,9 @@ impl Chart {
                 let ends = [(x - scale.of(11), y), (x + scale.of(11), y)];
                 stroke(area, &ends, series, scale)?;
             }
-            mark(area, (x, y), series.look, false, scale)?;
+            if series.line.has_marks() {
+                mark(area, (x, y), series.look, false, scale)?;
+            }
             let level = style.pos(Pos::new(HPos::Left, VPos::Center));
             area.draw(&Text::new(
                 series.name.as_str(),
@@ -162,12 +169,12 @@ impl Chart {
         };
         let mut taken = Vec::new();
         for series in self.series.iter().filter(|series| series.line != Line::None) {
-            let corners: Vec<(i32, i32)> = series.corners().iter().map(|&(x, y)| pixel(x, y)).collect();
+            let corners: Vec<(i32, i32)> = self.corners(series).iter().map(|&(x, y)| pixel(x, y)).collect();
             stroke(area, &corners, series, scale)?;
             taken.extend(along(&corners, scale));
         }
         for series in &self.series {
-            for point in series.drawn() {
+            for point in self.drawn(series).filter(|_| series.line.has_marks()) {
                 let at = pixel(point.x, point.y);
                 mark(area, at, series.look, point.at_least, scale)?;
                 let (x, y) = at;
@@ -182,7 +189,7 @@ impl Chart {
         for series in &self.series {
             let colour = series.look.colour();
             let style = scale.text(15, &colour);
-            for point in series.drawn().filter(|point| !point.label.is_empty()) {
+            for point in self.drawn(series).filter(|point| !point.label.is_empty()) {
                 let at = pixel(point.x, point.y);
                 // Two kinds that come to the same say so once.
                 if written.contains(&(point.label.as_str(), at)) {
@@ -201,20 +208,20 @@ impl Chart {
     }
 }
 
-impl Series {
-    /// The points that can be drawn on logarithmic axes.
-    fn drawn(&self) -> impl Iterator<Item = &Point> {
-        let can = |value: f64| value > 0.0 && value.is_finite();
-        self.points
+impl Chart {
+    /// The points of a series that both axes have a place for.
+    fn drawn<'s>(&'s self, series: &'s Series) -> impl Iterator<Item = &'s Point> {
+        series
+            .points
             .iter()
-            .filter(move |point| can(point.x) && can(point.y))
+            .filter(|point| self.x.shows(point.x) && self.y.shows(point.y))
     }
 
     /// Corners of its line.
-    fn corners(&self) -> Vec<(f64, f64)> {
+    fn corners(&self, series: &Series) -> Vec<(f64, f64)> {
         let mut corners: Vec<(f64, f64)> = Vec::new();
-        for point in self.drawn() {
-            if self.line == Line::Stair
+        for point in self.drawn(series) {
+            if series.line == Line::Stair
                 && let Some(&(_, y)) = corners.last()
             {
                 corners.push((point.x, y));
@@ -225,53 +232,14 @@ impl Series {
     }
 }
 
-impl Axis {
-    /// From a little below the smallest to a little above the largest.
-    fn range(&self, values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-        let ticks = self.ticks.iter().flatten().copied();
-        let (low, high) = values
-            .chain(ticks)
-            .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| {
-                (low.min(value), high.max(value))
-            });
-        // A fifteenth of the span either way, and at least a quarter of a power of ten altogether.
-        let room = ((high / low).ln() / 15.0).max(0.12).exp();
-        (low.is_finite() && high > 0.0).then_some((low / room, high * room))
+impl Line {
+    fn is_broken(self) -> bool {
+        matches!(self, Self::Dashed | Self::DashedTrace)
     }
 
-    fn marks(&self, (low, high): (f64, f64)) -> Vec<f64> {
-        if let Some(ticks) = &self.ticks {
-            return ticks.clone();
-        }
-        let decades = (high / low).log10();
-        let steps: &[f64] = if decades < 3.2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
-        (first..=last)
-            .flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)))
-            .filter(|value| (low..=high).contains(value))
-            .collect()
+    fn has_marks(self) -> bool {
+        !matches!(self, Self::Trace | Self::DashedTrace)
     }
-}
-
-/// A number as people write it: thousands apart, no more digits than it has.
-fn number(value: f64) -> String {
-    if value < 1000.0 {
-        // Three digits are more than any mark has; what rounding left behind them goes.
-        let digits = (2 - value.log10().floor() as i32).max(0) as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') {
-            return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-        }
-        return text;
-    }
-    if value >= 1e6 {
-        return format!("{} M", number(value / 1e6));
-    }
-    let whole = value.round() as u64;
-    if whole < 1000 {
-        return whole.to_string();
-    }
-    format!("{},{:03}", whole / 1000, whole % 1000)
 }
 
 impl Look {
@@ -310,7 +278,7 @@ fn stroke<DB: DrawingBackend>(
     scale: Scale,
 ) -> Result<(), String> {
     let style = scale.stroke(series.look.colour(), 2);
-    if series.line == Line::Dashed {
+    if series.line.is_broken() {
         let dashed = DashedPathElement::new(corners.iter().copied(), scale.of(7), scale.of(5), style);
         area.draw(&dashed).map_err(told)
     } else {
@@ -367,23 +335,8 @@ fn mark<DB: DrawingBackend>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::Axis;
     use super::*;
-
-    #[test]
-    fn numbers_are_short() {
-        let pairs = [
-            (0.02, "0.02"),
-            (0.5, "0.5"),
-            (0.30000000000000004, "0.3"),
-            (1.0, "1"),
-            (200.0, "200"),
-            (50_000.0, "50,000"),
-            (2e6, "2 M"),
-        ];
-        for (value, text) in pairs {
-            assert_eq!(number(value), text);
-        }
-    }
 
     #[test]
     fn a_stair_goes_level_first() {
@@ -398,6 +351,13 @@ mod tests {
             line: Line::Stair,
             points: vec![point(1.0, 9.0), point(3.0, 4.0)],
         };
-        assert_eq!(series.corners(), [(1.0, 9.0), (3.0, 9.0), (3.0, 4.0)]);
+        let chart = Chart {
+            title: String::new(),
+            note: String::new(),
+            x: Axis::new(""),
+            y: Axis::new(""),
+            series: Vec::new(),
+        };
+        assert_eq!(chart.corners(&series), [(1.0, 9.0), (3.0, 9.0), (3.0, 4.0)]);
     }
 }

@@ -1,8 +1,9 @@
-//! Charts as SVG and PNG: points and lines over two logarithmic axes, each told apart by colour, mark and a label of its own.
+//! Charts as SVG and PNG: points and lines over two axes, logarithmic or linear, each told apart by colour, mark and a label of its own.
 //!
 //! Colours are Okabe and Ito's (2008), which people with any kind of colour blindness tell apart. Letters come from a font in the program,
 //! so a machine needs none.
 
+mod axis;
 mod draw;
 mod labels;
 
@@ -10,14 +11,17 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Once;
 
-use plotters::backend::{BitMapBackend, SVGBackend};
-use plotters::drawing::IntoDrawingArea as _;
+use plotters::backend::{BitMapBackend, DrawingBackend, SVGBackend};
+use plotters::coord::Shift;
+use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
 use plotters::style::{FontStyle, register_font};
 
 use crate::error::LabError;
 
 /// Size as shown on a page, pixels.
 const SIZE: (u32, u32) = (960, 600);
+/// Height of each of several charts above one another.
+const STACKED: u32 = 260;
 /// The PNG has so many pixels to each of these, for sharp screens.
 const SHARPNESS: u32 = 2;
 /// It is drawn finer by so much and then averaged, which smooths every edge.
@@ -38,13 +42,25 @@ pub struct Chart {
     pub series: Vec<Series>,
 }
 
-/// A logarithmic axis.
+/// An axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// Quantity and unit.
     pub title: String,
-    /// Where marks are; `None`: at 1, 2 and 5 times the powers of ten, or at the powers alone where there are many.
+    /// Where marks are; `None`: at 1, 2 and 5 times the powers of ten, or at the powers alone where there are many; on a linear axis at equal steps.
     pub ticks: Option<Vec<f64>>,
+    /// What equal lengths on it are.
+    pub scale: AxisScale,
+}
+
+/// What equal lengths on an axis are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AxisScale {
+    /// Equal ratios.
+    #[default]
+    Logarithmic,
+    /// Equal differences.
+    Linear,
 }
 
 /// Points of one kind.
@@ -56,7 +72,7 @@ pub struct Series {
     pub look: Look,
     /// Whether lines join its points.
     pub line: Line,
-    /// Its points; those that are not positive and finite are left out.
+    /// Its points; those that are not finite, or not positive where an axis is logarithmic, are left out.
     pub points: Vec<Point>,
 }
 
@@ -105,6 +121,10 @@ pub enum Line {
     Dashed,
     /// As a stair of what no point beats: level until the next point, then down.
     Stair,
+    /// From each to the next, without marks: a course with more points than can be told apart.
+    Trace,
+    /// Likewise, broken.
+    DashedTrace,
 }
 
 /// A point, with words beside it.
@@ -121,10 +141,19 @@ pub struct Point {
 }
 
 impl Axis {
-    /// With marks chosen by the values.
+    /// Logarithmic, with marks chosen by the values.
     pub fn new(title: impl Into<String>) -> Self {
-        let title = title.into();
-        Self { title, ticks: None }
+        Self {
+            title: title.into(),
+            ticks: None,
+            scale: AxisScale::Logarithmic,
+        }
+    }
+
+    /// The same with equal steps.
+    pub fn linear(self) -> Self {
+        let scale = AxisScale::Linear;
+        Self { scale, ..self }
     }
 
     /// With marks at the given values.
@@ -140,56 +169,7 @@ impl Chart {
     /// # Errors
     /// `Unwritable`; `Input` for a chart without a point.
     pub fn write(&self, folder: &Path, name: &str) -> Result<(), LabError> {
-        static FONT: Once = Once::new();
-        FONT.call_once(|| {
-            for style in [FontStyle::Normal, FontStyle::Bold] {
-                // The only error is a font that cannot be read, and this one is part of the program (and of the test below).
-                let _ = register_font("sans-serif", style, epaint_default_fonts::UBUNTU_LIGHT);
-            }
-        });
-        let svg = folder.join(format!("{name}.svg"));
-        let mut text = String::new();
-        self.draw(&SVGBackend::with_string(&mut text, SIZE).into_drawing_area(), 1)
-            .map_err(|what| self.cannot(what))?;
-        let unwritable = |path: &Path| {
-            let path = path.to_owned();
-            move |source| LabError::Unwritable { path, source }
-        };
-        std::fs::write(&svg, text).map_err(unwritable(&svg))?;
-
-        let png = folder.join(format!("{name}.png"));
-        let pixels = self.pixels()?;
-        let file = std::fs::File::create(&png).map_err(unwritable(&png))?;
-        let mut encoder = png::Encoder::new(BufWriter::new(file), SIZE.0 * SHARPNESS, SIZE.1 * SHARPNESS);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_compression(png::Compression::High);
-        (encoder.write_header())
-            .and_then(|mut writer| writer.write_image_data(&pixels))
-            .map_err(|error| unwritable(&png)(error.into()))
-    }
-
-    /// Red, green and blue of each pixel of the PNG, row by row.
-    fn pixels(&self) -> Result<Vec<u8>, LabError> {
-        let fine = SHARPNESS * SMOOTHING;
-        let (width, height) = (SIZE.0 * fine, SIZE.1 * fine);
-        let mut drawn = vec![255u8; 3 * (width * height) as usize];
-        self.draw(
-            &BitMapBackend::with_buffer(&mut drawn, (width, height)).into_drawing_area(),
-            fine,
-        )
-        .map_err(|what| self.cannot(what))?;
-        let (step, row) = (SMOOTHING as usize, 3 * width as usize);
-        let mut pixels = Vec::with_capacity(drawn.len() / (step * step));
-        for y in (0..height as usize).step_by(step) {
-            for x in (0..width as usize).step_by(step) {
-                for channel in 0..3 {
-                    let block = (0..step * step)
-                        .map(|i| u32::from(drawn[(y + i / step) * row + 3 * (x + i % step) + channel]));
-                    pixels.push((block.sum::<u32>() / (SMOOTHING * SMOOTHING)) as u8);
-                }
-            }
-        }
-        Ok(pixels)
+        write_stack(std::slice::from_ref(self), folder, name)
     }
 
     fn cannot(&self, what: String) -> LabError {
@@ -198,6 +178,86 @@ impl Chart {
             what,
         }
     }
+}
+
+/// Writes charts above one another, the first on top, to `NAME.svg` and `NAME.png` in `folder`. Empty titles and notes take no room, nor does a
+/// legend without names.
+///
+/// # Errors
+/// `Unwritable`; `Input` for a chart without a point.
+pub fn write_stack(charts: &[Chart], folder: &Path, name: &str) -> Result<(), LabError> {
+    static FONT: Once = Once::new();
+    FONT.call_once(|| {
+        for style in [FontStyle::Normal, FontStyle::Bold] {
+            // The only error is a font that cannot be read, and this one is part of the program (and of the test below).
+            let _ = register_font("sans-serif", style, epaint_default_fonts::UBUNTU_LIGHT);
+        }
+    });
+    let size = size(charts.len());
+    let svg = folder.join(format!("{name}.svg"));
+    let mut text = String::new();
+    draw_stack(
+        charts,
+        &SVGBackend::with_string(&mut text, size).into_drawing_area(),
+        1,
+    )?;
+    let unwritable = |path: &Path| {
+        let path = path.to_owned();
+        move |source| LabError::Unwritable { path, source }
+    };
+    std::fs::write(&svg, text).map_err(unwritable(&svg))?;
+
+    let png = folder.join(format!("{name}.png"));
+    let pixels = pixels(charts)?;
+    let file = std::fs::File::create(&png).map_err(unwritable(&png))?;
+    let mut encoder = png::Encoder::new(BufWriter::new(file), size.0 * SHARPNESS, size.1 * SHARPNESS);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::High);
+    (encoder.write_header())
+        .and_then(|mut writer| writer.write_image_data(&pixels))
+        .map_err(|error| unwritable(&png)(error.into()))
+}
+
+fn size(charts: usize) -> (u32, u32) {
+    let (width, height) = SIZE;
+    let stacked = STACKED * u32::try_from(charts).unwrap_or(1);
+    (width, if charts > 1 { stacked } else { height })
+}
+
+fn draw_stack<DB: DrawingBackend>(
+    charts: &[Chart],
+    area: &DrawingArea<DB, Shift>,
+    scale: u32,
+) -> Result<(), LabError> {
+    for (chart, area) in charts.iter().zip(area.split_evenly((charts.len(), 1))) {
+        chart.draw(&area, scale).map_err(|what| chart.cannot(what))?;
+    }
+    Ok(())
+}
+
+/// Red, green and blue of each pixel of the PNG, row by row.
+fn pixels(charts: &[Chart]) -> Result<Vec<u8>, LabError> {
+    let fine = SHARPNESS * SMOOTHING;
+    let (width, height) = size(charts.len());
+    let (width, height) = (width * fine, height * fine);
+    let mut drawn = vec![255u8; 3 * (width * height) as usize];
+    draw_stack(
+        charts,
+        &BitMapBackend::with_buffer(&mut drawn, (width, height)).into_drawing_area(),
+        fine,
+    )?;
+    let (step, row) = (SMOOTHING as usize, 3 * width as usize);
+    let mut pixels = Vec::with_capacity(drawn.len() / (step * step));
+    for y in (0..height as usize).step_by(step) {
+        for x in (0..width as usize).step_by(step) {
+            for channel in 0..3 {
+                let block = (0..step * step)
+                    .map(|i| u32::from(drawn[(y + i / step) * row + 3 * (x + i % step) + channel]));
+                pixels.push((block.sum::<u32>() / (SMOOTHING * SMOOTHING)) as u8);
+            }
+        }
+    }
+    Ok(pixels)
 }
 
 #[cfg(test)]

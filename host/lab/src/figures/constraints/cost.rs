@@ -4,10 +4,10 @@ use mortise_bake::Grabbable;
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
 
-use super::guided::{SIM, emulated, insertion, play_to};
 use crate::LabError;
 use crate::figures::Row;
 use crate::fit::Fit;
+use crate::guided::{SIM, emulated, insertion, play_to};
 use crate::motion::{Motion, script};
 use crate::scenario::{PreparedScene, Recording};
 use crate::variant::Variant;

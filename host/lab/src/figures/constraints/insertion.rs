@@ -4,10 +4,10 @@ use mortise_bake::Grabbable;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 
-use super::guided::{Inserted, SIM, emulated, inserted, insertion, key, play};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
+use crate::guided::{Inserted, SIM, emulated, inserted, insertion, key, play};
 use crate::scenario::{Outcome, PreparedScene};
 use crate::variant::Variant;
 

@@ -4,9 +4,9 @@ use glam::DVec3;
 use mortise_guide::GuideSettings;
 use mortise_mating::recognise::State;
 
-use super::guided::{SIM, file, key, play_with, script};
 use crate::LabError;
 use crate::figures::Row;
+use crate::guided::{SIM, file, key, play_with, script};
 use crate::scenario::{PreparedScene, pose_mm};
 
 struct Joint {

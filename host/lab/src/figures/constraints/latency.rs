@@ -12,10 +12,10 @@ use mortise_guide::{Guide, GuideSettings};
 use mortise_protocol::message::{HandScript, Keyframe, Telemetry, ToDevice, WirePose};
 use mortise_rig::{Client, Event};
 
-use super::guided::{emulated, insertion};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
+use crate::guided::{emulated, insertion};
 use crate::scenario::PreparedScene;
 use crate::variant::Variant;
 

@@ -8,10 +8,10 @@ use mortise_protocol::message::{DeviceState, Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Faults, RigSpec, Window};
 
-use super::guided::{SIM, inserted, insertion, key, largest_step, play_to};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
+use crate::guided::{SIM, inserted, insertion, key, largest_step, play_to};
 use crate::scenario::{PreparedScene, Recording, Scenario};
 use crate::variant::Variant;
 

@@ -2,7 +2,6 @@
 
 mod contacts;
 mod cost;
-mod guided;
 mod insertion;
 mod joints;
 mod latency;

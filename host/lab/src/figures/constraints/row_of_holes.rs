@@ -2,9 +2,9 @@
 
 use mortise_protocol::message::Telemetry;
 
-use super::guided::{SIM, file, key, play, script};
 use crate::LabError;
 use crate::figures::Row;
+use crate::guided::{SIM, file, key, play, script};
 use crate::scenario::{Depth, Key, PreparedScene, Scenario};
 
 /// Plate of 15 mm with ten holes of 8.05 mm, 16 mm apart, three of them taken, and a free pin of 8 × 30 mm.

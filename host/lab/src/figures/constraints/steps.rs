@@ -4,10 +4,10 @@ use mortise_bake::Grabbable;
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
 
 use super::cost::peg_in_hole;
-use super::guided::{SIM, insertion, key, largest_step, play_to};
 use crate::LabError;
 use crate::figures::Row;
 use crate::fit::Fit;
+use crate::guided::{SIM, insertion, key, largest_step, play_to};
 use crate::scenario::{PreparedScene, Recording, Scenario, pose_mm};
 use crate::variant::Variant;
 

@@ -13,13 +13,13 @@ use crate::LabError;
 use crate::fit::Fit;
 use crate::scenario::{Depth, Key, PreparedScene, Recording, Scenario, connect, depth, pose_mm, record};
 
-const GUIDED: &str = include_str!("../../../../../hil-tests/scenarios/guided_fit.toml");
+const GUIDED: &str = include_str!("../../../hil-tests/scenarios/guided_fit.toml");
 
 /// The in-process rig.
-pub(super) const SIM: RigSpec = RigSpec::Simulated { realtime: false };
+pub(crate) const SIM: RigSpec = RigSpec::Simulated { realtime: false };
 
 /// The emulated board.
-pub(super) fn emulated() -> RigSpec {
+pub(crate) fn emulated() -> RigSpec {
     RigSpec::Emulated {
         mode: EmulatedMode::Lockstep,
         firmware: None,
@@ -27,7 +27,7 @@ pub(super) fn emulated() -> RigSpec {
 }
 
 /// `text` as a STEP file, removed when dropped: the CAD kernel reads files only.
-pub(super) fn file(text: &str) -> Result<NamedTempFile, LabError> {
+pub(crate) fn file(text: &str) -> Result<NamedTempFile, LabError> {
     let write = || {
         let mut file = Builder::new().prefix("mortise-").suffix(".step").tempfile()?;
         file.write_all(text.as_bytes())?;
@@ -40,7 +40,7 @@ pub(super) fn file(text: &str) -> Result<NamedTempFile, LabError> {
 }
 
 /// One point of a hand's way.
-pub(super) fn key(t_s: f64, offset_mm: [f64; 3], turn_deg: [f64; 3]) -> Key {
+pub(crate) fn key(t_s: f64, offset_mm: [f64; 3], turn_deg: [f64; 3]) -> Key {
     Key {
         t_s,
         offset_mm,
@@ -50,14 +50,14 @@ pub(super) fn key(t_s: f64, offset_mm: [f64; 3], turn_deg: [f64; 3]) -> Key {
 }
 
 /// The guided insertion, 1 mm and 2° off with a tremor of 0.2 mm at 10 Hz, with nothing on the table yet.
-pub(super) fn script(step: &Path) -> Result<Scenario, LabError> {
+pub(crate) fn script(step: &Path) -> Result<Scenario, LabError> {
     let mut scenario = Scenario::parse(GUIDED, "guided-fit")?;
     scenario.scene.step = step.to_owned();
     Ok(scenario)
 }
 
 /// The guided insertion of `fit`, from 20 mm above, 2 mm farther than through.
-pub(super) fn insertion(fit: &Fit, step: &Path) -> Result<Scenario, LabError> {
+pub(crate) fn insertion(fit: &Fit, step: &Path) -> Result<Scenario, LabError> {
     let mut scenario = script(step)?;
     scenario.hand.grip_mm = [0.0, 0.0, 0.5 * fit.length_mm - fit.engaged_mm];
     let through = fit.height_mm - fit.engaged_mm + 2.0;
@@ -78,7 +78,7 @@ pub(super) fn insertion(fit: &Fit, step: &Path) -> Result<Scenario, LabError> {
 }
 
 /// Plays `scenario` with a guide that hears every sample.
-pub(super) fn play(
+pub(crate) fn play(
     scenario: &Scenario,
     scene: &PreparedScene,
     spec: &RigSpec,
@@ -88,7 +88,7 @@ pub(super) fn play(
 }
 
 /// As [`play`], with a guide whose list is looked at afterwards.
-pub(super) fn play_with(
+pub(crate) fn play_with(
     scenario: &Scenario,
     scene: &PreparedScene,
     spec: &RigSpec,
@@ -99,7 +99,7 @@ pub(super) fn play_with(
 }
 
 /// Plays `scenario` while `listener` says what to send.
-pub(super) fn play_to(
+pub(crate) fn play_to(
     scenario: &Scenario,
     scene: &PreparedScene,
     spec: &RigSpec,
@@ -113,7 +113,7 @@ const SETTLING_TICKS: u32 = 150;
 
 /// How an insertion went.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inserted {
+pub(crate) struct Inserted {
     /// How deep at the end, and how deep the hole is, mm.
     pub depth_mm: f64,
     pub hole_mm: f64,
@@ -124,7 +124,7 @@ pub(super) struct Inserted {
 }
 
 /// Looks at an insertion's samples.
-pub(super) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Telemetry]) -> Inserted {
+pub(crate) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Telemetry]) -> Inserted {
     let mut seen = Inserted {
         depth_mm: f64::NAN,
         hole_mm: f64::NAN,
@@ -155,7 +155,7 @@ pub(super) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Te
 }
 
 /// Largest change of the handle's force (N) and torque (N m) between two samples a tick apart.
-pub(super) fn largest_step(samples: &[Telemetry]) -> (f64, f64) {
+pub(crate) fn largest_step(samples: &[Telemetry]) -> (f64, f64) {
     let of = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     (samples.windows(2))
         .filter(|pair| pair[1].tick == pair[0].tick + 1)
