@@ -16,6 +16,8 @@ pub const MAX_TARGETS: usize = 8;
 pub const MAX_TARGET_PAIRS: usize = 8;
 /// Keyframes of a simulated hand's script.
 pub const MAX_KEYFRAMES: usize = 12;
+/// Faults at the inputs of a simulated mechanism.
+pub const MAX_INPUT_FAULTS: usize = 8;
 /// Bytes of log in one message.
 pub const MAX_LOG: usize = 256;
 /// Characters of a board's or firmware's name.

@@ -24,12 +24,13 @@ const fn schema_hash() -> u64 {
 }
 
 /// Every bound that decides whether a message can be read.
-const WIRE_BOUNDS: [usize; 7] = [
+const WIRE_BOUNDS: [usize; 8] = [
     MAX_MESSAGE,
     MAX_CHUNK,
     MAX_PAIRS,
     MAX_TARGET_PAIRS,
     MAX_KEYFRAMES,
+    MAX_INPUT_FAULTS,
     MAX_LOG,
     MAX_NAME,
 ];
@@ -95,6 +96,8 @@ pub enum ToDevice {
     Stop,
     /// Leave the stopped or faulted state when its cause is gone.
     ClearFault,
+    /// The handle stands in its reference pose: encoders that only count motion start from here. Only while the motors are off.
+    Home,
     /// Keeps the link alive; anything else does too.
     Heartbeat,
     /// Change a parameter; refused outside its range.
@@ -154,6 +157,9 @@ pub enum ToDevice {
     },
     /// Script for the simulated hand (simulated mechanisms only); its time starts at the tick that takes it.
     SimulatedHand(HandScript),
+    /// What goes wrong at the inputs of a simulated mechanism, and when (simulated mechanisms only); replaces what was sent before. Its time starts at the
+    /// tick that takes it.
+    SimulatedInputs(Vec<InputFault, MAX_INPUT_FAULTS>),
     /// Lockstep on or off (simulated mechanisms only): on, a tick runs only when released by [`ToDevice::Run`].
     Lockstep(bool),
     /// Release ticks in lockstep; answered by [`FromDevice::Ran`] after the last.
@@ -280,6 +286,11 @@ pub enum ResetReason {
         /// Source line.
         line: u32,
     },
+    /// The processor met a fault it could not go on from: a bad access, a stack that overflowed.
+    HardFault {
+        /// Address of the instruction; 0 when it could not be read.
+        pc: u32,
+    },
     /// Supply too low.
     BrownOut,
     /// The board cannot tell.
@@ -291,6 +302,8 @@ pub enum ResetReason {
 pub enum DeviceState {
     /// Starting; motors off.
     Boot,
+    /// Motors off; encoders do not know where the handle is until [`ToDevice::Home`].
+    Homing,
     /// Motors off, waiting.
     Idle,
     /// Motors on, nothing grabbed: zero wrench.
@@ -320,13 +333,32 @@ pub enum Fault {
         /// Axis.
         axis: u8,
     },
+    /// An encoder did not move by a single count while its motor pushed hard: it is stuck or unplugged, or the mechanism is jammed.
+    EncoderStuck {
+        /// Axis.
+        axis: u8,
+    },
     /// The handle moves faster than allowed.
     OverSpeed,
-    /// A motor driver reports over-current or over-temperature.
+    /// The handle left the workspace.
+    Workspace,
+    /// A motor driver reports a fault without saying which.
     Driver {
         /// Axis.
         axis: u8,
     },
+    /// A motor driver reports too much current.
+    OverCurrent {
+        /// Axis.
+        axis: u8,
+    },
+    /// A motor or its driver is too hot.
+    OverTemperature {
+        /// Axis.
+        axis: u8,
+    },
+    /// The supply fell below what motors and sensors need; the processor still runs.
+    SupplyLow,
     /// A tick took longer than its period.
     TickOverrun,
     /// The scene does not pass its checks any more.
@@ -621,6 +653,55 @@ pub struct Keyframe {
     pub pose: WirePose,
     /// Added to the spring's force, N, world.
     pub push: [f32; 3],
+}
+
+/// One thing that goes wrong at the inputs of a simulated mechanism.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct InputFault {
+    /// First tick (ms) since the message was taken.
+    pub tick: u32,
+    /// How many ticks it lasts; a glitch comes once, whatever stands here.
+    pub ticks: u32,
+    /// What.
+    pub kind: InputFaultKind,
+}
+
+/// What can go wrong at the inputs of a mechanism. Axes 0 to 2 are the handle's position, 3 to 5 its rotation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum InputFaultKind {
+    /// An encoder's counter is off by so many counts from here on.
+    EncoderGlitch {
+        /// Axis.
+        axis: u8,
+        /// Counts.
+        counts: i32,
+    },
+    /// An encoder's counter stands still.
+    EncoderStuck {
+        /// Axis.
+        axis: u8,
+    },
+    /// The handle's position reads as not a number.
+    NotANumber,
+    /// A motor driver reports a fault without saying which.
+    Driver {
+        /// Axis.
+        axis: u8,
+    },
+    /// A motor driver reports too much current.
+    OverCurrent {
+        /// Axis.
+        axis: u8,
+    },
+    /// A motor driver reports too much heat.
+    OverTemperature {
+        /// Axis.
+        axis: u8,
+    },
+    /// The stop input is open.
+    StopOpen,
+    /// The supply is too low.
+    SupplyLow,
 }
 
 #[cfg(test)]

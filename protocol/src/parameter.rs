@@ -77,6 +77,10 @@ parameters! {
     TorqueSlew = "N·m/s", 0.1, 1_000.0, 200.0;
     /// Handle speed that counts as a fault.
     SpeedLimit = "m/s", 0.1, 5.0, 2.0;
+    /// Largest mechanical power the motors may put into the handle, force and torque together.
+    PowerLimit = "W", 0.1, 100.0, 10.0;
+    /// Distance of the handle from the world's origin that counts as a fault; beyond it no force points outwards.
+    WorkspaceRadius = "m", 0.01, 2.0, 1.0;
     /// Host silence while armed that counts as a fault.
     HostTimeout = "s", 0.05, 5.0, 0.5;
     /// Most work of a tick, in field look-ups; a point that may touch counts 4.

@@ -123,6 +123,8 @@ fn the_hash_covers_every_type_on_the_wire() {
         "Feature",
         "HandScript",
         "Keyframe",
+        "InputFault",
+        "InputFaultKind",
         "WirePose",
         "Capabilities",
         "CostUnit",

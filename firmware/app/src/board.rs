@@ -4,7 +4,9 @@
 //! pins, clocks and interrupts to these traits and nothing more.
 
 use mortise_haptics::{Pose, Twist, Wrench};
-use mortise_protocol::message::{CostUnit, HandScript, ResetReason};
+use mortise_protocol::message::{CostUnit, HandScript, InputFault, ResetReason};
+
+use crate::ceilings::Ceilings;
 
 /// Ticks in a second.
 pub const TICK_HZ: u16 = 1000;
@@ -20,10 +22,50 @@ pub struct Sensed {
     pub twist: Twist,
     /// The stop input is open (pressed, or its wire broken).
     pub stop_open: bool,
-    /// Motor axis whose driver reports a fault.
-    pub driver_fault: Option<u8>,
+    /// The supply is below what motors and sensors need.
+    pub supply_low: bool,
+    /// A motor driver reports a fault.
+    pub driver_fault: Option<DriverFault>,
     /// Encoder axis whose reading jumped further than the mechanism can move in a tick.
     pub encoder_jump: Option<u8>,
+    /// Encoder axis that stands still though its motor pushes hard, see [`crate::encoder::Stall`].
+    pub encoder_stuck: Option<u8>,
+    /// The encoders know where the handle is: absolute ones always do, counting ones since [`Mechanism::home`] and until they jump.
+    pub referenced: bool,
+}
+
+impl Sensed {
+    /// At the world's origin, at rest, nothing wrong.
+    pub const AT_REST: Self = Self {
+        handle: Pose::IDENTITY,
+        twist: Twist::ZERO,
+        stop_open: false,
+        supply_low: false,
+        driver_fault: None,
+        encoder_jump: None,
+        encoder_stuck: None,
+        referenced: true,
+    };
+}
+
+/// What a motor driver reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriverFault {
+    /// Motor axis.
+    pub axis: u8,
+    /// As far as the driver tells.
+    pub kind: DriverFaultKind,
+}
+
+/// Kinds of driver faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriverFaultKind {
+    /// One line for everything.
+    Any,
+    /// Too much current.
+    OverCurrent,
+    /// Too much heat.
+    OverTemperature,
 }
 
 /// What the motors are to do until the next tick.
@@ -56,6 +98,12 @@ pub trait Mechanism {
 
     /// Gives the simulated hand a script whose time starts now; `None` lets go. A real mechanism has no such hand and does nothing.
     fn set_hand(&mut self, _script: Option<&HandScript>) {}
+
+    /// The handle stands in its reference pose: counting encoders start from here. Called with the motors off only.
+    fn home(&mut self) {}
+
+    /// Lets the inputs of a simulated mechanism fail as told, from the next reading on. A real mechanism does nothing.
+    fn set_input_faults(&mut self, _faults: &[InputFault]) {}
 
     /// Puts a simulated mechanism where it was at start, at rest, without a hand, so that a scenario starts from known bits; returns the handle's
     /// pose there. A real one stays where it is.
@@ -137,4 +185,6 @@ pub struct Identity {
     pub reset: ResetReason,
     /// Missed ticks in a row, motors live, that are a fault; 0: they are only counted, because the mechanism stands still meanwhile.
     pub overrun_ticks: u8,
+    /// What this rig's motors and links bear, whatever the parameters say.
+    pub ceilings: Ceilings,
 }

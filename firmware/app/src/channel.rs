@@ -5,11 +5,13 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
+use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
 use mortise_haptics::State as LawState;
 use mortise_protocol::image::SceneImage;
+use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{
-    ConstraintTarget, DeviceState, Fault, HandScript, Refusal, Statistics, Telemetry,
+    ConstraintTarget, DeviceState, Fault, HandScript, InputFault, Refusal, Statistics, Telemetry,
 };
 
 use crate::parameters::ControlSettings;
@@ -72,8 +74,12 @@ pub enum CommandKind<'s> {
         /// And start counting anew.
         reset: bool,
     },
+    /// The handle stands in its reference pose.
+    Home,
     /// Script for the simulated hand.
     Hand(HandScript),
+    /// What goes wrong at the simulated inputs.
+    InputFaults(Vec<InputFault, MAX_INPUT_FAULTS>),
     /// Lockstep on or off.
     Lockstep(bool),
     /// Release ticks; replied to by [`Reply::Ran`] after the last.

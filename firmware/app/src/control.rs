@@ -10,12 +10,12 @@
 
 mod report;
 
-use mortise_haptics::{self as haptics, GrabError, Input, Output, Pose, TargetError, Twist, Wrench};
+use mortise_haptics::{self as haptics, GrabError, Input, Output, TargetError, Twist, Wrench};
 use mortise_protocol::image::SceneImage;
-use mortise_protocol::message::{ConstraintTarget, Fault, HandScript, Refusal, Statistics};
-use mortise_protocol::parameter::ParameterId;
+use mortise_protocol::message::{ConstraintTarget, Fault, HandScript, InputFault, Refusal, Statistics};
 
-use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
+use crate::board::{Clock, Drive, DriverFaultKind, Identity, Mechanism, Sensed};
+use crate::ceilings::{Ceilings, is_outside, restrain};
 use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Event, Reply};
 use crate::parameters::{ControlSettings, Parameters};
 use crate::safety::{Action, Event as SafetyEvent, Motors, Safety};
@@ -51,6 +51,7 @@ pub struct ControlPlane<'c, 's, M, C> {
     mechanism: M,
     clock: C,
     overrun_ticks: u8,
+    ceilings: Ceilings,
     safety: Safety,
     settings: ControlSettings,
     scene: Option<SceneImage<'s>>,
@@ -97,16 +98,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             mechanism,
             clock,
             overrun_ticks: identity.overrun_ticks,
+            ceilings: identity.ceilings,
             safety: Safety::Boot,
             settings,
             scene: None,
-            sensed: Sensed {
-                handle: Pose::IDENTITY,
-                twist: Twist::ZERO,
-                stop_open: false,
-                driver_fault: None,
-                encoder_jump: None,
-            },
+            sensed: Sensed::AT_REST,
             replaced: false,
             output: None,
             commanded: Wrench::ZERO,
@@ -268,7 +264,9 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.send_statistics(seq, reset);
                 return;
             }
+            CommandKind::Home => self.home(),
             CommandKind::Hand(script) => self.set_hand(&script),
+            CommandKind::InputFaults(faults) => self.set_input_faults(&faults),
             CommandKind::Lockstep(on) => self.set_lockstep(on),
             CommandKind::Run(_) if !self.lockstep => Err(Refusal::Lockstep),
             CommandKind::Run(ticks) => {
@@ -365,6 +363,22 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         Ok(())
     }
 
+    fn home(&mut self) -> Result<(), Refusal> {
+        if self.safety.live() {
+            return Err(Refusal::State(self.safety.reported()));
+        }
+        self.mechanism.home();
+        Ok(())
+    }
+
+    fn set_input_faults(&mut self, faults: &[InputFault]) -> Result<(), Refusal> {
+        if !M::SIMULATED {
+            return Err(Refusal::NotSimulated);
+        }
+        self.mechanism.set_input_faults(faults);
+        Ok(())
+    }
+
     fn set_hand(&mut self, script: &HandScript) -> Result<(), Refusal> {
         if !M::SIMULATED {
             return Err(Refusal::NotSimulated);
@@ -386,11 +400,20 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     /// What in the last readings forbids motors for as long as it lasts.
     fn persistent_cause(&self) -> Option<Fault> {
+        // First: a falling supply may open the stop input and trip the drivers too.
+        if self.sensed.supply_low {
+            return Some(Fault::SupplyLow);
+        }
         if self.sensed.stop_open {
             return Some(Fault::StopInput);
         }
-        if let Some(axis) = self.sensed.driver_fault {
-            return Some(Fault::Driver { axis });
+        if let Some(report) = self.sensed.driver_fault {
+            let axis = report.axis;
+            return Some(match report.kind {
+                DriverFaultKind::Any => Fault::Driver { axis },
+                DriverFaultKind::OverCurrent => Fault::OverCurrent { axis },
+                DriverFaultKind::OverTemperature => Fault::OverTemperature { axis },
+            });
         }
         self.replaced.then_some(Fault::NonFinite)
     }
@@ -408,6 +431,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         if self.safety == Safety::Boot {
             self.apply(SafetyEvent::Ready);
         }
+        self.apply(if self.sensed.referenced {
+            SafetyEvent::Referenced
+        } else {
+            SafetyEvent::ReferenceLost
+        });
         if let Some(fault) = self.persistent_cause().or_else(|| self.live_cause()) {
             self.apply(SafetyEvent::Fault(fault));
         }
@@ -421,9 +449,18 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         if let Some(axis) = self.sensed.encoder_jump {
             return Some(Fault::EncoderJump { axis });
         }
+        if !self.sensed.referenced {
+            return Some(Fault::EncoderJump { axis: 0 });
+        }
+        if let Some(axis) = self.sensed.encoder_stuck {
+            return Some(Fault::EncoderStuck { axis });
+        }
         let limit = self.settings.speed_limit_m_per_s;
         if self.sensed.twist.linear.length_squared() > limit * limit {
             return Some(Fault::OverSpeed);
+        }
+        if is_outside(self.sensed.handle.position, self.settings.workspace_m) {
+            return Some(Fault::Workspace);
         }
         let overrun = u32::from(self.overrun_ticks);
         if overrun > 0 && self.missed_in_row >= overrun {
@@ -467,23 +504,21 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             self.output = Some(output);
         }
         // The state may have changed just now.
-        let drive = match (self.safety.motors(), &self.output) {
-            (Motors::Off, _) => Drive::Off,
-            (Motors::Fading, _) => Drive::Wrench(self.fading()),
+        let wanted = match (self.safety.motors(), &self.output) {
+            (Motors::Off, _) => None,
+            (Motors::Fading, _) => Some(self.fading()),
             (Motors::Zero | Motors::Rendered, Some(output)) => {
                 self.ramp = self.ramp.saturating_add(1).min(RAMP_TICKS);
-                Drive::Wrench(below_ceiling(scaled(
+                Some(scaled(
                     output.handle,
                     f32::from(self.ramp) / f32::from(RAMP_TICKS),
-                )))
+                ))
             }
-            (Motors::Zero | Motors::Rendered, None) => Drive::Wrench(Wrench::ZERO),
+            (Motors::Zero | Motors::Rendered, None) => Some(Wrench::ZERO),
         };
-        self.commanded = match drive {
-            Drive::Off => Wrench::ZERO,
-            Drive::Wrench(wrench) => wrench,
-        };
-        self.mechanism.drive(drive);
+        let allowed = wanted.map(|wrench| self.restrained(wrench));
+        self.commanded = allowed.unwrap_or(Wrench::ZERO);
+        self.mechanism.drive(allowed.map_or(Drive::Off, Drive::Wrench));
         if self.safety.motors() == Motors::Fading && self.fade.0 >= SOFT_STOP_TICKS {
             self.apply(SafetyEvent::SoftStopOver);
         }
@@ -499,7 +534,15 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             torque: (self.sensed.twist.angular * -SOFT_STOP_ANGULAR_DAMPING)
                 .clamp_length_max(SOFT_STOP_TORQUE),
         };
-        below_ceiling(fade + damping)
+        fade + damping
+    }
+
+    /// The last thing before the motors.
+    fn restrained(&self, wrench: Wrench) -> Wrench {
+        let bounds = self
+            .ceilings
+            .with(self.settings.power_limit_w, self.settings.workspace_m);
+        restrain(wrench, self.sensed.handle.position, &self.sensed.twist, &bounds)
     }
 
     /// Asks the state machine; a refusal changes nothing.
@@ -545,6 +588,10 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.ends.law.restart_slew();
             }
         }
+        // Nobody is to arm in the tick that cleared a fault of the encoders.
+        if self.safety == Safety::Idle && !self.sensed.referenced {
+            self.apply(SafetyEvent::ReferenceLost);
+        }
     }
 }
 
@@ -555,22 +602,16 @@ fn scaled(wrench: Wrench, factor: f32) -> Wrench {
     }
 }
 
-/// The largest force and torque any parameter allows, whatever the settings and the law say.
-fn below_ceiling(wrench: Wrench) -> Wrench {
-    Wrench {
-        force: wrench.force.clamp_length_max(ParameterId::ForceLimit.row().max),
-        torque: wrench.torque.clamp_length_max(ParameterId::TorqueLimit.row().max),
-    }
-}
-
 impl ControlSettings {
-    /// The defaults of every parameter.
-    pub fn at_start() -> Self {
-        let parameters = Parameters::default();
+    /// The defaults of every parameter on a rig with these ceilings.
+    pub fn at_start(ceilings: Ceilings) -> Self {
+        let parameters = Parameters::within(ceilings);
         // The defaults pass their own checks (tested), so the second arm is never taken; with its speed limit of 0 nothing could stay armed.
         parameters.settings().unwrap_or_else(|_| Self {
             law: haptics::Settings::default(),
             speed_limit_m_per_s: 0.0,
+            power_limit_w: 0.0,
+            workspace_m: 0.0,
             host_timeout_ticks: 0,
         })
     }

@@ -2,6 +2,7 @@
 //!
 //! ```
 //! use mortise_firmware::board::{Clock, Identity, Outbound};
+//! use mortise_firmware::ceilings::Ceilings;
 //! use mortise_firmware::channel::Channels;
 //! use mortise_firmware::control::Ticked;
 //! use mortise_firmware::device::start;
@@ -24,7 +25,7 @@
 //! let mut channels = Box::new(Channels::new());
 //! let identity = Identity {
 //!     board: "simulated", force_axes: 3, torque_axes: 3, cost_unit: CostUnit::Nanoseconds, cost_budget: 0,
-//!     reset: ResetReason::PowerOn, overrun_ticks: 0,
+//!     reset: ResetReason::PowerOn, overrun_ticks: 0, ceilings: Ceilings::LARGEST,
 //! };
 //! let (mut link, mut control) = start(&mut channels, RamFlash::new(&mut flash), Simulated::new(), NoClock, identity);
 //! let mut out = Wire(Vec::new());
@@ -53,7 +54,7 @@ pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
         mechanism,
         clock,
         &identity,
-        ControlSettings::at_start(),
+        ControlSettings::at_start(identity.ceilings),
     );
     let link = LinkPlane::new(link_ends, flash, identity, M::SIMULATED);
     (link, control)

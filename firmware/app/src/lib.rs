@@ -9,21 +9,23 @@
 //! |---|---|
 //! | [`board`] | what a board must provide |
 //! | [`channel`] | queues and words between the planes |
-//! | [`control`], [`safety`], [`statistics`] | the tick; its state machine; counters and state hash |
+//! | [`control`], [`safety`], [`ceilings`], [`statistics`] | the tick; its state machine; the rig's limits; counters and state hash |
 //! | [`link`], [`parameters`], [`wire`] | messages; values and settings; conversions |
 //! | [`store`], [`ram_flash`] | A/B scene slots; flash in RAM |
-//! | [`simulated`], [`hand`], [`encoder`] | simulated mechanism and hand; encoder counts |
+//! | [`simulated`], [`hand`], [`input_faults`], [`encoder`] | simulated mechanism and hand, what goes wrong at its inputs; encoder counts |
 #![no_std]
 
 #[cfg(test)]
 extern crate std;
 
 pub mod board;
+pub mod ceilings;
 pub mod channel;
 pub mod control;
 pub mod device;
 pub mod encoder;
 pub mod hand;
+pub mod input_faults;
 pub mod link;
 pub mod parameters;
 pub mod ram_flash;

@@ -15,6 +15,7 @@ use mortise_protocol::message::{
 use crate::board::{Flash, Identity, Outbound, TICK_HZ};
 use crate::channel::{Command, CommandKind, EVENTS, Event, LinkEnds, Reply, SAMPLES};
 use crate::hand::check_script;
+use crate::input_faults::check_input_faults;
 use crate::parameters::Parameters;
 use crate::store::Store;
 
@@ -50,12 +51,13 @@ pub struct LinkPlane<'c, 's, F> {
 impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
     /// Looks for a scene in flash and hands it to the control plane.
     pub fn new(ends: LinkEnds<'c, 's>, flash: F, identity: Identity, simulated: bool) -> Self {
+        let parameters = Parameters::within(identity.ceilings);
         let mut plane = Self {
             ends,
             store: Store::open(flash),
             identity,
             simulated,
-            parameters: Parameters::default(),
+            parameters,
             decoder: Decoder::new(),
             sequence: 0,
             greeted: false,
@@ -241,7 +243,12 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             }
             ToDevice::SceneAbort if self.store.abort() => return ack,
             ToDevice::SceneAbort => return Err(Refusal::NoUpload),
-            ToDevice::SimulatedHand(_) | ToDevice::Lockstep(_) | ToDevice::Run { .. } if !self.simulated => {
+            ToDevice::SimulatedHand(_)
+            | ToDevice::SimulatedInputs(_)
+            | ToDevice::Lockstep(_)
+            | ToDevice::Run { .. }
+                if !self.simulated =>
+            {
                 return Err(Refusal::NotSimulated);
             }
 
@@ -262,6 +269,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::ClearTarget { id } => CommandKind::ClearTarget(id),
             ToDevice::Disarm => CommandKind::Disarm,
             ToDevice::ClearFault => CommandKind::ClearFault,
+            ToDevice::Home => CommandKind::Home,
             ToDevice::Grab { part } => CommandKind::Grab(part),
             ToDevice::Release => CommandKind::Release,
             ToDevice::ResetScene => CommandKind::ResetScene,
@@ -276,6 +284,10 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::SimulatedHand(script) => {
                 check_script(&script)?;
                 CommandKind::Hand(script)
+            }
+            ToDevice::SimulatedInputs(faults) => {
+                check_input_faults(&faults)?;
+                CommandKind::InputFaults(faults)
             }
             ToDevice::Lockstep(on) => CommandKind::Lockstep(on),
             ToDevice::Run { ticks } => CommandKind::Run(ticks),
@@ -297,7 +309,11 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             }
             // The change of state is on its way here.
             _ if self.ends.shared.live() || self.arming.is_some() => Err(Refusal::Busy),
-            DeviceState::Boot | DeviceState::Idle | DeviceState::Stopped | DeviceState::Fault(_) => Ok(()),
+            DeviceState::Boot
+            | DeviceState::Homing
+            | DeviceState::Idle
+            | DeviceState::Stopped
+            | DeviceState::Fault(_) => Ok(()),
         }
     }
 

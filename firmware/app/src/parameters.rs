@@ -5,6 +5,7 @@ use mortise_protocol::message::Refusal;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
 use crate::board::{TICK_HZ, TICK_S};
+use crate::ceilings::Ceilings;
 
 /// What the control plane needs, finished: swapped in between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +14,10 @@ pub struct ControlSettings {
     pub law: Settings,
     /// Handle speed that is a fault, m/s.
     pub speed_limit_m_per_s: f32,
+    /// Most power into the handle, W.
+    pub power_limit_w: f32,
+    /// Distance of the handle from the world's origin that is a fault, m.
+    pub workspace_m: f32,
     /// Ticks without a word from the host, motors live, that are a fault.
     pub host_timeout_ticks: u32,
 }
@@ -21,34 +26,37 @@ pub struct ControlSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     values: [f32; PARAMETERS.len()],
+    ceilings: Ceilings,
 }
 
 impl Default for Parameters {
+    /// On a rig that bears all a board accepts.
     fn default() -> Self {
-        let mut values = [0.0; PARAMETERS.len()];
-        for (value, row) in values.iter_mut().zip(PARAMETERS) {
-            *value = row.default;
-        }
-        Self { values }
+        Self::within(Ceilings::LARGEST)
     }
 }
 
 impl Parameters {
+    /// The defaults, none above its ceiling on this rig.
+    pub fn within(ceilings: Ceilings) -> Self {
+        let mut values = [0.0; PARAMETERS.len()];
+        for (value, row) in values.iter_mut().zip(PARAMETERS) {
+            *value = row.default.min(ceilings.most(row.id));
+        }
+        Self { values, ceilings }
+    }
+
     /// A parameter's value, in its unit.
     pub fn get(&self, id: ParameterId) -> f32 {
         self.values[id as usize]
     }
 
-    /// This set with one value changed; refused outside its range or when it is not a number.
+    /// This set with one value changed; refused outside its range, above the rig's ceiling or when it is not a number, with the range that holds here.
     pub fn with(mut self, id: ParameterId, value: f32) -> Result<Self, Refusal> {
-        let row = id.row();
+        let (min, max) = (id.row().min, self.ceilings.most(id));
         // A comparison with NaN is false, so NaN is refused too.
-        if !(value >= row.min && value <= row.max) {
-            return Err(Refusal::OutOfRange {
-                id,
-                min: row.min,
-                max: row.max,
-            });
+        if !(value >= min && value <= max) {
+            return Err(Refusal::OutOfRange { id, min, max });
         }
         self.values[id as usize] = value;
         Ok(self)
@@ -91,6 +99,8 @@ impl Parameters {
         Ok(ControlSettings {
             law,
             speed_limit_m_per_s: self.get(P::SpeedLimit),
+            power_limit_w: self.get(P::PowerLimit),
+            workspace_m: self.get(P::WorkspaceRadius),
             host_timeout_ticks: (self.get(P::HostTimeout) * f32::from(TICK_HZ)) as u32,
         })
     }
@@ -110,6 +120,32 @@ mod tests {
                 assert!(settings.is_ok(), "{} = {value}: {settings:?}", row.name);
             }
         }
+    }
+
+    #[test]
+    fn a_rigs_ceiling_is_the_range_that_holds() {
+        let ceilings = Ceilings {
+            force_n: 6.0,
+            speed_m_per_s: 1.0,
+            workspace_m: 0.1,
+            ..Ceilings::LARGEST
+        };
+        let weak = Parameters::within(ceilings);
+        let default = ParameterId::ForceLimit.row().default;
+        assert!(default > 6.0, "the default itself must be cut");
+        for (id, most) in [
+            (ParameterId::ForceLimit, 6.0),
+            (ParameterId::SpeedLimit, 1.0),
+            (ParameterId::WorkspaceRadius, 0.1),
+        ] {
+            let min = id.row().min;
+            assert_eq!(weak.get(id), most);
+            assert!(weak.with(id, most).is_ok());
+            let refused = Err(Refusal::OutOfRange { id, min, max: most });
+            assert_eq!(weak.with(id, most * 1.001), refused);
+            assert_eq!(weak.with(id, f32::NAN), refused);
+        }
+        assert!(weak.settings().is_ok());
     }
 
     #[test]

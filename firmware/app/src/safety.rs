@@ -10,6 +10,8 @@ use mortise_protocol::message::{DeviceState, Fault, Refusal};
 pub enum Safety {
     /// Starting: sensors not read yet.
     Boot,
+    /// Motors off; the encoders have no reference.
+    Homing,
     /// Motors off, waiting.
     Idle,
     /// Motors on, nothing grabbed: zero wrench.
@@ -51,6 +53,10 @@ pub enum Motors {
 pub enum Event {
     /// The first sensor readings are in.
     Ready,
+    /// The encoders know where the handle is.
+    Referenced,
+    /// They no longer do.
+    ReferenceLost,
     /// The host asks to arm; whether there is a scene to feel.
     Arm {
         /// A scene is loaded.
@@ -96,7 +102,10 @@ pub enum Action {
 
 /// Whether the motors still know where they are when this fault is seen: then a damped fade is kinder than letting go at once.
 pub const fn fades(fault: Fault) -> bool {
-    matches!(fault, Fault::HostSilent { .. } | Fault::SceneDamaged)
+    matches!(
+        fault,
+        Fault::HostSilent { .. } | Fault::SceneDamaged | Fault::Workspace
+    )
 }
 
 impl Safety {
@@ -104,6 +113,7 @@ impl Safety {
     pub const fn reported(self) -> DeviceState {
         match self {
             Self::Boot => DeviceState::Boot,
+            Self::Homing => DeviceState::Homing,
             Self::Idle => DeviceState::Idle,
             Self::Armed => DeviceState::Armed,
             Self::Active => DeviceState::Active,
@@ -116,7 +126,7 @@ impl Safety {
     /// What the motors may do.
     pub const fn motors(self) -> Motors {
         match self {
-            Self::Boot | Self::Idle | Self::Stopped | Self::Fault(_) => Motors::Off,
+            Self::Boot | Self::Homing | Self::Idle | Self::Stopped | Self::Fault(_) => Motors::Off,
             Self::Armed => Motors::Zero,
             Self::Active => Motors::Rendered,
             Self::SoftStop(_) => Motors::Fading,
@@ -151,6 +161,12 @@ impl Safety {
             (Boot, Event::Ready) => (Idle, Action::None),
             (_, Event::Ready) => (self, Action::None),
 
+            (Homing, Event::Referenced) => (Idle, Action::None),
+            (_, Event::Referenced) => (self, Action::None),
+            // While motors are driven this comes with a fault, and is asked again on the way to Idle.
+            (Idle, Event::ReferenceLost) => (Homing, Action::None),
+            (_, Event::ReferenceLost) => (self, Action::None),
+
             (Idle, Event::Arm { scene: true }) => (Armed, Action::Enable),
             (Idle, Event::Arm { scene: false }) => (self, Action::Refuse(Refusal::NoScene)),
             (Armed, Event::Grab) => (Active, Action::Couple),
@@ -162,7 +178,7 @@ impl Safety {
 
             (Stopped, Event::Clear { cause_gone: true }) => (Idle, Action::None),
             (Fault(_), Event::Clear { cause_gone: true }) => (Idle, Action::None),
-            (Idle, Event::Clear { .. }) => (self, Action::None),
+            (Idle | Homing, Event::Clear { .. }) => (self, Action::None),
 
             (SoftStop(AfterSoftStop::Idle), Event::SoftStopOver) => (Idle, Action::Off),
             (SoftStop(AfterSoftStop::Fault(fault)), Event::SoftStopOver) => (Fault(fault), Action::Off),
@@ -187,19 +203,25 @@ mod tests {
     const FADING: Fault = Fault::HostSilent { silent_ms: 500 };
     const SUDDEN: Fault = Fault::StopInput;
 
-    const FAULTS: [Fault; 8] = [
+    const FAULTS: [Fault; 13] = [
         Fault::StopInput,
         Fault::HostSilent { silent_ms: 1 },
         Fault::EncoderJump { axis: 0 },
+        Fault::EncoderStuck { axis: 0 },
         Fault::OverSpeed,
+        Fault::Workspace,
         Fault::Driver { axis: 0 },
+        Fault::OverCurrent { axis: 0 },
+        Fault::OverTemperature { axis: 0 },
+        Fault::SupplyLow,
         Fault::TickOverrun,
         Fault::SceneDamaged,
         Fault::NonFinite,
     ];
 
-    const STATES: [(&str, Safety); 8] = [
+    const STATES: [(&str, Safety); 9] = [
         ("Boot", Safety::Boot),
+        ("Homing", Safety::Homing),
         ("Idle", Safety::Idle),
         ("Armed", Safety::Armed),
         ("Active", Safety::Active),
@@ -212,8 +234,10 @@ mod tests {
         ("Fault", Safety::Fault(Fault::OverSpeed)),
     ];
 
-    const EVENTS: [(&str, Event); 12] = [
+    const EVENTS: [(&str, Event); 14] = [
         ("ready", Event::Ready),
+        ("reference known", Event::Referenced),
+        ("reference lost", Event::ReferenceLost),
         ("arm", Event::Arm { scene: true }),
         ("arm, no scene", Event::Arm { scene: false }),
         ("disarm", Event::Disarm),
@@ -230,6 +254,7 @@ mod tests {
     fn name(state: Safety) -> &'static str {
         match state {
             Safety::Boot => "Boot",
+            Safety::Homing => "Homing",
             Safety::Idle => "Idle",
             Safety::Armed => "Armed",
             Safety::Active => "Active",
@@ -320,11 +345,15 @@ mod tests {
         for fault in FAULTS {
             // A new fault must be decided on here.
             let fading = match fault {
-                Fault::HostSilent { .. } | Fault::SceneDamaged => true,
+                Fault::HostSilent { .. } | Fault::SceneDamaged | Fault::Workspace => true,
                 Fault::StopInput
                 | Fault::EncoderJump { .. }
+                | Fault::EncoderStuck { .. }
                 | Fault::OverSpeed
                 | Fault::Driver { .. }
+                | Fault::OverCurrent { .. }
+                | Fault::OverTemperature { .. }
+                | Fault::SupplyLow
                 | Fault::TickOverrun
                 | Fault::NonFinite => false,
             };

@@ -7,11 +7,12 @@
 
 use glam::{Quat, Vec3};
 use mortise_haptics::{Pose, Twist, Wrench, rotation};
-use mortise_protocol::message::HandScript;
+use mortise_protocol::message::{HandScript, InputFault};
 
 use crate::board::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
-use crate::encoder::{Counter, Velocity};
+use crate::encoder::{Counter, Stall, Velocity};
 use crate::hand::{Grip, Hand, Wish, small_turn};
+use crate::input_faults::{AXES, InputScript, Wiring};
 
 /// Steps in a tick.
 pub const SUBSTEPS: u32 = 4;
@@ -39,24 +40,15 @@ pub const MOTOR_TORQUE: f32 = 0.6;
 const JUMP_SPEED: f32 = 20.0;
 const JUMP_ANGULAR_SPEED: f32 = 200.0;
 
-/// What a test can do to the simulated wiring.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wiring {
-    /// The stop input is open.
-    pub stop_open: bool,
-    /// A motor driver reports a fault.
-    pub driver_fault: Option<u8>,
-    /// Counts added to position axis x in the next reading, once.
-    pub glitch_counts: i32,
-    /// The position reads as not a number.
-    pub not_a_number: bool,
-}
+/// Ticks without a count under load that are a stall. Longer than a real rig's: a scripted hand may hold perfectly still.
+const STALL_TICKS: u16 = 500;
 
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct Simulated {
     /// Faults put in by tests.
     pub wiring: Wiring,
+    script: InputScript,
     body: Body,
     encoders: Encoders,
     hand: Option<Hand>,
@@ -74,7 +66,12 @@ struct Body {
 #[derive(Clone, Copy, Debug)]
 struct Encoders {
     position: [Counter; 3],
-    offset: i32,
+    /// Of the last reading.
+    counts: [i32; 3],
+    offset: [i32; 3],
+    stalls: [Stall; AXES],
+    /// Nothing jumped since the counters were set.
+    referenced: bool,
     linear: [Velocity; 3],
     angular: [Velocity; 3],
     /// Orientation as counted: follows the true one in whole counts about its own axes.
@@ -91,12 +88,8 @@ impl Simulated {
     /// At the world's origin, at rest, nobody holding it, motors off.
     pub const fn new() -> Self {
         Self {
-            wiring: Wiring {
-                stop_open: false,
-                driver_fault: None,
-                glitch_counts: 0,
-                not_a_number: false,
-            },
+            wiring: Wiring::SOUND,
+            script: InputScript::new(),
             body: Body {
                 pose: Pose::IDENTITY,
                 twist: Twist::ZERO,
@@ -226,24 +219,37 @@ impl Encoders {
         let farthest = (JUMP_SPEED * TICK_S / RESOLUTION) as u32;
         Self {
             position: [Counter::new(farthest); 3],
-            offset: 0,
+            counts: [0; 3],
+            offset: [0; 3],
+            stalls: [Stall::new(STALL_TICKS); AXES],
+            referenced: true,
             linear: [Velocity::new(); 3],
             angular: [Velocity::new(); 3],
             orientation: Quat::IDENTITY,
         }
     }
 
-    /// Reads the true pose: position, twist, and the axis that jumped.
-    fn read(&mut self, pose: &Pose) -> (Pose, Twist, Option<u8>) {
-        let mut jump = None;
+    /// Reads the true pose through `wiring`, the motors pushing with `motors`.
+    fn read(&mut self, pose: &Pose, wiring: &Wiring, motors: &Wrench) -> Reading {
+        let (mut jump, mut stuck) = (None, None);
+        let force = motors.force.to_array().map(|f| f.abs() > 0.5 * MOTOR_FORCE);
+        let torque = motors.torque.to_array().map(|t| t.abs() > 0.5 * MOTOR_TORQUE);
         let (mut position, mut linear) = ([0.0; 3], [0.0; 3]);
         for (axis, x) in pose.position.to_array().into_iter().enumerate() {
-            // A float too large for the counter saturates.
-            let offset = if axis == 0 { self.offset } else { 0 };
-            let count = (rounded(x / RESOLUTION) as i32).saturating_add(offset);
+            self.offset[axis] = self.offset[axis].saturating_add(wiring.glitch[axis]);
+            let count = if wiring.stuck[axis] {
+                self.counts[axis]
+            } else {
+                // A float too large for the counter saturates.
+                (rounded(x / RESOLUTION) as i32).saturating_add(self.offset[axis])
+            };
+            self.counts[axis] = count;
             let step = self.position[axis].update(count);
             if step.jumped && jump.is_none() {
                 jump = Some(axis as u8);
+            }
+            if self.stalls[axis].update(step.counts != 0 || step.jumped, force[axis]) {
+                stuck = Some(axis as u8);
             }
             position[axis] = count as f32 * RESOLUTION;
             linear[axis] = self.linear[axis].update(step.counts as f32 * RESOLUTION);
@@ -256,7 +262,12 @@ impl Encoders {
         let mut moved = [0.0; 3];
         let mut angular = [0.0; 3];
         for (axis, angle) in turned.to_array().into_iter().enumerate() {
-            moved[axis] = rounded(angle / ANGULAR_RESOLUTION) * ANGULAR_RESOLUTION;
+            let whole = rounded(angle / ANGULAR_RESOLUTION) + wiring.glitch[3 + axis] as f32;
+            let counts = if wiring.stuck[3 + axis] { 0.0 } else { whole };
+            moved[axis] = counts * ANGULAR_RESOLUTION;
+            if self.stalls[3 + axis].update(counts != 0.0, torque[axis]) {
+                stuck = Some(3 + axis as u8);
+            }
             if moved[axis].abs() > JUMP_ANGULAR_SPEED * TICK_S && jump.is_none() {
                 jump = Some(3 + axis as u8);
             }
@@ -271,8 +282,22 @@ impl Encoders {
             linear: Vec3::from_array(linear),
             angular: Vec3::from_array(angular),
         };
-        (seen, twist, jump)
+        self.referenced &= jump.is_none();
+        Reading {
+            handle: seen,
+            twist,
+            jump,
+            stuck,
+        }
     }
+}
+
+/// What the encoders say in one tick.
+struct Reading {
+    handle: Pose,
+    twist: Twist,
+    jump: Option<u8>,
+    stuck: Option<u8>,
 }
 
 /// To the nearest whole number, halves away from zero, without a library call; larger than 2²³ comes out as it is.
@@ -288,18 +313,21 @@ impl Mechanism for Simulated {
 
     fn sense(&mut self) -> Sensed {
         self.advance();
-        self.encoders.offset = self.encoders.offset.saturating_add(self.wiring.glitch_counts);
-        self.wiring.glitch_counts = 0;
-        let (mut handle, twist, encoder_jump) = self.encoders.read(&self.body.pose);
-        if self.wiring.not_a_number {
-            handle.position.x = f32::NAN;
+        let wiring = self.script.advance(self.wiring);
+        self.wiring.glitch = [0; AXES];
+        let mut reading = self.encoders.read(&self.body.pose, &wiring, &self.motors);
+        if wiring.not_a_number {
+            reading.handle.position.x = f32::NAN;
         }
         Sensed {
-            handle,
-            twist,
-            stop_open: self.wiring.stop_open,
-            driver_fault: self.wiring.driver_fault,
-            encoder_jump,
+            handle: reading.handle,
+            twist: reading.twist,
+            stop_open: wiring.stop_open,
+            supply_low: wiring.supply_low,
+            driver_fault: wiring.driver_fault,
+            encoder_jump: reading.jump,
+            encoder_stuck: reading.stuck,
+            referenced: self.encoders.referenced,
         }
     }
 
@@ -320,6 +348,18 @@ impl Mechanism for Simulated {
 
     fn set_hand(&mut self, script: Option<&HandScript>) {
         self.hand = script.and_then(Hand::new);
+    }
+
+    /// The simulated operator knows exactly where the handle is.
+    fn home(&mut self) {
+        self.encoders = Encoders {
+            orientation: self.body.pose.orientation,
+            ..Encoders::new()
+        };
+    }
+
+    fn set_input_faults(&mut self, faults: &[InputFault]) {
+        self.script.start(faults);
     }
 
     fn reset(&mut self) -> Option<Pose> {

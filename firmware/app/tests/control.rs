@@ -3,7 +3,7 @@
 mod support;
 
 use glam::Vec3;
-use mortise_firmware::board::{Clock, Drive, Identity, Outbound};
+use mortise_firmware::board::{Clock, Drive, DriverFault, DriverFaultKind, Identity, Outbound, Sensed};
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::{ControlPlane, FADE_TICKS, RAMP_TICKS, SOFT_STOP_TICKS, Ticked};
 use mortise_firmware::device::start;
@@ -48,6 +48,10 @@ fn pulled() -> Bench {
     bench
 }
 
+fn report(sensed: &mut Sensed, axis: u8, kind: DriverFaultKind) {
+    sensed.driver_fault = Some(DriverFault { axis, kind });
+}
+
 #[test]
 fn motors_are_off_from_the_start_until_armed() {
     let mut bench = Bench::ready();
@@ -62,16 +66,24 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
     for make in [armed, active] {
         for (name, fault) in [
             ("stop input", Fault::StopInput),
+            ("supply", Fault::SupplyLow),
             ("driver", Fault::Driver { axis: 2 }),
+            ("current", Fault::OverCurrent { axis: 0 }),
+            ("heat", Fault::OverTemperature { axis: 1 }),
             ("encoder", Fault::EncoderJump { axis: 1 }),
+            ("stuck", Fault::EncoderStuck { axis: 2 }),
             ("speed", Fault::OverSpeed),
             ("nan", Fault::NonFinite),
         ] {
             let mut bench = make();
             bench.strings.pull(|s| match fault {
                 Fault::StopInput => s.stop_open = true,
-                Fault::Driver { axis } => s.driver_fault = Some(axis),
+                Fault::SupplyLow => s.supply_low = true,
+                Fault::Driver { axis } => report(s, axis, DriverFaultKind::Any),
+                Fault::OverCurrent { axis } => report(s, axis, DriverFaultKind::OverCurrent),
+                Fault::OverTemperature { axis } => report(s, axis, DriverFaultKind::OverTemperature),
                 Fault::EncoderJump { axis } => s.encoder_jump = Some(axis),
+                Fault::EncoderStuck { axis } => s.encoder_stuck = Some(axis),
                 Fault::OverSpeed => s.twist.linear = Vec3::new(0.0, 2.1, 0.0),
                 _ => s.handle.position.z = f32::NAN,
             });
@@ -82,14 +94,19 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
             // Arming is refused with the reason; clearing while the cause lasts as well where the sensors still show it.
             let state = Refusal::State(DeviceState::Fault(fault));
             assert_eq!(bench.request(&ToDevice::Arm), Err(state), "{name}");
-            let lasts = matches!(fault, Fault::StopInput | Fault::Driver { .. } | Fault::NonFinite);
+            let lasts = !matches!(
+                fault,
+                Fault::EncoderJump { .. } | Fault::EncoderStuck { .. } | Fault::OverSpeed
+            );
             if lasts {
                 assert_eq!(bench.request(&ToDevice::ClearFault), Err(state), "{name}");
             }
             bench.strings.pull(|s| {
                 s.stop_open = false;
+                s.supply_low = false;
                 s.driver_fault = None;
                 s.encoder_jump = None;
+                s.encoder_stuck = None;
                 s.twist.linear = Vec3::ZERO;
                 s.handle.position.z = 0.0;
             });
@@ -99,6 +116,119 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
             bench.request(&ToDevice::Arm).unwrap();
         }
     }
+}
+
+#[test]
+fn a_lost_reference_ends_in_homing_and_is_found_by_the_operator_alone() {
+    let mut bench = active();
+    let homed = |bench: &Bench| bench.strings.0.borrow().homed;
+    let homing = Refusal::State(DeviceState::Homing);
+    assert_eq!(
+        bench.request(&ToDevice::Home),
+        Err(Refusal::State(DeviceState::Active)),
+        "not with motors on"
+    );
+    bench.strings.pull(|s| {
+        s.encoder_jump = Some(1);
+        s.referenced = false;
+    });
+    bench.tick();
+    assert_eq!(bench.state(), DeviceState::Fault(Fault::EncoderJump { axis: 1 }));
+    bench.strings.pull(|s| s.encoder_jump = None);
+    bench.tick();
+    // In one tick: cleared, and nobody slips in between.
+    let clear = bench.send(&ToDevice::ClearFault);
+    let arm = bench.send(&ToDevice::Arm);
+    bench.ticks(3);
+    assert!(bench.heard.contains(&FromDevice::Ack { seq: clear }));
+    assert!(bench.heard.contains(&FromDevice::Refused {
+        seq: arm,
+        reason: homing
+    }));
+    bench.ticks(1000);
+    assert_eq!(bench.state(), DeviceState::Homing);
+    assert_eq!(homed(&bench), 0);
+    bench.request(&ToDevice::Home).unwrap();
+    bench.tick();
+    assert_eq!((homed(&bench), bench.state()), (1, DeviceState::Idle));
+    bench.request(&ToDevice::Arm).unwrap();
+}
+
+#[test]
+fn a_board_without_a_reference_starts_in_homing() {
+    let mut bench = Bench::<true>::new(TestFlash::leaked());
+    bench.strings.pull(|s| s.referenced = false);
+    bench.ticks(2);
+    assert_eq!(bench.state(), DeviceState::Homing);
+    assert_eq!(bench.strings.last(), Drive::Off);
+    bench.greet();
+    bench.upload(&two_parts(1)).unwrap();
+    assert_eq!(
+        bench.request(&ToDevice::Arm),
+        Err(Refusal::State(DeviceState::Homing))
+    );
+    bench.request(&ToDevice::Home).unwrap();
+    bench.tick();
+    assert_eq!(bench.state(), DeviceState::Idle);
+}
+
+#[test]
+fn beyond_the_workspace_the_handle_is_braked_and_never_pushed_out() {
+    let mut bench = active();
+    let set = |bench: &mut Bench, id, value| bench.request(&ToDevice::SetParameter { id, value }).unwrap();
+    set(&mut bench, ParameterId::WorkspaceRadius, 0.1);
+    // Coupled at the origin, carried 2 mm beyond the edge in one go: the coupling pulls it back.
+    bench
+        .strings
+        .pull(|s| s.handle.position = Vec3::new(0.0, 0.102, 0.0));
+    for tick in 0..u32::from(SOFT_STOP_TICKS) + 2 {
+        bench.tick();
+        assert_ne!(bench.state(), DeviceState::Active, "tick {tick}");
+        if let Drive::Wrench(wrench) = bench.strings.last() {
+            assert!(wrench.force.y <= 0.0, "tick {tick}: {wrench:?}");
+        }
+    }
+    assert_eq!(bench.state(), DeviceState::Fault(Fault::Workspace));
+    assert_eq!(bench.fault_heard(), Some(Fault::Workspace));
+    // Braking a handle on its way in would push it out: not beyond the edge.
+    bench.request(&ToDevice::ClearFault).unwrap();
+    bench.strings.pull(|s| s.handle.position = Vec3::ZERO);
+    bench.tick();
+    bench.request(&ToDevice::Arm).unwrap();
+    bench.strings.pull(|s| {
+        s.handle.position = Vec3::new(0.0, 0.102, 0.0);
+        s.twist.linear = Vec3::new(0.5, -1.0, 0.0);
+    });
+    bench.tick();
+    bench.tick();
+    let force = wrench(bench.strings.last()).force;
+    assert!(force.y <= 0.0 && force.x < -0.5, "{force}");
+}
+
+#[test]
+fn the_motors_never_give_more_power_than_the_limit() {
+    let mut bench = active();
+    bench
+        .request(&ToDevice::SetParameter {
+            id: ParameterId::PowerLimit,
+            value: 0.1,
+        })
+        .unwrap();
+    bench.ticks(u32::from(RAMP_TICKS));
+    // The part lies 30 mm behind: the coupling pulls towards -x, where the handle moves at 0.1 m/s.
+    let velocity = Vec3::new(-0.1, 0.0, 0.0);
+    let mut largest = 0.0f32;
+    bench.strings.pull(|s| {
+        s.handle.position = Vec3::new(0.03, 0.0, 0.0);
+        s.twist.linear = velocity;
+    });
+    for tick in 0..20 {
+        bench.tick();
+        let power = wrench(bench.strings.last()).force.dot(velocity);
+        assert!(power <= 0.1 + 1e-6, "tick {tick}: {power} W");
+        largest = largest.max(power);
+    }
+    assert!(largest > 0.0999, "never met: {largest} W");
 }
 
 #[test]

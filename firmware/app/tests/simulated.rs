@@ -158,7 +158,7 @@ fn encoders_round_to_their_resolution_and_never_drift() {
 fn a_glitch_is_told_as_a_jump_once() {
     let mut rig = Simulated::new();
     rig.sense();
-    rig.wiring.glitch_counts = 100_000;
+    rig.wiring.glitch[0] = 100_000;
     assert_eq!(rig.sense().encoder_jump, Some(0));
     assert_eq!(rig.sense().encoder_jump, None);
     rig.wiring.not_a_number = true;

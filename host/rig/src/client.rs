@@ -355,7 +355,11 @@ impl Drop for Client {
     fn drop(&mut self) {
         let motors_may_be_on = !matches!(
             self.state(),
-            DeviceState::Idle | DeviceState::Stopped | DeviceState::Fault(_) | DeviceState::Boot
+            DeviceState::Idle
+                | DeviceState::Homing
+                | DeviceState::Stopped
+                | DeviceState::Fault(_)
+                | DeviceState::Boot
         );
         if motors_may_be_on {
             // A lost link cannot carry it; the board then stops by itself.

@@ -61,6 +61,7 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::Disarm
         | ToDevice::Stop
         | ToDevice::Heartbeat
+        | ToDevice::Home
         | ToDevice::SetParameter { .. }
         | ToDevice::GetParameter(_)
         | ToDevice::Release
@@ -79,6 +80,7 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::SceneCommit
         | ToDevice::GetStatistics { reset: true }
         | ToDevice::SimulatedHand(_)
+        | ToDevice::SimulatedInputs(_)
         | ToDevice::Run { .. }
         | ToDevice::Restart => false,
     }

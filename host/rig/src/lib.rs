@@ -45,7 +45,7 @@ pub use emulator::{FIRMWARE_VARIABLE, QEMU_VARIABLE, SERIAL_VARIABLE};
 pub use error::{RigError, version_words};
 pub use event::{Event, Events, MAX_EVENTS};
 pub use exchange::{ATTEMPTS, Patience};
-pub use faults::{FaultCounts, FaultLine, Faults, Window};
+pub use faults::{FaultCounts, FaultLine, Faults, InputFault, InputFaultName, Window};
 pub use list::{RigEntry, list};
 pub use pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};
 pub use simulated::{Flash, simulate};

@@ -9,6 +9,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mortise_firmware::board::{Clock, Identity, Outbound, SLOTS, TICK_HZ};
+use mortise_firmware::ceilings::Ceilings;
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::Ticked;
 use mortise_firmware::device;
@@ -103,6 +104,7 @@ fn power_on(
         reset,
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
+        ceilings: Ceilings::LARGEST,
     };
     let (mut link, mut control) = device::start(
         &mut channels,

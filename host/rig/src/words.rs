@@ -1,6 +1,6 @@
 //! What the board says, in words for the operator: what happened, and what to do.
 
-use mortise_protocol::message::{DeviceState, Fault, Refusal, ToDevice};
+use mortise_protocol::message::{DeviceState, Fault, Refusal, ResetReason, ToDevice};
 
 /// Something of the protocol that can be said in words.
 pub trait Words {
@@ -23,6 +23,9 @@ impl Words for DeviceState {
     fn words(&self) -> String {
         match self {
             Self::Boot => "starting, motors off".into(),
+            Self::Homing => {
+                "waiting for its reference, motors off: bring the handle to its marked pose, then set the reference".into()
+            }
             Self::Idle => "idle, motors off".into(),
             Self::Armed => "armed, nothing grabbed".into(),
             Self::Active => "active, a part is grabbed".into(),
@@ -43,15 +46,42 @@ impl Words for Fault {
             Self::EncoderJump { axis } => {
                 format!("the encoder of axis {axis} jumped further than the mechanism can move: check its plug and cable, then clear the fault")
             }
+            Self::EncoderStuck { axis } => {
+                format!("the encoder of axis {axis} stood still while its motor pushed: check its plug and look for a jam, then clear the fault")
+            }
             Self::OverSpeed => "the handle moved faster than allowed: hold it still, then clear the fault".into(),
+            Self::Workspace => "the handle left the workspace: bring it back, then clear the fault".into(),
             Self::Driver { axis } => {
                 format!("the motor driver of axis {axis} reports too much current or heat: let it cool and look for a jam, then clear the fault")
             }
+            Self::OverCurrent { axis } => {
+                format!("the motor driver of axis {axis} reports too much current: look for a jam or a short circuit, then clear the fault")
+            }
+            Self::OverTemperature { axis } => {
+                format!("the motor driver of axis {axis} is too hot: let it cool, then clear the fault")
+            }
+            Self::SupplyLow => "the supply of the board is too low: check the power supply and its cable, then clear the fault".into(),
             Self::TickOverrun => {
                 "a tick took longer than its millisecond: use a smaller point budget or a coarser scene, then clear the fault".into()
             }
             Self::SceneDamaged => "the scene in the board's flash no longer passes its checks: upload it again".into(),
             Self::NonFinite => "a number in the force loop is not finite: reset the scene, then clear the fault".into(),
+        }
+    }
+}
+
+impl Words for ResetReason {
+    fn words(&self) -> String {
+        match self {
+            Self::PowerOn => "the board started with its power or reset button".into(),
+            Self::Requested => "the board restarted because it was asked to".into(),
+            Self::Watchdog => "the board restarted: its watchdog found the force loop standing still".into(),
+            Self::Panic { line } => format!("the board restarted after a panic in line {line}"),
+            Self::HardFault { pc } => format!("the board restarted after a processor fault at {pc:#010x}"),
+            Self::BrownOut => {
+                "the board restarted because its supply fell too low: check the power supply".into()
+            }
+            Self::Unknown => "the board cannot tell why it started".into(),
         }
     }
 }
@@ -102,6 +132,7 @@ fn hint(state: &DeviceState) -> &'static str {
         DeviceState::Stopped => " (clear the stop first)",
         DeviceState::Idle => " (arm first)",
         DeviceState::Boot => " (wait a moment)",
+        DeviceState::Homing => "",
         DeviceState::Fault(_) => "",
     }
 }
@@ -115,6 +146,7 @@ impl Words for ToDevice {
             Self::Disarm => "disarming".into(),
             Self::Stop => "stopping".into(),
             Self::ClearFault => "clearing the stop or fault".into(),
+            Self::Home => "setting the reference".into(),
             Self::Heartbeat => "the heartbeat".into(),
             Self::SetParameter { id, value } => {
                 format!("setting {} to {value} {}", id.row().name, id.row().unit)
@@ -132,6 +164,7 @@ impl Words for ToDevice {
             Self::SetTelemetry { every_ticks } => format!("asking for telemetry every {every_ticks} ticks"),
             Self::GetStatistics { .. } => "reading the counters".into(),
             Self::SimulatedHand(_) => "giving the simulated hand its script".into(),
+            Self::SimulatedInputs(_) => "giving the simulated inputs their faults".into(),
             Self::Lockstep(true) => "switching lockstep on".into(),
             Self::Lockstep(false) => "switching lockstep off".into(),
             Self::Run { ticks } => format!("running {ticks} ticks"),
@@ -160,8 +193,13 @@ mod tests {
             Fault::StopInput,
             Fault::HostSilent { silent_ms: 501 },
             Fault::EncoderJump { axis: 2 },
+            Fault::EncoderStuck { axis: 0 },
             Fault::OverSpeed,
+            Fault::Workspace,
             Fault::Driver { axis: 1 },
+            Fault::OverCurrent { axis: 1 },
+            Fault::OverTemperature { axis: 1 },
+            Fault::SupplyLow,
             Fault::TickOverrun,
             Fault::SceneDamaged,
             Fault::NonFinite,

@@ -87,28 +87,34 @@ impl Random {
     }
 
     fn fault(&mut self) -> Fault {
-        match self.below(8) {
+        match self.below(13) {
             0 => Fault::StopInput,
             1 => Fault::HostSilent {
                 silent_ms: self.u16(),
             },
             2 => Fault::EncoderJump { axis: self.u8() },
-            3 => Fault::OverSpeed,
-            4 => Fault::Driver { axis: self.u8() },
-            5 => Fault::TickOverrun,
-            6 => Fault::SceneDamaged,
+            3 => Fault::EncoderStuck { axis: self.u8() },
+            4 => Fault::OverSpeed,
+            5 => Fault::Workspace,
+            6 => Fault::Driver { axis: self.u8() },
+            7 => Fault::OverCurrent { axis: self.u8() },
+            8 => Fault::OverTemperature { axis: self.u8() },
+            9 => Fault::SupplyLow,
+            10 => Fault::TickOverrun,
+            11 => Fault::SceneDamaged,
             _ => Fault::NonFinite,
         }
     }
 
     fn state(&mut self) -> DeviceState {
-        match self.below(7) {
+        match self.below(8) {
             0 => DeviceState::Boot,
-            1 => DeviceState::Idle,
-            2 => DeviceState::Armed,
-            3 => DeviceState::Active,
-            4 => DeviceState::SoftStop,
-            5 => DeviceState::Stopped,
+            1 => DeviceState::Homing,
+            2 => DeviceState::Idle,
+            3 => DeviceState::Armed,
+            4 => DeviceState::Active,
+            5 => DeviceState::SoftStop,
+            6 => DeviceState::Stopped,
             _ => DeviceState::Fault(self.fault()),
         }
     }
@@ -215,6 +221,27 @@ impl Random {
         }
     }
 
+    fn input_fault(&mut self) -> InputFault {
+        let axis = self.u8();
+        InputFault {
+            tick: self.u32(),
+            ticks: self.u32(),
+            kind: match self.below(8) {
+                0 => InputFaultKind::EncoderGlitch {
+                    axis,
+                    counts: self.u32() as i32,
+                },
+                1 => InputFaultKind::EncoderStuck { axis },
+                2 => InputFaultKind::NotANumber,
+                3 => InputFaultKind::Driver { axis },
+                4 => InputFaultKind::OverCurrent { axis },
+                5 => InputFaultKind::OverTemperature { axis },
+                6 => InputFaultKind::StopOpen,
+                _ => InputFaultKind::SupplyLow,
+            },
+        }
+    }
+
     fn pair(&mut self) -> TouchingPair {
         TouchingPair {
             moving_face: self.u16(),
@@ -292,12 +319,13 @@ impl Random {
             cost_unit: [CostUnit::Instructions, CostUnit::Cycles, CostUnit::Nanoseconds][self.below(3)],
             cost_budget: self.u32(),
             max_targets: self.u8(),
-            reset: match self.below(6) {
+            reset: match self.below(7) {
                 0 => ResetReason::PowerOn,
                 1 => ResetReason::Requested,
                 2 => ResetReason::Watchdog,
                 3 => ResetReason::Panic { line: self.u32() },
-                4 => ResetReason::BrownOut,
+                4 => ResetReason::HardFault { pc: self.u32() },
+                5 => ResetReason::BrownOut,
                 _ => ResetReason::Unknown,
             },
             state: self.state(),
@@ -306,7 +334,7 @@ impl Random {
 }
 
 /// Kinds of host message; a test compares it with the schema.
-pub const TO_DEVICE: usize = 24;
+pub const TO_DEVICE: usize = 26;
 
 /// A random host message of kind `kind < TO_DEVICE`.
 pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
@@ -317,33 +345,35 @@ pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
         3 => ToDevice::Disarm,
         4 => ToDevice::Stop,
         5 => ToDevice::ClearFault,
-        6 => ToDevice::Heartbeat,
-        7 => ToDevice::SetParameter {
+        6 => ToDevice::Home,
+        7 => ToDevice::Heartbeat,
+        8 => ToDevice::SetParameter {
             id: r.parameter(),
             value: r.f32(),
         },
-        8 => ToDevice::GetParameter(r.parameter()),
-        9 => ToDevice::Grab { part: r.u16() },
-        10 => ToDevice::Release,
-        11 => ToDevice::ResetScene,
-        12 => ToDevice::SceneBegin {
+        9 => ToDevice::GetParameter(r.parameter()),
+        10 => ToDevice::Grab { part: r.u16() },
+        11 => ToDevice::Release,
+        12 => ToDevice::ResetScene,
+        13 => ToDevice::SceneBegin {
             length: r.u32(),
             crc: r.u32(),
             layout: r.u32(),
         },
-        13 => ToDevice::SceneChunk {
+        14 => ToDevice::SceneChunk {
             offset: r.u32(),
             data: r.list(Random::u8),
         },
-        14 => ToDevice::SceneCommit,
-        15 => ToDevice::SceneAbort,
-        16 => ToDevice::SetTarget(r.target()),
-        17 => ToDevice::ClearTarget { id: r.u16() },
-        18 => ToDevice::SetTelemetry { every_ticks: r.u16() },
-        19 => ToDevice::GetStatistics { reset: r.bool() },
-        20 => ToDevice::SimulatedHand(r.script()),
-        21 => ToDevice::Lockstep(r.bool()),
-        22 => ToDevice::Run { ticks: r.u32() },
+        15 => ToDevice::SceneCommit,
+        16 => ToDevice::SceneAbort,
+        17 => ToDevice::SetTarget(r.target()),
+        18 => ToDevice::ClearTarget { id: r.u16() },
+        19 => ToDevice::SetTelemetry { every_ticks: r.u16() },
+        20 => ToDevice::GetStatistics { reset: r.bool() },
+        21 => ToDevice::SimulatedHand(r.script()),
+        22 => ToDevice::SimulatedInputs(r.list(Random::input_fault)),
+        23 => ToDevice::Lockstep(r.bool()),
+        24 => ToDevice::Run { ticks: r.u32() },
         _ => ToDevice::Restart,
     }
 }

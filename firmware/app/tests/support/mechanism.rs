@@ -4,7 +4,6 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use mortise_firmware::board::{Drive, Mechanism, Sensed};
-use mortise_haptics::{Pose, Twist};
 
 /// Shared between the test and the mechanism.
 #[derive(Clone)]
@@ -14,18 +13,15 @@ pub struct Pulled {
     pub sensed: Sensed,
     /// Every drive command so far.
     pub drives: Vec<Drive>,
+    /// How often it was told that it stands in its reference pose.
+    pub homed: u32,
 }
 
 impl Default for Strings {
     fn default() -> Self {
         Self(Rc::new(RefCell::new(Pulled {
-            sensed: Sensed {
-                handle: Pose::IDENTITY,
-                twist: Twist::ZERO,
-                stop_open: false,
-                driver_fault: None,
-                encoder_jump: None,
-            },
+            sensed: Sensed::AT_REST,
+            homed: 0,
             drives: Vec::new(),
         })))
     }
@@ -54,6 +50,12 @@ impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
 
     fn sense(&mut self) -> Sensed {
         self.0.0.borrow().sensed
+    }
+
+    fn home(&mut self) {
+        let mut pulled = self.0.0.borrow_mut();
+        pulled.homed += 1;
+        pulled.sensed.referenced = true;
     }
 
     fn drive(&mut self, drive: Drive) {

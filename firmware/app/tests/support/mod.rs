@@ -10,6 +10,7 @@ use std::collections::VecDeque;
 use flash::TestFlash;
 use mechanism::{Puppet, Strings};
 use mortise_firmware::board::{Clock, Identity, Outbound};
+use mortise_firmware::ceilings::Ceilings;
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::{ControlPlane, Ticked};
 use mortise_firmware::device::start;
@@ -26,6 +27,7 @@ pub const IDENTITY: Identity = Identity {
     cost_budget: 480_000,
     reset: ResetReason::PowerOn,
     overrun_ticks: 3,
+    ceilings: Ceilings::LARGEST,
 };
 
 /// A wire with room for a few frames.

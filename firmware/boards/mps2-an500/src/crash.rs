@@ -18,29 +18,29 @@ const MAGIC: u32 = 0x6d6f_7274;
 struct Reason {
     magic: u32,
     kind: u32,
-    line: u32,
+    /// Source line of a panic, address of the instruction that faulted.
+    place: u32,
     /// Complement of the sum of the others.
     check: u32,
 }
 
 const REQUESTED: u32 = 1;
 const PANIC: u32 = 2;
-/// A processor fault; its line is 0.
 const HARD_FAULT: u32 = 3;
 
 #[unsafe(link_section = ".uninit.REASON")]
 static mut REASON: MaybeUninit<Reason> = MaybeUninit::uninit();
 
-fn check(kind: u32, line: u32) -> u32 {
-    !MAGIC.wrapping_add(kind).wrapping_add(line)
+fn check(kind: u32, place: u32) -> u32 {
+    !MAGIC.wrapping_add(kind).wrapping_add(place)
 }
 
-fn keep(kind: u32, line: u32) {
+fn keep(kind: u32, place: u32) {
     let reason = Reason {
         magic: MAGIC,
         kind,
-        line,
-        check: check(kind, line),
+        place,
+        check: check(kind, place),
     };
     // SAFETY: called where nothing else runs any more, or by the one task that restarts; read only at start.
     unsafe { write_volatile((&raw mut REASON).cast::<Reason>(), reason) };
@@ -52,12 +52,13 @@ pub fn reset_reason() -> ResetReason {
     let reason = unsafe { read_volatile((&raw const REASON).cast::<Reason>()) };
     // SAFETY: as above.
     unsafe { write_volatile((&raw mut REASON).cast::<u32>(), 0) };
-    if reason.magic != MAGIC || reason.check != check(reason.kind, reason.line) {
+    if reason.magic != MAGIC || reason.check != check(reason.kind, reason.place) {
         return ResetReason::PowerOn;
     }
     match reason.kind {
         REQUESTED => ResetReason::Requested,
-        PANIC | HARD_FAULT => ResetReason::Panic { line: reason.line },
+        PANIC => ResetReason::Panic { line: reason.place },
+        HARD_FAULT => ResetReason::HardFault { pc: reason.place },
         _ => ResetReason::Unknown,
     }
 }
@@ -78,8 +79,8 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 }
 
 #[cortex_m_rt::exception]
-unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     motors::off();
-    keep(HARD_FAULT, 0);
+    keep(HARD_FAULT, frame.pc());
     SCB::sys_reset()
 }

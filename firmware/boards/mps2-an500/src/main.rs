@@ -43,6 +43,7 @@ mod app {
 
     use heapless::spsc::{Consumer, Producer, Queue};
     use mortise_firmware::board::Identity;
+    use mortise_firmware::ceilings::Ceilings;
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::Ticked;
     use mortise_firmware::device::start;
@@ -77,6 +78,7 @@ mod app {
             reset: crash::reset_reason(),
             // The simulated mechanism stands still between ticks: late ticks are counted and do no harm.
             overrun_ticks: 0,
+            ceilings: Ceilings::LARGEST,
         };
         // SAFETY: the only call.
         let flash = unsafe { memory::scene_flash() };

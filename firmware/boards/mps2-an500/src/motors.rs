@@ -3,7 +3,7 @@
 use mortise_firmware::board::{Drive, Mechanism, Sensed};
 use mortise_firmware::simulated::Simulated;
 use mortise_haptics::{Pose, Wrench};
-use mortise_protocol::message::HandScript;
+use mortise_protocol::message::{HandScript, InputFault};
 
 use crate::device::Registers;
 
@@ -54,6 +54,14 @@ impl Mechanism for Motors {
 
     fn set_hand(&mut self, script: Option<&HandScript>) {
         self.mechanism.set_hand(script);
+    }
+
+    fn home(&mut self) {
+        self.mechanism.home();
+    }
+
+    fn set_input_faults(&mut self, faults: &[InputFault]) {
+        self.mechanism.set_input_faults(faults);
     }
 
     fn reset(&mut self) -> Option<Pose> {

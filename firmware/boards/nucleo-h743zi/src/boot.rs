@@ -68,7 +68,7 @@ const fn check(kind: u32, a: u32, b: u32) -> u32 {
     !(kind ^ a.rotate_left(11) ^ b.rotate_left(22))
 }
 
-/// What the host is told. A hard fault has no source line and reads as line 0; its address goes to the log.
+/// What the host is told. The status of a hard fault goes to the log.
 pub const fn reset_reason(flags: ResetFlags, crash: Option<Crash>) -> ResetReason {
     // After power-on or brown-out memory is undefined: no record counts.
     if flags.power_on {
@@ -79,7 +79,7 @@ pub const fn reset_reason(flags: ResetFlags, crash: Option<Crash>) -> ResetReaso
     }
     match crash {
         Some(Crash::Panic { line }) => return ResetReason::Panic { line },
-        Some(Crash::HardFault { .. }) => return ResetReason::Panic { line: 0 },
+        Some(Crash::HardFault { pc, .. }) => return ResetReason::HardFault { pc },
         None => {}
     }
     if flags.watchdog {
@@ -151,6 +151,14 @@ mod tests {
             ..NONE
         };
         assert_eq!(reset_reason(software, crash), ResetReason::Panic { line: 42 });
+        let fault = Some(Crash::HardFault {
+            pc: 0x0800_1234,
+            status: 2,
+        });
+        assert_eq!(
+            reset_reason(software, fault),
+            ResetReason::HardFault { pc: 0x0800_1234 }
+        );
         // The watchdog may bite while the record is being written; a whole record still tells more.
         let watchdog = ResetFlags {
             watchdog: true,

@@ -27,6 +27,11 @@ impl Follower {
         }
     }
 
+    /// What the last reading stands for, counts.
+    pub const fn set(&mut self, count: i32) {
+        self.count = count;
+    }
+
     /// Takes the next reading. Right as long as the counter moves less than 2¹⁵ counts between two calls.
     pub const fn follow(&mut self, raw: u16) -> Reading {
         let moved = raw.wrapping_sub(self.last).cast_signed();
@@ -45,6 +50,20 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn counting_goes_on_from_where_it_is_set() {
+        let mut follower = Follower::new(0, 100, 50);
+        follower.follow(130);
+        follower.set(6000);
+        assert_eq!(
+            follower.follow(125),
+            Reading {
+                count: 5995,
+                jump: false
+            }
+        );
+    }
 
     proptest! {
         /// The sum of all motions, whatever the counter's own width.

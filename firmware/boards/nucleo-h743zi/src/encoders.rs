@@ -29,7 +29,7 @@ pub struct Pins {
     pub lower_b: Peri<'static, PC7>,
 }
 
-/// The three encoders, started at the home counts.
+/// The three encoders. They only count: where they count from is set by [`Encoders::home`].
 pub struct Encoders {
     base: Qei<'static, TIM4>,
     upper: Qei<'static, TIM3>,
@@ -38,7 +38,7 @@ pub struct Encoders {
 }
 
 impl Encoders {
-    /// Starts counting: the arm must stand in its home posture now. `tick_s`: seconds between readings.
+    /// Starts counting from the home counts. `tick_s`: seconds between readings.
     pub fn new(
         base: Peri<'static, TIM4>,
         upper: Peri<'static, TIM3>,
@@ -71,6 +71,13 @@ impl Encoders {
             upper,
             lower,
             followers,
+        }
+    }
+
+    /// The arm stands in its home posture now.
+    pub fn home(&mut self) {
+        for (follower, counts) in self.followers.iter_mut().zip(RIG.home_counts) {
+            follower.set(counts);
         }
     }
 

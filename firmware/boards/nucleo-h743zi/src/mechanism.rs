@@ -1,6 +1,7 @@
 //! The arm as the application sees it: handle pose and velocity in, force on the handle out.
 
-use mortise_firmware::board::{Drive, Mechanism, Sensed, TICK_S};
+use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, TICK_S};
+use mortise_firmware::encoder::Stall;
 use mortise_haptics::{Pose, Quat, Twist, Vec3};
 use nucleo_h743zi::drive::{AXES, currents};
 use nucleo_h743zi::kinematics::Posture;
@@ -8,7 +9,10 @@ use nucleo_h743zi::rig::RIG;
 use nucleo_h743zi::velocity::Estimator;
 
 use crate::encoders::Encoders;
-use crate::motors::Motors;
+use crate::motors::{self, Motors};
+
+/// Ticks without a count under load that are a stall. A hand trembles at 8 Hz and more: it never holds still for so long.
+const STALL_TICKS: u16 = 200;
 
 /// Encoders, kinematics and motors together.
 pub struct HapticArm {
@@ -17,10 +21,16 @@ pub struct HapticArm {
     estimators: [Estimator; AXES],
     /// Of the last `sense`: torques belong to it.
     posture: Posture,
+    stalls: [Stall; AXES],
+    counts: [i32; AXES],
+    /// Currents of the last `drive`, A.
+    currents: [f32; AXES],
+    /// The arm was in its home posture when told so, and nothing jumped since. Counting encoders know nothing at power-on.
+    referenced: bool,
 }
 
 impl HapticArm {
-    /// Motors off, arm in its home posture.
+    /// Motors off; counts begin as if the arm were in its home posture, which nobody knows until [`Mechanism::home`].
     pub fn new(mut encoders: Encoders, motors: Motors) -> Self {
         let counts = encoders.read().map(|reading| reading.count);
         Self {
@@ -28,6 +38,10 @@ impl HapticArm {
             motors,
             estimators: counts.map(Estimator::new),
             posture: posture(counts),
+            stalls: [Stall::new(STALL_TICKS); AXES],
+            counts,
+            currents: [0.0; AXES],
+            referenced: false,
         }
     }
 }
@@ -44,9 +58,20 @@ impl Mechanism for HapticArm {
         let readings = self.encoders.read();
         self.posture = posture(readings.map(|reading| reading.count));
         let mut rates = Vec3::ZERO;
+        let (mut jump, mut stuck) = (None, None);
         for (axis, reading) in readings.iter().enumerate() {
+            let moved = reading.count != self.counts[axis];
+            let loaded = self.currents[axis].abs() > 0.5 * RIG.drivers[axis].current_limit;
+            if self.stalls[axis].update(moved, loaded) {
+                stuck = Some(axis as u8);
+            }
+            if reading.jump && jump.is_none() {
+                jump = Some(axis as u8);
+            }
+            self.counts[axis] = reading.count;
             rates[axis] = self.estimators[axis].update(reading.count) * RIG.radians_per_count(axis) / TICK_S;
         }
+        self.referenced &= jump.is_none();
         Sensed {
             // The gimbal's orientation is not sensed: the handle keeps the world's.
             handle: Pose::new(self.posture.position(), Quat::IDENTITY),
@@ -55,20 +80,34 @@ impl Mechanism for HapticArm {
                 angular: Vec3::ZERO,
             },
             stop_open: self.motors.stopped(),
-            driver_fault: self.motors.driver_fault(),
-            encoder_jump: readings
-                .iter()
-                .position(|reading| reading.jump)
-                .map(|axis| axis as u8),
+            supply_low: motors::supply_is_low(),
+            // One line for current and heat.
+            driver_fault: self.motors.driver_fault().map(|axis| DriverFault {
+                axis,
+                kind: DriverFaultKind::Any,
+            }),
+            encoder_jump: jump,
+            encoder_stuck: stuck,
+            referenced: self.referenced,
         }
+    }
+
+    fn home(&mut self) {
+        self.encoders.home();
+        self.estimators = RIG.home_counts.map(Estimator::new);
+        self.counts = RIG.home_counts;
+        self.referenced = true;
     }
 
     fn drive(&mut self, drive: Drive) {
         match drive {
-            Drive::Off => self.motors.off(),
+            Drive::Off => {
+                self.currents = [0.0; AXES];
+                self.motors.off();
+            }
             Drive::Wrench(wrench) => {
-                let wanted = currents(&RIG.drivers, self.posture.torques(wrench.force));
-                let setpoint = |axis: usize| RIG.drivers[axis].setpoint(wanted[axis]);
+                self.currents = currents(&RIG.drivers, self.posture.torques(wrench.force));
+                let setpoint = |axis: usize| RIG.drivers[axis].setpoint(self.currents[axis]);
                 self.motors.drive(core::array::from_fn(setpoint));
             }
         }

@@ -110,6 +110,11 @@ pub fn acknowledge_stop() {
     pac::EXTI.pr(0).write(|w| w.set_line(STOP_PIN, true));
 }
 
+/// The supply is under the level at which the timer cuts the motors.
+pub fn supply_is_low() -> bool {
+    pac::PWR.csr1().read().pvdo()
+}
+
 /// The stop input is open.
 pub fn stop_is_open() -> bool {
     pac::GPIOE.idr().read().idr(STOP_PIN) == pac::gpio::vals::Idr::HIGH

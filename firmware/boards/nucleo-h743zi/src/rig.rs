@@ -5,6 +5,8 @@
 
 use glam::Vec3;
 
+use mortise_firmware::ceilings::Ceilings;
+
 use crate::drive::{AXES, Driver};
 use crate::kinematics::Arm;
 
@@ -17,8 +19,10 @@ pub struct Rig {
     pub drivers: [Driver; AXES],
     /// Encoder counts (all four edges) per motor turn.
     pub counts_per_turn: [f32; AXES],
-    /// Encoder counts of each joint in the posture the arm is held in at power-on: there is no index pulse.
+    /// Encoder counts of each joint in the posture the arm stands in when its reference is set: there is no index pulse.
     pub home_counts: [i32; AXES],
+    /// The most its motors and links bear, whatever parameters say.
+    pub ceilings: Ceilings,
     /// Fastest joint rate the mechanism can reach, rad/s: what moves faster is an encoder fault.
     pub joint_rate_limit: f32,
 }
@@ -49,6 +53,15 @@ pub const RIG: Rig = Rig {
     drivers: [motor(0.160), motor(0.120), motor(0.120)],
     counts_per_turn: [2000.0; AXES],
     home_counts: [0, 0, 6000],
+    ceilings: Ceilings {
+        // 3 A · 0.0259 N·m/A · 16 over a lever of 0.22 m is 5.6 N at the centre of the workspace: nothing needs twice as much.
+        force_n: 10.0,
+        // No torque axes.
+        torque_nm: 0.0,
+        // Both links in one line end 0.205 + 0.245 − 0.22 = 0.23 m in front of the centre; the home posture is 0.21 m from it.
+        workspace_m: 0.25,
+        ..Ceilings::LARGEST
+    },
     joint_rate_limit: 30.0,
 };
 

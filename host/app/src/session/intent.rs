@@ -47,6 +47,8 @@ pub enum Intent {
     Stop,
     /// Leave the stopped or faulted state.
     ClearFault,
+    /// The handle stands at its marked pose.
+    Home,
     /// Mark a part in the list and the view.
     Select(Option<usize>),
     /// Take a part in hand.
@@ -140,6 +142,11 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(DeviceState::Stopped | DeviceState::Fault(_)) => None,
             Some(_) => no("Nothing is stopped"),
         },
+        Intent::Home => match session.device() {
+            None => no(NO_RIG),
+            Some(_) if armed => no("Only while the motors are off: disarm first"),
+            Some(_) => None,
+        },
         Intent::Grab(part) => grab(session, *part),
         Intent::Release => match session.device() {
             None => no(NO_RIG),
@@ -203,6 +210,7 @@ fn arm(session: &Session) -> Option<String> {
     };
     match connection.state {
         DeviceState::Armed | DeviceState::Active => return no("The rig is armed"),
+        DeviceState::Homing => return no("Bring the handle to its marked pose and set the reference first"),
         DeviceState::Stopped => return no("Stopped: clear the stop first"),
         DeviceState::Fault(_) => return no("Fault: see the messages, then clear it"),
         DeviceState::Boot | DeviceState::SoftStop => return no("Wait until the board is idle"),

@@ -172,6 +172,7 @@ impl Session {
             Intent::Disarm => self.request(ToDevice::Disarm),
             Intent::Stop => self.stop(),
             Intent::ClearFault => self.request(ToDevice::ClearFault),
+            Intent::Home => self.request(ToDevice::Home),
             Intent::Select(part) => self.selected = part,
             Intent::Grab(part) => self.grab(part),
             Intent::Release => self.request(ToDevice::Release),

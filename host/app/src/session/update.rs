@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mortise_bake::Baked;
-use mortise_protocol::message::{DeviceState, Telemetry, ToDevice};
+use mortise_protocol::message::{DeviceState, ResetReason, Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
@@ -174,6 +174,14 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
             describe(connection.state),
         ),
     );
+    // A restart nobody asked for is news; a board switched on is not.
+    let reset = connection.capabilities.reset;
+    if !matches!(
+        reset,
+        ResetReason::PowerOn | ResetReason::Requested | ResetReason::Unknown
+    ) {
+        session.notes.add(Severity::Warning, describe(reset));
+    }
     for (id, value) in parameters {
         if let Some(known) = session.parameters.get_mut(id as usize) {
             *known = value;

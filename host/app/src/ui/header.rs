@@ -98,6 +98,13 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 "Leave the stopped state; the motors stay off",
             );
         }
+        Some(DeviceState::Homing) => {
+            let button = egui::Button::new(text("Set home"))
+                .fill(theme::ACCENT_DIM)
+                .min_size(size);
+            let hint = "Bring the handle to its marked pose first: the board counts from there";
+            control::intent_button(ui, session, wanted, button, Intent::Home, hint);
+        }
         _ => {
             let button = egui::Button::new(text("Arm"))
                 .fill(theme::ACCENT_DIM)
@@ -129,6 +136,7 @@ fn state(ui: &mut Ui, session: &Session) {
         (_, Some(device)) => {
             let (color, text) = match device {
                 DeviceState::Boot => (theme::ACCENT, "Starting"),
+                DeviceState::Homing => (theme::WARNING, "No reference"),
                 DeviceState::Idle => (theme::TEXT_WEAK, "Idle"),
                 DeviceState::Armed => (theme::GOOD, "Armed"),
                 DeviceState::Active => (theme::HELD, "In hand"),

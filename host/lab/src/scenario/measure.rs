@@ -23,6 +23,14 @@ fn vector(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))
 }
 
+/// Largest force commanded from the second tick after the one in which a fault was seen, N. A sample carries the ticks that are done: its own is one less.
+pub(crate) fn force_after(samples: &[Telemetry], fault_tick: u32) -> f64 {
+    (samples.iter())
+        .filter(|sample| sample.tick > fault_tick + 2)
+        .map(|sample| vector(sample.wrench.force).length())
+        .fold(0.0, f64::max)
+}
+
 /// How far the moving part is in, mm, the hole's depth, and how far off the axis its centre of mass is.
 pub(crate) fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<(f64, f64, f64)> {
     let axis = DVec3::from_array(depth.axis).try_normalize()?;

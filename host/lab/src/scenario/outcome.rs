@@ -61,6 +61,12 @@ pub struct Outcome {
     pub flags: u16,
     /// Share of the samples whose tick left out points or contacts, %.
     pub degraded_percent: f64,
+    /// The first fault the board told of, in words; only where the scenario lets its inputs fail, else a fault is an error.
+    pub fault: Option<String>,
+    /// When, ms after the hand began.
+    pub fault_at_ms: Option<f64>,
+    /// Largest force commanded from the second tick after the fault on, N.
+    pub force_after_fault_n: Option<f64>,
     /// Bytes of the scene image.
     pub image_bytes: usize,
     /// Deepest stack seen, bytes; 0 where not measured.
@@ -140,6 +146,8 @@ quantities! {
     parameter_messages => |o| Some(f64::from(o.parameter_messages));
     flags => |o| Some(f64::from(o.flags));
     degraded_percent => |o| Some(o.degraded_percent);
+    fault_at_ms => |o| o.fault_at_ms;
+    force_after_fault_n => |o| o.force_after_fault_n;
 }
 
 impl Outcome {

@@ -3,8 +3,8 @@
 use glam::{DQuat, DVec3};
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{
-    Capabilities, CostUnit, DeviceState, FromDevice, HandScript, Keyframe, Statistics, Telemetry, ToDevice,
-    WirePose, flag,
+    Capabilities, CostUnit, DeviceState, Fault, FromDevice, HandScript, Keyframe, Statistics, Telemetry,
+    ToDevice, WirePose, flag,
 };
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe};
@@ -90,10 +90,14 @@ pub fn record(
             scenario: scenario.name.clone(),
         });
     }
+    let expected = (scenario.faults.as_ref()).is_some_and(|faults| !faults.inputs.is_empty());
     let mut play = Play {
         client,
         samples: Vec::new(),
         messages: 0,
+        begun: 0,
+        expected,
+        fault: None,
     };
     play.prepare(scenario, scene)?;
     let line = line_of(client, scenario)?;
@@ -104,7 +108,7 @@ pub fn record(
         // Anything still on its way.
         client.run(0)?;
         play.listen()?;
-        play.samples = overheard(line)?;
+        play.overheard(line)?;
         faults = line.counts().since(&before);
         line.end();
     }
@@ -112,6 +116,10 @@ pub fn record(
     client.request(ToDevice::SetTelemetry { every_ticks: 0 })?;
     // The last sample may come behind the answer to the last run, but not behind these.
     play.listen()?;
+    if play.expected {
+        // Sound inputs for whoever comes next.
+        client.request(ToDevice::SimulatedInputs(heapless::Vec::new()))?;
+    }
     client.request(ToDevice::Disarm)?;
     client.run(FADE_TICKS)?;
     Ok(Recording {
@@ -133,29 +141,42 @@ fn line_of<'c>(client: &'c Client, scenario: &Scenario) -> Result<Option<&'c Fau
     }
 }
 
-/// The samples the board sent, whatever became of them; a fault it told of is an error.
-fn overheard(line: &FaultLine) -> Result<Vec<Telemetry>, LabError> {
-    let mut samples = Vec::new();
-    for told in line.overheard() {
-        match told {
-            FromDevice::Telemetry(sample) => samples.push(sample),
-            FromDevice::Fault { tick, fault } => {
-                let what = describe(fault);
-                return Err(LabError::Fault { tick, what });
-            }
-            _ => {}
-        }
-    }
-    Ok(samples)
-}
-
 struct Play<'c> {
     client: &'c Client,
     samples: Vec<Telemetry>,
     messages: u32,
+    /// Tick in which the hand began.
+    begun: u32,
+    /// The scenario lets inputs fail.
+    expected: bool,
+    /// The first fault, with its tick.
+    fault: Option<(u32, Fault)>,
 }
 
 impl Play<'_> {
+    /// Takes the samples the board sent, whatever became of them, and faults it told of.
+    fn overheard(&mut self, line: &FaultLine) -> Result<(), LabError> {
+        self.samples.clear();
+        for told in line.overheard() {
+            match told {
+                FromDevice::Telemetry(sample) => self.samples.push(sample),
+                FromDevice::Fault { tick, fault } => self.faulted(tick, fault)?,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// A fault is an error unless the scenario makes it.
+    fn faulted(&mut self, tick: u32, fault: Fault) -> Result<(), LabError> {
+        if !self.expected {
+            let what = describe(fault);
+            return Err(LabError::Fault { tick, what });
+        }
+        self.fault.get_or_insert((tick, fault));
+        Ok(())
+    }
+
     /// Scene on the board, parameters set, handle at the grip, part in hand.
     fn prepare(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<(), LabError> {
         let client = self.client;
@@ -194,6 +215,14 @@ impl Play<'_> {
         client.request(ToDevice::SimulatedHand(script(&scenario.hand)))?;
         let faulty = scenario.faults.is_some();
         if let (Some(line), Some(faults)) = (line, &scenario.faults) {
+            if self.expected {
+                self.begun = client.run(0)?.tick;
+                let inputs = faults.input_message().map_err(|what| LabError::Scenario {
+                    name: scenario.name.clone(),
+                    what: format!("faults.{what}"),
+                })?;
+                client.request(inputs)?;
+            }
             line.begin(faults);
         }
         let ticks = (scenario.run.duration_s * TICK_HZ).round() as u32;
@@ -288,13 +317,11 @@ impl Play<'_> {
     }
 
     fn listen(&mut self) -> Result<(), LabError> {
-        for event in self.client.events().try_iter() {
+        let client = self.client;
+        for event in client.events().try_iter() {
             match event {
                 Event::Telemetry(sample) => self.samples.push(*sample),
-                Event::Fault { tick, fault } => {
-                    let what = describe(fault);
-                    return Err(LabError::Fault { tick, what });
-                }
+                Event::Fault { tick, fault } => self.faulted(tick, fault)?,
                 Event::State { .. } | Event::Log(_) | Event::LinkLost(_) => {}
             }
         }
@@ -405,6 +432,11 @@ fn outcome(
             let degraded = (samples.iter()).filter(|s| s.flags & (flag::BUDGET | flag::CONTACTS) != 0);
             100.0 * degraded.count() as f64 / samples.len().max(1) as f64
         },
+        fault: play.fault.map(|(_, fault)| describe(fault)),
+        fault_at_ms: play
+            .fault
+            .map(|(tick, _)| f64::from(tick.wrapping_sub(play.begun))),
+        force_after_fault_n: play.fault.map(|(tick, _)| measure::force_after(samples, tick)),
         image_bytes: scene.image.len(),
         stack_bytes_max: statistics.stack_max,
         state_hash: format!("{:016x}", ran.state_hash),

@@ -10,6 +10,7 @@
 //!
 //! What the board says is **overheard** before it is harmed: who measures sees every sample, whatever the client gets.
 
+mod inputs;
 mod pump;
 
 use std::io;
@@ -17,12 +18,13 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use mortise_protocol::message::FromDevice;
+use mortise_protocol::message::{FromDevice, ToDevice};
 use serde::Deserialize;
 
 use crate::error::RigError;
 use crate::pipe::pipe;
 use crate::transport::Transport;
+pub use inputs::{InputFault, InputFaultName};
 use pump::{Pump, from_board, to_board};
 
 /// What goes wrong. The default is nothing. Shares are of frames, 0 to 1, and hold in both directions.
@@ -47,6 +49,8 @@ pub struct Faults {
     pub disconnect: Vec<Window>,
     /// Frames in a second that nobody sent: to the board noise or heartbeats, from it noise.
     pub flood_per_s: u32,
+    /// What goes wrong at the board's inputs, where they are simulated.
+    pub inputs: Vec<InputFault>,
 }
 
 /// A time, counted from [`FaultLine::begin`].
@@ -87,7 +91,15 @@ impl Faults {
                 "delay_ms: from {from} to {to} is none; the smaller comes first"
             ));
         }
-        Ok(())
+        inputs::message(&self.inputs).map(|_| ())
+    }
+
+    /// The message that lets the simulated board's inputs fail; sent when their time is to begin. The line does not send it.
+    ///
+    /// # Errors
+    /// As [`Faults::check`].
+    pub fn input_message(&self) -> Result<ToDevice, String> {
+        inputs::message(&self.inputs)
     }
 
     fn stalled(&self, now_ms: u64) -> bool {

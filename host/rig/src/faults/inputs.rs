@@ -1,0 +1,139 @@
+//! What goes wrong at the inputs of a simulated board: encoders, drivers, stop input, supply.
+//!
+//! Not part of the line: the board is told beforehand ([`ToDevice::SimulatedInputs`]) and does it by itself, tick for tick alike in-process and emulated.
+
+use mortise_protocol::limits::MAX_INPUT_FAULTS;
+use mortise_protocol::message::{self, InputFaultKind, ToDevice};
+use serde::Deserialize;
+
+/// One thing that goes wrong, as a scenario says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputFault {
+    /// What.
+    pub what: InputFaultName,
+    /// Which encoder or motor: 0 to 2 are the handle's position, 3 to 5 its rotation.
+    pub axis: Option<u8>,
+    /// By how many counts an encoder is off.
+    pub counts: Option<i32>,
+    /// When it begins, ms after the hand began.
+    pub at_ms: u32,
+    /// How long it lasts, ms.
+    #[serde(default = "once")]
+    pub for_ms: u32,
+}
+
+fn once() -> u32 {
+    1
+}
+
+/// What can go wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InputFaultName {
+    /// An encoder's counter is off by `counts` from here on.
+    EncoderGlitch,
+    /// An encoder's counter stands still.
+    EncoderStuck,
+    /// The position reads as not a number.
+    NotANumber,
+    /// A motor driver reports a fault without saying which.
+    Driver,
+    /// A motor driver reports too much current.
+    OverCurrent,
+    /// A motor driver reports too much heat.
+    OverTemperature,
+    /// The stop input is open.
+    StopOpen,
+    /// The supply is too low.
+    SupplyLow,
+}
+
+impl InputFault {
+    /// As the board is told. Ticks are milliseconds.
+    ///
+    /// # Errors
+    /// An axis or count that is missing, or there without need: in words.
+    fn wire(&self) -> Result<message::InputFault, String> {
+        use InputFaultName as N;
+        let name = self.what;
+        let axis = || match self.axis {
+            Some(axis) if axis < 6 => Ok(axis),
+            other => Err(format!("{name:?} needs an axis from 0 to 5, not {other:?}")),
+        };
+        let kind = match name {
+            N::EncoderGlitch => InputFaultKind::EncoderGlitch {
+                axis: axis()?,
+                counts: self.counts.ok_or("EncoderGlitch needs counts")?,
+            },
+            N::EncoderStuck => InputFaultKind::EncoderStuck { axis: axis()? },
+            N::Driver => InputFaultKind::Driver { axis: axis()? },
+            N::OverCurrent => InputFaultKind::OverCurrent { axis: axis()? },
+            N::OverTemperature => InputFaultKind::OverTemperature { axis: axis()? },
+            N::NotANumber | N::StopOpen | N::SupplyLow if self.axis.is_some() => {
+                return Err(format!("{name:?} has no axis"));
+            }
+            N::NotANumber => InputFaultKind::NotANumber,
+            N::StopOpen => InputFaultKind::StopOpen,
+            N::SupplyLow => InputFaultKind::SupplyLow,
+        };
+        if self.counts.is_some() && name != N::EncoderGlitch {
+            return Err(format!("{name:?} has no counts"));
+        }
+        Ok(message::InputFault {
+            tick: self.at_ms,
+            ticks: self.for_ms,
+            kind,
+        })
+    }
+}
+
+/// The message that tells the board of all of them; none at all ends what was told before.
+///
+/// # Errors
+/// Too many, or one that is not possible: in words.
+pub(super) fn message(faults: &[InputFault]) -> Result<ToDevice, String> {
+    let all: Result<Vec<_>, _> = faults.iter().map(InputFault::wire).collect();
+    let all = all.map_err(|what| format!("inputs: {what}"))?;
+    let fits = heapless::Vec::from_slice(&all)
+        .map_err(|_| format!("inputs: {} faults, at most {MAX_INPUT_FAULTS} fit", all.len()))?;
+    Ok(ToDevice::SimulatedInputs(fits))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_or_too_much_is_said() {
+        let sound = InputFault {
+            what: InputFaultName::EncoderGlitch,
+            axis: Some(2),
+            counts: Some(-40),
+            at_ms: 7,
+            for_ms: 1,
+        };
+        assert!(message(&[sound]).is_ok());
+        let said = |fault| message(&[sound, fault]).expect_err("not possible");
+        assert!(said(InputFault { axis: None, ..sound }).contains("axis"));
+        assert!(
+            said(InputFault {
+                axis: Some(6),
+                ..sound
+            })
+            .contains("axis")
+        );
+        assert!(
+            said(InputFault {
+                counts: None,
+                ..sound
+            })
+            .contains("counts")
+        );
+        let what = InputFaultName::StopOpen;
+        assert!(said(InputFault { what, ..sound }).contains("no axis"));
+        let axis = None;
+        assert!(said(InputFault { what, axis, ..sound }).contains("no counts"));
+        assert!(message(&[sound; 9]).expect_err("too many").contains("at most 8"));
+    }
+}
