@@ -8,6 +8,7 @@ mod demo;
 mod elf;
 mod figures;
 mod firmware;
+mod fuzz;
 mod memory_map;
 mod program;
 mod setup;
@@ -57,6 +58,7 @@ fn run(arguments: &[String]) -> Result<ExitCode> {
         "demo" => demo::command(rest),
         "test" => test::command(rest),
         "figures" => figures::command(rest),
+        "fuzz" => fuzz::command(rest),
         "firmware" => firmware::command(rest),
         "tidy" => tidy::command(rest),
         unknown => {

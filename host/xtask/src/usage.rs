@@ -51,6 +51,12 @@ const COMMANDS: &[Command] = &[
         options: &[("--quick", "The shorter form that CI runs")],
     },
     Command {
+        name: "fuzz",
+        what: "Random bytes, guided by coverage, for what reads frames, scenes and STEP files; all of them, or TARGET",
+        arguments: "[TARGET]",
+        options: &[("--minutes <N>", "How long each runs; 1 by default")],
+    },
+    Command {
         name: "firmware",
         what: "Build the firmware of every board, or of BOARD, and print its flash and RAM use",
         arguments: "[BOARD]",

@@ -148,7 +148,7 @@ mod app {
             cost_budget: core_hz / 1000,
             reset: reset_reason(flags, last_crash),
             overrun_ticks: OVERRUN_TICKS,
-            ceilings: RIG.ceilings,
+            ceilings: nucleo_h743zi::rig::RIG.ceilings,
         };
         let (plane, control) = start(
             CHANNELS.take(),

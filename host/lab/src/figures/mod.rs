@@ -5,7 +5,7 @@ mod contact;
 mod end_to_end;
 mod link;
 mod parts;
-mod stability;
+pub mod stability;
 
 use std::path::Path;
 

@@ -2,16 +2,18 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
 use super::Bench;
-use crate::{figures, firmware as boards, program, setup, shell, tidy};
+use crate::{figures, firmware as boards, fuzz, program, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
 const HIL_BENCH: &str = "bench";
 /// Tables whose shorter form is measured.
 const FIGURES: [&str; 1] = ["end-to-end"];
+const FUZZ_EACH: Duration = Duration::from_secs(15);
 const BOARD_SIDE: [&str; 3] = ["mortise-protocol", "mortise-haptics", "mortise-firmware"];
 
 pub fn format(bench: &mut Bench) -> Result<String> {
@@ -119,6 +121,16 @@ pub fn hil(bench: &mut Bench) -> Result<String> {
         "--no-fail-fast",
     ]);
     counted(bench, &mut command)
+}
+
+/// The shorter form: long enough to find what a change broke near the kept corpora. `cargo xtask fuzz --minutes 10` goes on.
+pub fn fuzz(bench: &mut Bench) -> Result<String> {
+    if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
+        return Ok("not run: set up for Linux on x86-64 alone".to_owned());
+    }
+    let fuzzed = fuzz::run(&bench.root, FUZZ_EACH, None)?;
+    let words: Vec<String> = fuzzed.iter().map(ToString::to_string).collect();
+    Ok(words.join("; "))
 }
 
 pub fn docs(bench: &mut Bench) -> Result<String> {

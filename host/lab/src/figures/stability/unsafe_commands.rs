@@ -1,0 +1,303 @@
+//! Random inputs to the tick, and every force command looked at.
+//!
+//! Unsafe is a command that is not finite, one beyond the limits in force, and one that gives power into a wall: the peg is pressed onto the slab, the
+//! handle beyond it and on its way further, and the force points that way too. Left out of that last count are ticks in which the slew limit
+//! still takes an earlier force back, and those in which the peg does not touch or falls ahead of the handle. One input in twenty is absurd (not a number, infinite, out of
+//! all proportion, not a rotation); limits and gains change at random every 500 inputs. The implicit step, which is the board's default.
+
+use std::thread;
+
+use mortise_haptics::{Flags, Input, Pose, Quat, Settings, State, Twist, Vec3, tick};
+use mortise_protocol::image::SceneImage;
+
+use crate::LabError;
+use crate::figures::{Plan, Row};
+use crate::stability::slab::Slab;
+use crate::variant::Variant;
+
+/// Inputs in all, and in the shorter form.
+const INPUTS: u64 = 10_000_000;
+const QUICK: u64 = 200_000;
+/// Threads; each has inputs of its own.
+const SHARES: u64 = 2;
+/// Inputs from one grab to the next.
+const EPISODE: u64 = 500;
+/// Ticks from one velocity of the hand to the next.
+const STROKE: u64 = 20;
+/// The peg touches when the slab pushes it with more than this, N.
+const TOUCHING_N: f32 = 0.5;
+/// The handle is beyond the wall by more than this, m: far more than the peg sinks in.
+const BEYOND_M: f32 = 0.5e-3;
+/// Force into the wall that counts, N: a thousandth of the least limit.
+const LEAST_N: f32 = 2e-3;
+/// The limit is kept but for a rounding of the vector's length.
+const ROUNDING: f32 = 1.000_001;
+
+/// What was unsafe.
+#[derive(Clone, Copy, Debug, Default)]
+struct Unsafe {
+    inputs: u64,
+    /// Inputs while the peg was pressed into the slab.
+    at_wall: u64,
+    /// Inputs whose command was not zero.
+    felt: u64,
+    not_finite: u64,
+    beyond: u64,
+    into_wall: u64,
+}
+
+/// Three rows that must be 0, and what they are of.
+///
+/// # Errors
+/// Anything that keeps the scene from being baked.
+pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let inputs = if plan.quick { QUICK } else { INPUTS };
+    let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0)?;
+    let scene = slab.scene()?;
+    let mut sum = Unsafe::default();
+    thread::scope(|scope| {
+        let shares: Vec<_> = (0..SHARES)
+            .map(|share| {
+                let (scene, part) = (&scene, slab.part);
+                scope.spawn(move || share_of(scene, part, inputs / SHARES, share))
+            })
+            .collect();
+        for share in shares {
+            // A panic of the tick is what must not be: let it through.
+            let found = share
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            sum.inputs += found.inputs;
+            sum.at_wall += found.at_wall;
+            sum.felt += found.felt;
+            sum.not_finite += found.not_finite;
+            sum.beyond += found.beyond;
+            sum.into_wall += found.into_wall;
+        }
+    });
+    let form = if plan.quick { ", shorter form" } else { "" };
+    let what = format!("random inputs to the tick{form}");
+    out(Row::within(
+        format!("{what}: how many"),
+        sum.inputs as f64,
+        "",
+        inputs as f64,
+        f64::INFINITY,
+    ));
+    // Else the zeros below would say nothing.
+    out(Row::within(
+        format!("{what}: share with a force"),
+        share(sum.felt, sum.inputs),
+        "%",
+        50.0,
+        100.0,
+    ));
+    out(Row::within(
+        format!("{what}: share pressed into the wall"),
+        share(sum.at_wall, sum.inputs),
+        "%",
+        10.0,
+        90.0,
+    ));
+    for (unsafe_one, count) in [
+        ("not finite", sum.not_finite),
+        ("beyond the limit", sum.beyond),
+        ("into the wall", sum.into_wall),
+    ] {
+        out(Row::exactly(
+            format!("{what}: commands {unsafe_one}"),
+            count as f64,
+            "",
+            0.0,
+        ));
+    }
+    Ok(())
+}
+
+fn share(part: u64, all: u64) -> f64 {
+    100.0 * part as f64 / all.max(1) as f64
+}
+
+/// xorshift64*: the same inputs every time.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    /// 0 to 1.
+    fn unit(&mut self) -> f32 {
+        (self.next() >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    fn even(&mut self, from: f32, to: f32) -> f32 {
+        from + (to - from) * self.unit()
+    }
+
+    fn vector(&mut self, size: f32) -> Vec3 {
+        Vec3::new(
+            self.even(-size, size),
+            self.even(-size, size),
+            self.even(-size, size),
+        )
+    }
+
+    fn one_in(&mut self, n: u64) -> bool {
+        self.next() % n == 0
+    }
+
+    fn absurd(&mut self) -> f32 {
+        const ABSURD: [f32; 10] = [
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::MAX,
+            f32::MIN,
+            f32::MIN_POSITIVE,
+            1e-42,
+            -0.0,
+            1e20,
+            -99.9,
+        ];
+        ABSURD[(self.next() % ABSURD.len() as u64) as usize]
+    }
+}
+
+/// Inputs of one thread.
+fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsafe {
+    let mut random = Random(0x5afe ^ (share + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut state = Box::new(State::new());
+    let mut found = Unsafe::default();
+    let mut settings = Settings::default();
+    let mut hand = Hand::at_rest();
+    while found.inputs < inputs {
+        if found.inputs % EPISODE == 0 {
+            state.load_scene(scene);
+            // The peg stands on the slab; the handle takes hold of it at the world's origin. It can be grabbed: the baker made it so.
+            let grabbed = state.grab(scene, part, &Pose::IDENTITY);
+            debug_assert!(grabbed.is_ok(), "{grabbed:?}");
+            hand = Hand::at_rest();
+            settings = some_settings(&mut random);
+        }
+        if found.inputs % STROKE == 0 {
+            hand.turn(&mut random);
+        }
+        let absurd = random.one_in(20);
+        let input = if absurd {
+            hand.absurd(&mut random)
+        } else {
+            hand.moved()
+        };
+        let output = tick(&mut state, scene, &settings, &input);
+        found.inputs += 1;
+        let (force, torque) = (output.handle.force, output.handle.torque);
+        if !(force.is_finite() && torque.is_finite()) {
+            found.not_finite += 1;
+            continue;
+        }
+        found.felt += u64::from(force.length() > 0.0);
+        let limits = &settings.limits;
+        if force.length() > limits.force_n * ROUNDING || torque.length() > limits.torque_nm * ROUNDING {
+            found.beyond += 1;
+        }
+        let taking_back = output.work.flags.intersects(Flags::SLEW_LIMITED);
+        let into = input.handle.position.z < -BEYOND_M && input.handle_twist.linear.z < 0.0;
+        // Speed of the peg's point under the handle; `object` is about the peg's own frame, the twist about its centre of mass. Falling flat onto the slab from
+        // its rim the peg may run ahead of the handle, and drags it along as a body does: that is no wall's doing.
+        let peg = output.object_twist;
+        let arm = input.handle.position - output.object.position;
+        let ahead = (peg.linear + peg.angular.cross(arm)).z < input.handle_twist.linear.z;
+        if !absurd && !taking_back && !ahead && into && output.contact.force.z > TOUCHING_N {
+            found.at_wall += 1;
+            found.into_wall += u64::from(force.z < -LEAST_N);
+        }
+    }
+    found
+}
+
+/// A hand that wanders over the slab and into it.
+struct Hand {
+    position: Vec3,
+    linear: Vec3,
+    turn: Vec3,
+    angular: Vec3,
+}
+
+impl Hand {
+    fn at_rest() -> Self {
+        Self {
+            position: Vec3::ZERO,
+            linear: Vec3::ZERO,
+            turn: Vec3::ZERO,
+            angular: Vec3::ZERO,
+        }
+    }
+
+    /// Another velocity: back when it has come too far. Within 8 mm the peg stays over the slab.
+    fn turn(&mut self, random: &mut Random) {
+        self.linear = random.vector(0.4);
+        self.angular = random.vector(1.0);
+        let (low, high) = (Vec3::new(-0.008, -0.008, -0.010), Vec3::new(0.008, 0.008, 0.001));
+        for axis in 0..3 {
+            if self.position[axis] < low[axis] {
+                self.linear[axis] = self.linear[axis].abs();
+            } else if self.position[axis] > high[axis] {
+                self.linear[axis] = -self.linear[axis].abs();
+            }
+            if self.turn[axis].abs() > 0.1 {
+                self.angular[axis] = -self.angular[axis].abs() * self.turn[axis].signum();
+            }
+        }
+    }
+
+    /// A tick further.
+    fn moved(&mut self) -> Input {
+        const TICK_S: f32 = 1e-3;
+        self.position += self.linear * TICK_S;
+        self.turn += self.angular * TICK_S;
+        Input {
+            handle: Pose::new(self.position, Quat::from_scaled_axis(self.turn)),
+            handle_twist: Twist {
+                linear: self.linear,
+                angular: self.angular,
+            },
+            enabled: true,
+        }
+    }
+
+    /// The same with one number that none should be.
+    fn absurd(&self, random: &mut Random) -> Input {
+        let number = random.absurd();
+        let mut position = self.position;
+        let mut orientation = Quat::from_scaled_axis(self.turn).to_array();
+        let (mut linear, mut angular) = (self.linear, self.angular);
+        let axis = (random.next() % 3) as usize;
+        match random.next() % 4 {
+            0 => position[axis] = number,
+            1 => orientation[axis] = number,
+            2 => linear[axis] = number,
+            _ => angular[axis] = number,
+        }
+        Input {
+            handle: Pose::new(position, Quat::from_array(orientation)),
+            handle_twist: Twist { linear, angular },
+            enabled: true,
+        }
+    }
+}
+
+/// Gains and limits an operator can set.
+fn some_settings(random: &mut Random) -> Settings {
+    let mut settings = Settings::default();
+    settings.coupling.k_t_n_per_m = random.even(200.0, 2000.0);
+    settings.coupling.b_t = random.even(1.0, 20.0);
+    settings.contact.stiffness_n_per_m = random.even(2e4, 2e6);
+    settings.limits.force_n = random.even(2.0, 20.0);
+    settings.limits.torque_nm = random.even(0.05, 1.0);
+    settings.limits.force_slew_n_per_s = random.even(2_000.0, 20_000.0);
+    settings
+}
