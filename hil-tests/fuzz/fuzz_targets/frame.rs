@@ -33,8 +33,11 @@ fuzz_target!(|data: &[u8]| {
 fn frame_around(bytes: &[u8]) -> Vec<u8> {
     let mut raw = bytes.to_vec();
     raw.extend(CRC.checksum(bytes).to_le_bytes());
-    let mut wire = cobs::encode_vec(&raw);
-    wire.push(0);
+    // With the delimiter behind it, which is 0.
+    let mut wire = vec![0; cobs::max_encoding_length(raw.len()) + 1];
+    let used = cobs::encode(&raw, &mut wire);
+    wire.truncate(used + 1);
+    wire[used] = 0;
     wire
 }
 

@@ -4,7 +4,7 @@
 //! has to be installed: the counters are LLVM's, and the address sanitizer, which sees reads beyond an end in `unsafe` code, is asked for by the name under
 //! which a stable compiler knows it. Linux on x86-64 only.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Duration;
 

@@ -1,0 +1,107 @@
+//! What the sensors say, and what in it is a fault.
+
+use mortise_protocol::message::Fault;
+
+use super::ControlPlane;
+use crate::board::{Clock, DriverFaultKind, Mechanism};
+use crate::ceilings::is_outside;
+use crate::safety::{Event as SafetyEvent, Motors, Safety};
+
+impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
+    /// Reads the sensors; numbers that are not finite keep their last value, and [`Self::watch`] sees it.
+    pub(super) fn sense(&mut self) {
+        let last = self.sensed;
+        self.sensed = self.mechanism.sense();
+        self.replaced = !(self.sensed.handle.is_finite() && self.sensed.twist.is_finite());
+        if self.replaced {
+            self.sensed.handle = last.handle;
+            self.sensed.twist = last.twist;
+        }
+    }
+
+    /// What in the last readings forbids motors for as long as it lasts.
+    pub(super) fn persistent_cause(&self) -> Option<Fault> {
+        // First: a falling supply may open the stop input and trip the drivers too.
+        if self.sensed.supply_low {
+            return Some(Fault::SupplyLow);
+        }
+        if self.sensed.stop_open {
+            return Some(Fault::StopInput);
+        }
+        if let Some(report) = self.sensed.driver_fault {
+            let axis = report.axis;
+            return Some(match report.kind {
+                DriverFaultKind::Any => Fault::Driver { axis },
+                DriverFaultKind::OverCurrent => Fault::OverCurrent { axis },
+                DriverFaultKind::OverTemperature => Fault::OverTemperature { axis },
+            });
+        }
+        self.replaced.then_some(Fault::NonFinite)
+    }
+
+    /// Looks for faults, worst first, and runs the safety state machine.
+    pub(super) fn watch(&mut self, missed: u32) {
+        self.missed_total = self.missed_total.saturating_add(missed);
+        self.statistics.missed_ticks = self.statistics.missed_ticks.saturating_add(missed);
+        self.missed_in_row = if missed == 0 {
+            0
+        } else {
+            self.missed_in_row.saturating_add(missed)
+        };
+        self.listen();
+        if self.safety == Safety::Boot {
+            self.apply(SafetyEvent::Ready);
+        }
+        self.apply(if self.sensed.referenced {
+            SafetyEvent::Referenced
+        } else {
+            SafetyEvent::ReferenceLost
+        });
+        if let Some(fault) = self.persistent_cause().or_else(|| self.live_cause()) {
+            self.apply(SafetyEvent::Fault(fault));
+        }
+    }
+
+    /// What is a fault only while motors are driven.
+    fn live_cause(&self) -> Option<Fault> {
+        if !self.safety.live() {
+            return None;
+        }
+        if let Some(axis) = self.sensed.encoder_jump {
+            return Some(Fault::EncoderJump { axis });
+        }
+        if !self.sensed.referenced {
+            return Some(Fault::EncoderJump { axis: 0 });
+        }
+        if let Some(axis) = self.sensed.encoder_stuck {
+            return Some(Fault::EncoderStuck { axis });
+        }
+        let limit = self.settings.speed_limit_m_per_s;
+        if self.sensed.twist.linear.length_squared() > limit * limit {
+            return Some(Fault::OverSpeed);
+        }
+        if is_outside(self.sensed.handle.position, self.settings.workspace_m) {
+            return Some(Fault::Workspace);
+        }
+        let overrun = u32::from(self.overrun_ticks);
+        if overrun > 0 && self.missed_in_row >= overrun {
+            return Some(Fault::TickOverrun);
+        }
+        // A host that disarmed may leave before the fade is over.
+        let silent =
+            self.silent_ticks > self.settings.host_timeout_ticks && self.safety.motors() != Motors::Fading;
+        silent.then_some(Fault::HostSilent {
+            silent_ms: self.silent_ticks.min(u32::from(u16::MAX)) as u16,
+        })
+    }
+
+    fn listen(&mut self) {
+        let heard = self.ends.shared.heard();
+        if heard != self.heard || self.lockstep || !self.safety.live() {
+            self.heard = heard;
+            self.silent_ticks = 0;
+        } else {
+            self.silent_ticks = self.silent_ticks.saturating_add(1);
+        }
+    }
+}
