@@ -147,7 +147,7 @@ impl Random {
     }
 
     fn one_in(&mut self, n: u64) -> bool {
-        self.next() % n == 0
+        self.next().is_multiple_of(n)
     }
 
     fn absurd(&mut self) -> f32 {
@@ -175,7 +175,7 @@ fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsaf
     let mut settings = Settings::default();
     let mut hand = Hand::at_rest();
     while found.inputs < inputs {
-        if found.inputs % EPISODE == 0 {
+        if found.inputs.is_multiple_of(EPISODE) {
             state.load_scene(scene);
             // The peg stands on the slab; the handle takes hold of it at the world's origin. It can be grabbed: the baker made it so.
             let grabbed = state.grab(scene, part, &Pose::IDENTITY);
@@ -183,7 +183,7 @@ fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsaf
             hand = Hand::at_rest();
             settings = some_settings(&mut random);
         }
-        if found.inputs % STROKE == 0 {
+        if found.inputs.is_multiple_of(STROKE) {
             hand.turn(&mut random);
         }
         let absurd = random.one_in(20);
