@@ -15,6 +15,7 @@ use mortise_brep::Surface;
 use crate::partners::{Partners, face_range};
 use crate::piece::{Piece, PieceCurve};
 use crate::pointshell::{PointshellOptions, ShellPoint};
+use crate::ring_samples::sample_ring;
 
 /// Most points on one chain.
 const MAX_POINTS: f64 = 4000.0;
@@ -61,6 +62,7 @@ pub(crate) fn sample_edges(
                 continue;
             };
             sample_chain(surface, &chain, &demand, options, out);
+            sample_ring(surface, &chain, options, out);
             if let (Some(&(first, from)), Some(&(last, to))) = (chain.first(), chain.last()) {
                 let start = pieces[first as usize].ends[usize::from(!from)];
                 let end = pieces[last as usize].ends[usize::from(to)];
@@ -83,7 +85,7 @@ fn is_corner(surface: &ExactSurface, vertex: u32) -> bool {
 }
 
 /// A piece and whether the chain runs along it from `ends[0]` to `ends[1]`.
-type Link = (u32, bool);
+pub(crate) type Link = (u32, bool);
 
 /// Joins pieces end to end. A chain stops where the group forks.
 fn chains(pieces: &[Piece], group: &[u32]) -> Vec<Vec<Link>> {

@@ -82,11 +82,16 @@ fn difference(pin: (Round, f64, f64), bore: (Round, f64, f64)) -> Option<f64> {
     if pin == Round::Cone && bore == Round::Cone {
         return ((a - b).abs() <= SAME_ANGLE).then_some(0.0);
     }
-    let room = (bore_radius - r) / bore_radius;
-    let fit = (-TIGHTEST..=LOOSEST).contains(&room);
+    let room = room(r, bore_radius);
     match (pin, bore) {
-        (Round::Cylinder, Round::Cylinder) | (Round::Sphere, Round::Sphere) if fit => Some(room.max(0.0)),
-        (Round::Sphere, Round::Cylinder) if fit => Some(1.0),
+        (Round::Cylinder, Round::Cylinder) | (Round::Sphere, Round::Sphere) => room,
+        (Round::Sphere, Round::Cylinder) => room.map(|_| 1.0),
         _ => None,
     }
+}
+
+/// (bore's radius − pin's)/bore's radius, at least 0; `None` where one is too large or too small for the other.
+pub(crate) fn room(pin: f64, bore: f64) -> Option<f64> {
+    let room = (bore - pin) / bore;
+    (-TIGHTEST..=LOOSEST).contains(&room).then_some(room.max(0.0))
 }

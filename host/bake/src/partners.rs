@@ -8,6 +8,7 @@
 use mortise_brep::Surface;
 
 use crate::distance::ExactSurface;
+use crate::fits::room;
 use crate::spline_samples::area_curvatures;
 use crate::surface::{parameters, principal_curvatures};
 
@@ -17,8 +18,17 @@ pub enum Partners {
     /// Nothing is known and nothing is relied on: every face is sampled, no two neighbours farther apart than the largest spacing.
     #[default]
     Unknown,
-    /// Surfaces of these convex curvatures and, always, flat and concave ones and edges.
-    Known(Vec<CurvatureRange>),
+    /// These surfaces and, always, flat and concave ones and edges.
+    Known(Met),
+}
+
+/// Surfaces that a shape can meet.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Met {
+    /// Convex curvatures, each once, sorted.
+    pub convex: Vec<CurvatureRange>,
+    /// Radii of bores, mm, each once, sorted.
+    pub bores: Vec<f64>,
 }
 
 /// Smallest and largest convex principal curvature over a face, 1/mm: at each of its points the larger of the two counts.
@@ -30,17 +40,15 @@ const SPLINE_AREA: f64 = 0.9;
 impl Partners {
     /// These surfaces and whatever is flat or concave.
     pub fn of<'a>(surfaces: impl IntoIterator<Item = &'a ExactSurface>) -> Self {
-        let mut ranges: Vec<CurvatureRange> = surfaces.into_iter().flat_map(shape_ranges).collect();
-        tidy(&mut ranges);
-        Self::Known(ranges)
+        let each: Vec<Met> = surfaces.into_iter().map(Met::of).collect();
+        Self::Known(Met::all(&each))
     }
 
     /// Largest curvature of a partner no sharper than `own`, 1/mm; 0 when there are only flats.
     pub(crate) fn no_sharper_than(&self, own: f64) -> f64 {
         match self {
             Self::Unknown => own,
-            Self::Known(ranges) => ranges
-                .iter()
+            Self::Known(met) => (met.convex.iter())
                 .filter(|[low, _]| *low <= own * (1.0 + 1e-9))
                 .map(|[_, high]| high.min(own))
                 .fold(0.0, f64::max),
@@ -51,8 +59,52 @@ impl Partners {
     pub(crate) fn sharpest(&self) -> f64 {
         match self {
             Self::Unknown => f64::INFINITY,
-            Self::Known(ranges) => ranges.iter().map(|[_, high]| *high).fold(0.0, f64::max),
+            Self::Known(met) => met.convex.iter().map(|[_, high]| *high).fold(0.0, f64::max),
         }
+    }
+
+    /// Largest difference between the curvature of a shaft of this radius (mm) and that of a bore it fits, 1/mm; `None` where it fits none.
+    pub(crate) fn room(&self, shaft_mm: f64) -> Option<f64> {
+        let Self::Known(met) = self else { return None };
+        let rooms = met.bores.iter().filter_map(|&bore| room(shaft_mm, bore));
+        rooms.map(|room| room / shaft_mm).reduce(f64::max)
+    }
+}
+
+impl Met {
+    /// The surfaces of one shape.
+    pub(crate) fn of(surface: &ExactSurface) -> Self {
+        let faces = surface.shape().faces.iter().enumerate();
+        let bores = faces.filter_map(|(face, of)| match of.surface {
+            Surface::Cylinder { radius, .. } if surface.topology.sense[face] < 0.0 => Some(radius),
+            _ => None,
+        });
+        let mut met = Self {
+            convex: (0..surface.shape().faces.len() as u32)
+                .filter_map(|face| face_range(surface, face))
+                .collect(),
+            bores: bores.collect(),
+        };
+        met.tidy();
+        met
+    }
+
+    /// Those of several.
+    pub(crate) fn all<'a>(each: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut all = Self::default();
+        for met in each {
+            all.convex.extend(&met.convex);
+            all.bores.extend(&met.bores);
+        }
+        all.tidy();
+        all
+    }
+
+    fn tidy(&mut self) {
+        (self.convex).sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        self.convex.dedup();
+        self.bores.sort_by(f64::total_cmp);
+        self.bores.dedup();
     }
 }
 
@@ -88,19 +140,4 @@ pub(crate) fn face_range(surface: &ExactSurface, face: u32) -> Option<CurvatureR
         }
     };
     (high > 1e-9).then_some([low.min(high), high])
-}
-
-/// Convex curvatures of all faces of a shape, each once.
-pub(crate) fn shape_ranges(surface: &ExactSurface) -> Vec<CurvatureRange> {
-    let mut ranges: Vec<CurvatureRange> = (0..surface.shape().faces.len() as u32)
-        .filter_map(|face| face_range(surface, face))
-        .collect();
-    tidy(&mut ranges);
-    ranges
-}
-
-/// Sorted, each once.
-pub(crate) fn tidy(ranges: &mut Vec<CurvatureRange>) {
-    ranges.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    ranges.dedup();
 }

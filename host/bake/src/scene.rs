@@ -11,7 +11,7 @@ use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::grid::bounding_box;
 use crate::options::{BakeOptions, Grabbable};
-use crate::partners::{CurvatureRange, Partners, shape_ranges, tidy};
+use crate::partners::{Met, Partners};
 
 /// Which shapes and parts of a model go into the image.
 pub(crate) struct Scene {
@@ -89,15 +89,9 @@ impl Scene {
 
     /// What each shape can meet: the other parts of the scene of which one at least may be grabbed, or a second part of the same shape.
     pub fn find_partners(&mut self, prepared: &[ExactSurface]) {
-        let ranges: Vec<Vec<CurvatureRange>> = prepared.par_iter().map(shape_ranges).collect();
+        let each: Vec<Met> = prepared.par_iter().map(Met::of).collect();
         let of = |shape: usize| {
-            let mut met: Vec<CurvatureRange> = self
-                .met_by(shape)
-                .into_iter()
-                .flat_map(|other| ranges[other].clone())
-                .collect();
-            tidy(&mut met);
-            Partners::Known(met)
+            Partners::Known(Met::all(self.met_by(shape).into_iter().map(|other| &each[other])))
         };
         self.partners = (0..self.shapes.len()).map(of).collect();
     }

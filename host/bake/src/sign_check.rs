@@ -10,14 +10,18 @@
 //! The kernel's classifier shoots one ray a point, and a ray that grazes an edge may go astray. So where it differs from ours it is asked again
 //! about a ball that by its own distance holds no surface; only what it then says by more than three quarters counts.
 //!
-//! Cost: one ray of the kernel a point, 10 to 500 µs, in a process of its own.
+//! Cost: one ray of the kernel a point, 10 µs to 5 ms, in batches, each in a process of its own, as many at once as there are processors. What they
+//! have not answered in the time allowed is left out, and the number of answers says so.
 
+use std::num::NonZero;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::oracle::{Side, classify, nearest};
-use mortise_brep::{BrepError, LoadOptions, Shape};
+use mortise_brep::{BrepError, LoadOptions, Shape, child};
 use mortise_protocol::image::{Lookup, SceneImage};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -36,6 +40,8 @@ const MODEL_MM: f64 = 1e-3;
 const KERNEL_MM: f64 = 1e-7;
 /// Points of a ball by which a doubtful answer of the kernel is checked; more than three quarters of them decide.
 const BALL: usize = 16;
+/// Points of one batch: each reads the file anew.
+const BATCH: usize = 1000;
 /// Most points checked so: the kernel's rays miss one in ten thousand, so more are not its fault.
 const MOST_DOUBTED: usize = 200;
 
@@ -46,7 +52,7 @@ pub struct SignOptions {
     pub points: usize,
     /// Cells of the field along the shape's longest side.
     pub cells: f64,
-    /// Longest time for the kernel, seconds.
+    /// Longest time for the kernel, seconds: points it has not reached by then are left out. Half as much again for doubtful ones.
     pub time_limit_s: u64,
 }
 
@@ -70,7 +76,9 @@ pub struct SignCheck {
     pub closed: bool,
     /// Signs away from the surface come from the winding number.
     pub by_winding: bool,
-    /// Points the kernel decided.
+    /// Points there were to ask about.
+    pub asked: usize,
+    /// Of them, points the kernel decided in time.
     pub points: usize,
     /// Points the kernel could not decide, or put on the surface.
     pub undecided: usize,
@@ -126,11 +134,12 @@ pub fn check_signs(
     let longest = (hi - lo).max_element();
     let cell_mm = longest / options.cells;
     let points = sample_points(shape, options.points, 2.0 * cell_mm);
+    let asked = points.len();
+    let (points, mut sides) = in_batches(path, load, index, &points, options.time_limit_s)?;
     let load = LoadOptions {
-        time_limit_s: options.time_limit_s,
+        time_limit_s: options.time_limit_s.div_ceil(2),
         ..load.clone()
     };
-    let mut sides = classify(path, &load, index, &points, KERNEL_MM)?;
 
     let mut surface = ExactSurface::new(shape);
     let field = FieldOptions {
@@ -162,6 +171,7 @@ pub fn check_signs(
         let mut one = SignCheck {
             closed: shape.closed,
             by_winding: surface.sign_by_winding(),
+            asked: 0,
             points: 1,
             undecided: 0,
             tolerance_mm,
@@ -228,10 +238,67 @@ pub fn check_signs(
         &mut sides,
         &doubted[..contradictions],
     )?;
-    let all = points.par_iter().zip(&sides).map(count).reduce_with(add);
-    let mut all = all.ok_or(BakeError::NothingToBake { parts: 1 })?;
+    let none = || SignCheck {
+        points: 0,
+        undecided: 0,
+        ..count((&DVec3::ZERO, &Side::Unknown))
+    };
+    let mut all = (points.par_iter().zip(&sides).map(count)).reduce(none, add);
     all.contradictions = contradictions;
+    all.asked = asked;
     Ok(all)
+}
+
+/// The kernel's answers to as many of `points` as it reaches in `limit_s` seconds, batch by batch, and those points.
+fn in_batches(
+    path: &Path,
+    load: &LoadOptions,
+    index: usize,
+    points: &[DVec3],
+    limit_s: u64,
+) -> Result<(Vec<DVec3>, Vec<Side>), BrepError> {
+    let end = Instant::now() + Duration::from_secs(limit_s);
+    let next = AtomicUsize::new(0);
+    let batches: Vec<&[DVec3]> = points.chunks(BATCH).collect();
+    let ask = || -> Result<Vec<(usize, Vec<Side>)>, BrepError> {
+        let mut answers = Vec::new();
+        loop {
+            let place = next.fetch_add(1, Ordering::Relaxed);
+            let left_s = end.saturating_duration_since(Instant::now()).as_secs();
+            let Some(&batch) = batches.get(place).filter(|_| left_s > 0) else {
+                break;
+            };
+            let load = LoadOptions {
+                time_limit_s: left_s,
+                ..load.clone()
+            };
+            match classify(path, &load, index, batch, KERNEL_MM) {
+                Ok(sides) => answers.push((place, sides)),
+                Err(BrepError::TimedOut { .. }) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(answers)
+    };
+    // Threads, not rayon's: these only wait for processes. Where there are none the kernel works in this one, for one thread.
+    let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let processes = if child::is_ready() { processors } else { 1 };
+    let answers = std::thread::scope(|scope| {
+        let asking: Vec<_> = (0..processes).map(|_| scope.spawn(ask)).collect();
+        let each = asking.into_iter().map(|thread| match thread.join() {
+            Ok(answers) => answers,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        each.collect::<Result<Vec<_>, BrepError>>()
+    })?;
+    let mut answers: Vec<(usize, Vec<Side>)> = answers.into_iter().flatten().collect();
+    answers.sort_unstable_by_key(|&(place, _)| place);
+    let reached = answers.iter().flat_map(|&(place, _)| batches[place]).copied();
+    let reached = reached.collect();
+    Ok((
+        reached,
+        answers.into_iter().flat_map(|(_, sides)| sides).collect(),
+    ))
 }
 
 /// Asks the kernel again about the points `doubted`, in a ball about each that by the kernel's own distance holds no surface: all of the ball
@@ -245,7 +312,11 @@ fn reconsider(
     doubted: &[usize],
 ) -> Result<usize, BrepError> {
     let centers: Vec<DVec3> = doubted.iter().map(|&i| points[i]).collect();
-    let feet = nearest(path, load, index, &centers)?;
+    let feet = match nearest(path, load, index, &centers) {
+        // The first answers stand, then.
+        Err(BrepError::TimedOut { .. }) => return Ok(0),
+        feet => feet?,
+    };
     let mut random = SplitMix(2);
     let mut around = Vec::with_capacity(doubted.len() * BALL);
     for (&center, foot) in centers.iter().zip(feet) {
@@ -255,7 +326,10 @@ fn reconsider(
             (0..BALL).map(|_| center + DVec3::from_array([0; 3].map(|_| 2.0 * random.unit() - 1.0)) * reach),
         );
     }
-    let answers = classify(path, load, index, &around, KERNEL_MM)?;
+    let answers = match classify(path, load, index, &around, KERNEL_MM) {
+        Err(BrepError::TimedOut { .. }) => return Ok(0),
+        answers => answers?,
+    };
     let mut changed = 0;
     for (&i, ball) in doubted.iter().zip(answers.chunks(BALL)) {
         for side in [Side::In, Side::Out] {
@@ -272,6 +346,7 @@ fn reconsider(
 fn add(mut a: SignCheck, b: SignCheck) -> SignCheck {
     /// Enough to find the cause, not enough to flood a report.
     const EXAMPLES: usize = 8;
+    a.asked += b.asked;
     a.points += b.points;
     a.undecided += b.undecided;
     a.near += b.near;
@@ -315,6 +390,10 @@ fn sample_points(shape: &Shape, count: usize, reach: f64) -> Vec<DVec3> {
         }
         let normal = (b - a).cross(c - a).normalize_or_zero();
         points.push(a + (b - a) * x + (c - a) * y + normal * reach * (2.0 * random.unit() - 1.0));
+    }
+    // In no order (Fisher and Yates): whatever the kernel does not reach in time, the others are a fair choice.
+    for last in (1..points.len()).rev() {
+        points.swap(last, ((last + 1) as f64 * random.unit()) as usize);
     }
     points
 }

@@ -196,7 +196,8 @@ fn the_best_there_is_for_the_flash() {
     // A quarter finer does not fit any more.
     let finer = run(&model, &request(best / 1.25, 8192));
     assert!(finer.image.len() > 200 << 10, "{best}: {}", finer.image.len());
-    let asked = run(&model, &request(best * 1.01, 200));
+    // No more than that is promised: bytes are no smooth function, as bricks that repeat come and go.
+    let asked = run(&model, &request(best, 200));
     assert!(asked.met, "{best}");
 }
 

@@ -1,7 +1,7 @@
 //! The smallest clearance that assembles: a peg in its hole, without any help from constraints, pushed by a trembling hand.
 //!
-//! The scenario is `host/lab/data/tight_insertion.toml`; for each way to model the scene, clearances are tried from the largest down until one
-//! does not go. A trial goes when the peg is through the hole, no surface lies deeper in another than the radial clearance (exact surfaces, both
+//! The scenario is `host/lab/data/tight_insertion.toml`; for each way to model the scene, the border between what goes and what does not is looked for by
+//! halves: what goes at one clearance is taken to go at all larger ones. A trial goes when the peg is through the hole, no surface lies deeper in another than the radial clearance (exact surfaces, both
 //! ways: else it went through the wall, not the hole), and the hand felt no more than 3 N.
 
 use std::fmt;
@@ -93,7 +93,8 @@ pub fn trial(variant: &Variant, fit: &Fit, spec: &RigSpec) -> Result<(Trial, Opt
     Ok((trial, Some(outcome)))
 }
 
-/// Tries `clearances_mm`, descending, on the in-process rig until one does not go; each trial goes to `out`. Gives the smallest that goes, mm.
+/// Tries `clearances_mm`, descending, by halves on the in-process rig; each trial goes to `out`. Gives the smallest that goes, mm: the next smaller
+/// one, if there is one, was tried and does not go.
 ///
 /// # Errors
 /// As [`trial`].
@@ -102,18 +103,20 @@ pub fn smallest(
     clearances_mm: &[f64],
     out: &mut dyn FnMut(Trial),
 ) -> Result<Option<f64>, LabError> {
-    let mut smallest = None;
-    for &clearance in clearances_mm {
-        let simulated = RigSpec::Simulated { realtime: false };
-        let (trial, _) = trial(variant, &Fit::thesis(clearance), &simulated)?;
-        let goes = trial.goes;
-        out(trial);
-        if !goes {
-            break;
+    let simulated = RigSpec::Simulated { realtime: false };
+    let (mut goes, mut stuck) = (0, clearances_mm.len());
+    // All before `goes` go, none from `stuck` on.
+    while goes < stuck {
+        let middle = usize::midpoint(goes, stuck);
+        let (trial, _) = trial(variant, &Fit::thesis(clearances_mm[middle]), &simulated)?;
+        if trial.goes {
+            goes = middle + 1;
+        } else {
+            stuck = middle;
         }
-        smallest = Some(clearance);
+        out(trial);
     }
-    Ok(smallest)
+    Ok(goes.checked_sub(1).map(|last| clearances_mm[last]))
 }
 
 /// The ways to model the scene that the chart compares; `quick` has one cell of each kind.
@@ -142,19 +145,24 @@ pub fn chart(trials: &[Trial]) -> Chart {
             series.len() - 1
         });
         let points = &mut series[place].points;
-        if points.last().is_none_or(|point| point.x != trial.cell_mm) {
-            // Until one goes, the smallest that goes is larger than the largest that was tried.
+        let at = points.iter().position(|point| point.x == trial.cell_mm);
+        let at = at.unwrap_or_else(|| {
             points.push(Point {
                 x: trial.cell_mm,
-                y: 1e3 * trial.clearance_mm,
-                label: format!("not even {} mm", trial.clearance_mm),
                 at_least: true,
+                ..Point::default()
             });
-        }
-        if let Some(point) = points.last_mut().filter(|_| trial.goes) {
-            point.y = 1e3 * trial.clearance_mm;
-            point.label = format!("{} µm", (point.y * 10.0).round() / 10.0);
+            points.len() - 1
+        });
+        let (point, um) = (&mut points[at], 1e3 * trial.clearance_mm);
+        if trial.goes && (point.at_least || um < point.y) {
+            point.y = um;
+            point.label = format!("{} µm", (um * 10.0).round() / 10.0);
             point.at_least = false;
+        } else if !trial.goes && point.at_least && um > point.y {
+            // Until one goes, the smallest that goes is larger than the largest that was tried.
+            point.y = um;
+            point.label = format!("not even {} mm", trial.clearance_mm);
         }
     }
     Chart {
@@ -222,11 +230,13 @@ mod tests {
             peak_force_n: None,
             image_bytes: None,
         };
+        // In the order halves are tried.
         let trials = [
+            trial(2.0, 0.5, false),
             trial(2.0, 1.0, false),
-            trial(1.0, 1.0, true),
             trial(1.0, 0.5, true),
             trial(1.0, 0.2, false),
+            trial(1.0, 1.0, true),
         ];
         let chart = chart(&trials);
         assert_eq!(chart.series.len(), 1);

@@ -17,6 +17,8 @@ pub struct Variant {
     pub format: SampleFormat,
     /// Bound on the pointshell's error, mm; `None`: as [`BakeOptions`] chooses.
     pub epsilon_mm: Option<f64>,
+    /// Depth to which the field is stored at least, mm; never less than two cells.
+    pub reach_mm: f64,
 }
 
 /// The textbook's pointshell: a point for each voxel of the surface, not moved inward.
@@ -35,6 +37,7 @@ impl Variant {
             cell_mm,
             format: SampleFormat::Int16,
             epsilon_mm: Some(cell_mm / 100.0),
+            reach_mm: 0.0,
         }
     }
 
@@ -64,6 +67,11 @@ impl Variant {
         Self { epsilon_mm, ..self }
     }
 
+    /// The same with a field that reaches so deep.
+    pub const fn reach_mm(self, reach_mm: f64) -> Self {
+        Self { reach_mm, ..self }
+    }
+
     /// The same with the textbook's pointshell, a point for each voxel of `voxel_mm`, shrunk by half a voxel: else points stand out by as much.
     pub const fn classic_shell(self, voxel_mm: f64) -> Self {
         Self {
@@ -78,7 +86,11 @@ impl Variant {
 
     /// How to bake it. The image may be as large as layouts allow: what it costs is measured, not limited.
     pub fn options(&self, grabbable: Grabbable) -> BakeOptions {
+        let band_cells = BakeOptions::default()
+            .band_cells
+            .max(self.reach_mm / self.cell_mm);
         BakeOptions {
+            band_cells,
             method: self.method,
             shell: self.shell,
             cell_mm: Some(self.cell_mm),

@@ -47,7 +47,11 @@ impl Axis {
         match self.scale {
             AxisScale::Logarithmic => {
                 let decades = (high / low).log10();
-                let steps: &[f64] = if decades < 3.2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+                let steps: &[f64] = match decades {
+                    ..0.7 => &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
+                    ..3.2 => &[1.0, 2.0, 5.0],
+                    _ => &[1.0],
+                };
                 let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
                 (first..=last)
                     .flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)))

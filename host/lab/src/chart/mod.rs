@@ -47,7 +47,8 @@ pub struct Chart {
 pub struct Axis {
     /// Quantity and unit.
     pub title: String,
-    /// Where marks are; `None`: at 1, 2 and 5 times the powers of ten, or at the powers alone where there are many; on a linear axis at equal steps.
+    /// Where marks are; `None`: at 1, 2 and 5 times the powers of ten, at the powers alone where there are many and at every digit where there are
+    /// few; on a linear axis at equal steps.
     pub ticks: Option<Vec<f64>>,
     /// What equal lengths on it are.
     pub scale: AxisScale,

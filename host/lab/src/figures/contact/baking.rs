@@ -116,8 +116,8 @@ const SIGN_POINTS_QUICK: usize = 5_000;
 const SMALL_BYTES: u64 = 80 << 10;
 /// Cells of the field whose signs are compared, along a part's longest side.
 const SIGN_CELLS: f64 = 32.0;
-/// Longest time of the CAD kernel for one part, s.
-const SIGN_LIMIT_S: u64 = 600;
+/// Longest time of the CAD kernel for one part, s: its classifier shoots a ray a point, and on free-form faces that takes milliseconds.
+const SIGN_LIMIT_S: u64 = 60;
 
 /// A real file that can be read.
 struct RealFile {
@@ -187,7 +187,7 @@ fn signs(plan: &Plan<'_>, of: &str, files: &[RealFile], out: &mut dyn FnMut(Row)
         cells: SIGN_CELLS,
         time_limit_s: SIGN_LIMIT_S,
     };
-    let (mut closed, mut points, mut wrong, mut field_wrong) = (0usize, 0, 0, 0);
+    let (mut closed, mut unanswered, mut points, mut wrong, mut field_wrong) = (0usize, 0usize, 0, 0, 0);
     for RealFile { path, model } in files {
         for (index, shape) in model.shapes.iter().enumerate() {
             let check =
@@ -199,6 +199,17 @@ fn signs(plan: &Plan<'_>, of: &str, files: &[RealFile], out: &mut dyn FnMut(Row)
                 })?;
             // Where a shell is open, the kernel's own answer means nothing.
             if !check.closed {
+                continue;
+            }
+            if check.points < check.asked {
+                let part = format!("{}, shape {index}", path.display());
+                eprintln!(
+                    "{part}: the CAD kernel decided {} of {} points",
+                    check.points, check.asked
+                );
+            }
+            if check.points == 0 {
+                unanswered += 1;
                 continue;
             }
             closed += 1;
@@ -222,6 +233,12 @@ fn signs(plan: &Plan<'_>, of: &str, files: &[RealFile], out: &mut dyn FnMut(Row)
         what("on the wrong side of the field, farther from the surface than a cell"),
         field_wrong as f64,
         "points",
+        0.0,
+    ));
+    out(Row::exactly(
+        format!("{of}: closed parts at which the CAD kernel decides no point within {SIGN_LIMIT_S} s"),
+        unanswered as f64,
+        "parts",
         0.0,
     ));
     out(Row::within(
