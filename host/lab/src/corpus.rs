@@ -224,6 +224,7 @@ fn sweep(path: &Path, model: &CadModel, seconds: f64) -> (Scenario, String) {
         run: Run {
             duration_s: seconds,
             telemetry_every_ticks: 20,
+            heed_every_ticks: None,
             guidance: false,
             parameter_every_ticks: None,
             settled_s: 0.5,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use mortise_guide::{Guide, GuideSettings};
-use mortise_protocol::message::{Telemetry, ToDevice};
+use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
 use mortise_rig::{EmulatedMode, RigSpec};
 use tempfile::{Builder, NamedTempFile};
 
@@ -106,6 +106,44 @@ pub(crate) fn play_to(
     listener: &mut dyn FnMut(&Telemetry) -> Vec<ToDevice>,
 ) -> Result<Recording, LabError> {
     record(&connect(scenario, spec)?, scenario, scene, Some(listener))
+}
+
+/// The first target that the guide makes of what touches when `scenario` is played in-process without any.
+pub(crate) fn known_target(scenario: &Scenario, scene: &PreparedScene) -> Result<ConstraintTarget, LabError> {
+    let mut guide = scene.guide(GuideSettings::default());
+    let mut found = None;
+    let mut listener = |sample: &Telemetry| {
+        for message in guide.hear(sample) {
+            if let ToDevice::SetTarget(target) = message {
+                found.get_or_insert(target);
+            }
+        }
+        Vec::new()
+    };
+    play_to(scenario, scene, &SIM, &mut listener)?;
+    found.ok_or_else(|| LabError::Input {
+        name: scenario.name.clone(),
+        what: "nothing was recognised when the parts touched".into(),
+    })
+}
+
+/// Sends `target` at once and refreshes it: guidance without recognition.
+pub(crate) fn refreshed(target: ConstraintTarget) -> impl FnMut(&Telemetry) -> Vec<ToDevice> {
+    const REFRESH_TICKS: u32 = 100;
+    const EXPIRY_TICKS: u16 = 300;
+    let (mut due, mut sequence) = (None, 0u16);
+    move |sample| {
+        if due.is_some_and(|due| sample.tick < due) {
+            return Vec::new();
+        }
+        due = Some(sample.tick + REFRESH_TICKS);
+        sequence = sequence.wrapping_add(1);
+        vec![ToDevice::SetTarget(ConstraintTarget {
+            sequence,
+            expiry_ticks: EXPIRY_TICKS,
+            ..target.clone()
+        })]
+    }
 }
 
 /// Ticks after full engagement in which a part comes to its axis: 1 mm shrinks below 1 µm with τ = 20 ms.

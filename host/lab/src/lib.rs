@@ -4,6 +4,7 @@
 //! uploads, plays it on a rig in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and [`figures::figures`] are all
 //! this one function. [`figures::figures`] measures every row of a named table.
 //! [`clearance`] finds the smallest clearance that assembles, [`pareto`] holds accuracy against cost; [`chart`] and [`table`] write what sweeps find.
+//! [`rate`] and [`blend`] show an insertion tick by tick, the thesis' figures or method beside ours; [`study`] repeats its chapter 7.
 //! [`stability`] closes loops on one axis and finds where they become unstable.
 //! [`probe`] asks a scene for gap and contacts at given poses.
 
@@ -20,9 +21,11 @@ pub mod motion;
 pub mod pareto;
 pub mod peer;
 pub mod probe;
+pub mod rate;
 pub mod scenario;
 pub mod scene_p;
 pub mod stability;
+pub mod study;
 pub mod table;
 pub mod variant;
 

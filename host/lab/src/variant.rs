@@ -56,6 +56,17 @@ impl Variant {
         }
     }
 
+    /// Voxmap and pointshell as in the textbook, each point moved inward by a share of a voxel, percent: what Faas 2010 calls shrinking.
+    pub const fn shrunk(cell_mm: f64, shrink_percent: f64) -> Self {
+        Self {
+            shell: PointshellKind::Classic {
+                voxel_mm: None,
+                shrink_percent,
+            },
+            ..Self::textbook(cell_mm)
+        }
+    }
+
     /// The same in another number format.
     pub const fn format(self, format: SampleFormat) -> Self {
         Self { format, ..self }

@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 use clap::Subcommand;
 use mortise_lab::figures::{self, Plan, Value};
+use mortise_lab::study::{feature_size, shrink};
 use mortise_lab::table::write_csv;
-use mortise_lab::{blend, clearance, pareto};
+use mortise_lab::{blend, clearance, pareto, rate};
 
 use super::output;
 use crate::sample;
@@ -39,12 +40,24 @@ enum Experiment {
     Pareto(Sweep),
     /// Show force and engagement over an insertion, the thesis' blend beside the default guidance
     Blend(Sweep),
+    /// Show the rate that a tick allows over an insertion: collision only, guided, guided with recognition; emulated board
+    Rate(Sweep),
+    /// Which voxels let a peg into its hole, and what shrinking does: 27 trials by a simulated operator, textbook voxmap
+    Shrink(Sweep),
+    /// Whether a feature's size matters: 62 trials by a simulated operator, textbook voxmap
+    FeatureSize {
+        #[command(flatten)]
+        sweep: Sweep,
+        /// How far points of the shell are moved inward, percent of a voxel
+        #[arg(long, value_name = "PERCENT", default_value_t = feature_size::SHRINK_PERCENT)]
+        shrink: f64,
+    },
 }
 
 /// How a sweep is made and where it goes.
 #[derive(Debug, clap::Args)]
 struct Sweep {
-    /// The shorter form: one cell size, or one clearance
+    /// The shorter form: one cell size, clearance or pair, or the smallest pegs
     #[arg(long)]
     quick: bool,
     /// One JSON object a trial
@@ -72,6 +85,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Experiment::Clearance(sweep) => clearance(sweep),
         Experiment::Pareto(sweep) => pareto(sweep),
         Experiment::Blend(sweep) => blend(sweep),
+        Experiment::Rate(sweep) => rate(sweep),
+        Experiment::Shrink(sweep) => shrink(sweep),
+        Experiment::FeatureSize { sweep, shrink } => feature_size(sweep, *shrink),
     }
 }
 
@@ -122,6 +138,62 @@ fn blend(sweep: &Sweep) -> anyhow::Result<ExitCode> {
         let moments: Vec<&blend::Moment> = courses.iter().flat_map(|course| &course.moments).collect();
         write_csv(&moments, folder, "blend")?;
         blend::draw(&courses, folder)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn rate(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+    let mut written = Ok(());
+    let courses = rate::sweep(sweep.quick, &mut |course| {
+        if written.is_ok() {
+            written = sweep.tell(course);
+        }
+    })?;
+    written?;
+    if let Some(folder) = &sweep.out {
+        let windows: Vec<&rate::Window> = courses.iter().flat_map(|course| &course.windows).collect();
+        write_csv(&windows, folder, "rate")?;
+        for pair in &rate::PAIRS {
+            if courses.iter().any(|course| course.pair == pair.name) {
+                rate::chart(pair, &courses).write(folder, pair.name)?;
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn shrink(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+    let mut written = Ok(());
+    let study = shrink::study(sweep.quick, &mut |found| {
+        if written.is_ok() {
+            written = sweep.tell(&found);
+        }
+    })?;
+    written?;
+    if let Some(folder) = &sweep.out {
+        let trials: Vec<&shrink::Trial> = study.trials.iter().chain(&study.ours).collect();
+        write_csv(&trials, folder, "shrink")?;
+        if !study.rules.is_empty() {
+            write_csv(&study.terms, folder, "shrink-model")?;
+            write_csv(&study.largest, folder, "shrink-rule")?;
+            shrink::chart(&study).write(folder, "shrink")?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn feature_size(sweep: &Sweep, shrink: f64) -> anyhow::Result<ExitCode> {
+    let mut written = Ok(());
+    let study = feature_size::study(sweep.quick, shrink, &mut |found| {
+        if written.is_ok() {
+            written = sweep.tell(&found);
+        }
+    })?;
+    written?;
+    if let Some(folder) = &sweep.out {
+        write_csv(&study.trials, folder, "feature-size")?;
+        write_csv(&study.terms, folder, "feature-size-model")?;
+        feature_size::chart(&study).write(folder, "feature-size")?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -168,6 +168,8 @@ pub struct Run {
     /// Ticks between telemetry samples (every figure but the board's own counters comes from them).
     #[serde(default = "five")]
     pub telemetry_every_ticks: u16,
+    /// Ticks after which samples are answered, those of several at once; each when absent.
+    pub heed_every_ticks: Option<u16>,
     /// Ticks between parameter messages, for load; none when absent.
     pub parameter_every_ticks: Option<u32>,
     /// Whether the desktop recognises constraints from telemetry and sends them.

@@ -227,7 +227,10 @@ impl Play<'_> {
         }
         let ticks = (scenario.run.duration_s * TICK_HZ).round() as u32;
         match (listener, scenario.run.parameter_every_ticks) {
-            (Some(listener), _) => self.heeding(listener, ticks, u32::from(every_ticks.max(1)), faulty),
+            (Some(listener), _) => {
+                let every = scenario.run.heed_every_ticks.unwrap_or(every_ticks);
+                self.heeding(listener, ticks, u32::from(every.max(1)), faulty)
+            }
             (None, Some(every)) => self.loaded(scenario, ticks, every.max(1)),
             (None, None) => self.run(ticks),
         }
@@ -269,7 +272,7 @@ impl Play<'_> {
         Ok(ran)
     }
 
-    /// Lets ticks run from sample to sample, answering each with what the listener makes of it.
+    /// Lets `every` ticks run at a time, answering the samples with what the listener makes of them.
     fn heeding(
         &mut self,
         listener: &mut Listener<'_>,

@@ -1,13 +1,12 @@
 //! What targets cost the board: the dearest tick with four of them in force against the same motion without.
 
 use mortise_bake::Grabbable;
-use mortise_guide::GuideSettings;
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
 
 use crate::LabError;
 use crate::figures::Row;
 use crate::fit::Fit;
-use crate::guided::{SIM, emulated, insertion, play_to};
+use crate::guided::{emulated, insertion, known_target, play_to};
 use crate::motion::{Motion, script};
 use crate::scenario::{PreparedScene, Recording};
 use crate::variant::Variant;
@@ -48,21 +47,7 @@ pub(super) fn peg_in_hole(fit: &Fit) -> Result<ConstraintTarget, LabError> {
     scenario.run.telemetry_every_ticks = 10;
     let options = Variant::field(1.0).options(Grabbable::Named(vec!["peg".into()]));
     let scene = PreparedScene::with(&scenario, &options)?;
-    let mut guide = scene.guide(GuideSettings::default());
-    let mut found = None;
-    let mut listener = |sample: &Telemetry| {
-        for message in guide.hear(sample) {
-            if let ToDevice::SetTarget(target) = message {
-                found.get_or_insert(target);
-            }
-        }
-        Vec::new()
-    };
-    play_to(&scenario, &scene, &SIM, &mut listener)?;
-    found.ok_or_else(|| LabError::Input {
-        name: "peg in hole".into(),
-        what: "nothing was recognised when the peg touched its hole".into(),
-    })
+    known_target(&scenario, &scene)
 }
 
 /// The 20 µm fit pressed to the wall and slid, so that contact is at its dearest, and on its way in.

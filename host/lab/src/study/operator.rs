@@ -1,0 +1,172 @@
+//! A simulated operator: takes a peg from just above its hole and pushes it through, with a hand that is a little off and trembles.
+//!
+//! Every trial has a hand of its own, drawn from a seed: off the axis by up to half of the play, up to half a degree tilted, both any way round.
+
+use std::f64::consts::TAU;
+
+use mortise_bake::Grabbable;
+use mortise_protocol::parameter::ParameterId;
+use mortise_rig::Client;
+use tempfile::NamedTempFile;
+
+use crate::LabError;
+use crate::fit::Fit;
+use crate::guided::{SIM, key};
+use crate::scenario::{PreparedScene, Scenario, run_on};
+use crate::variant::Variant;
+
+const SCENARIO: &str = include_str!("../../data/tight_insertion.toml");
+
+/// The peg starts so far above its hole, and ends so far beyond, mm.
+const ABOVE_MM: f64 = 5.0;
+const BEYOND_MM: f64 = 2.0;
+/// Time to come to the hole's axis, at least to push through, and at the end, s; and the pushing's speed, mm/s.
+const COMES_S: f64 = 0.3;
+const PUSHES_S: f64 = 1.5;
+const ENDS_S: f64 = 0.3;
+const MM_PER_S: f64 = 50.0;
+/// Largest tilt, degrees, and largest offset as a share of the radial play.
+const TILT_DEG: f64 = 0.5;
+const OFF: f64 = 0.5;
+
+/// Where a hand goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hand {
+    /// Off the axis, as a share of the radial play.
+    pub off: [f64; 2],
+    /// Rotation vector across the axis, degrees.
+    pub tilt_deg: [f64; 2],
+}
+
+/// How a trial went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Went {
+    /// The peg came through its hole.
+    pub through: bool,
+    /// How far it came, mm; absent where the board gave up.
+    pub inserted_mm: Option<f64>,
+    /// Largest force on the handle, N, likewise.
+    pub peak_n: Option<f64>,
+    /// Share of ticks that could not look at all points, %, likewise.
+    pub degraded_percent: Option<f64>,
+}
+
+/// A fit, baked, with the part in hand above its hole.
+pub struct Task {
+    fit: Fit,
+    scenario: Scenario,
+    scene: PreparedScene,
+    _file: NamedTempFile,
+}
+
+impl Hand {
+    /// The worst that is drawn: as far off and as tilted as any, one towards the other.
+    pub const WORST: Self = Self {
+        off: [OFF, 0.0],
+        tilt_deg: [0.0, TILT_DEG],
+    };
+
+    /// The hand of this seed.
+    pub fn of(seed: u64) -> Self {
+        let mut random = fastrand::Rng::with_seed(seed);
+        // Areas, not radii, are evenly hit.
+        let mut any = |most: f64| {
+            let (radius, angle) = (most * random.f64().sqrt(), TAU * random.f64());
+            [radius * angle.cos(), radius * angle.sin()]
+        };
+        Self {
+            off: any(OFF),
+            tilt_deg: any(TILT_DEG),
+        }
+    }
+}
+
+impl Task {
+    /// Bakes the fit as `variant` says. The whole budget of points is the tick's: the textbook's shells have many.
+    ///
+    /// # Errors
+    /// As [`PreparedScene::with`].
+    pub fn new(fit: &Fit, variant: &Variant) -> Result<Self, LabError> {
+        let fit = fit.engaged(-ABOVE_MM);
+        let file = fit.file()?;
+        let mut scenario = Scenario::parse(SCENARIO, "operator")?;
+        scenario.scene.step = file.path().to_owned();
+        let budget = ParameterId::PointBudget.row();
+        scenario.parameters.insert(budget.name.to_owned(), budget.max);
+        let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
+        let scene = PreparedScene::with(&scenario, &options)?;
+        Ok(Self {
+            fit,
+            scenario,
+            scene,
+            _file: file,
+        })
+    }
+
+    /// Bytes of the scene image.
+    pub fn image_bytes(&self) -> usize {
+        self.scene.image.len()
+    }
+
+    /// One trial, in-process.
+    ///
+    /// # Errors
+    /// Anything that keeps it from being played but a fault of the board: the operator pushed until it gave up.
+    pub fn tried(&self, hand: &Hand) -> Result<Went, LabError> {
+        let mut scenario = self.scenario.clone();
+        let (fit, play) = (&self.fit, 0.5 * self.fit.clearance_mm());
+        let through = ABOVE_MM + fit.height_mm + BEYOND_MM;
+        scenario.hand.grip_mm = [0.0, 0.0, ABOVE_MM + 0.5 * fit.length_mm];
+        let at = |t_s: f64, down: f64| {
+            let [x, y] = hand.off.map(|off| off * play);
+            key(t_s, [x, y, -down], [hand.tilt_deg[0], hand.tilt_deg[1], 0.0])
+        };
+        let ends = COMES_S + PUSHES_S.max(through / MM_PER_S);
+        scenario.hand.keyframes = vec![key(0.0, [0.0; 3], [0.0; 3]), at(COMES_S, 0.0), at(ends, through)];
+        scenario.run.duration_s = ends + ENDS_S;
+        match run_on(&Client::connect(&SIM.lockstep())?, &scenario, &self.scene) {
+            Ok(outcome) => Ok(Went {
+                through: outcome.inserted_mm.is_some_and(|deep| deep >= fit.height_mm),
+                inserted_mm: outcome.inserted_mm,
+                peak_n: Some(outcome.peak_force_n),
+                degraded_percent: Some(outcome.degraded_percent),
+            }),
+            Err(LabError::Fault { .. }) => Ok(Went {
+                through: false,
+                inserted_mm: None,
+                peak_n: None,
+                degraded_percent: None,
+            }),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Hands differ, stay within bounds, and are the same again.
+    #[test]
+    fn hands_are_drawn() {
+        for seed in 0..200 {
+            let hand = Hand::of(seed);
+            let length = |[x, y]: [f64; 2]| x.hypot(y);
+            assert!(length(hand.off) <= OFF && length(hand.tilt_deg) <= TILT_DEG);
+            assert_eq!(hand, Hand::of(seed));
+            assert_ne!(hand, Hand::of(seed + 1));
+        }
+    }
+
+    /// Voxels as wide as the play stick; a field on cells as wide goes in.
+    #[test]
+    fn an_operator_gets_in_where_there_is_room() {
+        let fit = Fit::thesis(1.0);
+        let through = |variant: Variant| {
+            let task = Task::new(&fit, &variant).expect("baked");
+            task.tried(&Hand::WORST).expect("played").through
+        };
+        assert!(!through(Variant::textbook(2.0)));
+        assert!(through(Variant::field(2.0)));
+    }
+}
