@@ -37,6 +37,7 @@ struct Foot {
 
 /// Signed distance, outside positive, and foot of the perpendicular from `p`; none for a face without closed form, or where the foot is
 /// not unique.
+#[inline(never)]
 fn foot(face: &FaceRecord, p: Vec3) -> Option<Foot> {
     let (distance, normal) = signed(face, p)?;
     Some(Foot {
@@ -47,7 +48,7 @@ fn foot(face: &FaceRecord, p: Vec3) -> Option<Foot> {
 }
 
 /// Signed distance, outside positive, and outward unit normal, likewise.
-#[inline]
+#[inline(always)]
 fn signed(face: &FaceRecord, p: Vec3) -> Option<(f32, Vec3)> {
     let axis = Vec3::from_array(face.axis);
     let from = p - Vec3::from_array(face.origin);
@@ -184,7 +185,7 @@ fn distance(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<f32> {
             // On the axis, or within rounding of it, the direction is lost and so is the foot.
             (squared > 1e-12).then(|| (squared * inverse_sqrt(squared) - face.radius) * face.sense)
         }
-        _ => signed(face, p).map(|(distance, _)| distance),
+        _ => foot(face, p).map(|foot| foot.distance),
     }
 }
 

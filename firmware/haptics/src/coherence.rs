@@ -8,20 +8,25 @@
 //! A node that joints keep apart from all it could meet is far too, as long as every one of those joints lasts: what was noted so is told from the rest by
 //! an epoch that ends with any of them.
 //!
-//! A node is due no sooner than the first of those below it, so what is far is passed over in large pieces.
+//! A node is due no sooner than the first of those below it, so what is far is passed over in large pieces. Of a leaf that is near it is noted which of its
+//! points are, and how long the others can be left alone.
 //!
 //! Cost: some 25 instructions for a node of which enough is known, against some 200 for asking the field.
 
 /// Entries in the table. A power of two.
 const SLOTS: usize = 8192;
-/// Nodes of one job that can be told apart; further ones are looked at every tick. One less, and every key fits 29 bits.
+/// Nodes of one job that can be told apart.
 const NODES: u32 = 1 << 20;
-/// Bits of a slot's key above the node's.
-const EPOCH_SHIFT: u32 = 29;
-/// Epochs before all is forgotten and the count starts over.
-const EPOCHS: u32 = 7;
+/// Further ones are looked at every tick; so every tag fits 16 bits.
+const LAST_NODE: u32 = NODES - SLOTS as u32 - 1;
+/// Jobs that can be told apart; those of further ones too.
+const JOBS: u16 = 512;
 /// The travel is taken back to zero, and the table cleared, beyond this: 2 m.
 const LONGEST_NM: u32 = 2_000_000_000;
+/// Set in the due of a node that a joint keeps apart.
+const JOINED: u32 = 1 << 31;
+/// Never reached.
+const NEVER_NM: u32 = JOINED - 1;
 /// How much of its distance a node is left alone for, at most: interpolated distances may change a little faster than the object travels where
 /// a brick holds a sharp edge.
 const LONGEST_SHARE: f32 = 0.9;
@@ -31,41 +36,47 @@ const SHORTEST_SHARE: f32 = 0.45;
 /// Ticks after which a node that was near is asked again; a power of two. Which tick depends on the node, so that the work is spread.
 const ASK_AGAIN: u32 = 16;
 
+/// Points of a leaf, the first in the lowest bit. [`Points::ALL`] are all of it, be they more than there are bits.
+pub(crate) type Points = u16;
+/// See [`Points`].
+pub(crate) const ALL: Points = Points::MAX;
+
 /// Due times of nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct Coherence {
     travel_nm: u32,
     /// Ticks since everything was forgotten.
     round: u32,
-    /// Of the joints, less one: 0 to 6.
-    epoch: u32,
+    /// Of the joints.
+    epoch: u16,
     slots: [Slot; SLOTS],
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Slot {
-    key: u32,
-    /// [`NEAR`] or the travel at which the node is due.
+    tag: u16,
+    /// Points that are near: none of a node that is far. With [`JOINED`] the epoch instead.
+    near: Points,
+    /// The travel at which the others, or all, are due.
     due_nm: u32,
 }
 
 impl Slot {
+    /// All zero, so that a fresh table lies in memory that is cleared rather than copied from flash.
     const EMPTY: Self = Self {
-        key: Key::NONE,
+        tag: 0,
+        near: 0,
         due_nm: 0,
     };
 }
-
-/// Due time of a node that was near.
-const NEAR: u32 = 0;
 
 /// What is known of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Known {
     /// None of its points can be a candidate before this [`Due`].
     Far(Due),
-    /// It was near not long ago.
-    Near,
+    /// It was near not long ago: none but these of its points can be a candidate.
+    Near(Points),
     /// Nothing, or nothing of late.
     Nothing,
 }
@@ -76,9 +87,9 @@ pub(crate) struct Due(u32);
 
 impl Due {
     /// At every tick.
-    pub const NOW: Self = Self(NEAR);
+    pub const NOW: Self = Self(0);
     /// Never, before others have had their say.
-    pub const NEVER: Self = Self(u32::MAX);
+    pub const NEVER: Self = Self(NEVER_NM);
 }
 
 /// Which node of which job.
@@ -86,21 +97,30 @@ impl Due {
 pub(crate) struct Key(u32);
 
 impl Key {
-    /// No node. Zero, so that a fresh table lies in memory that is cleared rather than copied from flash.
-    const NONE: u32 = 0;
+    /// No node.
+    const NONE: Self = Self(0);
 
     pub fn new(job: u16, node: u32) -> Self {
-        if node < NODES - 1 {
+        if node < LAST_NODE && job < JOBS {
             Self(u32::from(job) * NODES + node + 1)
         } else {
-            Self(Self::NONE)
+            Self::NONE
         }
+    }
+
+    fn is_none(self) -> bool {
+        self.0 == Self::NONE.0
     }
 
     fn slot(self) -> usize {
         // Neighbouring nodes fall into neighbouring slots; jobs are spread over the table.
         let job = self.0 / NODES;
         (self.0 + 619 * job) as usize % SLOTS
+    }
+
+    /// Tells it from the others that fall into its slot; never that of an empty slot.
+    fn tag(self) -> u16 {
+        (self.0 / SLOTS as u32) as u16 + 1
     }
 
     /// The node's share of its distance: one of 256, by eight bits of a multiplicative hash (Knuth's 2³²/φ).
@@ -146,77 +166,87 @@ impl Coherence {
     #[inline]
     pub fn ask(&self, key: Key, horizon: u32, leaf: bool) -> Known {
         let slot = &self.slots[key.slot()];
-        if key.0 == Key::NONE {
-            Known::Nothing
-        } else if slot.key != key.0 {
-            if slot.key == self.joined_key(key) && slot.due_nm > horizon {
-                // What is above cannot tell it from other dues, and must not outlast the joint.
+        if slot.tag != key.tag() || key.is_none() {
+            return Known::Nothing;
+        }
+        if slot.due_nm >= JOINED {
+            // What is above cannot tell it from other dues, and must not outlast the joint.
+            return if slot.near == self.epoch && slot.due_nm & NEVER_NM > horizon {
                 Known::Far(Due::NOW)
             } else {
                 Known::Nothing
-            }
-        } else if slot.due_nm > horizon {
+            };
+        }
+        let due = slot.due_nm <= horizon;
+        if slot.near == 0 && !due {
             Known::Far(Due(slot.due_nm))
-        } else if (slot.due_nm == NEAR || !leaf)
-            && !(self.round.wrapping_add(key.0)).is_multiple_of(ASK_AGAIN)
-        {
-            Known::Near
-        } else {
+        } else if (slot.near == 0 && leaf) || (self.round.wrapping_add(key.0)).is_multiple_of(ASK_AGAIN) {
             Known::Nothing
+        } else {
+            Known::Near(if due { ALL } else { slot.near })
         }
     }
 
     /// No point of the node is nearer than `distance` m, as seen now.
     #[inline]
     pub fn set_distance(&mut self, key: Key, distance: f32) -> Due {
-        // A float that is negative or not a number becomes 0, a huge one the largest number.
-        let ahead = (distance * (key.share() * 1e9)) as u32;
-        let due_nm = self.travel_nm.saturating_add(ahead);
-        self.set(key, due_nm);
-        Due(due_nm)
+        let due = self.ahead(key, distance);
+        self.set_due(key, due);
+        due
     }
 
     /// No node below this one is due before `due`.
     #[inline]
     pub fn set_due(&mut self, key: Key, due: Due) {
-        self.set(key, due.0);
-    }
-
-    /// No point of the node can touch anything but what joints keep it from before it has travelled `distance` m.
-    pub fn set_joined(&mut self, key: Key, distance: f32) {
-        let ahead = (distance * (key.share() * 1e9)) as u32;
-        if key.0 != Key::NONE {
-            self.slots[key.slot()] = Slot {
-                key: self.joined_key(key),
-                due_nm: self.travel_nm.saturating_add(ahead),
-            };
-        }
-    }
-
-    /// Some joint is no more: what was noted for it is void.
-    pub fn end_joints(&mut self) {
-        self.epoch += 1;
-        if self.epoch == EPOCHS {
-            self.forget();
-        }
-    }
-
-    fn joined_key(&self, key: Key) -> u32 {
-        key.0 | (self.epoch + 1) << EPOCH_SHIFT
+        self.set(key, 0, due.0);
     }
 
     /// The node is near.
     #[inline]
     pub fn set_near(&mut self, key: Key) {
-        self.set(key, NEAR);
+        self.set(key, ALL, 0);
+    }
+
+    /// Of the leaf's points these are near, the others no nearer than `distance` m.
+    #[inline]
+    pub fn set_points(&mut self, key: Key, near: Points, distance: f32) {
+        let Due(due_nm) = self.ahead(key, distance);
+        self.set(key, near, due_nm);
+    }
+
+    /// No point of the node can touch anything but what joints keep it from before it has travelled `distance` m.
+    pub fn set_joined(&mut self, key: Key, distance: f32) {
+        let Due(due_nm) = self.ahead(key, distance);
+        self.set(key, self.epoch, due_nm | JOINED);
+    }
+
+    /// Some joint is no more: what was noted for it is void.
+    pub fn end_joints(&mut self) {
+        match self.epoch.checked_add(1) {
+            Some(next) => self.epoch = next,
+            None => self.forget(),
+        }
+    }
+
+    /// When the node's share of `distance` m will be used up.
+    #[inline]
+    fn ahead(&self, key: Key, distance: f32) -> Due {
+        // A float that is negative or not a number becomes 0, a huge one the largest number.
+        let ahead = (distance * (key.share() * 1e9)) as u32;
+        Due(smaller_of(self.travel_nm.saturating_add(ahead), NEVER_NM))
     }
 
     #[inline]
-    fn set(&mut self, key: Key, due_nm: u32) {
-        if key.0 != Key::NONE {
-            self.slots[key.slot()] = Slot { key: key.0, due_nm };
+    fn set(&mut self, key: Key, near: Points, due_nm: u32) {
+        if !key.is_none() {
+            let tag = key.tag();
+            self.slots[key.slot()] = Slot { tag, near, due_nm };
         }
     }
+}
+
+fn smaller_of(a: u32, b: u32) -> u32 {
+    if b < a { b } else { a }
 }
 
 /// Nanometres, rounded up past any rounding of the single-precision product.
@@ -270,7 +300,7 @@ mod tests {
     #[test]
     fn what_joints_keep_apart_is_far_while_they_last() {
         let mut c = Coherence::new();
-        let key = Key::new(511, NODES - 2);
+        let key = Key::new(JOBS - 1, LAST_NODE - 1);
         for _ in 0..20 {
             c.set_joined(key, 1e-3);
             assert!(is_far(c.ask(key, c.horizon(0.4e-3), true)));

@@ -75,17 +75,20 @@ const HALF: usize = MAX_CONTACTS / 2;
 /// offered stay. A contact is filled in place: it is too large to be handed about by value in the innermost loop.
 #[derive(Clone, Debug)]
 pub(crate) struct Contacts {
-    /// This tick's and the last one's, in turn: the deepest in the first half, the others in the second. Filled up to their lengths.
+    /// This tick's and the last one's, in turn, filled up to their lengths. One that overflowed has the deepest in its first half.
     lists: [[Contact; MAX_CONTACTS]; 2],
     /// Which is this tick's: 0 or 1.
     current: usize,
     /// Length of this tick's.
     len: usize,
-    /// Once the first half is full: its least deep on top.
+    /// Once it overflowed, of the first half: the least deep on top.
     by_gap: Heap,
-    /// Once all is full: the one of the second half that would touch last on top.
+    /// Likewise, of the second half: the one that would touch last on top.
     by_reach: Heap,
+    /// It overflowed.
     dropped: bool,
+    /// Square of the longest arm, m².
+    farthest2: f32,
     /// How many of the last tick's can be carried over.
     carried_len: usize,
 }
@@ -165,6 +168,7 @@ impl Contacts {
             by_gap: Heap::new(),
             by_reach: Heap::new(),
             dropped: false,
+            farthest2: 0.0,
             carried_len: 0,
         }
     }
@@ -173,6 +177,7 @@ impl Contacts {
     pub fn clear(&mut self) {
         self.len = 0;
         self.dropped = false;
+        self.farthest2 = 0.0;
         self.carried_len = 0;
     }
 
@@ -182,6 +187,7 @@ impl Contacts {
         self.current = 1 - self.current;
         self.len = 0;
         self.dropped = false;
+        self.farthest2 = 0.0;
     }
 
     /// Takes what pushed in the last tick over into this one where its leaf was not looked at: the gap as the object's `motion` since (scaled as the
@@ -192,7 +198,7 @@ impl Contacts {
             let gap = old.gap + dot(&old.row, motion);
             if old.phase != Phase::Free
                 && unseen(old.leaf)
-                && let Some(new) = self.offer(gap, old.reach_gap)
+                && let Some(new) = self.offer(gap, old.reach_gap, old.arm.length_squared())
             {
                 *new = Contact {
                     gap,
@@ -226,56 +232,54 @@ impl Contacts {
         self.dropped
     }
 
-    /// A place for a contact, the rest of which the caller fills in, unless it is not to be kept. Two comparisons, and at most twice 7 steps of a
-    /// heap when it displaces others.
+    /// The longest arm of all that were taken in, m.
+    pub fn farthest(&self) -> f32 {
+        libm::sqrtf(self.farthest2)
+    }
+
+    /// A place for a contact with an arm of √`arm2`, the rest of which the caller fills in, unless it is not to be kept. Once all is full it is two comparisons, and at most
+    /// twice 7 steps of a heap when it displaces others.
     #[inline]
-    pub fn offer(&mut self, gap: f32, reach_gap: f32) -> Option<&mut Contact> {
-        let place = if self.len < HALF {
+    pub fn offer(&mut self, gap: f32, reach_gap: f32, arm2: f32) -> Option<&mut Contact> {
+        let place = if self.len < MAX_CONTACTS {
             self.len += 1;
             self.len - 1
         } else {
             self.displace(gap, reach_gap)?
         };
-        let list = &mut self.lists[self.current];
-        list[place].gap = gap;
-        list[place].reach_gap = reach_gap;
-        if place + 1 == HALF && self.len == HALF {
-            self.by_gap.build(list[..HALF].iter().map(|c| c.gap));
+        if arm2 > self.farthest2 {
+            self.farthest2 = arm2;
         }
-        Some(&mut list[place])
+        let contact = &mut self.lists[self.current][place];
+        contact.gap = gap;
+        contact.reach_gap = reach_gap;
+        Some(contact)
     }
 
-    /// A place once the first half is full. Out of line: the loop over points is faster for it.
+    /// A place once all is full. Out of line: the loop over points is faster for it.
     #[inline(never)]
     fn displace(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
-        if gap < self.by_gap.largest() {
-            let place = self.by_gap.replace_largest(gap);
-            let displaced = self.lists[self.current][place];
-            if let Some(second) = self.offer_second_half(displaced.reach_gap) {
-                self.lists[self.current][second] = displaced;
-            }
-            return Some(place);
+        let list = &mut self.lists[self.current];
+        if !self.dropped {
+            self.dropped = true;
+            list.select_nth_unstable_by(HALF, |a, b| a.gap.total_cmp(&b.gap));
+            self.by_gap.build(list[..HALF].iter().map(|c| c.gap));
+            self.by_reach.build(list[HALF..].iter().map(|c| c.reach_gap));
         }
-        self.offer_second_half(reach_gap)
+        if gap >= self.by_gap.largest() {
+            return self.displace_in_second_half(reach_gap);
+        }
+        let place = self.by_gap.replace_largest(gap);
+        let displaced = self.lists[self.current][place];
+        if let Some(second) = self.displace_in_second_half(displaced.reach_gap) {
+            self.lists[self.current][second] = displaced;
+        }
+        Some(place)
     }
 
     /// A place in the second half, unless all there would touch sooner.
-    fn offer_second_half(&mut self, reach_gap: f32) -> Option<usize> {
-        if self.len < MAX_CONTACTS {
-            self.len += 1;
-            let place = self.len - 1;
-            if self.len == MAX_CONTACTS {
-                let half = &mut self.lists[self.current][HALF..];
-                half[HALF - 1].reach_gap = reach_gap;
-                self.by_reach.build(half.iter().map(|c| c.reach_gap));
-            }
-            return Some(place);
-        }
-        self.dropped = true;
-        if reach_gap >= self.by_reach.largest() {
-            return None;
-        }
-        Some(HALF + self.by_reach.replace_largest(reach_gap))
+    fn displace_in_second_half(&mut self, reach_gap: f32) -> Option<usize> {
+        (reach_gap < self.by_reach.largest()).then(|| HALF + self.by_reach.replace_largest(reach_gap))
     }
 }
 
@@ -290,7 +294,7 @@ mod tests {
         let mut x = 1u32;
         for _ in 0..2048 {
             x = (x * 1021 + 7) % 2048;
-            if let Some(c) = contacts.offer(x as f32, -(x as f32)) {
+            if let Some(c) = contacts.offer(x as f32, -(x as f32), 0.0) {
                 c.moving_face = x as u16;
             }
         }
@@ -315,7 +319,7 @@ mod tests {
         let mut contacts = Contacts::new();
         for i in 0..MAX_CONTACTS {
             // The deeper half comes last, so every one of it displaces another.
-            assert!(contacts.offer(-(i as f32), 0.0).is_some());
+            assert!(contacts.offer(-(i as f32), 0.0, 0.0).is_some());
         }
         assert!(!contacts.dropped());
         let sum: f32 = contacts.as_slice().iter().map(|c| c.gap).sum();
@@ -326,7 +330,7 @@ mod tests {
     fn carries_what_was_not_seen() {
         let mut contacts = Contacts::new();
         for i in 0..10 {
-            let c = contacts.offer(-1e-6, 0.0).unwrap();
+            let c = contacts.offer(-1e-6, 0.0, 0.0).unwrap();
             c.row = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
             c.phase = Phase::Parting;
             c.moving_face = i;

@@ -79,9 +79,10 @@ impl Walk<'_, '_, '_> {
         if !wanted {
             return 0.0;
         }
-        self.work.candidates = self.work.candidates.saturating_add(1);
-        let reach_gap = gap - self.search.swing * arm.length_squared();
-        if let Some(contact) = self.contacts.offer(gap, reach_gap) {
+        self.count_candidate();
+        let arm2 = arm.length_squared();
+        let reach_gap = gap - self.search.swing * arm2;
+        if let Some(contact) = self.contacts.offer(gap, reach_gap, arm2) {
             contact.row = row;
             contact.arm = arm;
             contact.rate = 0.0;

@@ -16,7 +16,7 @@ use glam::Vec3;
 use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage};
 
 use crate::analytic::{OnFace, edge_face, exact, on_face};
-use crate::coherence::{Coherence, Due, Key, Known};
+use crate::coherence::{ALL, Coherence, Due, Key, Known, Points};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mated, Mating};
 use crate::io::{Flags, Work};
@@ -34,13 +34,19 @@ const LEAST_GRADIENT2: f32 = 0.01;
 pub(crate) const APPROACH: f32 = 2.0;
 /// Thinning up to which some point of every leaf is looked at: leaves have 8 points.
 const LEAF_THINNING: u8 = 3;
-/// The budget counts what a look-up costs, 170 instructions. Passing over a node of which enough is known costs half of that, asking the field
-/// about one four times that; a point at an edge or within the margin costs as much again, and a candidate twice as much on top.
-const PASSED_OVER_PER_LOOKUP: u32 = 2;
-/// See [`PASSED_OVER_PER_LOOKUP`].
-const NODE: u32 = 4;
-/// See [`PASSED_OVER_PER_LOOKUP`].
-const CANDIDATE: u32 = 2;
+/// Which points of a leaf are looked at, by thinning.
+const THINNED: [Points; LEAF_THINNING as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
+/// A point of a leaf is near while its gap is not more than so many margins. Any others are then left alone for some ticks: the margin is more than
+/// twice the way of one.
+const NEAR_MARGINS: f32 = 4.0;
+/// The budget counts what a look-up costs, 170 instructions, here in halves: one more within the margin or at an edge,
+const LOOKUP: u32 = 2;
+/// two more when it may touch,
+const CANDIDATE: u32 = 4;
+/// four to ask the field about a node,
+const NODE: u32 = 8;
+/// and half a one to pass over a node of which enough is known.
+const PASSED_OVER: u32 = 1;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -123,10 +129,9 @@ impl<'i> Search<'_, 'i> {
             coherence,
             contacts,
             work,
-            passed_over: 0,
+            spent: LOOKUP * self.step_cost,
             mated: Mated::NONE,
             near: 0,
-            edges: 0,
         };
         let stop = walk
             .jobs(start, None)
@@ -189,10 +194,9 @@ impl<'i> Search<'_, 'i> {
             coherence,
             contacts,
             work,
-            passed_over: 0,
+            spent: LOOKUP * self.step_cost,
             mated: Mated::NONE,
             near: 0,
-            edges: 0,
         }
     }
 }
@@ -205,14 +209,12 @@ pub(crate) struct Walk<'w, 's, 'i> {
     horizon: u32,
     pub contacts: &'w mut Contacts,
     pub work: &'w mut Work,
-    /// Nodes known to be far or near.
-    passed_over: u32,
+    /// Of the budget, halves of a look-up.
+    spent: u32,
     /// What guidance said of the last point's faces.
     mated: Mated,
     /// Points within the margin.
     pub near: u32,
-    /// Points where one face did not tell all.
-    edges: u32,
 }
 
 /// Deepest tree whose inner nodes all learn when they are due: 2¹⁶ leaves in two halves each time.
@@ -315,15 +317,20 @@ impl Walk<'_, '_, '_> {
             above.close(index, self);
             let key = Key::new(job.index, index);
             let mut asked = false;
+            let mut near = ALL;
             match self.coherence.ask(key, self.horizon, node.skip == index + 1) {
                 Known::Far(due) => {
-                    self.passed_over += 1;
+                    self.spent += PASSED_OVER;
                     above.hear(due);
                     index = node.skip;
                     continue;
                 }
-                Known::Near => self.passed_over += 1,
+                Known::Near(points) => {
+                    self.spent += PASSED_OVER;
+                    near = points;
+                }
                 Known::Nothing => {
+                    self.spent += NODE;
                     self.work.nodes += 1;
                     let distance = job.distance(node.center) - (node.radius + edge_error);
                     if distance > self.search.margin {
@@ -362,54 +369,107 @@ impl Walk<'_, '_, '_> {
                 continue;
             }
             above.hear(if job.field.is_occupancy() {
-                self.points::<true>(job, here, points)
+                self.points::<true>(job, here, points, near)
             } else {
-                self.points::<false>(job, here, points)
+                self.points::<false>(job, here, points, near)
             });
         }
         above.close(index, self);
         None
     }
 
-    /// All points of a leaf, as far as the budget goes, and when it is due again; `VOXELS`: against a voxmap.
-    fn points<const VOXELS: bool>(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> Due {
+    /// The points of a leaf, those that are `near`, as far as the budget goes, and when it is due again; `VOXELS`: against a voxmap.
+    fn points<const VOXELS: bool>(
+        &mut self,
+        job: &Job<'_>,
+        leaf: Leaf,
+        points: &[PointRecord],
+        near: Points,
+    ) -> Due {
+        let thinning = self.search.thinning.min(LEAF_THINNING);
+        if near != ALL {
+            self.some::<VOXELS>(job, leaf, points, near & THINNED[usize::from(thinning)]);
+            return Due::NOW;
+        }
         let most = (self.left() as usize).min(points.len());
-        let stride = 1 << self.search.thinning.min(LEAF_THINNING);
-        let mut nearest = self.some::<VOXELS>(job, leaf, points[..most].iter().step_by(stride));
-        if stride > 1 && nearest > self.search.margin {
+        let stride = 1 << thinning;
+        let mut seen = self.each::<VOXELS>(job, leaf, points[..most].iter().step_by(stride));
+        let margin = self.search.margin;
+        if stride > 1 && seen.nearest > margin {
             // None of these is near: with the others, too, it is known for how long the leaf can be left alone.
             for start in 1..stride {
                 let others = points[..most].iter().skip(start).step_by(stride);
-                nearest = nearest.min(self.some::<VOXELS>(job, leaf, others));
+                let others = self.each::<VOXELS>(job, leaf, others);
+                if others.nearest < seen.nearest {
+                    seen.nearest = others.nearest;
+                }
             }
         }
+        let key = Key::new(leaf.job, leaf.node);
         // What is not looked at could be anywhere.
-        if nearest > self.search.margin && most == points.len() {
-            (self.coherence).set_distance(Key::new(leaf.job, leaf.node), nearest)
-        } else {
-            Due::NOW
+        if most < points.len() {
+            return Due::NOW;
+        }
+        if seen.nearest > margin {
+            return self.coherence.set_distance(key, seen.nearest);
+        }
+        if stride == 1 && points.len() <= Points::BITS as usize {
+            self.coherence.set_points(key, seen.near, seen.beyond);
+        }
+        Due::NOW
+    }
+
+    /// Those points of a leaf.
+    #[inline(always)]
+    fn some<const VOXELS: bool>(
+        &mut self,
+        job: &Job<'_>,
+        leaf: Leaf,
+        points: &[PointRecord],
+        mut which: Points,
+    ) {
+        while which != 0 {
+            if let Some(point) = points.get(which.trailing_zeros() as usize) {
+                self.work.points += 1;
+                self.spent += LOOKUP;
+                let _ = self.point::<VOXELS>(job, leaf, point);
+            }
+            which &= which - 1;
         }
     }
 
-    /// Some points of a leaf; the smallest gap.
+    /// Each of `points`, of one leaf.
     #[inline(always)]
-    fn some<'p, const VOXELS: bool>(
+    fn each<'p, const VOXELS: bool>(
         &mut self,
         job: &Job<'_>,
         leaf: Leaf,
         points: impl Iterator<Item = &'p PointRecord>,
-    ) -> f32 {
-        let mut nearest = f32::INFINITY;
+    ) -> Seen {
+        let near = NEAR_MARGINS * self.search.margin;
+        let mut seen = Seen {
+            nearest: f32::INFINITY,
+            near: 0,
+            beyond: f32::INFINITY,
+        };
         let mut looked_at = 0;
         for point in points {
-            looked_at += 1;
             let gap = self.point::<VOXELS>(job, leaf, point);
-            if gap < nearest {
-                nearest = gap;
+            if gap < seen.nearest {
+                seen.nearest = gap;
             }
+            if gap > near {
+                if gap < seen.beyond {
+                    seen.beyond = gap;
+                }
+            } else {
+                seen.near |= 1 << (looked_at % Points::BITS);
+            }
+            looked_at += 1;
         }
         self.work.points += looked_at;
-        nearest
+        self.spent += LOOKUP * looked_at;
+        seen
     }
 
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
@@ -441,7 +501,7 @@ impl Walk<'_, '_, '_> {
     /// A point where more than one face is near, or none has a closed form.
     #[inline(never)]
     fn at_edge(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, cell: &Cell<'_>, p: Vec3) -> f32 {
-        self.edges += 1;
+        self.spent += LOOKUP;
         let nearby = job.field.nearby(cell);
         if let Some((distance, face)) = exact(job.faces, nearby, p) {
             if distance < self.search.margin
@@ -480,6 +540,7 @@ impl Walk<'_, '_, '_> {
     #[inline(always)]
     fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: &OnFace) {
         self.near += 1;
+        self.spent += LOOKUP;
         let n = job.to_push * found.normal;
         let (moving, fixed) = {
             let (own, other) = ([point.face, point.edge_face], [found.face, NO_FACE]);
@@ -501,12 +562,14 @@ impl Walk<'_, '_, '_> {
         let arm = job.to_arm.apply(point.position);
         let turn = arm.cross(n) * self.search.inverse_length;
         let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
-        if gap >= self.search.slack + self.search.approach(&row) {
+        let slack = self.search.slack;
+        if gap >= slack && gap >= slack + self.search.approach(&row) {
             return;
         }
-        self.work.candidates = self.work.candidates.saturating_add(1);
-        let reach_gap = gap - self.search.swing * arm.length_squared();
-        let Some(contact) = self.contacts.offer(gap, reach_gap) else {
+        self.count_candidate();
+        let arm2 = arm.length_squared();
+        let reach_gap = gap - self.search.swing * arm2;
+        let Some(contact) = self.contacts.offer(gap, reach_gap, arm2) else {
             return;
         };
         contact.row = row;
@@ -523,26 +586,37 @@ impl Walk<'_, '_, '_> {
         contact.leaf = leaf;
     }
 
+    /// A point may touch.
+    #[inline(always)]
+    pub fn count_candidate(&mut self) {
+        self.spent += CANDIDATE;
+        self.work.candidates = self.work.candidates.saturating_add(1);
+    }
+
     /// A point's surroundings were looked at for a joint: as much as a look-up.
     pub fn count_clearing(&mut self) {
-        self.passed_over += PASSED_OVER_PER_LOOKUP;
+        self.spent += LOOKUP;
     }
 
     /// What was done so far, in look-ups.
     fn used(&self) -> u32 {
-        self.search.step_cost
-            + NODE * self.work.nodes
-            + self.passed_over / PASSED_OVER_PER_LOOKUP
-            + self.work.points
-            + self.near
-            + self.edges
-            + CANDIDATE * u32::from(self.work.candidates)
+        self.spent / LOOKUP
     }
 
     /// Look-ups left.
     fn left(&self) -> u32 {
         self.search.budget.saturating_sub(self.used())
     }
+}
+
+/// What points of a leaf told.
+struct Seen {
+    /// Smallest gap, m.
+    nearest: f32,
+    /// Those that are near.
+    near: Points,
+    /// Smallest gap of the others, m.
+    beyond: f32,
 }
 
 /// 1/√x for ordinary positive x: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).

@@ -15,6 +15,8 @@
 //! Cost on a Cortex-M7 (counted as in [`crate::tick()`]): 150 instructions to set a system up, 150 to solve it, and about 300 for a contact in all
 //! passes over it together.
 
+use core::{array, mem};
+
 use glam::{Mat3, Vec3};
 use heapless::Vec;
 
@@ -63,6 +65,15 @@ struct Secants {
     pulls: Vec<Secant, MAX_PULLS>,
 }
 
+impl Secants {
+    const fn new() -> Self {
+        Self {
+            slip: Slip::NONE,
+            pulls: Vec::new(),
+        }
+    }
+}
+
 /// Stiffness of contacts, N/m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stiffness {
@@ -95,15 +106,17 @@ pub(crate) struct Solution {
 impl Step<'_> {
     /// The step without contacts.
     pub fn free(&self) -> Solution {
-        let mut secants = self.secants(&self.scale(self.twist));
+        let (secants, next) = &mut (Secants::new(), Secants::new());
+        let (mut secants, mut next) = (secants, next);
+        self.find_secants(&self.scale(self.twist), secants);
         secants.slip = Slip::NONE;
         let mut solves = 0;
         loop {
-            let (matrix, right) = self.without_contact(&secants);
+            let (matrix, right) = self.without_contact(secants);
             let x = matrix.solve(&right);
             solves += 1;
-            let next = self.secants(&x);
-            if settled(&secants, &next) || solves == MAX_FREE_SOLVES {
+            self.find_secants(&x, next);
+            if settled(secants, next) || solves == MAX_FREE_SOLVES {
                 return Solution {
                     twist: self.unscale(&x),
                     contact: Wrench::ZERO,
@@ -111,12 +124,12 @@ impl Step<'_> {
                     settled: true,
                 };
             }
-            secants = next;
+            mem::swap(&mut secants, &mut next);
         }
     }
 
     /// The step with `contacts` of stiffness `k` and approach damping `damping_s` (τ), starting from the motion so far, or from the
-    /// `free` solution when that touches nothing.
+    /// `free` solution when that touches nothing. No contact's arm is longer than `farthest` (m).
     ///
     /// On return each contact's rate and phase are those of the solution.
     pub fn with_contacts(
@@ -125,8 +138,12 @@ impl Step<'_> {
         contacts: &mut [Contact],
         k: &Stiffness,
         damping_s: f32,
+        farthest: f32,
     ) -> Solution {
         let h = self.period_s;
+        let lever = farthest / self.length;
+        // No rate changes by more than the unknowns' change times this: the length of a row.
+        let row_length = length6(&[1.0, lever, 0.0, 0.0, 0.0, 0.0]);
         let reach = |phase| match phase {
             Phase::Free => 0.0,
             Phase::Parting => h,
@@ -139,13 +156,22 @@ impl Step<'_> {
         let mut x = self.scale(self.twist);
         // Whether `x` solves the step with some set of touching points.
         let mut solved = false;
-        let mut secants = self.secants(&self.scale(free.twist));
+        // Two, taken in turn: they are too large to be handed about.
+        let (secants, next) = &mut (Secants::new(), Secants::new());
+        let (mut secants, mut next) = (secants, next);
+        self.find_secants(&self.scale(free.twist), secants);
         let mut stiffness = Symmetric6::ZERO;
         let mut push = [0.0f32; 6];
         let mut solves = 0;
+        // What of a free point's gap is left at the step's end by the rate last looked at, m, can have been closed since when it is less than this.
+        let mut out_of_reach = f32::INFINITY;
+        let mut way = 0.0;
         let is_settled = loop {
             let mut changed = false;
             for c in contacts.iter_mut() {
+                if c.phase == Phase::Free && c.gap + closing_s * c.rate >= out_of_reach {
+                    continue;
+                }
                 c.rate = dot(&c.row, &x);
                 // Most points are free and stay so: a gap that closing in full would leave open needs no closer look.
                 if c.phase == Phase::Free && c.gap >= 0.0 && c.gap + closing_s * c.rate >= 0.0 {
@@ -164,20 +190,23 @@ impl Step<'_> {
                     c.phase = phase;
                 }
             }
+            let last = x;
             if !solved && !changed {
                 x = self.scale(free.twist);
                 solved = true;
+                way += row_length * length6(&array::from_fn(|i| x[i] - last[i]));
+                out_of_reach = closing_s * way;
                 continue;
             }
-            let next = self.secants(&x);
-            if solved && !changed && settled(&secants, &next) {
+            self.find_secants(&x, next);
+            if solved && !changed && settled(secants, next) {
                 break true;
             }
             if solves == MAX_SOLVES {
                 break false;
             }
-            secants = next;
-            let (mut matrix, mut right) = self.without_contact(&secants);
+            mem::swap(&mut secants, &mut next);
+            let (mut matrix, mut right) = self.without_contact(secants);
             matrix.add_matrix(&stiffness);
             for (r, p) in right.iter_mut().zip(&push) {
                 *r += p;
@@ -185,6 +214,8 @@ impl Step<'_> {
             x = matrix.solve(&right);
             solved = true;
             solves += 1;
+            way += row_length * length6(&array::from_fn(|i| x[i] - last[i]));
+            out_of_reach = closing_s * way;
         };
         let contact = total_force(contacts, k, h, damping_s);
         Solution {
@@ -195,17 +226,14 @@ impl Step<'_> {
         }
     }
 
-    fn secants(&self, x: &[f32; 6]) -> Secants {
+    fn find_secants(&self, x: &[f32; 6], found: &mut Secants) {
         let pull = self.coupling.pull(self.settings, self.period_s, self.unscale(x));
-        let mut secants = Secants {
-            slip: Coupling::slip(pull, self.settings),
-            pulls: Vec::new(),
-        };
+        found.slip = Coupling::slip(pull, self.settings);
+        found.pulls.clear();
         for pull in self.pulls {
             // No more than there is room for pulls.
-            let _ = secants.pulls.push(pull.secant(x));
+            let _ = found.pulls.push(pull.secant(x));
         }
-        secants
     }
 
     /// Matrix and right side of mass and coupling, scaled: (M + h·B + h²·K)·V' = M·V + h·(K·d + (B + h·K)·V_hand).
@@ -301,6 +329,11 @@ fn next_phase(c: &Contact, h: f32, damping_s: f32, band: f32) -> Phase {
 #[inline]
 pub(crate) fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+}
+
+/// At least the length of `a`.
+fn length6(a: &[f32; 6]) -> f32 {
+    1.000_01 * libm::sqrtf(dot(a, a))
 }
 
 fn settled(a: &Secants, b: &Secants) -> bool {

@@ -239,6 +239,7 @@ impl State {
         let touching_now = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as f32;
         self.sharing = larger(larger(touching_now, 1.0), self.sharing * SHARING_DECAY);
         let fastest = self.fastest(settings);
+        let farthest = self.contacts.farthest();
         let contacts = self.contacts.as_mut_slice();
         let solution = if explicit {
             let k = explicit::shared_stiffness(contact, self.sharing);
@@ -253,7 +254,7 @@ impl State {
                 point: k,
                 guided: k * guided_share,
             };
-            step.with_contacts(free, contacts, &k, contact.damping_s)
+            step.with_contacts(free, contacts, &k, contact.damping_s, farthest)
         };
         work.contacts = self.contacts.pushing() as u16;
         work.solves = solution.solves;

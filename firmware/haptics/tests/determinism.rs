@@ -39,13 +39,12 @@ impl Hash {
             self.word(u32::from(p.count));
             self.word(p.depth_m.to_bits());
         }
-        self.word(out.work.points);
         self.word(u32::from(out.work.flags.bits()));
     }
 }
 
 /// The contract: a change of this number is a change of the force law's results, and belongs in the changelog.
-const GOLDEN: u64 = 0x1d23_34e8_68db_32ee;
+const GOLDEN: u64 = 0xa2e7_a808_ff6d_3aba;
 
 #[test]
 fn a_thousand_ticks_hash_to_the_golden_value() {

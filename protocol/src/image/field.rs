@@ -16,6 +16,8 @@ pub struct Field<'a> {
     pub(super) inverse_cell: f32,
     /// Cells along x, y, z.
     pub(super) cells: [f32; 3],
+    /// No surface is nearer to the grid's sides, cells.
+    pub(super) padding: f32,
 }
 
 /// Where a position lies in a field.
@@ -185,19 +187,17 @@ impl<'a> Field<'a> {
         g[0].to_bits() < n[0].to_bits() && g[1].to_bits() < n[1].to_bits() && g[2].to_bits() < n[2].to_bits()
     }
 
-    /// Lower bound of the distance (m) from a position outside the grid: that to its box, which holds the whole shape. 0 for one that is not a number.
+    /// Lower bound of the distance (m) from a position outside the grid: that to the box which holds the whole shape, the grid's less its padding.
+    /// 0 for one that is not a number.
     #[cold]
     pub(super) fn beyond(&self, g: [f32; 3]) -> f32 {
         let mut squared = f32::MIN_POSITIVE;
         for (g, n) in g.iter().zip(&self.cells) {
-            let d = if *g < 0.0 {
-                *g
-            } else if *g >= *n {
-                g - n
-            } else {
-                0.0
-            };
-            squared += d * d;
+            let (below, above) = (self.padding - g, g - (n - self.padding));
+            let d = if below > above { below } else { above };
+            if d > 0.0 {
+                squared += d * d;
+            }
         }
         sqrt_below(squared) * self.record.cell
     }

@@ -137,6 +137,7 @@ impl<'a> SceneImage<'a> {
                 blob: self.blob,
                 inverse_cell: 1.0 / field.cell,
                 cells: field.brick_dims.map(|d| f32::from(d) * BRICK_CELLS as f32),
+                padding: field.padding(),
             },
         }
     }

@@ -146,6 +146,18 @@ pub struct FieldRecord {
     pub brick_count: u32,
 }
 
+impl FieldRecord {
+    /// What surrounds the surface in the grid at least, cells: all within `band` − √3 cells of it is in stored bricks, so in the grid. 0 in a voxmap.
+    pub fn padding(&self) -> f32 {
+        // The root rounded up by more than the quotient can be off.
+        const DIAGONAL: f32 = 1.7321;
+        if self.format == FORMAT_OCCUPANCY {
+            return 0.0;
+        }
+        (self.band / self.cell - DIAGONAL).max(0.0)
+    }
+}
+
 /// One entry of a field's brick grid, as stored in 16 bits.
 ///
 /// Bit 15 clear: the number of a brick (from `first_brick`). Bit 15 set: no brick; bit 14 tells inside (1) from outside (0), bits 0–13
