@@ -109,9 +109,11 @@ impl Flags {
     pub const BAD_INPUT: Self = Self(1 << 9);
     /// The step came out non-finite: zero wrench, object stopped where it was.
     pub const NON_FINITE: Self = Self(1 << 10);
+    /// The coupling had made energy: the handle's wrench is turned down.
+    pub const SOFTENED: Self = Self(1 << 11);
 
     /// Every flag with its name, in order of bits.
-    pub const NAMES: [(Self, &'static str); 11] = [
+    pub const NAMES: [(Self, &'static str); 12] = [
         (Self::BUDGET_EXCEEDED, "budget exceeded"),
         (Self::CONTACTS_DROPPED, "contacts dropped"),
         (Self::UNSETTLED, "unsettled"),
@@ -123,6 +125,7 @@ impl Flags {
         (Self::SLEW_LIMITED, "slew limited"),
         (Self::BAD_INPUT, "bad input"),
         (Self::NON_FINITE, "non-finite"),
+        (Self::SOFTENED, "softened"),
     ];
 
     /// None.

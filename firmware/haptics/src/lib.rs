@@ -17,6 +17,7 @@
 //! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
 //! | `guidance`, `constraint`, `pull` | constraint targets: in force, engaged; errors and their rows; how they pull in a step |
 //! | `joint` | what an engaged target keeps apart leaves the work |
+//! | `passivity` | observer of the energy the coupling makes, and the valve that stops it |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
 //! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
@@ -40,6 +41,7 @@ mod limits;
 mod linear;
 mod nearest;
 mod occupancy;
+mod passivity;
 mod pose;
 mod probe;
 mod proximity;
@@ -54,11 +56,12 @@ mod touching;
 pub use glam::{Quat, Vec3};
 pub use guidance::{GuidanceState, TargetError};
 pub use io::{FacePair, FacePairs, Flags, Input, Output, Work};
+pub use passivity::Passivity;
 pub use pose::{Pose, Twist, Wrench};
 pub use probe::{ContactPoint, Nearest, Probe, ProbeError, Prober};
 pub use settings::{
     ContactSettings, CouplingSettings, GuidanceMethod, GuidanceSettings, Integrator, LimitSettings,
-    ObjectSettings, Range, Settings, SettingsError, ranges,
+    ObjectSettings, PassivitySettings, Range, Settings, SettingsError, ranges,
 };
 pub use state::{GrabError, State};
 pub use tick::tick;

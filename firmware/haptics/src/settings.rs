@@ -16,6 +16,8 @@ pub struct Settings {
     pub object: ObjectSettings,
     /// How constraint targets guide.
     pub guidance: GuidanceSettings,
+    /// How much energy the coupling may make.
+    pub passivity: PassivitySettings,
     /// What may reach the motors.
     pub limits: LimitSettings,
     /// Time from tick to tick (h in the notation), s. Default 1 ms.
@@ -120,6 +122,23 @@ pub enum GuidanceMethod {
     Thesis,
 }
 
+/// What the coupling may make of nothing; see `passivity` in the sources.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassivitySettings {
+    /// Most energy that the coupling may make and not have dissipated, J; from half of it on the wrench is turned down. 0 switches observer and valve off. Default
+    /// 0.5 mJ: a tap of 0.1 kg at 0.1 m/s.
+    pub tank_j: f32,
+    /// The handle's own viscous friction, N s/m, as far as it is certain: what it dissipates may be made. Default 0.
+    pub damping: f32,
+    /// The same in rotation, N m s/rad. Default 0.
+    pub angular_damping: f32,
+    /// Whole ticks from a wrench to the motors that give it, at most [`MAX_DELAY_TICKS`]. Default 0: they give it within the period.
+    pub delay_ticks: u32,
+}
+
+/// Largest [`PassivitySettings::delay_ticks`].
+pub const MAX_DELAY_TICKS: usize = 4;
+
 /// Last limits before the mechanism.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitSettings {
@@ -162,6 +181,12 @@ impl Default for Settings {
                 allowance_m: 0.1e-3,
                 time_s: 20e-3,
                 joints: true,
+            },
+            passivity: PassivitySettings {
+                tank_j: 0.5e-3,
+                damping: 0.0,
+                angular_damping: 0.0,
+                delay_ticks: 0,
             },
             limits: LimitSettings {
                 force_n: 12.0,
@@ -232,6 +257,17 @@ pub mod ranges {
     pub const ALLOWANCE_M: Range = Range { min: 0.0, max: 1e-3 };
     /// [`super::GuidanceSettings::time_s`].
     pub const GUIDANCE_TIME_S: Range = Range { min: 1e-3, max: 1.0 };
+    /// [`super::PassivitySettings::tank_j`].
+    pub const TANK_J: Range = Range { min: 0.0, max: 0.1 };
+    /// [`super::PassivitySettings::damping`].
+    pub const HANDLE_DAMPING: Range = Range { min: 0.0, max: 20.0 };
+    /// [`super::PassivitySettings::angular_damping`].
+    pub const HANDLE_ANGULAR_DAMPING: Range = Range { min: 0.0, max: 0.1 };
+    /// [`super::PassivitySettings::delay_ticks`].
+    pub const DELAY_TICKS: Range = Range {
+        min: 0.0,
+        max: super::MAX_DELAY_TICKS as f32,
+    };
     /// [`super::LimitSettings::force_n`].
     pub const FORCE_N: Range = Range { min: 0.0, max: 100.0 };
     /// [`super::LimitSettings::torque_nm`].
@@ -275,6 +311,7 @@ impl Settings {
             contact,
             object,
             guidance,
+            passivity,
             limits,
             period_s,
             integrator: Integrator::Implicit | Integrator::Explicit,
@@ -325,6 +362,18 @@ impl Settings {
             ),
             ("guidance.allowance_m", guidance.allowance_m, ranges::ALLOWANCE_M),
             ("guidance.time_s", guidance.time_s, ranges::GUIDANCE_TIME_S),
+            ("passivity.tank_j", passivity.tank_j, ranges::TANK_J),
+            ("passivity.damping", passivity.damping, ranges::HANDLE_DAMPING),
+            (
+                "passivity.angular_damping",
+                passivity.angular_damping,
+                ranges::HANDLE_ANGULAR_DAMPING,
+            ),
+            (
+                "passivity.delay_ticks",
+                passivity.delay_ticks as f32,
+                ranges::DELAY_TICKS,
+            ),
             ("limits.force_n", limits.force_n, ranges::FORCE_N),
             ("limits.torque_nm", limits.torque_nm, ranges::TORQUE_NM),
             (

@@ -12,6 +12,7 @@ use crate::body::{Body, Grabbed};
 use crate::coherence::Coherence;
 use crate::contact::Contacts;
 use crate::guidance::{Guidance, TargetError};
+use crate::passivity::{Passivity, Tank};
 use crate::pose::{Pose, Twist, Wrench};
 use crate::proximity::Leaf;
 use crate::tick::usable_pose;
@@ -26,6 +27,8 @@ pub struct State {
     pub(crate) last_object: Option<Pose>,
     /// Handle wrench of the last tick, for the slew limit.
     pub(crate) previous_wrench: Wrench,
+    /// Energy account of the coupling.
+    pub(crate) tank: Tank,
     /// Points touching, rising at once and falling by a twentieth a tick: divides the total contact stiffness.
     pub(crate) sharing: f32,
     /// Where to go on after a tick whose budget ran out, else the beginning.
@@ -113,6 +116,7 @@ impl State {
             grabbed: None,
             last_object: None,
             previous_wrench: Wrench::ZERO,
+            tank: Tank::new(),
             sharing: 0.0,
             resume: Leaf::FIRST,
             busy: false,
@@ -236,6 +240,11 @@ impl State {
         self.grabbed.as_ref().map(|g| g.center)
     }
 
+    /// How passive the coupling is.
+    pub fn passivity(&self) -> Passivity {
+        self.tank.seen
+    }
+
     /// Forgets the last handle wrench, so that the next one builds up from zero under the slew limit.
     pub fn restart_slew(&mut self) {
         self.previous_wrench = Wrench::ZERO;
@@ -253,6 +262,7 @@ impl State {
         self.thinning = 0;
         self.overruns = 0;
         self.step_cost = 0;
+        self.tank.forget();
         self.guidance.forget();
         self.contacts.clear();
         self.coherence.forget();

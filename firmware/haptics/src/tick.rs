@@ -74,6 +74,21 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         return out;
     };
     let (mut grabbed, coupling) = take_hold(grabbed, handle, input.handle_twist);
+    let open = if input.enabled {
+        let object_energy = grabbed.moving_energy(settings.object.mass_kg);
+        (state.tank).balance(
+            handle,
+            input.handle_twist,
+            &coupling,
+            state.previous_wrench,
+            object_energy,
+            settings,
+        )
+    } else {
+        state.tank.forget();
+        1.0
+    };
+    work.flags.insert_if(open < 1.0, Flags::SOFTENED);
     let (gyration2, scale) = grabbed
         .body
         .gyration2_in_world(grabbed.orientation, &settings.object);
@@ -147,7 +162,12 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         settings,
         &mut work.flags,
     );
-    let wanted = coupling.reaction(pull);
+    state.tank.pulled(pull, twist, settings.period_s);
+    let felt = Wrench {
+        force: pull.force * open,
+        torque: pull.torque * open,
+    };
+    let wanted = coupling.reaction(felt);
     let guided = (state.contacts.as_slice().iter())
         .filter(|c| c.guided && c.phase != Phase::Free)
         .map(|c| c.arm);
@@ -350,6 +370,11 @@ fn slipping(pull: Wrench, settings: &Settings, flags: &mut Flags) -> Wrench {
 }
 
 impl Grabbed {
+    /// Energy of its motion, J, without that of its turning.
+    fn moving_energy(&self, mass_kg: f32) -> f32 {
+        0.5 * mass_kg * self.twist.linear.length_squared()
+    }
+
     /// Moves with `twist` for `period_s`.
     fn advance(&mut self, twist: Twist, period_s: f32) {
         self.twist = twist;

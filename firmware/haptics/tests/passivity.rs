@@ -1,0 +1,160 @@
+//! What the coupling makes of nothing stays within the tank, whatever the gains, the handle and the delay; a loop that dissipates is left alone.
+
+mod support;
+
+use std::collections::VecDeque;
+
+use mortise_haptics::{Flags, Input, Pose, Quat, Settings, State, Twist, Vec3, tick};
+use proptest::prelude::*;
+use support::image::Image;
+
+/// A handle on one axis over the slab, held so many ticks late, its speed the filtered difference of positions.
+#[derive(Clone, Copy, Debug)]
+struct Loop {
+    mass_kg: f64,
+    damping: f64,
+    filter_s: f64,
+    delay: usize,
+    /// Damping of the hand, N s/m.
+    grip: f64,
+    /// Of the hand's spring, once it has come to rest without the slab giving way.
+    push_n: f64,
+}
+
+#[derive(Debug, Default)]
+struct Seen {
+    /// Largest net work of the device on the handle, J, since the press.
+    made_j: f64,
+    /// All that passed.
+    passed_j: f64,
+    /// Largest speed in the last half second, m/s.
+    unrest_m_per_s: f64,
+    softened: f32,
+    flagged: bool,
+}
+
+/// Presses the box onto the slab, taps the handle after a second, and watches for three.
+fn press(image: &Image, settings: &Settings, rig: Loop) -> Seen {
+    let mut settings = *settings;
+    settings.passivity.delay_ticks = rig.delay as u32;
+    settings.passivity.damping = rig.damping as f32;
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let start = 5.05e-3;
+    let pose = |z: f64| Pose::new(Vec3::new(0.0, 0.0, z as f32), Quat::IDENTITY);
+    state.grab(&scene, 1, &pose(start)).unwrap();
+    let (mut z, mut v, mut last, mut speed) = (start, 0.0, start, 0.0);
+    let period = f64::from(settings.period_s);
+    let mut under_way: VecDeque<f64> = vec![0.0; rig.delay].into();
+    let (mut seen, mut net) = (Seen::default(), 0.0);
+    let ticks = (4.0 / period) as u32;
+    for i in 0..ticks {
+        let t = f64::from(i) * period;
+        speed += period / (rig.filter_s + period) * ((z - last) / period - speed);
+        last = z;
+        let input = Input {
+            handle: pose(z),
+            handle_twist: Twist {
+                linear: Vec3::new(0.0, 0.0, speed as f32),
+                angular: Vec3::ZERO,
+            },
+            enabled: true,
+        };
+        let out = tick(&mut state, &scene, &settings, &input);
+        under_way.push_back(f64::from(out.handle.force.z));
+        let force = under_way.pop_front().unwrap();
+        let from = z;
+        if (t - 1.0).abs() < 0.5 * period {
+            v += 0.05;
+        }
+        for _ in 0..10 {
+            let h = period / 10.0;
+            let goal = start - rig.push_n / SPRING * (2.0 * t).min(1.0);
+            v += h * (force + SPRING * (goal - z) - (rig.damping + rig.grip) * v) / rig.mass_kg;
+            z += h * v;
+        }
+        let work = force * (z - from);
+        net += work;
+        seen.made_j = seen.made_j.max(net);
+        seen.passed_j += work.abs();
+        if t > 3.5 {
+            seen.unrest_m_per_s = seen.unrest_m_per_s.max(v.abs());
+        }
+        seen.flagged |= out.work.flags.contains(Flags::SOFTENED);
+    }
+    seen.softened = state.passivity().softened;
+    seen
+}
+
+/// Of the hand, N/m.
+const SPRING: f64 = 400.0;
+
+const USUAL: Loop = Loop {
+    mass_kg: 0.15,
+    damping: 1.0,
+    filter_s: 3e-3,
+    delay: 0,
+    grip: 4.0,
+    push_n: 5.0,
+};
+
+#[test]
+fn a_loop_that_dissipates_is_left_alone() {
+    let image = support::slab_and_box(0.05e-3, 5);
+    let seen = press(&image, &Settings::default(), USUAL);
+    println!("{seen:?}");
+    assert!(!seen.flagged && seen.softened == 0.0, "{seen:?}");
+    assert!(seen.made_j < 1e-6 && seen.unrest_m_per_s < 1e-4, "{seen:?}");
+}
+
+/// A light handle too well damped by a speed that comes late, and a stiff spring three ticks late: both buzz without the valve.
+#[test]
+fn a_loop_that_buzzes_is_turned_down() {
+    let image = support::slab_and_box(0.05e-3, 5);
+    let mut damped = Settings::default();
+    damped.coupling.b_t = 60.0;
+    let light = Loop {
+        mass_kg: 0.02,
+        damping: 0.2,
+        grip: 0.2,
+        ..USUAL
+    };
+    let mut stiff = Settings::default();
+    stiff.coupling.k_t_n_per_m = 4000.0;
+    stiff.coupling.b_t = 0.0;
+    let late = Loop {
+        delay: 3,
+        grip: 0.2,
+        ..USUAL
+    };
+    for (settings, rig) in [(damped, light), (stiff, late)] {
+        let mut open = settings;
+        open.passivity.tank_j = 0.0;
+        let (without, with) = (press(&image, &open, rig), press(&image, &settings, rig));
+        println!("without {without:?}\nwith {with:?}");
+        assert!(without.unrest_m_per_s > 0.02, "{without:?}");
+        assert!(with.flagged, "{with:?}");
+        assert!(with.made_j < 1e-3, "{with:?}");
+        assert!(with.unrest_m_per_s < 0.25 * without.unrest_m_per_s, "{with:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_gains_make_more_than_a_millijoule(
+        k in 100.0f32..5e3, b in 0.0f32..50.0, mass in 0.05f64..1.0, damping in 0.0f64..2.0, filter in 0.0f64..5e-3,
+        delay in 0usize..3, grip in 0.2f64..10.0, push in 0.5f64..8.0, period in prop::sample::select(vec![0.25e-3f32, 1e-3, 2e-3]),
+    ) {
+        let image = support::slab_and_box(0.05e-3, 3);
+        let mut settings = Settings { period_s: period, ..Settings::default() };
+        settings.coupling.k_t_n_per_m = k;
+        settings.coupling.b_t = b;
+        let rig = Loop { mass_kg: mass, damping, filter_s: filter, delay, grip, push_n: push };
+        let seen = press(&image, &settings, rig);
+        // The tank, what is drawn in the ticks that the valve takes to close, and the flick's own.
+        prop_assert!(seen.made_j < 1e-3, "{:?}", seen);
+    }
+}
