@@ -8,7 +8,7 @@ use clap::Subcommand;
 use mortise_lab::figures::{self, Plan, Value};
 use mortise_lab::study::{feature_size, shrink};
 use mortise_lab::table::write_csv;
-use mortise_lab::{blend, clearance, pareto, rate};
+use mortise_lab::{blend, clearance, pareto, rate, stability};
 
 use super::output;
 use crate::sample;
@@ -40,6 +40,8 @@ enum Experiment {
     Pareto(Sweep),
     /// Show force and engagement over an insertion, the thesis' blend beside the default guidance
     Blend(Sweep),
+    /// Find where closed loops become unstable, theory drawn beside
+    Stability(Sweep),
     /// Show the rate that a tick allows over an insertion: collision only, guided, guided with recognition; emulated board
     Rate(Sweep),
     /// Which voxels let a peg into its hole, and what shrinking does: 27 trials by a simulated operator, textbook voxmap
@@ -85,6 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Experiment::Clearance(sweep) => clearance(sweep),
         Experiment::Pareto(sweep) => pareto(sweep),
         Experiment::Blend(sweep) => blend(sweep),
+        Experiment::Stability(sweep) => stability(sweep),
         Experiment::Rate(sweep) => rate(sweep),
         Experiment::Shrink(sweep) => shrink(sweep),
         Experiment::FeatureSize { sweep, shrink } => feature_size(sweep, *shrink),
@@ -194,6 +197,22 @@ fn feature_size(sweep: &Sweep, shrink: f64) -> anyhow::Result<ExitCode> {
         write_csv(&study.trials, folder, "feature-size")?;
         write_csv(&study.terms, folder, "feature-size-model")?;
         feature_size::chart(&study).write(folder, "feature-size")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn stability(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+    let mut written = Ok(());
+    let maps = stability::maps(sweep.quick, &mut |trial| {
+        if written.is_ok() {
+            written = sweep.tell(trial);
+        }
+    })?;
+    written?;
+    if let Some(folder) = &sweep.out {
+        for map in &maps {
+            map.write(folder)?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -123,19 +123,58 @@ pub(crate) fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> 
     Some((handle / count, hand / count))
 }
 
-/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Trapezoids between
-/// samples: what happens between two of them is not seen.
+/// Most net work of contacts on the object at any time, mJ. The contact wrench of a tick moved the object to the pose told with it.
+pub(crate) fn contact_energy(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
+    let Some(part) = scene.bodies().get(usize::from(scene.part)) else {
+        return 0.0;
+    };
+    let center = part.surface.shape().center_of_mass;
+    let (mut given, mut largest) = (0.0f64, 0.0f64);
+    for pair in samples.windows(2) {
+        let (Some((_, from)), Some((_, to))) = (&pair[0].object, &pair[1].object) else {
+            continue;
+        };
+        let (start, end) = (pose_mm(from), pose_mm(to));
+        let moved = 1e-3 * (end.transform_point3(center) - start.transform_point3(center));
+        let turned = turn(&start, &end);
+        let near = share_of_first(pair);
+        let mean = |get: fn(&WireWrench) -> [f32; 3]| {
+            (1.0 - near) * vector(get(&pair[0].contact)) + near * vector(get(&pair[1].contact))
+        };
+        given += 1e3 * (mean(|w| w.force).dot(moved) + mean(|w| w.torque).dot(turned));
+        largest = largest.max(given);
+    }
+    largest
+}
+
+/// Rotation vector from one pose to another, world axes.
+fn turn(from: &DAffine3, to: &DAffine3) -> DVec3 {
+    let rotation = |pose: &DAffine3| DQuat::from_mat3(&pose.matrix3);
+    (rotation(to) * rotation(from).inverse())
+        .normalize()
+        .to_scaled_axis()
+}
+
+/// Of a held wrench between two samples: all of one of them when they are neighbouring ticks, else as much of each.
+fn share_of_first(pair: &[Telemetry]) -> f64 {
+    if pair[1].tick.wrapping_sub(pair[0].tick) == 1 {
+        1.0
+    } else {
+        0.5
+    }
+}
+
+/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Exact between samples of neighbouring ticks,
+/// whose wrench is held from the first to the second; else trapezoids: what happens between two samples is not seen.
 pub(crate) fn energy(samples: &[Telemetry]) -> (f64, f64) {
     let (mut given, mut largest, mut passed) = (0.0f64, 0.0f64, 0.0f64);
     for pair in samples.windows(2) {
         let (from, to) = (pose_mm(&pair[0].handle), pose_mm(&pair[1].handle));
         let moved = 1e-3 * (to.translation - from.translation);
-        let rotation = |pose: &DAffine3| DQuat::from_mat3(&pose.matrix3);
-        let turned = (rotation(&to) * rotation(&from).inverse())
-            .normalize()
-            .to_scaled_axis();
+        let turned = turn(&from, &to);
+        let first = share_of_first(pair);
         let mean = |get: fn(&WireWrench) -> [f32; 3]| {
-            0.5 * (vector(get(&pair[0].wrench)) + vector(get(&pair[1].wrench)))
+            first * vector(get(&pair[0].wrench)) + (1.0 - first) * vector(get(&pair[1].wrench))
         };
         let work = 1e3 * (mean(|w| w.force).dot(moved) + mean(|w| w.torque).dot(turned));
         given += work;

@@ -49,6 +49,8 @@ pub struct Outcome {
     pub energy_given_mj: f64,
     /// Work that went through the handle either way, mJ.
     pub energy_passed_mj: f64,
+    /// Most net work contacts had done on the object at any time, mJ; exact where each tick is heard, else trapezoids between samples.
+    pub contact_given_mj: f64,
     /// Telemetry samples taken.
     pub samples: u32,
     /// Telemetry the board dropped because the link was slower.
@@ -140,6 +142,7 @@ quantities! {
     board_penetration_mm => |o| Some(o.board_penetration_mm);
     energy_given_mj => |o| Some(o.energy_given_mj);
     energy_passed_mj => |o| Some(o.energy_passed_mj);
+    contact_given_mj => |o| Some(o.contact_given_mj);
     samples => |o| Some(f64::from(o.samples));
     dropped_samples => |o| Some(f64::from(o.dropped_samples));
     bad_frames => |o| Some(f64::from(o.bad_frames));

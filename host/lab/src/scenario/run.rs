@@ -426,6 +426,7 @@ fn outcome(
         board_penetration_mm: measure::board_deepest(samples),
         energy_given_mj,
         energy_passed_mj,
+        contact_given_mj: measure::contact_energy(scene, samples),
         samples: samples.len() as u32,
         dropped_samples: statistics.dropped,
         bad_frames: statistics.bad_frames,

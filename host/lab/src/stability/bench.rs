@@ -4,7 +4,7 @@
 //! Runge and Kutta's fourth order in [`SUBSTEPS`] steps a tick in double precision; where dry friction can hold the handle, it does. The encoder rounds, the speed comes
 //! from its differences, and the force is given out so many ticks late. The work of the device is exact, because its force is held.
 
-use mortise_haptics::{Input, Output, Pose, Quat, Settings, State, Twist, Vec3, tick};
+use mortise_haptics::{Input, Output, Passivity, Pose, Quat, Settings, State, Twist, Vec3, tick};
 use mortise_protocol::image::SceneImage;
 
 use super::oracle::Plant;
@@ -45,6 +45,42 @@ pub struct Rig {
     pub sensor: Sensor,
     /// Ticks from measuring to giving the force out, beyond none.
     pub delay_ticks: usize,
+}
+
+impl Rig {
+    /// A handle held by nothing but friction of its own, measured exactly.
+    pub const fn bare(mass_kg: f64, damping: f64) -> Self {
+        Self {
+            plant: Plant {
+                mass_kg,
+                damping,
+                stiffness: 0.0,
+            },
+            hand_damping: 0.0,
+            coulomb_n: 0.0,
+            sensor: Sensor::EXACT,
+            delay_ticks: 0,
+        }
+    }
+
+    /// The simulated mechanism of the rigs in a hand of 400 N/m with 4 N s/m.
+    pub const fn held() -> Self {
+        Self {
+            plant: Plant {
+                mass_kg: 0.15,
+                damping: 1.0 + 4.0,
+                stiffness: 400.0,
+            },
+            hand_damping: 4.0,
+            coulomb_n: 0.01,
+            sensor: Sensor {
+                resolution_m: 5e-6,
+                filter_s: 3e-3,
+                share: 1.0,
+            },
+            delay_ticks: 0,
+        }
+    }
 }
 
 /// What the hand does in a tick.
@@ -122,6 +158,11 @@ impl<'a> Bench<'a> {
             energy: Energy::default(),
             contact: Energy::default(),
         }
+    }
+
+    /// How passive the coupling is.
+    pub fn passivity(&self) -> Passivity {
+        self.state.passivity()
     }
 
     /// One tick, and the period after it.

@@ -7,7 +7,7 @@ use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
 
 use super::bench::{Bench, Energy, Rig, Sensor, Wish};
-use super::oracle::{Plant, Wall, limit};
+use super::oracle::{Law, Search, Wall, limit};
 
 /// Pressed with this force, N.
 const PRESS_N: f64 = 5.0;
@@ -22,16 +22,20 @@ const PART: f64 = 0.2;
 /// Trembling beyond this multiple of what the flick gave ends the watch: it has grown.
 const GROWN: f64 = 20.0;
 
-/// A wall rendered by the product's coupling, its object pinned by contact: settings, and what the sensor tells of the speed.
+/// A wall rendered by the product's coupling, its object pinned by contact, without the valve: settings, and what the sensor tells of the speed.
 ///
-/// The coupling looks a period ahead: it gives K·x + (b_T + T·K)·v̂. A wall of damping B is one with b_T = 0 that is told B/(T·K) of the speed.
-pub fn settings(wall: &Wall) -> (Settings, Sensor) {
+/// The coupling looks a period ahead: it gives K·x + (b_T + T·K)·v̂. A textbook's wall of damping B is one with b_T = 0 that is told B/(T·K) of the speed.
+pub fn settings(law: Law, wall: &Wall, stiffness: f64) -> (Settings, Sensor) {
     let mut settings = open(wall.period_s);
-    settings.coupling.k_t_n_per_m = wall.stiffness as f32;
-    settings.coupling.b_t = 0.0;
+    settings.coupling.k_t_n_per_m = stiffness as f32;
+    let (damping, share) = match law {
+        Law::Wall => (0.0, wall.damping / (wall.period_s * stiffness)),
+        Law::Coupling => (wall.damping, 1.0),
+    };
+    settings.coupling.b_t = damping as f32;
     let sensor = Sensor {
         filter_s: wall.filter_s,
-        share: wall.damping / (wall.period_s * wall.stiffness),
+        share,
         ..Sensor::EXACT
     };
     (settings, sensor)
@@ -48,6 +52,7 @@ pub fn open(period_s: f64) -> Settings {
     settings.contact.total_stiffness_n_per_m = 1e9;
     settings.limits.force_n = 100.0;
     settings.limits.force_slew_n_per_s = 1e6;
+    settings.passivity.tank_j = 0.0;
     settings
 }
 
@@ -58,6 +63,8 @@ pub struct Flick {
     pub first_m: f64,
     /// See `first_m`.
     pub last_m: f64,
+    /// Deviation of the flick in a linear loop without damping, v·√(m/K), m: trembling that has grown to what limits it may fall again, but not so far.
+    pub linear_m: f64,
     /// Work of the device on the handle since the flick.
     pub energy: Energy,
 }
@@ -65,7 +72,7 @@ pub struct Flick {
 impl Flick {
     /// Whether the trembling died out.
     pub fn dies_out(&self) -> bool {
-        self.last_m < self.first_m
+        self.last_m < self.first_m && self.last_m < 2.0 * self.linear_m
     }
 }
 
@@ -109,21 +116,34 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
     Flick {
         first_m,
         last_m,
+        linear_m: FLICK_M_PER_S * (rig.plant.mass_kg / f64::from(settings.coupling.k_t_n_per_m)).sqrt(),
         energy: bench.energy,
     }
 }
 
-/// Largest stiffness, N/m, at which the flick dies out, with a wall that is otherwise `wall`; looked for between a quarter and four times `near`.
-pub fn stiffness_limit(scene: &SceneImage<'_>, part: u16, plant: Plant, wall: &Wall, near: f64) -> f64 {
-    limit(0.25 * near, 4.0 * near, |stiffness| {
-        let (settings, sensor) = settings(&Wall { stiffness, ..*wall });
+/// Largest stiffness, N/m, at which the flick dies out, with a wall that is otherwise `wall`; looked for around `near`.
+pub fn stiffness_limit(
+    scene: &SceneImage<'_>,
+    part: u16,
+    rig: &Rig,
+    law: Law,
+    wall: &Wall,
+    near: f64,
+    search: Search,
+) -> f64 {
+    let around = if search.steps > 10 { 4.0 } else { 2.0 };
+    limit(near / around, near * around, search, |stiffness| {
+        let (settings, told) = settings(law, wall, stiffness);
         let rig = Rig {
-            plant,
-            hand_damping: 0.0,
-            coulomb_n: 0.0,
-            sensor,
+            sensor: Sensor {
+                resolution_m: rig.sensor.resolution_m,
+                ..told
+            },
             delay_ticks: wall.delay_ticks,
+            ..*rig
         };
-        flick(scene, part, &settings, &rig).dies_out()
+        let flick = flick(scene, part, &settings, &rig);
+        // What is smaller than the encoder tells is not seen, and no trembling.
+        flick.dies_out() || flick.last_m < 2.0 * rig.sensor.resolution_m
     })
 }

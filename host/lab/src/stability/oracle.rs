@@ -38,6 +38,30 @@ pub struct Wall {
     pub delay_ticks: usize,
 }
 
+/// How damping goes with stiffness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// The textbook's wall: K·x + B·v̂.
+    Wall,
+    /// The product's coupling, which looks a period ahead: K·x + (b_T + T·K)·v̂, with B in place of b_T.
+    Coupling,
+}
+
+impl Law {
+    /// `wall` as this law renders it at another stiffness; its own damping is the law's B or b_T.
+    pub fn at(self, wall: &Wall, stiffness: f64) -> Wall {
+        let ahead = match self {
+            Self::Wall => 0.0,
+            Self::Coupling => wall.period_s * stiffness,
+        };
+        Wall {
+            stiffness,
+            damping: wall.damping + ahead,
+            ..*wall
+        }
+    }
+}
+
 type Matrix = [[f64; STATES]; STATES];
 
 /// Largest absolute eigenvalue of the closed loop's step; the loop is stable below 1.
@@ -67,25 +91,45 @@ pub fn spectral_radius(plant: &Plant, wall: &Wall) -> f64 {
 }
 
 /// Largest stable K below `most`, N/m, for a wall that is otherwise `wall`; 0 when none is.
-pub fn stiffness_limit(plant: &Plant, wall: &Wall, most: f64) -> f64 {
+pub fn stiffness_limit(plant: &Plant, law: Law, wall: &Wall, most: f64) -> f64 {
     // Below a good many stiffnesses the first unstable one is looked for, since a wall that is damped too much is unstable when soft as well.
-    limit(1e-3 * most, most, |stiffness| {
-        spectral_radius(plant, &Wall { stiffness, ..*wall }) < 1.0
+    limit(1e-3 * most, most, FINE, |stiffness| {
+        spectral_radius(plant, &law.at(wall, stiffness)) < 1.0
     })
 }
 
-/// The largest value up to which `stable` is true, between `least` and `most`: forty steps of a constant ratio, then bisection. 0 when not even `least` is.
-pub fn limit(least: f64, most: f64, mut stable: impl FnMut(f64) -> bool) -> f64 {
-    const STEPS: i32 = 40;
-    let at = |i: i32| least * (most / least).powf(f64::from(i) / f64::from(STEPS));
-    let Some(first) = (0..=STEPS).find(|&i| !stable(at(i))) else {
+/// How closely a limit is looked for: steps of a constant ratio before bisection, and the ratio at which that ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Search {
+    /// Steps.
+    pub steps: i32,
+    /// Above 1.
+    pub ratio: f64,
+}
+
+/// For oracles, and where experiment is held against them.
+pub const FINE: Search = Search {
+    steps: 40,
+    ratio: 1.0 + 1e-4,
+};
+
+/// For maps.
+pub const COARSE: Search = Search {
+    steps: 6,
+    ratio: 1.01,
+};
+
+/// The largest value up to which `stable` is true, between `least` and `most`. 0 when not even `least` is.
+pub fn limit(least: f64, most: f64, search: Search, mut stable: impl FnMut(f64) -> bool) -> f64 {
+    let at = |i: i32| least * (most / least).powf(f64::from(i) / f64::from(search.steps));
+    let Some(first) = (0..=search.steps).find(|&i| !stable(at(i))) else {
         return most;
     };
     if first == 0 {
         return 0.0;
     }
     let (mut low, mut high) = (at(first - 1), at(first));
-    while high / low > 1.0 + 1e-4 {
+    while high / low > search.ratio {
         let middle = (low * high).sqrt();
         if stable(middle) {
             low = middle;
@@ -191,7 +235,7 @@ mod tests {
             (0.4, 0, 1794.0),
             (5.0, 1, 3468.0),
         ] {
-            let found = stiffness_limit(&PLANT, &wall(damping, delay), 1e5);
+            let found = stiffness_limit(&PLANT, Law::Wall, &wall(damping, delay), 1e5);
             assert!(
                 (found / expected - 1.0).abs() < 5e-4,
                 "{damping} {delay}: {found}"
@@ -203,7 +247,7 @@ mod tests {
     #[test]
     fn without_damping_the_closed_form_is_near() {
         for delay in 0..3 {
-            let found = stiffness_limit(&PLANT, &wall(0.0, delay), 1e5);
+            let found = stiffness_limit(&PLANT, Law::Wall, &wall(0.0, delay), 1e5);
             let formula = passive_stiffness(0.5, &wall(0.0, delay));
             assert!((found / formula - 1.0).abs() < 5e-3, "{delay}: {found} {formula}");
         }

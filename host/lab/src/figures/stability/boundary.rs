@@ -2,8 +2,9 @@
 
 use crate::LabError;
 use crate::figures::Row;
+use crate::stability::bench::Rig;
 use crate::stability::boundary::stiffness_limit;
-use crate::stability::oracle::{self, Plant, Wall};
+use crate::stability::oracle::{self, FINE, Law, Wall};
 use crate::stability::slab::Slab;
 use crate::variant::Variant;
 
@@ -14,11 +15,7 @@ const WITHIN_PERCENT: f64 = 1.0;
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0)?;
     let scene = slab.scene()?;
-    let plant = Plant {
-        mass_kg: 0.1,
-        damping: 0.5,
-        stiffness: 0.0,
-    };
+    let rig = Rig::bare(0.1, 0.5);
     for (damping, delay_ticks) in [(0.0, 0), (0.0, 1), (0.4, 0), (5.0, 1)] {
         let wall = Wall {
             stiffness: 0.0,
@@ -27,8 +24,8 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             period_s: 1e-3,
             delay_ticks,
         };
-        let theory = oracle::stiffness_limit(&plant, &wall, 1e5);
-        let found = stiffness_limit(&scene, slab.part, plant, &wall, theory);
+        let theory = oracle::stiffness_limit(&rig.plant, Law::Wall, &wall, 1e5);
+        let found = stiffness_limit(&scene, slab.part, &rig, Law::Wall, &wall, theory, FINE);
         let what = format!(
             "handle 0.1 kg, 0.5 N s/m, 1 kHz; wall through coupling and contact, B = {damping} N s/m, {delay_ticks} ticks late: "
         );

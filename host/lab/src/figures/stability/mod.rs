@@ -1,7 +1,11 @@
-//! Stability: where theory puts the boundary, and what the whole loop does on either side of it.
+//! Stability: where theory puts the boundary, what the whole loop does on either side of it, and what it makes of nothing.
 
 mod boundary;
+mod contacts;
+mod energy;
 pub mod faults;
+mod impact;
+mod rate;
 pub mod unsafe_commands;
 
 use super::{Plan, Row};
@@ -10,6 +14,10 @@ use crate::LabError;
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     boundary::measure(out)?;
+    energy::measure(plan, out)?;
+    contacts::measure(out)?;
+    impact::measure(out)?;
+    rate::measure(out)?;
     faults::measure(plan, out)?;
     unsafe_commands::measure(plan, out)
 }

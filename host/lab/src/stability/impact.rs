@@ -1,0 +1,163 @@
+//! A blow on a thin wall: how deep the part goes, whether it comes through, what the handle feels.
+
+use mortise_haptics::{Integrator, Settings};
+use mortise_protocol::image::SceneImage;
+use serde::Serialize;
+
+use super::bench::{Bench, Rig, Wish};
+use super::slab::Slab;
+use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::error::LabError;
+use crate::variant::Variant;
+
+/// Thickness of the wall, mm, and how far above it the part starts.
+pub const WALL_MM: f64 = 1.0;
+const GAP_MM: f64 = 20.0;
+/// How far beyond touching the hand wants to be, mm, and how long it stays there, s.
+const BEYOND_MM: f64 = 5.0;
+const STAY_S: f64 = 0.5;
+/// Speeds tried, m/s.
+const SPEEDS: [f64; 6] = [0.03, 0.06, 0.12, 0.25, 0.5, 1.0];
+
+/// One blow.
+#[derive(Clone, Debug, Serialize)]
+pub struct Blow {
+    /// Model of the scene and step.
+    pub method: &'static str,
+    /// m/s.
+    pub speed: f64,
+    /// Deepest, µm; negative when it stopped above the wall.
+    pub penetration_um: f64,
+    /// Whether it was ever past the wall's middle.
+    pub tunnelled: bool,
+    /// Largest force on the handle, N.
+    pub peak_force_n: f64,
+    /// Most net work of the device on the handle, mJ.
+    pub handle_made_mj: f64,
+}
+
+impl std::fmt::Display for Blow {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{}, {} m/s: {:.1} µm deep, {:.2} N{}",
+            self.method,
+            self.speed,
+            self.penetration_um,
+            self.peak_force_n,
+            if self.tunnelled { ", came through" } else { "" }
+        )
+    }
+}
+
+/// Ways to model wall and step.
+pub const METHODS: [(&str, Variant, Integrator); 3] = [
+    (
+        "field, implicit (ours)",
+        Variant::board(0.5),
+        Integrator::Implicit,
+    ),
+    ("field, explicit", Variant::board(0.5), Integrator::Explicit),
+    (
+        "voxmap 0.5 mm, explicit (textbook)",
+        Variant::textbook(0.5),
+        Integrator::Explicit,
+    ),
+];
+
+/// The thin wall, baked.
+///
+/// # Errors
+/// Anything that keeps it from being baked.
+pub fn wall(variant: &Variant) -> Result<Slab, LabError> {
+    Slab::bake(variant, WALL_MM, GAP_MM)
+}
+
+/// Strikes at `speed`, m/s.
+pub fn strike(
+    scene: &SceneImage<'_>,
+    part: u16,
+    method: &'static str,
+    integrator: Integrator,
+    speed: f64,
+) -> Blow {
+    let settings = Settings {
+        integrator,
+        ..Settings::default()
+    };
+    let period = f64::from(settings.period_s);
+    let mut bench = Bench::new(scene, part, settings, Rig::held());
+    bench.speed = -speed;
+    let end = -1e-3 * (GAP_MM + BEYOND_MM);
+    let ticks = ((-end / speed + STAY_S) / period) as u32;
+    let start = f64::from(scene.parts()[usize::from(part)].position[2]);
+    let (mut deepest, mut peak) = (f64::NEG_INFINITY, 0.0f64);
+    for i in 0..ticks {
+        let wanted = -speed * period * f64::from(i);
+        let out = bench.step(&Wish {
+            position: wanted.max(end),
+            speed: if wanted > end { -speed } else { 0.0 },
+            push: 0.0,
+        });
+        let z = f64::from(out.object.position.z);
+        deepest = deepest.max(start - z - 1e-3 * GAP_MM);
+        peak = peak.max(f64::from(out.handle.force.length()));
+    }
+    Blow {
+        method,
+        speed,
+        penetration_um: 1e6 * deepest,
+        tunnelled: deepest > 0.5e-3 * WALL_MM,
+        peak_force_n: peak,
+        handle_made_mj: 1e3 * bench.energy.made,
+    }
+}
+
+/// All methods at all speeds.
+///
+/// # Errors
+/// As [`wall`].
+pub fn sweep(quick: bool, out: &mut dyn FnMut(&Blow)) -> Result<Vec<Blow>, LabError> {
+    let mut blows = Vec::new();
+    for (method, variant, integrator) in METHODS {
+        let slab = wall(&variant)?;
+        let scene = slab.scene()?;
+        let speeds = if quick { &SPEEDS[4..] } else { &SPEEDS[..] };
+        for &speed in speeds {
+            let blow = strike(&scene, slab.part, method, integrator, speed);
+            out(&blow);
+            blows.push(blow);
+        }
+    }
+    Ok(blows)
+}
+
+/// Penetration over speed.
+pub fn chart(blows: &[Blow]) -> Chart {
+    // What stopped above the wall, as voxels make it, or did not go in, is drawn at the foot.
+    const LEAST_UM: f64 = 0.1;
+    let series = METHODS.iter().enumerate().map(|(index, (method, ..))| Series {
+        name: (*method).into(),
+        look: [Look::BlueDisc, Look::PurpleDiamond, Look::VermilionSquare][index],
+        line: Line::Solid,
+        points: (blows.iter().filter(|blow| blow.method == *method))
+            .map(|blow| Point {
+                x: blow.speed,
+                y: blow.penetration_um.max(LEAST_UM),
+                label: if blow.tunnelled {
+                    "through".into()
+                } else {
+                    String::new()
+                },
+                at_least: blow.tunnelled,
+            })
+            .collect(),
+    });
+    Chart {
+        title: "A blow on a wall of 1 mm: penetration over speed".into(),
+        note: "Peg ø20 mm flat on a slab, hand 400 N/m, 4 N s/m, handle 0.15 kg, 1 kHz. At the foot: 0.1 µm or less, or held off by voxels.".into(),
+        x: Axis::new("speed, m/s").with_ticks(&SPEEDS),
+        y: Axis::new("deepest, µm"),
+        series: series.collect(),
+    }
+}
