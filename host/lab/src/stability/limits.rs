@@ -86,12 +86,6 @@ fn colgate(rig: &Rig, wall: &Wall) -> f64 {
     oracle::passive_stiffness(rig.plant.damping, wall)
 }
 
-/// Abbott and Okamura 2005, Diolaiti et al. 2006: K ≤ min(2·b/T, 2·f_c/Δ).
-fn quantised(rig: &Rig, wall: &Wall) -> f64 {
-    let by_friction = 2.0 * rig.coulomb_n / rig.sensor.resolution_m;
-    by_friction.min(2.0 * rig.plant.damping / wall.period_s)
-}
-
 /// The textbook's wall without damping and the product's coupling with its default 20 N s/m and a speed filtered by 3 ms, over what `rig_of` varies.
 fn both(rig_of: fn(f64) -> (Rig, f64)) -> Vec<Condition> {
     vec![
@@ -123,17 +117,6 @@ pub fn all() -> Vec<Map> {
         law: Law::Wall,
         build: Box::new(move |damping| (Rig::bare(0.1, 0.5), wall(damping, 1e-3, 0.0, delay))),
         formula: None,
-    });
-    let frictions = [0.01, 0.05, 0.25].into_iter().map(|coulomb_n| Condition {
-        name: format!("f_c = {coulomb_n} N"),
-        law: Law::Wall,
-        build: Box::new(move |micrometres| {
-            let mut rig = Rig::bare(0.1, 0.5);
-            rig.coulomb_n = coulomb_n;
-            rig.sensor.resolution_m = 1e-6 * micrometres;
-            (rig, wall(0.0, 1e-3, 0.0, 0))
-        }),
-        formula: Some(("min(2b/T, 2f_c/Δ)", quantised)),
     });
     vec![
         Map {
@@ -180,16 +163,6 @@ pub fn all() -> Vec<Map> {
                 rig.hand_damping = 0.01 * stiffness;
                 (rig, 1e-3)
             }),
-        },
-        Map {
-            name: "stability-encoder",
-            title: "Largest quiet wall over the encoder's step and dry friction",
-            note: "Handle 0.1 kg, 0.5 N s/m, 1 kHz, wall K·x. Marks: trembling dies out or stays below two steps. Dashed: passive for certain.",
-            across: "step of the encoder, µm",
-            from: 1.0,
-            to: 300.0,
-            points: 7,
-            conditions: frictions.collect(),
         },
     ]
 }
@@ -263,11 +236,7 @@ impl Map {
                 let (rig, wall) = (condition.build)(x);
                 oracle::stiffness_limit(&rig.plant, condition.law, &wall, MOST_N_PER_M)
             };
-            // Rounding is no linear law: there only the closed form is drawn.
-            let (rig, _) = (condition.build)(self.from);
-            if rig.sensor.resolution_m == 0.0 {
-                series.push(line(String::new(), Line::Trace, &theory));
-            }
+            series.push(line(String::new(), Line::Trace, &theory));
             if let Some((name, formula)) = condition.formula {
                 let at = |x: f64| {
                     let (rig, wall) = (condition.build)(x);

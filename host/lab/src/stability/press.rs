@@ -1,5 +1,6 @@
 //! Many points pressed at once: how still the handle is, and how deep they are, implicit and explicit step side by side.
 
+use mortise_bake::PointshellKind;
 use mortise_haptics::{Integrator, Pose, Settings, Vec3};
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;
@@ -15,8 +16,8 @@ pub const PUSH_N: f64 = 10.0;
 /// Time of the press, growing in its first half, s, and what of it is looked at, s.
 const PRESS_S: f64 = 2.0;
 const LOOK_S: f64 = 0.5;
-/// Points this much above the lowest ones touch with them, m: a shell's rows differ by rounding.
-const LEVEL_M: f32 = 2e-4;
+/// Points this much above the lowest ones touch with them, m: less than what the press makes of depth.
+const LEVEL_M: f32 = 5e-6;
 /// Edges of the shells' voxels, mm.
 const VOXELS_MM: [f64; 7] = [20.0, 8.0, 4.0, 2.0, 1.0, 0.6, 0.4];
 
@@ -49,12 +50,20 @@ impl std::fmt::Display for Press {
     }
 }
 
-/// The slab under a peg whose flat end is so finely sampled.
+/// The slab under a peg whose flat end is so finely sampled: centres of voxels, not moved inward, so that all of them lie in one plane.
 ///
 /// # Errors
 /// Anything that keeps it from being baked.
 pub fn slab(voxel_mm: f64) -> Result<Slab, LabError> {
-    Slab::bake(&Variant::field(1.0).classic_shell(voxel_mm), 10.0, 0.05)
+    let variant = Variant {
+        shell: PointshellKind::Classic {
+            voxel_mm: Some(voxel_mm),
+            shrink_percent: 0.0,
+        },
+        epsilon_mm: None,
+        ..Variant::field(1.0)
+    };
+    Slab::bake(&variant, 10.0, 0.5 * voxel_mm + 0.05)
 }
 
 /// Points that lie on the peg's lower end.
