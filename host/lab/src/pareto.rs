@@ -175,7 +175,7 @@ pub fn ticks_chart(entries: &[Entry]) -> Chart {
         title: "Accuracy against the cost of a tick on the board".into(),
         note: format!(
             "Longest tick of an emulated Cortex-M7, peg with {COUNTED_MM} mm clearance pressed to the wall with 5 N and slid. \
-             Labels: cell and image; ε a tenth or a hundredth of the cell. Down and left is better."
+             Labels: cell and image. Down and left is better."
         ),
         x: Axis::new("instructions in the longest tick"),
         y: Axis::new("largest error on scene P, µm"),
