@@ -12,7 +12,7 @@ use glam::Vec3;
 use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Nearby, Shape, surface_kind};
 
 use crate::limits::length;
-use crate::proximity::inverse_sqrt;
+use crate::linear::inverse_sqrt;
 
 /// A foot counts when the field's distance there is below this many cells: interpolation errs by 0.2 next to a right angle.
 const ON_SURFACE_CELLS: f32 = 0.3;

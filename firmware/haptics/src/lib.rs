@@ -26,6 +26,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod above;
 mod analytic;
 mod body;
 mod coherence;

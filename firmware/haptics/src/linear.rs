@@ -103,6 +103,16 @@ impl Symmetric6 {
     }
 }
 
+/// 1/√x for ordinary positive x: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).
+#[inline]
+pub(crate) fn inverse_sqrt(x: f32) -> f32 {
+    let mut y = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
+    for _ in 0..3 {
+        y *= 1.5 - 0.5 * x * y * y;
+    }
+    y
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -129,6 +139,18 @@ mod tests {
                 // Condition number at most about 4/0.1 = 40, some ten roundings of 6·10⁻⁸ each way.
                 assert!((back[i] - x[i]).abs() < 5e-5, "{back:?} {x:?}");
             }
+        }
+    }
+
+    #[test]
+    fn inverse_square_root() {
+        for i in 0..10_000 {
+            let x = 0.01 + 3.99 * i as f32 / 10_000.0;
+            let y = inverse_sqrt(x);
+            assert!(
+                (f64::from(y) * f64::from(y) * f64::from(x) - 1.0).abs() < 6e-7,
+                "{x}"
+            );
         }
     }
 }

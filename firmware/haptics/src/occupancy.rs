@@ -14,9 +14,10 @@ use mortise_protocol::image::{NO_FACE, PointRecord, Voxel, VoxelSample, oct_deco
 use crate::contact::Phase;
 use crate::io::Flags;
 use crate::job::Job;
+use crate::linear::inverse_sqrt;
 use crate::nearest::SoFar;
 use crate::probe::Nearest;
-use crate::proximity::{Leaf, Walk, inverse_sqrt};
+use crate::proximity::{Leaf, Walk};
 
 /// The plane a point meets.
 struct TangentPlane {

@@ -15,12 +15,14 @@
 use glam::Vec3;
 use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage};
 
+use crate::above::Above;
 use crate::analytic::{OnFace, edge_face, exact, on_face};
 use crate::coherence::{ALL, Coherence, Due, Key, Known, Points};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mated, Mating};
 use crate::io::{Flags, Work};
 use crate::job::Job;
+use crate::linear::inverse_sqrt;
 use crate::pose::Pose;
 use crate::settings::GuidanceSettings;
 use crate::state::Placed;
@@ -217,44 +219,6 @@ pub(crate) struct Walk<'w, 's, 'i> {
     pub near: u32,
 }
 
-/// Deepest tree whose inner nodes all learn when they are due: 2¹⁶ leaves in two halves each time.
-const DEEPEST: usize = 16;
-
-/// The nodes above the one that is looked at, and when the first below each is due.
-#[derive(Default)]
-struct Above(heapless::Vec<(Key, u32, Due), DEEPEST>);
-
-impl Above {
-    /// What follows, up to node `end`, is below `key`. In a deeper tree the last above has it all.
-    fn open(&mut self, key: Key, end: u32) {
-        let _ = self.0.push((key, end, Due::NEVER));
-    }
-
-    /// Something below is due.
-    #[inline]
-    fn hear(&mut self, due: Due) {
-        if let Some((_, _, first)) = self.0.last_mut()
-            && due < *first
-        {
-            *first = due;
-        }
-    }
-
-    /// All nodes before `index` were looked at or passed over.
-    #[inline]
-    fn close(&mut self, index: u32, walk: &mut Walk<'_, '_, '_>) {
-        while let Some(&(key, end, due)) = self.0.last()
-            && end <= index
-        {
-            self.0.pop();
-            if due != Due::NOW {
-                walk.coherence.set_due(key, due);
-            }
-            self.hear(due);
-        }
-    }
-}
-
 impl Walk<'_, '_, '_> {
     /// All of a job.
     pub fn all(&mut self, job: &Job<'_>) {
@@ -314,7 +278,7 @@ impl Walk<'_, '_, '_> {
             if self.left() == 0 {
                 return Some(here);
             }
-            above.close(index, self);
+            above.close(index, self.coherence);
             let key = Key::new(job.index, index);
             let mut asked = false;
             let mut near = ALL;
@@ -374,7 +338,7 @@ impl Walk<'_, '_, '_> {
                 self.points::<false>(job, here, points, near)
             });
         }
-        above.close(index, self);
+        above.close(index, self.coherence);
         None
     }
 
@@ -617,31 +581,4 @@ struct Seen {
     near: Points,
     /// Smallest gap of the others, m.
     beyond: f32,
-}
-
-/// 1/√x for ordinary positive x: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).
-#[inline]
-pub(crate) fn inverse_sqrt(x: f32) -> f32 {
-    let mut y = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
-    for _ in 0..3 {
-        y *= 1.5 - 0.5 * x * y * y;
-    }
-    y
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn inverse_square_root() {
-        for i in 0..10_000 {
-            let x = 0.01 + 3.99 * i as f32 / 10_000.0;
-            let y = inverse_sqrt(x);
-            assert!(
-                (f64::from(y) * f64::from(y) * f64::from(x) - 1.0).abs() < 6e-7,
-                "{x}"
-            );
-        }
-    }
 }
