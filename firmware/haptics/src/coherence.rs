@@ -21,12 +21,14 @@ const NODES: u32 = 1 << 20;
 const LAST_NODE: u32 = NODES - SLOTS as u32 - 1;
 /// Jobs that can be told apart; those of further ones too.
 const JOBS: u16 = 512;
-/// The travel is taken back to zero, and the table cleared, beyond this: 2 m.
-const LONGEST_NM: u32 = 2_000_000_000;
+/// The travel is taken back to zero, and the table cleared, beyond this: 1.8 m.
+const LONGEST_NM: u32 = 1_800_000_000;
+// Dues stay clear of [`JOINED`].
+const _: () = assert!(LONGEST_NM + FARTHEST_NM < JOINED);
 /// Set in the due of a node that a joint keeps apart.
 const JOINED: u32 = 1 << 31;
-/// Never reached.
-const NEVER_NM: u32 = JOINED - 1;
+/// No due lies farther ahead: 268 mm.
+const FARTHEST_NM: u32 = 1 << 28;
 /// How much of its distance a node is left alone for, at most: interpolated distances may change a little faster than the object travels where
 /// a brick holds a sharp edge.
 const LONGEST_SHARE: f32 = 0.9;
@@ -89,7 +91,7 @@ impl Due {
     /// At every tick.
     pub const NOW: Self = Self(0);
     /// Never, before others have had their say.
-    pub const NEVER: Self = Self(NEVER_NM);
+    pub const NEVER: Self = Self(u32::MAX);
 }
 
 /// Which node of which job.
@@ -142,18 +144,23 @@ impl Coherence {
 
     /// Everything is due. For a jump of the object, or other parts.
     pub fn forget(&mut self) {
-        // In place: made anew it would pass over the stack, which has not room for many such.
-        (self.travel_nm, self.round, self.epoch) = (0, 0, 0);
-        self.slots.fill(Slot::EMPTY);
+        // As if it had travelled past every due: clearing the table costs more than most ticks.
+        self.add_travel(FARTHEST_NM);
+    }
+
+    fn add_travel(&mut self, nm: u32) {
+        self.travel_nm = self.travel_nm.saturating_add(nm);
+        if self.travel_nm > LONGEST_NM {
+            // In place: made anew it would pass over the stack, which has not room for many such.
+            (self.travel_nm, self.epoch) = (0, 0);
+            self.slots.fill(Slot::EMPTY);
+        }
     }
 
     /// The object moved, no point of it by more than `distance` m.
     pub fn travelled(&mut self, distance: f32) {
         self.round = self.round.wrapping_add(1);
-        self.travel_nm = self.travel_nm.saturating_add(up_nm(distance));
-        if self.travel_nm > LONGEST_NM {
-            self.forget();
-        }
+        self.add_travel(up_nm(distance));
     }
 
     /// The travel that leaves `margin` m unseen: to be given to [`Self::ask`].
@@ -171,7 +178,7 @@ impl Coherence {
         }
         if slot.due_nm >= JOINED {
             // What is above cannot tell it from other dues, and must not outlast the joint.
-            return if slot.near == self.epoch && slot.due_nm & NEVER_NM > horizon {
+            return if slot.near == self.epoch && slot.due_nm & !JOINED > horizon {
                 Known::Far(Due::NOW)
             } else {
                 Known::Nothing
@@ -198,7 +205,7 @@ impl Coherence {
     /// No node below this one is due before `due`.
     #[inline]
     pub fn set_due(&mut self, key: Key, due: Due) {
-        self.set(key, 0, due.0);
+        self.set(key, 0, smaller_of(due.0, self.travel_nm + FARTHEST_NM));
     }
 
     /// The node is near.
@@ -224,7 +231,10 @@ impl Coherence {
     pub fn end_joints(&mut self) {
         match self.epoch.checked_add(1) {
             Some(next) => self.epoch = next,
-            None => self.forget(),
+            None => {
+                self.forget();
+                self.epoch = 0;
+            }
         }
     }
 
@@ -233,7 +243,7 @@ impl Coherence {
     fn ahead(&self, key: Key, distance: f32) -> Due {
         // A float that is negative or not a number becomes 0, a huge one the largest number.
         let ahead = (distance * (key.share() * 1e9)) as u32;
-        Due(smaller_of(self.travel_nm.saturating_add(ahead), NEVER_NM))
+        Due(self.travel_nm + smaller_of(ahead, FARTHEST_NM))
     }
 
     #[inline]
@@ -328,14 +338,35 @@ mod tests {
     }
 
     #[test]
-    fn long_travel_starts_over() {
+    fn no_due_outlasts_long_travel() {
         let mut c = Coherence::new();
         let key = Key::new(0, 0);
-        c.set_distance(key, f32::INFINITY);
-        c.travelled(1.9);
-        assert!(is_far(c.ask(key, c.horizon(0.1), true)));
-        c.travelled(0.2);
-        assert_eq!(c.ask(key, c.horizon(0.0), true), Known::Nothing);
+        for start in 0..20 {
+            c.set_distance(key, f32::INFINITY);
+            assert!(is_far(c.ask(key, c.horizon(0.2), true)), "{start}");
+            c.travelled(0.2);
+            assert_eq!(c.ask(key, c.horizon(0.1), true), Known::Nothing);
+        }
+    }
+
+    #[test]
+    fn nothing_is_far_once_forgotten() {
+        let mut c = Coherence::new();
+        for start in 0..20 {
+            let key = |node| Key::new(3, node);
+            c.set_distance(key(0), f32::INFINITY);
+            c.set_due(key(1), Due::NEVER);
+            c.set_points(key(2), 5, f32::INFINITY);
+            c.set_joined(key(3), f32::INFINITY);
+            c.forget();
+            for node in 0..4 {
+                let known = c.ask(key(node), c.horizon(0.0), true);
+                assert!(
+                    matches!(known, Known::Nothing | Known::Near(ALL)),
+                    "{start}: {known:?}"
+                );
+            }
+        }
     }
 
     #[test]

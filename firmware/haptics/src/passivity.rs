@@ -62,7 +62,7 @@ pub(crate) struct Tank {
     stored: f32,
     /// Work on the object since, J.
     to_object: f32,
-    /// Wrenches of the last ticks, newest first.
+    /// Wrenches of the last ticks, newest first, where the motors are late.
     given: [Wrench; MAX_DELAY_TICKS + 1],
 }
 
@@ -96,9 +96,7 @@ impl Tank {
         object_energy: f32,
         settings: &Settings,
     ) -> f32 {
-        self.given.rotate_right(1);
-        self.given[0] = given;
-        let acting = self.given[(settings.passivity.delay_ticks as usize).min(MAX_DELAY_TICKS)];
+        let acting = self.acting(given, settings.passivity.delay_ticks as usize);
         let stored = potential(coupling, &settings.coupling);
         let open = 1.0 - self.seen.softened;
         let size = settings.passivity.tank_j;
@@ -117,6 +115,16 @@ impl Tank {
         self.handle = handle;
         self.stored = stored;
         1.0 - self.seen.softened
+    }
+
+    /// Takes in the last tick's wrench; the one that acted since.
+    fn acting(&mut self, given: Wrench, delay_ticks: usize) -> Wrench {
+        if delay_ticks == 0 {
+            return given;
+        }
+        self.given.rotate_right(1);
+        self.given[0] = given;
+        self.given[delay_ticks.min(MAX_DELAY_TICKS)]
     }
 
     /// After the step: the object moved with `twist` under `pull`.
@@ -164,11 +172,12 @@ impl Tank {
 /// Energy in the coupling's springs, J: ½·k·d² until they slip at F, F·d − F²/(2·k) from there on.
 fn potential(coupling: &Coupling, settings: &CouplingSettings) -> f32 {
     let spring = |k: f32, stretch: Vec3, most: f32| {
-        let d = length(stretch);
-        if k * d > most {
-            most * (d - 0.5 * most / k)
+        let squared = stretch.length_squared();
+        // The root, dear without an instruction of its own, only where it slips.
+        if k * k * squared > most * most {
+            most * (length(stretch) - 0.5 * most / k)
         } else {
-            0.5 * k * d * d
+            0.5 * k * squared
         }
     };
     spring(settings.k_t_n_per_m, coupling.stretch, settings.force_max_n)

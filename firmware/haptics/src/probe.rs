@@ -172,6 +172,7 @@ impl Prober {
             scene,
             parts: &[],
             held: moving,
+            held_shape: scene.shape_of_part(usize::from(moving)),
             pose,
             center,
             margin: 0.0,

@@ -13,7 +13,7 @@
 //! Cost: see [`crate::tick()`]; the look-ups in the field are two thirds of it.
 
 use glam::Vec3;
-use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage};
+use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage, Shape};
 
 use crate::above::Above;
 use crate::analytic::{OnFace, edge_face, exact, on_face};
@@ -74,6 +74,7 @@ pub(crate) struct Search<'s, 'i> {
     pub parts: &'s [Placed],
     /// Index of the held part.
     pub held: u16,
+    pub held_shape: Shape<'i>,
     pub pose: Pose,
     /// World position of its centre of mass, m.
     pub center: Vec3,
@@ -164,14 +165,13 @@ impl<'i> Search<'_, 'i> {
             return None;
         }
         let parts = self.scene.parts().len();
-        if usize::from(part) >= parts || usize::from(self.held) >= parts {
+        if usize::from(part) >= parts {
             return None;
         }
-        let held_shape = self.scene.shape_of_part(usize::from(self.held));
         let other_shape = self.scene.shape_of_part(usize::from(part));
         let mut job = Job::new(
             index,
-            (&held_shape, self.pose),
+            (&self.held_shape, self.pose),
             (&other_shape, other.pose),
             self.center,
         );

@@ -1,5 +1,6 @@
 //! One tick of the force law.
 
+use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::image::SceneImage;
 
@@ -9,7 +10,8 @@ use crate::coupling::Coupling;
 use crate::explicit;
 use crate::guidance::{At, GuidanceState};
 use crate::io::{FacePairs, Flags, Input, Output, Work};
-use crate::limits::{length, limit};
+use crate::limits::limit;
+use crate::linear::inverse_sqrt;
 use crate::pose::{Pose, Twist, Wrench, renormalize};
 use crate::proximity::{Leaf, Search};
 use crate::rotation;
@@ -181,22 +183,25 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         center: grabbed.center,
         period_s: settings.period_s,
     };
-    let pairs = touching_faces(state.contacts.as_slice(), &scenery);
+    // Filled in place: what it holds is large.
+    let mut out = Output {
+        handle: Wrench::ZERO,
+        contact: solution.contact,
+        object: grabbed.pose(),
+        object_twist: twist,
+        pairs: Vec::new(),
+        guidance,
+        work: Work::default(),
+    };
+    touching_faces(state.contacts.as_slice(), &scenery, &mut out.pairs);
     state
         .coherence
         .travelled(settings.period_s * point_speed(twist, reach));
     state.grabbed = Some(grabbed);
     state.settle();
-    let handle = state.hand_over(wanted, input.enabled, settings, &mut work.flags);
-    Output {
-        handle,
-        contact: solution.contact,
-        object: state.last_object.unwrap_or_default(),
-        object_twist: twist,
-        pairs,
-        guidance,
-        work,
-    }
+    out.handle = state.hand_over(wanted, input.enabled, settings, &mut work.flags);
+    out.work = work;
+    out
 }
 
 /// What a step took, in the look-ups of the budget (170 instructions): a solve 13 and each target's pull in it 8, and past the third one half a look-up for
@@ -227,6 +232,7 @@ impl State {
             scene,
             parts: &self.parts,
             held: grabbed.part,
+            held_shape: scene.shape_of_part(usize::from(grabbed.part)),
             pose: grabbed.pose(),
             center: grabbed.center,
             margin,
@@ -387,6 +393,11 @@ impl Grabbed {
 
 /// Upper bound of the speed of any point within `reach` of the centre of mass, m/s.
 fn point_speed(twist: Twist, reach: f32) -> f32 {
+    // No less than the lengths, by more than rounding can make the roots too small.
+    let length = |v: Vec3| {
+        let squared = v.length_squared();
+        1.000_001 * squared * inverse_sqrt(squared)
+    };
     length(twist.linear) + length(twist.angular) * reach
 }
 

@@ -41,10 +41,10 @@ struct Gathered {
     to: f32,
 }
 
-/// Face pairs of all contacts that push, deepest first (by depth at the step's end); among equals the first found comes first.
+/// Adds the face pairs of all contacts that push to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes first.
 ///
 /// Contacts come in order of the tree, so the pair last seen is tried first. Cost: 30 instructions a contact, and 500 a pair that has an edge.
-pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>) -> FacePairs {
+pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) {
     let mut gathered: Vec<Gathered, MAX_GATHERED> = Vec::new();
     let mut last = 0;
     for c in contacts.iter().filter(|c| c.phase != Phase::Free) {
@@ -76,7 +76,6 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>) -> Face
         }
     }
     // Insertion into a sorted list of bounded length: at most MAX_GATHERED · MAX_PAIRS comparisons.
-    let mut pairs = FacePairs::new();
     for g in &merged {
         let p = FacePair {
             insertion_m: g.to - g.from,
@@ -93,7 +92,6 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>) -> Face
             let _ = pairs.insert(place, p);
         }
     }
-    pairs
 }
 
 impl Gathered {

@@ -192,6 +192,9 @@ impl<'a> Field<'a> {
     #[cold]
     pub(super) fn beyond(&self, g: [f32; 3]) -> f32 {
         let mut squared = f32::MIN_POSITIVE;
+        if (g[0] + g[1] + g[2]).is_nan() {
+            return 0.0;
+        }
         for (g, n) in g.iter().zip(&self.cells) {
             let (below, above) = (self.padding - g, g - (n - self.padding));
             let d = if below > above { below } else { above };
