@@ -450,6 +450,8 @@ mod tests {
                 Surface::Sphere { frame, radius },
                 Surface::Torus { frame, major: 3.0 * radius, minor: radius },
             ];
+            // On a small patch more would turn the normals too far.
+            let ripple = 5e-4 * (radius / 4.0).min(1.0);
             for truth in surfaces {
                 let turned = |mut samples: Vec<Sample>| {
                     if inward { samples.iter_mut().for_each(|s| s.normal = -s.normal); }
@@ -465,7 +467,7 @@ mod tests {
                     let (off, _) = found.distance(s.point).unwrap();
                     prop_assert!(off.abs() < 1e-6, "{off} {found:?} for {truth:?}");
                 }
-                let (_, fit) = surface(&turned(patch(&truth, (start, span), 5e-4)), 1e-3)
+                let (_, fit) = surface(&turned(patch(&truth, (start, span), ripple)), 1e-3)
                     .ok_or_else(|| TestCaseError::fail(format!("rippled {truth:?} not recognised")))?;
                 prop_assert!(fit > 1e-5 && fit <= 5.1e-4, "{fit}");
                 prop_assert!(surface(&turned(patch(&truth, (start, span), 5e-4)), 1e-6).is_none());
