@@ -55,9 +55,10 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
-/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-21, thesis pair with 20 µm clearance baked at 0.5 mm cells with a
-/// pointshell of 25 µm: 92,740 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 19,720 in free motion. A peg of 0.7 m with 0.2 mm
-/// clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below 120,000.
+/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-22, thesis pair with 20 µm clearance baked at 0.5 mm cells with a
+/// pointshell of 25 µm: 74,740 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 19,920 in free motion. A peg of 0.7 m with 0.2 mm
+/// clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below 120,000. Not kept yet where guidance takes hold: 369,000 were seen
+/// in one tick of a 0.2 mm fit (`mortise lab rate`); to ask whether joints keep a leaf clear costs more than the budget counts for it.
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
