@@ -1,6 +1,6 @@
 //! Where closed loops become unstable, by theory and by experiment, and where each method fails.
 //!
-//! [`bench`] closes a loop round the product's tick on one axis; [`oracle`] says what the linear loop must do; [`boundary`] finds what the whole one does.
+//! [`mod@bench`] closes a loop round the product's tick on one axis; [`oracle`] says what the linear loop must do; [`boundary`] finds what the whole one does.
 //! [`limits`] is the maps that hold the two together, [`press`], [`impact`] and [`shell`] are those where methods are compared.
 
 pub mod bench;
