@@ -10,6 +10,7 @@ use mortise_protocol::message::{CostUnit, DeviceState, Refusal, ToDevice, Versio
 use mortise_protocol::parameter::PARAMETERS;
 use mortise_rig::{Client, Event, RigError, begin_message, chunk_message};
 
+use crate::described::descriptions_are_kept_and_driven;
 use crate::image;
 
 /// What a check saw, or what was wrong.
@@ -28,6 +29,10 @@ pub const CHECKS: &[Check] = &[
     ("stop_stops", stop_stops),
     ("idle_ticks_are_on_time", idle_ticks_are_on_time),
     ("the_log_is_readable", the_log_is_readable),
+    (
+        "descriptions_are_kept_and_driven",
+        descriptions_are_kept_and_driven,
+    ),
 ];
 
 fn fine<T>(result: Result<T, RigError>) -> Result<T, String> {

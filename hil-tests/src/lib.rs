@@ -4,6 +4,7 @@
 //! scenario shows: refuse with the reason, survive garbage, keep its scene when an upload is cut off, stop.
 
 pub mod checks;
+mod described;
 mod image;
 
 use std::path::{Path, PathBuf};

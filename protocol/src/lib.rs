@@ -1,4 +1,4 @@
-//! What host and board share by wire: the [`message`] table, [`frame`]s, [`parameter`]s, and the layout
+//! What host and board share by wire: the [`message`] table, [`frame`]s, [`parameter`]s, the [`rig`]'s description, and the layout
 //! of the [`image`] a scene is stored in. No I/O, no allocation; the only crate both sides know.
 #![no_std]
 
@@ -10,3 +10,4 @@ pub mod image;
 pub mod limits;
 pub mod message;
 pub mod parameter;
+pub mod rig;

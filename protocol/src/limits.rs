@@ -20,5 +20,7 @@ pub const MAX_KEYFRAMES: usize = 12;
 pub const MAX_INPUT_FAULTS: usize = 8;
 /// Bytes of log in one message.
 pub const MAX_LOG: usize = 256;
+/// Joints with motors that a rig's description can have.
+pub const MAX_JOINTS: usize = 3;
 /// Characters of a board's or firmware's name.
 pub const MAX_NAME: usize = 32;

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::image::ImageError;
 use crate::limits::*;
 use crate::parameter::ParameterId;
+use crate::rig::{Rig, RigFault};
 
 /// Hash of both message enums' schema and of the bounds they are read with: any change to a message changes it.
 pub const SCHEMA_HASH: u64 = schema_hash();
@@ -24,7 +25,7 @@ const fn schema_hash() -> u64 {
 }
 
 /// Every bound that decides whether a message can be read.
-const WIRE_BOUNDS: [usize; 8] = [
+const WIRE_BOUNDS: [usize; 9] = [
     MAX_MESSAGE,
     MAX_CHUNK,
     MAX_PAIRS,
@@ -33,6 +34,7 @@ const WIRE_BOUNDS: [usize; 8] = [
     MAX_INPUT_FAULTS,
     MAX_LOG,
     MAX_NAME,
+    MAX_JOINTS,
 ];
 
 /// FNV-1a, 64 bit, one step for each number.
@@ -169,6 +171,10 @@ pub enum ToDevice {
     },
     /// Restart the board. Refused while armed.
     Restart,
+    /// Keep this description of the rig; in use from the next start on. Only while disarmed, and only by boards whose mechanism is not compiled in.
+    SetRig(Rig),
+    /// Ask for [`FromDevice::Rig`].
+    GetRig,
 }
 
 /// Board to host.
@@ -227,6 +233,13 @@ pub enum FromDevice {
         tick: u32,
         /// See [`Statistics::state_hash`].
         state_hash: u64,
+    },
+    /// The rig's description.
+    Rig {
+        /// As kept; `None`: none was sent, or the one kept is damaged.
+        rig: Option<Rig>,
+        /// It is what the board senses and pushes with; else it will be from the next start on.
+        in_use: bool,
     },
 }
 
@@ -435,6 +448,12 @@ pub enum Refusal {
     Busy,
     /// The frame was sound but no message of this version.
     Undecodable,
+    /// The description of the rig is not one that can be used.
+    Rig(RigFault),
+    /// This board's mechanism is compiled into its firmware.
+    RigFixed,
+    /// The description in flash is damaged or of another release: send it again.
+    RigDamaged,
 }
 
 /// A rigid pose.

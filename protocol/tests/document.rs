@@ -59,6 +59,7 @@ fn the_page_has_the_limits_of_the_code() {
         ("MAX_KEYFRAMES", limits::MAX_KEYFRAMES),
         ("MAX_INPUT_FAULTS", limits::MAX_INPUT_FAULTS),
         ("MAX_LOG", limits::MAX_LOG),
+        ("MAX_JOINTS", limits::MAX_JOINTS),
         ("MAX_NAME", limits::MAX_NAME),
     ];
     let found: Vec<(String, String)> = table("Limits")

@@ -137,6 +137,14 @@ fn the_hash_covers_every_type_on_the_wire() {
         "WireWrench",
         "TouchingPair",
         "Statistics",
+        "Rig",
+        "Kinematics",
+        "Mount",
+        "Joint",
+        "Wrist",
+        "RigCeilings",
+        "RigFault",
+        "RigKey",
     ] {
         assert!(found.contains(&wanted), "{wanted} is not among {found:?}");
     }

@@ -84,6 +84,8 @@ pub enum Drive {
 pub trait Mechanism {
     /// Mechanism and hand are simulated: time may then wait for the host (lockstep).
     const SIMULATED: bool;
+    /// It is what the description kept in flash says; else it is compiled in, and no description is taken.
+    const DESCRIBED: bool = false;
 
     /// Reads the sensors.
     fn sense(&mut self) -> Sensed;
@@ -128,16 +130,18 @@ pub struct FlashError;
 
 /// Scene slots in flash.
 pub const SLOTS: usize = 2;
+/// Slots of the rig's description, one [`Flash::erase_size`] each. A board whose mechanism is compiled in has none: its flash gives no memory for them.
+pub const RIG_SLOTS: [usize; 2] = [SLOTS, SLOTS + 1];
 /// Smallest piece that can be written, bytes: one flash word of an STM32H7. A piece is written at most once between two erasures.
 pub const WRITE_SIZE: usize = 32;
 
-/// Two slots of memory-mapped flash, read in place.
+/// Two slots of memory-mapped flash for scenes, read in place, and two small ones for the rig's description ([`RIG_SLOTS`]).
 ///
 /// Erased bytes read as `0xff`. Used from the link plane only; calls may block for as long as the flash needs (1–2 s for a 128 KiB
 /// sector of an STM32H7), which is why scenes are stored only while the motors are off.
 ///
 /// # Safety
-/// `slot` must return memory that starts at a multiple of [`WRITE_SIZE`], is `capacity()` bytes long, is valid for `'s`, and changes only by
+/// `slot` must return memory that starts at a multiple of [`WRITE_SIZE`], is `capacity()` bytes long (a rig slot: `erase_size()`, or empty), is valid for `'s`, and changes only by
 /// `erase` and `write` of the same slot.
 pub unsafe trait Flash<'s> {
     /// Bytes in one slot; a multiple of [`Self::erase_size`].
@@ -149,7 +153,7 @@ pub unsafe trait Flash<'s> {
     /// The slot's memory.
     ///
     /// # Safety
-    /// `slot < SLOTS`, and no result of an earlier call may be used after the next `erase` or `write` to this slot.
+    /// `slot < SLOTS` or in [`RIG_SLOTS`], and no result of an earlier call may be used after the next `erase` or `write` to this slot.
     unsafe fn slot(&self, slot: usize) -> &'s [u8];
 
     /// Erases the piece that starts at `offset`, a multiple of [`Self::erase_size`].

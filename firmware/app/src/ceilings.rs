@@ -7,6 +7,7 @@
 use glam::Vec3;
 use mortise_haptics::{Twist, Wrench};
 use mortise_protocol::parameter::ParameterId;
+use mortise_protocol::rig::Rig;
 
 /// The most this rig allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +39,18 @@ impl Ceilings {
         speed_m_per_s: ParameterId::SpeedLimit.row().max,
         workspace_m: ParameterId::WorkspaceRadius.row().max,
     };
+
+    /// Those of a described rig, none above the firmware's own.
+    pub fn of(rig: &Rig) -> Self {
+        let own = rig.ceilings;
+        Self {
+            force_n: Self::LARGEST.force_n.min(own.force),
+            power_w: Self::LARGEST.power_w.min(own.power),
+            speed_m_per_s: Self::LARGEST.speed_m_per_s.min(own.speed),
+            workspace_m: Self::LARGEST.workspace_m.min(own.workspace),
+            ..Self::LARGEST
+        }
+    }
 
     /// The largest value of a parameter on this rig: its own range's end, or less.
     pub fn most(&self, id: ParameterId) -> f32 {

@@ -56,6 +56,6 @@ pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
         &identity,
         ControlSettings::at_start(identity.ceilings),
     );
-    let link = LinkPlane::new(link_ends, flash, identity, M::SIMULATED);
+    let link = LinkPlane::new(link_ends, flash, identity, M::SIMULATED, M::DESCRIBED);
     (link, control)
 }

@@ -67,6 +67,27 @@ pub struct Grip {
     pub angular_damping: f32,
 }
 
+impl Grip {
+    /// Nobody holds the handle.
+    pub const NONE: Self = Self {
+        stiffness: 0.0,
+        damping: 0.0,
+        angular_stiffness: 0.0,
+        angular_damping: 0.0,
+    };
+}
+
+impl Wish {
+    /// To stay there.
+    pub const fn at(pose: Pose) -> Self {
+        Self {
+            pose,
+            twist: Twist::ZERO,
+            push: Vec3::ZERO,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     tick: u32,

@@ -11,8 +11,10 @@
 //! | [`channel`] | queues and words between the planes |
 //! | [`control`], [`safety`], [`ceilings`], [`statistics`] | the tick; its state machine; the rig's limits; counters and state hash |
 //! | [`link`], [`parameters`], [`wire`] | messages; values and settings; conversions |
-//! | [`store`], [`ram_flash`] | A/B scene slots; flash in RAM |
+//! | [`store`], [`ram_flash`] | A/B scene slots, the rig's description; flash in RAM |
+//! | [`kinematics`], [`joints`] | of a described rig: angles to pose and force to torques; counts to angles and torques to currents |
 //! | [`simulated`], [`hand`], [`input_faults`], [`encoder`] | simulated mechanism and hand, what goes wrong at its inputs; encoder counts |
+//! | [`described`], [`simulated_rig`] | simulated mechanism of a described rig; whichever a simulated board has |
 #![no_std]
 
 #[cfg(test)]
@@ -22,15 +24,19 @@ pub mod board;
 pub mod ceilings;
 pub mod channel;
 pub mod control;
+pub mod described;
 pub mod device;
 pub mod encoder;
 pub mod hand;
 pub mod input_faults;
+pub mod joints;
+pub mod kinematics;
 pub mod link;
 pub mod parameters;
 pub mod ram_flash;
 pub mod safety;
 pub mod simulated;
+pub mod simulated_rig;
 pub mod statistics;
 pub mod store;
 pub mod wire;

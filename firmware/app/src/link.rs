@@ -16,8 +16,10 @@ use crate::board::{Flash, Identity, Outbound, TICK_HZ};
 use crate::channel::{Command, CommandKind, EVENTS, Event, LinkEnds, Reply, SAMPLES};
 use crate::hand::check_script;
 use crate::input_faults::check_input_faults;
+use crate::kinematics::Model;
 use crate::parameters::Parameters;
 use crate::store::Store;
+use crate::store::rig::Kept;
 
 /// Room an [`Outbound`] must have when empty: telemetry leaves one frame's room for answers.
 pub const OUTBOUND_MIN: usize = 2 * MAX_FRAME;
@@ -28,6 +30,9 @@ pub struct LinkPlane<'c, 's, F> {
     store: Store<'s, F>,
     identity: Identity,
     simulated: bool,
+    described: bool,
+    /// The description the board started with.
+    rig: Kept,
     parameters: Parameters,
     decoder: Decoder,
     sequence: u16,
@@ -50,13 +55,23 @@ pub struct LinkPlane<'c, 's, F> {
 
 impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
     /// Looks for a scene in flash and hands it to the control plane.
-    pub fn new(ends: LinkEnds<'c, 's>, flash: F, identity: Identity, simulated: bool) -> Self {
+    pub fn new(
+        ends: LinkEnds<'c, 's>,
+        flash: F,
+        identity: Identity,
+        simulated: bool,
+        described: bool,
+    ) -> Self {
+        let store = Store::open(flash);
+        let rig = if described { store.rig() } else { Kept::Nothing };
         let parameters = Parameters::within(identity.ceilings);
         let mut plane = Self {
             ends,
-            store: Store::open(flash),
+            store,
             identity,
             simulated,
+            described,
+            rig,
             parameters,
             decoder: Decoder::new(),
             sequence: 0,
@@ -222,6 +237,21 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                 let value = self.parameters.get(id);
                 return Ok(Some(FromDevice::Parameter { id, value }));
             }
+            ToDevice::GetRig => {
+                let kept = self.store.rig();
+                let in_use = kept == self.rig;
+                let rig = kept.rig().cloned();
+                return Ok(Some(FromDevice::Rig { rig, in_use }));
+            }
+            ToDevice::SetRig(rig) => {
+                if !self.described {
+                    return Err(Refusal::RigFixed);
+                }
+                self.may_store()?;
+                Model::new(&rig).map_err(Refusal::Rig)?;
+                self.store.keep_rig(&rig)?;
+                return ack;
+            }
             ToDevice::SceneBegin { length, crc, layout } => {
                 self.may_store()?;
                 self.store.begin(length, crc, layout)?;
@@ -321,6 +351,9 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
     fn may_arm(&mut self) -> Result<(), Refusal> {
         if self.store.busy() || self.arming.is_some() {
             return Err(Refusal::Busy);
+        }
+        if self.rig == Kept::Damaged {
+            return Err(Refusal::RigDamaged);
         }
         let Some(stored) = self.store.current() else {
             return Err(Refusal::NoScene);

@@ -5,7 +5,7 @@
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 
-use crate::board::{Flash, FlashError, SLOTS, WRITE_SIZE};
+use crate::board::{Flash, FlashError, RIG_SLOTS, SLOTS, WRITE_SIZE};
 
 /// Bytes erased at once, as on an STM32H743.
 pub const ERASE_SIZE: usize = 128 * 1024;
@@ -18,7 +18,7 @@ pub struct FlashWord(pub [u8; WRITE_SIZE]);
 /// An erased word.
 pub const ERASED: FlashWord = FlashWord([0xff; WRITE_SIZE]);
 
-/// Two slots in RAM.
+/// Two scene slots in RAM, and behind them two sectors for the rig's description.
 #[derive(Debug)]
 pub struct RamFlash<'s> {
     memory: NonNull<FlashWord>,
@@ -31,9 +31,10 @@ pub struct RamFlash<'s> {
 unsafe impl Send for RamFlash<'_> {}
 
 impl<'s> RamFlash<'s> {
-    /// Both slots in `memory`, half each, rounded down to whole sectors. What is there is kept: it may be a scene from before a reset.
+    /// All slots in `memory`: two sectors at its end for the rig, half of the rest for each scene, rounded down to whole sectors. What is there is kept: it may
+    /// be from before a reset.
     pub fn new(memory: &'s mut [FlashWord]) -> Self {
-        let slot = size_of_val(memory) / SLOTS;
+        let slot = (size_of_val(memory) / SLOTS).saturating_sub(ERASE_SIZE);
         Self {
             capacity: slot - slot % ERASE_SIZE,
             memory: NonNull::from(memory).cast(),
@@ -42,16 +43,27 @@ impl<'s> RamFlash<'s> {
     }
 
     fn word(&self, slot: usize, offset: usize) -> Result<NonNull<FlashWord>, FlashError> {
-        if slot >= SLOTS || !offset.is_multiple_of(WRITE_SIZE) || offset >= self.capacity {
+        let (start, length) = self.place(slot);
+        if !offset.is_multiple_of(WRITE_SIZE) || offset >= length {
             return Err(FlashError);
         }
-        let index = (slot * self.capacity + offset) / WRITE_SIZE;
-        // SAFETY: below SLOTS · capacity bytes, which the memory has.
-        Ok(unsafe { self.memory.add(index) })
+        // SAFETY: inside a slot, and all slots lie in the memory.
+        Ok(unsafe { self.memory.add((start + offset) / WRITE_SIZE) })
+    }
+
+    /// First byte and length of a slot. Scenes first; a rig's slots are there when scenes' are, because `new` takes both from the same halves.
+    fn place(&self, slot: usize) -> (usize, usize) {
+        if slot < SLOTS {
+            (slot * self.capacity, self.capacity)
+        } else if RIG_SLOTS.contains(&slot) && self.capacity > 0 {
+            (SLOTS * self.capacity + (slot - SLOTS) * ERASE_SIZE, ERASE_SIZE)
+        } else {
+            (0, 0)
+        }
     }
 }
 
-// SAFETY: FlashWord is aligned to WRITE_SIZE and capacity is a multiple of it, so both slots start aligned; the memory is borrowed for
+// SAFETY: FlashWord is aligned to WRITE_SIZE and capacity is a multiple of it, so all slots start aligned; the memory is borrowed for
 // 's; only `erase` and `write` change it, each within its slot.
 unsafe impl<'s> Flash<'s> for RamFlash<'s> {
     fn capacity(&self) -> usize {
@@ -63,12 +75,9 @@ unsafe impl<'s> Flash<'s> for RamFlash<'s> {
     }
 
     unsafe fn slot(&self, slot: usize) -> &'s [u8] {
-        debug_assert!(slot < SLOTS);
+        let (start, length) = self.place(slot);
         // SAFETY: within the memory, initialised; the caller uses it for nothing while the slot changes.
-        unsafe {
-            let start = self.memory.cast::<u8>().add(slot * self.capacity);
-            core::slice::from_raw_parts(start.as_ptr(), self.capacity)
-        }
+        unsafe { core::slice::from_raw_parts(self.memory.cast::<u8>().add(start).as_ptr(), length) }
     }
 
     fn erase(&mut self, slot: usize, offset: usize) -> Result<(), FlashError> {

@@ -41,7 +41,7 @@ const JUMP_SPEED: f32 = 20.0;
 const JUMP_ANGULAR_SPEED: f32 = 200.0;
 
 /// Ticks without a count under load that are a stall. Longer than a real rig's: a scripted hand may hold perfectly still.
-const STALL_TICKS: u16 = 500;
+pub(crate) const STALL_TICKS: u16 = 500;
 
 /// See the module.
 #[derive(Clone, Debug)]
@@ -131,19 +131,7 @@ impl Body {
     fn step(&mut self, motors: &Wrench, held: Option<&(Grip, Wish)>) -> Wrench {
         const H: f32 = TICK_S / SUBSTEPS as f32;
         // Nobody holding is a grip of no stiffness.
-        let free = Grip {
-            stiffness: 0.0,
-            damping: 0.0,
-            angular_stiffness: 0.0,
-            angular_damping: 0.0,
-        };
-        let (grip, wish) = held.map_or((free, None), |(grip, wish)| (*grip, Some(wish)));
-        let rest = Wish {
-            pose: self.pose,
-            twist: Twist::ZERO,
-            push: Vec3::ZERO,
-        };
-        let wish = wish.copied().unwrap_or(rest);
+        let (grip, wish) = held.copied().unwrap_or((Grip::NONE, Wish::at(self.pose)));
 
         let apart = wish.pose.position - self.pose.position;
         let pull = apart * grip.stiffness + wish.twist.linear * grip.damping + wish.push;

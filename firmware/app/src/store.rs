@@ -1,4 +1,4 @@
-//! The scene store: two slots in flash, the newest sound one in use, the other free for an upload.
+//! The scene store (and, in [`rig`], the rig's description): two slots in flash, the newest sound one in use, the other free for an upload.
 //!
 //! ```text
 //! slot: | record, 32 bytes | image ... |
@@ -8,9 +8,12 @@
 //! The record is one flash word and written last: before it is whole, the slot holds no scene. Beginning an upload erases the free
 //! slot's record first. Cut off at any moment, the scene in use is untouched in its own slot and found again at the next start.
 
+pub mod rig;
+
 use mortise_protocol::image::{CRC, Header, ImageError, LAYOUT_VERSION, SceneImage};
 use mortise_protocol::limits::MAX_PARTS;
 use mortise_protocol::message::Refusal;
+use mortise_protocol::rig::Rig;
 
 use crate::board::{Flash, FlashError, SLOTS, WRITE_SIZE};
 
@@ -289,6 +292,19 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
     /// Forgets an upload under way; `false` when there was none.
     pub fn abort(&mut self) -> bool {
         self.upload.take().is_some()
+    }
+
+    /// The rig's description in flash.
+    pub fn rig(&self) -> rig::Kept {
+        rig::kept(&self.flash)
+    }
+
+    /// Keeps a description that was checked.
+    ///
+    /// # Errors
+    /// `Flash`; the one before stays.
+    pub fn keep_rig(&mut self, rig: &Rig) -> Result<(), Refusal> {
+        rig::keep(&mut self.flash, rig)
     }
 
     /// The flash, for a test that looks at it.

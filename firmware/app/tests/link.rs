@@ -2,17 +2,19 @@
 
 mod support;
 
-use mortise_firmware::board::Drive;
+use mortise_firmware::board::{Drive, RIG_SLOTS};
 use mortise_firmware::store::IMAGE_OFFSET;
 use mortise_protocol::frame::encode;
 use mortise_protocol::image::{CRC, ImageError, LAYOUT_VERSION};
 use mortise_protocol::limits::{MAX_FRAME, MAX_MESSAGE};
 use mortise_protocol::message::*;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_protocol::rig::RigFault;
 use proptest::prelude::*;
 use support::Bench;
 use support::flash::{SLOT, TestFlash};
 use support::image::two_parts;
+use support::rigs::arm;
 
 fn hand() -> HandScript {
     HandScript {
@@ -115,6 +117,9 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
         Refusal::Lockstep,
         Refusal::BadNumber,
         Refusal::Busy,
+        Refusal::Rig(RigFault::Joints { needed: 3 }),
+        Refusal::RigFixed,
+        Refusal::RigDamaged,
         Refusal::Undecodable,
     ];
     for reason in reasons {
@@ -204,6 +209,27 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
             Refusal::Busy => {
                 let mut bench = Bench::ready();
                 bench.begin(&two_parts(9)).unwrap();
+                bench.request(&ToDevice::Arm)
+            }
+            Refusal::Rig(_) => {
+                let mut rig = arm();
+                rig.joints.pop();
+                Bench::ready().request(&ToDevice::SetRig(rig))
+            }
+            Refusal::RigFixed => {
+                let mut bench = Bench::<false>::new(TestFlash::leaked());
+                bench.greet();
+                bench.request(&ToDevice::SetRig(arm()))
+            }
+            Refusal::RigDamaged => {
+                let flash = TestFlash::leaked();
+                let mut bench: Bench = Bench::new(flash.clone());
+                bench.greet();
+                bench.upload(&two_parts(1)).unwrap();
+                bench.request(&ToDevice::SetRig(arm())).unwrap();
+                flash.damage(RIG_SLOTS[0], 100);
+                let mut bench: Bench = Bench::new(flash);
+                bench.greet();
                 bench.request(&ToDevice::Arm)
             }
             Refusal::Undecodable => {

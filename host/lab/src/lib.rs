@@ -13,6 +13,7 @@ pub mod chart;
 pub mod clearance;
 pub mod contacts;
 pub mod corpus;
+pub mod endurance;
 mod error;
 pub mod figures;
 pub mod fit;

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use mortise_protocol::message::{Capabilities, DeviceState, FromDevice, Statistics, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_protocol::rig::Rig;
 
 use crate::error::RigError;
 use crate::event::Events;
@@ -200,6 +201,7 @@ impl Client {
             | ToDevice::GetCapabilities
             | ToDevice::GetParameter(_)
             | ToDevice::GetStatistics { .. }
+            | ToDevice::GetRig
             | ToDevice::Run { .. } => self.ask(&message).map(|_| ()),
             ToDevice::Lockstep(on) => {
                 let on = *on;
@@ -232,6 +234,17 @@ impl Client {
         match *self.ask(&message)? {
             FromDevice::Statistics(statistics) => Ok(statistics),
             _ => Err(self.no_answer(&message, self.patience.answer)),
+        }
+    }
+
+    /// The description of the rig that the board keeps, and whether it is in use.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn rig(&self) -> Result<(Option<Rig>, bool), RigError> {
+        match *self.ask(&ToDevice::GetRig)? {
+            FromDevice::Rig { rig, in_use } => Ok((rig, in_use)),
+            _ => Err(self.no_answer(&ToDevice::GetRig, self.patience.answer)),
         }
     }
 

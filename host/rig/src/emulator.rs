@@ -35,8 +35,11 @@ impl Drop for Qemu {
     }
 }
 
-/// Path of the firmware: `given`, else the environment's, else the one the workspace builds.
-pub(crate) fn firmware_path(given: Option<&Path>) -> Result<PathBuf, RigError> {
+/// Path of the emulated board's firmware: `given`, else the environment's ([`FIRMWARE_VARIABLE`]), else the one the workspace builds.
+///
+/// # Errors
+/// `NoFirmware`: no such file.
+pub fn firmware_path(given: Option<&Path>) -> Result<PathBuf, RigError> {
     if let Some(path) = given
         .map(Path::to_path_buf)
         .or_else(|| std::env::var_os(FIRMWARE_VARIABLE).map(PathBuf::from))

@@ -69,6 +69,8 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::SceneBegin { .. }
         | ToDevice::SceneChunk { .. }
         | ToDevice::SceneAbort
+        | ToDevice::SetRig(_)
+        | ToDevice::GetRig
         | ToDevice::SetTarget(_)
         | ToDevice::ClearTarget { .. }
         | ToDevice::SetTelemetry { .. }
@@ -88,7 +90,9 @@ fn repeatable(message: &ToDevice) -> bool {
 
 pub(crate) fn patience_for(message: &ToDevice, patience: &Patience) -> Duration {
     match message {
-        ToDevice::SceneBegin { .. } | ToDevice::SceneCommit => patience.answer.max(FLASH_WAIT),
+        ToDevice::SceneBegin { .. } | ToDevice::SceneCommit | ToDevice::SetRig(_) => {
+            patience.answer.max(FLASH_WAIT)
+        }
         ToDevice::Run { ticks } => patience.answer + TICK_WAIT.saturating_mul(*ticks),
         _ => patience.answer,
     }

@@ -23,6 +23,7 @@
 //! bounded queue of [`Event`]s. Another keeps the link alive and notices when it is not. The protocol is in `docs/protocol.md`.
 
 mod client;
+mod description;
 mod emulator;
 mod error;
 mod event;
@@ -41,7 +42,8 @@ mod upload;
 mod words;
 
 pub use client::{Client, LinkCounts, Ran};
-pub use emulator::{FIRMWARE_VARIABLE, QEMU_VARIABLE, SERIAL_VARIABLE};
+pub use description::{Abilities, DescriptionError, abilities, load_rig, parse_rig, write_rig};
+pub use emulator::{FIRMWARE_VARIABLE, QEMU_VARIABLE, SERIAL_VARIABLE, firmware_path};
 pub use error::{RigError, version_words};
 pub use event::{Event, Events, MAX_EVENTS};
 pub use exchange::{ATTEMPTS, Patience};

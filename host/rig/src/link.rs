@@ -26,6 +26,7 @@ pub(crate) enum Expect {
     Parameter(ParameterId),
     Statistics,
     Ran,
+    Rig,
 }
 
 impl Expect {
@@ -36,6 +37,7 @@ impl Expect {
             ToDevice::GetParameter(id) => Self::Parameter(*id),
             ToDevice::GetStatistics { .. } => Self::Statistics,
             ToDevice::Run { .. } => Self::Ran,
+            ToDevice::GetRig => Self::Rig,
             _ => Self::Ack,
         }
     }
@@ -45,7 +47,8 @@ impl Expect {
             (Self::Hello, FromDevice::Hello(_))
             | (Self::Capabilities, FromDevice::Capabilities(_))
             | (Self::Statistics, FromDevice::Statistics(_))
-            | (Self::Ran, FromDevice::Ran { .. }) => true,
+            | (Self::Ran, FromDevice::Ran { .. })
+            | (Self::Rig, FromDevice::Rig { .. }) => true,
             (Self::Parameter(wanted), FromDevice::Parameter { id, .. }) => wanted == *id,
             _ => false,
         }

@@ -15,7 +15,8 @@ use mortise_firmware::control::Ticked;
 use mortise_firmware::device;
 use mortise_firmware::link::OUTBOUND_MIN;
 use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
-use mortise_firmware::simulated::Simulated;
+use mortise_firmware::simulated_rig::SimulatedRig;
+use mortise_firmware::store;
 use mortise_protocol::message::{CostUnit, ResetReason};
 
 use crate::error::RigError;
@@ -24,6 +25,8 @@ use crate::transport::{READ_WAIT, Transport, is_quiet};
 
 /// Bytes of a scene slot: far more than a board has, so that a PC can feel scenes no board could hold yet.
 const SLOT: usize = 256 * ERASE_SIZE;
+/// Bytes of all slots: a sector for each of the rig's descriptions too.
+const ALL: usize = SLOTS * (SLOT + ERASE_SIZE);
 /// Bytes a board's output buffer holds.
 const OUTBOUND: usize = 4 * OUTBOUND_MIN;
 const TICK: Duration = Duration::from_micros(1_000_000 / TICK_HZ as u64);
@@ -72,7 +75,7 @@ impl Drop for Board {
 fn run(flash: &Flash, realtime: bool, mut from_host: PipeReader, mut to_host: PipeWriter) {
     let mut memory = flash.0.lock().unwrap_or_else(PoisonError::into_inner);
     if memory.is_empty() {
-        memory.resize(SLOTS * SLOT / size_of::<FlashWord>(), ERASED);
+        memory.resize(ALL / size_of::<FlashWord>(), ERASED);
     }
     let mut reset = ResetReason::PowerOn;
     while power_on(&mut memory, reset, realtime, &mut from_host, &mut to_host).is_ok() {
@@ -90,26 +93,30 @@ fn power_on(
 ) -> io::Result<()> {
     let mut channels = Box::new(Channels::new());
     let pace = Rc::new(Pace::new(realtime));
+    let flash = RamFlash::new(memory);
+    let kept = store::rig::kept(&flash);
+    let rig = kept.rig();
     let identity = Identity {
         board: if realtime {
             "simulation"
         } else {
             "simulation, lockstep"
         },
-        force_axes: 3,
-        torque_axes: 3,
+        force_axes: rig.map_or(3, |rig| rig.joints.len() as u8),
+        // A described wrist is passive.
+        torque_axes: if rig.is_some() { 0 } else { 3 },
         cost_unit: CostUnit::Nanoseconds,
         // Without pacing nothing is due at any time.
         cost_budget: if realtime { TICK.as_nanos() as u32 } else { 0 },
         reset,
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
-        ceilings: Ceilings::LARGEST,
+        ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
     };
     let (mut link, mut control) = device::start(
         &mut channels,
-        RamFlash::new(memory),
-        Simulated::new(),
+        flash,
+        SimulatedRig::of(rig),
         WallClock(pace.clone()),
         identity,
     );

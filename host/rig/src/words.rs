@@ -121,6 +121,9 @@ impl Words for Refusal {
             Self::Lockstep => "the board is not in lockstep, or still has ticks to run: switch lockstep on and wait for the last run".into(),
             Self::BadNumber => "a number is not finite or not possible".into(),
             Self::Busy => "the board's queue is full: try again".into(),
+            Self::Rig(fault) => fault.words(),
+            Self::RigFixed => "this board's mechanism is compiled into its firmware: change it there, or use a board that takes a description".into(),
+            Self::RigDamaged => "the description of the rig in the board's flash is damaged or of another release: send it again (`mortise rig send`)".into(),
             Self::Undecodable => "the board did not understand the message: flash the firmware of this release".into(),
         }
     }
@@ -169,6 +172,8 @@ impl Words for ToDevice {
             Self::Lockstep(false) => "switching lockstep off".into(),
             Self::Run { ticks } => format!("running {ticks} ticks"),
             Self::Restart => "restarting the board".into(),
+            Self::SetRig(rig) => format!("sending the description of `{}`", rig.name),
+            Self::GetRig => "reading the description of the rig".into(),
         }
     }
 }
@@ -240,6 +245,9 @@ mod tests {
             Refusal::Lockstep,
             Refusal::BadNumber,
             Refusal::Busy,
+            Refusal::Rig(mortise_protocol::rig::RigFault::Linkage),
+            Refusal::RigFixed,
+            Refusal::RigDamaged,
             Refusal::Undecodable,
         ] {
             is_a_sentence(&describe(refusal));

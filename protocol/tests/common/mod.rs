@@ -6,6 +6,7 @@ use mortise_protocol::image::ImageError;
 use mortise_protocol::limits::*;
 use mortise_protocol::message::*;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_protocol::rig::*;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): small, and the same everywhere.
 pub struct Random(pub u64);
@@ -144,7 +145,7 @@ impl Random {
     }
 
     fn refusal(&mut self) -> Refusal {
-        match self.below(20) {
+        match self.below(23) {
             0 => Refusal::NotGreeted,
             1 => Refusal::State(self.state()),
             2 => Refusal::NoScene,
@@ -170,7 +171,89 @@ impl Random {
             15 => Refusal::Lockstep,
             16 => Refusal::BadNumber,
             17 => Refusal::Busy,
+            18 => Refusal::Rig(self.rig_fault()),
+            19 => Refusal::RigFixed,
+            20 => Refusal::RigDamaged,
             _ => Refusal::Undecodable,
+        }
+    }
+
+    fn rig_fault(&mut self) -> RigFault {
+        let joint = self.u8();
+        match self.below(9) {
+            0 => RigFault::OutOfRange {
+                key: RIG_KEYS[self.below(RIG_KEYS.len())].id,
+                joint,
+                value: self.f32(),
+            },
+            1 => RigFault::Joints { needed: joint },
+            2 => RigFault::Range { joint },
+            3 => RigFault::Home { joint },
+            4 => RigFault::Counts { joint },
+            5 => RigFault::WristAxes,
+            6 => RigFault::Linkage,
+            7 => RigFault::Singular,
+            _ => RigFault::Workspace,
+        }
+    }
+
+    fn name(&mut self) -> String<MAX_NAME> {
+        let mut name = String::new();
+        for _ in 0..self.below(MAX_NAME + 1) {
+            // One byte each, so that MAX_NAME of them fit.
+            let letter = char::from(b'a' + self.below(26) as u8);
+            name.push(letter).expect("no longer than MAX_NAME");
+        }
+        name
+    }
+
+    pub fn rig(&mut self) -> Rig {
+        Rig {
+            name: self.name(),
+            kinematics: match self.below(3) {
+                0 => Kinematics::Paddle { radius: self.f32() },
+                1 => Kinematics::Pantograph {
+                    base: self.f32(),
+                    proximal: self.floats(),
+                    distal: self.floats(),
+                },
+                _ => Kinematics::SerialArm {
+                    base_height: self.f32(),
+                    upper: self.f32(),
+                    lower: self.f32(),
+                },
+            },
+            mount: Mount {
+                origin: self.floats(),
+                turn: self.floats(),
+            },
+            joints: self.list(|r| Joint {
+                counts_per_turn: r.f32(),
+                encoder_on_motor: r.bool(),
+                encoder_reversed: r.bool(),
+                gear: r.f32(),
+                torque_constant: r.f32(),
+                motor_reversed: r.bool(),
+                current_limit: r.f32(),
+                range: r.floats(),
+                home: r.f32(),
+                rate_limit: r.f32(),
+                coulomb: r.f32(),
+                viscous: r.f32(),
+                inertia: r.f32(),
+            }),
+            wrist: self.bool().then(|| Wrist {
+                axes: [self.floats(), self.floats(), self.floats()],
+                counts_per_turn: self.floats(),
+                home: self.floats(),
+            }),
+            handle_mass: self.f32(),
+            ceilings: RigCeilings {
+                force: self.f32(),
+                power: self.f32(),
+                speed: self.f32(),
+                workspace: self.f32(),
+            },
         }
     }
 
@@ -301,14 +384,8 @@ impl Random {
     }
 
     fn capabilities(&mut self) -> Capabilities {
-        let mut board = String::new();
-        for _ in 0..self.below(MAX_NAME + 1) {
-            // One byte each, so that MAX_NAME of them fit.
-            let letter = char::from(b'a' + self.below(26) as u8);
-            board.push(letter).expect("no longer than MAX_NAME");
-        }
         Capabilities {
-            board,
+            board: self.name(),
             scene_capacity: self.u32(),
             scene_layout: self.u32(),
             scene: if self.bool() { Some(self.u32()) } else { None },
@@ -334,7 +411,7 @@ impl Random {
 }
 
 /// Kinds of host message; a test compares it with the schema.
-pub const TO_DEVICE: usize = 26;
+pub const TO_DEVICE: usize = 28;
 
 /// A random host message of kind `kind < TO_DEVICE`.
 pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
@@ -374,12 +451,14 @@ pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
         22 => ToDevice::SimulatedInputs(r.list(Random::input_fault)),
         23 => ToDevice::Lockstep(r.bool()),
         24 => ToDevice::Run { ticks: r.u32() },
-        _ => ToDevice::Restart,
+        25 => ToDevice::Restart,
+        26 => ToDevice::SetRig(r.rig()),
+        _ => ToDevice::GetRig,
     }
 }
 
 /// Kinds of board message; a test compares it with the schema.
-pub const FROM_DEVICE: usize = 11;
+pub const FROM_DEVICE: usize = 12;
 
 /// A random board message of kind `kind < FROM_DEVICE`.
 pub fn from_device(kind: usize, r: &mut Random) -> FromDevice {
@@ -406,9 +485,13 @@ pub fn from_device(kind: usize, r: &mut Random) -> FromDevice {
             fault: r.fault(),
         },
         9 => FromDevice::Log(r.list(Random::u8)),
-        _ => FromDevice::Ran {
+        10 => FromDevice::Ran {
             tick: r.u32(),
             state_hash: r.u64(),
+        },
+        _ => FromDevice::Rig {
+            rig: r.bool().then(|| r.rig()),
+            in_use: r.bool(),
         },
     }
 }

@@ -3,12 +3,14 @@
 use std::cell::{Cell, UnsafeCell};
 use std::rc::Rc;
 
-use mortise_firmware::board::{Flash, FlashError, SLOTS, WRITE_SIZE};
+use mortise_firmware::board::{Flash, FlashError, RIG_SLOTS, SLOTS, WRITE_SIZE};
 use mortise_firmware::ram_flash::{ERASED, FlashWord};
 
 pub const SECTOR: usize = 512;
 pub const SLOT: usize = 16 * SECTOR;
-const WORDS: usize = SLOTS * SLOT / WRITE_SIZE;
+/// Scenes' slots, then the rig's, as large: only their first sector is used.
+const ALL: usize = SLOTS + RIG_SLOTS.len();
+const WORDS: usize = ALL * SLOT / WRITE_SIZE;
 
 struct Memory(UnsafeCell<[FlashWord; WORDS]>);
 
@@ -41,7 +43,7 @@ impl TestFlash {
     }
 
     fn word(&self, slot: usize, offset: usize) -> *mut FlashWord {
-        assert!(slot < SLOTS && offset < SLOT && offset.is_multiple_of(WRITE_SIZE));
+        assert!(slot < ALL && offset < SLOT && offset.is_multiple_of(WRITE_SIZE));
         let index = (slot * SLOT + offset) / WRITE_SIZE;
         // SAFETY: index < WORDS.
         unsafe { self.memory.0.get().cast::<FlashWord>().add(index) }

@@ -47,6 +47,7 @@ impl<const SIMULATED: bool> Puppet<SIMULATED> {
 
 impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
     const SIMULATED: bool = SIMULATED;
+    const DESCRIBED: bool = SIMULATED;
 
     fn sense(&mut self) -> Sensed {
         self.0.0.borrow().sensed

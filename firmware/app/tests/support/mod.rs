@@ -4,6 +4,7 @@
 pub mod flash;
 pub mod image;
 pub mod mechanism;
+pub mod rigs;
 
 use std::collections::VecDeque;
 
@@ -167,6 +168,7 @@ impl<const SIMULATED: bool> Bench<SIMULATED> {
                 | FromDevice::Capabilities(_)
                 | FromDevice::Parameter { .. }
                 | FromDevice::Statistics(_)
+                | FromDevice::Rig { .. }
                 | FromDevice::Ran { .. } => true,
                 _ => false,
             });

@@ -47,6 +47,7 @@ mod app {
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::Ticked;
     use mortise_firmware::device::start;
+    use mortise_firmware::store;
     use mortise_protocol::message::CostUnit;
 
     use crate::device::Interrupt;
@@ -69,22 +70,25 @@ mod app {
     ])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         memory::guard_stack(&mut cx.core.MPU);
+        // SAFETY: the only call.
+        let flash = unsafe { memory::scene_flash() };
+        let kept = store::rig::kept(&flash);
+        let rig = kept.rig();
         let identity = Identity {
             board: "mps2-an500",
-            force_axes: 3,
-            torque_axes: 3,
+            force_axes: rig.map_or(3, |rig| rig.joints.len() as u8),
+            // A described wrist is passive.
+            torque_axes: if rig.is_some() { 0 } else { 3 },
             cost_unit: CostUnit::Instructions,
             cost_budget: timer::BUDGET,
             reset: crash::reset_reason(),
             // The simulated mechanism stands still between ticks: late ticks are counted and do no harm.
             overrun_ticks: 0,
-            ceilings: Ceilings::LARGEST,
+            ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
         };
-        // SAFETY: the only call.
-        let flash = unsafe { memory::scene_flash() };
         let (bytes_in, bytes_out) = cx.local.bytes.split();
         // Reads the scene in flash before the first tick is due.
-        let mechanism = motors::Motors::new();
+        let mechanism = motors::Motors::new(rig);
         let (link, control) = start(
             cx.local.channels,
             flash,

@@ -2,14 +2,14 @@
 
 use cortex_m::peripheral::MPU;
 use mortise_firmware::board::WRITE_SIZE;
-use mortise_firmware::ram_flash::{FlashWord, RamFlash};
+use mortise_firmware::ram_flash::{ERASE_SIZE, FlashWord, RamFlash};
 
 /// Start of the external RAM (QEMU puts it here for AN500, at 0x21000000 for the other images of the board).
 const PSRAM: usize = 0x6000_0000;
 /// Start of the stack's memory, as in memory.x.
 const GUARD: u32 = 0x2000_0000;
-/// Bytes in both scene slots: 2 MiB each.
-const SLOTS_SIZE: usize = 2 * 2 * 1024 * 1024;
+/// Bytes in all slots: 2 MiB for each scene, and a sector for each of the rig's descriptions.
+const SLOTS_SIZE: usize = 2 * (2 * 1024 * 1024 + ERASE_SIZE);
 
 /// The scene slots. Call once.
 ///

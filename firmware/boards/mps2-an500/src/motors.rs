@@ -1,9 +1,10 @@
 //! The simulated mechanism behind an enable output that can be seen: LED 0 is on while motors are enabled.
 
 use mortise_firmware::board::{Drive, Mechanism, Sensed};
-use mortise_firmware::simulated::Simulated;
+use mortise_firmware::simulated_rig::SimulatedRig;
 use mortise_haptics::{Pose, Wrench};
 use mortise_protocol::message::{HandScript, InputFault};
+use mortise_protocol::rig::Rig;
 
 use crate::device::Registers;
 
@@ -16,16 +17,16 @@ pub fn off() {
 
 /// Simulated mechanism with an enable output.
 pub struct Motors {
-    mechanism: Simulated,
+    mechanism: SimulatedRig,
     enabled: bool,
 }
 
 impl Motors {
-    /// Off.
-    pub fn new() -> Self {
+    /// Off; of the description kept, or a free handle.
+    pub fn new(rig: Option<&Rig>) -> Self {
         off();
         Self {
-            mechanism: Simulated::new(),
+            mechanism: SimulatedRig::of(rig),
             enabled: false,
         }
     }
@@ -33,6 +34,7 @@ impl Motors {
 
 impl Mechanism for Motors {
     const SIMULATED: bool = true;
+    const DESCRIBED: bool = true;
 
     fn sense(&mut self) -> Sensed {
         self.mechanism.sense()

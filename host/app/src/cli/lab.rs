@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::Subcommand;
-use mortise_lab::figures::{self, Plan, Value};
+use mortise_lab::figures::{self, Plan, Row, Value};
 use mortise_lab::study::{feature_size, shrink};
 use mortise_lab::table::write_csv;
-use mortise_lab::{blend, clearance, pareto, rate, stability};
+use mortise_lab::{blend, clearance, endurance, pareto, rate, stability};
+use mortise_rig::RigSpec;
 
 use super::output;
 use crate::sample;
@@ -31,6 +32,24 @@ enum Experiment {
         #[arg(long)]
         quick: bool,
         /// One JSON object a row
+        #[arg(long)]
+        json: bool,
+    },
+    /// Keep a board busy for an hour of its own time, and see whether anything wears; exit code 1 when it does
+    Endurance {
+        /// Virtual time
+        #[arg(long, default_value_t = 1.0, value_name = "HOURS")]
+        hours: f64,
+        /// Three minutes of virtual time instead
+        #[arg(long, conflicts_with = "hours")]
+        quick: bool,
+        /// Where random scenes, hands and faults start from
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// emulated, or sim
+        #[arg(long, value_parser = super::rig, default_value = "emulated")]
+        rig: RigSpec,
+        /// One JSON object a turn, and the report
         #[arg(long)]
         json: bool,
     },
@@ -84,6 +103,16 @@ impl Sweep {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.experiment {
         Experiment::Figures { name, quick, json } => figures(name, *quick, *json),
+        Experiment::Endurance {
+            hours,
+            quick,
+            seed,
+            rig,
+            json,
+        } => {
+            let seconds = if *quick { 180.0 } else { 3600.0 * hours };
+            endurance(rig, seconds, *seed, *json)
+        }
         Experiment::Clearance(sweep) => clearance(sweep),
         Experiment::Pareto(sweep) => pareto(sweep),
         Experiment::Blend(sweep) => blend(sweep),
@@ -92,6 +121,51 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Experiment::Shrink(sweep) => shrink(sweep),
         Experiment::FeatureSize { sweep, shrink } => feature_size(sweep, *shrink),
     }
+}
+
+fn endurance(rig: &RigSpec, seconds: f64, seed: u64, json: bool) -> anyhow::Result<ExitCode> {
+    if !(1.0..=360_000.0).contains(&seconds) {
+        anyhow::bail!("{seconds} s is no time for an endurance run: 1 s to 100 h");
+    }
+    let mut written = Ok(());
+    let report = endurance::run(rig, seconds as u32, seed, &mut |turn| {
+        let line = if json {
+            output::json(turn)
+        } else {
+            output::line(&turn.to_string())
+        };
+        if written.is_ok() {
+            written = line;
+        }
+    })?;
+    written?;
+    if json {
+        output::json(&report)?;
+    }
+    let mut holds = true;
+    for row in report.rows() {
+        holds &= row.holds;
+        if !json {
+            tell_row(&row)?;
+        }
+    }
+    Ok(if holds {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+fn tell_row(row: &Row) -> anyhow::Result<()> {
+    let mark = if row.holds { "ok  " } else { "FAIL" };
+    let value = match &row.value {
+        Value::Number(number) => format!("{number}"),
+        Value::Text(text) => text.clone(),
+    };
+    output::line(&format!(
+        "{mark} {}: {value} {} ({})",
+        row.what, row.unit, row.bound
+    ))
 }
 
 fn clearance(sweep: &Sweep) -> anyhow::Result<ExitCode> {
@@ -229,19 +303,7 @@ fn figures(name: &str, quick: bool, json: bool) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
     figures::figures(name, &plan, &mut |row| {
         holds &= row.holds;
-        let line = if json {
-            output::json(&row)
-        } else {
-            let mark = if row.holds { "ok  " } else { "FAIL" };
-            let value = match &row.value {
-                Value::Number(number) => format!("{number}"),
-                Value::Text(text) => text.clone(),
-            };
-            output::line(&format!(
-                "{mark} {}: {value} {} ({})",
-                row.what, row.unit, row.bound
-            ))
-        };
+        let line = if json { output::json(&row) } else { tell_row(&row) };
         if written.is_ok() {
             written = line;
         }

@@ -11,6 +11,7 @@ mod lab;
 mod output;
 mod ports;
 mod probe;
+mod rig;
 mod units;
 
 use std::path::PathBuf;
@@ -51,6 +52,8 @@ enum Command {
     Probe(probe::Args),
     /// List the rigs: simulated ones and serial ports
     Ports(ports::Args),
+    /// Check, send or show the description of a rig
+    Rig(rig::Args),
     /// Open the window
     Open(Open),
 }
@@ -105,6 +108,7 @@ pub fn main() -> ExitCode {
             Command::Lab(args) => lab::run(&args),
             Command::Probe(args) => probe::run(&args),
             Command::Ports(args) => ports::run(&args),
+            Command::Rig(args) => rig::run(&args),
         },
     };
     match result {

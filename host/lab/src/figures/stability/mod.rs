@@ -2,6 +2,7 @@
 
 mod boundary;
 mod contacts;
+mod endurance;
 mod energy;
 pub mod faults;
 mod impact;
@@ -19,5 +20,6 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     impact::measure(out)?;
     rate::measure(out)?;
     faults::measure(plan, out)?;
-    unsafe_commands::measure(plan, out)
+    unsafe_commands::measure(plan, out)?;
+    endurance::hour(plan, out)
 }

@@ -1,0 +1,205 @@
+//! Encoder counts to handle pose and velocity, and force to motor currents: what a described rig does in each tick, simulated or real.
+
+use glam::Vec3;
+use mortise_haptics::{Pose, Twist};
+use mortise_protocol::limits::MAX_JOINTS;
+use mortise_protocol::rig::{Rig, RigFault};
+
+use crate::board::TICK_S;
+use crate::encoder::{Counter, Velocity};
+use crate::kinematics::{Model, Posture};
+
+/// Encoders of a description: joints, then wrist axes. Those that are not there count nothing.
+pub const ENCODERS: usize = MAX_JOINTS + 3;
+/// Fastest a wrist axis turns, rad/s: no wrist of a person's does 50.
+const WRIST_RATE: f32 = 100.0;
+
+/// Everything between counts and the handle.
+#[derive(Clone, Debug)]
+pub struct Joints {
+    model: Model,
+    radians_per_count: [f32; ENCODERS],
+    home: [f32; ENCODERS],
+    farthest: [u32; ENCODERS],
+    counters: [Counter; ENCODERS],
+    velocities: [Velocity; ENCODERS],
+    torque_per_ampere: [f32; MAX_JOINTS],
+    current_limit: [f32; MAX_JOINTS],
+    force_ceiling: f32,
+    posture: Posture,
+}
+
+/// What the encoders say in one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// Handle in the world.
+    pub handle: Pose,
+    /// Its velocity.
+    pub twist: Twist,
+    /// First encoder that moved further than it can, or says where the links cannot be.
+    pub jump: Option<u8>,
+    /// Counts each encoder moved.
+    pub moved: [i32; ENCODERS],
+}
+
+impl Joints {
+    /// In the home pose, at rest, all counts 0.
+    ///
+    /// # Errors
+    /// See [`Model::new`].
+    pub fn new(rig: &Rig) -> Result<Self, RigFault> {
+        let model = Model::new(rig)?;
+        let mut home = [0.0; ENCODERS];
+        let mut radians_per_count = [0.0; ENCODERS];
+        let mut farthest = [0; ENCODERS];
+        let mut torque_per_ampere = [1.0; MAX_JOINTS];
+        let mut current_limit = [0.0; MAX_JOINTS];
+        for (number, joint) in rig.joints.iter().enumerate() {
+            home[number] = joint.home;
+            radians_per_count[number] = joint.radians_per_count();
+            // At least one count: a slow joint with a coarse encoder still counts. The cast saturates.
+            farthest[number] = (joint.counts_per_tick() + 1.0) as u32;
+            torque_per_ampere[number] = joint.torque_per_ampere();
+            current_limit[number] = joint.current_limit;
+        }
+        if let Some(wrist) = &rig.wrist {
+            for axis in 0..3 {
+                let number = MAX_JOINTS + axis;
+                home[number] = wrist.home[axis];
+                radians_per_count[number] = wrist.radians_per_count(axis);
+                farthest[number] = (WRIST_RATE * TICK_S / radians_per_count[number].abs() + 1.0) as u32;
+            }
+        }
+        let posture = posture(&model, &home).ok_or(RigFault::Linkage)?;
+        let mut joints = Self {
+            model,
+            radians_per_count,
+            home,
+            farthest,
+            counters: farthest.map(Counter::new),
+            velocities: [Velocity::new(); ENCODERS],
+            torque_per_ampere,
+            current_limit,
+            force_ceiling: rig.ceilings.force,
+            posture,
+        };
+        joints.start();
+        Ok(joints)
+    }
+
+    /// The mechanism stands in its home pose: counters start at 0.
+    pub fn start(&mut self) {
+        self.start_at(&[0; ENCODERS]);
+    }
+
+    /// The mechanism rests where these counts say: the next reading is compared with them. Where it cannot be, the last posture stays.
+    pub fn start_at(&mut self, counts: &[i32; ENCODERS]) {
+        self.counters = self.farthest.map(Counter::new);
+        self.velocities = [Velocity::new(); ENCODERS];
+        let mut angles = [0.0; ENCODERS];
+        for encoder in 0..ENCODERS {
+            self.counters[encoder].update(counts[encoder]);
+            angles[encoder] = self.angle(encoder, counts[encoder]);
+        }
+        if let Some(posture) = posture(&self.model, &angles) {
+            self.posture = posture;
+        }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The posture of the last reading.
+    pub fn posture(&self) -> &Posture {
+        &self.posture
+    }
+
+    /// Angle of an encoder's axis at a count, rad.
+    pub fn angle(&self, encoder: usize, count: i32) -> f32 {
+        self.home[encoder] + count as f32 * self.radians_per_count[encoder]
+    }
+
+    /// The count nearest to an angle; 0 for an encoder that is not there.
+    pub fn count(&self, encoder: usize, angle: f32) -> i32 {
+        let scale = self.radians_per_count[encoder];
+        if scale == 0.0 {
+            return 0;
+        }
+        let count = (angle - self.home[encoder]) / scale;
+        (if count < 0.0 { count - 0.5 } else { count + 0.5 }) as i32
+    }
+
+    /// Takes the counts of one tick. Where the links cannot be so, the last posture stays and the first joint is told as having jumped.
+    pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Reading {
+        let mut jump = None;
+        let mut rates = [0.0; ENCODERS];
+        let mut moved = [0; ENCODERS];
+        let mut angles = [0.0; ENCODERS];
+        for encoder in 0..ENCODERS {
+            let step = self.counters[encoder].update(counts[encoder]);
+            if step.jumped && jump.is_none() {
+                jump = Some(encoder as u8);
+            }
+            moved[encoder] = step.counts;
+            rates[encoder] =
+                self.velocities[encoder].update(step.counts as f32 * self.radians_per_count[encoder]);
+            angles[encoder] = self.angle(encoder, counts[encoder]);
+        }
+        match posture(&self.model, &angles) {
+            Some(posture) => self.posture = posture,
+            None => jump = jump.or(Some(0)),
+        }
+        let [a, b, c, d, e, f] = rates;
+        Reading {
+            handle: Pose::new(self.posture.position, self.posture.orientation),
+            twist: Twist {
+                linear: self.posture.velocity([a, b, c]),
+                angular: self.posture.angular_velocity([a, b, c], [d, e, f]),
+            },
+            jump,
+            moved,
+        }
+    }
+
+    /// Currents (A, signed in the motor's sense) that push the handle with `force` (N, world) in the posture of the last reading: τ = Jᵀ·F, i = τ/(gear·k).
+    ///
+    /// The force is cut to the rig's ceiling, fades near singular postures ([`Posture::share`]), and when a motor would exceed its limit all are scaled by
+    /// one factor: it gets weaker but keeps its direction. A force that is no number gives no current.
+    pub fn currents(&self, force: Vec3) -> [f32; MAX_JOINTS] {
+        let given = force.clamp_length_max(self.force_ceiling) * self.posture.share();
+        let torques = self.posture.torques(given);
+        let mut currents = [0.0; MAX_JOINTS];
+        let mut scale = 1.0f32;
+        for joint in 0..MAX_JOINTS {
+            let wanted = torques[joint] / self.torque_per_ampere[joint];
+            if !wanted.is_finite() {
+                return [0.0; MAX_JOINTS];
+            }
+            let limit = self.current_limit[joint];
+            if wanted.abs() > limit {
+                scale = scale.min(limit / wanted.abs());
+            }
+            currents[joint] = wanted;
+        }
+        currents.map(|wanted| wanted * scale)
+    }
+
+    /// Joint torques of these currents, N·m.
+    pub fn torques(&self, currents: &[f32; MAX_JOINTS]) -> Vec3 {
+        Vec3::from_array(core::array::from_fn(|joint| {
+            currents[joint] * self.torque_per_ampere[joint]
+        }))
+    }
+
+    /// A motor gives more than half of what it can.
+    pub fn loaded(&self, currents: &[f32; MAX_JOINTS], joint: usize) -> bool {
+        currents[joint].abs() > 0.5 * self.current_limit[joint]
+    }
+}
+
+fn posture(model: &Model, angles: &[f32; ENCODERS]) -> Option<Posture> {
+    let [a, b, c, d, e, f] = *angles;
+    model.posture([a, b, c], [d, e, f])
+}

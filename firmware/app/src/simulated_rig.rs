@@ -1,0 +1,74 @@
+//! The mechanism a simulated board has: the one its kept description tells of, or a free handle with six motors.
+
+use mortise_haptics::{Pose, Wrench};
+use mortise_protocol::message::{HandScript, InputFault};
+use mortise_protocol::rig::Rig;
+
+use crate::board::{Drive, Mechanism, Sensed};
+use crate::described::Described;
+use crate::simulated::Simulated;
+
+/// See the module.
+#[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one is made, in a static; there is nothing to allocate from"
+)]
+pub enum SimulatedRig {
+    /// No description.
+    Free(Simulated),
+    /// As described.
+    Described(Described),
+}
+
+impl SimulatedRig {
+    /// The mechanism of `rig`; a free handle without one, or for one that cannot be built (which is never kept).
+    pub fn of(rig: Option<&Rig>) -> Self {
+        match rig.map(Described::new) {
+            Some(Ok(described)) => Self::Described(described),
+            _ => Self::Free(Simulated::new()),
+        }
+    }
+}
+
+macro_rules! each {
+    ($self:expr, $mechanism:ident => $call:expr) => {
+        match $self {
+            SimulatedRig::Free($mechanism) => $call,
+            SimulatedRig::Described($mechanism) => $call,
+        }
+    };
+}
+
+impl Mechanism for SimulatedRig {
+    const SIMULATED: bool = true;
+    const DESCRIBED: bool = true;
+
+    fn sense(&mut self) -> Sensed {
+        each!(self, mechanism => mechanism.sense())
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        each!(self, mechanism => mechanism.drive(drive));
+    }
+
+    fn hand(&self) -> Option<Wrench> {
+        each!(self, mechanism => mechanism.hand())
+    }
+
+    fn set_hand(&mut self, script: Option<&HandScript>) {
+        each!(self, mechanism => mechanism.set_hand(script));
+    }
+
+    fn home(&mut self) {
+        each!(self, mechanism => mechanism.home());
+    }
+
+    fn set_input_faults(&mut self, faults: &[InputFault]) {
+        each!(self, mechanism => mechanism.set_input_faults(faults));
+    }
+
+    fn reset(&mut self) -> Option<Pose> {
+        each!(self, mechanism => mechanism.reset())
+    }
+}

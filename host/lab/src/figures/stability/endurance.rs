@@ -1,0 +1,23 @@
+//! Endurance: a board kept busy, and nothing that wears.
+
+use mortise_rig::{EmulatedMode, RigSpec};
+
+use super::{Plan, Row};
+use crate::{LabError, endurance};
+
+/// Virtual time, s: the hour, and the shorter form.
+const HOUR_S: u32 = 3_600;
+const QUICK_S: u32 = 180;
+const SEED: u64 = 1;
+
+/// An hour of virtual time on the emulated board with random scenes, a random hand and faults on the link; the rows say how long it was.
+pub(super) fn hour(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let emulated = RigSpec::Emulated {
+        mode: EmulatedMode::Lockstep,
+        firmware: None,
+    };
+    let seconds = if plan.quick { QUICK_S } else { HOUR_S };
+    let report = endurance::run(&emulated, seconds, SEED, &mut |turn| eprintln!("{turn}"))?;
+    report.rows().into_iter().for_each(out);
+    Ok(())
+}
