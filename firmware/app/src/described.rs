@@ -257,8 +257,8 @@ impl Links {
             }
         }
         let mut wrist = self.wrist;
-        for axis in 0..3 {
-            wrist[axis] += h * self.wrist_rates[axis];
+        for (angle, rate) in wrist.iter_mut().zip(self.wrist_rates.to_array()) {
+            *angle += h * rate;
         }
         match model.posture(angles, wrist) {
             // Out of a narrow posture is always allowed.

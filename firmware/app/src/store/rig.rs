@@ -21,6 +21,10 @@ const MAGIC: [u8; 8] = *b"MRIG0001";
 
 /// What the flash holds.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "no heap on the board, and one of these at start"
+)]
 pub enum Kept {
     /// None was ever sent.
     Nothing,
