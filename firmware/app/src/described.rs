@@ -123,8 +123,7 @@ impl Described {
 
     /// Kinetic energy of links and handle, J, for tests.
     pub fn kinetic_energy(&self) -> f32 {
-        let links = &self.links;
-        0.5 * links.rates.dot(links.mass_matrix() * links.rates)
+        self.links.kinetic_energy()
     }
 
     /// What the motors are given, A.
@@ -193,6 +192,10 @@ impl Links {
             + self.posture.jacobian.transpose() * self.posture.jacobian * self.mass
     }
 
+    fn kinetic_energy(&self) -> f32 {
+        0.5 * self.rates.dot(self.mass_matrix() * self.rates)
+    }
+
     /// One backward-Euler step; returns the hand's wrench in it.
     fn step(&mut self, motors: Vec3, held: Option<&(Grip, Wish)>, joints: &Joints) -> Wrench {
         const H: f32 = TICK_S / SUBSTEPS as f32;
@@ -232,7 +235,13 @@ impl Links {
                 inertia + (Mat3::from_diagonal(Vec3::splat(WRIST_VISCOUS)) + across * angular_yields) * H;
             self.wrist_rates = solve(system, inertia * self.wrist_rates + axes.transpose() * twist * H);
         }
+        let before = self.kinetic_energy();
         self.move_on(H, joints);
+        // The inertia moves along with the angles; the forces that keep the energy of it are left out above, and stand here.
+        let after = self.kinetic_energy();
+        if after > before {
+            self.rates *= libm::sqrtf(before / after);
+        }
         Wrench {
             force: pull - jacobian * self.rates * yields,
             torque: if has_wrist {
