@@ -1,11 +1,11 @@
 //! Endurance: a board kept busy for an hour of its own time, and whether anything wears.
 //!
-//! The hour is cut into turns of [`TURN_S`]. Each turn uploads a scene nobody has seen before ([`scenes`]), arms, grabs, and lets a random hand push
+//! The hour is cut into turns of `TURN_S`. Each turn uploads a scene nobody has seen before (`scenes`), arms, grabs, and lets a random hand push
 //! the part about while frames are lost, damaged, repeated, late and made up; parameters, constraint targets, releases, garbage and now and then a
 //! STOP come in between. The board runs in lockstep and counts instructions, so its time does not depend on this computer's load.
 //!
 //! No fault is provoked that the board would be right to report (its stop input, encoders and drivers stay whole, and in lockstep the host is never
-//! silent): each one it tells is unexplained. Memory is looked at after every turn: what had been used when [`WARM`] of the hour was over must still
+//! silent): each one it tells is unexplained. Memory is looked at after every turn: what had been used when `WARM` of the hour was over must still
 //! be all at its end.
 
 mod memory;
@@ -111,7 +111,7 @@ pub struct Report {
     pub peak_force: f32,
     /// RAM of the firmware's statics, bytes: all it has beside the stack, there is no heap. 0 where there is no firmware file.
     pub static_bytes: u64,
-    /// Deepest stack when [`WARM`] of the time was over, bytes.
+    /// Deepest stack when `WARM` of the time was over, bytes.
     pub stack_warm_bytes: u32,
     /// Deepest stack at the end.
     pub stack_bytes: u32,
