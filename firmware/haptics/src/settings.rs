@@ -132,7 +132,7 @@ pub struct PassivitySettings {
     pub damping: f32,
     /// The same in rotation, N m s/rad. Default 0.
     pub angular_damping: f32,
-    /// Whole ticks from a wrench to the motors that give it, at most [`MAX_DELAY_TICKS`]. Default 0: they give it within the period.
+    /// Whole ticks from a wrench to the motors that give it, at most 4. Default 0: they give it within the period.
     pub delay_ticks: u32,
 }
 
