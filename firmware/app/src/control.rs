@@ -22,7 +22,10 @@ use crate::parameters::{ControlSettings, Parameters};
 use crate::safety::{Action, Event as SafetyEvent, Motors, Safety};
 use crate::statistics::{StateHash, count_tick};
 
-/// Ticks from zero to whole wrench after arming or grabbing.
+/// Ticks in which what the coupling can hold grows from nothing to its settings after arming or grabbing; what it cannot hold slips in the hand.
+///
+/// It is the grip that is weak, not the wrench that is scaled on its way to the motors: what the object is given the hand must give. Scaled behind the
+/// coupling, an object set in motion during the ramp returned kinetic energy that nobody had put in, all of ½·m·v².
 pub const RAMP_TICKS: u16 = 200;
 /// Ticks in which a soft stop takes the last wrench to zero.
 pub const FADE_TICKS: u16 = 50;
@@ -61,7 +64,7 @@ pub struct ControlPlane<'c, 's, M, C> {
     replaced: bool,
     output: Option<Output>,
     commanded: Wrench,
-    /// Ticks since the wrench began to ramp up.
+    /// Ticks since the grip began to ramp up.
     ramp: u16,
     /// Ticks since the soft stop began, and the wrench it began with.
     fade: (u16, Wrench),
@@ -398,7 +401,17 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 handle_twist: self.sensed.twist,
                 enabled: true,
             };
-            let output = haptics::tick(self.ends.law, scene, &self.settings.law, &input);
+            self.ramp = self.ramp.saturating_add(1).min(RAMP_TICKS);
+            let ramping = self.ramp < RAMP_TICKS;
+            self.ends.law.set_slipping(ramping);
+            let ramped;
+            let law = if ramping {
+                ramped = loosened(&self.settings.law, f32::from(self.ramp) / f32::from(RAMP_TICKS));
+                &ramped
+            } else {
+                &self.settings.law
+            };
+            let output = haptics::tick(self.ends.law, scene, law, &input);
             // A reading out of all proportion is as good as none.
             let mut bad = haptics::Flags::NON_FINITE;
             bad.insert(haptics::Flags::BAD_INPUT);
@@ -411,13 +424,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         let wanted = match (self.safety.motors(), &self.output) {
             (Motors::Off, _) => None,
             (Motors::Fading, _) => Some(self.fading()),
-            (Motors::Zero | Motors::Rendered, Some(output)) => {
-                self.ramp = self.ramp.saturating_add(1).min(RAMP_TICKS);
-                Some(scaled(
-                    output.handle,
-                    f32::from(self.ramp) / f32::from(RAMP_TICKS),
-                ))
-            }
+            (Motors::Zero | Motors::Rendered, Some(output)) => Some(output.handle),
             (Motors::Zero | Motors::Rendered, None) => Some(Wrench::ZERO),
         };
         let allowed = wanted.map(|wrench| self.restrained(wrench));
@@ -497,6 +504,14 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             self.apply(SafetyEvent::ReferenceLost);
         }
     }
+}
+
+/// `law` with a coupling that holds `share` of its force and torque.
+fn loosened(law: &haptics::Settings, share: f32) -> haptics::Settings {
+    let mut law = *law;
+    law.coupling.force_max_n *= share;
+    law.coupling.torque_max_nm *= share;
+    law
 }
 
 fn scaled(wrench: Wrench, factor: f32) -> Wrench {

@@ -41,6 +41,8 @@ fn wrench(drive: Drive) -> Wrench {
 /// Moves the handle away from the part and waits until the coupling pulls with all it has.
 fn pulled() -> Bench {
     let mut bench = active();
+    // Before the grip is firm the part would slip in the hand instead.
+    bench.ticks(u32::from(RAMP_TICKS));
     bench
         .strings
         .pull(|s| s.handle.position = Vec3::new(0.004, 0.0, 0.0));
@@ -354,13 +356,15 @@ fn a_soft_stop_brakes_and_stays_below_its_limits() {
 #[test]
 fn the_wrench_ramps_up_from_zero() {
     let mut bench = active();
-    bench
-        .strings
-        .pull(|s| s.handle.position = Vec3::new(0.3, 0.0, 0.0));
-    // Far away: the coupling pulls at its limit from the first ticks on.
-    let limit = ParameterId::ForceLimit.row().default;
+    // The hand is off at once with 0.8 m/s: the part, 0.1 kg, is brought to that by a grip that is still growing, ∫F dt = m·v.
+    let speed = 0.8;
+    let limit = ParameterId::CouplingForce.row().default;
     let mut forces = Vec::new();
-    for _ in 0..RAMP_TICKS {
+    for i in 0..RAMP_TICKS {
+        bench.strings.pull(|s| {
+            s.handle.position = Vec3::new(1e-3 * speed * f32::from(i + 1), 0.0, 0.0);
+            s.twist.linear = Vec3::new(speed, 0.0, 0.0);
+        });
         bench.tick();
         forces.push(wrench(bench.strings.last()).force.length());
     }
@@ -368,8 +372,11 @@ fn the_wrench_ramps_up_from_zero() {
         let ramp = limit * (i + 2) as f32 / f32::from(RAMP_TICKS);
         assert!(force <= ramp + 1e-3, "tick {i}: {force} above {ramp}");
     }
+    // F grows by 50 N/s: 0.08 N s are given after 57 ms, at 2.8 N.
     let peak = forces.iter().copied().fold(0.0, f32::max);
-    assert!(peak > 1.0, "the ramp was never met: {peak}");
+    assert!((2.5..3.1).contains(&peak), "{peak}");
+    // The grip slipped for good: nothing pulls the part after the hand once it is as fast.
+    assert!(forces[120..].iter().all(|&force| force < 0.05), "{forces:?}");
 }
 
 #[test]

@@ -10,9 +10,9 @@
 use glam::Vec3;
 
 use crate::body::Grabbed;
-use crate::limits::length;
+use crate::limits::{cut, length};
 use crate::pose::{Pose, Twist, Wrench};
-use crate::rotation::log_continuous;
+use crate::rotation::{self, log_continuous};
 use crate::settings::CouplingSettings;
 
 /// The coupling at the tick's start, world axes.
@@ -54,6 +54,22 @@ impl Coupling {
             target: handle_twist.moved_by(lever),
             lever,
         }
+    }
+
+    /// Where the handle must hold the object (G) for the coupling to be stretched and turned no farther than its springs may pull; `None`: it is not.
+    pub fn slipped(&self, handle: Pose, grabbed: &Grabbed, settings: &CouplingSettings) -> Option<Pose> {
+        // A spring of no stiffness may be as long as it likes: x/0 is infinite, and 0/0 compares false.
+        let (stretch, pulled) = cut(self.stretch, settings.force_max_n / settings.k_t_n_per_m);
+        let (angle, turned) = cut(self.angle, settings.torque_max_nm / settings.k_r);
+        if !(pulled || turned) {
+            return None;
+        }
+        let orientation = rotation::exp(cut(angle, rotation::EXP_MAX).0) * grabbed.orientation;
+        let position = grabbed.center + stretch - orientation * grabbed.body.center_of_mass;
+        Some(handle.inverse().compose(Pose {
+            position,
+            orientation,
+        }))
     }
 
     /// Wrench on the object at its centre of mass at the tick's end, when it has moved with `twist` for `period_s`; before slipping.

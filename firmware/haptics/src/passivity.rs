@@ -13,8 +13,9 @@
 //! goes to the tank; turning it up again costs as much, is paid by the tank, and takes 20 s in contact and half a second out of it.
 //!
 //! A wrench that reaches the motors late works on another motion than it was made for: rigs whose drivers take ticks to answer say so in
-//! [`crate::PassivitySettings::delay_ticks`]. What is not seen: an encoder that rounds hides energy below its resolution, and a wrench that the application scales down (ramps, fades) is taken
-//! for whole. Both make W too small or too large by no more than one resolution, or one ramp, of force.
+//! [`crate::PassivitySettings::delay_ticks`]. What is not seen: an encoder that rounds hides energy below its resolution, and a wrench that the application takes down (a ceiling, the fade of a soft stop) is taken
+//! for whole. Both make W too small or too large by no more than one resolution, or one fade, of force. A ramp from nothing therefore raises the coupling's own limits,
+//! with a part that slips in the hand meanwhile ([`crate::State::set_slipping`]): scaling the wrench behind the coupling makes up to the object's kinetic energy.
 //!
 //! After the energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli, *Bilateral telemanipulation with time delays: a two-layer approach combining
 //! passivity and transparency*, IEEE T-RO 27(4), 2011, with the reference energy of Ryu, Preusche, Hannaford and Hirzinger, *Time domain

@@ -23,6 +23,8 @@ pub struct State {
     /// Every part's placement.
     pub(crate) parts: Vec<Placed, MAX_PARTS>,
     pub(crate) grabbed: Option<Grabbed>,
+    /// What the coupling cannot hold slips in the hand for good.
+    pub(crate) slipping: bool,
     /// Where the part last held stood.
     pub(crate) last_object: Option<Pose>,
     /// Handle wrench of the last tick, for the slew limit.
@@ -114,6 +116,7 @@ impl State {
         Self {
             parts: Vec::new(),
             grabbed: None,
+            slipping: false,
             last_object: None,
             previous_wrench: Wrench::ZERO,
             tank: Tank::new(),
@@ -243,6 +246,14 @@ impl State {
     /// How passive the coupling is.
     pub fn passivity(&self) -> Passivity {
         self.tank.seen
+    }
+
+    /// Whether the part slips in the hand for good where the coupling would have to pull harder than it may, instead of being pulled back with all it may.
+    ///
+    /// For as long as a grip is still being made firm ([`crate::CouplingSettings::force_max_n`] raised from tick to tick): a coupling that is stretched farther than it can hold
+    /// would gain d·ΔF with each step of its limit, energy that nobody put in; one that has slipped stores no more than it can give back.
+    pub fn set_slipping(&mut self, slipping: bool) {
+        self.slipping = slipping;
     }
 
     /// Forgets the last handle wrench, so that the next one builds up from zero under the slew limit.

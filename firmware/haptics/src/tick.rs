@@ -15,7 +15,7 @@ use crate::linear::inverse_sqrt;
 use crate::pose::{Pose, Twist, Wrench, renormalize};
 use crate::proximity::{Leaf, Search};
 use crate::rotation;
-use crate::settings::{Integrator, Settings};
+use crate::settings::{CouplingSettings, Integrator, Settings};
 use crate::state::State;
 use crate::step::{Solution, Step, Stiffness};
 use crate::touching::{Scenery, touching_faces};
@@ -76,7 +76,8 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         out.handle = state.hand_over(Wrench::ZERO, input.enabled, settings, &mut out.work.flags);
         return out;
     };
-    let (mut grabbed, coupling) = take_hold(grabbed, handle, input.handle_twist);
+    let limits = state.slipping.then_some(&settings.coupling);
+    let (mut grabbed, coupling) = take_hold(grabbed, handle, input.handle_twist, limits);
     let open = if input.enabled {
         let object_energy = grabbed.moving_energy(settings.object.mass_kg);
         (state.tank).balance(
@@ -354,9 +355,21 @@ impl State {
     }
 }
 
-/// The coupling at the tick's start. In the first tick after a grab the object takes over the hand's motion, or the damper would be felt.
-fn take_hold(mut grabbed: Grabbed, handle: Pose, handle_twist: Twist) -> (Grabbed, Coupling) {
-    let coupling = Coupling::measure(handle, handle_twist, &grabbed);
+/// The coupling at the tick's start, slipping in the hand where it is stretched beyond `limits`. In the first tick after a grab the object takes over the hand's motion,
+/// or the damper would be felt.
+fn take_hold(
+    mut grabbed: Grabbed,
+    handle: Pose,
+    handle_twist: Twist,
+    limits: Option<&CouplingSettings>,
+) -> (Grabbed, Coupling) {
+    let mut coupling = Coupling::measure(handle, handle_twist, &grabbed);
+    if let Some(limits) = limits
+        && let Some(offset) = coupling.slipped(handle, &grabbed, limits)
+    {
+        grabbed.offset = offset;
+        coupling = Coupling::measure(handle, handle_twist, &grabbed);
+    }
     grabbed.angle = coupling.angle;
     if grabbed.age == 0 {
         grabbed.twist = coupling.target;

@@ -3,6 +3,7 @@
 mod support;
 
 use std::collections::VecDeque;
+use std::f64::consts::TAU;
 
 use mortise_haptics::{Flags, Input, Pose, Quat, Settings, State, Twist, Vec3, tick};
 use proptest::prelude::*;
@@ -137,6 +138,68 @@ fn a_loop_that_buzzes_is_turned_down() {
         assert!(with.flagged, "{with:?}");
         assert!(with.made_j < 1e-3, "{with:?}");
         assert!(with.unrest_m_per_s < 0.25 * without.unrest_m_per_s, "{with:?}");
+    }
+}
+
+/// Moves the handle to and fro in free air while the grip grows from nothing in 200 ticks. Net work of the device on the handle at most, all that passed, and the
+/// least that the valve was open, for a part that slips in the hand or does not.
+fn grip_grows(image: &Image, amplitude_m: f64, hz: f64, slipping: bool) -> (f64, f64, f32) {
+    const TICKS: u32 = 200;
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let pose = |x: f64| Pose::new(Vec3::new(x as f32, 0.0, 0.02), Quat::IDENTITY);
+    state.grab(&scene, 1, &pose(0.0)).unwrap();
+    let at = |t: f64| amplitude_m * (1.0 - (TAU * hz * t).cos());
+    let (mut net, mut made, mut passed, mut shut) = (0.0, 0.0f64, 0.0, 0.0f32);
+    for i in 0..1000 {
+        let share = ((i + 1) as f32 / TICKS as f32).min(1.0);
+        state.set_slipping(slipping && share < 1.0);
+        let mut settings = Settings::default();
+        settings.coupling.force_max_n *= share;
+        settings.coupling.torque_max_nm *= share;
+        let (now, next) = (1e-3 * f64::from(i), 1e-3 * f64::from(i + 1));
+        let input = Input {
+            handle: pose(at(now)),
+            handle_twist: Twist {
+                linear: Vec3::new(((at(now) - at(now - 1e-3)) / 1e-3) as f32, 0.0, 0.0),
+                angular: Vec3::ZERO,
+            },
+            enabled: true,
+        };
+        let out = tick(&mut state, &scene, &settings, &input);
+        let work = f64::from(out.handle.force.x) * (at(next) - at(now));
+        net += work;
+        made = made.max(net);
+        passed += work.abs();
+        shut = shut.max(state.passivity().softened);
+    }
+    (made, passed, shut)
+}
+
+/// A limit that is raised under a stretched coupling makes energy: the valve must close. A part that slips in the hand stores none that could be raised.
+#[test]
+fn a_growing_grip_makes_nothing_if_the_part_slips() {
+    let image = support::slab_and_box(0.05e-3, 3);
+    let (_, _, held) = grip_grows(&image, 0.03, 4.0, false);
+    assert!(held > 0.1, "this motion does not outrun the grip: {held}");
+    let (made, passed, slipped) = grip_grows(&image, 0.03, 4.0, true);
+    println!("{made} of {passed} J");
+    assert!(passed > 1e-3 && slipped == 0.0, "{passed} {slipped}");
+    assert!(made <= 1e-2 * passed, "{made} of {passed} J");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_the_hand_does_while_the_grip_grows(amplitude in 1e-3f64..0.05, hz in 0.2f64..6.0) {
+        // As fast as a handle may be.
+        prop_assume!(TAU * hz * amplitude < 1.0);
+        let image = support::slab_and_box(0.05e-3, 3);
+        let (made, passed, shut) = grip_grows(&image, amplitude, hz, true);
+        prop_assert!(made <= 1e-2 * passed + 1e-9, "{made} of {passed} J");
+        prop_assert_eq!(shut, 0.0);
     }
 }
 

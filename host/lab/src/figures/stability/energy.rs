@@ -1,12 +1,14 @@
 //! What the whole chain makes of nothing, in every closed-loop scenario there is.
 
+use std::path::Path;
+
 use mortise_rig::RigSpec;
 use tempfile::NamedTempFile;
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
-use crate::scenario::{Scenario, run};
+use crate::scenario::{Outcome, Scenario, run};
 
 /// Most net energy at the handle, mJ, and of what passed, %.
 const MADE_MJ: f64 = 1.0;
@@ -34,7 +36,6 @@ const SCENARIOS: &[(&str, &str)] = scenarios!(
 const LONG: &str = "load";
 
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let simulated = RigSpec::Simulated { realtime: false };
     let tight: NamedTempFile = Fit::thesis(0.02).engaged(-20.0).file()?;
     for &(name, text) in SCENARIOS {
         if plan.quick && name == LONG {
@@ -44,12 +45,8 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             ));
             continue;
         }
-        let mut scenario = Scenario::parse(text, name)?;
         let guided = name == "guided_fit";
-        scenario.scene.step = if guided { tight.path() } else { plan.pair }.to_owned();
-        // Every tick: what a held force does between two poses is then exact.
-        scenario.run.telemetry_every_ticks = 1;
-        let outcome = run(&scenario, &simulated)?;
+        let outcome = play(name, text, if guided { tight.path() } else { plan.pair })?;
         let what = format!("scenario {name}, every tick");
         out(Row::at_most(
             format!("{what}: net energy made at the handle"),
@@ -71,4 +68,39 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         ));
     }
     Ok(())
+}
+
+fn play(name: &str, text: &str, step: &Path) -> Result<Outcome, LabError> {
+    let mut scenario = Scenario::parse(text, name)?;
+    scenario.scene.step = step.to_owned();
+    // Every tick: what a held force does between two poses is then exact.
+    scenario.run.telemetry_every_ticks = 1;
+    run(&scenario, &RigSpec::Simulated { realtime: false })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The presses in which least passes, where a constant amount made weighs most: the ramp after the grab made an eleventh of it while it scaled the wrench.
+    #[test]
+    fn what_passes_little_makes_little() {
+        let pair = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../app/samples/pair_d18.75_clear1.00.step"
+        );
+        for (name, text) in SCENARIOS.iter().filter(|(name, _)| name.starts_with("press")) {
+            let made = play(name, text, Path::new(pair)).expect("played");
+            let (given, passed) = (made.energy_given_mj, made.energy_passed_mj);
+            println!(
+                "{name}: {given} mJ of {passed} mJ, contacts {} mJ",
+                made.contact_given_mj
+            );
+            assert!(passed > 0.1, "{name}: nothing passed");
+            assert!(
+                given <= 1e-2 * MADE_PERCENT * passed,
+                "{name}: {given} of {passed} mJ"
+            );
+        }
+    }
 }
