@@ -355,10 +355,10 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         if self.rig == Kept::Damaged {
             return Err(Refusal::RigDamaged);
         }
-        let Some(stored) = self.store.current() else {
+        if self.store.current().is_none() {
             return Err(Refusal::NoScene);
-        };
-        if self.state == DeviceState::Idle && !stored.is_sound() {
+        }
+        if self.state == DeviceState::Idle && !self.store.is_sound() {
             self.enqueue(0, CommandKind::SceneDamaged)?;
             return Err(Refusal::State(DeviceState::Fault(Fault::SceneDamaged)));
         }

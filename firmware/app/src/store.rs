@@ -80,16 +80,10 @@ pub struct Stored<'s> {
     pub image: SceneImage<'s>,
     /// CRC-32 over the whole image: names the scene to the host.
     pub crc: u32,
-    bytes: &'s [u8],
+    /// Of the image, bytes.
+    length: usize,
     slot: usize,
     sequence: u32,
-}
-
-impl Stored<'_> {
-    /// Whether the bytes in flash are still what was stored. Reads them all.
-    pub fn is_sound(&self) -> bool {
-        CRC.checksum(self.bytes) == self.crc
-    }
 }
 
 /// An upload under way.
@@ -139,6 +133,17 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
     /// The scene in use.
     pub fn current(&self) -> Option<&Stored<'s>> {
         self.current.as_ref()
+    }
+
+    /// Whether there is a scene in use and the flash still holds it. Reads all of it, from the flash anew: what a reference showed before a compiler may take for
+    /// unchanged.
+    pub fn is_sound(&self) -> bool {
+        self.current.is_some_and(|scene| {
+            let bytes = self.memory(scene.slot).get(IMAGE_OFFSET..);
+            bytes
+                .and_then(|bytes| bytes.get(..scene.length))
+                .is_some_and(|image| CRC.checksum(image) == scene.crc)
+        })
     }
 
     /// Largest image, bytes.
@@ -331,7 +336,7 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         Ok(Stored {
             image: check(bytes)?,
             crc: record.crc,
-            bytes,
+            length: bytes.len(),
             slot,
             sequence: record.sequence,
         })

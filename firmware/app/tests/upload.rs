@@ -124,7 +124,7 @@ fn a_scene_that_changed_in_flash_is_a_fault_when_arming() {
     let mut bench: Bench = Bench::new(flash.clone());
     bench.greet();
     bench.upload(&two_parts(1)).unwrap();
-    flash.damage(0, IMAGE_OFFSET + 40 * WRITE_SIZE);
+    flash.damage_in_use(0, IMAGE_OFFSET + 40 * WRITE_SIZE);
     let fault = DeviceState::Fault(Fault::SceneDamaged);
     assert_eq!(bench.request(&ToDevice::Arm), Err(Refusal::State(fault)));
     bench.tick();

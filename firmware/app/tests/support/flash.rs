@@ -14,13 +14,19 @@ const WORDS: usize = ALL * SLOT / WRITE_SIZE;
 
 struct Memory(UnsafeCell<[FlashWord; WORDS]>);
 
+impl Memory {
+    fn leaked(content: [FlashWord; WORDS]) -> &'static Self {
+        Box::leak(Box::new(Self(UnsafeCell::new(content))))
+    }
+}
+
 /// Operations left until the power goes; `None`: it stays.
 pub type Fuse = Rc<Cell<Option<u32>>>;
 
 /// A handle on leaked memory: cloning it is taking the chip out and putting it into the next board.
 #[derive(Clone)]
 pub struct TestFlash {
-    memory: &'static Memory,
+    memory: Rc<Cell<&'static Memory>>,
     pub fuse: Fuse,
     /// Operations done so far.
     pub operations: Rc<Cell<u32>>,
@@ -29,24 +35,33 @@ pub struct TestFlash {
 impl TestFlash {
     pub fn leaked() -> Self {
         Self {
-            memory: Box::leak(Box::new(Memory(UnsafeCell::new([ERASED; WORDS])))),
+            memory: Rc::new(Cell::new(Memory::leaked([ERASED; WORDS]))),
             fuse: Rc::default(),
             operations: Rc::default(),
         }
     }
 
-    /// Overwrites a byte as a failing cell would.
+    /// Changes a byte as a failing cell would. Nothing may be reading the slot.
     pub fn damage(&self, slot: usize, offset: usize) {
         let word = self.word(slot, offset / WRITE_SIZE * WRITE_SIZE);
         // SAFETY: inside the memory; the tests are single-threaded.
         unsafe { (*word).0[offset % WRITE_SIZE] ^= 0x10 };
     }
 
+    /// The same under whoever is reading: the chip is exchanged for one with the same content but for that byte. References handed out before go on seeing
+    /// the old one, since memory behind a shared reference must not change; who asks the flash again sees the damage.
+    pub fn damage_in_use(&self, slot: usize, offset: usize) {
+        // SAFETY: whole and initialised; only read here.
+        let content = unsafe { *self.memory.get().0.get() };
+        self.memory.set(Memory::leaked(content));
+        self.damage(slot, offset);
+    }
+
     fn word(&self, slot: usize, offset: usize) -> *mut FlashWord {
         assert!(slot < ALL && offset < SLOT && offset.is_multiple_of(WRITE_SIZE));
         let index = (slot * SLOT + offset) / WRITE_SIZE;
         // SAFETY: index < WORDS.
-        unsafe { self.memory.0.get().cast::<FlashWord>().add(index) }
+        unsafe { self.memory.get().0.get().cast::<FlashWord>().add(index) }
     }
 
     /// How much of the next operation happens: all, half (power goes), none.
