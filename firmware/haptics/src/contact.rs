@@ -87,6 +87,8 @@ pub(crate) struct Contacts {
     by_reach: Heap,
     /// It overflowed.
     dropped: bool,
+    /// How many of those left out touch.
+    lost: u32,
     /// Square of the longest arm, m².
     farthest2: f32,
     /// How many of the last tick's can be carried over.
@@ -168,6 +170,7 @@ impl Contacts {
             by_gap: Heap::new(),
             by_reach: Heap::new(),
             dropped: false,
+            lost: 0,
             farthest2: 0.0,
             carried_len: 0,
         }
@@ -177,6 +180,7 @@ impl Contacts {
     pub fn clear(&mut self) {
         self.len = 0;
         self.dropped = false;
+        self.lost = 0;
         self.farthest2 = 0.0;
         self.carried_len = 0;
     }
@@ -187,6 +191,7 @@ impl Contacts {
         self.current = 1 - self.current;
         self.len = 0;
         self.dropped = false;
+        self.lost = 0;
         self.farthest2 = 0.0;
     }
 
@@ -232,6 +237,11 @@ impl Contacts {
         self.dropped
     }
 
+    /// How many contacts that touch were left out since [`Self::clear`].
+    pub fn lost(&self) -> u32 {
+        self.lost
+    }
+
     /// The longest arm of all that were taken in, m.
     pub fn farthest(&self) -> f32 {
         libm::sqrtf(self.farthest2)
@@ -267,19 +277,23 @@ impl Contacts {
             self.by_reach.build(list[HALF..].iter().map(|c| c.reach_gap));
         }
         if gap >= self.by_gap.largest() {
-            return self.displace_in_second_half(reach_gap);
+            return self.displace_in_second_half(gap, reach_gap);
         }
         let place = self.by_gap.replace_largest(gap);
         let displaced = self.lists[self.current][place];
-        if let Some(second) = self.displace_in_second_half(displaced.reach_gap) {
+        if let Some(second) = self.displace_in_second_half(displaced.gap, displaced.reach_gap) {
             self.lists[self.current][second] = displaced;
         }
         Some(place)
     }
 
-    /// A place in the second half, unless all there would touch sooner.
-    fn displace_in_second_half(&mut self, reach_gap: f32) -> Option<usize> {
-        (reach_gap < self.by_reach.largest()).then(|| HALF + self.by_reach.replace_largest(reach_gap))
+    /// A place in the second half, unless all there would touch sooner. Whichever is left out for it is counted.
+    fn displace_in_second_half(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
+        let sooner = reach_gap < self.by_reach.largest();
+        let place = sooner.then(|| HALF + self.by_reach.replace_largest(reach_gap));
+        let left_out = place.map_or(gap, |place| self.lists[self.current][place].gap);
+        self.lost += u32::from(left_out < 0.0);
+        place
     }
 }
 
@@ -299,6 +313,8 @@ mod tests {
             }
         }
         assert!(contacts.dropped());
+        // No gap is negative.
+        assert_eq!(contacts.lost(), 0);
         let mut kept = [false; 2048];
         for c in contacts.as_slice() {
             assert_eq!(
@@ -324,6 +340,23 @@ mod tests {
         assert!(!contacts.dropped());
         let sum: f32 = contacts.as_slice().iter().map(|c| c.gap).sum();
         assert_eq!(sum, -((MAX_CONTACTS * (MAX_CONTACTS - 1) / 2) as f32));
+    }
+
+    #[test]
+    fn counts_those_that_touch_and_are_left_out() {
+        let mut contacts = Contacts::new();
+        let mut x = 1u32;
+        let touching = 700;
+        for _ in 0..2048 {
+            x = (x * 1021 + 7) % 2048;
+            // The deepest have the least levers.
+            let gap = x as f32 - touching as f32;
+            let _ = contacts.offer(gap, 0.5 * gap, 0.0);
+        }
+        let kept = contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
+        assert_eq!(contacts.lost() + kept, touching);
+        contacts.begin(false);
+        assert_eq!(contacts.lost(), 0);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use heapless::Vec;
 use mortise_protocol::image::SceneImage;
 
 use crate::body::Grabbed;
-use crate::contact::Phase;
+use crate::contact::{MAX_CONTACTS, Phase};
 use crate::coupling::Coupling;
 use crate::explicit;
 use crate::guidance::{At, GuidanceState};
@@ -206,6 +206,18 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     out
 }
 
+/// The thinning at which of `touching` points three quarters of a store are left, if as many as these were seen at `thinning`.
+///
+/// More than the store holds must not touch: which are kept would follow the last tick's tilt and tilt the part the other way, and the stiffness that comes and goes
+/// with them makes energy. A flat face on more than 256 points rattled so from tick to tick, by as much as it was deep in.
+fn thinned_to_fit(mut thinning: u8, mut touching: u32) -> u8 {
+    while thinning < MOST_THINNING && touching * 4 > MAX_CONTACTS as u32 * 3 {
+        thinning += 1;
+        touching /= 2;
+    }
+    thinning
+}
+
 /// What a step took, in the look-ups of the budget (170 instructions): a solve 13 and each target's pull in it 8, and past the third one half a look-up for
 /// each candidate.
 fn step_cost(solution: &Solution, candidates: u16, pulls: usize) -> u32 {
@@ -255,17 +267,24 @@ impl State {
         self.busy = used > settings.contact.point_budget / 2;
         work.flags.insert_if(self.thinning > 0, Flags::BUDGET_EXCEEDED);
         self.overruns = if stopped.is_some() { self.overruns + 1 } else { 0 };
-        if self.overruns > OVERRUNS_BORNE {
+        let touching = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
+        let lost = self.contacts.lost();
+        if lost > 0 {
+            self.overruns = 0;
+            self.thinning = thinned_to_fit(self.thinning, touching + lost);
+        } else if self.overruns > OVERRUNS_BORNE {
             self.overruns = 0;
             self.thinning = (self.thinning + 1).min(MOST_THINNING);
-        } else if self.thinning > 0 && used * ROOM_TO_THICKEN < settings.contact.point_budget * 4 {
+        } else if self.thinning > 0
+            && used * ROOM_TO_THICKEN < settings.contact.point_budget * 4
+            && touching * ROOM_TO_THICKEN < MAX_CONTACTS as u32 * 4
+        {
             self.thinning -= 1;
         }
         work.flags
             .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
         let contact = &settings.contact;
-        let touching_now = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as f32;
-        self.sharing = larger(larger(touching_now, 1.0), self.sharing * SHARING_DECAY);
+        self.sharing = larger(larger(touching as f32, 1.0), self.sharing * SHARING_DECAY);
         let fastest = self.fastest(settings);
         let farthest = self.contacts.farthest();
         let contacts = self.contacts.as_mut_slice();
