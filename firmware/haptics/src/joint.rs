@@ -26,11 +26,13 @@ use crate::proximity::Walk;
 
 /// Pairs of joints to one part; of more, the rest stay in the work.
 const MAX_JOINED: usize = 2 * MAX_TARGETS;
-/// Around each point, cells that must hold the mating face and no other: half a brick, or else the next.
-const CLEAR_CELLS: [f32; 2] = [4.0, 1.0];
-
+/// Around a leaf's points, cells that must hold the mating face and no other: half a brick, or else the next.
+const FAR_CELLS: f32 = 4.0;
+const NEXT_CELLS: f32 = 1.0;
 /// A way shorter than this is not worth remembering.
 const LEAST_CLEAR_CELLS: f32 = 0.5;
+/// Read for one answer, at most: what 8 points take that each lie in a corner of bricks which hold other faces too.
+const MOST_READS: u32 = 1000;
 
 /// Face pairs that joints to one part keep apart: of the tree's shape, of the field's.
 pub(crate) type Joined = Vec<[u16; 2], MAX_JOINED>;
@@ -102,39 +104,85 @@ fn misfit(face: &FaceRecord, feature: &Feature, lever: f32) -> f32 {
 
 impl Walk<'_, '_, '_> {
     /// How far the object may travel before a point of the leaf at `points` could touch anything but what joints keep it from, m; none when that is
-    /// not known, or hardly any way.
+    /// not known, or hardly any way, or enough leaves were asked about in this tick.
     pub(crate) fn joined(&mut self, job: &Job<'_>, points: &[PointRecord]) -> Option<f32> {
+        let common = mates(job, points)?;
+        if !self.may_clear() {
+            return None;
+        }
         let cell = job.field.record().cell;
-        // In cells; the first reach that is tried is that of the points before.
-        let mut clear = f32::INFINITY;
-        let mut tried = CLEAR_CELLS[0];
+        let mut left = MOST_READS;
+        let mut only = |[low, high]: [Vec3; 2], reach: f32, mates: &[u16]| {
+            let (low, high) = ((low - reach).to_array(), (high + reach).to_array());
+            (job.field).only(low, high, &mut left, |face| mates.contains(&face))
+        };
+        // All of them at once by what bricks say, or else each by the cells about it.
+        if !common.is_empty() && only(bounds(job, points)?, FAR_CELLS, &common) {
+            self.count_clearing(0, MOST_READS - left, 0);
+            return Some(FAR_CELLS * cell);
+        }
+        let (mut clear, mut looked_up) = (NEXT_CELLS, 0);
+        let (mut mates, mut last) = (common, None);
         for point in points {
-            self.count_clearing();
-            let own = [point.face, point.edge_face];
-            let mates =
-                |face: u16| (job.joined.iter()).any(|[tree, field]| *field == face && holds(own, *tree));
-            let at = job.in_cells(point);
-            let reach = (CLEAR_CELLS.iter())
-                .copied()
-                .filter(|&reach| reach <= tried && job.joined.iter().any(|[tree, _]| holds(own, *tree)))
-                .find(|&reach| job.field.only(at, reach, mates));
-            let far = match reach {
-                Some(reach) => {
-                    tried = reach;
-                    reach
-                }
-                // Not a mating face's, or near another: as far as it is from everything.
-                None => job.distance(point.position) / cell - EDGE_ERROR_CELLS,
-            };
+            if last.replace(own(point)) != Some(own(point)) {
+                mates = mates_of(job, point);
+            }
+            let at = Vec3::from_array(job.in_cells(point));
+            if !mates.is_empty() && only([at; 2], NEXT_CELLS, &mates) {
+                continue;
+            }
+            // Not a mating face's, or near another: as far as it is from everything.
+            looked_up += 1;
+            let far = job.distance(point.position) / cell - EDGE_ERROR_CELLS;
             if far < clear {
                 clear = far;
             }
             if clear < LEAST_CLEAR_CELLS {
-                return None;
+                break;
             }
         }
-        Some(clear * cell)
+        self.count_clearing(points.len() as u32, MOST_READS - left, looked_up);
+        (clear >= LEAST_CLEAR_CELLS).then_some(clear * cell)
     }
+}
+
+/// The faces that a point lies on.
+fn own(point: &PointRecord) -> [u16; 2] {
+    [point.face, point.edge_face]
+}
+
+/// Faces of the field's shape that joints keep the point from.
+fn mates_of(job: &Job<'_>, point: &PointRecord) -> Vec<u16, MAX_JOINED> {
+    (job.joined.iter())
+        .filter(|[tree, _]| holds(own(point), *tree))
+        .map(|&[_, field]| field)
+        .collect()
+}
+
+/// Those that joints keep every one of the points from; `None` where they keep none of them from any.
+fn mates(job: &Job<'_>, points: &[PointRecord]) -> Option<Vec<u16, MAX_JOINED>> {
+    let (mut common, mut any) = (None::<Vec<u16, MAX_JOINED>>, false);
+    let mut last = None;
+    for point in points {
+        // Points that follow each other mostly have the same faces.
+        if last.replace(own(point)) == Some(own(point)) {
+            continue;
+        }
+        let mates = mates_of(job, point);
+        any |= !mates.is_empty();
+        match &mut common {
+            Some(common) => common.retain(|face| mates.contains(face)),
+            None => common = Some(mates),
+        }
+    }
+    common.filter(|_| any)
+}
+
+/// Least and largest of the points' coordinates, in cells of the field.
+fn bounds(job: &Job<'_>, points: &[PointRecord]) -> Option<[Vec3; 2]> {
+    let mut all = points.iter().map(|point| Vec3::from_array(job.in_cells(point)));
+    let first = all.next()?;
+    Some(all.fold([first; 2], |[low, high], at| [low.min(at), high.max(at)]))
 }
 
 #[cfg(test)]

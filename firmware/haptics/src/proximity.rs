@@ -47,8 +47,13 @@ const LOOKUP: u32 = 2;
 const CANDIDATE: u32 = 4;
 /// four to ask the field about a node,
 const NODE: u32 = 8;
-/// and half a one to pass over a node of which enough is known.
+/// half a one to pass over a node of which enough is known,
 const PASSED_OVER: u32 = 1;
+/// and four to ask what a joint keeps a leaf from, with one more for each point that is asked about by itself and half a one for so many reads.
+const CLEARING: u32 = 8;
+const CLEARING_READS: u32 = 7;
+/// No more than such a part of the budget is spent on that in a tick.
+const CLEARING_SHARE: u32 = 12;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -133,6 +138,7 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             spent: LOOKUP * self.step_cost,
+            clearing: 0,
             mated: Mated::NONE,
             near: 0,
         };
@@ -197,6 +203,7 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             spent: LOOKUP * self.step_cost,
+            clearing: 0,
             mated: Mated::NONE,
             near: 0,
         }
@@ -213,6 +220,8 @@ pub(crate) struct Walk<'w, 's, 'i> {
     pub work: &'w mut Work,
     /// Of the budget, halves of a look-up.
     spent: u32,
+    /// Of that, for what joints keep apart.
+    clearing: u32,
     /// What guidance said of the last point's faces.
     mated: Mated,
     /// Points within the margin.
@@ -319,11 +328,7 @@ impl Walk<'_, '_, '_> {
                 continue;
             }
             let points = node.points(job.points);
-            // A leaf is looked at as a whole, unless even the whole budget would not do.
-            if (self.left() as usize) < points.len() && self.work.points > 0 {
-                return Some(here);
-            }
-            // Asked as seldom as the field is: it costs about as much as looking the points up.
+            // Asked as seldom as the field is.
             if asked
                 && !job.joined.is_empty()
                 && let Some(clear) = self.joined(job, points)
@@ -331,6 +336,10 @@ impl Walk<'_, '_, '_> {
                 self.coherence.set_joined(key, clear);
                 above.hear(Due::NOW);
                 continue;
+            }
+            // A leaf is looked at as a whole, unless even the whole budget would not do.
+            if (self.left() as usize) < points.len() && self.work.points > 0 {
+                return Some(here);
             }
             above.hear(if job.field.is_occupancy() {
                 self.points::<true>(job, here, points, near)
@@ -557,9 +566,17 @@ impl Walk<'_, '_, '_> {
         self.work.candidates = self.work.candidates.saturating_add(1);
     }
 
-    /// A point's surroundings were looked at for a joint: as much as a look-up.
-    pub fn count_clearing(&mut self) {
-        self.spent += LOOKUP;
+    /// Whether this tick may still ask what joints keep apart. A leaf not asked about is looked at, which is felt the same, and asked about again before
+    /// long.
+    pub fn may_clear(&self) -> bool {
+        self.clearing < LOOKUP * self.search.budget / CLEARING_SHARE
+    }
+
+    /// The surroundings of a leaf's points were looked at for a joint.
+    pub fn count_clearing(&mut self, one_by_one: u32, reads: u32, looked_up: u32) {
+        let spent = CLEARING + LOOKUP * one_by_one + reads / CLEARING_READS + 2 * LOOKUP * looked_up;
+        self.clearing += spent;
+        self.spent += spent;
     }
 
     /// What was done so far, in look-ups.

@@ -63,17 +63,24 @@ pub const MODES: [Mode; 3] = [Mode::Collision, Mode::Guided, Mode::Recognised];
 pub struct Pair {
     /// File name of its chart.
     pub name: &'static str,
-    what: &'static str,
+    /// In words.
+    pub what: &'static str,
     fit: Fit,
     cell_mm: f64,
 }
 
-/// The pairs: the thesis' 18.75 mm one and its large one (table 6).
-pub const PAIRS: [Pair; 2] = [
+/// The pairs: the thesis' 18.75 mm one, the same as close as it goes in unguided too, and its large one (table 6).
+pub const PAIRS: [Pair; 3] = [
     Pair {
         name: "rate",
         what: "peg in a hole of 18.75 mm, 0.2 mm clearance, cells of 0.5 mm",
         fit: Fit::thesis(0.2),
+        cell_mm: 0.5,
+    },
+    Pair {
+        name: "rate-close",
+        what: "peg in a hole of 18.75 mm, 0.02 mm clearance, cells of 0.5 mm",
+        fit: Fit::thesis(0.02),
         cell_mm: 0.5,
     },
     Pair {
@@ -129,19 +136,32 @@ pub struct Course {
     pub windows: Vec<Window>,
 }
 
-/// Plays every mode with every pair; `quick` takes the first pair only. Each course goes to `out`.
+/// How many of the pairs the shorter form plays.
+pub const QUICK: usize = 2;
+
+/// Plays every mode with every pair; `quick` takes the first [`QUICK`] pairs only. Each course goes to `out`.
 ///
 /// # Errors
 /// Anything that keeps an insertion from being played.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Course)) -> Result<Vec<Course>, LabError> {
+    let pairs = if quick { &PAIRS[..QUICK] } else { &PAIRS[..] };
+    played(pairs, &MODES, out)
+}
+
+/// Plays these modes with these pairs.
+pub(crate) fn played(
+    pairs: &[Pair],
+    modes: &[Mode],
+    out: &mut dyn FnMut(&Course),
+) -> Result<Vec<Course>, LabError> {
     let mut courses = Vec::new();
-    for pair in &PAIRS[..if quick { 1 } else { PAIRS.len() }] {
+    for pair in pairs {
         let fit = pair.fit;
         let file = fit.file()?;
         let scenario = scenario(&fit, file.path())?;
         let options = Variant::field(pair.cell_mm).options(Grabbable::Named(vec!["peg".into()]));
         let scene = PreparedScene::with(&scenario, &options)?;
-        for mode in MODES {
+        for &mode in modes {
             let course = course(pair, mode, &scenario, &scene)?;
             out(&course);
             courses.push(course);
@@ -323,7 +343,8 @@ pub fn chart(pair: &Pair, courses: &[Course]) -> Chart {
 }
 
 impl Mode {
-    fn name(self) -> &'static str {
+    /// In words.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Collision => "collision only",
             Self::Guided => "guided, target known",

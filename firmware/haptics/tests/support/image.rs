@@ -268,15 +268,23 @@ impl Writer {
             }
         }
         let palette = self.palette.len() as u32;
+        // Few entries are packed, as the baker does.
+        let packed = self.surfaces && entries.len() <= 16;
+        let (index_bits, values) = if packed { (4, 16) } else { (8, 256) };
+        if packed {
+            let wide = self.blob.split_off(indices as usize);
+            self.blob
+                .extend(wide.chunks_exact(2).map(|pair| pair[0] | pair[1] << 4));
+        }
         let palette_len = if self.surfaces { entries.len() as u16 } else { 256 };
-        entries.extend(entries.len() as u16..256);
+        entries.extend(entries.len() as u16..values);
         self.palette.extend(entries);
         self.bricks.push(BrickRecord {
             samples: offset,
             indices,
             palette,
             palette_len,
-            index_bits: 8,
+            index_bits,
         });
     }
 

@@ -8,12 +8,15 @@ use crate::figures::Row;
 use crate::fit::Fit;
 use crate::guided::{emulated, insertion, known_target, play_to};
 use crate::motion::{Motion, script};
+use crate::rate::{self, Mode};
 use crate::scenario::{PreparedScene, Recording};
 use crate::variant::Variant;
 
 const TARGETS: u16 = 4;
 /// Times the instructions without.
 const RATIO: f64 = 1.2;
+/// In a guided tick, at most.
+const INSTRUCTIONS: f64 = 120_000.0;
 /// Ticks between refreshes, and until a target that is not refreshed expires.
 const REFRESH_TICKS: u32 = 100;
 const EXPIRY_TICKS: u16 = 300;
@@ -48,6 +51,27 @@ pub(super) fn peg_in_hole(fit: &Fit) -> Result<ConstraintTarget, LabError> {
     let options = Variant::field(1.0).options(Grabbable::Named(vec!["peg".into()]));
     let scene = PreparedScene::with(&scenario, &options)?;
     known_target(&scenario, &scene)
+}
+
+/// Insertions with a hand off by four fifths of the play, the target known from the start or recognised on the desktop: no tick may take more
+/// than contact alone is bounded by.
+pub(super) fn guided_ticks(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let (pairs, modes) = (&rate::PAIRS[..rate::QUICK], [Mode::Guided, Mode::Recognised]);
+    for course in rate::played(pairs, &modes, &mut |_| {})? {
+        let pair = pairs.iter().find(|pair| pair.name == course.pair);
+        let what = format!(
+            "{}, {}, emulated board: largest instructions of a guided tick",
+            pair.map_or(course.pair, |pair| pair.what),
+            course.mode.name()
+        );
+        out(Row::at_most(
+            what,
+            f64::from(course.instructions_max),
+            "instructions",
+            INSTRUCTIONS,
+        ));
+    }
+    Ok(())
 }
 
 /// The 20 µm fit pressed to the wall and slid, so that contact is at its dearest, and on its way in.
