@@ -22,7 +22,7 @@ use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 use crate::guidance::holds;
 use crate::job::Job;
 use crate::limits::length;
-use crate::proximity::Walk;
+use crate::proximity::{LOOKUP, Walk};
 
 /// Pairs of joints to one part; of more, the rest stay in the work.
 const MAX_JOINED: usize = 2 * MAX_TARGETS;
@@ -33,6 +33,13 @@ const NEXT_CELLS: f32 = 1.0;
 const LEAST_CLEAR_CELLS: f32 = 0.5;
 /// Read for one answer, at most: what 8 points take that each lie in a corner of bricks which hold other faces too.
 const MOST_READS: u32 = 1000;
+
+/// The budget counts four look-ups for a leaf that is asked about, in halves,
+const CLEARING: u32 = 8;
+/// and half a one for so many reads.
+const CLEARING_READS: u32 = 7;
+/// No more than such a part of the budget is begun on it in a tick.
+const CLEARING_SHARE: u32 = 12;
 
 /// Face pairs that joints to one part keep apart: of the tree's shape, of the field's.
 pub(crate) type Joined = Vec<[u16; 2], MAX_JOINED>;
@@ -143,6 +150,19 @@ impl Walk<'_, '_, '_> {
         }
         self.count_clearing(points.len() as u32, MOST_READS - left, looked_up);
         (clear >= LEAST_CLEAR_CELLS).then_some(clear * cell)
+    }
+
+    /// Whether this tick may still ask what joints keep apart. A leaf not asked about is looked at, which is felt the same, and asked about again before
+    /// long.
+    fn may_clear(&self) -> bool {
+        self.clearing < LOOKUP * self.search.budget / CLEARING_SHARE
+    }
+
+    /// The surroundings of a leaf were looked at: so many points by themselves, so much read, and so many points looked up, at two look-ups each.
+    fn count_clearing(&mut self, one_by_one: u32, reads: u32, looked_up: u32) {
+        let spent = CLEARING + LOOKUP * (one_by_one + 2 * looked_up) + reads / CLEARING_READS;
+        self.clearing += spent;
+        self.spent += spent;
     }
 }
 

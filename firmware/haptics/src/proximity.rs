@@ -42,18 +42,13 @@ const THINNED: [Points; LEAF_THINNING as usize + 1] = [ALL, 0x5555, 0x1111, 0x01
 /// twice the way of one.
 const NEAR_MARGINS: f32 = 4.0;
 /// The budget counts what a look-up costs, 170 instructions, here in halves: one more within the margin or at an edge,
-const LOOKUP: u32 = 2;
+pub(crate) const LOOKUP: u32 = 2;
 /// two more when it may touch,
 const CANDIDATE: u32 = 4;
 /// four to ask the field about a node,
 const NODE: u32 = 8;
-/// half a one to pass over a node of which enough is known,
+/// and half a one to pass over a node of which enough is known. What joints take: [`crate::joint`].
 const PASSED_OVER: u32 = 1;
-/// and four to ask what a joint keeps a leaf from, with one more for each point that is asked about by itself and half a one for so many reads.
-const CLEARING: u32 = 8;
-const CLEARING_READS: u32 = 7;
-/// No more than such a part of the budget is spent on that in a tick.
-const CLEARING_SHARE: u32 = 12;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -219,9 +214,9 @@ pub(crate) struct Walk<'w, 's, 'i> {
     pub contacts: &'w mut Contacts,
     pub work: &'w mut Work,
     /// Of the budget, halves of a look-up.
-    spent: u32,
+    pub spent: u32,
     /// Of that, for what joints keep apart.
-    clearing: u32,
+    pub clearing: u32,
     /// What guidance said of the last point's faces.
     mated: Mated,
     /// Points within the margin.
@@ -564,19 +559,6 @@ impl Walk<'_, '_, '_> {
     pub fn count_candidate(&mut self) {
         self.spent += CANDIDATE;
         self.work.candidates = self.work.candidates.saturating_add(1);
-    }
-
-    /// Whether this tick may still ask what joints keep apart. A leaf not asked about is looked at, which is felt the same, and asked about again before
-    /// long.
-    pub fn may_clear(&self) -> bool {
-        self.clearing < LOOKUP * self.search.budget / CLEARING_SHARE
-    }
-
-    /// The surroundings of a leaf's points were looked at for a joint.
-    pub fn count_clearing(&mut self, one_by_one: u32, reads: u32, looked_up: u32) {
-        let spent = CLEARING + LOOKUP * one_by_one + reads / CLEARING_READS + 2 * LOOKUP * looked_up;
-        self.clearing += spent;
-        self.spent += spent;
     }
 
     /// What was done so far, in look-ups.
