@@ -38,7 +38,7 @@ const SHORTEST_SHARE: f32 = 0.45;
 /// Ticks after which a node that was near is asked again; a power of two. Which tick depends on the node, so that the work is spread.
 const ASK_AGAIN: u32 = 16;
 
-/// Points of a leaf, the first in the lowest bit. [`Points::ALL`] are all of it, be they more than there are bits.
+/// Points of a leaf, the first in the lowest bit. [`ALL`] are all of it, be they more than there are bits.
 pub(crate) type Points = u16;
 /// See [`Points`].
 pub(crate) const ALL: Points = Points::MAX;
@@ -47,6 +47,8 @@ pub(crate) const ALL: Points = Points::MAX;
 #[derive(Clone, Debug)]
 pub(crate) struct Coherence {
     travel_nm: u32,
+    /// What was noted at up to this travel is void.
+    forgotten_nm: u32,
     /// Ticks since everything was forgotten.
     round: u32,
     /// Of the joints.
@@ -57,7 +59,7 @@ pub(crate) struct Coherence {
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     tag: u16,
-    /// Points that are near: none of a node that is far. With [`JOINED`] the epoch instead.
+    /// Points that are near: none of a node that is far, or of an inner one. With [`JOINED`] the epoch instead.
     near: Points,
     /// The travel at which the others, or all, are due.
     due_nm: u32,
@@ -136,6 +138,7 @@ impl Coherence {
     pub const fn new() -> Self {
         Self {
             travel_nm: 0,
+            forgotten_nm: 0,
             round: 0,
             epoch: 0,
             slots: [Slot::EMPTY; SLOTS],
@@ -146,13 +149,14 @@ impl Coherence {
     pub fn forget(&mut self) {
         // As if it had travelled past every due: clearing the table costs more than most ticks.
         self.add_travel(FARTHEST_NM);
+        self.forgotten_nm = self.travel_nm;
     }
 
     fn add_travel(&mut self, nm: u32) {
         self.travel_nm = self.travel_nm.saturating_add(nm);
         if self.travel_nm > LONGEST_NM {
             // In place: made anew it would pass over the stack, which has not room for many such.
-            (self.travel_nm, self.epoch) = (0, 0);
+            (self.travel_nm, self.forgotten_nm, self.epoch) = (0, 0, 0);
             self.slots.fill(Slot::EMPTY);
         }
     }
@@ -173,7 +177,7 @@ impl Coherence {
     #[inline]
     pub fn ask(&self, key: Key, horizon: u32, leaf: bool) -> Known {
         let slot = &self.slots[key.slot()];
-        if slot.tag != key.tag() || key.is_none() {
+        if slot.tag != key.tag() || slot.due_nm <= self.forgotten_nm {
             return Known::Nothing;
         }
         if slot.due_nm >= JOINED {
@@ -205,13 +209,15 @@ impl Coherence {
     /// No node below this one is due before `due`.
     #[inline]
     pub fn set_due(&mut self, key: Key, due: Due) {
-        self.set(key, 0, smaller_of(due.0, self.travel_nm + FARTHEST_NM));
+        let due_nm = smaller_of(due.0, self.travel_nm + FARTHEST_NM);
+        self.set(key, 0, due_nm);
     }
 
     /// The node is near.
     #[inline]
     pub fn set_near(&mut self, key: Key) {
-        self.set(key, ALL, 0);
+        // Due at once, but not forgotten.
+        self.set(key, ALL, self.travel_nm + 1);
     }
 
     /// Of the leaf's points these are near, the others no nearer than `distance` m.
@@ -350,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_far_once_forgotten() {
+    fn nothing_is_known_once_forgotten() {
         let mut c = Coherence::new();
         for start in 0..20 {
             let key = |node| Key::new(3, node);
@@ -358,14 +364,34 @@ mod tests {
             c.set_due(key(1), Due::NEVER);
             c.set_points(key(2), 5, f32::INFINITY);
             c.set_joined(key(3), f32::INFINITY);
+            c.set_near(key(4));
             c.forget();
-            for node in 0..4 {
-                let known = c.ask(key(node), c.horizon(0.0), true);
-                assert!(
-                    matches!(known, Known::Nothing | Known::Near(ALL)),
-                    "{start}: {known:?}"
-                );
+            for node in 0..5 {
+                for leaf in [false, true] {
+                    let known = c.ask(key(node), c.horizon(0.0), leaf);
+                    assert_eq!(known, Known::Nothing, "{start}: {node}");
+                }
             }
+        }
+    }
+
+    /// Whatever was noted, right after everything was forgotten too.
+    #[test]
+    fn what_is_noted_is_known() {
+        let mut c = Coherence::new();
+        for _ in 0..20 {
+            c.forget();
+            c.set_near(Key::new(3, 1));
+            c.set_points(Key::new(3, 2), 5, 1e-3);
+            c.set_distance(Key::new(3, 3), 1e-3);
+            let ask = |node| c.ask(Key::new(3, node), c.horizon(0.0), true);
+            // Each in one of 16 ticks is asked again.
+            for (node, known) in [(1, Known::Near(ALL)), (2, Known::Near(5))] {
+                let again = c.round.wrapping_add(Key::new(3, node).0).is_multiple_of(ASK_AGAIN);
+                assert_eq!(ask(node), if again { Known::Nothing } else { known });
+            }
+            assert!(is_far(ask(3)));
+            c.travelled(0.0);
         }
     }
 

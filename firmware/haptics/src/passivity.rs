@@ -56,8 +56,8 @@ pub struct Passivity {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tank {
     pub seen: Passivity,
-    /// Ticks observed in a row; what follows is known from the first on.
-    known: u32,
+    /// Whether the last tick was observed, so that what follows is known.
+    known: bool,
     handle: Pose,
     /// U, J.
     stored: f32,
@@ -76,7 +76,7 @@ impl Tank {
                 softened: 0.0,
                 made_j: 0.0,
             },
-            known: 0,
+            known: false,
             handle: Pose {
                 position: Vec3::ZERO,
                 orientation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
@@ -101,7 +101,7 @@ impl Tank {
         let stored = potential(coupling, &settings.coupling);
         let open = 1.0 - self.seen.softened;
         let size = settings.passivity.tank_j;
-        if self.known > 0 && size > 0.0 {
+        if self.known && size > 0.0 {
             let moved = handle.position - self.handle.position;
             let turned = small_turn(self.handle.orientation, handle.orientation);
             let to_handle = acting.force.dot(moved) + acting.torque.dot(turned);
@@ -112,7 +112,7 @@ impl Tank {
             let drawn = made - if rubbed > 0.0 { rubbed } else { 0.0 };
             self.account(drawn, stored, object_energy, settings.period_s, size);
         }
-        self.known = self.known.saturating_add(1);
+        self.known = true;
         self.handle = handle;
         self.stored = stored;
         1.0 - self.seen.softened

@@ -41,14 +41,15 @@ const THINNED: [Points; LEAF_THINNING as usize + 1] = [ALL, 0x5555, 0x1111, 0x01
 /// A point of a leaf is near while its gap is not more than so many margins. Any others are then left alone for some ticks: the margin is more than
 /// twice the way of one.
 const NEAR_MARGINS: f32 = 4.0;
-/// The budget counts what a look-up costs, 170 instructions, here in halves: one more within the margin or at an edge,
+/// A look-up, 170 instructions, in the unit that the budget is counted in, halves of one. As much again for a point within the margin, and for one at an
+/// edge. What joints take: [`crate::joint`].
 pub(crate) const LOOKUP: u32 = 2;
-/// two more when it may touch,
-const CANDIDATE: u32 = 4;
-/// four to ask the field about a node,
-const NODE: u32 = 8;
-/// and half a one to pass over a node of which enough is known. What joints take: [`crate::joint`].
-const PASSED_OVER: u32 = 1;
+/// A point that may touch, besides.
+const CANDIDATE: u32 = 2 * LOOKUP;
+/// To ask the field about a node.
+const NODE: u32 = 4 * LOOKUP;
+/// To pass over a node of which enough is known.
+const PASSED_OVER: u32 = LOOKUP / 2;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

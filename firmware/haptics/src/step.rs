@@ -142,8 +142,8 @@ impl Step<'_> {
     ) -> Solution {
         let h = self.period_s;
         let lever = farthest / self.length;
-        // No rate changes by more than the unknowns' change times this: the length of a row.
-        let row_length = length6(&[1.0, lever, 0.0, 0.0, 0.0, 0.0]);
+        // No rate changes by more than the unknowns' change times this: the length of a row, n and (r × n)/L.
+        let row_length = above_root(1.0 + lever * lever);
         let reach = |phase| match phase {
             Phase::Free => 0.0,
             Phase::Parting => h,
@@ -163,10 +163,17 @@ impl Step<'_> {
         let mut stiffness = Symmetric6::ZERO;
         let mut push = [0.0f32; 6];
         let mut solves = 0;
-        // What of a free point's gap is left at the step's end by the rate last looked at, m, can have been closed since when it is less than this.
-        let mut out_of_reach = f32::INFINITY;
+        // How far any rate can have changed since all were looked at, m/s.
         let mut way = 0.0;
+        let mut last: Option<[f32; 6]> = None;
         let is_settled = loop {
+            // What of a free point's gap is left at the step's end by the rate last looked at, m, can have been closed since when it is less than this.
+            let out_of_reach = last.map_or(f32::INFINITY, |last| {
+                let moved: [f32; 6] = array::from_fn(|i| x[i] - last[i]);
+                way += row_length * above_root(dot(&moved, &moved));
+                closing_s * way
+            });
+            last = Some(x);
             let mut changed = false;
             for c in contacts.iter_mut() {
                 if c.phase == Phase::Free && c.gap + closing_s * c.rate >= out_of_reach {
@@ -190,12 +197,9 @@ impl Step<'_> {
                     c.phase = phase;
                 }
             }
-            let last = x;
             if !solved && !changed {
                 x = self.scale(free.twist);
                 solved = true;
-                way += row_length * length6(&array::from_fn(|i| x[i] - last[i]));
-                out_of_reach = closing_s * way;
                 continue;
             }
             self.find_secants(&x, next);
@@ -214,8 +218,6 @@ impl Step<'_> {
             x = matrix.solve(&right);
             solved = true;
             solves += 1;
-            way += row_length * length6(&array::from_fn(|i| x[i] - last[i]));
-            out_of_reach = closing_s * way;
         };
         let contact = total_force(contacts, k, h, damping_s);
         Solution {
@@ -331,9 +333,9 @@ pub(crate) fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 }
 
-/// At least the length of `a`.
-fn length6(a: &[f32; 6]) -> f32 {
-    1.000_01 * libm::sqrtf(dot(a, a))
+/// At least √`squared`.
+fn above_root(squared: f32) -> f32 {
+    1.000_01 * libm::sqrtf(squared)
 }
 
 fn settled(a: &Secants, b: &Secants) -> bool {
