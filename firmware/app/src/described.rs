@@ -300,20 +300,15 @@ impl Mechanism for Described {
         self.advance();
         let wiring = self.script.advance(self.wiring);
         self.wiring.glitch = [0; AXES];
-        let (mut reading, stuck) = self.read(&wiring);
-        if wiring.not_a_number {
-            reading.handle.position.x = f32::NAN;
-        }
-        Sensed {
+        let (reading, stuck) = self.read(&wiring);
+        wiring.through(Sensed {
             handle: reading.handle,
             twist: reading.twist,
-            stop_open: wiring.stop_open,
-            supply_low: wiring.supply_low,
-            driver_fault: wiring.driver_fault,
             encoder_jump: reading.jump,
             encoder_stuck: stuck,
             referenced: self.referenced,
-        }
+            ..Sensed::AT_REST
+        })
     }
 
     fn drive(&mut self, drive: Drive) {

@@ -6,7 +6,7 @@ use heapless::Vec;
 use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{InputFault, InputFaultKind, Refusal};
 
-use crate::board::{DriverFault, DriverFaultKind};
+use crate::board::{DriverFault, DriverFaultKind, Sensed};
 
 /// Encoder axes: position x, y, z, rotation about x, y, z.
 pub const AXES: usize = 6;
@@ -38,6 +38,19 @@ impl Wiring {
         stuck: [false; AXES],
         not_a_number: false,
     };
+
+    /// What is sensed through it, of what the mechanism would tell.
+    pub fn through(&self, mut sensed: Sensed) -> Sensed {
+        if self.not_a_number {
+            sensed.handle.position.x = f32::NAN;
+        }
+        Sensed {
+            stop_open: self.stop_open,
+            supply_low: self.supply_low,
+            driver_fault: self.driver_fault,
+            ..sensed
+        }
+    }
 
     fn apply(&mut self, kind: InputFaultKind, first: bool) {
         let driver = |axis, kind| Some(DriverFault { axis, kind });

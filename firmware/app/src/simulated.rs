@@ -303,20 +303,15 @@ impl Mechanism for Simulated {
         self.advance();
         let wiring = self.script.advance(self.wiring);
         self.wiring.glitch = [0; AXES];
-        let mut reading = self.encoders.read(&self.body.pose, &wiring, &self.motors);
-        if wiring.not_a_number {
-            reading.handle.position.x = f32::NAN;
-        }
-        Sensed {
+        let reading = self.encoders.read(&self.body.pose, &wiring, &self.motors);
+        wiring.through(Sensed {
             handle: reading.handle,
             twist: reading.twist,
-            stop_open: wiring.stop_open,
-            supply_low: wiring.supply_low,
-            driver_fault: wiring.driver_fault,
             encoder_jump: reading.jump,
             encoder_stuck: reading.stuck,
             referenced: self.encoders.referenced,
-        }
+            ..Sensed::AT_REST
+        })
     }
 
     fn drive(&mut self, drive: Drive) {

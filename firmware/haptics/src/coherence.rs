@@ -387,7 +387,10 @@ mod tests {
             let ask = |node| c.ask(Key::new(3, node), c.horizon(0.0), true);
             // Each in one of 16 ticks is asked again.
             for (node, known) in [(1, Known::Near(ALL)), (2, Known::Near(5))] {
-                let again = c.round.wrapping_add(Key::new(3, node).0).is_multiple_of(ASK_AGAIN);
+                let again = c
+                    .round
+                    .wrapping_add(Key::new(3, node).0)
+                    .is_multiple_of(ASK_AGAIN);
                 assert_eq!(ask(node), if again { Known::Nothing } else { known });
             }
             assert!(is_far(ask(3)));

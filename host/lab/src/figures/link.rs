@@ -1,5 +1,6 @@
 //! The link under damage: frames that are no frames, uploads that are cut off.
 
+use fastrand::Rng;
 use mortise_protocol::frame::{Decoder, encode};
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
@@ -14,26 +15,11 @@ use crate::scenario::{PreparedScene, Scenario};
 /// Frames of each kind.
 const FRAMES: u32 = 500_000;
 
-/// xorshift64* (Vigna 2016): the same frames in every run.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        ((self.next() >> 32) as usize) % n
-    }
-}
-
 /// Half a million random frames and as many sound ones with one to four bits flipped, delimiters included. Two sound frames follow each: the
 /// first is lost only when a delimiter was hit and joined it to the damaged one, the second never.
 pub(super) fn damage(out: &mut dyn FnMut(Row)) {
-    let mut random = Random(0x4d6f_7274_6973_6521);
+    // The same frames in every run.
+    let mut random = Rng::with_seed(0x4d6f_7274_6973_6521);
     let mut decoder = Decoder::new();
     let mut wire = [0u8; MAX_FRAME];
     let (mut damaged, mut accepted, mut lost) = (0u32, 0u32, 0u32);
@@ -50,13 +36,13 @@ pub(super) fn damage(out: &mut dyn FnMut(Row)) {
         };
         bytes.clear();
         if number < FRAMES {
-            let length = random.below(64);
-            bytes.extend((0..length).map(|_| random.next() as u8));
+            let length = random.usize(..64);
+            bytes.extend((0..length).map(|_| random.u8(..)));
             bytes.push(0);
         } else {
             bytes.extend_from_slice(frame);
-            for _ in 0..=random.below(4) {
-                let bit = random.below(8 * bytes.len());
+            for _ in 0..=random.usize(..4) {
+                let bit = random.usize(..8 * bytes.len());
                 bytes[bit / 8] ^= 1 << (bit % 8);
             }
         }

@@ -7,6 +7,7 @@
 
 use std::thread;
 
+use fastrand::Rng;
 use mortise_haptics::{Flags, Input, Pose, Quat, Settings, State, Twist, Vec3, tick};
 use mortise_protocol::image::SceneImage;
 
@@ -118,24 +119,12 @@ fn share(part: u64, all: u64) -> f64 {
     100.0 * part as f64 / all.max(1) as f64
 }
 
-/// xorshift64*: the same inputs every time.
-struct Random(u64);
+/// The same inputs every time.
+struct Random(Rng);
 
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
-
-    /// 0 to 1.
-    fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u64 << 24) as f32
-    }
-
     fn even(&mut self, from: f32, to: f32) -> f32 {
-        from + (to - from) * self.unit()
+        from + (to - from) * self.0.f32()
     }
 
     fn vector(&mut self, size: f32) -> Vec3 {
@@ -147,7 +136,7 @@ impl Random {
     }
 
     fn one_in(&mut self, n: u64) -> bool {
-        self.next().is_multiple_of(n)
+        self.0.u64(..n) == 0
     }
 
     fn absurd(&mut self) -> f32 {
@@ -163,13 +152,13 @@ impl Random {
             1e20,
             -99.9,
         ];
-        ABSURD[(self.next() % ABSURD.len() as u64) as usize]
+        ABSURD[self.0.usize(..ABSURD.len())]
     }
 }
 
 /// Inputs of one thread.
 fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsafe {
-    let mut random = Random(0x5afe ^ (share + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut random = Random(Rng::with_seed(0x5afe ^ share));
     let mut state = Box::new(State::new());
     let mut found = Unsafe::default();
     let mut settings = Settings::default();
@@ -275,8 +264,8 @@ impl Hand {
         let mut position = self.position;
         let mut orientation = Quat::from_scaled_axis(self.turn).to_array();
         let (mut linear, mut angular) = (self.linear, self.angular);
-        let axis = (random.next() % 3) as usize;
-        match random.next() % 4 {
+        let axis = random.0.usize(..3);
+        match random.0.u8(..4) {
             0 => position[axis] = number,
             1 => orientation[axis] = number,
             2 => linear[axis] = number,
