@@ -560,6 +560,14 @@ pub mod flag {
     pub const CONTACTS: u16 = 1 << 6;
     /// The coupling's own force limit acted.
     pub const COUPLING_LIMIT: u16 = 1 << 7;
+    /// The handle's wrench is turned down because the loop made energy.
+    pub const SOFTENED: u16 = 1 << 8;
+    /// The part was held to its largest speed, or to what was looked at.
+    pub const SPEED_LIMIT: u16 = 1 << 9;
+    /// A point is so deep inside that no way out is known.
+    pub const DEEP: u16 = 1 << 10;
+    /// The step's touching points had not come to rest.
+    pub const UNSETTLED: u16 = 1 << 11;
 }
 
 /// Counters since start or the last reset of the counters.

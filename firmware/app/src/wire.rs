@@ -72,6 +72,10 @@ pub fn flags_to_wire(flags: Flags, wrench: &Wrench, limits: &LimitSettings) -> u
         (Flags::SATURATED_FORCE, flag::COUPLING_LIMIT),
         (Flags::SATURATED_TORQUE, flag::COUPLING_LIMIT),
         (Flags::SLEW_LIMITED, flag::SLEW_LIMIT),
+        (Flags::SPEED_LIMITED, flag::SPEED_LIMIT),
+        (Flags::SOFTENED, flag::SOFTENED),
+        (Flags::DEEP, flag::DEEP),
+        (Flags::UNSETTLED, flag::UNSETTLED),
         (Flags::BAD_INPUT, flag::NON_FINITE),
         (Flags::NON_FINITE, flag::NON_FINITE),
     ];
@@ -92,4 +96,35 @@ pub fn flags_to_wire(flags: Flags, wrench: &Wrench, limits: &LimitSettings) -> u
         }
     }
     wire
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever the force law flags reaches the host, each by itself and told from nothing.
+    #[test]
+    fn no_flag_is_lost() {
+        let limits = LimitSettings {
+            force_n: 10.0,
+            torque_nm: 0.5,
+            ..mortise_haptics::Settings::default().limits
+        };
+        let at = |force: f32, torque: f32| Wrench {
+            force: Vec3::new(0.0, force, 0.0),
+            torque: Vec3::new(torque, 0.0, 0.0),
+        };
+        for (flag, name) in Flags::NAMES {
+            assert_ne!(flags_to_wire(flag, &at(10.0, 0.0), &limits), 0, "{name}");
+        }
+        assert_eq!(flags_to_wire(Flags::empty(), &at(10.0, 0.5), &limits), 0);
+        assert_eq!(
+            flags_to_wire(Flags::LIMITED, &at(10.0, 0.1), &limits),
+            flag::FORCE_LIMIT
+        );
+        assert_eq!(
+            flags_to_wire(Flags::LIMITED, &at(1.0, 0.5), &limits),
+            flag::TORQUE_LIMIT
+        );
+    }
 }

@@ -226,13 +226,16 @@ fn swatch(ui: &mut Ui, color: Color32, hatched: bool, text: &str, hint: &str) {
 }
 
 /// What the board reports of the tick, in words.
-const FLAGS: [(u16, &str); 7] = [
+const FLAGS: [(u16, &str); 10] = [
     (flag::FORCE_LIMIT, "force limit acts"),
     (flag::TORQUE_LIMIT, "torque limit acts"),
     (flag::SLEW_LIMIT, "slew limit acts"),
     (flag::COUPLING_LIMIT, "the coupling slips"),
     (flag::BUDGET, "point budget reached"),
     (flag::CONTACTS, "more contacts than fit"),
+    (flag::SPEED_LIMIT, "speed limit acts"),
+    (flag::SOFTENED, "turned down: the loop made energy"),
+    (flag::DEEP, "too deep inside to find a way out"),
     (flag::NON_FINITE, "a number was not finite"),
 ];
 
