@@ -18,10 +18,12 @@ const INK: RGBColor = RGBColor(36, 41, 47);
 const GREY: RGBColor = RGBColor(101, 109, 118);
 const GRID: RGBColor = RGBColor(225, 228, 232);
 
-/// Room above the plot for title and legend, and below for the note, pixels.
+/// Room above the plot for title and legend, and below for each line of the note, pixels.
 const HEAD: u32 = 34;
 const LEGEND_ROW: u32 = 24;
-const NOTE: u32 = 26;
+const NOTE: u32 = 22;
+/// Free on either side of the note.
+const NOTE_SIDE: u32 = 16;
 
 type Area<DB> = DrawingArea<DB, Shift>;
 type Context<'a, DB> = ChartContext<'a, DB, Cartesian2d<Coordinate, Coordinate>>;
@@ -49,6 +51,35 @@ fn told(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
+/// `text` in as many lines as fit the area with `side` left free on either side; none of nothing.
+fn wrapped<DB: DrawingBackend>(
+    area: &Area<DB>,
+    text: &str,
+    style: &TextStyle<'_>,
+    side: i32,
+) -> Result<Vec<String>, String> {
+    let most = area.dim_in_pixel().0.cast_signed() - 2 * side;
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        let longer = lines.last().map(|line| format!("{line} {word}"));
+        let fits = match &longer {
+            Some(line) => {
+                area.estimate_text_size(line, style)
+                    .map_err(told)?
+                    .0
+                    .cast_signed()
+                    <= most
+            }
+            None => false,
+        };
+        match (longer, lines.last_mut()) {
+            (Some(longer), Some(line)) if fits => *line = longer,
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    Ok(lines)
+}
+
 impl Chart {
     /// Draws it; every length is multiplied by `scale`. Errors are words.
     pub(super) fn draw<DB: DrawingBackend>(&self, area: &Area<DB>, scale: u32) -> Result<(), String> {
@@ -73,14 +104,13 @@ impl Chart {
         let rows = self.legend(&rest, scale)?;
         let (_, rest) = rest.split_vertically(scale.of(LEGEND_ROW * rows + 6));
         let height = rest.dim_in_pixel().1.cast_signed();
-        let note = if self.note.is_empty() { 0 } else { scale.of(NOTE) };
-        let (plot, foot) = rest.split_vertically(height - note);
-        foot.draw(&Text::new(
-            self.note.as_str(),
-            (scale.of(16), scale.of(4)),
-            scale.text(14, &GREY),
-        ))
-        .map_err(told)?;
+        let note = wrapped(&rest, &self.note, &scale.text(14, &GREY), scale.of(NOTE_SIDE))?;
+        let (plot, foot) = rest.split_vertically(height - scale.of(NOTE) * note.len() as i32);
+        for (row, line) in note.into_iter().enumerate() {
+            let at = (scale.of(NOTE_SIDE), scale.of(4) + scale.of(NOTE) * row as i32);
+            foot.draw(&Text::new(line, at, scale.text(14, &GREY)))
+                .map_err(told)?;
+        }
 
         let mut context: Context<'_, DB> = ChartBuilder::on(&plot)
             .margin_left(scale.of(14))

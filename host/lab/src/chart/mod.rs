@@ -315,6 +315,24 @@ mod tests {
     }
 
     #[test]
+    fn a_long_note_stays_on_the_paper() {
+        let long = Chart {
+            note: "Down and left is better, most of the time. ".repeat(12),
+            ..chart(&[(1.0, 20.0), (10.0, 2.0)])
+        };
+        let pixels = pixels(&[long]).expect("two points");
+        let row = 3 * (SIZE.0 * SHARPNESS) as usize;
+        let at_side = 3 * (4 * SHARPNESS) as usize;
+        let grey = |part: &[u8]| part.iter().any(|&value| value < 200);
+        let foot = &pixels[pixels.len() - 40 * SHARPNESS as usize * row..];
+        assert!(foot.chunks(row).any(grey), "no note");
+        assert!(
+            !foot.chunks(row).any(|row| grey(&row[row.len() - at_side..])),
+            "cut off"
+        );
+    }
+
+    #[test]
     fn a_chart_without_points_says_so() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         for points in [&[][..], &[(0.0, 1.0), (1.0, f64::NAN), (-1.0, 2.0)]] {
