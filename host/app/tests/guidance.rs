@@ -12,6 +12,8 @@ use glam::DVec3;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
+use mortise::viewport::camera::Camera;
+use mortise::viewport::compose::compose;
 use mortise_guide::{GuideSettings, List, Row, Standing, When};
 use mortise_mating::Axis;
 use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId, TargetKind};
@@ -167,8 +169,27 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
         static_edge_face: u16::MAX,
         insertion: 0.0,
     };
-    telemetry.pairs.push(pair).expect("room");
+    let at_edges = TouchingPair {
+        moving_face: 2,
+        moving_edge_face: 0,
+        static_part: 0,
+        static_face: 3,
+        static_edge_face: 5,
+        ..pair
+    };
+    telemetry.pairs.clear();
+    for pair in [pair, at_edges, at_edges] {
+        telemetry.pairs.push(pair).expect("room");
+    }
     session.telemetry = Some(telemetry);
+    let document = session.document.as_ref().expect("the sample");
+    let items = compose(session, document, Camera::default(), false, 1.0).items;
+    assert_eq!(
+        items[1].lit_edges,
+        [[0, 2]],
+        "the edge of the part in hand that touches"
+    );
+    assert_eq!(items[0].lit_edges, [[3, 5]], "and that of the other");
     let mut odd = List {
         held: Some(1),
         freedom: Freedom::default(),

@@ -6,6 +6,7 @@ use eframe::wgpu;
 use glam::DVec3;
 use mortise::session::document::Document;
 use mortise::viewport::camera::{Camera, View};
+use mortise::viewport::mesh::meeting;
 use mortise::viewport::picture::{Arrow, Item, Picture};
 use mortise::viewport::renderer::Renderer;
 
@@ -79,6 +80,7 @@ fn picture(document: &Document, camera: Camera) -> Picture {
             tint: [0.0; 4],
             line: [0.0, 0.0, 0.0, 1.0],
             lit: Vec::new(),
+            lit_edges: Vec::new(),
             mates: Vec::new(),
         })
         .collect();
@@ -172,6 +174,53 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
     assert!(r > b + 60, "touching comes first: {r} {b}");
 }
 
+/// The edge between the block's front and its top, seen from the front above the block's corner.
+#[test]
+fn an_edge_that_touches_stands_out_and_no_other_does() {
+    let Some((device, queue)) = device() else { return };
+    let document = Document::sample(1).expect("the sample opens");
+    let mut renderer = Renderer::new(&device, &queue);
+    renderer.set_shapes(&document.meshes);
+    renderer.resize(SIZE);
+    let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
+    let mut camera = Camera::default();
+    camera.look(View::Front);
+    camera.fit(document.extent, aspect);
+    // How much of the picture about a point is nearly white.
+    let mut white_at = |lit_edges: Vec<[u32; 2]>, point: DVec3| {
+        let mut told = picture(&document, camera);
+        told.items[0].lit_edges = lit_edges;
+        renderer.render(&told);
+        let (texture, _) = renderer.texture().expect("resized");
+        let pixels = read(&device, &queue, texture);
+        let ndc = camera.project(point, aspect).expect("in front");
+        let x = (0.5 * (ndc.x + 1.0) * f64::from(SIZE[0])) as u32;
+        let y = (0.5 * (1.0 - ndc.y) * f64::from(SIZE[1])) as u32;
+        let white = |y: u32| pixel(&pixels, x, y).into_iter().all(|c| c > 200);
+        (y - 4..y + 4).filter(|&y| white(y)).count()
+    };
+    let front = face_at(&document, DVec3::new(0.0, -25.0, -20.0));
+    let shape = &document.model.shapes[document.model.parts[0].shape];
+    let (above, below) = (DVec3::new(-20.0, -25.0, 0.0), DVec3::new(-20.0, -25.0, -40.0));
+    let edges = |z: f64| -> Vec<[u32; 2]> {
+        (shape.edges.iter())
+            .filter(|edge| {
+                edge.faces.contains(&front) && edge.polyline.iter().all(|p| (p.z - z).abs() < 1e-6)
+            })
+            .map(|edge| meeting(&edge.faces))
+            .collect()
+    };
+    let (top, bottom) = (edges(0.0), edges(-40.0));
+    assert!(top.len() == 1 && bottom.len() == 1, "{top:?} {bottom:?}");
+    assert_eq!(white_at(Vec::new(), above), 0, "an edge is dark");
+    assert!(
+        white_at(top.clone(), above) >= 3,
+        "the edge that touches is bright and wide"
+    );
+    assert_eq!(white_at(top, below), 0, "the other is as it was");
+    assert!(white_at(bottom, below) >= 3);
+}
+
 /// Face of the block under a point of its surface.
 fn face_at(document: &Document, point: DVec3) -> u32 {
     let hit = mortise::viewport::pick::pick(
@@ -209,6 +258,7 @@ fn nothing_to_draw_is_no_trouble() {
                 tint: [0.0; 4],
                 line: [1.0; 4],
                 lit: vec![],
+                lit_edges: vec![],
                 mates: vec![],
             },
             Item {
@@ -219,6 +269,7 @@ fn nothing_to_draw_is_no_trouble() {
                 tint: [0.0; 4],
                 line: [1.0; 4],
                 lit: vec![],
+                lit_edges: vec![],
                 mates: vec![],
             },
         ],

@@ -192,7 +192,7 @@ fn legend(ui: &mut Ui, rect: Rect, session: &Session) {
     let place = Rect::from_min_size(rect.min + Vec2::new(14.0, 52.0), Vec2::new(240.0, 20.0));
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
         ui.horizontal(|ui| {
-            let touches = "Faces that touch now, in both parts";
+            let touches = "Faces that touch now, in both parts, and edges where it is an edge that touches";
             swatch(ui, theme::CONTACT, false, "touches", touches);
             let fits = "Faces that fit: guided onto each other, or kept together by contact (hatched)";
             swatch(ui, theme::MATES, true, "fits", fits);

@@ -6,7 +6,8 @@ use mortise_protocol::image::NO_FACE;
 use mortise_protocol::message::Telemetry;
 
 use super::camera::{Camera, Extent};
-use super::picture::{Arrow, Item, MAX_LIT, Picture};
+use super::mesh::meeting;
+use super::picture::{Arrow, Item, MAX_LIT, MAX_LIT_EDGES, Picture};
 use crate::session::Session;
 use crate::session::document::Document;
 use crate::session::pose::point_from_wire;
@@ -59,6 +60,7 @@ pub fn compose(
                     _ => EDGE,
                 },
                 lit: touching.map_or_else(Vec::new, |t| lit(document, t, index, in_hand)),
+                lit_edges: touching.map_or_else(Vec::new, |t| lit_edges(document, t, index, in_hand)),
                 mates: mates(session, index),
             }
         })
@@ -74,6 +76,7 @@ pub fn compose(
             tint: [0.0; 4],
             line: [GHOST[0], GHOST[1], GHOST[2], 0.55],
             lit: Vec::new(),
+            lit_edges: Vec::new(),
             mates: Vec::new(),
         });
     }
@@ -106,6 +109,25 @@ fn lit(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -
         }
     }
     faces
+}
+
+/// Edges of a part that touch, deepest first.
+fn lit_edges(document: &Document, telemetry: &Telemetry, part: usize, in_hand: bool) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = Vec::new();
+    for pair in &telemetry.pairs {
+        let faces = if in_hand {
+            [pair.moving_face, pair.moving_edge_face]
+        } else if document.model_part(pair.static_part) == Some(part) {
+            [pair.static_face, pair.static_edge_face]
+        } else {
+            continue;
+        };
+        let edge = meeting(&faces.map(u32::from));
+        if !faces.contains(&NO_FACE) && edges.len() < MAX_LIT_EDGES && !edges.contains(&edge) {
+            edges.push(edge);
+        }
+    }
+    edges
 }
 
 /// Faces of a part that fit another's and are held there: guided, or kept by contact.

@@ -31,6 +31,8 @@ pub struct Segment {
     pub a: [f32; 3],
     /// To.
     pub b: [f32; 3],
+    /// The faces that meet in the edge, smaller id first; one twice where it is a seam.
+    pub faces: [u32; 2],
 }
 
 /// A shape, ready for the graphics card.
@@ -80,13 +82,22 @@ impl ShapeMesh {
             vertex.normal = normal.as_vec3().to_array();
         }
         for edge in &shape.edges {
+            let faces = meeting(&edge.faces);
             mesh.segments.extend(edge.polyline.windows(2).map(|ends| Segment {
                 a: ends[0].as_vec3().to_array(),
                 b: ends[1].as_vec3().to_array(),
+                faces,
             }));
         }
         mesh
     }
+}
+
+/// Two faces that meet in an edge, in the order in which edges are told apart by them; no face ([`u32::MAX`]) where there is none.
+pub fn meeting(faces: &[u32]) -> [u32; 2] {
+    let a = faces.first().copied().unwrap_or(u32::MAX);
+    let b = faces.get(1).copied().unwrap_or(a);
+    [a.min(b), a.max(b)]
 }
 
 /// Linear RGB in 0..1 to 8-bit sRGB, opaque.
@@ -229,6 +240,14 @@ mod tests {
         let segments = ShapeMesh::of(&shape()).segments;
         assert_eq!(segments.len(), 2);
         assert_eq!(segments[0].b, segments[1].a);
+        assert!(segments.iter().all(|segment| segment.faces == [0, 1]));
+    }
+
+    #[test]
+    fn an_edge_is_known_by_its_faces_in_either_order() {
+        assert_eq!(meeting(&[4, 2]), meeting(&[2, 4]));
+        assert_eq!(meeting(&[3]), [3, 3]);
+        assert_eq!(meeting(&[]), [u32::MAX; 2]);
     }
 
     #[test]

@@ -6,6 +6,8 @@ use super::camera::{Camera, Extent};
 
 /// Faces of one part that can be lit up at once; more than the wire carries pairs of one part worth telling apart.
 pub const MAX_LIT: usize = 8;
+/// Edges of one part that can be lit up at once.
+pub const MAX_LIT_EDGES: usize = 8;
 
 /// A part, or a ghost of one.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +26,8 @@ pub struct Item {
     pub line: [f32; 4],
     /// Faces that touch, at most [`MAX_LIT`].
     pub lit: Vec<u32>,
+    /// Edges that touch, by the two faces that meet there, smaller id first; at most [`MAX_LIT_EDGES`].
+    pub lit_edges: Vec<[u32; 2]>,
     /// Faces that are guided onto another part's, at most [`MAX_LIT`].
     pub mates: Vec<u32>,
 }

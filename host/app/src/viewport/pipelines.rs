@@ -61,7 +61,7 @@ impl Pipelines {
         let lines = [Some(wgpu::VertexBufferLayout {
             array_stride: size_of::<Segment>() as u64,
             step_mode: wgpu::VertexStepMode::Instance,
-            attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
+            attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32x2],
         })];
         let make = |kind: Kind<'_>| pipeline(device, &module, &layout, &kind);
         Self {

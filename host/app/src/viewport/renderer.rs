@@ -9,14 +9,17 @@ use glam::{DAffine3, DMat4, DVec3};
 use wgpu::util::DeviceExt as _;
 
 use super::mesh::ShapeMesh;
-use super::picture::{Item, MAX_LIT, Picture, arrow_poses};
+use super::picture::{Item, MAX_LIT, MAX_LIT_EDGES, Picture, arrow_poses};
 use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
 use super::solids;
 
 /// Room for one item's numbers; a multiple of every device's alignment for uniform buffers.
-const DRAW_STRIDE: u64 = 256;
+const DRAW_STRIDE: u64 = 512;
+const _: () = assert!(size_of::<Draw>() as u64 <= DRAW_STRIDE);
 /// Lines are brought this fraction of their distance nearer, so that faces do not swallow them.
 const LINE_LIFT: f64 = 6e-4;
+/// What no edge has: an edge without faces has twice the last number.
+const NO_EDGE: [u32; 2] = [u32::MAX, 0];
 /// Background at the top and at the bottom, sRGB.
 const SKY: [[f32; 4]; 2] = [[0.135, 0.150, 0.180, 1.0], [0.075, 0.082, 0.098, 1.0]];
 
@@ -41,6 +44,7 @@ struct Draw {
     line: [f32; 4],
     lit: [u32; MAX_LIT],
     mates: [u32; MAX_LIT],
+    lit_edges: [[u32; 2]; MAX_LIT_EDGES],
 }
 
 /// A shape on the graphics card.
@@ -244,14 +248,15 @@ fn draw_of(item: &Item, to_clip: DMat4) -> Draw {
         color: [r, g, b, item.opacity],
         tint: item.tint,
         line: item.line,
-        lit: slots(&item.lit),
-        mates: slots(&item.mates),
+        lit: slots(&item.lit, u32::MAX),
+        mates: slots(&item.mates, u32::MAX),
+        lit_edges: slots(&item.lit_edges, NO_EDGE),
     }
 }
 
-/// The first faces, and none for the rest.
-fn slots(faces: &[u32]) -> [u32; MAX_LIT] {
-    std::array::from_fn(|i| faces.get(i).copied().unwrap_or(u32::MAX))
+/// The first of them, and `none` for the rest.
+fn slots<T: Copy, const N: usize>(all: &[T], none: T) -> [T; N] {
+    std::array::from_fn(|i| all.get(i).copied().unwrap_or(none))
 }
 
 fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
@@ -262,8 +267,9 @@ fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
         color,
         tint: [0.0; 4],
         line: [0.0; 4],
-        lit: slots(&[]),
-        mates: slots(&[]),
+        lit: slots(&[], u32::MAX),
+        mates: slots(&[], u32::MAX),
+        lit_edges: slots(&[], NO_EDGE),
     }
 }
 

@@ -27,12 +27,16 @@ struct Draw {
     // Faces that are guided onto another part's, likewise.
     mates_a: vec4<u32>,
     mates_b: vec4<u32>,
+    // Edges lit up: two in each, by the faces that meet there, smaller id first; unused ones are no edge's.
+    lit_edges: array<vec4<u32>, 4>,
 }
 
 @group(0) @binding(0) var<uniform> globals: Globals;
 @group(1) @binding(0) var<uniform> draw: Draw;
 
 const LIT: vec3<f32> = vec3<f32>(1.0, 0.36, 0.24);
+// Of edges: nearly white, to be told from a lit face beside them and from the edges of the part in hand.
+const LIT_EDGE: vec3<f32> = vec3<f32>(1.0, 0.95, 0.90);
 const MATES: vec3<f32> = vec3<f32>(0.22, 0.80, 0.65);
 
 fn linear(s: vec3<f32>) -> vec3<f32> {
@@ -131,12 +135,33 @@ fn arrow_fragment(in: Solid) -> @location(0) vec4<f32> {
 
 // Edges --------------------------------------------------------------------------------------------------------
 
+// An edge that touches is so many times as wide as others, and brought so many times as far forward, so as to lie over them.
+const LIT_WIDER: f32 = 3.0;
+const LIT_NEARER: f32 = 2.0;
+
+struct Line {
+    @builtin(position) position: vec4<f32>,
+    @location(0) @interpolate(flat) color: vec4<f32>,
+}
+
+fn touches(faces: vec2<u32>) -> bool {
+    for (var i = 0u; i < 4u; i++) {
+        let two = draw.lit_edges[i];
+        if all(two.xy == faces) || all(two.zw == faces) {
+            return true;
+        }
+    }
+    return false;
+}
+
 @vertex
 fn lines_vertex(
     @builtin(vertex_index) i: u32,
     @location(0) a: vec3<f32>,
     @location(1) b: vec3<f32>,
-) -> @builtin(position) vec4<f32> {
+    @location(2) faces: vec2<u32>,
+) -> Line {
+    let lit = touches(faces);
     var p = draw.to_clip * vec4<f32>(a, 1.0);
     var q = draw.to_clip * vec4<f32>(b, 1.0);
     // An end behind the eye is brought forward along the line.
@@ -158,13 +183,16 @@ fn lines_vertex(
     if far_end {
         end = q;
     }
-    let shift = side * across * globals.screen.z / globals.screen.xy;
+    let width = globals.screen.z * select(1.0, LIT_WIDER, lit);
+    let shift = side * across * width / globals.screen.xy;
     // Depth is A + B/w. Brought a fraction e nearer to the eye a point has depth A + B/(w(1 - e)), about e·B/w less;
     // screen.w holds e·B, which is negative.
-    return vec4<f32>(end.xy + shift * end.w, end.z + globals.screen.w, end.w);
+    let nearer = globals.screen.w * select(1.0, LIT_NEARER, lit);
+    let position = vec4<f32>(end.xy + shift * end.w, end.z + nearer, end.w);
+    return Line(position, select(draw.line, vec4<f32>(LIT_EDGE, 1.0), lit));
 }
 
 @fragment
-fn lines_fragment() -> @location(0) vec4<f32> {
-    return draw.line;
+fn lines_fragment(in: Line) -> @location(0) vec4<f32> {
+    return in.color;
 }
