@@ -26,6 +26,9 @@ const CUT: Window = Window {
     for_ms: 450,
 };
 
+/// When the hand holds still, and nothing swings any more, ms.
+const HELD_MS: [usize; 2] = [1450, 2350];
+
 /// Half-way in by 1.2 s, held there until 2.4 s, through by 3.6 s.
 fn prepared(clearance_mm: f64) -> Result<(Scenario, PreparedScene), LabError> {
     let fit = Fit::thesis(clearance_mm).engaged(-20.0);
@@ -67,7 +70,9 @@ fn play(scenario: &Scenario, scene: &PreparedScene) -> Result<Result<Recording, 
 
 /// Every row about a link that fails.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    cut(out)?;
+    let (mut still, held_scene) = prepared(1.0)?;
+    still.hand.tremor_mm = 0.0;
+    cut(&still, &held_scene, out)?;
     let (scenario, scene) = prepared(0.02)?;
     let stall = Faults {
         stall: vec![
@@ -115,6 +120,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         ]);
     }
     for (name, faults) in cases {
+        held(&still, &held_scene, name, faults.clone(), out)?;
         through(&scenario, &scene, name, faults, out)?;
     }
     by_the_clock(&scene, out)
@@ -166,6 +172,19 @@ fn through(
         "mN m",
         limit(ParameterId::TorqueSlew),
     ));
+    let (force, torque) = largest_step_untouched(&recording.samples);
+    out(Row::at_most(
+        what("largest step of force between two ticks in which nothing touches"),
+        force,
+        "N",
+        FORCE_N,
+    ));
+    out(Row::at_most(
+        what("largest step of torque likewise"),
+        1e3 * torque,
+        "mN m",
+        TORQUE_MNM,
+    ));
     out(Row::at_most(
         what("largest force"),
         recording.outcome.peak_force_n,
@@ -175,41 +194,54 @@ fn through(
     Ok(())
 }
 
-/// A peg held half-way, 1 mm off without tremor, when the link is cut: guidance runs out and comes again.
-fn cut(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let (mut scenario, scene) = prepared(1.0)?;
-    scenario.hand.tremor_mm = 0.0;
-    scenario.faults = Some(Faults {
-        disconnect: vec![CUT],
-        ..Faults::default()
-    });
-    let what = |what: &str| {
-        format!(
-            "link cut for {} ms, peg held half-way 1 mm and 2° off: {what}",
-            CUT.for_ms
-        )
+/// As [`largest_step`], of steps with nothing touching before or after them: what is left is the hand's and guidance's.
+fn largest_step_untouched(samples: &[Telemetry]) -> (f64, f64) {
+    (samples.chunk_by(|a, b| a.pairs.is_empty() && b.pairs.is_empty()))
+        .map(largest_step)
+        .fold((0.0, 0.0), |(a, b), (force, torque)| {
+            (a.max(force), b.max(torque))
+        })
+}
+
+/// A peg held half-way, 1 mm off without tremor, over a link with `faults`: only guidance could change what is felt.
+fn held(
+    still: &Scenario,
+    scene: &PreparedScene,
+    name: &str,
+    faults: Faults,
+    out: &mut dyn FnMut(Row),
+) -> Result<(), LabError> {
+    let scenario = Scenario {
+        faults: Some(faults),
+        ..still.clone()
     };
-    let recording = match play(&scenario, &scene)? {
+    let what = |what: &str| format!("peg held half-way 1 mm and 2° off, link on which {name}: {what}");
+    let recording = match play(&scenario, scene)? {
         Ok(recording) => recording,
         Err(fault) => {
             out(Row::same(what("fault of the board"), &fault, "none"));
             return Ok(());
         }
     };
-    out(Row::same(what("fault of the board"), "none", "none"));
-    let samples = &recording.samples;
-    let held = &samples[CUT.at_ms as usize - 50..2350];
-    let least = held
-        .iter()
-        .map(|sample| sample.guidance.engagement)
-        .fold(1.0, f32::min);
-    out(Row::exactly(
-        what("engagement when guidance had run out"),
-        f64::from(least),
-        "",
-        0.0,
-    ));
-    let (force, torque) = largest_step(held);
+    let held = while_held(&recording.samples);
+    let most = engagements(held).fold(0.0, f32::max);
+    out(Row::exactly(what("largest engagement"), f64::from(most), "", 1.0));
+    steps(&what, held, out);
+    Ok(())
+}
+
+/// The samples in which the hand holds still.
+fn while_held(samples: &[Telemetry]) -> &[Telemetry] {
+    &samples[HELD_MS[0].min(samples.len())..HELD_MS[1].min(samples.len())]
+}
+
+fn engagements(samples: &[Telemetry]) -> impl Iterator<Item = f32> {
+    samples.iter().map(|sample| sample.guidance.engagement)
+}
+
+/// Steps while nothing but guidance changes.
+fn steps(what: &dyn Fn(&str) -> String, samples: &[Telemetry], out: &mut dyn FnMut(Row)) {
+    let (force, torque) = largest_step(samples);
     out(Row::at_most(
         what("largest step of force between two ticks"),
         force,
@@ -222,10 +254,43 @@ fn cut(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         "mN m",
         TORQUE_MNM,
     ));
+}
+
+/// The same when the link is cut: guidance runs out and comes again.
+fn cut(still: &Scenario, scene: &PreparedScene, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let mut scenario = still.clone();
+    scenario.faults = Some(Faults {
+        disconnect: vec![CUT],
+        ..Faults::default()
+    });
+    let what = |what: &str| {
+        format!(
+            "link cut for {} ms, peg held half-way 1 mm and 2° off: {what}",
+            CUT.for_ms
+        )
+    };
+    let recording = match play(&scenario, scene)? {
+        Ok(recording) => recording,
+        Err(fault) => {
+            out(Row::same(what("fault of the board"), &fault, "none"));
+            return Ok(());
+        }
+    };
+    out(Row::same(what("fault of the board"), "none", "none"));
+    let samples = &recording.samples;
+    let held = while_held(samples);
+    let least = engagements(held).fold(1.0, f32::min);
+    out(Row::exactly(
+        what("engagement when guidance had run out"),
+        f64::from(least),
+        "",
+        0.0,
+    ));
+    steps(&what, held, out);
     let again = (held.iter().rev())
         .take_while(|sample| sample.guidance.engagement == 1.0)
         .count();
-    let back = 2350.0 - again as f64 - (CUT.at_ms + CUT.for_ms) as f64;
+    let back = HELD_MS[1] as f64 - again as f64 - (CUT.at_ms + CUT.for_ms) as f64;
     out(Row::within(
         what("guided again by itself after the cut"),
         back,
@@ -233,7 +298,7 @@ fn cut(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         0.0,
         399.0,
     ));
-    let seen = inserted(&scenario, &scene, samples);
+    let seen = inserted(&scenario, scene, samples);
     out(Row::within(
         what("inserted in the end"),
         seen.depth_mm,

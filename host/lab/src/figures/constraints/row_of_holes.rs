@@ -9,26 +9,33 @@ use crate::scenario::{Depth, Key, PreparedScene, Scenario};
 
 /// Plate of 15 mm with ten holes of 8.05 mm, 16 mm apart, three of them taken, and a free pin of 8 × 30 mm.
 const STEP: &str = include_str!("../../../data/fixture_row.step");
+/// Where the three pins stand, as the file has it.
+const TAKEN_X: [&str; 3] = ["-40.", "-24.", "40."];
 /// The free pin's place, and its middle's height, mm.
 const START_X: f64 = 15.9;
 const START_Z: f64 = 55.0;
 /// Its middle's height with its end on the plate, mm.
 const LANDED_Z: f64 = 30.0;
-/// Holes that no pin is in, mm.
-const FREE_X: [f64; 7] = [-72.0, -56.0, -8.0, 8.0, 24.0, 56.0, 72.0];
+/// All holes, mm.
+const HOLES_X: [f64; 10] = [-72.0, -56.0, -40.0, -24.0, -8.0, 8.0, 24.0, 40.0, 56.0, 72.0];
 /// Free stretches of the row, mm.
 const SPANS_X: [(f64, f64); 3] = [(-16.0, 32.0), (-80.0, -48.0), (48.0, 80.0)];
-/// Attempts: each free hole from one side, the first three from the other too.
-const ATTEMPTS: usize = 10;
 
-fn prepared() -> Result<(Scenario, PreparedScene), LabError> {
-    let file = file(STEP)?;
+fn prepared(step: &str) -> Result<(Scenario, PreparedScene), LabError> {
+    let file = file(step)?;
     let mut scenario = script(file.path())?;
     scenario.scene.part = "pin-free".into();
     scenario.hand.grip_mm = [START_X, 0.0, START_Z];
     scenario.depth = None;
     let scene = PreparedScene::of(&scenario)?;
     Ok((scenario, scene))
+}
+
+/// The same with those three 200 mm above their holes, out of the way.
+fn emptied() -> String {
+    TAKEN_X.iter().fold(STEP.to_owned(), |text, x| {
+        text.replace(&format!("({x},0.,0.5)"), &format!("({x},0.,200.5)"))
+    })
 }
 
 /// The hand so far along the row and so high above where the pin's end meets the plate.
@@ -38,8 +45,9 @@ fn at(t_s: f64, x: f64, above: f64) -> Key {
 
 /// Both rows.
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let (mut scenario, scene) = prepared()?;
+    let (mut scenario, scene) = prepared(STEP)?;
     carried(&mut scenario, &scene, out)?;
+    let (mut scenario, scene) = prepared(&emptied())?;
     inserted(&mut scenario, &scene, out)
 }
 
@@ -66,8 +74,8 @@ fn carried(scenario: &mut Scenario, scene: &PreparedScene, out: &mut dyn FnMut(R
     }
     let what = |what: &str| {
         format!(
-            "pin carried 1 mm above {} equal holes in a row: {what}",
-            FREE_X.len()
+            "pin carried 1 mm above the free holes of a row of {}: {what}",
+            HOLES_X.len()
         )
     };
     out(Row::exactly(
@@ -93,9 +101,8 @@ fn inserted(
     out: &mut dyn FnMut(Row),
 ) -> Result<(), LabError> {
     let mut right = 0;
-    for attempt in 0..ATTEMPTS {
-        let x = FREE_X[attempt % FREE_X.len()];
-        let side = if attempt < FREE_X.len() { 1.0 } else { -1.0 };
+    for (attempt, x) in HOLES_X.into_iter().enumerate() {
+        let side = if attempt % 2 == 0 { 1.0 } else { -1.0 };
         let tilted = |t, above| Key {
             turn_deg: [0.0, 2.0 * side, 0.0],
             ..at(t, x + side, above)
@@ -128,10 +135,27 @@ fn inserted(
         right += u32::from(in_it && on_axis && engaged);
     }
     out(Row::exactly(
-        "the same pin set down 1 mm and 2° off on a hole, in-process: in that hole, on its axis",
+        "the same pin set down 1 mm and 2° off on each hole of the row, all of them free, in-process: in that hole, on its axis",
         f64::from(right),
-        &format!("of {ATTEMPTS}"),
-        ATTEMPTS as f64,
+        &format!("of {}", HOLES_X.len()),
+        HOLES_X.len() as f64,
     ));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_hole_of_the_emptied_row_is_free() {
+        let file = file(&emptied()).expect("a temporary file");
+        let model = mortise_brep::load_step(file.path()).expect("sound");
+        let standing = model
+            .parts
+            .iter()
+            .filter(|part| part.name.starts_with("pin-in-hole"));
+        let heights: Vec<f64> = standing.map(|part| part.placement.translation.z).collect();
+        assert_eq!(heights, [200.5; 3]);
+    }
 }
