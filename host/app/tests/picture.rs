@@ -201,11 +201,16 @@ fn an_edge_that_touches_stands_out_and_no_other_does() {
     };
     let front = face_at(&document, DVec3::new(0.0, -25.0, -20.0));
     let shape = &document.model.shapes[document.model.parts[0].shape];
+    let pose = document.poses[0];
     let (above, below) = (DVec3::new(-20.0, -25.0, 0.0), DVec3::new(-20.0, -25.0, -40.0));
     let edges = |z: f64| -> Vec<[u32; 2]> {
         (shape.edges.iter())
             .filter(|edge| {
-                edge.faces.contains(&front) && edge.polyline.iter().all(|p| (p.z - z).abs() < 1e-6)
+                edge.faces.contains(&front)
+                    && edge
+                        .polyline
+                        .iter()
+                        .all(|&p| (pose.transform_point3(p).z - z).abs() < 1e-6)
             })
             .map(|edge| meeting(&edge.faces))
             .collect()

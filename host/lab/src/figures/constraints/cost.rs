@@ -4,7 +4,7 @@ use mortise_bake::Grabbable;
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
 
 use crate::LabError;
-use crate::figures::Row;
+use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::guided::{emulated, insertion, known_target, play_to};
 use crate::motion::{Motion, script};
@@ -55,9 +55,14 @@ pub(super) fn peg_in_hole(fit: &Fit) -> Result<ConstraintTarget, LabError> {
 
 /// Insertions with a hand off by four fifths of the play, the target known from the start or recognised on the desktop: no tick may take more
 /// than contact alone is bounded by.
-pub(super) fn guided_ticks(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let (pairs, modes) = (&rate::PAIRS[..rate::QUICK], [Mode::Guided, Mode::Recognised]);
-    for course in rate::played(pairs, &modes, &mut |_| {})? {
+pub(super) fn guided_ticks(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let pairs = &rate::PAIRS[..rate::QUICK];
+    let modes: &[Mode] = if plan.quick {
+        &[Mode::Recognised]
+    } else {
+        &[Mode::Guided, Mode::Recognised]
+    };
+    for course in rate::played(pairs, modes, &mut |_| {})? {
         let pair = pairs.iter().find(|pair| pair.name == course.pair);
         let what = format!(
             "{}, {}, emulated board: largest instructions of a guided tick",

@@ -18,7 +18,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     insertion::fits(plan, out)?;
     insertion::large(out)?;
     cost::four_targets(out)?;
-    cost::guided_ticks(out)?;
+    cost::guided_ticks(plan, out)?;
     steps::come_and_go(out)?;
     steps::leave(out)?;
     row_of_holes::measure(out)?;
