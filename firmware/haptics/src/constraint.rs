@@ -87,10 +87,14 @@ impl Rows {
 
     /// Length of the error after the twist `x` has acted for `ahead` s.
     pub fn error(&self, x: &[f32; 6], ahead: f32) -> f32 {
-        let squared = (self.rows.iter())
+        libm::sqrtf(self.error2(x, ahead))
+    }
+
+    /// Its square.
+    pub fn error2(&self, x: &[f32; 6], ahead: f32) -> f32 {
+        (self.rows.iter())
             .map(|(row, error)| error + ahead * dot(row, x))
-            .fold(0.0, |sum, e| sum + e * e);
-        libm::sqrtf(squared)
+            .fold(0.0, |sum, e| sum + e * e)
     }
 
     /// Length of the error's rate under the twist `x`.

@@ -7,7 +7,7 @@ use glam::Vec3;
 use mortise_protocol::limits::MAX_TARGETS;
 
 use crate::constraint::Rows;
-use crate::linear::Symmetric6;
+use crate::linear::{Symmetric6, inverse_sqrt};
 use crate::pose::Wrench;
 use crate::step::dot;
 
@@ -95,13 +95,14 @@ impl Pull {
                 cap,
                 ahead,
             } => {
-                secant.reach = self.rows.error(x, ahead);
-                secant.spring = saturating(stiffness, cap, secant.reach);
+                let squared = self.rows.error2(x, ahead);
+                secant.reach = root(squared);
+                secant.spring = saturating(stiffness, cap, squared);
             }
         }
         if self.damper_n > 0.0 {
             secant.speed = self.rows.speed(x);
-            secant.damper = saturating(LETTING_GO, self.damper_n, secant.speed);
+            secant.damper = saturating(LETTING_GO, self.damper_n, secant.speed * secant.speed);
         }
         secant
     }
@@ -135,9 +136,23 @@ impl Pull {
     }
 }
 
-/// Force over u of a pull that is k·u at first and never more than `cap`: cap/√((cap/k)² + u²).
-fn saturating(k: f32, cap: f32, u: f32) -> f32 {
+/// Force over u of a pull that is k·u at first and never more than `cap`: cap/√((cap/k)² + u²). Asked for in each solve by each pull.
+fn saturating(k: f32, cap: f32, u2: f32) -> f32 {
     let slack = cap / k;
-    let length = libm::sqrtf(slack * slack + u * u);
-    if length > 0.0 { cap / length } else { 0.0 }
+    let squared = slack * slack + u2;
+    if is_ordinary(squared) {
+        cap * inverse_sqrt(squared)
+    } else {
+        0.0
+    }
+}
+
+/// √x.
+fn root(x: f32) -> f32 {
+    if is_ordinary(x) { x * inverse_sqrt(x) } else { 0.0 }
+}
+
+/// Whether [`inverse_sqrt`] is for such a number.
+fn is_ordinary(x: f32) -> bool {
+    x > f32::MIN_POSITIVE && x < f32::MAX
 }

@@ -119,21 +119,25 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             ("lost, damaged, repeated, out of order, late, flooded", bad(1)),
         ]);
     }
+    let mut sound = None;
     for (name, faults) in cases {
         held(&still, &held_scene, name, faults.clone(), out)?;
-        through(&scenario, &scene, name, faults, out)?;
+        let steps = through(&scenario, &scene, name, faults, sound, out)?;
+        // The first is the sound one.
+        sound = sound.or(steps);
     }
     by_the_clock(&scene, out)
 }
 
-/// The insertion of the 20 µm fit over a link with `faults`.
+/// The insertion of the 20 µm fit over a link with `faults`; its largest steps of force (N) and torque (N m), held against those over a `sound` link.
 fn through(
     scenario: &Scenario,
     scene: &PreparedScene,
     name: &str,
     faults: Faults,
+    sound: Option<(f64, f64)>,
     out: &mut dyn FnMut(Row),
-) -> Result<(), LabError> {
+) -> Result<Option<(f64, f64)>, LabError> {
     let scenario = Scenario {
         faults: Some(faults),
         ..scenario.clone()
@@ -143,7 +147,7 @@ fn through(
         Ok(recording) => recording,
         Err(fault) => {
             out(Row::same(what("fault of the board"), &fault, "none"));
-            return Ok(());
+            return Ok(None);
         }
     };
     let counts = recording.faults;
@@ -172,35 +176,27 @@ fn through(
         "mN m",
         limit(ParameterId::TorqueSlew),
     ));
-    let (force, torque) = largest_step_untouched(&recording.samples);
-    out(Row::at_most(
-        what("largest step of force between two ticks in which nothing touches"),
-        force,
-        "N",
-        FORCE_N,
-    ));
-    out(Row::at_most(
-        what("largest step of torque likewise"),
-        1e3 * torque,
-        "mN m",
-        TORQUE_MNM,
-    ));
+    if let Some(sound) = sound {
+        out(Row::at_most(
+            what("largest step of force, more than over a sound link"),
+            force - sound.0,
+            "N",
+            FORCE_N,
+        ));
+        out(Row::at_most(
+            what("largest step of torque, more than over a sound link"),
+            1e3 * (torque - sound.1),
+            "mN m",
+            TORQUE_MNM,
+        ));
+    }
     out(Row::at_most(
         what("largest force"),
         recording.outcome.peak_force_n,
         "N",
         limit(ParameterId::ForceLimit),
     ));
-    Ok(())
-}
-
-/// As [`largest_step`], of steps with nothing touching before or after them: what is left is the hand's and guidance's.
-fn largest_step_untouched(samples: &[Telemetry]) -> (f64, f64) {
-    (samples.chunk_by(|a, b| a.pairs.is_empty() && b.pairs.is_empty()))
-        .map(largest_step)
-        .fold((0.0, 0.0), |(a, b), (force, torque)| {
-            (a.max(force), b.max(torque))
-        })
+    Ok(Some((force, torque)))
 }
 
 /// A peg held half-way, 1 mm off without tremor, over a link with `faults`: only guidance could change what is felt.
