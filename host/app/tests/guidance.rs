@@ -226,8 +226,8 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     }
     session.guidance = odd;
     let document = session.document.as_ref().expect("open");
-    let camera = mortise::viewport::camera::Camera::default();
-    let picture = mortise::viewport::compose::compose(session, document, camera, true, 1.0);
+    let camera = Camera::default();
+    let picture = compose(session, document, camera, true, 1.0);
     assert!(picture.items.iter().all(|item| item.mates.is_empty()));
     harness.step();
 
