@@ -10,6 +10,10 @@
 //! nothing but the other face are passed over until the object has travelled to where that may end. What is felt is the same to the bit
 //! with and without: a joint forms and ends without a step because it changes the work and nothing else.
 //!
+//! Whether a leaf's points meet nothing else is asked of the field, as seldom as the field is asked about nodes: of all of them at once by what the bricks
+//! about them have to do with, or of each by the cells next to it. What is read is counted in the budget for what it takes, and a tick begins no more
+//! once it has spent a twelfth of its budget so: leaves not asked about are looked at as ever.
+//!
 //! R − r is taken from the scene's own exact surfaces, not from the target: faces that are not what the target says stay in the work. So do
 //! conical and flat ones, which have a stop of their own along the axis, and all others of both parts: a bolt's head still lands.
 
