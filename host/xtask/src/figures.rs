@@ -34,11 +34,13 @@ pub struct Measured {
     pub success: bool,
 }
 
-/// A sweep that belongs to a table: the experiment of `mortise lab` that makes it, and the charts it leaves in `docs/figures`.
+/// A sweep that belongs to a table: the experiment of `mortise lab` that makes it, and the charts it leaves in `docs/figures`, drawn from one table of the experiment's name, or each
+/// from one of its own.
 struct Sweep {
     table: &'static str,
     experiment: &'static str,
     charts: &'static [(&'static str, &'static str)],
+    own_tables: bool,
 }
 
 const SWEEPS: &[Sweep] = &[
@@ -49,6 +51,7 @@ const SWEEPS: &[Sweep] = &[
             "clearance",
             "Smallest clearance that assembles, by method and cell",
         )],
+        own_tables: false,
     },
     Sweep {
         table: "contact",
@@ -63,6 +66,36 @@ const SWEEPS: &[Sweep] = &[
                 "Accuracy against nanoseconds of a query, parry3d beside it",
             ),
         ],
+        own_tables: false,
+    },
+    Sweep {
+        table: "stability",
+        experiment: "stability",
+        charts: &[
+            ("stability-z-width", "Largest stable wall over its damping"),
+            ("stability-rate", "Largest stable stiffness over the rate"),
+            (
+                "stability-mass",
+                "Largest stable stiffness over the handle's mass",
+            ),
+            ("stability-hand", "Largest stable stiffness, hand loose to tight"),
+            (
+                "stability-encoder",
+                "Largest stiffness that rests over the encoder's step",
+            ),
+            (
+                "stability-jam",
+                "How far to the side a peg may be pushed and still goes in",
+            ),
+            (
+                "stability-contacts",
+                "Unrest of the force over the number of touching points",
+            ),
+            ("stability-impact", "A blow on a wall of a millimetre"),
+            ("stability-shell", "Where a flat wall is felt"),
+            ("stability-lapses", "Targets lost and late"),
+        ],
+        own_tables: true,
     },
 ];
 
@@ -127,11 +160,17 @@ fn run_sweep(root: &Path, program: &Path, sweep: &Sweep) -> Result<()> {
 /// The charts of a sweep as a page shows them.
 fn charts(sweep: &Sweep) -> String {
     let experiment = sweep.experiment;
-    let mut text = format!(
-        "\n`mortise lab {experiment} --out docs/figures` makes the following from [{experiment}.csv]({experiment}.csv).\n"
-    );
+    let mut text = format!("\n`mortise lab {experiment} --out docs/figures` makes the following");
+    if sweep.own_tables {
+        text.push_str(".\n");
+    } else {
+        text.push_str(&format!(" from [{experiment}.csv]({experiment}.csv).\n"));
+    }
     for (file, title) in sweep.charts {
         text.push_str(&format!("\n![{title}]({file}.svg)\n"));
+        if sweep.own_tables {
+            text.push_str(&format!("\n[{file}.csv]({file}.csv)\n"));
+        }
     }
     text
 }

@@ -60,7 +60,13 @@ enum Experiment {
     /// Show force and engagement over an insertion, the thesis' blend beside the default guidance
     Blend(Sweep),
     /// Find where closed loops become unstable, theory drawn beside
-    Stability(Sweep),
+    Stability {
+        #[command(flatten)]
+        sweep: Sweep,
+        /// Only the map of this name, that of its files
+        #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(stability::NAMES))]
+        map: Option<String>,
+    },
     /// Show the rate that a tick allows over an insertion: collision only, guided, guided with recognition; emulated board
     Rate(Sweep),
     /// Which voxels let a peg into its hole, and what shrinking does: 27 trials by a simulated operator, textbook voxmap
@@ -116,7 +122,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Experiment::Clearance(sweep) => clearance(sweep),
         Experiment::Pareto(sweep) => pareto(sweep),
         Experiment::Blend(sweep) => blend(sweep),
-        Experiment::Stability(sweep) => stability(sweep),
+        Experiment::Stability { sweep, map } => stability(sweep, map.as_deref()),
         Experiment::Rate(sweep) => rate(sweep),
         Experiment::Shrink(sweep) => shrink(sweep),
         Experiment::FeatureSize { sweep, shrink } => feature_size(sweep, *shrink),
@@ -275,9 +281,9 @@ fn feature_size(sweep: &Sweep, shrink: f64) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn stability(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+fn stability(sweep: &Sweep, only: Option<&str>) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
-    let maps = stability::maps(sweep.quick, &mut |trial| {
+    let maps = stability::maps(sweep.quick, only, &mut |trial| {
         if written.is_ok() {
             written = sweep.tell(trial);
         }

@@ -1,0 +1,213 @@
+//! Encoder steps against dry friction: up to which stiffness a pressed wall lets the handle rest.
+//!
+//! An encoder of step Δ makes of a wall K a stair: its force jumps by K·Δ. Pressed with a force half-way between two stairs the handle has no place to rest unless dry friction
+//! f_c holds the half step that is left, K·Δ/2. With viscous friction b against the sampled wall the whole condition is
+//!
+//! K ≤ min(2·b/T, 2·f_c/Δ)
+//!
+//! (J. J. Abbott and A. M. Okamura, *Effects of position quantization and sampling rate on virtual-wall passivity*, IEEE T-RO 21(5), 2005; N. Diolaiti, G. Niemeyer, F. Barbagli and
+//! J. K. Salisbury, *Stability of haptic rendering: discretization, quantization, time delay, and Coulomb effects*, IEEE T-RO 22(2), 2006). The second bound is sharp, which is what the experiment
+//! shows; beyond the first one dry friction still bears small motions, so that the marks may lie above it.
+
+use mortise_protocol::image::SceneImage;
+use serde::Serialize;
+
+use super::bench::{Bench, Rig, Sensor, Wish};
+use super::boundary::settings;
+use super::oracle::{COARSE, Law, Wall, limit};
+use super::slab::Slab;
+use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::error::LabError;
+use crate::variant::Variant;
+
+/// Handle, kg and N s/m; period, s.
+const MASS_KG: f64 = 0.15;
+const VISCOUS: f64 = 1.0;
+const PERIOD_S: f64 = 1e-3;
+/// Dry friction of the handle, N.
+const COULOMB_N: [f64; 3] = [0.01, 0.03, 0.1];
+/// Steps of the encoder, m.
+const FINEST_M: f64 = 2e-6;
+const COARSEST_M: f64 = 200e-6;
+const STEPS: u32 = 8;
+/// About so much presses, N: to the fraction of a stair that is tried.
+const PRESS_N: f64 = 5.0;
+/// Between two stairs; the half is the worst.
+const FRACTIONS: [f64; 3] = [0.0, 0.25, 0.5];
+/// The flick after it lies still, m/s.
+const FLICK_M_PER_S: f64 = 0.05;
+/// Then so long is waited, s, and in the last part of it nothing may move.
+const WATCH_S: f64 = 4.0;
+const STILL_S: f64 = 0.5;
+/// Stiffer walls are not looked for, N/m.
+const MOST_N_PER_M: f64 = 8e3;
+
+/// One boundary.
+#[derive(Clone, Debug, Serialize)]
+pub struct Rest {
+    /// f_c, N.
+    pub coulomb_n: f64,
+    /// Δ, µm.
+    pub resolution_um: f64,
+    /// Largest stiffness at which the handle comes to rest, N/m.
+    pub experiment_n_per_m: f64,
+    /// min(2·b/T, 2·f_c/Δ), N/m.
+    pub formula_n_per_m: f64,
+}
+
+impl std::fmt::Display for Rest {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "encoder of {:.1} µm, dry friction {} N: rests up to {:.0} N/m, by the closed form {:.0} N/m",
+            self.resolution_um, self.coulomb_n, self.experiment_n_per_m, self.formula_n_per_m
+        )
+    }
+}
+
+/// min(2·b/T, 2·f_c/Δ), N/m; the second is infinite for an exact encoder.
+pub fn restful_stiffness(viscous: f64, period_s: f64, coulomb_n: f64, resolution_m: f64) -> f64 {
+    (2.0 * viscous / period_s).min(2.0 * coulomb_n / resolution_m)
+}
+
+/// Whether the handle, pressed on what part `part` stands on, comes to rest on a wall of `stiffness` N/m, wherever between two stairs the press ends.
+pub fn rests(scene: &SceneImage<'_>, part: u16, stiffness: f64, coulomb_n: f64, resolution_m: f64) -> bool {
+    let wall = Wall {
+        stiffness,
+        damping: 0.0,
+        filter_s: 0.0,
+        period_s: PERIOD_S,
+        delay_ticks: 0,
+    };
+    let (settings, sensor) = settings(Law::Wall, &wall, stiffness);
+    let stair = stiffness * resolution_m;
+    FRACTIONS.iter().all(|fraction| {
+        let press = ((PRESS_N / stair).round() + fraction) * stair;
+        let mut rig = Rig::bare(MASS_KG, VISCOUS);
+        rig.coulomb_n = coulomb_n;
+        rig.sensor = Sensor {
+            resolution_m,
+            ..sensor
+        };
+        let mut bench = Bench::new(scene, part, settings, rig);
+        // Critically damped while it sinks in, with a time constant of √(m/K).
+        bench.rig.plant.damping += 2.0 * (stiffness * MASS_KG).sqrt();
+        let calm = ((20.0 * (MASS_KG / stiffness).sqrt()).max(0.2) / PERIOD_S) as u32;
+        for i in 0..calm {
+            let push = -press * f64::from(2 * i).min(f64::from(calm)) / f64::from(calm);
+            bench.step(&Wish {
+                push,
+                ..Wish::default()
+            });
+        }
+        bench.rig.plant.damping = VISCOUS;
+        bench.speed += FLICK_M_PER_S;
+        let wish = Wish {
+            push: -press,
+            ..Wish::default()
+        };
+        let (watch, still) = ((WATCH_S / PERIOD_S) as u32, (STILL_S / PERIOD_S) as u32);
+        for _ in 0..watch - still {
+            bench.step(&wish);
+        }
+        let at = bench.position;
+        // Dry friction that holds, holds exactly.
+        (0..still).all(|_| {
+            bench.step(&wish);
+            bench.position == at
+        })
+    })
+}
+
+/// The boundary for each friction and encoder; each goes to `out`.
+///
+/// # Errors
+/// Anything that keeps the scene from being baked.
+pub fn sweep(quick: bool, out: &mut dyn FnMut(&Rest)) -> Result<Vec<Rest>, LabError> {
+    let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0)?;
+    let scene = slab.scene()?;
+    let mut found = Vec::new();
+    for coulomb_n in COULOMB_N {
+        let steps = if quick { 2 } else { STEPS };
+        for i in 0..steps {
+            let resolution_m = FINEST_M * (COARSEST_M / FINEST_M).powf(f64::from(i) / f64::from(steps - 1));
+            let formula = restful_stiffness(VISCOUS, PERIOD_S, coulomb_n, resolution_m);
+            let experiment = limit(formula / 3.0, MOST_N_PER_M, COARSE, |stiffness| {
+                rests(&scene, slab.part, stiffness, coulomb_n, resolution_m)
+            });
+            let rest = Rest {
+                coulomb_n,
+                resolution_um: 1e6 * resolution_m,
+                experiment_n_per_m: experiment,
+                formula_n_per_m: formula,
+            };
+            out(&rest);
+            found.push(rest);
+        }
+    }
+    Ok(found)
+}
+
+/// Largest stiffness over the encoder's step.
+pub fn chart(found: &[Rest]) -> Chart {
+    const LINE_POINTS: u32 = 80;
+    let mut series = Vec::new();
+    for (index, coulomb_n) in COULOMB_N.into_iter().enumerate() {
+        series.push(Series {
+            name: format!("dry friction {coulomb_n} N"),
+            look: Look::nth(index),
+            line: Line::None,
+            points: (found.iter().filter(|rest| rest.coulomb_n == coulomb_n))
+                .map(|rest| Point {
+                    x: rest.resolution_um,
+                    y: rest.experiment_n_per_m,
+                    label: String::new(),
+                    at_least: rest.experiment_n_per_m >= MOST_N_PER_M,
+                })
+                .collect(),
+        });
+        series.push(Series {
+            name: if index == 0 {
+                "min(2·b/T, 2·f_c/Δ)".into()
+            } else {
+                String::new()
+            },
+            look: Look::Black,
+            line: Line::Trace,
+            points: (0..LINE_POINTS)
+                .map(|i| {
+                    let share = f64::from(i) / f64::from(LINE_POINTS - 1);
+                    let resolution_m = FINEST_M * (COARSEST_M / FINEST_M).powf(share);
+                    Point {
+                        x: 1e6 * resolution_m,
+                        y: restful_stiffness(VISCOUS, PERIOD_S, coulomb_n, resolution_m),
+                        ..Point::default()
+                    }
+                })
+                .collect(),
+        });
+    }
+    Chart {
+        title: "Largest stiffness at which a pressed handle rests, over the encoder's step".into(),
+        note: "Handle 0.15 kg, 1 N s/m, 1 kHz, wall K·x; pressed with 5 N to any place between two steps, and flicked. Lines: Abbott and Okamura 2005.".into(),
+        x: Axis::new("step of the encoder at the handle Δ, µm"),
+        y: Axis::new("largest stiffness that rests, N/m"),
+        series,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half-way between two stairs only dry friction holds: the closed form is where that ends, from either side.
+    #[test]
+    fn dry_friction_holds_half_a_stair_and_no_more() {
+        let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0).expect("baked");
+        let scene = slab.scene().expect("sound");
+        let formula = restful_stiffness(VISCOUS, PERIOD_S, 0.03, 100e-6);
+        assert_eq!(formula, 600.0);
+        assert!(rests(&scene, slab.part, 0.9 * formula, 0.03, 100e-6));
+        assert!(!rests(&scene, slab.part, 1.1 * formula, 0.03, 100e-6));
+    }
+}
