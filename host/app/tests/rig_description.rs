@@ -112,7 +112,6 @@ fn a_board_shows_what_it_keeps_and_says_when_it_keeps_nothing() {
         &["rig", "show", "--rig", "sim"],
         &["keeps no description", "mortise rig send"],
     );
-    refused(&["rig", "show", "--rig", "emulated:fast"], &["emulated:fast"]);
     let file = example("haply_2diy.toml");
     let output = mortise(&["rig", "send", text(&file), "--rig", "sim"]);
     assert!(output.status.success(), "{output:?}");

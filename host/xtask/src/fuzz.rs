@@ -13,11 +13,16 @@ use anyhow::{Context, Result, bail};
 use crate::{program, shell};
 
 /// What is fuzzed, and files there are that serve as a start.
-const TARGETS: [Target; 3] = [
+const TARGETS: [Target; 4] = [
     Target {
         name: "frame",
         seeds: None,
         longest: 1600,
+    },
+    Target {
+        name: "rig",
+        seeds: Some("firmware/rigs"),
+        longest: 4096,
     },
     Target {
         name: "scene",

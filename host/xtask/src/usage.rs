@@ -52,7 +52,7 @@ const COMMANDS: &[Command] = &[
     },
     Command {
         name: "fuzz",
-        what: "Random bytes, guided by coverage, for what reads frames, scenes and STEP files; all of them, or TARGET",
+        what: "Random bytes, guided by coverage, for what reads frames, scenes, rigs and STEP files; all of them, or TARGET",
         arguments: "[TARGET]",
         options: &[("--minutes <N>", "How long each runs; 1 by default")],
     },

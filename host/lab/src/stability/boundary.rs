@@ -11,7 +11,7 @@ use super::oracle::{Law, Search, Wall, limit};
 
 /// Pressed with this force, N.
 const PRESS_N: f64 = 5.0;
-/// Damping of the hand while it presses, N s/m, and how long that takes, s.
+/// Damping of the hand while it presses, N s/m at the most, and how long that takes, s.
 const CALM_N_S_PER_M: f64 = 20.0;
 const CALM_S: f64 = 1.0;
 /// The flick, m/s.
@@ -81,7 +81,9 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
     let mut bench = Bench::new(scene, part, *settings, *rig);
     let ticks = |s: f64| (s / f64::from(settings.period_s)).round() as u32;
     let calm = ticks(CALM_S);
-    bench.rig.plant.damping += CALM_N_S_PER_M;
+    // No more than critical: an overdamped handle on a soft wall would still be creeping.
+    let critical = 2.0 * (f64::from(settings.coupling.k_t_n_per_m) * rig.plant.mass_kg).sqrt();
+    bench.rig.plant.damping += critical.min(CALM_N_S_PER_M);
     // The push grows in half of that time.
     for i in 0..calm {
         let push = -PRESS_N * f64::from(2 * i).min(f64::from(calm)) / f64::from(calm);

@@ -175,6 +175,7 @@ fn play(scenario: &Scenario, scene: &PreparedScene, case: &Case, lost: f64) -> R
 /// Share of the time in force, and largest step, over what is lost.
 pub fn charts(found: &[Held]) -> Vec<Chart> {
     const LINE_POINTS: u32 = 60;
+    const LEAST_STEP_N: f64 = 1e-4;
     let of = |named: bool, y: fn(&Held) -> f64| -> Vec<Series> {
         (CASES.iter())
             .map(|case| Series {
@@ -218,7 +219,8 @@ pub fn charts(found: &[Held]) -> Vec<Chart> {
             note: "Peg ø18.75 mm, 1 mm clearance, held half-way 1 mm and 2° off for a minute; refreshed each 100 ms, fading after 300 ms without.".into(),
             x: Axis::new("refreshes lost p, %").linear(),
             y: Axis::new("largest step of force, N a tick"),
-            series: of(false, |held| held.step_n),
+            // What makes no step is drawn at the foot.
+            series: of(false, |held| held.step_n.max(LEAST_STEP_N)),
         },
     ]
 }

@@ -45,7 +45,7 @@ const STEPS: &[Step] = &[
     Step { name: "unit", what: "unit, property and integration tests", run: steps::unit },
     Step { name: "unit-boards", what: "parts of boards that need no chip, tested here", run: steps::unit_boards },
     Step { name: "hil", what: "scenarios on the simulated and the emulated rig", run: steps::hil },
-    Step { name: "fuzz", what: "random bytes for what reads frames, scenes and STEP files, 15 s each", run: steps::fuzz },
+    Step { name: "fuzz", what: "random bytes for what reads frames, scenes, rigs and STEP files, 15 s each", run: steps::fuzz },
     Step { name: "docs", what: "every public item's documentation builds; commands named in pages exist", run: steps::docs },
     Step { name: "figures", what: "end-to-end figures, the quick form", run: steps::figures },
     Step { name: "window", what: "the sample insertion moves in the program's window, on a virtual screen", run: window::run },
