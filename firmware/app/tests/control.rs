@@ -43,9 +43,7 @@ fn pulled() -> Bench {
     let mut bench = active();
     // Before the grip is firm the part would slip in the hand instead.
     bench.ticks(u32::from(RAMP_TICKS));
-    bench
-        .strings
-        .pull(|s| s.handle.position = Vec3::new(0.004, 0.0, 0.0));
+    bench.strings.pull(|s| s.handle.position.x = 0.004);
     bench.ticks(20);
     bench
 }
@@ -357,21 +355,18 @@ fn a_soft_stop_brakes_and_stays_below_its_limits() {
 fn the_wrench_ramps_up_from_zero() {
     let mut bench = active();
     // The hand is off at once with 0.8 m/s: the part, 0.1 kg, is brought to that by a grip that is still growing, ∫F dt = m·v.
-    let speed = 0.8;
-    let limit = ParameterId::CouplingForce.row().default;
+    let (speed, limit) = (0.8, ParameterId::CouplingForce.row().default);
     let mut forces = Vec::new();
     for i in 0..RAMP_TICKS {
         bench.strings.pull(|s| {
-            s.handle.position = Vec3::new(1e-3 * speed * f32::from(i + 1), 0.0, 0.0);
             s.twist.linear = Vec3::new(speed, 0.0, 0.0);
+            s.handle.position = 1e-3 * f32::from(i + 1) * s.twist.linear;
         });
         bench.tick();
         forces.push(wrench(bench.strings.last()).force.length());
     }
-    for (i, &force) in forces.iter().enumerate() {
-        let ramp = limit * (i + 2) as f32 / f32::from(RAMP_TICKS);
-        assert!(force <= ramp + 1e-3, "tick {i}: {force} above {ramp}");
-    }
+    let below = |(i, &force): (usize, &f32)| force <= limit * (i + 2) as f32 / f32::from(RAMP_TICKS) + 1e-3;
+    assert!(forces.iter().enumerate().all(below), "{forces:?}");
     // F grows by 50 N/s: 0.08 N s are given after 57 ms, at 2.8 N.
     let peak = forces.iter().copied().fold(0.0, f32::max);
     assert!((2.5..3.1).contains(&peak), "{peak}");
