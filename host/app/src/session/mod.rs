@@ -11,6 +11,7 @@ pub mod intent;
 pub mod link;
 pub mod notes;
 pub mod pose;
+pub mod touch;
 mod tour;
 pub mod tree;
 mod update;

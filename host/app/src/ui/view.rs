@@ -8,6 +8,8 @@ use glam::DVec3;
 use mortise_protocol::message::flag;
 
 use super::{control, theme};
+use crate::session::pose::point_from_wire;
+use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
 use crate::viewport::camera::View;
 use crate::viewport::compose::{compose, touching_points};
@@ -264,9 +266,14 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         }
     }
     for pair in telemetry.pairs.iter().take(3) {
-        let other = document.model_part(pair.static_part);
-        let other = other.map_or("?", |other| document.part_name(other));
-        let text = format!("touches {other}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));
+        let at = point_from_wire(pair.point);
+        let own = Touch::of(document, part, [pair.moving_face, pair.moving_edge_face], at);
+        let touched = document.model_part(pair.static_part).map(|other| {
+            let touch = Touch::of(document, other, [pair.static_face, pair.static_edge_face], at);
+            format!("{touch} of {}", document.part_name(other))
+        });
+        let touched = touched.as_deref().unwrap_or("?");
+        let text = format!("{own} on {touched}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));
         lines.push((text, theme::CONTACT, 12.5));
     }
     if telemetry.guidance.active > 0 {

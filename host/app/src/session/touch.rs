@@ -1,0 +1,112 @@
+//! What of a part touches: a face, an edge or a corner.
+//!
+//! The board names the touching face, and the other one where the point lies on an edge. A corner is an edge's end in which a third face meets.
+
+use std::fmt;
+
+use glam::DVec3;
+use mortise_brep::Shape;
+use mortise_protocol::image::NO_FACE;
+
+use super::document::Document;
+
+/// A touch no farther from an edge's end than this is at it, mm: twice what the board takes for at an edge.
+const AT_CORNER_MM: f64 = 0.02;
+
+/// Part of a shape's boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Touch {
+    /// Of two dimensions.
+    Face,
+    /// Of one.
+    Edge,
+    /// Of none.
+    Corner,
+}
+
+impl fmt::Display for Touch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Face => "face",
+            Self::Edge => "edge",
+            Self::Corner => "corner",
+        })
+    }
+}
+
+impl Touch {
+    /// What of part `part` touches at `point` (world, mm), with these faces told by the board.
+    pub fn of(document: &Document, part: usize, faces: [u16; 2], point: DVec3) -> Self {
+        let (Some(shape), Some(pose)) = (
+            (document.model.parts.get(part)).and_then(|part| document.model.shapes.get(part.shape)),
+            document.poses.get(part),
+        ) else {
+            return Self::Face;
+        };
+        if faces.contains(&NO_FACE) {
+            return Self::Face;
+        }
+        if is_corner(
+            shape,
+            faces.map(u32::from),
+            pose.inverse().transform_point3(point),
+        ) {
+            Self::Corner
+        } else {
+            Self::Edge
+        }
+    }
+}
+
+/// Whether at `point` (shape frame, mm) an edge of `faces` ends and a third face meets.
+fn is_corner(shape: &Shape, faces: [u32; 2], point: DVec3) -> bool {
+    let ends_here = |polyline: &[DVec3]| {
+        let ends = [polyline.first(), polyline.last()];
+        (ends.into_iter().flatten()).any(|end| end.distance(point) <= AT_CORNER_MM)
+    };
+    let mut here = shape.edges.iter().filter(|edge| ends_here(&edge.polyline));
+    let own = here
+        .clone()
+        .any(|edge| faces.iter().all(|face| edge.faces.contains(face)));
+    own && here.any(|edge| edge.faces.iter().any(|face| !faces.contains(face)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All edges of the sample's parts, in the middle and at their ends: of the block's straight ones both ends are corners; a hole's or a peg's rim has
+    /// none, though its seam begins there.
+    #[test]
+    fn corners_are_where_three_faces_meet() {
+        let document = Document::sample(0).expect("the sample opens");
+        let (mut corners, mut rims) = (0, 0);
+        for (part, pose) in document.poses.iter().enumerate() {
+            let shape = &document.model.shapes[document.model.parts[part].shape];
+            for edge in &shape.edges {
+                let [a, b] = edge.faces[..] else { continue };
+                let faces = [a as u16, b as u16];
+                let touch = |faces, at: DVec3| Touch::of(&document, part, faces, pose.transform_point3(at));
+                let (first, last) = (edge.polyline[0], edge.polyline[edge.polyline.len() - 1]);
+                let middle = if edge.polyline.len() > 2 {
+                    edge.polyline[edge.polyline.len() / 2]
+                } else {
+                    0.5 * (first + last)
+                };
+                assert_eq!(touch([faces[0], NO_FACE], first), Touch::Face);
+                assert_eq!(touch(faces, middle), Touch::Edge);
+                if first.distance(last) < 1e-6 {
+                    rims += 1;
+                    assert_eq!(touch(faces, first), Touch::Edge, "a rim: {edge:?}");
+                } else if a != b {
+                    corners += 2;
+                    assert_eq!(touch(faces, first), Touch::Corner);
+                    assert_eq!(touch(faces, last), Touch::Corner);
+                }
+            }
+        }
+        assert!(corners >= 24 && rims >= 2, "{corners} {rims}");
+        let beyond = Touch::of(&document, usize::MAX, [0, 1], DVec3::ZERO);
+        assert_eq!(beyond, Touch::Face);
+    }
+}
