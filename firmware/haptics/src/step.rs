@@ -140,6 +140,13 @@ impl Step<'_> {
         damping_s: f32,
         farthest: f32,
     ) -> Solution {
+        if contacts.is_empty() {
+            // What the loop below comes to then, to the bit.
+            return Solution {
+                twist: self.unscale(&self.scale(free.twist)),
+                ..*free
+            };
+        }
         let h = self.period_s;
         let lever = farthest / self.length;
         // No rate changes by more than the unknowns' change times this: the length of a row, n and (r × n)/L.
