@@ -49,7 +49,7 @@ pub(crate) struct Coherence {
     travel_nm: u32,
     /// What was noted at up to this travel is void.
     forgotten_nm: u32,
-    /// Ticks since everything was forgotten.
+    /// Times the object was moved, one each tick, wrapping; never reset. Says whose turn it is to be asked again, see [`ASK_AGAIN`].
     round: u32,
     /// Of the joints.
     epoch: u16,

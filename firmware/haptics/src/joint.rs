@@ -38,11 +38,11 @@ const LEAST_CLEAR_CELLS: f32 = 0.5;
 /// Read for one answer, at most: what 8 points take that each lie in a corner of bricks which hold other faces too.
 const MOST_READS: u32 = 1000;
 
-/// The budget counts four look-ups for a leaf that is asked about, in halves,
+/// What asking about a leaf counts in the budget before anything is read: four times [`LOOKUP`].
 const CLEARING: u32 = 8;
-/// and half a one for so many reads.
+/// So many reads of the field's bricks and cells count in the budget as one: half a [`LOOKUP`].
 const CLEARING_READS: u32 = 7;
-/// No more than such a part of the budget is begun on it in a tick.
+/// A tick asks about no further leaf once asking has counted one part in so many of its budget of look-ups, each [`LOOKUP`].
 const CLEARING_SHARE: u32 = 12;
 
 /// Face pairs that joints to one part keep apart: of the tree's shape, of the field's.
