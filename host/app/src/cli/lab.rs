@@ -64,7 +64,7 @@ enum Experiment {
         #[command(flatten)]
         sweep: Sweep,
         /// Only the map of this name, that of its files
-        #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(stability::NAMES))]
+        #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(stability::names()))]
         map: Option<String>,
     },
     /// Show the rate that a tick allows over an insertion: collision only, guided, guided with recognition; emulated board

@@ -17,26 +17,13 @@ pub mod shell;
 pub mod slab;
 
 use std::path::Path;
+use std::rc::Rc;
 
 use serde::Serialize;
 
 use crate::chart::{Chart, write_stack};
 use crate::error::LabError;
 use crate::table::write_csv;
-
-/// Names of the maps.
-pub const NAMES: [&str; 10] = [
-    "stability-z-width",
-    "stability-rate",
-    "stability-mass",
-    "stability-hand",
-    "stability-encoder",
-    "stability-jam",
-    "stability-contacts",
-    "stability-impact",
-    "stability-shell",
-    "stability-lapses",
-];
 
 /// One experiment of any map.
 #[derive(Clone, Debug, Serialize)]
@@ -82,14 +69,6 @@ pub struct Map {
 }
 
 impl Map {
-    fn new<T: Clone>(name: &'static str, trials: &[T], kind: fn(T) -> Trial, charts: Vec<Chart>) -> Self {
-        Self {
-            name,
-            trials: trials.iter().cloned().map(kind).collect(),
-            charts,
-        }
-    }
-
     /// Writes table (CSV) and chart (SVG and PNG).
     ///
     /// # Errors
@@ -100,49 +79,78 @@ impl Map {
     }
 }
 
+/// What each experiment goes to as it is made.
+type Out<'a> = &'a mut dyn FnMut(&Trial);
+
+/// How a map is made: the shorter form or the whole.
+type Make = Box<dyn Fn(bool, Out<'_>) -> Result<Map, LabError>>;
+
+/// A map's name and how it is made: by a sweep, whose trials are of a kind and are drawn.
+fn recipe<T: Clone + 'static>(
+    name: &'static str,
+    sweep: impl Fn(bool, &mut dyn FnMut(&T)) -> Result<Vec<T>, LabError> + 'static,
+    kind: fn(T) -> Trial,
+    charts: impl Fn(&[T]) -> Vec<Chart> + 'static,
+) -> (&'static str, Make) {
+    let make = move |quick: bool, out: Out<'_>| {
+        let found = sweep(quick, &mut |trial| out(&kind(trial.clone())))?;
+        Ok(Map {
+            name,
+            charts: charts(&found),
+            trials: found.into_iter().map(kind).collect(),
+        })
+    };
+    (name, Box::new(make))
+}
+
+/// Every map there is.
+fn recipes() -> Vec<(&'static str, Make)> {
+    let mut all: Vec<_> = (limits::all().into_iter().map(Rc::new))
+        .map(|map| {
+            let drawn = Rc::clone(&map);
+            let sweep = move |quick: bool, out: &mut dyn FnMut(&limits::Limit)| map.run(quick, out);
+            recipe(drawn.name, sweep, Trial::Limit, move |f| vec![drawn.chart(f)])
+        })
+        .collect();
+    all.extend([
+        recipe("stability-encoder", quantisation::sweep, Trial::Rest, |f| {
+            vec![quantisation::chart(f)]
+        }),
+        recipe("stability-jam", jam::sweep, Trial::Push, |f| vec![jam::chart(f)]),
+        recipe("stability-contacts", press::sweep, Trial::Press, |f| {
+            vec![press::chart(f)]
+        }),
+        recipe("stability-impact", impact::sweep, Trial::Blow, |f| {
+            vec![impact::chart(f)]
+        }),
+        recipe("stability-shell", shell::sweep, Trial::Felt, |f| {
+            vec![shell::chart(f)]
+        }),
+        recipe("stability-lapses", lapses::sweep, Trial::Held, lapses::charts),
+    ]);
+    all
+}
+
+/// Names of the maps.
+pub fn names() -> Vec<&'static str> {
+    recipes().into_iter().map(|(name, _)| name).collect()
+}
+
 /// Makes every map, or the one of that name; each experiment goes to `out`.
 ///
 /// # Errors
 /// `NoSuchFigures`; anything that keeps a scene from being baked.
 pub fn maps(quick: bool, only: Option<&str>, out: &mut dyn FnMut(&Trial)) -> Result<Vec<Map>, LabError> {
-    let mut maps = Vec::new();
-    let wanted = |name: &str| only.is_none_or(|only| only == name);
-    for map in limits::all() {
-        if wanted(map.name) {
-            let found = map.run(quick, &mut |trial| out(&Trial::Limit(trial.clone())))?;
-            maps.push(Map::new(map.name, &found, Trial::Limit, vec![map.chart(&found)]));
-        }
-    }
-    // Name, experiment, its kind of trial, its charts.
-    macro_rules! map {
-        ($name:literal, $module:ident, $kind:path, $charts:expr) => {
-            if wanted($name) {
-                let found = $module::sweep(quick, &mut |trial| out(&$kind(trial.clone())))?;
-                maps.push(Map::new($name, &found, $kind, $charts(&found)));
-            }
-        };
-    }
-    map!("stability-encoder", quantisation, Trial::Rest, |f: &_| vec![
-        quantisation::chart(f)
-    ]);
-    map!("stability-jam", jam, Trial::Push, |f: &_| vec![jam::chart(f)]);
-    map!("stability-contacts", press, Trial::Press, |f: &_| vec![
-        press::chart(f)
-    ]);
-    map!("stability-impact", impact, Trial::Blow, |f: &_| vec![
-        impact::chart(f)
-    ]);
-    map!("stability-shell", shell, Trial::Felt, |f: &_| vec![shell::chart(
-        f
-    )]);
-    map!("stability-lapses", lapses, Trial::Held, lapses::charts);
-    if maps.is_empty() {
+    if let Some(name) = only.filter(|only| !names().contains(only)) {
         return Err(LabError::NoSuchFigures {
-            name: only.unwrap_or_default().to_owned(),
-            known: NAMES.join(", "),
+            name: name.to_owned(),
+            known: names().join(", "),
         });
     }
-    Ok(maps)
+    (recipes().into_iter())
+        .filter(|(name, _)| only.is_none_or(|only| only == *name))
+        .map(|(_, make)| make(quick, out))
+        .collect()
 }
 
 #[cfg(test)]
@@ -151,13 +159,10 @@ mod tests {
 
     #[test]
     fn a_map_that_is_not_there_is_refused_with_those_that_are() {
-        for map in limits::all() {
-            assert!(NAMES.contains(&map.name), "{}", map.name);
-        }
         let refused = maps(true, Some("stability-moon"), &mut |_| {}).map(|_| ());
         let said = refused.expect_err("no such map").to_string();
         assert!(
-            said.contains("stability-moon") && said.contains("stability-jam"),
+            said.contains("stability-moon") && names().iter().all(|name| said.contains(name)),
             "{said}"
         );
     }
