@@ -11,7 +11,7 @@ use mortise_protocol::rig::Rig;
 
 use crate::error::RigError;
 use crate::event::Events;
-use crate::exchange::{Patience, greet, no_answer, obtain, patience_for};
+use crate::exchange::{Patience, greet, no_answer, obtain, patience_for, started_anew};
 use crate::faults::FaultLine;
 use crate::heartbeat::{HEARTBEAT, HEARTBEAT_COUNTED, Heartbeat};
 use crate::link::{Answer, Link, Reader};
@@ -135,7 +135,7 @@ impl Client {
             EmulatedMode::Interactive => HEARTBEAT,
             EmulatedMode::Counted | EmulatedMode::Lockstep => HEARTBEAT_COUNTED,
         };
-        let heartbeat = Heartbeat::start(link.clone(), lockstep.clone(), period, patience.silence)?;
+        let heartbeat = Heartbeat::start(link.clone(), name, lockstep.clone(), period, patience.silence)?;
         Ok(Self {
             link,
             name: name.to_owned(),
@@ -307,6 +307,8 @@ impl Client {
     /// # Errors
     /// As [`Client::request`] and [`Client::connect`].
     pub fn restart(mut self) -> Result<Self, RigError> {
+        // Heartbeats in between are refused, and that is no news.
+        self.link.forget_greeting();
         self.request(ToDevice::Restart)?;
         let lockstep = self.lockstep.swap(false, Ordering::Relaxed);
         self.link.forgive_silence();
@@ -335,7 +337,16 @@ impl Client {
     }
 
     fn obtain(&self, message: &ToDevice) -> Result<Answer, RigError> {
-        obtain(&self.link, message, &self.patience)
+        if matches!(message, ToDevice::Hello(_)) {
+            // Who greets by hand may do so as another version.
+            self.link.forget_greeting();
+        }
+        match obtain(&self.link, message, &self.patience) {
+            Err(RigError::Refused { .. }) if self.link.has_started_anew() => {
+                Err(started_anew(&self.link, &self.name))
+            }
+            result => result,
+        }
     }
 
     pub(crate) fn no_answer(&self, message: &ToDevice, after: Duration) -> RigError {

@@ -48,6 +48,8 @@ const BUSY_ATTEMPTS: u32 = 200;
 const BUSY_PAUSE: Duration = Duration::from_millis(5);
 /// Between two greetings.
 const GREETING_PAUSE: Duration = Duration::from_millis(250);
+/// A board that has just refused something is there to say why it started.
+const WHY_WAIT: Duration = Duration::from_secs(1);
 /// Erasing and checking a slot of flash takes seconds on a real board.
 const FLASH_WAIT: Duration = Duration::from_secs(15);
 /// Wall time a lockstep tick may take: an emulated board under load on a slow machine.
@@ -158,10 +160,12 @@ pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capa
             if device.schema != host.schema {
                 return Err(RigError::VersionMismatch { host, device });
             }
+            let seq = ticket.seq();
             drop(ticket);
             match obtain(link, &ToDevice::GetCapabilities, patience) {
                 Ok(Answer::Value(value)) => {
                     if let FromDevice::Capabilities(capabilities) = *value {
+                        link.set_greeted(seq);
                         return Ok(capabilities);
                     }
                 }
@@ -178,4 +182,22 @@ pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capa
             return Err(silent());
         }
     }
+}
+
+/// A board that has started anew has forgotten parameters, targets and grip, so what this program believes of it is wrong: asks why it started and ends the
+/// link with the answer.
+pub(crate) fn started_anew(link: &Link, name: &str) -> RigError {
+    let patience = Patience {
+        greeting: WHY_WAIT,
+        answer: WHY_WAIT,
+        silence: WHY_WAIT,
+    };
+    let why = match greet(link, name, &patience) {
+        Ok(capabilities) => capabilities.reset.words(),
+        Err(error) => error.to_string(),
+    };
+    let why = format!("the board has started anew: {why}");
+    link.lose(&why);
+    // Another thread may have said it before, or the cable may have gone: the first reason stays.
+    link.check().err().unwrap_or(RigError::LinkLost { why })
 }

@@ -1,4 +1,4 @@
-//! The heartbeat: keeps the link alive and notices when it is not.
+//! The heartbeat: keeps the link alive, and notices when it is not and when the board has started anew.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -8,6 +8,7 @@ use std::time::Duration;
 use mortise_protocol::message::ToDevice;
 
 use crate::error::RigError;
+use crate::exchange::started_anew;
 use crate::link::Link;
 
 /// Between two heartbeats: a fifth of the default silence the board bears while armed.
@@ -15,7 +16,7 @@ pub(crate) const HEARTBEAT: Duration = Duration::from_millis(100);
 /// The same for a counted board, whose virtual time runs ahead of the wall clock.
 pub(crate) const HEARTBEAT_COUNTED: Duration = Duration::from_millis(5);
 
-/// Keeps the link alive and notices when it is not.
+/// See the module.
 pub(crate) struct Heartbeat {
     ending: Arc<(Mutex<bool>, Condvar)>,
     thread: Option<JoinHandle<()>>,
@@ -24,6 +25,7 @@ pub(crate) struct Heartbeat {
 impl Heartbeat {
     pub(crate) fn start(
         link: Arc<Link>,
+        name: &str,
         lockstep: Arc<AtomicBool>,
         period: Duration,
         silence: Duration,
@@ -32,7 +34,7 @@ impl Heartbeat {
         let thread = std::thread::Builder::new()
             .name("mortise-heartbeat".into())
             .spawn({
-                let ending = ending.clone();
+                let (ending, name) = (ending.clone(), name.to_owned());
                 move || loop {
                     let ended = ending.0.lock().unwrap_or_else(PoisonError::into_inner);
                     let (ended, _) = ending
@@ -43,6 +45,10 @@ impl Heartbeat {
                         return;
                     }
                     drop(ended);
+                    if link.has_started_anew() {
+                        started_anew(&link, &name);
+                        return;
+                    }
                     // In lockstep the board waits for the host, however long that takes.
                     if lockstep.load(Ordering::Relaxed) {
                         link.forgive_silence();

@@ -83,8 +83,19 @@ struct Desk {
 
 struct Writer {
     port: Box<dyn std::io::Write + Send>,
-    sequence: u16,
     last: Instant,
+}
+
+/// Whether the board still knows this program.
+#[derive(Clone, Copy, Default)]
+enum Greeted {
+    /// Not greeted yet, or a restart is under way.
+    #[default]
+    No,
+    /// Greeted with this message, counted as [`Link::sent`] counts.
+    With(u64),
+    /// Greeted, and it refused a later message as not greeted: it has started anew.
+    Forgotten,
 }
 
 /// Shared by the client, the reader thread and the heartbeat.
@@ -95,6 +106,9 @@ pub(crate) struct Link {
     pub(crate) events: Events,
     closing: AtomicBool,
     state: Mutex<Option<DeviceState>>,
+    greeted: Mutex<Greeted>,
+    /// Messages sent; a sequence number is the lowest 16 bits of it.
+    sent: AtomicU64,
     heard: Mutex<Instant>,
     pub(crate) frames: AtomicU64,
     pub(crate) bad_frames: AtomicU64,
@@ -126,7 +140,6 @@ impl Link {
         let link = Arc::new(Self {
             writer: Mutex::new(Writer {
                 port: writer,
-                sequence: 0,
                 last: Instant::now(),
             }),
             desk: Mutex::default(),
@@ -134,6 +147,8 @@ impl Link {
             events: Events::default(),
             closing: AtomicBool::new(false),
             state: Mutex::new(None),
+            greeted: Mutex::default(),
+            sent: AtomicU64::new(0),
             heard: Mutex::new(Instant::now()),
             frames: AtomicU64::new(0),
             bad_frames: AtomicU64::new(0),
@@ -186,6 +201,14 @@ impl Link {
                 self.answer(|slot| slot.seq == seq && slot.expect == Expect::Ack, Answer::Done)
             }
             FromDevice::Refused { seq, reason } => {
+                let mut greeted = lock(&self.greeted);
+                // A refusal of what was sent before the greeting may come late.
+                let later = |greeting| self.number(seq) > greeting;
+                if reason == Refusal::NotGreeted && matches!(*greeted, Greeted::With(number) if later(number))
+                {
+                    *greeted = Greeted::Forgotten;
+                }
+                drop(greeted);
                 self.answer(|slot| slot.seq == seq, Answer::Refused(reason))
             }
             FromDevice::Telemetry(sample) => self.events.push(Event::Telemetry(Box::new(sample))),
@@ -239,7 +262,7 @@ impl Link {
         self.events.close();
     }
 
-    fn check(&self) -> Result<(), RigError> {
+    pub(crate) fn check(&self) -> Result<(), RigError> {
         match &lock(&self.desk).lost {
             Some(why) => Err(RigError::LinkLost { why: why.clone() }),
             None => Ok(()),
@@ -249,8 +272,7 @@ impl Link {
     /// Sends without waiting; returns the sequence number.
     pub(crate) fn send(&self, message: &ToDevice) -> Result<u16, RigError> {
         let mut writer = lock(&self.writer);
-        writer.sequence = writer.sequence.wrapping_add(1);
-        let seq = writer.sequence;
+        let seq = self.next_sequence(&writer);
         self.write(&mut writer, seq, message)?;
         Ok(seq)
     }
@@ -258,8 +280,7 @@ impl Link {
     /// Sends and remembers that an answer is due.
     pub(crate) fn post(&self, message: &ToDevice) -> Result<Ticket<'_>, RigError> {
         let mut writer = lock(&self.writer);
-        writer.sequence = writer.sequence.wrapping_add(1);
-        let seq = writer.sequence;
+        let seq = self.next_sequence(&writer);
         // Before it is written: the answer may be faster than this thread.
         lock(&self.desk).slots.push(Slot {
             seq,
@@ -269,6 +290,17 @@ impl Link {
         let ticket = Ticket { link: self, seq };
         self.write(&mut writer, seq, message)?;
         Ok(ticket)
+    }
+
+    /// Under the writer's lock, so that messages go out in order.
+    fn next_sequence(&self, _writer: &Writer) -> u16 {
+        (self.sent.fetch_add(1, Ordering::Relaxed) + 1) as u16
+    }
+
+    /// The newest message of this sequence number, counted as [`Self::sent`] counts.
+    fn number(&self, seq: u16) -> u64 {
+        let sent = self.sent.load(Ordering::Relaxed);
+        sent.saturating_sub(u64::from((sent as u16).wrapping_sub(seq)))
     }
 
     fn write(&self, writer: &mut Writer, seq: u16, message: &ToDevice) -> Result<(), RigError> {
@@ -321,6 +353,24 @@ impl Link {
         *lock(&self.heard) = Instant::now();
     }
 
+    /// The board was greeted with the message of this sequence number, and knows this program from then on. That it has started anew is not forgotten so.
+    pub(crate) fn set_greeted(&self, seq: u16) {
+        let mut greeted = lock(&self.greeted);
+        if !matches!(*greeted, Greeted::Forgotten) {
+            *greeted = Greeted::With(self.number(seq));
+        }
+    }
+
+    /// It need not know this program until it is greeted again.
+    pub(crate) fn forget_greeting(&self) {
+        *lock(&self.greeted) = Greeted::No;
+    }
+
+    /// It was greeted and knows nothing of it any more.
+    pub(crate) fn has_started_anew(&self) -> bool {
+        matches!(*lock(&self.greeted), Greeted::Forgotten)
+    }
+
     /// The state the board last told.
     pub(crate) fn state(&self) -> Option<DeviceState> {
         *lock(&self.state)
@@ -332,6 +382,11 @@ impl Link {
 }
 
 impl Ticket<'_> {
+    /// Number of the message.
+    pub(crate) fn seq(&self) -> u16 {
+        self.seq
+    }
+
     /// Waits for the answer; `None` when none came in time (it may still come: the ticket stays valid).
     pub(crate) fn wait(&self, timeout: Duration) -> Result<Option<Answer>, RigError> {
         let deadline = Instant::now() + timeout;

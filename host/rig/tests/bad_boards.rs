@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use common::{short, wire};
 use mortise_protocol::message::{
-    Capabilities, CostUnit, DeviceState, FromDevice, ResetReason, ToDevice, Version,
+    Capabilities, CostUnit, DeviceState, FromDevice, Refusal, ResetReason, ToDevice, Version,
 };
 use mortise_rig::{Client, Event, RigError, RigSpec};
 
@@ -103,6 +103,61 @@ fn a_pulled_cable_shows_as_event_and_error() {
         .any(|event| matches!(event, Event::LinkLost(_)));
     assert!(lost);
     board.join().expect("ended");
+}
+
+/// A board that fails and starts anew knows no greeting any more; why it started is what the operator reads, whether the program asks for something or not.
+#[test]
+fn a_board_that_started_anew_is_told_with_the_reason() {
+    for asks in [false, true] {
+        let (transport, mut far) = wire();
+        let board = std::thread::spawn(move || {
+            let mut told = capabilities(DeviceState::Idle);
+            let (mut greeted, mut refused) = (false, 0);
+            while let Some((seq, message)) = far.next() {
+                match message {
+                    ToDevice::Hello(_) => {
+                        greeted = true;
+                        far.say(&FromDevice::Hello(Version::own()));
+                    }
+                    _ if !greeted => {
+                        refused += 1;
+                        far.say(&FromDevice::Refused {
+                            seq,
+                            reason: Refusal::NotGreeted,
+                        });
+                    }
+                    ToDevice::GetCapabilities => far.say(&FromDevice::Capabilities(told.clone())),
+                    ToDevice::Disarm => {
+                        far.say(&FromDevice::Ack { seq });
+                        // And then it fails.
+                        greeted = false;
+                        told.reset = ResetReason::Panic { line: 4242 };
+                    }
+                    _ => far.say(&FromDevice::Ack { seq }),
+                }
+            }
+            refused
+        });
+        let client = Client::over(transport, "test", short(), None).expect("greeted");
+        client.request(ToDevice::Disarm).expect("answered");
+        let reason = "the board has started anew: the board restarted after a panic in line 4242";
+        if asks {
+            let failed = client.request(ToDevice::Arm).expect_err("forgotten");
+            assert!(
+                failed.is_link_lost() && failed.to_string().contains(reason),
+                "{failed}"
+            );
+        }
+        let told = std::iter::from_fn(|| client.events().recv_timeout(Duration::from_secs(5)).ok()).find_map(
+            |event| match event {
+                Event::LinkLost(why) => Some(why),
+                _ => None,
+            },
+        );
+        assert_eq!(told.as_deref(), Some(reason));
+        drop(client);
+        assert!(board.join().expect("ended") > 0);
+    }
 }
 
 /// A board that is armed hears STOP when its client goes.

@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use common::image;
 use mortise_protocol::image::CRC;
-use mortise_protocol::message::ToDevice;
-use mortise_rig::{Client, Flash, RigError, RigSpec, Transport, simulate};
+use mortise_protocol::message::{ResetReason, ToDevice};
+use mortise_rig::{Client, Event, Flash, RigError, RigSpec, Transport, simulate};
 use serialport::{SerialPort, TTYPort};
 
 /// Bytes to and fro between a pseudo-terminal and a simulated board, until `over`.
@@ -98,4 +98,28 @@ fn a_board_is_reached_by_the_name_of_its_port_again_and_again() {
     assert_eq!(client.capabilities().scene, Some(CRC.checksum(&scene)));
     let held = Client::connect(&spec).map(|_| ());
     assert!(matches!(held, Err(RigError::Busy { .. })), "{held:?}");
+}
+
+/// Nobody here asked for the restart: the heartbeat notices, and the link ends with the board's own reason.
+#[test]
+fn a_board_that_starts_anew_says_why() {
+    let bridge = Bridge::new();
+    let spec: RigSpec = bridge.port.parse().expect("a port's name");
+    let client = Client::connect(&spec).expect("the board greets");
+    client.send(ToDevice::Restart).expect("sent");
+    let told =
+        std::iter::from_fn(|| client.events().recv_timeout(Duration::from_secs(5)).ok()).find_map(|event| {
+            match event {
+                Event::LinkLost(why) => Some(why),
+                _ => None,
+            }
+        });
+    assert_eq!(
+        told.as_deref(),
+        Some("the board has started anew: the board restarted because it was asked to")
+    );
+    drop(client);
+    // And it can be reached again.
+    let client = Client::connect(&spec).expect("the board greets again");
+    assert_eq!(client.capabilities().reset, ResetReason::Requested);
 }
