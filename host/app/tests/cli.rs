@@ -285,3 +285,55 @@ fn a_rig_that_is_not_there_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("emulated:sideways"));
 }
+
+/// Before the first trial, which would be on standard output.
+#[test]
+fn a_folder_that_cannot_be_written_is_refused_before_the_sweep() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    let file = place.path().join("taken");
+    std::fs::write(&file, "no folder").expect("written");
+    let inside = file.join("out");
+    for folder in [file.to_str().expect("UTF-8"), inside.to_str().expect("UTF-8")] {
+        for sweep in [
+            "clearance",
+            "pareto",
+            "blend",
+            "stability",
+            "rate",
+            "shrink",
+            "feature-size",
+        ] {
+            let said = format!("{folder}: ");
+            refused(&["lab", sweep, "--quick", "--out", folder], &said);
+        }
+    }
+    assert_eq!(std::fs::read(&file).expect("still there"), b"no folder");
+}
+
+#[test]
+fn a_missing_folder_is_made_and_holds_nothing_but_the_results() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    let folder = place.path().join("to/results");
+    let name = "stability-impact";
+    let output = mortise(&[
+        "lab",
+        "stability",
+        "--quick",
+        "--map",
+        name,
+        "--out",
+        folder.to_str().expect("UTF-8"),
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let mut found: Vec<String> = (std::fs::read_dir(&folder).expect("made"))
+        .map(|entry| {
+            entry
+                .expect("readable")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    found.sort();
+    assert_eq!(found, ["csv", "png", "svg"].map(|kind| format!("{name}.{kind}")));
+}

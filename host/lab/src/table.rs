@@ -6,6 +6,21 @@ use serde::Serialize;
 
 use crate::error::LabError;
 
+/// Makes `folder` where there is none and sees that files can be made in it, so that a sweep of half an hour does not end in nothing.
+///
+/// # Errors
+/// `Unwritable`.
+pub fn prepare_folder(folder: &Path) -> Result<(), LabError> {
+    let probe = folder.join(format!(".mortise-{}", std::process::id()));
+    let made = std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::File::create(&probe))
+        .and_then(|_| std::fs::remove_file(&probe));
+    made.map_err(|source| LabError::Unwritable {
+        path: folder.to_path_buf(),
+        source,
+    })
+}
+
 /// Writes rows, plain structs of numbers, words and booleans, to `NAME.csv` in `folder`; what is absent is an empty cell.
 ///
 /// # Errors

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use clap::Subcommand;
 use mortise_lab::figures::{self, Plan, Row, Value};
 use mortise_lab::study::{feature_size, shrink};
-use mortise_lab::table::write_csv;
+use mortise_lab::table::{prepare_folder, write_csv};
 use mortise_lab::{blend, clearance, endurance, pareto, rate, stability};
 use mortise_rig::RigSpec;
 
@@ -90,9 +90,25 @@ struct Sweep {
     /// One JSON object a trial
     #[arg(long)]
     json: bool,
-    /// Folder for tables (CSV) and charts (SVG and PNG)
+    /// Folder for tables (CSV) and charts (SVG and PNG); made where there is none
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+}
+
+impl Experiment {
+    /// How it is swept, where it is.
+    fn sweep(&self) -> Option<&Sweep> {
+        match self {
+            Self::Clearance(sweep)
+            | Self::Pareto(sweep)
+            | Self::Blend(sweep)
+            | Self::Stability { sweep, .. }
+            | Self::Rate(sweep)
+            | Self::Shrink(sweep)
+            | Self::FeatureSize { sweep, .. } => Some(sweep),
+            Self::Figures { .. } | Self::Endurance { .. } => None,
+        }
+    }
 }
 
 impl Sweep {
@@ -107,6 +123,9 @@ impl Sweep {
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    if let Some(folder) = args.experiment.sweep().and_then(|sweep| sweep.out.as_ref()) {
+        prepare_folder(folder)?;
+    }
     match &args.experiment {
         Experiment::Figures { name, quick, json } => figures(name, *quick, *json),
         Experiment::Endurance {
