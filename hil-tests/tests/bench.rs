@@ -181,10 +181,15 @@ impl Bench {
         let verdicts = outcome.verdicts(&scenario);
         let lines: Vec<String> = verdicts.iter().map(|verdict| format!("    {verdict}")).collect();
         let text = format!(
-            "{} on {spec}, hash {}:\n{}",
+            "{} on {spec}, hash {}:\n{}\n    made, every {} ticks seen: at the handle {:.4} of {:.3} mJ, at the object by contacts {:.4} mJ, with targets {:.4} mJ",
             scenario.name,
             outcome.state_hash,
-            lines.join("\n")
+            lines.join("\n"),
+            scenario.run.telemetry_every_ticks,
+            outcome.energy_given_mj,
+            outcome.energy_passed_mj,
+            outcome.contact_given_mj,
+            outcome.constraint_given_mj,
         );
         if verdicts.iter().all(|verdict| verdict.holds) {
             println!("{text}");

@@ -123,13 +123,25 @@ pub(crate) fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> 
     Some((handle / count, hand / count))
 }
 
-/// Most net work of contacts on the object at any time, mJ. The contact wrench of a tick moved the object to the pose told with it.
-pub(crate) fn contact_energy(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
+/// Most net work done on the object at any time, mJ.
+pub(crate) struct ObjectEnergy {
+    /// By contacts.
+    pub contact_mj: f64,
+    /// By contacts and targets together: through the whole port between the object and what constrains it.
+    pub constraint_mj: f64,
+}
+
+/// See [`ObjectEnergy`]. The wrenches of a tick, taken at its end, moved the object to the pose told with them.
+pub(crate) fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> ObjectEnergy {
+    let mut most = ObjectEnergy {
+        contact_mj: 0.0,
+        constraint_mj: 0.0,
+    };
     let Some(part) = scene.bodies().get(usize::from(scene.part)) else {
-        return 0.0;
+        return most;
     };
     let center = part.surface.shape().center_of_mass;
-    let (mut given, mut largest) = (0.0f64, 0.0f64);
+    let (mut contacts, mut targets) = (0.0f64, 0.0f64);
     for pair in samples.windows(2) {
         let (Some((_, from)), Some((_, to))) = (&pair[0].object, &pair[1].object) else {
             continue;
@@ -138,13 +150,16 @@ pub(crate) fn contact_energy(scene: &PreparedScene, samples: &[Telemetry]) -> f6
         let moved = 1e-3 * (end.transform_point3(center) - start.transform_point3(center));
         let turned = turn(&start, &end);
         let near = share_of_first(pair);
-        let mean = |get: fn(&WireWrench) -> [f32; 3]| {
-            (1.0 - near) * vector(get(&pair[0].contact)) + near * vector(get(&pair[1].contact))
+        let work = |get: fn(&Telemetry) -> &WireWrench| {
+            let of = |w: &WireWrench| 1e3 * (vector(w.force).dot(moved) + vector(w.torque).dot(turned));
+            (1.0 - near) * of(get(&pair[0])) + near * of(get(&pair[1]))
         };
-        given += 1e3 * (mean(|w| w.force).dot(moved) + mean(|w| w.torque).dot(turned));
-        largest = largest.max(given);
+        contacts += work(|sample| &sample.contact);
+        targets += work(|sample| &sample.guidance.wrench);
+        most.contact_mj = most.contact_mj.max(contacts);
+        most.constraint_mj = most.constraint_mj.max(contacts + targets);
     }
-    largest
+    most
 }
 
 /// Rotation vector from one pose to another, world axes.

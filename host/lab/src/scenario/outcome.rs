@@ -51,6 +51,8 @@ pub struct Outcome {
     pub energy_passed_mj: f64,
     /// Most net work contacts had done on the object at any time, mJ; exact where each tick is heard, else trapezoids between samples.
     pub contact_given_mj: f64,
+    /// The same of contacts and targets together: what came through the port between the object and what constrains it.
+    pub constraint_given_mj: f64,
     /// Telemetry samples taken.
     pub samples: u32,
     /// Telemetry the board dropped because the link was slower.
@@ -143,6 +145,7 @@ quantities! {
     energy_given_mj => |o| Some(o.energy_given_mj);
     energy_passed_mj => |o| Some(o.energy_passed_mj);
     contact_given_mj => |o| Some(o.contact_given_mj);
+    constraint_given_mj => |o| Some(o.constraint_given_mj);
     samples => |o| Some(f64::from(o.samples));
     dropped_samples => |o| Some(f64::from(o.dropped_samples));
     bad_frames => |o| Some(f64::from(o.bad_frames));

@@ -402,6 +402,7 @@ fn outcome(
         .as_ref()
         .and_then(|press| measure::press(press, settled));
     let (energy_given_mj, energy_passed_mj) = measure::energy(samples);
+    let object = measure::object_energy(scene, samples);
     let counted = capabilities.cost_unit == CostUnit::Instructions;
     Outcome {
         scenario: scenario.name.clone(),
@@ -426,7 +427,8 @@ fn outcome(
         board_penetration_mm: measure::board_deepest(samples),
         energy_given_mj,
         energy_passed_mj,
-        contact_given_mj: measure::contact_energy(scene, samples),
+        contact_given_mj: object.contact_mj,
+        constraint_given_mj: object.constraint_mj,
         samples: samples.len() as u32,
         dropped_samples: statistics.dropped,
         bad_frames: statistics.bad_frames,

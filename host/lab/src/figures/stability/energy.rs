@@ -32,6 +32,8 @@ const SCENARIOS: &[(&str, &str)] = scenarios!(
     "press_wall_5n",
     "load"
 );
+/// The one with targets, and a fit of its own.
+const GUIDED: &str = "guided_fit";
 /// A minute long: left out of the shorter form.
 const LONG: &str = "load";
 
@@ -45,7 +47,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             ));
             continue;
         }
-        let guided = name == "guided_fit";
+        let guided = name == GUIDED;
         let outcome = play(name, text, if guided { tight.path() } else { plan.pair })?;
         let what = format!("scenario {name}, every tick");
         out(Row::at_most(
@@ -63,6 +65,12 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         out(Row::at_most(
             format!("{what}: net energy that contacts made at the object"),
             outcome.contact_given_mj,
+            "mJ",
+            MADE_MJ,
+        ));
+        out(Row::at_most(
+            format!("{what}: net energy that contacts and targets together made at the object"),
+            outcome.constraint_given_mj,
             "mJ",
             MADE_MJ,
         ));
@@ -102,5 +110,21 @@ mod tests {
                 "{name}: {given} of {passed} mJ"
             );
         }
+    }
+
+    /// A target that takes hold of a part beside its axis brings the energy of its pull from there; the observer must see it, and it is all there may be.
+    #[test]
+    fn targets_are_seen_at_the_object_and_give_little() {
+        let tight = Fit::thesis(0.02).engaged(-20.0).file().expect("written");
+        let guided = SCENARIOS.iter().find(|(name, _)| *name == GUIDED);
+        let (name, text) = guided.expect("among the scenarios");
+        let made = play(name, text, tight.path()).expect("played");
+        let (contacts, both) = (made.contact_given_mj, made.constraint_given_mj);
+        println!("{name}: contacts {contacts} mJ, with targets {both} mJ");
+        assert!(
+            both > contacts + 0.1,
+            "targets pulled the part onto its axis: {both} mJ"
+        );
+        assert!(both <= MADE_MJ, "{both} mJ");
     }
 }
