@@ -128,33 +128,75 @@ fn command(mode: EmulatedMode, firmware: &Path, serial: &str) -> Command {
     command
 }
 
-fn spawn(mut command: Command) -> Result<Qemu, RigError> {
-    command.spawn().map(Qemu).map_err(|error| RigError::Qemu {
-        what: format!(
-            "`{}` does not start: {error}",
-            command.get_program().to_string_lossy()
-        ),
+/// Starts QEMU on a thread that stays with it and passes on what it says: on Linux QEMU ends with this program, and that goes by the thread which started it.
+fn spawn(mut command: Command) -> Result<(Qemu, mpsc::Receiver<String>), RigError> {
+    let program = command.get_program().to_string_lossy().into_owned();
+    let (to, lines) = mpsc::sync_channel(32);
+    let (started, child) = mpsc::sync_channel(1);
+    #[cfg(target_os = "linux")]
+    end_with_this_program(&mut command);
+    std::thread::Builder::new()
+        .name("mortise-qemu".into())
+        .spawn(move || match command.spawn() {
+            Ok(mut child) => {
+                let stdout = child.stdout.take();
+                // Whoever asked waits for it.
+                let _ = started.send(Ok((Qemu(child), to.clone())));
+                if let Some(stdout) = stdout {
+                    read_lines(stdout, &to);
+                }
+            }
+            Err(error) => {
+                let _ = started.send(Err(error));
+            }
+        })
+        .map_err(RigError::Thread)?;
+    let started = child
+        .recv()
+        .unwrap_or_else(|_| Err(io::ErrorKind::BrokenPipe.into()));
+    let (mut qemu, to) = started.map_err(|error| RigError::Qemu {
+        what: format!("`{program}` does not start: {error}"),
         hint: INSTALL.to_owned(),
-    })
+    })?;
+    if let Some(stderr) = qemu.0.stderr.take() {
+        std::thread::Builder::new()
+            .name("mortise-qemu".into())
+            .spawn(move || read_lines(stderr, &to))
+            .map_err(RigError::Thread)?;
+    }
+    Ok((qemu, lines))
+}
+
+/// Whatever ends this program, SIGKILL too, which leaves no time for `Drop`: the kernel then kills QEMU. It does so when the thread that starts `command` ends.
+#[cfg(target_os = "linux")]
+fn end_with_this_program(command: &mut Command) {
+    use std::os::unix::process::CommandExt as _;
+    let parent = std::process::id();
+    // SAFETY: between fork and exec two system calls and no more, which take no lock and no memory.
+    unsafe {
+        command.pre_exec(move || {
+            if libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0 {
+                return Err(io::Error::last_os_error());
+            }
+            // Had it ended before, no signal would come.
+            if libc::getppid().cast_unsigned() != parent {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
+            Ok(())
+        });
+    }
 }
 
 /// Passes the lines of `stream` on for as long as it lives, so that QEMU never blocks on a full pipe.
-fn lines_of(stream: impl Read + Send + 'static, to: mpsc::SyncSender<String>) -> Result<(), RigError> {
-    std::thread::Builder::new()
-        .name("mortise-qemu".into())
-        .spawn(move || {
-            for line in BufReader::new(stream).lines().map_while(Result::ok) {
-                // Nobody listens after the start: then lines are only read away.
-                let _ = to.try_send(line);
-            }
-        })
-        .map(|_| ())
-        .map_err(RigError::Thread)
+fn read_lines(stream: impl Read, to: &mpsc::SyncSender<String>) {
+    for line in BufReader::new(stream).lines().map_while(Result::ok) {
+        // Nobody listens after the start: then lines are only read away.
+        let _ = to.try_send(line);
+    }
 }
 
 fn start_on_pty(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigError> {
-    let mut qemu = spawn(command(mode, firmware, "pty"))?;
-    let lines = listen(&mut qemu)?;
+    let (mut qemu, lines) = spawn(command(mode, firmware, "pty"))?;
     let deadline = Instant::now() + START_WAIT;
     let mut said = Vec::new();
     loop {
@@ -185,8 +227,7 @@ fn start_on_tcp(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigErr
     let listener = TcpListener::bind(("127.0.0.1", 0)).map_err(no_port)?;
     listener.set_nonblocking(true).map_err(no_port)?;
     let address = listener.local_addr().map_err(no_port)?;
-    let mut qemu = spawn(command(mode, firmware, &format!("tcp:{address},nodelay=on")))?;
-    let lines = listen(&mut qemu)?;
+    let (mut qemu, lines) = spawn(command(mode, firmware, &format!("tcp:{address},nodelay=on")))?;
     let deadline = Instant::now() + START_WAIT;
     let stream = loop {
         match listener.accept() {
@@ -221,17 +262,6 @@ fn over_tcp(stream: TcpStream) -> io::Result<Transport> {
     })
 }
 
-fn listen(qemu: &mut Qemu) -> Result<mpsc::Receiver<String>, RigError> {
-    let (to, lines) = mpsc::sync_channel(32);
-    if let Some(stream) = qemu.0.stdout.take() {
-        lines_of(stream, to.clone())?;
-    }
-    if let Some(stream) = qemu.0.stderr.take() {
-        lines_of(stream, to)?;
-    }
-    Ok(lines)
-}
-
 fn not_started(qemu: &mut Qemu, said: &[String]) -> RigError {
     let ended = match qemu.0.try_wait() {
         Ok(Some(status)) => format!("QEMU ended with {status}"),
@@ -245,5 +275,74 @@ fn not_started(qemu: &mut Qemu, said: &[String]) -> RigError {
     RigError::Qemu {
         what: format!("{ended}{said}"),
         hint: "QEMU 7.2 or newer with the machine mps2-an500 is needed (`cargo xtask setup`)".into(),
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    /// Set in the process that is killed.
+    const VICTIM: &str = "MORTISE_TEST_VICTIM";
+
+    fn sleeper() -> Command {
+        let mut command = Command::new("sleep");
+        command.arg("60").stdin(Stdio::null()).stdout(Stdio::piped());
+        command
+    }
+
+    /// Whether it runs: neither gone nor waiting for a parent to take note of its end.
+    fn runs(process: &str) -> bool {
+        std::fs::read_to_string(format!("/proc/{process}/stat")).is_ok_and(|stat| {
+            stat.rsplit(") ")
+                .next()
+                .is_some_and(|rest| !rest.starts_with(['Z', 'X']))
+        })
+    }
+
+    #[test]
+    fn it_outlives_the_thread_that_asked_for_it() {
+        let asked = std::thread::spawn(|| spawn(sleeper()).expect("started"));
+        let (mut qemu, _lines) = asked.join().expect("no panic");
+        // Long enough for the signal, which the kernel sends while the thread ends.
+        std::thread::sleep(Duration::from_millis(100));
+        assert!(matches!(qemu.0.try_wait(), Ok(None)));
+    }
+
+    #[test]
+    fn it_ends_with_a_program_that_is_killed() {
+        if std::env::var_os(VICTIM).is_some() {
+            let (qemu, _lines) = spawn(sleeper()).expect("started");
+            println!("started {}", qemu.0.id());
+            std::thread::sleep(Duration::from_secs(60));
+            return;
+        }
+        let mut victim = Command::new(std::env::current_exe().expect("this test"))
+            .args([
+                "--exact",
+                "emulator::tests::it_ends_with_a_program_that_is_killed",
+                "--nocapture",
+            ])
+            .env(VICTIM, "")
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("started");
+        let said = BufReader::new(victim.stdout.take().expect("piped"))
+            .lines()
+            .map_while(Result::ok);
+        // The harness writes the test's name before, on the same line.
+        let process = { said }.find_map(|line| Some(line.split_once("started ")?.1.to_owned()));
+        let process = process.expect("it tells of its companion");
+        assert!(runs(&process));
+        victim.kill().expect("killed");
+        victim.wait().expect("ended");
+        let deadline = Instant::now() + Duration::from_secs(10);
+        while runs(&process) {
+            assert!(
+                Instant::now() < deadline,
+                "{process} outlived the program that started it"
+            );
+            std::thread::sleep(Duration::from_millis(10));
+        }
     }
 }
