@@ -19,7 +19,7 @@ use serde::Deserialize;
 
 use crate::error::LabError;
 
-pub(crate) use measure::{depth, pose_mm};
+pub(crate) use measure::{depth, energy, object_energy, pose_mm};
 pub use outcome::{Outcome, Verdict};
 pub use run::{Listener, Recording, connect, record, run, run_on};
 pub use scene::PreparedScene;

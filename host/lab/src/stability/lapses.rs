@@ -17,7 +17,7 @@ use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::fit::Fit;
 use crate::guided::{SIM, insertion, key, largest_step, play_to};
-use crate::scenario::{PreparedScene, Scenario};
+use crate::scenario::{PreparedScene, Scenario, energy, object_energy};
 use crate::variant::Variant;
 
 /// Shares lost.
@@ -78,19 +78,31 @@ pub struct Held {
     pub step_n: f64,
     /// Of its torque, mN m.
     pub step_mnm: f64,
+    /// Most net work of the device on the handle while it is held, mJ, and all that passed.
+    pub handle_made_mj: f64,
+    /// See above.
+    pub handle_passed_mj: f64,
+    /// Most net work of contacts and targets on the object, mJ.
+    pub object_made_mj: f64,
+    /// Times a target came into force again.
+    pub fetched: usize,
 }
 
 impl std::fmt::Display for Held {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "{}, {:.0} % lost: in force {:.1} % of the time (1 − p³: {:.1} %), steps of {:.4} N and {:.3} mN m",
+            "{}, {:.0} % lost: in force {:.1} % of the time (1 − p³: {:.1} %), steps of {:.4} N and {:.3} mN m; fetched {} times, which made {:.3} mJ at the object, {:.3} of {:.3} mJ at the handle",
             self.case,
             100.0 * self.lost,
             100.0 * self.in_force,
             100.0 * self.formula,
             self.step_n,
-            self.step_mnm
+            self.step_mnm,
+            self.fetched,
+            self.object_made_mj,
+            self.handle_made_mj,
+            self.handle_passed_mj
         )
     }
 }
@@ -162,6 +174,9 @@ fn play(scenario: &Scenario, scene: &PreparedScene, case: &Case, lost: f64) -> R
     let held = recording.samples.get(held_from as usize..).unwrap_or(&[]);
     let in_force = held.iter().filter(|sample| sample.guidance.active > 0).count();
     let (step_n, step_nm) = largest_step(held);
+    let (handle_made_mj, handle_passed_mj) = energy(held);
+    let fetched =
+        (held.windows(2)).filter(|pair| pair[0].guidance.active == 0 && pair[1].guidance.active > 0);
     Ok(Held {
         case: case.name,
         lost,
@@ -169,6 +184,10 @@ fn play(scenario: &Scenario, scene: &PreparedScene, case: &Case, lost: f64) -> R
         formula: 1.0 - lost.powi(3),
         step_n,
         step_mnm: 1e3 * step_nm,
+        handle_made_mj,
+        handle_passed_mj,
+        object_made_mj: object_energy(scene, held).constraint_mj,
+        fetched: fetched.count(),
     })
 }
 
@@ -237,6 +256,13 @@ mod tests {
             assert!((held.in_force - held.formula).abs() < 0.1, "{held}");
             // A lapse fades: no step that is felt.
             assert!(held.step_n < 0.05, "{held}");
+            // And a target that takes hold again gives the handle no more than the bound of a switch in `firmware/haptics/tests/switching.rs`.
+            assert!(held.handle_made_mj <= 0.1 * 2.0 * held.fetched as f64, "{held}");
+            // Which the observer at the object sees.
+            assert!(
+                held.fetched == 0 || held.object_made_mj > held.handle_made_mj,
+                "{held}"
+            );
         }
     }
 }
