@@ -93,6 +93,11 @@ pub trait Mechanism {
     /// Sets the motors. Applied at once; holds until the next call.
     fn drive(&mut self, drive: Drive);
 
+    /// Counts of the encoders at the handle, at most: m and rad. Readings are within half of this; 0: not known.
+    fn count(&self) -> [f32; 2] {
+        [0.0; 2]
+    }
+
     /// Wrench (world, at the handle's origin) of the simulated hand in the last tick; `None` where a person holds the handle.
     fn hand(&self) -> Option<Wrench> {
         None

@@ -318,6 +318,10 @@ impl Mechanism for Described {
         };
     }
 
+    fn count(&self) -> [f32; 2] {
+        self.joints.count_at_handle()
+    }
+
     fn hand(&self) -> Option<Wrench> {
         Some(self.hand_wrench)
     }

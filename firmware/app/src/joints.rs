@@ -131,6 +131,16 @@ impl Joints {
         (if count < 0.0 { count - 0.5 } else { count + 0.5 }) as i32
     }
 
+    /// A count of every encoder together, at the handle in the posture of the last reading: the most along a world axis, m, and about one, rad.
+    pub fn count_at_handle(&self) -> [f32; 2] {
+        let [a, b, c, d, e, f] = self.radians_per_count.map(f32::abs);
+        let (joints, wrist) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
+        let posture = &self.posture;
+        let moved = posture.jacobian.abs() * joints;
+        let turned = posture.joint_axes.abs() * joints + posture.wrist_axes.abs() * wrist;
+        [moved.max_element(), turned.max_element()]
+    }
+
     /// Takes the counts of one tick. Where the links cannot be so, the last posture stays and the first joint is told as having jumped.
     pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Reading {
         let mut jump = None;

@@ -325,6 +325,10 @@ impl Mechanism for Simulated {
         };
     }
 
+    fn count(&self) -> [f32; 2] {
+        [RESOLUTION, ANGULAR_RESOLUTION]
+    }
+
     fn hand(&self) -> Option<Wrench> {
         Some(self.hand_wrench)
     }

@@ -52,6 +52,10 @@ impl Mechanism for SimulatedRig {
         each!(self, mechanism => mechanism.drive(drive));
     }
 
+    fn count(&self) -> [f32; 2] {
+        each!(self, mechanism => mechanism.count())
+    }
+
     fn hand(&self) -> Option<Wrench> {
         each!(self, mechanism => mechanism.hand())
     }

@@ -17,6 +17,7 @@
 //! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
 //! | `guidance`, `constraint`, `pull` | constraint targets: in force, engaged; errors and their rows; how they pull in a step |
 //! | `joint` | what an engaged target keeps apart leaves the work |
+//! | `counted` | work on a motion that is told in an encoder's counts |
 //! | `passivity` | observer of the energy the coupling makes, and the valve that stops it |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
@@ -32,6 +33,7 @@ mod body;
 mod coherence;
 mod constraint;
 mod contact;
+mod counted;
 mod coupling;
 mod explicit;
 mod guidance;

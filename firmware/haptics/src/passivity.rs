@@ -13,17 +13,20 @@
 //! goes to the tank; turning it up again costs as much, is paid by the tank, and takes 20 s in contact and half a second out of it.
 //!
 //! A wrench that reaches the motors late works on another motion than it was made for: rigs whose drivers take ticks to answer say so in
-//! [`crate::PassivitySettings::delay_ticks`]. What is not seen: an encoder that rounds hides energy below its resolution, and a wrench that the application takes down (a ceiling, the fade of a soft stop) is taken
-//! for whole. Both make W too small or too large by no more than one resolution, or one fade, of force. A ramp from nothing therefore raises the coupling's own limits,
+//! [`crate::PassivitySettings::delay_ticks`]. So do those whose encoders count ([`crate::PassivitySettings::position_count_m`]): a sum over
+//! differences of counts takes for made what is dissipated between them, and shut the valve on a hand that leaned and trembled for half a minute (see the source of `counted`). What is not seen: energy below
+//! one count, and a wrench that the application takes down (a ceiling, the fade of a soft stop), which is taken
+//! for whole. Both make W too small or too large by no more than one count, or one fade, of force. A ramp from nothing therefore raises the coupling's own limits,
 //! with a part that slips in the hand meanwhile ([`crate::State::set_slipping`]): scaling the wrench behind the coupling makes up to the object's kinetic energy.
 //!
 //! After the energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli, *Bilateral telemanipulation with time delays: a two-layer approach combining
 //! passivity and transparency*, IEEE T-RO 27(4), 2011, with the reference energy of Ryu, Preusche, Hannaford and Hirzinger, *Time domain
 //! passivity control with reference energy following*, IEEE T-CST 13(5), 2005, and stiffness paid for as in Ferraguti, Secchi and Fantuzzi, *A tank-based approach
-//! to impedance control with variable stiffness*, ICRA 2013. Cost: about 250 instructions.
+//! to impedance control with variable stiffness*, ICRA 2013. Cost: about 450 instructions.
 
 use glam::{Quat, Vec3};
 
+use crate::counted::Counted;
 use crate::coupling::Coupling;
 use crate::limits::length;
 use crate::pose::{Pose, Twist, Wrench};
@@ -59,6 +62,9 @@ pub(crate) struct Tank {
     /// Whether the last tick was observed, so that what follows is known.
     known: bool,
     handle: Pose,
+    /// What the wrench did on the handle, which is told in counts.
+    linear: Counted,
+    angular: Counted,
     /// U, J.
     stored: f32,
     /// Work on the object since, J.
@@ -81,6 +87,8 @@ impl Tank {
                 position: Vec3::ZERO,
                 orientation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
             },
+            linear: Counted::new(),
+            angular: Counted::new(),
             stored: 0.0,
             to_object: 0.0,
             given: [Wrench::ZERO; MAX_DELAY_TICKS + 1],
@@ -104,7 +112,9 @@ impl Tank {
         if self.known && size > 0.0 {
             let moved = handle.position - self.handle.position;
             let turned = small_turn(self.handle.orientation, handle.orientation);
-            let to_handle = acting.force.dot(moved) + acting.torque.dot(turned);
+            let told = &settings.passivity;
+            let to_handle = self.linear.work(acting.force, moved, told.position_count_m)
+                + (self.angular).work(acting.torque, turned, told.angle_count_rad);
             let made = to_handle + open * (self.to_object + stored - self.stored);
             let rubbed = settings.passivity.damping * handle_twist.linear.dot(moved)
                 + settings.passivity.angular_damping * handle_twist.angular.dot(turned);

@@ -134,6 +134,10 @@ pub struct PassivitySettings {
     pub angular_damping: f32,
     /// Whole ticks from a wrench to the motors that give it, at most 4. Default 0: they give it within the period.
     pub delay_ticks: u32,
+    /// Counts of the encoders at the handle, m: its position is told within half of this. Default 0: told exactly, or not known.
+    pub position_count_m: f32,
+    /// The same of its orientation, rad.
+    pub angle_count_rad: f32,
 }
 
 /// Largest [`PassivitySettings::delay_ticks`].
@@ -187,6 +191,8 @@ impl Default for Settings {
                 damping: 0.0,
                 angular_damping: 0.0,
                 delay_ticks: 0,
+                position_count_m: 0.0,
+                angle_count_rad: 0.0,
             },
             limits: LimitSettings {
                 force_n: 12.0,
@@ -268,6 +274,10 @@ pub mod ranges {
         min: 0.0,
         max: super::MAX_DELAY_TICKS as f32,
     };
+    /// [`super::PassivitySettings::position_count_m`].
+    pub const POSITION_COUNT_M: Range = Range { min: 0.0, max: 1e-3 };
+    /// [`super::PassivitySettings::angle_count_rad`].
+    pub const ANGLE_COUNT_RAD: Range = Range { min: 0.0, max: 0.1 };
     /// [`super::LimitSettings::force_n`].
     pub const FORCE_N: Range = Range { min: 0.0, max: 100.0 };
     /// [`super::LimitSettings::torque_nm`].
@@ -373,6 +383,16 @@ impl Settings {
                 "passivity.delay_ticks",
                 passivity.delay_ticks as f32,
                 ranges::DELAY_TICKS,
+            ),
+            (
+                "passivity.position_count_m",
+                passivity.position_count_m,
+                ranges::POSITION_COUNT_M,
+            ),
+            (
+                "passivity.angle_count_rad",
+                passivity.angle_count_rad,
+                ranges::ANGLE_COUNT_RAD,
             ),
             ("limits.force_n", limits.force_n, ranges::FORCE_N),
             ("limits.torque_nm", limits.torque_nm, ranges::TORQUE_NM),

@@ -374,8 +374,8 @@ impl State {
     }
 }
 
-/// The coupling at the tick's start, slipping in the hand where it is stretched beyond `limits`. In the first tick after a grab the object takes over the hand's motion,
-/// or the damper would be felt.
+/// The coupling at the tick's start, slipping in the hand where it is stretched beyond `limits`. A firm grip that closes on a part at once
+/// gives it the hand's motion, or the damper would be felt; one that slips takes it along from rest, since ½·m·v² is the hand's to give.
 fn take_hold(
     mut grabbed: Grabbed,
     handle: Pose,
@@ -390,7 +390,7 @@ fn take_hold(
         coupling = Coupling::measure(handle, handle_twist, &grabbed);
     }
     grabbed.angle = coupling.angle;
-    if grabbed.age == 0 {
+    if grabbed.age == 0 && limits.is_none() {
         grabbed.twist = coupling.target;
     }
     grabbed.age = grabbed.age.saturating_add(1);

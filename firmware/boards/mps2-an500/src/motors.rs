@@ -50,6 +50,10 @@ impl Mechanism for Motors {
         self.mechanism.drive(drive);
     }
 
+    fn count(&self) -> [f32; 2] {
+        self.mechanism.count()
+    }
+
     fn hand(&self) -> Option<Wrench> {
         self.mechanism.hand()
     }

@@ -92,6 +92,12 @@ impl Mechanism for HapticArm {
         }
     }
 
+    fn count(&self) -> [f32; 2] {
+        let counts = core::array::from_fn(|axis| RIG.radians_per_count(axis).abs());
+        let moved = self.posture.jacobian().abs() * Vec3::from_array(counts);
+        [moved.max_element(), 0.0]
+    }
+
     fn home(&mut self) {
         self.encoders.home();
         self.estimators = RIG.home_counts.map(Estimator::new);

@@ -149,7 +149,7 @@ pub(crate) fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> Obj
         let (start, end) = (pose_mm(from), pose_mm(to));
         let moved = 1e-3 * (end.transform_point3(center) - start.transform_point3(center));
         let turned = turn(&start, &end);
-        let near = share_of_first(pair);
+        let near = share_of_first(pair[0].tick, pair[1].tick);
         let work = |get: fn(&Telemetry) -> &WireWrench| {
             let of = |w: &WireWrench| 1e3 * (vector(w.force).dot(moved) + vector(w.torque).dot(turned));
             (1.0 - near) * of(get(&pair[0])) + near * of(get(&pair[1]))
@@ -171,23 +171,42 @@ fn turn(from: &DAffine3, to: &DAffine3) -> DVec3 {
 }
 
 /// Of a held wrench between two samples: all of one of them when they are neighbouring ticks, else as much of each.
-fn share_of_first(pair: &[Telemetry]) -> f64 {
-    if pair[1].tick.wrapping_sub(pair[0].tick) == 1 {
+fn share_of_first(from_tick: u32, to_tick: u32) -> f64 {
+    if to_tick.wrapping_sub(from_tick) == 1 {
         1.0
     } else {
         0.5
     }
 }
 
-/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Exact between samples of neighbouring ticks,
-/// whose wrench is held from the first to the second; else trapezoids: what happens between two samples is not seen.
-pub(crate) fn energy(samples: &[Telemetry]) -> (f64, f64) {
+/// The handle at the start of a tick, and the wrench held from there on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Felt {
+    pub tick: u32,
+    pub handle: WirePose,
+    pub wrench: WireWrench,
+}
+
+impl Felt {
+    /// As the board tells it: its encoders round the pose.
+    pub fn told(sample: &Telemetry) -> Self {
+        Self {
+            tick: sample.tick,
+            handle: sample.handle,
+            wrench: sample.wrench,
+        }
+    }
+}
+
+/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Exact between neighbouring ticks, whose wrench is held from
+/// the first to the second, as far as the poses are; else trapezoids: what happens between two samples is not seen.
+pub(crate) fn energy(felt: &[Felt]) -> (f64, f64) {
     let (mut given, mut largest, mut passed) = (0.0f64, 0.0f64, 0.0f64);
-    for pair in samples.windows(2) {
+    for pair in felt.windows(2) {
         let (from, to) = (pose_mm(&pair[0].handle), pose_mm(&pair[1].handle));
         let moved = 1e-3 * (to.translation - from.translation);
         let turned = turn(&from, &to);
-        let first = share_of_first(pair);
+        let first = share_of_first(pair[0].tick, pair[1].tick);
         let mean = |get: fn(&WireWrench) -> [f32; 3]| {
             first * vector(get(&pair[0].wrench)) + (1.0 - first) * vector(get(&pair[1].wrench))
         };

@@ -7,6 +7,7 @@ mod measure;
 mod outcome;
 mod run;
 mod scene;
+mod truth;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

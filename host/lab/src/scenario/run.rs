@@ -9,16 +9,17 @@ use mortise_protocol::message::{
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe};
 
+use super::measure::Felt;
 use super::outcome::Outcome;
 use super::scene::PreparedScene;
-use super::{Hand, Key, Scenario, measure, parameter_named};
+use super::{Hand, Key, Scenario, measure, parameter_named, truth};
 use crate::error::LabError;
 
 /// Ticks in a second of every simulated rig.
 const TICK_HZ: f64 = 1000.0;
 /// Ticks in which the hand brings the handle to the grip, and in which it comes to rest there.
-const REACH_TICKS: u32 = 300;
-const REST_TICKS: u32 = 200;
+pub(super) const REACH_TICKS: u32 = 300;
+pub(super) const REST_TICKS: u32 = 200;
 /// Ticks asked for at once: bounds the telemetry that waits, and the time until a fault is seen.
 const BATCH_TICKS: u32 = 500;
 /// Ticks after disarming in which the wrench fades out.
@@ -69,6 +70,8 @@ pub struct Recording {
     pub outcome: Outcome,
     /// Every sample the board sent from the hand's start on, also those a faulty link lost.
     pub samples: Vec<Telemetry>,
+    /// The same handle and wrench for each: of its true motion where [`Outcome::energy_exact`], else as the board tells it.
+    pub(crate) felt: Vec<Felt>,
     /// What the link did to the frames.
     pub faults: FaultCounts,
 }
@@ -122,9 +125,14 @@ pub fn record(
     }
     client.request(ToDevice::Disarm)?;
     client.run(FADE_TICKS)?;
+    let before = (&reach(&scenario.hand), REACH_TICKS + REST_TICKS);
+    let replayed = truth::replay(before, &script(&scenario.hand), &play.samples);
+    let exact = replayed.is_some();
+    let felt = replayed.unwrap_or_else(|| play.samples.iter().map(Felt::told).collect());
     Ok(Recording {
-        outcome: outcome(scenario, scene, client, &play, &statistics, ran),
+        outcome: outcome(scenario, scene, client, &play, &statistics, ran, (&felt, exact)),
         samples: play.samples,
+        felt,
         faults,
     })
 }
@@ -352,7 +360,7 @@ fn with_keyframes(hand: &Hand, keyframes: impl Iterator<Item = Keyframe>) -> Han
 }
 
 /// From where a simulated handle starts (the world's origin) to the grip, without tremor.
-fn reach(hand: &Hand) -> HandScript {
+pub(super) fn reach(hand: &Hand) -> HandScript {
     let keyframe = |tick, position_mm| Keyframe {
         tick,
         pose: wire_pose(position_mm, DQuat::IDENTITY),
@@ -368,7 +376,7 @@ fn reach(hand: &Hand) -> HandScript {
     }
 }
 
-fn script(hand: &Hand) -> HandScript {
+pub(super) fn script(hand: &Hand) -> HandScript {
     let grip = DVec3::from_array(hand.grip_mm);
     let keyframe = |key: &Key| Keyframe {
         tick: (key.t_s * TICK_HZ).round() as u32,
@@ -388,6 +396,7 @@ fn outcome(
     play: &Play<'_>,
     statistics: &Statistics,
     ran: Ran,
+    (felt, energy_exact): (&[Felt], bool),
 ) -> Outcome {
     let capabilities: &Capabilities = client.capabilities();
     let samples = play.samples.as_slice();
@@ -401,7 +410,7 @@ fn outcome(
         .press
         .as_ref()
         .and_then(|press| measure::press(press, settled));
-    let (energy_given_mj, energy_passed_mj) = measure::energy(samples);
+    let (energy_given_mj, energy_passed_mj) = measure::energy(felt);
     let object = measure::object_energy(scene, samples);
     let counted = capabilities.cost_unit == CostUnit::Instructions;
     Outcome {
@@ -427,6 +436,7 @@ fn outcome(
         board_penetration_mm: measure::board_deepest(samples),
         energy_given_mj,
         energy_passed_mj,
+        energy_exact,
         contact_given_mj: object.contact_mj,
         constraint_given_mj: object.constraint_mj,
         samples: samples.len() as u32,

@@ -174,7 +174,7 @@ fn play(scenario: &Scenario, scene: &PreparedScene, case: &Case, lost: f64) -> R
     let held = recording.samples.get(held_from as usize..).unwrap_or(&[]);
     let in_force = held.iter().filter(|sample| sample.guidance.active > 0).count();
     let (step_n, step_nm) = largest_step(held);
-    let (handle_made_mj, handle_passed_mj) = energy(held);
+    let (handle_made_mj, handle_passed_mj) = energy(recording.felt.get(held_from as usize..).unwrap_or(&[]));
     let fetched =
         (held.windows(2)).filter(|pair| pair[0].guidance.active == 0 && pair[1].guidance.active > 0);
     Ok(Held {
