@@ -56,8 +56,8 @@ pub struct Cell<'a> {
     entry: u16,
     /// Of the cell in the brick.
     index: usize,
-    /// From the cell's least corner, 0 to 1.
-    within: [f32; 3],
+    /// Of the position, in cells from the grid's corner.
+    at: [f32; 3],
 }
 
 /// Distance and gradient at a position.
@@ -118,7 +118,7 @@ impl<'a> Field<'a> {
                 bound: self.beyond(g),
             };
         }
-        let (entry, index, within) = self.entry(g);
+        let (entry, index) = self.entry(g);
         match entry {
             GridEntry::Brick(number) => {
                 let brick = &self.bricks[number as usize];
@@ -128,7 +128,7 @@ impl<'a> Field<'a> {
                 Place::Cell(Cell {
                     brick,
                     index,
-                    within,
+                    at: g,
                     entry: self.palette_entry(brick, index),
                 })
             }
@@ -161,7 +161,7 @@ impl<'a> Field<'a> {
     /// Interpolated distance in a cell, m.
     #[inline(always)]
     pub fn distance(&self, cell: &Cell<'_>) -> f32 {
-        value(&self.corners(cell.brick, cell.index), cell.within) * self.record.scale
+        value(&self.corners(cell.brick, cell.index), within(cell.at)) * self.record.scale
     }
 
     /// Interpolated distance and its gradient in a cell.
@@ -171,8 +171,8 @@ impl<'a> Field<'a> {
         let per_cell = self.record.scale * self.inverse_cell;
         let nearby = self.nearby(cell);
         FieldSample {
-            distance: value(&corners, cell.within) * self.record.scale,
-            gradient: gradient(&corners, cell.within).map(|x| x * per_cell),
+            distance: value(&corners, within(cell.at)) * self.record.scale,
+            gradient: gradient(&corners, within(cell.at)).map(|x| x * per_cell),
             face: nearby.face(),
             nearby,
         }
@@ -205,17 +205,16 @@ impl<'a> Field<'a> {
         sqrt_below(squared) * self.record.cell
     }
 
-    /// The entry, cell of the brick, and position in the cell of a grid position that the grid holds.
+    /// The entry and the cell of the brick of a grid position that the grid holds.
     #[inline(always)]
-    pub(super) fn entry(&self, g: [f32; 3]) -> (GridEntry, usize, [f32; 3]) {
+    pub(super) fn entry(&self, g: [f32; 3]) -> (GridEntry, usize) {
         let w = [g[0] as u32, g[1] as u32, g[2] as u32];
-        let f = [g[0] - w[0] as f32, g[1] - w[1] as f32, g[2] - w[2] as f32];
         let dims = &self.record.brick_dims;
         let row = (w[2] >> BRICK_SHIFT) * u32::from(dims[1]) + (w[1] >> BRICK_SHIFT);
         let index = row * u32::from(dims[0]) + (w[0] >> BRICK_SHIFT);
         // Three bits for each axis, x lowest: also the cell's place among the palette indices.
         let cell = (w[0] & 7) | (w[1] & 7) << 3 | (w[2] & 7) << 6;
-        (GridEntry::from_bits(self.grid[index as usize]), cell as usize, f)
+        (GridEntry::from_bits(self.grid[index as usize]), cell as usize)
     }
 
     /// The eight samples round a cell, x fastest.
@@ -285,6 +284,12 @@ fn chunk<const N: usize>(blob: &[u8], at: usize) -> &[u8; N] {
 
 // `entry` packs three bits an axis.
 const _: () = assert!(BRICK_CELLS == 8);
+
+/// Of a grid position that the grid holds, from its cell's least corner, 0 to 1.
+#[inline(always)]
+fn within(g: [f32; 3]) -> [f32; 3] {
+    g.map(|g| g - (g as u32) as f32)
+}
 
 /// Value between the corners `c` at `f`.
 #[inline(always)]

@@ -73,14 +73,14 @@ impl Field<'_> {
         if !self.holds(g) {
             return nothing(Voxel::Free, self.beyond(g));
         }
-        let (entry, cell, f) = self.entry(g);
+        let (entry, cell) = self.entry(g);
         match entry {
             GridEntry::Brick(number) => {
                 let brick = &self.bricks[number as usize];
                 let voxel = self.voxel_of(brick, cell);
                 let (o, edge) = (&self.record.origin, self.record.cell);
                 // Whole cells are exact in single precision.
-                let center = |axis: usize| o[axis] + (g[axis] - f[axis] + 0.5) * edge;
+                let center = |axis: usize| o[axis] + ((g[axis] as u32) as f32 + 0.5) * edge;
                 VoxelSample {
                     voxel,
                     center: [center(0), center(1), center(2)],
