@@ -159,36 +159,70 @@ impl Step<'_> {
         let band = FORCE_BAND_N / k.point;
         // A ten-thousandth more than the force law's own, so that rounding (some 10⁻⁷ of the gap) cannot decide otherwise than it does.
         let closing_s = 1.0001 * (h + damping_s);
-        // Where the object rests or slides, its motion up to now already tells which points touch.
-        let mut x = self.scale(self.twist);
-        // Whether `x` solves the step with some set of touching points.
-        let mut solved = false;
         // Two, taken in turn: they are too large to be handed about.
         let (secants, next) = &mut (Secants::new(), Secants::new());
         let (mut secants, mut next) = (secants, next);
         self.find_secants(&self.scale(free.twist), secants);
-        let mut stiffness = Symmetric6::ZERO;
+        // Where the object rests or slides, its motion up to now already tells which points touch.
+        let mut x = self.scale(self.twist);
+        let mut changed = false;
+        for c in contacts.iter_mut() {
+            c.rate = dot(&c.row, &x);
+            // Most points are free and stay so: a gap that closing in full would leave open needs no closer look.
+            if c.gap >= 0.0 && c.gap + closing_s * c.rate >= 0.0 {
+                continue;
+            }
+            c.phase = next_phase(c, h, damping_s, band);
+            changed |= c.phase != Phase::Free;
+        }
+        let touching = || contacts.iter().filter(|c| c.phase != Phase::Free);
+        let mut stiffness =
+            Symmetric6::sum_of_outer(touching().map(|c| (h * k.of(c) * reach(c.phase), &c.row)));
         let mut push = [0.0f32; 6];
+        for c in touching() {
+            add_scaled(&mut push, -h * k.of(c) * c.gap, &c.row);
+        }
         let mut solves = 0;
+        // Whether `x` solves the step with some set of touching points.
+        let mut solved = false;
         // How far any rate can have changed since all were looked at, m/s.
         let mut way = 0.0;
-        let mut last: Option<[f32; 6]> = None;
         let is_settled = loop {
+            let last = x;
+            if !solved && !changed {
+                x = self.scale(free.twist);
+            } else {
+                self.find_secants(&x, next);
+                if solved && !changed && settled(secants, next) {
+                    break true;
+                }
+                if solves == MAX_SOLVES {
+                    break false;
+                }
+                mem::swap(&mut secants, &mut next);
+                let (mut matrix, mut right) = self.without_contact(secants);
+                matrix.add_matrix(&stiffness);
+                for (r, p) in right.iter_mut().zip(&push) {
+                    *r += p;
+                }
+                x = matrix.solve(&right);
+                solves += 1;
+            }
+            solved = true;
             // What of a free point's gap is left at the step's end by the rate last looked at, m, can have been closed since when it is less than this.
-            let out_of_reach = last.map_or(f32::INFINITY, |last| {
-                let moved: [f32; 6] = array::from_fn(|i| x[i] - last[i]);
-                way += row_length * above_root(dot(&moved, &moved));
-                closing_s * way
-            });
-            last = Some(x);
-            let mut changed = false;
+            let moved: [f32; 6] = array::from_fn(|i| x[i] - last[i]);
+            way += row_length * above_root(dot(&moved, &moved));
+            let out_of_reach = closing_s * way;
+            changed = false;
             for c in contacts.iter_mut() {
                 if c.phase == Phase::Free && c.gap + closing_s * c.rate >= out_of_reach {
                     continue;
                 }
                 c.rate = dot(&c.row, &x);
-                // Most points are free and stay so: a gap that closing in full would leave open needs no closer look.
                 if c.phase == Phase::Free && c.gap >= 0.0 && c.gap + closing_s * c.rate >= 0.0 {
+                    continue;
+                }
+                if stays(c, h, damping_s, band) {
                     continue;
                 }
                 let phase = next_phase(c, h, damping_s, band);
@@ -197,34 +231,10 @@ impl Step<'_> {
                     let k = k.of(c);
                     stiffness.add_outer(h * k * (reach(phase) - reach(c.phase)), &c.row);
                     let sign = f32::from(phase != Phase::Free) - f32::from(c.phase != Phase::Free);
-                    let impulse = -h * k * c.gap * sign;
-                    for (p, j) in push.iter_mut().zip(&c.row) {
-                        *p += impulse * j;
-                    }
+                    add_scaled(&mut push, -h * k * c.gap * sign, &c.row);
                     c.phase = phase;
                 }
             }
-            if !solved && !changed {
-                x = self.scale(free.twist);
-                solved = true;
-                continue;
-            }
-            self.find_secants(&x, next);
-            if solved && !changed && settled(secants, next) {
-                break true;
-            }
-            if solves == MAX_SOLVES {
-                break false;
-            }
-            mem::swap(&mut secants, &mut next);
-            let (mut matrix, mut right) = self.without_contact(secants);
-            matrix.add_matrix(&stiffness);
-            for (r, p) in right.iter_mut().zip(&push) {
-                *r += p;
-            }
-            x = matrix.solve(&right);
-            solved = true;
-            solves += 1;
         };
         let contact = total_force(contacts, k, h, damping_s);
         Solution {
@@ -317,6 +327,17 @@ pub(crate) fn force(c: &Contact, k: f32, period_s: f32, damping_s: f32) -> f32 {
     if force > 0.0 { force } else { 0.0 }
 }
 
+/// Whether a contact that pushes goes on to, on its branch: what [`next_phase`] says too, sooner.
+#[inline(always)]
+fn stays(c: &Contact, h: f32, damping_s: f32, band: f32) -> bool {
+    let end = c.gap + h * c.rate;
+    match c.phase {
+        Phase::Free => false,
+        Phase::Parting => c.rate >= -RATE_BAND_M_PER_S && end < band,
+        Phase::Closing => c.rate < RATE_BAND_M_PER_S && end + damping_s * c.rate < band,
+    }
+}
+
 #[inline]
 fn next_phase(c: &Contact, h: f32, damping_s: f32, band: f32) -> Phase {
     let closing = match c.phase {
@@ -338,6 +359,14 @@ fn next_phase(c: &Contact, h: f32, damping_s: f32, band: f32) -> Phase {
 #[inline]
 pub(crate) fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+}
+
+/// Adds `weight · v`.
+#[inline(always)]
+fn add_scaled(to: &mut [f32; 6], weight: f32, v: &[f32; 6]) {
+    for (t, v) in to.iter_mut().zip(v) {
+        *t += weight * v;
+    }
 }
 
 /// At least √`squared`.
