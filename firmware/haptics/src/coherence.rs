@@ -15,11 +15,11 @@
 
 /// Entries in the table. A power of two.
 const SLOTS: usize = 8192;
-/// Nodes of one job that can be told apart.
-const NODES: u32 = 1 << 20;
-/// Further ones are looked at every tick; so every tag fits 16 bits.
-const LAST_NODE: u32 = NODES - SLOTS as u32 - 1;
-/// Jobs that can be told apart; those of further ones too.
+/// A job of more nodes is looked at whole every tick. So every tag fits 16 bits.
+const NODES: u32 = (1 << JOB_SHIFT) - SLOTS as u32;
+/// Keys of jobs lie so many bits apart.
+const JOB_SHIFT: u32 = 20;
+/// Jobs that can be told apart; further ones likewise.
 const JOBS: u16 = 512;
 /// The travel is taken back to zero, and the table cleared, beyond this: 1.8 m.
 const LONGEST_NM: u32 = 1_800_000_000;
@@ -33,10 +33,13 @@ const FARTHEST_NM: u32 = 1 << 28;
 /// a brick holds a sharp edge.
 const LONGEST_SHARE: f32 = 0.9;
 /// And at least. Between the two it depends on the node, so that a ring of points at one distance does not become due in one tick.
-const SHORTEST_SHARE: f32 = 0.45;
+pub(crate) const SHORTEST_SHARE: f32 = 0.75;
 
-/// Ticks after which a node that was near is asked again; a power of two. Which tick depends on the node, so that the work is spread.
+/// Ticks after which a node that was near is asked again, or all points of such a leaf are looked at; a power of two. Which tick depends on the node, so that
+/// the work is spread.
 const ASK_AGAIN: u32 = 16;
+/// Set in the due of a leaf whose sphere did not tell that it is far, but its points did: when it is due, so are they.
+const BY_POINTS: u32 = 1;
 
 /// Points of a leaf, the first in the lowest bit. [`ALL`] are all of it, be they more than there are bits.
 pub(crate) type Points = u16;
@@ -44,12 +47,14 @@ pub(crate) type Points = u16;
 pub(crate) const ALL: Points = Points::MAX;
 
 /// Due times of nodes.
+// In this order: what is asked with every node lies at offsets that fit an instruction.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Coherence {
     travel_nm: u32,
     /// What was noted at up to this travel is void.
     forgotten_nm: u32,
-    /// Times the object was moved, one each tick, wrapping; never reset. Says whose turn it is to be asked again, see [`ASK_AGAIN`].
+    /// Counts ticks.
     round: u32,
     /// Of the joints.
     epoch: u16,
@@ -81,6 +86,8 @@ pub(crate) enum Known {
     Far(Due),
     /// It was near not long ago: none but these of its points can be a candidate.
     Near(Points),
+    /// A leaf all of whose points are due, and whose sphere told nothing when it was last asked.
+    Due,
     /// Nothing, or nothing of late.
     Nothing,
 }
@@ -96,6 +103,37 @@ impl Due {
     pub const NEVER: Self = Self(u32::MAX);
 }
 
+/// The nodes of one job.
+#[derive(Clone, Copy)]
+pub(crate) struct Keys {
+    first: u32,
+    /// All bits, or none where nothing is noted.
+    mask: u32,
+}
+
+impl Keys {
+    /// Of a job with so many nodes.
+    pub fn new(job: u16, nodes: usize) -> Self {
+        if nodes <= NODES as usize && job < JOBS {
+            Self {
+                first: (u32::from(job) << JOB_SHIFT) + 1,
+                mask: u32::MAX,
+            }
+        } else {
+            Self {
+                first: Key::NONE.0,
+                mask: 0,
+            }
+        }
+    }
+
+    /// Of one of the nodes.
+    #[inline(always)]
+    pub fn of(self, node: u32) -> Key {
+        Key(self.first + (node & self.mask))
+    }
+}
+
 /// Which node of which job.
 #[derive(Clone, Copy)]
 pub(crate) struct Key(u32);
@@ -104,21 +142,13 @@ impl Key {
     /// No node.
     const NONE: Self = Self(0);
 
-    pub fn new(job: u16, node: u32) -> Self {
-        if node < LAST_NODE && job < JOBS {
-            Self(u32::from(job) * NODES + node + 1)
-        } else {
-            Self::NONE
-        }
-    }
-
     fn is_none(self) -> bool {
         self.0 == Self::NONE.0
     }
 
     fn slot(self) -> usize {
         // Neighbouring nodes fall into neighbouring slots; jobs are spread over the table.
-        let job = self.0 / NODES;
+        let job = self.0 >> JOB_SHIFT;
         (self.0 + 619 * job) as usize % SLOTS
     }
 
@@ -190,27 +220,41 @@ impl Coherence {
         }
         let due = slot.due_nm <= horizon;
         if slot.near == 0 && !due {
-            Known::Far(Due(slot.due_nm))
-        } else if (slot.near == 0 && leaf) || (self.round.wrapping_add(key.0)).is_multiple_of(ASK_AGAIN) {
-            Known::Nothing
-        } else {
-            Known::Near(if due { ALL } else { slot.near })
+            return Known::Far(Due(slot.due_nm));
+        }
+        let again = self.round.wrapping_add(key.0).is_multiple_of(ASK_AGAIN);
+        match (leaf, slot.near) {
+            (false, _) if again => Known::Nothing,
+            (false, _) => Known::Near(ALL),
+            // Now and then it is seen whether the sphere tells by now.
+            (true, 0) if again || slot.due_nm & BY_POINTS == 0 => Known::Nothing,
+            (true, 0) => Known::Due,
+            (true, _) if again => Known::Due,
+            (true, near) => Known::Near(if due { ALL } else { near }),
         }
     }
 
-    /// No point of the node is nearer than `distance` m, as seen now.
+    /// No point of the node is nearer than `distance` m, as its sphere tells now.
     #[inline]
     pub fn set_distance(&mut self, key: Key, distance: f32) -> Due {
-        let due = self.ahead(key, distance);
-        self.set_due(key, due);
-        due
+        let Due(due_nm) = self.ahead(key, distance);
+        self.set_due(key, Due(due_nm & !BY_POINTS))
+    }
+
+    /// No point of the leaf is nearer than `distance` m, as each of them tells now.
+    #[inline]
+    pub fn set_far(&mut self, key: Key, distance: f32) -> Due {
+        let Due(due_nm) = self.ahead(key, distance);
+        // No later than that.
+        self.set_due(key, Due(due_nm.saturating_sub(1) | BY_POINTS))
     }
 
     /// No node below this one is due before `due`.
     #[inline]
-    pub fn set_due(&mut self, key: Key, due: Due) {
+    pub fn set_due(&mut self, key: Key, due: Due) -> Due {
         let due_nm = smaller_of(due.0, self.travel_nm + FARTHEST_NM);
         self.set(key, 0, due_nm);
+        Due(due_nm)
     }
 
     /// The node is near.
@@ -274,6 +318,10 @@ fn up_nm(distance: f32) -> u32 {
 mod tests {
     use super::*;
 
+    fn key_of(job: u16, node: u32) -> Key {
+        Keys::new(job, node as usize + 1).of(node)
+    }
+
     fn is_far(known: Known) -> bool {
         matches!(known, Known::Far(_))
     }
@@ -281,7 +329,7 @@ mod tests {
     #[test]
     fn due_once_the_distance_is_used_up() {
         let mut c = Coherence::new();
-        let key = Key::new(3, 77);
+        let key = key_of(3, 77);
         assert_eq!(c.ask(key, c.horizon(0.0), true), Known::Nothing);
         c.set_distance(key, 1e-3);
         assert!(is_far(c.ask(key, c.horizon(0.0), true)));
@@ -302,7 +350,7 @@ mod tests {
     fn shares_lie_between_their_bounds_and_differ() {
         let mut seen = [0u32; 8];
         for node in 0..1000 {
-            let share = Key::new(3, node).share();
+            let share = key_of(3, node).share();
             assert!(
                 (SHORTEST_SHARE - 1e-6..=LONGEST_SHARE).contains(&share),
                 "{share}"
@@ -316,7 +364,7 @@ mod tests {
     #[test]
     fn what_joints_keep_apart_is_far_while_they_last() {
         let mut c = Coherence::new();
-        let key = Key::new(JOBS - 1, LAST_NODE - 1);
+        let key = key_of(JOBS - 1, NODES - 1);
         for _ in 0..20 {
             c.set_joined(key, 1e-3);
             assert!(is_far(c.ask(key, c.horizon(0.4e-3), true)));
@@ -336,7 +384,7 @@ mod tests {
     #[test]
     fn a_collision_forgets() {
         let mut c = Coherence::new();
-        let (a, b) = (Key::new(0, 5), Key::new(0, 5 + SLOTS as u32));
+        let (a, b) = (key_of(0, 5), key_of(0, 5 + SLOTS as u32));
         c.set_distance(a, 1.0);
         c.set_distance(b, 1.0);
         assert_eq!(c.ask(a, c.horizon(0.0), true), Known::Nothing);
@@ -346,7 +394,7 @@ mod tests {
     #[test]
     fn no_due_outlasts_long_travel() {
         let mut c = Coherence::new();
-        let key = Key::new(0, 0);
+        let key = key_of(0, 0);
         for start in 0..20 {
             c.set_distance(key, f32::INFINITY);
             assert!(is_far(c.ask(key, c.horizon(0.2), true)), "{start}");
@@ -359,7 +407,7 @@ mod tests {
     fn nothing_is_known_once_forgotten() {
         let mut c = Coherence::new();
         for start in 0..20 {
-            let key = |node| Key::new(3, node);
+            let key = |node| key_of(3, node);
             c.set_distance(key(0), f32::INFINITY);
             c.set_due(key(1), Due::NEVER);
             c.set_points(key(2), 5, f32::INFINITY);
@@ -381,17 +429,14 @@ mod tests {
         let mut c = Coherence::new();
         for _ in 0..20 {
             c.forget();
-            c.set_near(Key::new(3, 1));
-            c.set_points(Key::new(3, 2), 5, 1e-3);
-            c.set_distance(Key::new(3, 3), 1e-3);
-            let ask = |node| c.ask(Key::new(3, node), c.horizon(0.0), true);
+            c.set_near(key_of(3, 1));
+            c.set_points(key_of(3, 2), 5, 1e-3);
+            c.set_distance(key_of(3, 3), 1e-3);
+            let ask = |node| c.ask(key_of(3, node), c.horizon(0.0), true);
             // Each in one of 16 ticks is asked again.
             for (node, known) in [(1, Known::Near(ALL)), (2, Known::Near(5))] {
-                let again = c
-                    .round
-                    .wrapping_add(Key::new(3, node).0)
-                    .is_multiple_of(ASK_AGAIN);
-                assert_eq!(ask(node), if again { Known::Nothing } else { known });
+                let again = c.round.wrapping_add(key_of(3, node).0).is_multiple_of(ASK_AGAIN);
+                assert_eq!(ask(node), if again { Known::Due } else { known });
             }
             assert!(is_far(ask(3)));
             c.travelled(0.0);
@@ -403,9 +448,9 @@ mod tests {
         let mut c = Coherence::new();
         c.travelled(1e-3);
         for distance in [-1.0, 0.0, f32::NAN, f32::NEG_INFINITY] {
-            c.set_distance(Key::new(1, 1), distance);
+            c.set_distance(key_of(1, 1), distance);
             assert_eq!(
-                c.ask(Key::new(1, 1), c.horizon(0.0), true),
+                c.ask(key_of(1, 1), c.horizon(0.0), true),
                 Known::Nothing,
                 "{distance}"
             );
@@ -415,11 +460,33 @@ mod tests {
     #[test]
     fn near_is_asked_again() {
         let mut c = Coherence::new();
-        let key = Key::new(1, 9);
-        let mut asked = 0;
+        let key = key_of(1, 9);
+        let (mut asked, mut looked_at) = (0, 0);
         for _ in 0..4 * ASK_AGAIN {
             c.set_near(key);
-            asked += u32::from(c.ask(key, c.horizon(1.0), true) == Known::Nothing);
+            asked += u32::from(c.ask(key, c.horizon(1.0), false) == Known::Nothing);
+            looked_at += u32::from(c.ask(key, c.horizon(1.0), true) == Known::Due);
+            c.travelled(0.0);
+        }
+        assert_eq!((asked, looked_at), (4, 4));
+    }
+
+    /// A leaf that only its points told to be far is looked at when due, and now and then asked.
+    #[test]
+    fn far_by_points_is_due_without_asking() {
+        let mut c = Coherence::new();
+        let key = key_of(1, 9);
+        let mut asked = 0;
+        for _ in 0..4 * ASK_AGAIN {
+            c.set_far(key, 1e-3);
+            assert!(is_far(c.ask(key, c.horizon(0.7e-3), true)));
+            match c.ask(key, c.horizon(0.9e-3), true) {
+                Known::Due => {}
+                known => {
+                    assert_eq!(known, Known::Nothing);
+                    asked += 1;
+                }
+            }
             c.travelled(0.0);
         }
         assert_eq!(asked, 4);

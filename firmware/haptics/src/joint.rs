@@ -38,10 +38,10 @@ const LEAST_CLEAR_CELLS: f32 = 0.5;
 /// Read for one answer, at most: what 8 points take that each lie in a corner of bricks which hold other faces too.
 const MOST_READS: u32 = 1000;
 
-/// What asking about a leaf counts in the budget before anything is read: four times [`LOOKUP`].
-const CLEARING: u32 = 8;
-/// So many reads of the field's bricks and cells count in the budget as one: half a [`LOOKUP`].
-const CLEARING_READS: u32 = 7;
+/// What asking about a leaf counts in the budget before anything is read.
+const CLEARING: u32 = 4 * LOOKUP;
+/// So many reads of the field's bricks and cells count in the budget as one [`LOOKUP`].
+const CLEARING_READS: u32 = 14;
 /// A tick asks about no further leaf once asking has counted one part in so many of its budget of look-ups, each [`LOOKUP`].
 const CLEARING_SHARE: u32 = 12;
 
@@ -164,7 +164,7 @@ impl Walk<'_, '_, '_> {
 
     /// The surroundings of a leaf were looked at: so many points by themselves, so much read, and so many points looked up, at two look-ups each.
     fn count_clearing(&mut self, one_by_one: u32, reads: u32, looked_up: u32) {
-        let spent = CLEARING + LOOKUP * (one_by_one + 2 * looked_up) + reads / CLEARING_READS;
+        let spent = CLEARING + LOOKUP * (one_by_one + 2 * looked_up) + LOOKUP * reads / CLEARING_READS;
         self.clearing += spent;
         self.spent += spent;
     }

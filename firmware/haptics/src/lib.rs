@@ -44,6 +44,7 @@ mod limits;
 mod linear;
 mod nearest;
 mod occupancy;
+mod overload;
 mod passivity;
 mod pose;
 mod probe;

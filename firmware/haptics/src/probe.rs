@@ -176,6 +176,7 @@ impl Prober {
             pose,
             center,
             margin: 0.0,
+            way: 0.0,
             slack: 0.0,
             motions: [[0.0; 6]; 2],
             swing: 0.0,

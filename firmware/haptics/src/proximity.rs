@@ -4,11 +4,11 @@
 //! or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every sphere that the
 //! field's distance at its centre puts farther off than the margin.
 //!
-//! When the budget runs out, work is left undone in this order. For a tick or two, as after a grab, what pushed in leaves not reached is carried over
+//! When the budget runs out, work is left undone in this order. For some ticks, as after a grab, what pushed in leaves not reached is carried over
 //! with the gaps the last motion left them, and the next tick goes on where this one stopped, round and round. When that does not catch up,
 //! points are left out evenly: each second, fourth, … 128th of those that are near is looked at, always the same ones, until there is room
-//! again; the error bound of the pointshell grows by four at each step, all else stays as it was. Carrying is prepared for once a tick needed
-//! half the budget.
+//! again ([`crate::overload`]); the error bound of the pointshell grows by four at each step, all else stays as it was. Carrying is prepared for once a
+//! tick needed half the budget.
 //!
 //! Cost: see [`crate::tick()`]; the look-ups in the field are two thirds of it.
 
@@ -17,7 +17,7 @@ use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecor
 
 use crate::above::Above;
 use crate::analytic::{OnFace, edge_face, exact, on_face};
-use crate::coherence::{ALL, Coherence, Due, Key, Known, Points};
+use crate::coherence::{ALL, Coherence, Due, Keys, Known, Points, SHORTEST_SHARE};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mated, Mating};
 use crate::io::{Flags, Work};
@@ -34,22 +34,30 @@ const LEAST_GRADIENT2: f32 = 0.01;
 /// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
 /// the other end moves half as fast again. So the approach by either is taken this many times.
 pub(crate) const APPROACH: f32 = 2.0;
-/// Thinning up to which some point of every leaf is looked at: leaves have 8 points.
+/// Thinning up to which some point of every leaf is looked at: most leaves have 8 points or a few more.
 const LEAF_THINNING: u8 = 3;
 /// Which points of a leaf are looked at, by thinning.
 const THINNED: [Points; LEAF_THINNING as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
-/// A point of a leaf is near while its gap is not more than so many margins. Any others are then left alone for some ticks: the margin is more than
-/// twice the way of one.
-const NEAR_MARGINS: f32 = 4.0;
-/// A look-up, 170 instructions, in the unit that the budget is counted in, halves of one. As much again for a point within the margin, and for one at an
-/// edge. What joints take: [`crate::joint`].
-pub(crate) const LOOKUP: u32 = 2;
-/// A point that may touch, besides.
-const CANDIDATE: u32 = 2 * LOOKUP;
+/// Leaves of which it is found out in one tick how far the points are that thinning leaves out.
+const LEFT_OUT_LEAVES: u32 = 16;
+/// What would be due after so many ticks like the last one counts as near, and is looked at every tick: finding out whether it is, with all of a leaf, costs as much.
+const NEAR_TICKS: f32 = 2.0;
+/// A look-up, 170 instructions: what the budget is counted in, here in eighths of one. What joints take: [`crate::joint`].
+pub(crate) const LOOKUP: u32 = 8;
+/// A look-up whose gap is noted, besides.
+const NOTED: u32 = 2;
+/// A point at an edge, besides.
+const EDGE: u32 = 5;
+/// A point within the margin, besides.
+const NEAR: u32 = 7;
+/// A point that may touch, besides: half of them do, and in most ticks three solves are enough.
+const CANDIDATE: u32 = 16;
+/// To begin with a leaf.
+const LEAF: u32 = 6;
 /// To ask the field about a node.
-const NODE: u32 = 4 * LOOKUP;
+const NODE: u32 = 15;
 /// To pass over a node of which enough is known.
-const PASSED_OVER: u32 = LOOKUP / 2;
+const PASSED_OVER: u32 = 4;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,10 +71,23 @@ impl Leaf {
     /// The beginning.
     pub const FIRST: Self = Self { job: 0, node: 0 };
 
+    #[cfg(test)]
+    pub fn at(job: u16, node: u32) -> Self {
+        Self { job, node }
+    }
+
     /// Index of the other part.
     pub fn part(self) -> u16 {
         self.job / 2
     }
+}
+
+/// What a search took, look-ups.
+#[derive(Clone, Copy)]
+pub(crate) struct Used {
+    pub all: u32,
+    /// On points rather than the way to them.
+    pub on_points: u32,
 }
 
 /// One search.
@@ -81,6 +102,8 @@ pub(crate) struct Search<'s, 'i> {
     pub center: Vec3,
     /// No point can travel farther in this tick: points with larger gaps are not looked at closely, m.
     pub margin: f32,
+    /// How far any point went in the last tick at most, m.
+    pub way: f32,
     /// Points that come as near as this by the motion so far, or by that without contacts, are candidates, m.
     pub slack: f32,
     /// The last tick's motion and that without contacts, of one period, scaled as the step's unknowns, m.
@@ -105,6 +128,12 @@ pub(crate) struct Search<'s, 'i> {
 }
 
 impl<'i> Search<'_, 'i> {
+    /// Points that come as near as this are looked at every tick, m.
+    #[inline]
+    fn near(&self) -> f32 {
+        (self.margin + NEAR_TICKS * self.way) * (1.0 / SHORTEST_SHARE)
+    }
+
     /// How far a contact's gap may close in this tick, m, at least 0.
     #[inline]
     pub fn approach(&self, row: &[f32; 6]) -> f32 {
@@ -118,14 +147,14 @@ impl<'i> Search<'_, 'i> {
         APPROACH * most
     }
 
-    /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out, and how much of the budget was used.
+    /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out, and what it took.
     pub fn run(
         &self,
         start: Leaf,
         coherence: &mut Coherence,
         contacts: &mut Contacts,
         work: &mut Work,
-    ) -> (Option<Leaf>, u32) {
+    ) -> (Option<Leaf>, Used) {
         contacts.begin(self.busy);
         let mut walk = Walk {
             search: self,
@@ -134,6 +163,8 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             spent: LOOKUP * self.step_cost,
+            on_points: 0,
+            left_out: 0,
             clearing: 0,
             mated: Mated::NONE,
             near: 0,
@@ -141,7 +172,10 @@ impl<'i> Search<'_, 'i> {
         let stop = walk
             .jobs(start, None)
             .or_else(|| walk.jobs(Leaf::FIRST, Some(start)));
-        let used = walk.used();
+        let used = Used {
+            all: walk.used(),
+            on_points: walk.on_points / LOOKUP,
+        };
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET_EXCEEDED);
             contacts.carry(&self.motions[0], |leaf| {
@@ -199,6 +233,8 @@ impl<'i> Search<'_, 'i> {
             contacts,
             work,
             spent: LOOKUP * self.step_cost,
+            on_points: 0,
+            left_out: 0,
             clearing: 0,
             mated: Mated::NONE,
             near: 0,
@@ -214,8 +250,12 @@ pub(crate) struct Walk<'w, 's, 'i> {
     horizon: u32,
     pub contacts: &'w mut Contacts,
     pub work: &'w mut Work,
-    /// Of the budget, halves of a look-up.
+    /// Of the budget, eighths of a look-up.
     pub spent: u32,
+    /// Of that, on points rather than the way to them.
+    on_points: u32,
+    /// Leaves looked at for what thinning leaves out of them.
+    left_out: u32,
     /// Of that, for what joints keep apart.
     pub clearing: u32,
     /// What guidance said of the last point's faces.
@@ -236,7 +276,7 @@ impl Walk<'_, '_, '_> {
         match found {
             Some(found) => self.near(job, leaf, point, &found),
             None => {
-                let _ = self.point::<false>(job, leaf, point);
+                let _ = self.point(job, leaf, point);
             }
         }
     }
@@ -270,7 +310,9 @@ impl Walk<'_, '_, '_> {
             return None;
         }
         let edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
-        let mut above = Above::default();
+        let limit = LOOKUP.saturating_mul(self.search.budget);
+        let keys = Keys::new(job.index, job.nodes.len());
+        let mut above = Above::new();
         let mut index = from;
         while index < to {
             let Some(node) = job.nodes.get(index as usize) else {
@@ -280,11 +322,11 @@ impl Walk<'_, '_, '_> {
                 job: job.index,
                 node: index,
             };
-            if self.left() == 0 {
+            if self.spent >= limit {
                 return Some(here);
             }
             above.close(index, self.coherence);
-            let key = Key::new(job.index, index);
+            let key = keys.of(index);
             let mut asked = false;
             let mut near = ALL;
             match self.coherence.ask(key, self.horizon, node.skip == index + 1) {
@@ -297,6 +339,10 @@ impl Walk<'_, '_, '_> {
                 Known::Near(points) => {
                     self.spent += PASSED_OVER;
                     near = points;
+                }
+                Known::Due => {
+                    self.spent += PASSED_OVER;
+                    asked = true;
                 }
                 Known::Nothing => {
                     self.spent += NODE;
@@ -316,13 +362,7 @@ impl Walk<'_, '_, '_> {
                 above.open(key, node.skip);
                 continue;
             }
-            let first = node.first_point as usize;
-            // When one point of each leaf is too many, whole leaves are left out, evenly too.
-            let leaves = (1usize << self.search.thinning.saturating_sub(LEAF_THINNING)) - 1;
-            if (first >> LEAF_THINNING) & leaves != 0 {
-                above.hear(Due::NOW);
-                continue;
-            }
+            let mask = thinned(self.search.thinning, node.first_point);
             let points = node.points(job.points);
             // Asked as seldom as the field is.
             if asked
@@ -337,52 +377,67 @@ impl Walk<'_, '_, '_> {
             if (self.left() as usize) < points.len() && self.work.points > 0 {
                 return Some(here);
             }
-            above.hear(if job.field.is_occupancy() {
-                self.points::<true>(job, here, points, near)
+            self.spent += LEAF;
+            let before = self.spent;
+            above.hear(if near != ALL {
+                self.some(job, here, points, near & mask);
+                Due::NOW
             } else {
-                self.points::<false>(job, here, points, near)
+                match mask {
+                    ALL => self.points(job, here, points),
+                    mask => self.thinned(job, here, points, mask),
+                }
             });
+            self.on_points += self.spent - before;
         }
         above.close(index, self.coherence);
         None
     }
 
-    /// The points of a leaf, those that are `near`, as far as the budget goes, and when it is due again; `VOXELS`: against a voxmap.
-    fn points<const VOXELS: bool>(
-        &mut self,
-        job: &Job<'_>,
-        leaf: Leaf,
-        points: &[PointRecord],
-        near: Points,
-    ) -> Due {
-        let thinning = self.search.thinning.min(LEAF_THINNING);
-        if near != ALL {
-            self.some::<VOXELS>(job, leaf, points, near & THINNED[usize::from(thinning)]);
-            return Due::NOW;
-        }
+    /// All points of a leaf, as far as the budget goes, and when it is due again.
+    fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> Due {
         let most = (self.left() as usize).min(points.len());
-        let stride = 1 << thinning;
-        let mut seen = self.each::<VOXELS>(job, leaf, points[..most].iter().step_by(stride));
-        let margin = self.search.margin;
-        if stride > 1 && seen.nearest > margin {
-            // None of these is near: with the others, too, it is known for how long the leaf can be left alone.
-            for start in 1..stride {
-                let others = points[..most].iter().skip(start).step_by(stride);
-                let others = self.each::<VOXELS>(job, leaf, others);
-                if others.nearest < seen.nearest {
-                    seen.nearest = others.nearest;
-                }
-            }
+        let mut seen = Seen::new(self.search.near());
+        for point in points.iter().take(most) {
+            seen.add(self.point(job, leaf, point));
         }
-        let key = Key::new(leaf.job, leaf.node);
-        // What is not looked at could be anywhere.
-        if most < points.len() {
+        self.seen(job, leaf, points, seen)
+    }
+
+    /// The same when points are left out: only those of the `mask` are offered as contacts.
+    ///
+    /// The others are looked at in some leaves a tick, so that more and more of what is left out is known to be far.
+    #[inline(never)]
+    fn thinned(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], mask: Points) -> Due {
+        if self.left_out == LEFT_OUT_LEAVES || job.field.is_occupancy() {
+            let all = ALL.checked_shr(Points::BITS.saturating_sub(points.len() as u32));
+            self.some(job, leaf, points, mask & all.unwrap_or(0));
             return Due::NOW;
         }
-        if seen.nearest > margin {
-            return self.coherence.set_distance(key, seen.nearest);
+        self.left_out += 1;
+        let most = (self.left() as usize).min(points.len());
+        let mut seen = Seen::new(self.search.near());
+        for point in points.iter().take(most) {
+            seen.add(job.distance(point.position));
         }
-        if stride == 1 && points.len() <= Points::BITS as usize {
+        self.some(job, leaf, points, seen.near & mask);
+        self.seen(job, leaf, points, seen)
+    }
+
+    /// Notes what was `seen` of a leaf, and tells when it is due again.
+    #[inline(always)]
+    fn seen(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], seen: Seen) -> Due {
+        self.work.points += seen.points;
+        self.spent += (LOOKUP + NOTED) * seen.points;
+        // What was not looked at could be anywhere.
+        if (seen.points as usize) < points.len() {
+            return Due::NOW;
+        }
+        let key = Keys::new(leaf.job, job.nodes.len()).of(leaf.node);
+        if seen.near == 0 {
+            return self.coherence.set_far(key, seen.beyond);
+        }
+        if seen.points <= Points::BITS {
             self.coherence.set_points(key, seen.near, seen.beyond);
         }
         Due::NOW
@@ -390,61 +445,22 @@ impl Walk<'_, '_, '_> {
 
     /// Those points of a leaf.
     #[inline(always)]
-    fn some<const VOXELS: bool>(
-        &mut self,
-        job: &Job<'_>,
-        leaf: Leaf,
-        points: &[PointRecord],
-        mut which: Points,
-    ) {
+    fn some(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], mut which: Points) {
+        let looked_at = which.count_ones();
+        self.work.points += looked_at;
+        self.spent += LOOKUP * looked_at;
         while which != 0 {
             if let Some(point) = points.get(which.trailing_zeros() as usize) {
-                self.work.points += 1;
-                self.spent += LOOKUP;
-                let _ = self.point::<VOXELS>(job, leaf, point);
+                let _ = self.point(job, leaf, point);
             }
             which &= which - 1;
         }
     }
 
-    /// Each of `points`, of one leaf.
-    #[inline(always)]
-    fn each<'p, const VOXELS: bool>(
-        &mut self,
-        job: &Job<'_>,
-        leaf: Leaf,
-        points: impl Iterator<Item = &'p PointRecord>,
-    ) -> Seen {
-        let near = NEAR_MARGINS * self.search.margin;
-        let mut seen = Seen {
-            nearest: f32::INFINITY,
-            near: 0,
-            beyond: f32::INFINITY,
-        };
-        let mut looked_at = 0;
-        for point in points {
-            let gap = self.point::<VOXELS>(job, leaf, point);
-            if gap < seen.nearest {
-                seen.nearest = gap;
-            }
-            if gap > near {
-                if gap < seen.beyond {
-                    seen.beyond = gap;
-                }
-            } else {
-                seen.near |= 1 << (looked_at % Points::BITS);
-            }
-            looked_at += 1;
-        }
-        self.work.points += looked_at;
-        self.spent += LOOKUP * looked_at;
-        seen
-    }
-
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
     #[inline(always)]
-    fn point<const VOXELS: bool>(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
-        if VOXELS {
+    fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
+        if job.field.is_occupancy() {
             return self.voxel(job, leaf, point);
         }
         let in_field = job.to_field.apply(point.position);
@@ -470,7 +486,7 @@ impl Walk<'_, '_, '_> {
     /// A point where more than one face is near, or none has a closed form.
     #[inline(never)]
     fn at_edge(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, cell: &Cell<'_>, p: Vec3) -> f32 {
-        self.spent += LOOKUP;
+        self.spent += EDGE;
         let nearby = job.field.nearby(cell);
         if let Some((distance, face)) = exact(job.faces, nearby, p) {
             if distance < self.search.margin
@@ -509,7 +525,7 @@ impl Walk<'_, '_, '_> {
     #[inline(always)]
     fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: &OnFace) {
         self.near += 1;
-        self.spent += LOOKUP;
+        self.spent += NEAR;
         let n = job.to_push * found.normal;
         let (moving, fixed) = {
             let (own, other) = ([point.face, point.edge_face], [found.face, NO_FACE]);
@@ -573,12 +589,49 @@ impl Walk<'_, '_, '_> {
     }
 }
 
+/// Which points of a leaf are looked at. When one of each leaf is too many, whole leaves are left out, evenly too.
+#[inline]
+fn thinned(thinning: u8, first_point: u32) -> Points {
+    let leaves = (1u32 << thinning.saturating_sub(LEAF_THINNING)) - 1;
+    if (first_point >> LEAF_THINNING) & leaves != 0 {
+        0
+    } else {
+        THINNED[usize::from(thinning.min(LEAF_THINNING))]
+    }
+}
+
 /// What points of a leaf told.
 struct Seen {
-    /// Smallest gap, m.
-    nearest: f32,
+    /// How many.
+    points: u32,
+    /// What counts as near, m.
+    limit: f32,
     /// Those that are near.
     near: Points,
     /// Smallest gap of the others, m.
     beyond: f32,
+}
+
+impl Seen {
+    fn new(limit: f32) -> Self {
+        Self {
+            points: 0,
+            limit,
+            near: 0,
+            beyond: f32::INFINITY,
+        }
+    }
+
+    /// The next point has this gap.
+    #[inline(always)]
+    fn add(&mut self, gap: f32) {
+        if gap > self.limit {
+            if gap < self.beyond {
+                self.beyond = gap;
+            }
+        } else {
+            self.near |= 1 << (self.points % Points::BITS);
+        }
+        self.points += 1;
+    }
 }

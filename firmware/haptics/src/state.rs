@@ -12,6 +12,7 @@ use crate::body::{Body, Grabbed};
 use crate::coherence::Coherence;
 use crate::contact::Contacts;
 use crate::guidance::{Guidance, TargetError};
+use crate::overload::Overload;
 use crate::passivity::{Passivity, Tank};
 use crate::pose::{Pose, Twist, Wrench};
 use crate::proximity::Leaf;
@@ -37,12 +38,10 @@ pub struct State {
     pub(crate) resume: Leaf,
     /// The last tick needed half the look-up budget or more.
     pub(crate) busy: bool,
-    /// Of the points of a leaf that is near each 2ⁿth is looked at.
-    pub(crate) thinning: u8,
+    /// What is left out while there is too much to look at.
+    pub(crate) overload: Overload,
     /// What the last step took, look-ups.
     pub(crate) step_cost: u32,
-    /// Ticks in a row whose budget ran out.
-    pub(crate) overruns: u8,
     /// Smallest cell of any field in the scene, m; 0 without parts.
     pub(crate) finest_cell_m: f32,
     /// Smallest voxel of any voxmap in the scene, m; 0 when there is none.
@@ -123,9 +122,8 @@ impl State {
             sharing: 0.0,
             resume: Leaf::FIRST,
             busy: false,
-            thinning: 0,
+            overload: Overload::NEW,
             step_cost: 0,
-            overruns: 0,
             finest_cell_m: 0.0,
             finest_voxel_m: 0.0,
             guidance: Guidance::new(),
@@ -270,8 +268,7 @@ impl State {
         self.sharing = 0.0;
         self.resume = Leaf::FIRST;
         self.busy = false;
-        self.thinning = 0;
-        self.overruns = 0;
+        self.overload = Overload::NEW;
         self.step_cost = 0;
         self.tank.forget();
         self.guidance.forget();

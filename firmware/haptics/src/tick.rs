@@ -5,13 +5,14 @@ use heapless::Vec;
 use mortise_protocol::image::SceneImage;
 
 use crate::body::Grabbed;
-use crate::contact::{MAX_CONTACTS, Phase};
+use crate::contact::Phase;
 use crate::coupling::Coupling;
 use crate::explicit;
 use crate::guidance::{At, GuidanceState};
 use crate::io::{FacePairs, Flags, Input, Output, Work};
 use crate::limits::limit;
 use crate::linear::inverse_sqrt;
+use crate::overload::Searched;
 use crate::pose::{Pose, Twist, Wrench, renormalize};
 use crate::proximity::{Leaf, Search};
 use crate::rotation;
@@ -36,12 +37,8 @@ const START_M_PER_S: f32 = 0.02;
 /// See [`START_M_PER_S`].
 const FASTER: f32 = 2.0;
 
-/// Ticks in a row whose budget runs out before points are left out: what is looked at for the first time needs one or two.
-const OVERRUNS_BORNE: u8 = 2;
-/// Of the points that are near each 128th is looked at in any case.
-const MOST_THINNING: u8 = 7;
-/// Twice the points cost up to twice as much, and the next tick may need more: they are looked at again once four ninths of the budget were enough.
-const ROOM_TO_THICKEN: u32 = 9;
+/// So many solves are expected of every step: some do not settle sooner, and nothing tells of them the tick before.
+const LEAST_SOLVES: u8 = 5;
 /// The diagonal of a cell, cells.
 const DIAGONAL_CELLS: f32 = 1.733;
 
@@ -206,23 +203,11 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     out
 }
 
-/// The thinning at which of `touching` points three quarters of a store are left, if as many as these were seen at `thinning`.
-///
-/// More than the store holds must not touch: which are kept would follow the last tick's tilt and tilt the part the other way, and the stiffness that comes and goes
-/// with them makes energy. A flat face on more than 256 points rattled so from tick to tick, by as much as it was deep in.
-fn thinned_to_fit(mut thinning: u8, mut touching: u32) -> u8 {
-    while thinning < MOST_THINNING && touching * 4 > MAX_CONTACTS as u32 * 3 {
-        thinning += 1;
-        touching /= 2;
-    }
-    thinning
-}
-
-/// What a step took, in the look-ups of the budget (170 instructions): a solve 13 and each target's pull in it 8, and past the third one half a look-up for
-/// each candidate.
+/// What a step took, in the look-ups of the budget (170 instructions): a solve 8 and each target's pull in it 8, and past the third one a quarter of
+/// one for each candidate.
 fn step_cost(solution: &Solution, candidates: u16, pulls: usize) -> u32 {
-    let solves = u32::from(solution.solves);
-    (13 + 8 * pulls as u32) * solves + solves.saturating_sub(3) * u32::from(candidates) / 2
+    let solves = u32::from(solution.solves.max(LEAST_SOLVES));
+    (8 + 8 * pulls as u32) * solves + solves.saturating_sub(3) * u32::from(candidates) / 4
 }
 
 impl State {
@@ -250,37 +235,34 @@ impl State {
             pose: grabbed.pose(),
             center: grabbed.center,
             margin,
+            way: settings.period_s * point_speed(grabbed.twist, grabbed.body.reach),
             slack: self.slack(settings),
             motions: *motions,
             swing: margin / (grabbed.body.reach * grabbed.body.reach),
             inverse_length: 1.0 / step.length,
             busy: self.busy,
-            thinning: self.thinning,
+            thinning: self.overload.thinning(),
             budget: settings.contact.point_budget,
             step_cost: self.step_cost,
             braking_m,
             guidance: &self.guidance,
             guidance_settings: &settings.guidance,
         };
-        let (stopped, used) = search.run(self.resume, &mut self.coherence, &mut self.contacts, work);
+        let start = self.resume;
+        let (stopped, used) = search.run(start, &mut self.coherence, &mut self.contacts, work);
         self.resume = stopped.unwrap_or(Leaf::FIRST);
-        self.busy = used > settings.contact.point_budget / 2;
-        work.flags.insert_if(self.thinning > 0, Flags::BUDGET_EXCEEDED);
-        self.overruns = if stopped.is_some() { self.overruns + 1 } else { 0 };
+        self.busy = used.all > settings.contact.point_budget / 2;
+        work.flags.insert_if(search.thinning > 0, Flags::BUDGET_EXCEEDED);
         let touching = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
-        let lost = self.contacts.lost();
-        if lost > 0 {
-            self.overruns = 0;
-            self.thinning = thinned_to_fit(self.thinning, touching + lost);
-        } else if self.overruns > OVERRUNS_BORNE {
-            self.overruns = 0;
-            self.thinning = (self.thinning + 1).min(MOST_THINNING);
-        } else if self.thinning > 0
-            && used * ROOM_TO_THICKEN < settings.contact.point_budget * 4
-            && touching * ROOM_TO_THICKEN < MAX_CONTACTS as u32 * 4
-        {
-            self.thinning -= 1;
-        }
+        self.overload.learn(&Searched {
+            start,
+            stopped,
+            used,
+            step_cost: self.step_cost,
+            budget: settings.contact.point_budget,
+            touching,
+            lost: self.contacts.lost(),
+        });
         work.flags
             .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
         let contact = &settings.contact;

@@ -4,7 +4,7 @@
 
 mod support;
 
-use mortise_haptics::{Settings, State};
+use mortise_haptics::{Flags, Settings, State};
 use support::hand::{Hand, Seen, run};
 
 const TICKS: u32 = 2000;
@@ -78,4 +78,31 @@ fn free_above() {
     println!("at most {} nodes + {} points", seen.nodes, seen.points);
     assert!(seen.nodes < 20, "{seen:?}");
     assert_eq!(seen.points, 0);
+}
+
+/// What was left out while the part was shaken is looked at again once it rests.
+#[test]
+fn catches_up_after_an_overload() {
+    let image = support::hole_and_peg(0.2e-3, 25e-3);
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let mut settings = Settings::default();
+    settings.contact.point_budget = 1000;
+    let mut hand = Hand::at([0.0; 3]);
+    hand.push = [5.0, 0.0, 0.0];
+    state.grab(&scene, 1, &hand.pose()).unwrap();
+    let degraded = |seen: &Seen| seen.flags.contains(Flags::BUDGET_EXCEEDED);
+    let rest = |_: u32, hand: &mut Hand, _: Option<&_>| hand.goal[2] = 0.0;
+    let shake = |t: u32, hand: &mut Hand, _: Option<&_>| hand.goal[2] = 20e-3 * (0.2 * f64::from(t)).sin();
+    // The first look at everything takes many ticks, and leaves nothing out for good.
+    run(&mut state, &scene, &settings, &mut hand, 300, rest);
+    let (_, resting) = run(&mut state, &scene, &settings, &mut hand, 300, rest);
+    assert!(!degraded(&resting), "{resting:?}");
+    let (_, shaken) = run(&mut state, &scene, &settings, &mut hand, 300, shake);
+    assert!(degraded(&shaken), "{shaken:?}");
+    run(&mut state, &scene, &settings, &mut hand, 2500, rest);
+    let (_, after) = run(&mut state, &scene, &settings, &mut hand, 300, rest);
+    assert!(!degraded(&after), "{after:?}");
+    assert_eq!(after.contacts, resting.contacts);
 }
