@@ -40,6 +40,7 @@ mod guidance;
 mod io;
 mod job;
 mod joint;
+mod leaf;
 mod limits;
 mod linear;
 mod nearest;

@@ -121,7 +121,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn at(node: u32) -> Leaf {
-        Leaf::at(0, node)
+        Leaf { job: 0, node }
     }
 
     fn stopped(start: u32, stop: u32) -> Searched {

@@ -17,11 +17,12 @@ use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecor
 
 use crate::above::Above;
 use crate::analytic::{OnFace, edge_face, exact, on_face};
-use crate::coherence::{ALL, Coherence, Due, Keys, Known, Points, SHORTEST_SHARE};
+use crate::coherence::{ALL, Coherence, Due, Keys, Known, SHORTEST_SHARE};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mated, Mating};
 use crate::io::{Flags, Work};
 use crate::job::Job;
+use crate::leaf::mask;
 use crate::linear::inverse_sqrt;
 use crate::pose::Pose;
 use crate::settings::GuidanceSettings;
@@ -34,18 +35,10 @@ const LEAST_GRADIENT2: f32 = 0.01;
 /// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
 /// the other end moves half as fast again. So the approach by either is taken this many times.
 pub(crate) const APPROACH: f32 = 2.0;
-/// Thinning up to which some point of every leaf is looked at: most leaves have 8 points or a few more.
-const LEAF_THINNING: u8 = 3;
-/// Which points of a leaf are looked at, by thinning.
-const THINNED: [Points; LEAF_THINNING as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
-/// Leaves of which it is found out in one tick how far the points are that thinning leaves out.
-const LEFT_OUT_LEAVES: u32 = 16;
 /// What would be due after so many ticks like the last one counts as near, and is looked at every tick: finding out whether it is, with all of a leaf, costs as much.
 const NEAR_TICKS: f32 = 2.0;
 /// A look-up, 170 instructions: what the budget is counted in, here in eighths of one. What joints take: [`crate::joint`].
 pub(crate) const LOOKUP: u32 = 8;
-/// A look-up whose gap is noted, besides.
-const NOTED: u32 = 2;
 /// A point at an edge, besides.
 const EDGE: u32 = 5;
 /// A point within the margin, besides.
@@ -63,18 +56,13 @@ const PASSED_OVER: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Leaf {
     /// Twice the part's index, plus one for backward.
-    job: u16,
-    node: u32,
+    pub job: u16,
+    pub node: u32,
 }
 
 impl Leaf {
     /// The beginning.
     pub const FIRST: Self = Self { job: 0, node: 0 };
-
-    #[cfg(test)]
-    pub fn at(job: u16, node: u32) -> Self {
-        Self { job, node }
-    }
 
     /// Index of the other part.
     pub fn part(self) -> u16 {
@@ -130,7 +118,7 @@ pub(crate) struct Search<'s, 'i> {
 impl<'i> Search<'_, 'i> {
     /// Points that come as near as this are looked at every tick, m.
     #[inline]
-    fn near(&self) -> f32 {
+    pub fn near(&self) -> f32 {
         (self.margin + NEAR_TICKS * self.way) * (1.0 / SHORTEST_SHARE)
     }
 
@@ -245,7 +233,7 @@ impl<'i> Search<'_, 'i> {
 /// A search under way.
 pub(crate) struct Walk<'w, 's, 'i> {
     pub search: &'w Search<'s, 'i>,
-    coherence: &'w mut Coherence,
+    pub coherence: &'w mut Coherence,
     /// Travel at which what lies within the margin is due.
     horizon: u32,
     pub contacts: &'w mut Contacts,
@@ -255,7 +243,7 @@ pub(crate) struct Walk<'w, 's, 'i> {
     /// Of that, on points rather than the way to them.
     on_points: u32,
     /// Leaves looked at for what thinning leaves out of them.
-    left_out: u32,
+    pub left_out: u32,
     /// Of that, for what joints keep apart.
     pub clearing: u32,
     /// What guidance said of the last point's faces.
@@ -362,7 +350,7 @@ impl Walk<'_, '_, '_> {
                 above.open(key, node.skip);
                 continue;
             }
-            let mask = thinned(self.search.thinning, node.first_point);
+            let mask = mask(self.search.thinning, node.first_point);
             let points = node.points(job.points);
             // Asked as seldom as the field is.
             if asked
@@ -394,72 +382,9 @@ impl Walk<'_, '_, '_> {
         None
     }
 
-    /// All points of a leaf, as far as the budget goes, and when it is due again.
-    fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> Due {
-        let most = (self.left() as usize).min(points.len());
-        let mut seen = Seen::new(self.search.near());
-        for point in points.iter().take(most) {
-            seen.add(self.point(job, leaf, point));
-        }
-        self.seen(job, leaf, points, seen)
-    }
-
-    /// The same when points are left out: only those of the `mask` are offered as contacts.
-    ///
-    /// The others are looked at in some leaves a tick, so that more and more of what is left out is known to be far.
-    #[inline(never)]
-    fn thinned(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], mask: Points) -> Due {
-        if self.left_out == LEFT_OUT_LEAVES || job.field.is_occupancy() {
-            let all = ALL.checked_shr(Points::BITS.saturating_sub(points.len() as u32));
-            self.some(job, leaf, points, mask & all.unwrap_or(0));
-            return Due::NOW;
-        }
-        self.left_out += 1;
-        let most = (self.left() as usize).min(points.len());
-        let mut seen = Seen::new(self.search.near());
-        for point in points.iter().take(most) {
-            seen.add(job.distance(point.position));
-        }
-        self.some(job, leaf, points, seen.near & mask);
-        self.seen(job, leaf, points, seen)
-    }
-
-    /// Notes what was `seen` of a leaf, and tells when it is due again.
-    #[inline(always)]
-    fn seen(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], seen: Seen) -> Due {
-        self.work.points += seen.points;
-        self.spent += (LOOKUP + NOTED) * seen.points;
-        // What was not looked at could be anywhere.
-        if (seen.points as usize) < points.len() {
-            return Due::NOW;
-        }
-        let key = Keys::new(leaf.job, job.nodes.len()).of(leaf.node);
-        if seen.near == 0 {
-            return self.coherence.set_far(key, seen.beyond);
-        }
-        if seen.points <= Points::BITS {
-            self.coherence.set_points(key, seen.near, seen.beyond);
-        }
-        Due::NOW
-    }
-
-    /// Those points of a leaf.
-    #[inline(always)]
-    fn some(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], mut which: Points) {
-        let looked_at = which.count_ones();
-        self.work.points += looked_at;
-        self.spent += LOOKUP * looked_at;
-        while which != 0 {
-            if let Some(point) = points.get(which.trailing_zeros() as usize) {
-                let _ = self.point(job, leaf, point);
-            }
-            which &= which - 1;
-        }
-    }
-
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
     #[inline(always)]
-    fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
+    pub fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
         if job.field.is_occupancy() {
             return self.voxel(job, leaf, point);
         }
@@ -584,54 +509,7 @@ impl Walk<'_, '_, '_> {
     }
 
     /// Look-ups left.
-    fn left(&self) -> u32 {
+    pub fn left(&self) -> u32 {
         self.search.budget.saturating_sub(self.used())
-    }
-}
-
-/// Which points of a leaf are looked at. When one of each leaf is too many, whole leaves are left out, evenly too.
-#[inline]
-fn thinned(thinning: u8, first_point: u32) -> Points {
-    let leaves = (1u32 << thinning.saturating_sub(LEAF_THINNING)) - 1;
-    if (first_point >> LEAF_THINNING) & leaves != 0 {
-        0
-    } else {
-        THINNED[usize::from(thinning.min(LEAF_THINNING))]
-    }
-}
-
-/// What points of a leaf told.
-struct Seen {
-    /// How many.
-    points: u32,
-    /// What counts as near, m.
-    limit: f32,
-    /// Those that are near.
-    near: Points,
-    /// Smallest gap of the others, m.
-    beyond: f32,
-}
-
-impl Seen {
-    fn new(limit: f32) -> Self {
-        Self {
-            points: 0,
-            limit,
-            near: 0,
-            beyond: f32::INFINITY,
-        }
-    }
-
-    /// The next point has this gap.
-    #[inline(always)]
-    fn add(&mut self, gap: f32) {
-        if gap > self.limit {
-            if gap < self.beyond {
-                self.beyond = gap;
-            }
-        } else {
-            self.near |= 1 << (self.points % Points::BITS);
-        }
-        self.points += 1;
     }
 }
