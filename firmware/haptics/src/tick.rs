@@ -53,9 +53,10 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
 /// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-22, thesis pair with 20 µm clearance baked at 0.5 mm cells with a
-/// pointshell of 25 µm: 70,400 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 19,520 in free motion. A peg of 0.7 m with 0.2 mm
+/// pointshell of 25 µm: 72,000 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 18,260 in free motion. A peg of 0.7 m with 0.2 mm
 /// clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below 120,000.
-/// Guided into a fit of 0.2 or 0.02 mm, joints asked about on the way: 111,460 at worst (`mortise lab rate --quick`).
+/// Guided into a fit of 0.2 mm, joints asked about on the way: 104,360 at worst; by collision alone into one of 0.02 mm, where the rims meet: 133,600
+/// (`mortise lab rate --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
