@@ -172,7 +172,7 @@ impl Default for Settings {
                 total_stiffness_n_per_m: 20e6,
                 damping_s: 0.5e-3,
                 margin_m: 5e-6,
-                point_budget: 580,
+                point_budget: 560,
             },
             object: ObjectSettings {
                 mass_kg: 0.1,
