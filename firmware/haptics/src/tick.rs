@@ -55,7 +55,7 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-22, thesis pair with 20 µm clearance baked at 0.5 mm cells with a
 /// pointshell of 25 µm: 72,000 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 18,260 in free motion. A peg of 0.7 m with 0.2 mm
 /// clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below 120,000.
-/// Guided into a fit of 0.2 mm, joints asked about on the way: 104,360 at worst; by collision alone into one of 0.02 mm, where the rims meet: 133,600
+/// Guided into a fit of 0.2 mm, joints asked about on the way: 102,300 at worst, of 0.02 mm 113,280; by collision alone into the latter 125,800
 /// (`mortise lab rate --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
