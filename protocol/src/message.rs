@@ -159,8 +159,8 @@ pub enum ToDevice {
     },
     /// Script for the simulated hand (simulated mechanisms only); its time starts at the tick that takes it.
     SimulatedHand(HandScript),
-    /// What goes wrong at the inputs of a simulated mechanism, and when (simulated mechanisms only); replaces what was sent before. Its time starts at the
-    /// tick that takes it.
+    /// What goes wrong at the inputs of a simulated mechanism, and when (simulated mechanisms only); replaces what was sent before. Its time starts
+    /// at the tick that takes it.
     SimulatedInputs(Vec<InputFault, MAX_INPUT_FAULTS>),
     /// Lockstep on or off (simulated mechanisms only): on, a tick runs only when released by [`ToDevice::Run`].
     Lockstep(bool),
@@ -493,8 +493,8 @@ pub struct TouchingPair {
     pub depth: f32,
     /// Where, world, m.
     pub point: [f32; 3],
-    /// Insertion depth: how far the touching points reach along the axis of the static face, or else the moving one, m; 0 where neither is round. Faces that
-    /// guidance keeps apart do not touch and have none.
+    /// Insertion depth: how far the touching points reach along the axis of the static face, or else the moving one, m; 0 where neither is round.
+    /// Faces that guidance keeps apart do not touch and have none.
     pub insertion: f32,
 }
 
@@ -667,7 +667,8 @@ pub struct HandScript {
     pub tremor: f32,
     /// Tremor's frequency, Hz.
     pub tremor_hz: f32,
-    /// Where the hand wants to be, times ascending; before the first the first holds, after the last the last, between them linear (orientation: shortest arc).
+    /// Where the hand wants to be, times ascending; before the first the first holds, after the last the last, between them linear (orientation:
+    /// shortest arc).
     pub keyframes: Vec<Keyframe, MAX_KEYFRAMES>,
 }
 

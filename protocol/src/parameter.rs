@@ -84,7 +84,7 @@ parameters! {
     /// Host silence while armed that counts as a fault.
     HostTimeout = "s", 0.05, 5.0, 0.5;
     /// Most work of a tick, in field look-ups; a point that may touch counts 4.
-    PointBudget = "look-ups", 16.0, 65_535.0, 560.0;
+    PointBudget = "look-ups", 16.0, 65_535.0, 520.0;
     /// How the object is moved: 0 implicit, 1 explicit (the textbook's, which trembles on stiff contact).
     Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];
     /// How constraint targets guide: 0 not at all, 1 stiff up to their cap, 2 the blend of the thesis.

@@ -135,7 +135,8 @@ pub struct FlashError;
 
 /// Scene slots in flash.
 pub const SLOTS: usize = 2;
-/// Slots of the rig's description, one [`Flash::erase_size`] each. A board whose mechanism is compiled in has none: its flash gives no memory for them.
+/// Slots of the rig's description, one [`Flash::erase_size`] each. A board whose mechanism is compiled in has none: its flash gives no memory for
+/// them.
 pub const RIG_SLOTS: [usize; 2] = [SLOTS, SLOTS + 1];
 /// Smallest piece that can be written, bytes: one flash word of an STM32H7. A piece is written at most once between two erasures.
 pub const WRITE_SIZE: usize = 32;
@@ -146,8 +147,8 @@ pub const WRITE_SIZE: usize = 32;
 /// sector of an STM32H7), which is why scenes are stored only while the motors are off.
 ///
 /// # Safety
-/// `slot` must return memory that starts at a multiple of [`WRITE_SIZE`], is `capacity()` bytes long (a rig slot: `erase_size()`, or empty), is valid for `'s`, and changes only by
-/// `erase` and `write` of the same slot.
+/// `slot` must return memory that starts at a multiple of [`WRITE_SIZE`], is `capacity()` bytes long (a rig slot: `erase_size()`, or empty), is valid
+/// for `'s`, and changes only by `erase` and `write` of the same slot.
 pub unsafe trait Flash<'s> {
     /// Bytes in one slot; a multiple of [`Self::erase_size`].
     fn capacity(&self) -> usize;

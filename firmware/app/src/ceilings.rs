@@ -1,7 +1,7 @@
 //! Limits that cannot be talked around: the rig's compiled ceilings, and what is cut from a wrench after the force law.
 //!
-//! Every adjustable limit has a range of its own ([`mortise_protocol::parameter`]). A rig whose motors or links bear less states that here, in its firmware:
-//! no message reaches these numbers. A parameter beyond its ceiling is refused with the range that holds on this board, and
+//! Every adjustable limit has a range of its own ([`mortise_protocol::parameter`]). A rig whose motors or links bear less states that here, in its
+//! firmware: no message reaches these numbers. A parameter beyond its ceiling is refused with the range that holds on this board, and
 //! [`restrain`] cuts the wrench once more after everything else, so that an error in the force law or in the settings ends there.
 
 use glam::Vec3;
@@ -104,8 +104,8 @@ pub fn is_outside(handle: Vec3, radius_m: f32) -> bool {
 /// 3. power into the handle, P = F·v + τ·ω, is at most the limit: what gives more is scaled by limit/P. A wrench that brakes is never weakened;
 /// 4. what is not finite becomes zero.
 ///
-/// The power comes last of the three, because cutting a torque that takes power would let a force give more; one factor for both undoes nothing before
-/// it. Cost: about 60 operations.
+/// The power comes last of the three, because cutting a torque that takes power would let a force give more; one factor for both undoes nothing
+/// before it. Cost: about 60 operations.
 pub fn restrain(wrench: Wrench, handle: Vec3, twist: &Twist, bounds: &Bounds) -> Wrench {
     let mut force = wrench.force.clamp_length_max(bounds.force_n);
     let mut torque = wrench.torque.clamp_length_max(bounds.torque_nm);

@@ -24,8 +24,8 @@ use crate::statistics::{StateHash, count_tick};
 
 /// Ticks in which what the coupling can hold grows from nothing to its settings after arming or grabbing; what it cannot hold slips in the hand.
 ///
-/// It is the grip that is weak, not the wrench that is scaled on its way to the motors: what the object is given the hand must give. Scaled behind the
-/// coupling, an object set in motion during the ramp returned kinetic energy that nobody had put in, all of ½·m·v².
+/// It is the grip that is weak, not the wrench that is scaled on its way to the motors: what the object is given the hand must give. Scaled behind
+/// the coupling, an object set in motion during the ramp returned kinetic energy that nobody had put in, all of ½·m·v².
 pub const RAMP_TICKS: u16 = 200;
 /// Ticks in which a soft stop takes the last wrench to zero.
 pub const FADE_TICKS: u16 = 50;

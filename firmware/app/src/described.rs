@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Integrated like the free handle ([`crate::simulated`]) with [`SUBSTEPS`] backward-Euler steps a tick: one 3×3 system with springs, dampers and
-//! viscous friction implicit and J frozen over the step. Coulomb friction then takes h·Σ f_c|θ̇| out of the kinetic energy, all joints slowing by one factor, until
-//! there is none. Joints end at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's orientation through the same
-//! equation. Sensing and currents are [`Joints`], the code of a real rig.
+//! viscous friction implicit and J frozen over the step. Coulomb friction then takes h·Σ f_c|θ̇| out of the kinetic energy, all joints slowing by one
+//! factor, until there is none. Joints end at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's
+//! orientation through the same equation. Sensing and currents are [`Joints`], the code of a real rig.
 
 use glam::{Mat3, Vec3};
 use mortise_haptics::{Pose, Wrench, rotation};

@@ -38,9 +38,9 @@ impl Counter {
 
 /// Tells an encoder that stands still under load.
 ///
-/// A hand that holds a handle against a motor trembles by far more than a count. No count at all for [`Stall::new`]'s ticks, while the motor pushes with
-/// more than half of what it can, therefore means that the encoder is stuck or unplugged, or the mechanism jammed. In either case the coupling no longer sees
-/// what its force does. Below half load nothing is told: there a hand is stronger by far, and simulated hands need not tremble.
+/// A hand that holds a handle against a motor trembles by far more than a count. No count at all for [`Stall::new`]'s ticks, while the motor pushes
+/// with more than half of what it can, therefore means that the encoder is stuck or unplugged, or the mechanism jammed. In either case the coupling
+/// no longer sees what its force does. Below half load nothing is told: there a hand is stronger by far, and simulated hands need not tremble.
 #[derive(Clone, Copy, Debug)]
 pub struct Stall {
     ticks: u16,

@@ -1,6 +1,7 @@
 //! What goes wrong at the inputs of the simulated mechanism: put there by a test, or by a host's script.
 //!
-//! A script ([`InputFault`]s with their times) works wherever the simulated mechanism does: in-process and on the emulated board, tick for tick alike.
+//! A script ([`InputFault`]s with their times) works wherever the simulated mechanism does: in-process and on the emulated board, tick for tick
+//! alike.
 
 use heapless::Vec;
 use mortise_protocol::limits::MAX_INPUT_FAULTS;

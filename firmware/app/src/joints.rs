@@ -173,10 +173,11 @@ impl Joints {
         }
     }
 
-    /// Currents (A, signed in the motor's sense) that push the handle with `force` (N, world) in the posture of the last reading: τ = Jᵀ·F, i = τ/(gear·k).
+    /// Currents (A, signed in the motor's sense) that push the handle with `force` (N, world) in the posture of the last reading: τ = Jᵀ·F, i =
+    /// τ/(gear·k).
     ///
-    /// The force is cut to the rig's ceiling, fades near singular postures ([`Posture::share`]), and when a motor would exceed its limit all are scaled by
-    /// one factor: it gets weaker but keeps its direction. A force that is no number gives no current.
+    /// The force is cut to the rig's ceiling, fades near singular postures ([`Posture::share`]), and when a motor would exceed its limit all are
+    /// scaled by one factor: it gets weaker but keeps its direction. A force that is no number gives no current.
     pub fn currents(&self, force: Vec3) -> [f32; MAX_JOINTS] {
         let given = force.clamp_length_max(self.force_ceiling) * self.posture.share();
         let torques = self.posture.torques(given);

@@ -31,8 +31,8 @@ pub struct RamFlash<'s> {
 unsafe impl Send for RamFlash<'_> {}
 
 impl<'s> RamFlash<'s> {
-    /// All slots in `memory`: two sectors at its end for the rig, half of the rest for each scene, rounded down to whole sectors. What is there is kept: it may
-    /// be from before a reset.
+    /// All slots in `memory`: two sectors at its end for the rig, half of the rest for each scene, rounded down to whole sectors. What is there is
+    /// kept: it may be from before a reset.
     pub fn new(memory: &'s mut [FlashWord]) -> Self {
         let slot = (size_of_val(memory) / SLOTS).saturating_sub(ERASE_SIZE);
         Self {

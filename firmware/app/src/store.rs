@@ -135,8 +135,8 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         self.current.as_ref()
     }
 
-    /// Whether there is a scene in use and the flash still holds it. Reads all of it, from the flash anew: what a reference showed before a compiler may take for
-    /// unchanged.
+    /// Whether there is a scene in use and the flash still holds it. Reads all of it, from the flash anew: what a reference showed before a compiler
+    /// may take for unchanged.
     pub fn is_sound(&self) -> bool {
         self.current.is_some_and(|scene| {
             let bytes = self.memory(scene.slot).get(IMAGE_OFFSET..);

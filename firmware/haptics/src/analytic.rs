@@ -159,18 +159,69 @@ fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<
     Some(found)
 }
 
-/// The other face of the edge that `p`, at the distance `at` from `face`, lies at: of those that `nearby` names the first whose surface is as far off to
-/// within [`AT_EDGE_M`], else [`NO_FACE`].
-pub(crate) fn edge_face(faces: &[FaceRecord], nearby: Nearby, face: u16, at: f32, p: Vec3) -> u16 {
-    let (Nearby::Convex(group) | Nearby::Reentrant(group)) = nearby else {
-        return NO_FACE;
+/// As [`exact`], with the normal of the face whose distance it is, and the other face that is as far off to within [`AT_EDGE_M`]. About 80
+/// instructions a face on a Cortex-M7.
+#[inline]
+pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<OnFace> {
+    let (group, sign) = match nearby {
+        Nearby::Face(face) => return on_face(faces, face, p),
+        Nearby::Convex(group) => (group, 1.0),
+        Nearby::Reentrant(group) => (group, -1.0),
+        Nearby::Roughly(_) | Nearby::Unknown => return None,
     };
-    let meets = |other: &u16| {
-        *other != NO_FACE
-            && *other != face
-            && distance(faces, *other, p).is_some_and(|d| (d - at).abs() < AT_EDGE_M)
+    let mut found = on_face(faces, group[0], p)?;
+    for face in [group[1], group[2]] {
+        if face == NO_FACE {
+            break;
+        }
+        let other = on_face(faces, face, p)?;
+        let ahead = (other.distance - found.distance) * sign;
+        let at_edge = ahead.abs() < AT_EDGE_M;
+        if ahead > 0.0 {
+            let edge_face = if at_edge { found.face } else { NO_FACE };
+            found = OnFace { edge_face, ..other };
+        } else if at_edge && found.edge_face == NO_FACE {
+            found.edge_face = face;
+        }
+    }
+    Some(found)
+}
+
+/// What [`exact_on_face`] would have `found` were every face farther off by its `room`, which is nowhere more than `most`. About 60 instructions a
+/// face.
+#[inline(never)]
+pub(crate) fn with_room(
+    found: OnFace,
+    faces: &[FaceRecord],
+    nearby: Nearby,
+    p: Vec3,
+    most: f32,
+    mut room: impl FnMut(u16) -> f32,
+) -> OnFace {
+    let (group, sign) = match nearby {
+        Nearby::Convex(group) => (group, 1.0),
+        Nearby::Reentrant(group) => (group, -1.0),
+        _ => return found,
     };
-    group.iter().copied().find(meets).unwrap_or(NO_FACE)
+    // Room makes a convex edge's other faces the nearer ones only when it is more than they are behind.
+    let reach = if sign > 0.0 { most } else { 0.0 };
+    let first = found.face;
+    let (mut chosen, mut gap) = (found, found.distance + room(first));
+    for face in group {
+        if face == NO_FACE || face == first {
+            continue;
+        }
+        let Some(other) = on_face(faces, face, p) else {
+            continue;
+        };
+        if (other.distance - gap) * sign + reach > 0.0 {
+            let other_gap = other.distance + room(face);
+            if (other_gap - gap) * sign > 0.0 {
+                (chosen, gap) = (other, other_gap);
+            }
+        }
+    }
+    chosen
 }
 
 #[inline]

@@ -3,20 +3,23 @@
 //! A node whose points are all at least D from the other part cannot hold a candidate until some point of the object has travelled
 //! D − margin. The travel is added up once a tick from a bound on the speed of any point, so the due times are conservative and the
 //! candidates found are the same with and without them. They are kept in a direct-mapped table: a collision costs a look-up, never a contact.
-//! A node that was near is taken to be near still, without asking the field, and asked again once in [`ASK_AGAIN`] ticks. Whole numbers of nanometres, rounded to the safe side, so that no travel is lost to rounding.
+//! A node that was near is taken to be near still, without asking the field, and asked again once in [`ASK_AGAIN`] ticks. Whole numbers of
+//! nanometres, rounded to the safe side, so that no travel is lost to rounding.
 //!
-//! A node that joints keep apart from all it could meet is far too, as long as every one of those joints lasts: what was noted so is told from the rest by
-//! an epoch that ends with any of them.
+//! A node that joints keep apart from all it could meet is far too, as long as every one of those joints lasts: what was noted so is told from the
+//! rest by an epoch that ends with any of them.
 //!
-//! A node is due no sooner than the first of those below it, so what is far is passed over in large pieces. Of a leaf that is near it is noted which of its
-//! points are, and how long the others can be left alone.
+//! A node is due no sooner than the first of those below it, so what is far is passed over in large pieces. Of a leaf that is near it is noted which
+//! of its points are, and how long the others can be left alone.
 //!
 //! Cost: some 25 instructions for a node of which enough is known, against some 200 for asking the field.
+
+use crate::walls::{Wall, Walls};
 
 /// Entries in the table. A power of two.
 const SLOTS: usize = 8192;
 /// A job of more nodes is looked at whole every tick. So every tag fits 16 bits.
-const NODES: u32 = (1 << JOB_SHIFT) - SLOTS as u32;
+const NODES: u32 = (1 << JOB_SHIFT) - SLOTS as u32 - 1;
 /// Keys of jobs lie so many bits apart.
 const JOB_SHIFT: u32 = 20;
 /// Jobs that can be told apart; further ones likewise.
@@ -35,8 +38,8 @@ const LONGEST_SHARE: f32 = 0.9;
 /// And at least. Between the two it depends on the node, so that a ring of points at one distance does not become due in one tick.
 pub(crate) const SHORTEST_SHARE: f32 = 0.75;
 
-/// Ticks after which a node that was near is asked again, or all points of such a leaf are looked at; a power of two. Which tick depends on the node, so that
-/// the work is spread.
+/// Ticks after which a node that was near is asked again, or all points of such a leaf are looked at; a power of two. Which tick depends on the
+/// node, so that the work is spread.
 const ASK_AGAIN: u32 = 16;
 /// Set in the due of a leaf whose sphere did not tell that it is far, but its points did: when it is due, so are they.
 const BY_POINTS: u32 = 1;
@@ -59,6 +62,7 @@ pub(crate) struct Coherence {
     /// Of the joints.
     epoch: u16,
     slots: [Slot; SLOTS],
+    walls: Walls,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -135,12 +139,12 @@ impl Keys {
 }
 
 /// Which node of which job.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Key(u32);
 
 impl Key {
     /// No node.
-    const NONE: Self = Self(0);
+    pub const NONE: Self = Self(0);
 
     fn is_none(self) -> bool {
         self.0 == Self::NONE.0
@@ -157,9 +161,15 @@ impl Key {
         (self.0 / SLOTS as u32) as u16 + 1
     }
 
-    /// The node's share of its distance: one of 256, by eight bits of a multiplicative hash (Knuth's 2³²/φ).
+    /// Multiplicative, Knuth's 2³²/φ: the upper bits are the better ones.
+    #[inline(always)]
+    pub fn hash(self) -> u32 {
+        self.0.wrapping_mul(2_654_435_769)
+    }
+
+    /// The node's share of its distance: one of 256.
     fn share(self) -> f32 {
-        let place = self.0.wrapping_mul(2_654_435_769) >> 24;
+        let place = self.hash() >> 24;
         LONGEST_SHARE - (LONGEST_SHARE - SHORTEST_SHARE) * (1.0 / 255.0) * place as f32
     }
 }
@@ -172,6 +182,7 @@ impl Coherence {
             round: 0,
             epoch: 0,
             slots: [Slot::EMPTY; SLOTS],
+            walls: Walls::new(),
         }
     }
 
@@ -188,6 +199,7 @@ impl Coherence {
             // In place: made anew it would pass over the stack, which has not room for many such.
             (self.travel_nm, self.forgotten_nm, self.epoch) = (0, 0, 0);
             self.slots.fill(Slot::EMPTY);
+            self.walls.clear();
         }
     }
 
@@ -202,8 +214,8 @@ impl Coherence {
         self.travel_nm.saturating_add(up_nm(margin))
     }
 
-    /// What is known of a node, for points that come within the `horizon`. More is known of what lies below an inner node than of the node: when it is
-    /// due, it counts as near.
+    /// What is known of a node, for points that come within the `horizon`. More is known of what lies below an inner node than of the node: when it
+    /// is due, it counts as near.
     #[inline]
     pub fn ask(&self, key: Key, horizon: u32, leaf: bool) -> Known {
         let slot = &self.slots[key.slot()];
@@ -275,6 +287,21 @@ impl Coherence {
     pub fn set_joined(&mut self, key: Key, distance: f32) {
         let Due(due_nm) = self.ahead(key, distance);
         self.set(key, self.epoch, due_nm | JOINED);
+    }
+
+    /// What these points of a leaf have to do with.
+    #[inline(always)]
+    pub fn wall(&self, leaf: Key, which: Points) -> Wall {
+        self.walls.get(leaf, which, self.travel_nm)
+    }
+
+    /// All that these points of a leaf find within `distance` m of where they are has to do with this face, or with more than one.
+    pub fn set_wall(&mut self, leaf: Key, which: Points, wall: Option<u16>, distance: f32) {
+        if !leaf.is_none() {
+            // Not all leaves in the same tick again.
+            let Due(until_nm) = self.ahead(leaf, distance);
+            self.walls.set(leaf, which, wall, until_nm);
+        }
     }
 
     /// Some joint is no more: what was noted for it is void.
@@ -365,6 +392,7 @@ mod tests {
     fn what_joints_keep_apart_is_far_while_they_last() {
         let mut c = Coherence::new();
         let key = key_of(JOBS - 1, NODES - 1);
+        assert_eq!(key.tag(), u16::MAX, "the largest, and not that of an empty slot");
         for _ in 0..20 {
             c.set_joined(key, 1e-3);
             assert!(is_far(c.ask(key, c.horizon(0.4e-3), true)));

@@ -247,8 +247,8 @@ impl Contacts {
         libm::sqrtf(self.farthest2)
     }
 
-    /// A place for a contact with an arm of √`arm2`, the rest of which the caller fills in, unless it is not to be kept. Once all is full it is two comparisons, and at most
-    /// twice 7 steps of a heap when it displaces others.
+    /// A place for a contact with an arm of √`arm2`, the rest of which the caller fills in, unless it is not to be kept. Once all is full it is two
+    /// comparisons, and at most twice 7 steps of a heap when it displaces others.
     #[inline]
     pub fn offer(&mut self, gap: f32, reach_gap: f32, arm2: f32) -> Option<&mut Contact> {
         let place = if self.len < MAX_CONTACTS {

@@ -1,12 +1,14 @@
 //! Work of a held force on a motion that is told in counts.
 //!
-//! An encoder of count u tells the position within ±u/2. Its difference from tick to tick is no motion: a handle that moves by less than a count a tick stands, then jumps. What the force does while
-//! it stands, not least its answer to the last jump, is lost from a sum of force times difference, and what is lost is dissipation: g₀·u²/(12·h) of power on each axis, with g₀ the force's first
-//! answer to a step of position, 32 µW on three axes of 5 µm. Of a hand that presses and trembles for half a minute such a sum makes a motor.
+//! An encoder of count u tells the position within ±u/2. Its difference from tick to tick is no motion: a handle that moves by less than a count a
+//! tick stands, then jumps. What the force does while it stands, not least its answer to the last jump, is lost from a sum of force times difference,
+//! and what is lost is dissipation: g₀·u²/(12·h) of power on each axis, with g₀ the force's first answer to a step of position, 32 µW on three axes
+//! of 5 µm. Of a hand that presses and trembles for half a minute such a sum makes a motor.
 //!
-//! So the position is taken to have moved only as far as it must have to be told as it is, by a play of one count: it is known exactly when a count changes, and the same count
-//! there and back again moves nothing. Each such motion is the work of the mean force since the last one, as if it had gone on evenly. A motion of more than a count in a tick is
-//! that of the tick's own force. Of sums over a path the error does not grow: no more than force times count at each turn of the way.
+//! So the position is taken to have moved only as far as it must have to be told as it is, by a play of one count: it is known exactly when a count
+//! changes, and the same count there and back again moves nothing. Each such motion is the work of the mean force since the last one, as if it had
+//! gone on evenly. A motion of more than a count in a tick is that of the tick's own force. Of sums over a path the error does not grow: no more than
+//! force times count at each turn of the way.
 
 use glam::Vec3;
 
@@ -40,8 +42,8 @@ impl Counted {
         )
     }
 
-    /// Work of `force`, held over a tick in which the reading changed by `moved`, and of what was held before it, that is known by now, J. `count` is u; with 0 it is
-    /// force times difference. About 15 instructions an axis.
+    /// Work of `force`, held over a tick in which the reading changed by `moved`, and of what was held before it, that is known by now, J. `count` is
+    /// u; with 0 it is force times difference. About 15 instructions an axis.
     pub fn work(&mut self, force: Vec3, moved: Vec3, count: f32) -> f32 {
         if count == 0.0 {
             return force.dot(moved);
@@ -111,7 +113,8 @@ mod tests {
         (seen, plain, truth)
     }
 
-    /// A damper whose speed is the filtered difference, as the boards have it: at a third of a count a tick it dissipates, and a sum of differences sees less.
+    /// A damper whose speed is the filtered difference, as the boards have it: at a third of a count a tick it dissipates, and a sum of differences
+    /// sees less.
     #[test]
     fn a_damper_dissipates_below_a_count_a_tick() {
         const COUNT: f32 = 5e-6;

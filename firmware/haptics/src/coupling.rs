@@ -43,6 +43,17 @@ impl Slip {
 }
 
 impl Coupling {
+    /// Stretched so far, with the hand at rest.
+    #[cfg(test)]
+    pub fn stretched(stretch: Vec3, angle: Vec3) -> Self {
+        Self {
+            stretch,
+            angle,
+            target: Twist::ZERO,
+            lever: Vec3::ZERO,
+        }
+    }
+
     /// Measures stretch and angle.
     pub fn measure(handle: Pose, handle_twist: Twist, grabbed: &Grabbed) -> Self {
         let place = handle.compose(grabbed.offset);

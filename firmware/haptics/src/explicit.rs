@@ -42,8 +42,8 @@ pub(crate) fn free(step: &Step<'_>) -> Solution {
     }
 }
 
-/// The step with `contacts` of stiffness `k` (N/m); those with a gap up to `braking_m` only brake. On return their phases are those of the solution, and their rates
-/// those of its motion as far as `allowed` lets it.
+/// The step with `contacts` of stiffness `k` (N/m); those with a gap up to `braking_m` only brake. On return their phases are those of the solution,
+/// and their rates those of its motion as far as `allowed` lets it.
 pub(crate) fn with_contacts(
     step: &Step<'_>,
     contacts: &mut [Contact],

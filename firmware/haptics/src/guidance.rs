@@ -1,9 +1,9 @@
 //! Constraint targets: which are in force, how far engaged, and how they pull.
 //!
 //! The desktop sends a target; the board holds it until it expires, is cleared or replaced. Nothing about a target is ever switched: its
-//! *engagement* a rises from 0 to 1 and falls again by steps so small that the caps on all forces, a·F, together change by 0.015 N a tick at most and those
-//! on torques by less than 2 mN m: a part on its way to the axis follows the cap's growth, and neither starts nor stops with a step of 0.05 N on the
-//! handle. Torque comes first, as fast as it may. Within its cap a target is stiff,
+//! *engagement* a rises from 0 to 1 and falls again by steps so small that the caps on all forces, a·F, together change by 0.015 N a tick at most and
+//! those on torques by less than 2 mN m: a part on its way to the axis follows the cap's growth, and neither starts nor stops with a step of 0.05 N
+//! on the handle. Torque comes first, as fast as it may. Within its cap a target is stiff,
 //!
 //! f = −a·F·u/√((a·F/(a⁴·k))² + |u|²),   u = e + (h + τ)·J·V'
 //!
@@ -13,6 +13,8 @@
 //!
 //! A target that ends leaves a part that the hand pulled against it: it would fly off. So a damper takes over where the pull falls, 200 N s/m up to
 //! 1 N, and fades in a second: 0.4 N move the part at 2 mm/s.
+//!
+//! A target's pull is free; what the hand is given of it is not: see the source of `grip`.
 //!
 //! Where the target's faces meet, contact makes room: gaps between them count for larger by a·[`GuidanceSettings::allowance_m`]. The axis holds
 //! what the wall held before, an exact fit goes in, and a part pulled off its axis against the cap finds the wall again. All other contacts
@@ -400,6 +402,11 @@ impl Guidance {
         slot.engagement * (0.5 * libm::expf(-theta / theta_0) + 0.5 * libm::expf(-d / voxel))
     }
 
+    /// Whether there are none, not even fading.
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
     /// Whether any target makes room at this part.
     pub fn concerns(&self, part: u16) -> bool {
         self.slots
@@ -508,7 +515,8 @@ impl Slot {
     }
 }
 
-/// Whether contact between a target's faces makes room. Planes and cones stop a part, with more force than the target's cap: they stay where they are.
+/// Whether contact between a target's faces makes room. Planes and cones stop a part, with more force than the target's cap: they stay where they
+/// are.
 fn makes_room(kind: ConstraintKind) -> bool {
     !matches!(kind, ConstraintKind::Coplanar | ConstraintKind::Conical)
 }

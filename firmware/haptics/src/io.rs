@@ -89,8 +89,8 @@ impl Flags {
     /// The work reached [`crate::ContactSettings::point_budget`]: points are left out evenly, and when that is not enough the rest waits for the next
     /// ticks; what touched stays felt.
     pub const BUDGET_EXCEEDED: Self = Self(1 << 0);
-    /// More candidates than fit: kept were the deepest, and of the rest those that a turn would bring to touch first. Where more touch than fit, points are left out evenly
-    /// from the next tick on ([`Self::BUDGET_EXCEEDED`]).
+    /// More candidates than fit: kept were the deepest, and of the rest those that a turn would bring to touch first. Where more touch than fit,
+    /// points are left out evenly from the next tick on ([`Self::BUDGET_EXCEEDED`]).
     pub const CONTACTS_DROPPED: Self = Self(1 << 1);
     /// The set of touching points had not settled after the last solve allowed.
     pub const UNSETTLED: Self = Self(1 << 2);

@@ -4,8 +4,12 @@ use glam::{Mat3, Vec3};
 use mortise_protocol::image::{FaceRecord, Field, NodeRecord, Place, PointRecord, Shape};
 
 use crate::analytic::exact;
+use crate::coherence::Keys;
 use crate::joint::Joined;
 use crate::pose::Pose;
+
+/// A position in a field is off by less than this times the lengths it is summed up from: eight roundings of 2⁻²⁴ at most.
+const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
 /// Trees and fields of one job, and the way between their frames.
 pub(crate) struct Job<'i> {
@@ -16,6 +20,8 @@ pub(crate) struct Job<'i> {
     /// Faces that joints keep apart.
     pub joined: Joined,
     pub nodes: &'i [NodeRecord],
+    /// What is known of them goes by these.
+    pub keys: Keys,
     pub points: &'i [PointRecord],
     pub field: Field<'i>,
     /// Exact surfaces of the field's shape.
@@ -54,6 +60,32 @@ impl<'i> Job<'i> {
         self.field.in_cells(in_field.to_array())
     }
 
+    /// The face that every cell within `free_m` of any of these points of the tree names all over, if it is one; at a cost of `reads` at most, as of
+    /// [`Field::all_at`].
+    pub fn wall<'p>(
+        &self,
+        points: impl Iterator<Item = &'p PointRecord>,
+        free_m: f32,
+        mut reads: u32,
+    ) -> Option<u16> {
+        let mut face = None;
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for point in points {
+            let in_field = self.to_field.apply(point.position);
+            if face.is_none() {
+                let Place::Cell(cell) = self.field.place(in_field.to_array()) else {
+                    return None;
+                };
+                face = Some(cell.face()?);
+            }
+            (low, high) = (low.min(in_field), high.max(in_field));
+        }
+        let extent = self.field.extent_m() + self.to_field.offset.abs().element_sum();
+        let free = Vec3::splat(free_m + ROUNDING * extent);
+        let [low, high] = [low - free, high + free].map(|p| self.field.in_cells(p.to_array()));
+        face.filter(|face| self.field.all_at(low, high, &mut reads, *face))
+    }
+
     /// Signed distance of the field's shape from `p` (tree frame), or a bound: by exact surfaces where they are known.
     #[inline(always)]
     pub fn distance(&self, p: [f32; 3]) -> f32 {
@@ -86,6 +118,7 @@ impl<'i> Job<'i> {
             guided: false,
             joined: Joined::new(),
             nodes: tree.nodes,
+            keys: Keys::new(index, tree.nodes.len()),
             points: tree.points,
             field: field.field,
             faces: field.faces,

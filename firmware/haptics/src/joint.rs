@@ -1,7 +1,7 @@
 //! Joints: what a target keeps apart needs no looking at.
 //!
-//! A target that is fully engaged keeps the part on its axis, and its mating faces, which make room for each other there ([`crate::guidance`]), cannot
-//! touch: coaxial cylinders of radii R and r are R − r apart, less what the part is off the axis. As long as
+//! A target that is fully engaged keeps the part on its axis, and its mating faces, which make room for each other there ([`crate::guidance`]),
+//! cannot touch: coaxial cylinders of radii R and r are R − r apart, less what the part is off the axis. As long as
 //!
 //! e + θ·l + 2·Δ + slack ≤ (R − r) + room
 //!
@@ -10,9 +10,9 @@
 //! nothing but the other face are passed over until the object has travelled to where that may end. What is felt is the same to the bit
 //! with and without: a joint forms and ends without a step because it changes the work and nothing else.
 //!
-//! Whether a leaf's points meet nothing else is asked of the field, as seldom as the field is asked about nodes: of all of them at once by what the bricks
-//! about them have to do with, or of each by the cells next to it. What is read is counted in the budget for what it takes, and a tick begins no more
-//! once it has spent a twelfth of its budget so: leaves not asked about are looked at as ever.
+//! Whether a leaf's points meet nothing else is asked of the field, as seldom as the field is asked about nodes: of all of them at once by what the
+//! bricks about them have to do with, or of each by the cells next to it. What is read is counted in the budget for what it takes, and a tick begins
+//! no more once it has spent a twelfth of its budget so: leaves not asked about are looked at as ever.
 //!
 //! R − r is taken from the scene's own exact surfaces, not from the target: faces that are not what the target says stay in the work. So do
 //! conical and flat ones, which have a stop of their own along the axis, and all others of both parts: a bolt's head still lands.
@@ -156,8 +156,8 @@ impl Walk<'_, '_, '_> {
         (clear >= LEAST_CLEAR_CELLS).then_some(clear * cell)
     }
 
-    /// Whether this tick may still ask what joints keep apart. A leaf not asked about is looked at, which is felt the same, and asked about again before
-    /// long.
+    /// Whether this tick may still ask what joints keep apart. A leaf not asked about is looked at, which is felt the same, and asked about again
+    /// before long.
     fn may_clear(&self) -> bool {
         self.clearing < LOOKUP * self.search.budget / CLEARING_SHARE
     }

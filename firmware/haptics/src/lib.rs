@@ -11,7 +11,9 @@
 //! | `pose`, `rotation` | rigid motions, between rotation vectors and quaternions |
 //! | `settings`, `io`, `state` | what a tick reads, returns and remembers |
 //! | `coupling` | virtual coupling between handle and object |
-//! | `proximity`, `job`, `coherence`, `contact` | sphere tree against field; what is not due yet; bounded store of contacts |
+//! | `proximity`, `leaf`, `job`, `contact` | sphere tree against field; bounded store of contacts |
+//! | `coherence`, `above`, `walls` | what is not due yet; which leaves have one face before them |
+//! | `overload` | what is left out when there is too much to look at |
 //! | `occupancy` | the same with a voxmap in place of the field: the textbook method, to be compared with |
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
 //! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
@@ -19,6 +21,7 @@
 //! | `joint` | what an engaged target keeps apart leaves the work |
 //! | `counted` | work on a motion that is told in an encoder's counts |
 //! | `passivity` | observer of the energy the coupling makes, and the valve that stops it |
+//! | `grip` | what targets would give the hand that it never brought: the part gives way in it instead |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
 //! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
@@ -36,6 +39,7 @@ mod contact;
 mod counted;
 mod coupling;
 mod explicit;
+mod grip;
 mod guidance;
 mod io;
 mod job;
@@ -57,6 +61,7 @@ mod state;
 mod step;
 mod tick;
 mod touching;
+mod walls;
 
 pub use glam::{Quat, Vec3};
 pub use guidance::{GuidanceState, TargetError};

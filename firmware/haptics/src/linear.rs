@@ -31,7 +31,7 @@ impl Symmetric6 {
         }
     }
 
-    /// Sum of `weight · v vᵀ`. Some 45 instructions each on a Cortex-M7, half of [`Self::add_outer`]: the sum stays in registers.
+    /// Sum of `weight · v vᵀ`. Some 55 instructions each on a Cortex-M7, half of [`Self::add_outer`]: the sum stays in registers.
     #[inline(never)]
     pub fn sum_of_outer<'a>(outer: impl Iterator<Item = (f32, &'a [f32; 6])>) -> Self {
         let mut sum = Self::ZERO;

@@ -1,9 +1,9 @@
 //! Contact of a pointshell with a voxmap: tangent planes.
 //!
-//! The textbook method (McNeely, Puterbaugh & Troy 1999, tangent-plane force model), kept beside the distance field to be compared with. A point of the
-//! held part in a *surface* voxel meets a plane through the voxel's centre with the point's own normal; with n the point's inward normal, p the point
-//! and c the centre, the gap is φ = (p − c)·n, and it is pushed along n. So a contact carries the same numbers as one from a distance field, and both
-//! integrators take both. The depth is wrong by up to half a voxel's diagonal, and jumps where a point goes from voxel to voxel.
+//! The textbook method (McNeely, Puterbaugh & Troy 1999, tangent-plane force model), kept beside the distance field to be compared with. A point of
+//! the held part in a *surface* voxel meets a plane through the voxel's centre with the point's own normal; with n the point's inward normal, p the
+//! point and c the centre, the gap is φ = (p − c)·n, and it is pushed along n. So a contact carries the same numbers as one from a distance field,
+//! and both integrators take both. The depth is wrong by up to half a voxel's diagonal, and jumps where a point goes from voxel to voxel.
 //!
 //! As in the paper: points of the held part only, none of the other's; *interior* voxels push nothing, they are flagged [`Flags::DEEP`]; *proximity*
 //! voxels only brake, and only with [`crate::Integrator::Explicit`]. Unlike it, the force layer is where the surface is, not two voxels outside.

@@ -1,23 +1,26 @@
 //! What is left out while there is more to look at than the budget allows, and when it is looked at again.
 //!
-//! A tick whose budget runs out carries over the contacts of leaves not reached, and the next goes on where it stopped: that does for a while, and for the
-//! first look at everything after a grab. When it lasts, every second of the points that are near is left out, then every second of the rest, until the budget
-//! suffices. Points come back, twice as many at a time, once the budget would allow it and nothing was carried over for a quarter of a second: contacts that
-//! come and go are felt more than fewer of them.
+//! A tick whose budget runs out carries over what pushed in leaves not reached, and the next goes on where it stopped: that does where two ticks get
+//! round, and for the first look at everything after a grab. Where they do not, every second of the points that are near is left out, then every
+//! second of the rest, until they do. Where an eighth of them is not the most of the work, no leaf is left out as a whole: a face may have no more
+//! than one. The ticks then go on getting round as they can. Points come back, twice as many at a time, once the budget would allow it and nothing
+//! was carried over for a quarter of a second: contacts that come and go are felt more than fewer of them.
 
 use crate::contact::MAX_CONTACTS;
+use crate::leaf::LEAF_THINNING;
 use crate::proximity::{Leaf, Used};
 
-/// Ticks in a row whose budget may run out before points are left out.
-const OVERRUNS_BORNE: u8 = 2;
+/// Ticks in a row whose budget may run out with the last leaf not reached: so whatever is near is looked at every second tick, or points are left
+/// out.
+const OVERRUNS_BORNE: u8 = 1;
 /// Likewise after a grab, until all was looked at for the first time.
 const FIRST_LOOK: u8 = 64;
 /// Of the points that are near each 128th is looked at in any case.
 const MOST_THINNING: u8 = 7;
 /// Ticks in a row whose budget must suffice before more points are looked at.
 const CALM_TICKS: u16 = 250;
-/// Of a budget or a store, what twice the points may be expected to take: 8/9 of the one, 8/9 of the other.
-const ROOM: [u32; 2] = [8, 9];
+/// A budget or a store has room for twice the points when they are expected to fill less than eight ninths of it.
+const NINTHS: u32 = 8;
 
 /// How much is left out, and for how long it went well or ill.
 #[derive(Clone, Copy, Debug)]
@@ -38,8 +41,6 @@ pub(crate) struct Searched {
     pub stopped: Option<Leaf>,
     /// Look-ups.
     pub used: Used,
-    /// What a step takes, look-ups.
-    pub step_cost: u32,
     /// Look-ups allowed.
     pub budget: u32,
     /// Contacts that overlap.
@@ -67,15 +68,15 @@ impl Overload {
         let Searched { touching, lost, .. } = *searched;
         if lost > 0 {
             self.thin_to_fit(touching + lost);
-        } else if overrun {
-            self.thinning = (self.thinning + 1).min(MOST_THINNING);
+        } else if overrun && self.thinning < MOST_THINNING && self.helps(searched) {
+            self.thinning += 1;
         } else if self.thinning > 0 && self.calm >= CALM_TICKS && has_room(searched) {
             self.thinning -= 1;
             self.calm = 0;
         }
     }
 
-    /// Whether the budget ran out once too often.
+    /// Whether the budget ran out once too often without getting round.
     fn bear(&mut self, searched: &Searched) -> bool {
         let Some(stop) = searched.stopped else {
             self.patience = OVERRUNS_BORNE;
@@ -84,8 +85,9 @@ impl Overload {
         };
         self.calm = 0;
         if stop < searched.start {
-            // Once round: the first look is over.
-            self.patience = self.patience.min(OVERRUNS_BORNE);
+            // Past the last leaf and on from the first: the first look is over, too.
+            self.patience = OVERRUNS_BORNE;
+            return false;
         }
         let overrun = self.patience == 0;
         self.patience = if overrun {
@@ -96,10 +98,18 @@ impl Overload {
         overrun
     }
 
+    /// Whether half the points would make a difference, not only the way to them be too long; and where that leaves out whole leaves, whether there
+    /// are so many that faces are not left out with them.
+    fn helps(&self, searched: &Searched) -> bool {
+        let part = if self.thinning < LEAF_THINNING { 4 } else { 2 };
+        part * searched.used.on_points > searched.budget
+    }
+
     /// To where three quarters of a store are left of so many `touching` points seen at this thinning.
     ///
-    /// More than the store holds must not touch: which are kept would follow the last tick's tilt and tilt the part the other way, and the stiffness that
-    /// comes and goes with them makes energy. A flat face on more than 256 points rattled so from tick to tick, by as much as it was deep in.
+    /// More than the store holds must not touch: which are kept would follow the last tick's tilt and tilt the part the other way, and the
+    /// stiffness that comes and goes with them makes energy. A flat face on more than 256 points rattled so from tick to tick, by as much as it was
+    /// deep in.
     fn thin_to_fit(&mut self, mut touching: u32) {
         while self.thinning < MOST_THINNING && touching * 4 > MAX_CONTACTS as u32 * 3 {
             self.thinning += 1;
@@ -110,9 +120,9 @@ impl Overload {
 
 /// Whether twice the points would do. What leads to them costs the same as before.
 fn has_room(searched: &Searched) -> bool {
-    let [share, of] = ROOM;
-    let twice = searched.used.all + searched.used.on_points + searched.step_cost;
-    twice * of < searched.budget * share && 2 * searched.touching * of < MAX_CONTACTS as u32 * share
+    let has_room = |filled: u32, of: u32| 9 * filled < NINTHS * of;
+    let twice = searched.used.all + searched.used.on_points;
+    has_room(twice, searched.budget) && has_room(2 * searched.touching, MAX_CONTACTS as u32)
 }
 
 #[cfg(test)]
@@ -138,9 +148,8 @@ mod tests {
             stopped: None,
             used: Used {
                 all,
-                on_points: all / 2,
+                on_points: 3 * all / 4,
             },
-            step_cost: 20,
             budget: 500,
             touching: 10,
             lost: 0,
@@ -156,7 +165,7 @@ mod tests {
         }
         // From the end to the beginning again.
         o.learn(&stopped(500, 5));
-        for _ in 0..OVERRUNS_BORNE {
+        for _ in 0..=OVERRUNS_BORNE {
             o.learn(&stopped(5, 15));
         }
         assert_eq!(o.thinning(), 1);
@@ -170,6 +179,26 @@ mod tests {
             o.learn(&stopped(0, 1));
         }
         assert_eq!(o.thinning(), 1);
+    }
+
+    /// Points are left out for the work they make, whole leaves for more of it.
+    #[test]
+    fn a_way_too_long_leaves_nothing_out() {
+        let mut o = Overload::NEW;
+        let mut play = |on_points| {
+            for _ in 0..1000 {
+                let used = Used { all: 500, on_points };
+                o.learn(&Searched {
+                    used,
+                    ..stopped(5, 40)
+                });
+            }
+            o.thinning()
+        };
+        assert_eq!(play(125), 0);
+        assert_eq!(play(126), LEAF_THINNING);
+        assert_eq!(play(250), LEAF_THINNING);
+        assert_eq!(play(251), MOST_THINNING);
     }
 
     #[test]

@@ -1,36 +1,42 @@
 //! Passivity of the coupling: an observer of the energy it makes, and a valve that turns the handle's wrench down before that can be felt.
 //!
-//! The handle is sampled and its wrench held from tick to tick, so a virtual spring can give back more than was put in; speed that is told late makes of a damper
-//! a motor. Neither can happen unseen, because the work of a held wrench is known exactly once the next pose is: W = F·Δp + τ·Δφ. The coupling is a two-port
-//! between handle and object; what it makes in a tick is what left by both ports and what is stored more than before,
+//! The handle is sampled and its wrench held from tick to tick, so a virtual spring can give back more than was put in; speed that is told late makes
+//! of a damper a motor. Neither can happen unseen, because the work of a held wrench is known exactly once the next pose is: W = F·Δp + τ·Δφ. The
+//! coupling is a two-port between handle and object; what it makes in a tick is what left by both ports and what is stored more than before,
 //!
 //! G = W_handle + s·(W_object + ΔU), U = the potential of a spring that slips at F_max.
 //!
-//! An energy tank pays for G and is filled by what coupling and handle ([`crate::PassivitySettings::damping`]) dissipate, to [`crate::PassivitySettings::tank_j`] and no further: energy that an hour of
-//! friction took out is not there to be spent by an instability (the late action of a plain passivity observer), and since U is part of the account a spring that was
-//! pressed may give back all of it. Below half of the tank the valve s falls, by up to a quarter a tick. It scales the wrench as a whole: no speed is divided by or fed
-//! back, so nothing buzzes at rest, and it works where an added damper would not because speed itself is late. Turning it down frees s·U, which
-//! goes to the tank; turning it up again costs as much, is paid by the tank, and takes 20 s in contact and half a second out of it.
+//! An energy tank pays for G and is filled by what coupling and handle ([`crate::PassivitySettings::damping`]) dissipate, to
+//! [`crate::PassivitySettings::tank_j`] and no further: energy that an hour of friction took out is not there to be spent by an instability (the late
+//! action of a plain passivity observer), and since U is part of the account a spring that was pressed may give back all of it. Below half of the
+//! tank the valve s falls, by up to a quarter a tick. It scales the wrench as a whole: no speed is divided by or fed back, so nothing buzzes at rest,
+//! and it works where an added damper would not because speed itself is late. Turning it down frees s·U, which goes to the tank; turning it up again
+//! costs as much, is paid by the tank, and takes 20 s in contact and half a second out of it.
+//!
+//! What is behind the coupling is the object's port: targets that take hold there make energy of nothing, and what the hand is given of it `grip`
+//! keeps from it, by the same account of W.
 //!
 //! A wrench that reaches the motors late works on another motion than it was made for: rigs whose drivers take ticks to answer say so in
 //! [`crate::PassivitySettings::delay_ticks`]. So do those whose encoders count ([`crate::PassivitySettings::position_count_m`]): a sum over
-//! differences of counts takes for made what is dissipated between them, and shut the valve on a hand that leaned and trembled for half a minute (see the source of `counted`). What is not seen: energy below
-//! one count, and a wrench that the application takes down (a ceiling, the fade of a soft stop), which is taken
-//! for whole. Both make W too small or too large by no more than one count, or one fade, of force. A ramp from nothing therefore raises the coupling's own limits,
-//! with a part that slips in the hand meanwhile ([`crate::State::set_slipping`]): scaling the wrench behind the coupling makes up to the object's kinetic energy.
+//! differences of counts takes for made what is dissipated between them, and shut the valve on a hand that leaned and trembled for half a minute (see
+//! the source of `counted`). What is not seen: energy below one count, and a wrench that the application takes down (a ceiling, the fade of a soft
+//! stop), which is taken for whole. Both make W too small or too large by no more than one count, or one fade, of force. A ramp from nothing
+//! therefore raises the coupling's own limits, with a part that slips in the hand meanwhile ([`crate::State::set_slipping`]): scaling the wrench
+//! behind the coupling makes up to the object's kinetic energy.
 //!
-//! After the energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli, *Bilateral telemanipulation with time delays: a two-layer approach combining
-//! passivity and transparency*, IEEE T-RO 27(4), 2011, with the reference energy of Ryu, Preusche, Hannaford and Hirzinger, *Time domain
-//! passivity control with reference energy following*, IEEE T-CST 13(5), 2005, and stiffness paid for as in Ferraguti, Secchi and Fantuzzi, *A tank-based approach
-//! to impedance control with variable stiffness*, ICRA 2013. Cost: about 450 instructions.
+//! After the energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli, *Bilateral telemanipulation with time delays: a two-layer approach
+//! combining passivity and transparency*, IEEE T-RO 27(4), 2011, with the reference energy of Ryu, Preusche, Hannaford and Hirzinger, *Time domain
+//! passivity control with reference energy following*, IEEE T-CST 13(5), 2005, and stiffness paid for as in Ferraguti, Secchi and Fantuzzi, *A
+//! tank-based approach to impedance control with variable stiffness*, ICRA 2013. Cost: about 450 instructions.
 
 use glam::{Quat, Vec3};
 
 use crate::counted::Counted;
 use crate::coupling::Coupling;
+use crate::grip::{Grip, Hold};
 use crate::limits::length;
 use crate::pose::{Pose, Twist, Wrench};
-use crate::settings::{CouplingSettings, MAX_DELAY_TICKS, Settings};
+use crate::settings::{CouplingSettings, MAX_DELAY_TICKS, PassivitySettings, Settings};
 
 /// The most the valve closes in a tick, once the tank is empty.
 const CLOSING: f32 = 0.25;
@@ -67,6 +73,7 @@ pub(crate) struct Tank {
     angular: Counted,
     /// U, J.
     stored: f32,
+    grip: Grip,
     /// Work on the object since, J.
     to_object: f32,
     /// Wrenches of the last ticks, newest first, where the motors are late.
@@ -90,6 +97,7 @@ impl Tank {
             linear: Counted::new(),
             angular: Counted::new(),
             stored: 0.0,
+            grip: Grip::new(),
             to_object: 0.0,
             given: [Wrench::ZERO; MAX_DELAY_TICKS + 1],
         }
@@ -109,18 +117,21 @@ impl Tank {
         let stored = potential(coupling, &settings.coupling);
         let open = 1.0 - self.seen.softened;
         let size = settings.passivity.tank_j;
-        if self.known && size > 0.0 {
+        if self.known {
             let moved = handle.position - self.handle.position;
             let turned = small_turn(self.handle.orientation, handle.orientation);
             let told = &settings.passivity;
             let to_handle = self.linear.work(acting.force, moved, told.position_count_m)
                 + (self.angular).work(acting.torque, turned, told.angle_count_rad);
+            self.grip.gave(to_handle);
             let made = to_handle + open * (self.to_object + stored - self.stored);
             let rubbed = settings.passivity.damping * handle_twist.linear.dot(moved)
                 + settings.passivity.angular_damping * handle_twist.angular.dot(turned);
-            self.seen.made_j += made;
-            let drawn = made - if rubbed > 0.0 { rubbed } else { 0.0 };
-            self.account(drawn, stored, object_energy, settings.period_s, size);
+            if size > 0.0 {
+                self.seen.made_j += made;
+                let drawn = made - if rubbed > 0.0 { rubbed } else { 0.0 };
+                self.account(drawn, stored, object_energy, settings.period_s, size);
+            }
         }
         self.known = true;
         self.handle = handle;
@@ -136,6 +147,28 @@ impl Tank {
         self.given.rotate_right(1);
         self.given[0] = given;
         self.given[delay_ticks.min(MAX_DELAY_TICKS)]
+    }
+
+    /// See [`Grip::measure`]; before [`Self::balance`].
+    pub fn measure(&self, coupling: &mut Coupling, handle: Quat) {
+        self.grip.measure(coupling, handle);
+    }
+
+    /// See [`Grip::give_way`]; after [`Self::balance`].
+    pub fn give_way(
+        &mut self,
+        coupling: &mut Coupling,
+        handle: Quat,
+        hold: Hold,
+        settings: &Settings,
+    ) -> f32 {
+        let open = 1.0 - self.seen.softened;
+        (self.grip).give_way(coupling, &mut self.stored, handle, hold, open, settings)
+    }
+
+    /// See [`Grip::keep`].
+    pub fn keep(&mut self, behind: f32, settings: &PassivitySettings) {
+        self.grip.keep(self.stored, behind, settings);
     }
 
     /// After the step: the object moved with `twist` under `pull`.
@@ -181,7 +214,7 @@ impl Tank {
 }
 
 /// Energy in the coupling's springs, J: ½·k·d² until they slip at F, F·d − F²/(2·k) from there on.
-fn potential(coupling: &Coupling, settings: &CouplingSettings) -> f32 {
+pub(crate) fn potential(coupling: &Coupling, settings: &CouplingSettings) -> f32 {
     let spring = |k: f32, stretch: Vec3, most: f32| {
         let squared = stretch.length_squared();
         // The root, dear without an instruction of its own, only where it slips.

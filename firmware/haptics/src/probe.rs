@@ -48,8 +48,8 @@ pub struct Nearest {
     pub field_distance_m: f32,
     /// The distance is one to an analytic face or edge, within single precision.
     pub exact: bool,
-    /// The point lies where the field stores distances, or past a tangent plane; when neither this nor `exact`, the distance is only a bound: at least so far apart,
-    /// or at least so deep.
+    /// The point lies where the field stores distances, or past a tangent plane; when neither this nor `exact`, the distance is only a bound: at
+    /// least so far apart, or at least so deep.
     pub in_band: bool,
     /// From the moving part's centre of mass to the point, axes of the fixed part, m.
     pub arm: Vec3,
@@ -184,7 +184,8 @@ impl Prober {
             busy: false,
             thinning: 0,
             budget: u32::MAX,
-            step_cost: 0,
+            reserved: 0,
+            carried: 0,
             braking_m: 0.0,
             guidance: &guidance,
             guidance_settings: &Settings::default().guidance,
@@ -193,7 +194,7 @@ impl Prober {
         if voxmaps {
             self.coherence.forget();
         }
-        let mut touching = search.walk(&mut self.coherence, &mut self.contacts, &mut touched);
+        let mut touching = search.walk(false, &mut self.coherence, &mut self.contacts, &mut touched);
         let mut searches = [0, 1].map(|way| NearestSearch::new(&jobs[way], [&other, &held][way]));
         for (search, job) in searches.iter_mut().zip(&jobs) {
             if !job.field.is_occupancy() {
@@ -227,7 +228,7 @@ impl Prober {
             contact.phase = Phase::Parting;
         }
         let k = Stiffness { point: k, guided: k };
-        let wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0);
+        let wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0, 1.0);
         work.contacts = pushing as u16;
         Ok(Probe {
             nearest,

@@ -4,11 +4,12 @@
 //! or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every sphere that the
 //! field's distance at its centre puts farther off than the margin.
 //!
-//! When the budget runs out, work is left undone in this order. For some ticks, as after a grab, what pushed in leaves not reached is carried over
-//! with the gaps the last motion left them, and the next tick goes on where this one stopped, round and round. When that does not catch up,
-//! points are left out evenly: each second, fourth, … 128th of those that are near is looked at, always the same ones, until there is room
-//! again ([`crate::overload`]); the error bound of the pointshell grows by four at each step, all else stays as it was. Carrying is prepared for once a
-//! tick needed half the budget.
+//! When the budget runs out, work is left undone in this order. The step has no more solves than the budget has room for, four at least. What pushed
+//! in leaves not reached is carried over with the gaps the last motion left them, and the next tick goes on where this one stopped, round and round.
+//! When two ticks do not get round, but for those after a grab, points are left out evenly where they are the work: each second, fourth, eighth of
+//! those that are near is looked at where points take a quarter of the budget, and where they still take half of it whole leaves are left out, to
+//! each 128th point; always the same ones, until there is room again ([`crate::overload`]). The error bound of the pointshell grows by four at each
+//! step, all else stays as it was. Carrying is prepared for once a tick needed half the budget.
 //!
 //! Cost: see [`crate::tick()`]; the look-ups in the field are two thirds of it.
 
@@ -16,8 +17,8 @@ use glam::Vec3;
 use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage, Shape};
 
 use crate::above::Above;
-use crate::analytic::{OnFace, edge_face, exact, on_face};
-use crate::coherence::{ALL, Coherence, Due, Keys, Known, SHORTEST_SHARE};
+use crate::analytic::{OnFace, exact_on_face, on_face, with_room};
+use crate::coherence::{ALL, Coherence, Due, Known, SHORTEST_SHARE};
 use crate::contact::{Contacts, Phase};
 use crate::guidance::{Guidance, Mated, Mating};
 use crate::io::{Flags, Work};
@@ -35,22 +36,27 @@ const LEAST_GRADIENT2: f32 = 0.01;
 /// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
 /// the other end moves half as fast again. So the approach by either is taken this many times.
 pub(crate) const APPROACH: f32 = 2.0;
-/// What would be due after so many ticks like the last one counts as near, and is looked at every tick: finding out whether it is, with all of a leaf, costs as much.
-const NEAR_TICKS: f32 = 2.0;
-/// A look-up, 170 instructions: what the budget is counted in, here in eighths of one. What joints take: [`crate::joint`].
+/// What would be due within so many more ticks like the last one counts as near, and is looked at every tick: finding out whether it is, with all of
+/// a leaf, costs as much.
+const NEAR_TICKS: f32 = 4.0;
+/// A look-up, 190 instructions: what the budget is counted in, here in eighths of one. What joints take: [`crate::joint`].
 pub(crate) const LOOKUP: u32 = 8;
 /// A point at an edge, besides.
-const EDGE: u32 = 5;
+const EDGE: u32 = 6;
 /// A point within the margin, besides.
-const NEAR: u32 = 7;
-/// A point that may touch, besides: half of them do, and in most ticks three solves are enough.
-const CANDIDATE: u32 = 16;
+const NEAR: u32 = 6;
+/// Where targets guide, besides, to ask for the faces' mating,
+const MATING: u32 = 2;
+/// and at an edge for the room its faces have.
+const ROOM: u32 = 8;
+/// A point that may touch, besides: half of them do, and in most ticks two solves are enough.
+const CANDIDATE: u32 = 11;
 /// To begin with a leaf.
 const LEAF: u32 = 6;
 /// To ask the field about a node.
-const NODE: u32 = 15;
+const NODE: u32 = 12;
 /// To pass over a node of which enough is known.
-const PASSED_OVER: u32 = 4;
+const PASSED_OVER: u32 = 5;
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -106,8 +112,10 @@ pub(crate) struct Search<'s, 'i> {
     pub thinning: u8,
     /// Work allowed, look-ups.
     pub budget: u32,
-    /// What of it the step is expected to take.
-    pub step_cost: u32,
+    /// What of it is the step's.
+    pub reserved: u32,
+    /// Contacts that will be in it though none is found, for they are carried over.
+    pub carried: u32,
     /// Points that come this near are braked, m; 0 for no braking. Then points in proximity voxels are wanted too.
     pub braking_m: f32,
     /// Where guided faces meet, contact makes room.
@@ -143,23 +151,11 @@ impl<'i> Search<'_, 'i> {
         contacts: &mut Contacts,
         work: &mut Work,
     ) -> (Option<Leaf>, Used) {
-        contacts.begin(self.busy);
-        let mut walk = Walk {
-            search: self,
-            horizon: coherence.horizon(self.margin),
-            coherence,
-            contacts,
-            work,
-            spent: LOOKUP * self.step_cost,
-            on_points: 0,
-            left_out: 0,
-            clearing: 0,
-            mated: Mated::NONE,
-            near: 0,
-        };
+        let mut walk = self.walk(self.busy, coherence, contacts, work);
         let stop = walk
             .jobs(start, None)
             .or_else(|| walk.jobs(Leaf::FIRST, Some(start)));
+        walk.spent -= CANDIDATE * walk.expected;
         let used = Used {
             all: walk.used(),
             on_points: walk.on_points / LOOKUP,
@@ -206,24 +202,28 @@ impl<'i> Search<'_, 'i> {
         Some(job)
     }
 
-    /// A walk that has not begun, into an empty store.
+    /// A walk that has not begun, into an empty store; with `put_aside` what that held can be carried over.
     pub fn walk<'w>(
         &'w self,
+        put_aside: bool,
         coherence: &'w mut Coherence,
         contacts: &'w mut Contacts,
         work: &'w mut Work,
     ) -> Walk<'w, 'w, 'i> {
-        contacts.begin(false);
+        contacts.begin(put_aside);
         Walk {
             search: self,
             horizon: coherence.horizon(self.margin),
             coherence,
             contacts,
             work,
-            spent: LOOKUP * self.step_cost,
+            spent: LOOKUP * self.reserved + CANDIDATE * self.carried,
+            expected: self.carried,
             on_points: 0,
-            left_out: 0,
+            aside: 0,
             clearing: 0,
+            left_out: 0,
+            asked_walls: 0,
             mated: Mated::NONE,
             near: 0,
         }
@@ -242,10 +242,16 @@ pub(crate) struct Walk<'w, 's, 'i> {
     pub spent: u32,
     /// Of that, on points rather than the way to them.
     on_points: u32,
-    /// Leaves looked at for what thinning leaves out of them.
-    pub left_out: u32,
+    /// Of that, for what thinning leaves out of the leaf that is looked at.
+    pub aside: u32,
     /// Of that, for what joints keep apart.
     pub clearing: u32,
+    /// Candidates paid for and not yet found.
+    expected: u32,
+    /// Leaves looked at for what thinning leaves out of them.
+    pub left_out: u32,
+    /// Leaves whose walls were asked for.
+    pub asked_walls: u32,
     /// What guidance said of the last point's faces.
     mated: Mated,
     /// Points within the margin.
@@ -259,6 +265,7 @@ impl Walk<'_, '_, '_> {
     }
 
     /// One point of the leaf `node`: as `found`, or looked up.
+    #[inline(never)]
     pub fn one(&mut self, job: &Job<'_>, node: u32, point: &PointRecord, found: Option<OnFace>) {
         let leaf = Leaf { job: job.index, node };
         match found {
@@ -299,7 +306,7 @@ impl Walk<'_, '_, '_> {
         }
         let edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
         let limit = LOOKUP.saturating_mul(self.search.budget);
-        let keys = Keys::new(job.index, job.nodes.len());
+        let keys = job.keys;
         let mut above = Above::new();
         let mut index = from;
         while index < to {
@@ -376,7 +383,8 @@ impl Walk<'_, '_, '_> {
                     mask => self.thinned(job, here, points, mask),
                 }
             });
-            self.on_points += self.spent - before;
+            self.on_points += self.spent - before - self.aside;
+            self.aside = 0;
         }
         above.close(index, self.coherence);
         None
@@ -413,12 +421,15 @@ impl Walk<'_, '_, '_> {
     fn at_edge(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, cell: &Cell<'_>, p: Vec3) -> f32 {
         self.spent += EDGE;
         let nearby = job.field.nearby(cell);
-        if let Some((distance, face)) = exact(job.faces, nearby, p) {
-            if distance < self.search.margin
-                && let Some(mut found) = on_face(job.faces, face, p)
-            {
-                if distance < self.search.slack {
-                    found.edge_face = edge_face(job.faces, nearby, face, distance, p);
+        if let Some(mut found) = exact_on_face(job.faces, nearby, p) {
+            let distance = found.distance;
+            if distance < self.search.margin {
+                if job.guided {
+                    self.spent += ROOM;
+                    // At the rim of a guided face the other face gives way with it: the part would stand on it else.
+                    let most = self.search.guidance_settings.allowance_m;
+                    let room = |face| self.mating(job, leaf, point, face).room;
+                    found = with_room(found, job.faces, nearby, p, most, room);
                 }
                 self.near(job, leaf, point, &found);
             }
@@ -448,23 +459,14 @@ impl Walk<'_, '_, '_> {
 
     /// Offers a point within the margin as a contact.
     #[inline(always)]
-    fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: &OnFace) {
+    pub fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: &OnFace) {
         self.near += 1;
         self.spent += NEAR;
         let n = job.to_push * found.normal;
-        let (moving, fixed) = {
-            let (own, other) = ([point.face, point.edge_face], [found.face, NO_FACE]);
-            if job.backward { (other, own) } else { (own, other) }
-        };
+        let (moving, fixed) = sides(job, point, found.face);
         let mating = if job.guided {
-            let search = self.search;
-            (search.guidance).mating_after(
-                &mut self.mated,
-                leaf.part(),
-                moving,
-                fixed,
-                search.guidance_settings,
-            )
+            self.spent += MATING;
+            self.mating(job, leaf, point, found.face)
         } else {
             Mating::NONE
         };
@@ -496,10 +498,27 @@ impl Walk<'_, '_, '_> {
         contact.leaf = leaf;
     }
 
+    /// What guidance says of a point and a face.
+    fn mating(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, face: u16) -> Mating {
+        let (moving, fixed) = sides(job, point, face);
+        let search = self.search;
+        (search.guidance).mating_after(
+            &mut self.mated,
+            leaf.part(),
+            moving,
+            fixed,
+            search.guidance_settings,
+        )
+    }
+
     /// A point may touch.
     #[inline(always)]
     pub fn count_candidate(&mut self) {
-        self.spent += CANDIDATE;
+        if self.expected > 0 {
+            self.expected -= 1;
+        } else {
+            self.spent += CANDIDATE;
+        }
         self.work.candidates = self.work.candidates.saturating_add(1);
     }
 
@@ -512,4 +531,11 @@ impl Walk<'_, '_, '_> {
     pub fn left(&self) -> u32 {
         self.search.budget.saturating_sub(self.used())
     }
+}
+
+/// Faces of the held part and of the other one, where a point meets a face.
+#[inline(always)]
+fn sides(job: &Job<'_>, point: &PointRecord, face: u16) -> ([u16; 2], [u16; 2]) {
+    let (own, other) = ([point.face, point.edge_face], [face, NO_FACE]);
+    if job.backward { (other, own) } else { (own, other) }
 }

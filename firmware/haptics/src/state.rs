@@ -40,8 +40,8 @@ pub struct State {
     pub(crate) busy: bool,
     /// What is left out while there is too much to look at.
     pub(crate) overload: Overload,
-    /// What the last step took, look-ups.
-    pub(crate) step_cost: u32,
+    /// Contacts that pushed in the last tick.
+    pub(crate) pushing: u16,
     /// Smallest cell of any field in the scene, m; 0 without parts.
     pub(crate) finest_cell_m: f32,
     /// Smallest voxel of any voxmap in the scene, m; 0 when there is none.
@@ -123,7 +123,7 @@ impl State {
             resume: Leaf::FIRST,
             busy: false,
             overload: Overload::NEW,
-            step_cost: 0,
+            pushing: 0,
             finest_cell_m: 0.0,
             finest_voxel_m: 0.0,
             guidance: Guidance::new(),
@@ -246,10 +246,12 @@ impl State {
         self.tank.seen
     }
 
-    /// Whether the part slips in the hand for good where the coupling would have to pull harder than it may, instead of being pulled back with all it may.
+    /// Whether the part slips in the hand for good where the coupling would have to pull harder than it may, instead of being pulled back with all it
+    /// may.
     ///
-    /// For as long as a grip is still being made firm ([`crate::CouplingSettings::force_max_n`] raised from tick to tick): a coupling that is stretched farther than it can hold
-    /// would gain d·ΔF with each step of its limit, energy that nobody put in; one that has slipped stores no more than it can give back.
+    /// For as long as a grip is still being made firm ([`crate::CouplingSettings::force_max_n`] raised from tick to tick): a coupling that is
+    /// stretched farther than it can hold would gain d·ΔF with each step of its limit, energy that nobody put in; one that has slipped stores no more
+    /// than it can give back.
     pub fn set_slipping(&mut self, slipping: bool) {
         self.slipping = slipping;
     }
@@ -269,7 +271,7 @@ impl State {
         self.resume = Leaf::FIRST;
         self.busy = false;
         self.overload = Overload::NEW;
-        self.step_cost = 0;
+        self.pushing = 0;
         self.tank.forget();
         self.guidance.forget();
         self.contacts.clear();
@@ -301,6 +303,6 @@ mod tests {
     /// The smallest board has 512 KiB of RAM.
     #[test]
     fn fits_a_board() {
-        assert!(size_of::<State>() <= 118 * 1024, "{}", size_of::<State>());
+        assert!(size_of::<State>() <= 126 * 1024, "{}", size_of::<State>());
     }
 }

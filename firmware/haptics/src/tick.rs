@@ -1,6 +1,6 @@
 //! One tick of the force law.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use heapless::Vec;
 use mortise_protocol::image::SceneImage;
 
@@ -8,6 +8,7 @@ use crate::body::Grabbed;
 use crate::contact::Phase;
 use crate::coupling::Coupling;
 use crate::explicit;
+use crate::grip::Hold;
 use crate::guidance::{At, GuidanceState};
 use crate::io::{FacePairs, Flags, Input, Output, Work};
 use crate::limits::limit;
@@ -15,10 +16,11 @@ use crate::linear::inverse_sqrt;
 use crate::overload::Searched;
 use crate::pose::{Pose, Twist, Wrench, renormalize};
 use crate::proximity::{Leaf, Search};
+use crate::pull::Pull;
 use crate::rotation;
 use crate::settings::{CouplingSettings, Integrator, Settings};
 use crate::state::State;
-use crate::step::{Solution, Step, Stiffness};
+use crate::step::{MAX_SOLVES, Solution, Step, Stiffness};
 use crate::touching::{Scenery, touching_faces};
 
 /// Positions beyond this are an encoder's fault, not a place, m.
@@ -37,8 +39,10 @@ const START_M_PER_S: f32 = 0.02;
 /// See [`START_M_PER_S`].
 const FASTER: f32 = 2.0;
 
-/// So many solves are expected of every step: some do not settle sooner, and nothing tells of them the tick before.
-const LEAST_SOLVES: u8 = 5;
+/// So many solves with contacts every step may take, whatever the search took; most do with fewer.
+const LEAST_SOLVES: u8 = 4;
+/// To find what a target pulls with, and what follows from it, look-ups. What it takes in a solve: [`solve_cost`].
+const PULL: u32 = 6;
 /// The diagonal of a cell, cells.
 const DIAGONAL_CELLS: f32 = 1.733;
 
@@ -52,11 +56,11 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
-/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-22, thesis pair with 20 µm clearance baked at 0.5 mm cells with a
-/// pointshell of 25 µm: 72,000 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 18,260 in free motion. A peg of 0.7 m with 0.2 mm
-/// clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below 120,000.
-/// Guided into a fit of 0.2 mm, joints asked about on the way: 102,300 at worst, of 0.02 mm 113,280; by collision alone into the latter 125,800
-/// (`mortise lab rate --quick`).
+/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-22, thesis pair with 20 µm clearance baked at 0.5 mm cells
+/// with a pointshell of 25 µm: 72,480 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 18,440 in free motion. A peg of 0.7 m
+/// with 0.2 mm clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below
+/// 120,000. Guided into a fit of 0.2 mm, joints asked about on the way: 104,360 at worst, of 0.02 mm 118,720
+/// (`mortise lab figures constraints --quick`); by collision alone into the latter some 138,000 (`mortise lab rate --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
@@ -75,17 +79,28 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         return out;
     };
     let limits = state.slipping.then_some(&settings.coupling);
-    let (mut grabbed, coupling) = take_hold(grabbed, handle, input.handle_twist, limits);
+    let (mut grabbed, mut coupling) = take_hold(grabbed, handle, input.handle_twist, limits);
+    let object_energy = grabbed.moving_energy(settings.object.mass_kg);
+    let mut held = settings.coupling;
     let open = if input.enabled {
-        let object_energy = grabbed.moving_energy(settings.object.mass_kg);
-        (state.tank).balance(
+        (state.tank).measure(&mut coupling, handle.orientation);
+        let open = (state.tank).balance(
             handle,
             input.handle_twist,
             &coupling,
             state.previous_wrench,
             object_energy,
             settings,
-        )
+        );
+        let hold = match (state.guidance.is_empty(), state.pushing) {
+            (false, _) => Hold::Targets,
+            (true, 0) => Hold::Nothing,
+            (true, _) => Hold::Contacts,
+        };
+        let share = (state.tank).give_way(&mut coupling, handle.orientation, hold, settings);
+        held.b_t *= share;
+        held.b_r *= share;
+        open
     } else {
         state.tank.forget();
         1.0
@@ -108,10 +123,13 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     };
     let mut pulls = Vec::new();
     state.guidance.add_pulls(&at, &mut pulls);
+    let pulled: f32 = pulls.iter().map(Pull::stored).sum();
+    let turning = grabbed.turning_energy(settings.object.mass_kg, gyration2);
+    (state.tank).keep(object_energy + turning + pulled, &settings.passivity);
     let guided_share = state.guidance.share(&at);
     let step = Step {
         coupling: &coupling,
-        settings: &settings.coupling,
+        settings: &held,
         period_s: settings.period_s,
         mass_kg: settings.object.mass_kg,
         gyration2,
@@ -160,7 +178,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         return state.still(work);
     }
     let pull = slipping(
-        coupling.pull(&settings.coupling, settings.period_s, twist),
+        coupling.pull(&held, settings.period_s, twist),
         settings,
         &mut work.flags,
     );
@@ -204,11 +222,18 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     out
 }
 
-/// What a step took, in the look-ups of the budget (170 instructions): a solve 8 and each target's pull in it 8, and past the third one a quarter of
-/// one for each candidate.
-fn step_cost(solution: &Solution, candidates: u16, pulls: usize) -> u32 {
-    let solves = u32::from(solution.solves.max(LEAST_SOLVES));
-    (8 + 8 * pulls as u32) * solves + solves.saturating_sub(3) * u32::from(candidates) / 4
+/// A solve with so many pulls, in the look-ups of the budget.
+fn solve_cost(pulls: usize) -> u32 {
+    8 + 5 * pulls as u32 / 2
+}
+
+/// How many solves there may be with contacts, when so many look-ups are `left`: past the third, a solve takes three eighths of one for each
+/// candidate too.
+fn most_solves(left: u32, candidates: u16, pulls: usize) -> u8 {
+    let more = left / (solve_cost(pulls) + 3 * u32::from(candidates) / 8);
+    u32::from(LEAST_SOLVES)
+        .saturating_add(more)
+        .min(u32::from(MAX_SOLVES)) as u8
 }
 
 impl State {
@@ -228,6 +253,11 @@ impl State {
     ) -> Solution {
         let explicit = settings.integrator == Integrator::Explicit;
         let braking_m = if explicit { self.finest_cell_m } else { 0.0 };
+        let pulls = step.pulls.len();
+        let budget = settings.contact.point_budget;
+        let reserved = solve_cost(pulls) * u32::from(free.solves + LEAST_SOLVES) + PULL * pulls as u32;
+        // Whatever pulls, contact is looked for.
+        let reserved = reserved.min(budget / 2);
         let search = Search {
             scene,
             parts: &self.parts,
@@ -243,8 +273,9 @@ impl State {
             inverse_length: 1.0 / step.length,
             busy: self.busy,
             thinning: self.overload.thinning(),
-            budget: settings.contact.point_budget,
-            step_cost: self.step_cost,
+            budget,
+            reserved,
+            carried: if self.busy { u32::from(self.pushing) } else { 0 },
             braking_m,
             guidance: &self.guidance,
             guidance_settings: &settings.guidance,
@@ -252,15 +283,14 @@ impl State {
         let start = self.resume;
         let (stopped, used) = search.run(start, &mut self.coherence, &mut self.contacts, work);
         self.resume = stopped.unwrap_or(Leaf::FIRST);
-        self.busy = used.all > settings.contact.point_budget / 2;
+        self.busy = used.all > budget / 2;
         work.flags.insert_if(search.thinning > 0, Flags::BUDGET_EXCEEDED);
         let touching = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
         self.overload.learn(&Searched {
             start,
             stopped,
             used,
-            step_cost: self.step_cost,
-            budget: settings.contact.point_budget,
+            budget,
             touching,
             lost: self.contacts.lost(),
         });
@@ -284,11 +314,13 @@ impl State {
                 point: k,
                 guided: k * guided_share,
             };
-            step.with_contacts(free, contacts, &k, contact.damping_s, farthest)
+            let left = budget.saturating_sub(used.all);
+            let solves = most_solves(left, work.candidates, pulls);
+            step.with_contacts(free, contacts, &k, contact.damping_s, farthest, solves)
         };
-        work.contacts = self.contacts.pushing() as u16;
+        self.pushing = self.contacts.pushing() as u16;
+        work.contacts = self.pushing;
         work.solves = solution.solves;
-        self.step_cost = step_cost(&solution, work.candidates, step.pulls.len());
         work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
         solution
     }
@@ -395,6 +427,11 @@ impl Grabbed {
     /// Energy of its motion, J, without that of its turning.
     fn moving_energy(&self, mass_kg: f32) -> f32 {
         0.5 * mass_kg * self.twist.linear.length_squared()
+    }
+
+    /// Energy of its turning, J.
+    fn turning_energy(&self, mass_kg: f32, gyration2: Mat3) -> f32 {
+        0.5 * mass_kg * self.twist.angular.dot(gyration2 * self.twist.angular)
     }
 
     /// Moves with `twist` for `period_s`.

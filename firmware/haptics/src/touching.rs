@@ -1,7 +1,7 @@
 //! Which faces touch: contacts gathered by face pair.
 //!
-//! A point on an edge belongs to two faces. Of these the one that touches is the one that faces the other part's surface: the hole's wall where its rim
-//! meets a peg's side, the block's top where it meets the peg's end. It is chosen for the deepest point of those that share their faces.
+//! A point on an edge belongs to two faces. Of these the one that touches is the one that faces the other part's surface: the hole's wall where its
+//! rim meets a peg's side, the block's top where it meets the peg's end. It is chosen for the deepest point of those that share their faces.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -41,7 +41,8 @@ struct Gathered {
     to: f32,
 }
 
-/// Adds the face pairs of all contacts that push to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes first.
+/// Adds the face pairs of all contacts that push to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes
+/// first.
 ///
 /// Contacts come in order of the tree, so the pair last seen is tried first. Cost: 30 instructions a contact, and 500 a pair that has an edge.
 pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) {

@@ -3,6 +3,7 @@
 mod support;
 
 use mortise_haptics::{Flags, GuidanceMethod, Output, Quat, Settings, State, TargetError, Vec3, Wrench};
+use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::{ConstraintTarget, Feature};
 use support::hand::{Hand, Seen, run};
 use support::{BLOCK_HALF, CAP_N, PEG_HALF, axis_on_axis};
@@ -189,6 +190,53 @@ fn a_stronger_hand_gets_away_without_a_jump() {
     assert!(steps.force_n < 0.05, "{steps:?}");
 }
 
+/// A box pressed flat on a slab while so many targets hold it upright: how deep it gets and the least points a tick looks at once it lies.
+fn pressed_under(targets: usize) -> (f32, u32) {
+    let image = support::slab_and_box(0.05e-3, 9);
+    let scene = image.open();
+    let mut state = State::new();
+    state.load_scene(&scene);
+    let mut hand = Hand::at([0.0, 0.0, 5.05e-3]);
+    hand.push = [0.0, 0.0, -9.0];
+    state.grab(&scene, 1, &hand.pose()).unwrap();
+    for id in 0..targets as u16 {
+        let upright = ConstraintTarget {
+            id,
+            faces: heapless::Vec::new(),
+            ..axis_on_axis(1, 60_000)
+        };
+        state.set_target(&upright).unwrap();
+    }
+    let mut fewest = u32::MAX;
+    let settings = Settings::default();
+    let (out, seen) = run(&mut state, &scene, &settings, &mut hand, 2000, |t, _, out| {
+        if let Some(out) = out.filter(|_| t > 500) {
+            fewest = fewest.min(out.work.points);
+        }
+    });
+    assert_eq!(usize::from(out.guidance.active), targets);
+    (seen.deepest_m, fewest)
+}
+
+/// What targets take of the work of a tick is not taken from contact to the last point.
+#[test]
+fn contact_is_felt_however_many_targets_pull() {
+    let (alone, _) = pressed_under(0);
+    for targets in [1, 2, 4, MAX_TARGETS] {
+        let (deepest, fewest) = pressed_under(targets);
+        println!(
+            "{targets} targets: {fewest} points, {:.2} um deep ({:.2})",
+            deepest * 1e6,
+            alone * 1e6
+        );
+        assert!(fewest > 0, "{targets} targets");
+        assert!(
+            deepest < 1.1 * alone,
+            "{targets} targets: {deepest} m, {alone} m without"
+        );
+    }
+}
+
 #[test]
 fn stale_damaged_and_too_many_targets_change_nothing() {
     let image = scene(1e-3, -5e-3);
@@ -261,16 +309,13 @@ fn stale_damaged_and_too_many_targets_change_nothing() {
             ..axis_on_axis(1, 100)
         };
         if state.set_target(&target) == Err(TargetError::Full) {
-            assert_eq!(usize::from(id), 99 + mortise_protocol::limits::MAX_TARGETS);
+            assert_eq!(usize::from(id), 99 + MAX_TARGETS);
             break;
         }
     }
     state.clear_target(7);
     state.clear_target(12345);
-    assert_eq!(
-        usize::from(count(&mut state)),
-        mortise_protocol::limits::MAX_TARGETS - 1
-    );
+    assert_eq!(usize::from(count(&mut state)), MAX_TARGETS - 1);
     state.release();
     assert_eq!(count(&mut state), 0);
 }

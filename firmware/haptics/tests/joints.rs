@@ -150,21 +150,24 @@ proptest! {
         // What may be read decides whether there is an answer, not which.
         let of_all = field.only(low, high, &mut u32::MAX.clone(), |face| face == 3);
         prop_assert!(of_all || !only);
+        let mut left = most;
+        let all = field.all_at(low, high, &mut left, 3);
+        prop_assert!(left <= most && (only || !all));
         if only {
             for d in within {
                 let record = field.record();
                 let p = core::array::from_fn(|a| record.origin[a] + record.cell * (low[a] + size[a] * d[a]));
                 match field.lookup(p) {
                     Lookup::Near(sample) => prop_assert_eq!(sample.nearby, Nearby::Face(3)),
-                    Lookup::Far { inside, .. } => prop_assert!(!inside),
+                    Lookup::Far { inside, .. } => prop_assert!(!inside && !all),
                 }
             }
         }
     }
 }
 
-/// A bolt with a 5 mm head and a shaft of 25 mm, pushed into its hole with 5 N by a hand 1 mm and 2° off; with the planes' angle guided too, or not. How
-/// far it is off its stop and its axis at most once there, m, and in how many of 500 ticks the head touches while the shaft is a joint.
+/// A bolt with a 5 mm head and a shaft of 25 mm, pushed into its hole with 5 N by a hand 1 mm and 2° off; with the planes' angle guided too, or not.
+/// How far it is off its stop and its axis at most once there, m, and in how many of 500 ticks the head touches while the shaft is a joint.
 fn bolted(play: f64, parallel: bool) -> ([f64; 2], u32) {
     let mut w = support::image::Writer::exact(0.5e-3);
     let block = w.shape(&Block {
@@ -267,6 +270,13 @@ fn the_holes_wall_is_a_region_of_its_own() {
     let wall = [support::HOLE, 0.0, 0.0];
     assert!(only(wall, 1.0, 3));
     assert!(!only(wall, 1.0, 0));
+    let at = field.in_cells(wall.map(|x| x as f32));
+    let all = |reach: f32| {
+        let (low, high) = (at.map(|x| x - reach), at.map(|x| x + reach));
+        field.all_at(low, high, &mut 10_000, 3)
+    };
+    // Of the grid, and beyond it.
+    assert!(all(1.0) && !all(1e3));
     // Two cells below the rim cells tell where bricks do not.
     let below = |cells: f64| [support::HOLE, 0.0, BLOCK_HALF - cells * 0.5e-3];
     assert!(!only(below(0.0), 1.0, 3));

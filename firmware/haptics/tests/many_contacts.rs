@@ -5,7 +5,8 @@ mod support;
 use mortise_haptics::{Flags, Settings, State};
 use support::hand::{Hand, run};
 
-/// A face with 2,025 points pressed flat, at rest within `unrest_n` (N, and 100 N s/m times the handle's speed) after a second; deepest penetration, felt force.
+/// A face with 2,025 points pressed flat, at rest within `unrest_n` (N, and 100 N s/m times the handle's speed) after a second; deepest penetration,
+/// felt force.
 fn press(settings: &Settings, unrest_n: f32) -> (f32, f32, support::hand::Seen) {
     let image = support::slab_and_box(0.05e-3, 45);
     let scene = image.open();

@@ -161,8 +161,8 @@ fn a_loop_that_buzzes_is_turned_down() {
     }
 }
 
-/// Leans on the slab for `seconds` with a hand that trembles by 50 µm on all axes, over encoders of `COUNT_M`; `known`: the board knows of them. Most net work on the handle in truth, J, and
-/// how far the valve was shut at last.
+/// Leans on the slab for `seconds` with a hand that trembles by 50 µm on all axes, over encoders of `COUNT_M`; `known`: the board knows of them. Most
+/// net work on the handle in truth, J, and how far the valve was shut at last.
 fn lean(image: &Image, seconds: f64, known: bool) -> (f64, f32) {
     const COUNT_M: f64 = 5e-6;
     const START: DVec3 = DVec3::new(0.0, 0.0, 5.05e-3);
@@ -223,8 +223,8 @@ fn who_leans_and_trembles_is_not_turned_down() {
 /// So far above the slab that nothing touches.
 const HIGH_M: f64 = 0.05;
 
-/// Moves the handle to and fro in free air, `phase` turns into its way when it grabs, while the grip grows from nothing in 200 ticks. Net work of the device on the handle at most, all that passed, and the
-/// least that the valve was open, for a part that slips in the hand or does not.
+/// Moves the handle to and fro in free air, `phase` turns into its way when it grabs, while the grip grows from nothing in 200 ticks. Net work of the
+/// device on the handle at most, all that passed, and the least that the valve was open, for a part that slips in the hand or does not.
 fn grip_grows(image: &Image, amplitude_m: f64, (hz, phase): (f64, f64), slipping: bool) -> (f64, f64, f32) {
     const TICKS: u32 = 200;
     let scene = image.open();
@@ -259,7 +259,8 @@ fn grip_grows(image: &Image, amplitude_m: f64, (hz, phase): (f64, f64), slipping
     (made, passed, shut)
 }
 
-/// A limit that is raised under a stretched coupling makes energy: the valve must close. A part that slips in the hand stores none that could be raised.
+/// A limit that is raised under a stretched coupling makes energy: the valve must close. A part that slips in the hand stores none that could be
+/// raised.
 #[test]
 fn a_growing_grip_makes_nothing_if_the_part_slips() {
     let image = support::slab_and_box(HIGH_M, 3);

@@ -15,6 +15,8 @@ const STEP_NM: f32 = 2e-3;
 const FADED: u32 = 4 * 200 + 1024;
 /// Ticks after which the hand is at rest again: 20 of its time constant, 2·5/400 s.
 const RESTED: u32 = 500;
+/// Ticks in which a part that gave way in the hand by a millimetre is back to a micrometre: ln 1000 of `grip`'s 0.25 s.
+const BACK: u32 = 1730;
 
 /// What the desktop means to say.
 #[derive(Clone, Copy, Debug)]
@@ -140,7 +142,7 @@ proptest! {
         let mut next = arrivals.iter().peekable();
         let mut last: Option<Wrench> = None;
         let (mut given, mut switches) = (0.0, 0);
-        for t in 0..until + FADED + RESTED {
+        for t in 0..until + FADED + BACK + RESTED {
             while let Some((_, word, sequence)) = next.next_if(|(at, ..)| *at == t) {
                 match word {
                     Word::Set { id, place, expiry } => {

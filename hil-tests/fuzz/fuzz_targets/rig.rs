@@ -1,8 +1,8 @@
 //! A rig's description, as bytes from the link or from flash and as a file's text: whatever they are, what is taken can be driven.
 //!
-//! From what passes the checks the board builds kinematics and drives motors. So a description that is taken must give finite places, currents within its own limits, and must come
-//! back the same from bytes; one that is read from a file must come back from what is written of it. An even first byte is not part of it and says
-//! that the rest is bytes; `#` and `[`, with which a file begins, are odd.
+//! From what passes the checks the board builds kinematics and drives motors. So a description that is taken must give finite places, currents within
+//! its own limits, and must come back the same from bytes; one that is read from a file must come back from what is written of it. An even first byte
+//! is not part of it and says that the rest is bytes; `#` and `[`, with which a file begins, are odd.
 #![no_main]
 
 use glam::Vec3;

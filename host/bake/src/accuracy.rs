@@ -8,8 +8,8 @@
 //! | shell, round in hollow | ε·(1 − R₁/R₂): rims are sampled by s² = 8ε·R₁ and follow a curve that bends nearly as much |
 //! | shell, anything else | ε |
 //!
-//! They hold within a quarter of a cell of the surface, where the nearest point is inside a face that bends less than half a radian a cell. Within a cell of a sharp edge, or where two surfaces
-//! are equally near, interpolation cuts the crease: up to half a cell.
+//! They hold within a quarter of a cell of the surface, where the nearest point is inside a face that bends less than half a radian a cell. Within a
+//! cell of a sharp edge, or where two surfaces are equally near, interpolation cuts the crease: up to half a cell.
 
 use mortise_brep::Surface;
 

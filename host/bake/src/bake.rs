@@ -108,7 +108,8 @@ fn field_bytes(field: &BakedField) -> u64 {
 }
 
 impl Scene {
-    /// Fields and pointshells, each shape by its own options, with cells of about these sizes (a size too small for the layout is made larger when the choice is free).
+    /// Fields and pointshells, each shape by its own options, with cells of about these sizes (a size too small for the layout is made larger when
+    /// the choice is free).
     pub fn fields_and_shells(
         &self,
         each: &[BakeOptions],

@@ -161,7 +161,8 @@ fn faces_that_fit(fits: &[(u32, [f64; 2], f64, String)]) -> Vec<u32> {
     faces
 }
 
-/// Largest cell that still shows the walls and slots beside the larger faces: no corner of a cell near the surface may be nearer to another. Their width is felt for from the middle of each face's largest triangle, inward and outward, by halving.
+/// Largest cell that still shows the walls and slots beside the larger faces: no corner of a cell near the surface may be nearer to another. Their
+/// width is felt for from the middle of each face's largest triangle, inward and outward, by halving.
 fn walls(surface: &ExactSurface, words: &dyn Fn(u32) -> String) -> (f64, String) {
     let shape = surface.shape();
     let size = longest_side(shape);

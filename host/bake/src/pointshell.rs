@@ -11,8 +11,9 @@
 //! | on shafts that fit a bore, beside their rims | a ring, see [`crate::ring_samples`] |
 //!
 //! Two directions of a face share ε, an edge has it alone. Inside faces that do not bend both ways outward, cylinders above all, samples serve
-//! nothing but contact of convex with convex away from every edge, and are many: they may have a bound of their own. So a cylinder that only flats and bores can meet has its two rims, a ring beside each, and nothing
-//! between; a peg's rim in its hole errs by s²/8 times the *difference* of the two curvatures, and on a flat at tilt α by ε·sin α.
+//! nothing but contact of convex with convex away from every edge, and are many: they may have a bound of their own. So a cylinder that only flats
+//! and bores can meet has its two rims, a ring beside each, and nothing between; a peg's rim in its hole errs by s²/8 times the *difference* of the
+//! two curvatures, and on a flat at tilt α by ε·sin α.
 //!
 //! No such bound holds where two sharp edges cross: a sample s/2 from the crossing lies up to (s/2)·sin(θ/2) less deep, θ the angle between
 //! the edge and the partner's face it dives under. So edges are never sampled more sparsely than `max_spacing_mm`, and a strip of

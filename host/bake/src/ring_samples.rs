@@ -5,8 +5,9 @@
 //! min(p, δ − h): together that is all of p up to δ/2. With δ = 4ε the side is found up to a depth of 2ε, and on a shaft tilted by α the
 //! ring is shallower than the rim by δ·tan α: by no more than ε up to 14°.
 //!
-//! Round the shaft the depth falls off as s²/8·(κ − κ' + 2ε·κ²), κ the curvature of the shaft, κ' that of the loosest bore it fits (see [`crate::fits`]),
-//! and the last term what a depth of 2ε adds to the room between both: four points in a tight fit. Shafts that fit no bore have no ring.
+//! Round the shaft the depth falls off as s²/8·(κ − κ' + 2ε·κ²), κ the curvature of the shaft, κ' that of the loosest bore it fits (see
+//! [`crate::fits`]), and the last term what a depth of 2ε adds to the room between both: four points in a tight fit. Shafts that fit no bore have no
+//! ring.
 
 use mortise_brep::Surface;
 use mortise_protocol::image::NO_FACE;

@@ -119,8 +119,8 @@ pub(crate) fn area_curvatures(surface: &ExactSurface, face: u32) -> Vec<(f64, f6
     own.iter().filter_map(of).collect()
 }
 
-/// Principal curvatures of a triangle, 1/mm, convex positive, the larger absolute one first: the symmetric 2×2 operator that best explains, in the sense of least
-/// squares, the change of the normal along its sides.
+/// Principal curvatures of a triangle, 1/mm, convex positive, the larger absolute one first: the symmetric 2×2 operator that best explains, in the
+/// sense of least squares, the change of the normal along its sides.
 fn principal_curvatures(facet: DVec3, corners: [DVec3; 3], normals: [DVec3; 3]) -> [f64; 2] {
     let x = facet.any_orthonormal_vector();
     let y = facet.cross(x);

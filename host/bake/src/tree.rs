@@ -21,8 +21,8 @@ const OFFSET_WEIGHT: f32 = 128.0;
 /// Builds the tree over `positions` as they will be stored: halves along the longest axis down to leaves of at most 16. Every sphere holds
 /// all points below it, also in the board's `f32`. Cost: n log² n.
 ///
-/// `offsets` (same unit; empty for none) tell how far points lie off the surface. They count as a fourth axis, so that points of one depth share a leaf:
-/// they come near together, and a leaf of which one point is near is looked at as a whole.
+/// `offsets` (same unit; empty for none) tell how far points lie off the surface. They count as a fourth axis, so that points of one depth share a
+/// leaf: they come near together, and a leaf of which one point is near is looked at as a whole.
 pub fn build_tree(positions: &[[f32; 3]], offsets: &[f32]) -> SphereTree {
     let mut tree = SphereTree {
         nodes: Vec::new(),

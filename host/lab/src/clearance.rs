@@ -1,8 +1,8 @@
 //! The smallest clearance that assembles: a peg in its hole, without any help from constraints, pushed by a trembling hand.
 //!
-//! The scenario is `host/lab/data/tight_insertion.toml`; for each way to model the scene, the border between what goes and what does not is looked for by
-//! halves: what goes at one clearance is taken to go at all larger ones. A trial goes when the peg is through the hole, no surface lies deeper in another than the radial clearance (exact surfaces, both
-//! ways: else it went through the wall, not the hole), and the hand felt no more than 3 N.
+//! The scenario is `host/lab/data/tight_insertion.toml`; for each way to model the scene, the border between what goes and what does not is looked
+//! for by halves: what goes at one clearance is taken to go at all larger ones. A trial goes when the peg is through the hole, no surface lies deeper
+//! in another than the radial clearance (exact surfaces, both ways: else it went through the wall, not the hole), and the hand felt no more than 3 N.
 
 use std::fmt;
 

@@ -123,8 +123,8 @@ pub(crate) fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabEr
     }
 }
 
-/// Plays `motion` on the rig `spec`, with look-ups for at most `point_budget` points a tick if that is said. What the scenario itself asks (it does press; no tick is missed) is the caller's to look at: the second of
-/// what is given says what did not hold.
+/// Plays `motion` on the rig `spec`, with look-ups for at most `point_budget` points a tick if that is said. What the scenario itself asks (it does
+/// press; no tick is missed) is the caller's to look at: the second of what is given says what did not hold.
 ///
 /// # Errors
 /// Anything that keeps it from being played, a fault of the board too.

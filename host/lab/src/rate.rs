@@ -1,7 +1,7 @@
 //! The rate that a tick allows over an insertion: collision only, guided, and guided by what is recognised, on the emulated board.
 //!
-//! Fig. 35 of Faas 2010 shows the update rate over an insertion: it falls from 800 Hz to 100 Hz when constraints are evaluated. Here the board counts the
-//! instructions of each tick; the rate they allow is the clock over the slowest tick, at one instruction a clock cycle of a Cortex-M7 at
+//! Fig. 35 of Faas 2010 shows the update rate over an insertion: it falls from 800 Hz to 100 Hz when constraints are evaluated. Here the board counts
+//! the instructions of each tick; the rate they allow is the clock over the slowest tick, at one instruction a clock cycle of a Cortex-M7 at
 //! 480 MHz. It is headroom, not pace: the loop itself runs at 1 kHz whatever happens. Recognition runs on the desktop, so the board does the same
 //! work whether a target was recognised or known.
 

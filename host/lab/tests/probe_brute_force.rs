@@ -1,7 +1,7 @@
 //! The probe's branch and bound against every point in closed form: scene P at any pose, near and far, upright and tumbled.
 //!
-//! Both parts have their origin at their centre and the hole along z. Distances here are of the solids themselves, in double precision; the points are
-//! those of the image, so that the shells' own error bound plays no part.
+//! Both parts have their origin at their centre and the hole along z. Distances here are of the solids themselves, in double precision; the points
+//! are those of the image, so that the shells' own error bound plays no part.
 
 use std::ops::ControlFlow;
 use std::sync::LazyLock;

@@ -128,7 +128,8 @@ fn command(mode: EmulatedMode, firmware: &Path, serial: &str) -> Command {
     command
 }
 
-/// Starts QEMU on a thread that stays with it and passes on what it says: on Linux QEMU ends with this program, and that goes by the thread which started it.
+/// Starts QEMU on a thread that stays with it and passes on what it says: on Linux QEMU ends with this program, and that goes by the thread which
+/// started it.
 fn spawn(mut command: Command) -> Result<(Qemu, mpsc::Receiver<String>), RigError> {
     let program = command.get_program().to_string_lossy().into_owned();
     let (to, lines) = mpsc::sync_channel(32);
@@ -167,7 +168,8 @@ fn spawn(mut command: Command) -> Result<(Qemu, mpsc::Receiver<String>), RigErro
     Ok((qemu, lines))
 }
 
-/// Whatever ends this program, SIGKILL too, which leaves no time for `Drop`: the kernel then kills QEMU. It does so when the thread that starts `command` ends.
+/// Whatever ends this program, SIGKILL too, which leaves no time for `Drop`: the kernel then kills QEMU. It does so when the thread that starts
+/// `command` ends.
 #[cfg(target_os = "linux")]
 fn end_with_this_program(command: &mut Command) {
     use std::os::unix::process::CommandExt as _;

@@ -184,8 +184,8 @@ pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capa
     }
 }
 
-/// A board that has started anew has forgotten parameters, targets and grip, so what this program believes of it is wrong: asks why it started and ends the
-/// link with the answer.
+/// A board that has started anew has forgotten parameters, targets and grip, so what this program believes of it is wrong: asks why it started and
+/// ends the link with the answer.
 pub(crate) fn started_anew(link: &Link, name: &str) -> RigError {
     let patience = Patience {
         greeting: WHY_WAIT,

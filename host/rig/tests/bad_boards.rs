@@ -105,7 +105,8 @@ fn a_pulled_cable_shows_as_event_and_error() {
     board.join().expect("ended");
 }
 
-/// A board that fails and starts anew knows no greeting any more; why it started is what the operator reads, whether the program asks for something or not.
+/// A board that fails and starts anew knows no greeting any more; why it started is what the operator reads, whether the program asks for something
+/// or not.
 #[test]
 fn a_board_that_started_anew_is_told_with_the_reason() {
     for asks in [false, true] {

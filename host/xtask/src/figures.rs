@@ -34,8 +34,8 @@ pub struct Measured {
     pub success: bool,
 }
 
-/// A sweep that belongs to a table: the experiment of `mortise lab` that makes it, and the charts it leaves in `docs/figures`, drawn from one table of the experiment's name, or each
-/// from one of its own.
+/// A sweep that belongs to a table: the experiment of `mortise lab` that makes it, and the charts it leaves in `docs/figures`, drawn from one table
+/// of the experiment's name, or each from one of its own.
 struct Sweep {
     table: &'static str,
     experiment: &'static str,

@@ -1,8 +1,8 @@
 //! `cargo xtask fuzz`: random bytes, guided by coverage, for everything that reads what others wrote.
 //!
-//! The targets in `hil-tests/fuzz` have the layout of cargo-fuzz, which runs them too. Here they are built with the repository's own toolchain, so that nothing
-//! has to be installed: the counters are LLVM's, and the address sanitizer, which sees reads beyond an end in `unsafe` code, is asked for by the name under
-//! which a stable compiler knows it. Linux on x86-64 only.
+//! The targets in `hil-tests/fuzz` have the layout of cargo-fuzz, which runs them too. Here they are built with the repository's own toolchain, so
+//! that nothing has to be installed: the counters are LLVM's, and the address sanitizer, which sees reads beyond an end in `unsafe` code, is asked
+//! for by the name under which a stable compiler knows it. Linux on x86-64 only.
 
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};

@@ -158,6 +158,12 @@ impl<'a> Field<'a> {
         self.decoded(brick, self.palette_entry(brick, index))
     }
 
+    /// Sum of the grid's sides, m.
+    #[inline]
+    pub fn extent_m(&self) -> f32 {
+        (self.cells[0] + self.cells[1] + self.cells[2]) * self.record.cell
+    }
+
     /// Interpolated distance in a cell, m.
     #[inline(always)]
     pub fn distance(&self, cell: &Cell<'_>) -> f32 {

@@ -9,12 +9,32 @@ const MOST_ENTRIES: u16 = u16::BITS as u16;
 const BRICK: u32 = 6;
 
 impl Field<'_> {
-    /// Whether a look-up anywhere from `low` to `high` (cells from the grid's corner) finds nothing, or nothing but faces that `these` says yes to, by
-    /// their exact surfaces. No is also the answer where more than `reads` would have to be read to tell, where either is no number, and of voxmaps.
+    /// Whether a look-up anywhere from `low` to `high` (cells from the grid's corner) finds a cell that names this face and no other. Unlike
+    /// [`Self::only`] nothing found is not enough; when the answer is no all the same, and the cost, are as there.
+    pub fn all_at(&self, low: [f32; 3], high: [f32; 3], reads: &mut u32, face: u16) -> bool {
+        (0..3).all(|a| low[a] >= 0.0 && high[a] < self.cells[a])
+            && self.region(low, high, reads, |found| found == Some(face))
+    }
+
+    /// Whether a look-up anywhere from `low` to `high` (cells from the grid's corner) finds nothing, or nothing but faces that `these` says yes to,
+    /// by their exact surfaces. No is also the answer where more than `reads` would have to be read to tell, where either is no number, and of
+    /// voxmaps.
     ///
-    /// Cost: what is taken off `reads`, each some 8 instructions: 6 for a brick, one for each entry of its palette, and, of a brick that has to do with other
-    /// faces too, one for each cell of the region.
+    /// Cost: what is taken off `reads`, each some 8 instructions: 6 for a brick, one for each entry of its palette, and, of a brick that has to do
+    /// with other faces too, one for each cell of the region.
     pub fn only(&self, low: [f32; 3], high: [f32; 3], reads: &mut u32, these: impl Fn(u16) -> bool) -> bool {
+        self.region(low, high, reads, |found| found.is_none_or(&these))
+    }
+
+    /// Whether all that a look-up from `low` to `high` finds is good: the one face of a cell, or nothing at all.
+    #[inline]
+    fn region(
+        &self,
+        low: [f32; 3],
+        high: [f32; 3],
+        reads: &mut u32,
+        is_good: impl Fn(Option<u16>) -> bool,
+    ) -> bool {
         if self.is_occupancy() || !(0..3).all(|a| low[a] <= high[a]) {
             return false;
         }
@@ -35,7 +55,7 @@ impl Field<'_> {
                     let at = [x, y, z].map(|b| b * BRICK_CELLS as u32);
                     let from = core::array::from_fn(|a| first[a].max(at[a]) - at[a]);
                     let to = core::array::from_fn(|a| last[a].min(at[a] + BRICK_CELLS as u32 - 1) - at[a]);
-                    if !self.brick_only([x, y, z], from, to, reads, &these) {
+                    if !self.in_brick([x, y, z], from, to, reads, &is_good) {
                         return false;
                     }
                 }
@@ -46,13 +66,13 @@ impl Field<'_> {
 
     /// The same of cells `from..=to` of a brick.
     #[inline]
-    fn brick_only(
+    fn in_brick(
         &self,
         at: [u32; 3],
         from: [u32; 3],
         to: [u32; 3],
         reads: &mut u32,
-        these: &impl Fn(u16) -> bool,
+        is_good: &impl Fn(Option<u16>) -> bool,
     ) -> bool {
         if !take(reads, BRICK) {
             return false;
@@ -60,7 +80,7 @@ impl Field<'_> {
         let dims = self.record.brick_dims.map(u32::from);
         let index = (at[2] * dims[1] + at[1]) * dims[0] + at[0];
         let brick = match GridEntry::from_bits(self.grid[index as usize]) {
-            GridEntry::Empty { inside, .. } => return !inside,
+            GridEntry::Empty { inside, .. } => return !inside && is_good(None),
             GridEntry::Brick(number) => &self.bricks[number as usize],
         };
         let entries = brick.palette_len;
@@ -71,7 +91,7 @@ impl Field<'_> {
         let mut good = 0u32;
         for (i, &bits) in palette.iter().enumerate() {
             // Where more than one face is near, not all of them are these.
-            good |= u32::from(bits <= Nearby::MAX_FACES && these(bits)) << i;
+            good |= u32::from(bits <= Nearby::MAX_FACES && is_good(Some(bits))) << i;
         }
         if good.count_ones() == u32::from(entries) {
             return true;

@@ -1,8 +1,8 @@
 //! A rig's description: what a board must know of its mechanism, encoders and motors to sense a handle and to push it.
 //!
 //! A rig builder writes it as a file (`firmware/rigs/*.toml`, `docs/rigs.md`); it crosses the link as one message, so that it arrives whole or not at
-//! all; [`Rig::check`] is what host and board both ask before they believe it. Metres, radians, seconds, newtons, amperes here; the file's units are in
-//! [`RIG_KEYS`].
+//! all; [`Rig::check`] is what host and board both ask before they believe it. Metres, radians, seconds, newtons, amperes here; the file's units are
+//! in [`RIG_KEYS`].
 
 mod keys;
 
@@ -46,8 +46,8 @@ pub enum Kinematics {
         /// Distance of the handle from the axis.
         radius: f32,
     },
-    /// Five links in the plane z = 0. Motors at (∓base/2, 0), angles from x, counter-clockwise; the handle is where the two distal links meet, on the left
-    /// of the way from the left elbow to the right one.
+    /// Five links in the plane z = 0. Motors at (∓base/2, 0), angles from x, counter-clockwise; the handle is where the two distal links meet, on the
+    /// left of the way from the left elbow to the right one.
     Pantograph {
         /// Distance between the motors.
         base: f32,
@@ -206,8 +206,8 @@ pub enum RigFault {
 }
 
 impl Rig {
-    /// Whether every number is possible and they agree with each other. What takes kinematics (do the links reach each other?) the board finds out when
-    /// it builds them.
+    /// Whether every number is possible and they agree with each other. What takes kinematics (do the links reach each other?) the board finds out
+    /// when it builds them.
     ///
     /// # Errors
     /// The first fault.

@@ -1,11 +1,12 @@
 //! Kinematics of the mechanisms a rig's description can name: joint angles to handle pose and Jacobians, and force to joint torques.
 //!
-//! A [`Model`] is made of a [`Rig`] once; [`Model::posture`] is asked each tick. The handle's velocity is v = J·θ̇, a force F on the handle takes the torques
-//! τ = Jᵀ·F (virtual work: τ·θ̇ = F·v), so that torques need no inverse and no iteration.
+//! A [`Model`] is made of a [`Rig`] once; [`Model::posture`] is asked each tick. The handle's velocity is v = J·θ̇, a force F on the handle takes the
+//! torques τ = Jᵀ·F (virtual work: τ·θ̇ = F·v), so that torques need no inverse and no iteration.
 //!
 //! **Singular postures.** Where J loses rank the motors cannot push the handle in some direction, and where a closed linkage stretches out J grows
-//! without bound and so would τ. Both show in one number, the isotropy of J (Kim & Khosla 1991): geometric over arithmetic mean of the eigenvalues of JᵀJ,
-//! 1 where all directions are alike, 0 in a singular posture. Force is given whole above [`WHOLE`], not at all below [`NONE`], and in proportion between.
+//! without bound and so would τ. Both show in one number, the isotropy of J (Kim & Khosla 1991): geometric over arithmetic mean of the eigenvalues of
+//! JᵀJ, 1 where all directions are alike, 0 in a singular posture. Force is given whole above [`WHOLE`], not at all below [`NONE`], and in proportion
+//! between.
 //!
 //! Metres, radians, newtons; positions and Jacobians in the world. Cost: at most three sine–cosine pairs, three roots and 150 operations a posture.
 

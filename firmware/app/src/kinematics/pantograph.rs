@@ -7,7 +7,8 @@
 //! ```
 //!
 //! with e⊥ to the left of e. Their lengths stay: u·∂p/∂θ = u·∂E/∂θ with u = p − E for each side, two equations for each column of J:
-//! ∂p/∂θ₁ = (u₁·t₁)/(u₁ × u₂)·(u₂y, −u₂x), ∂p/∂θ₂ = (u₂·t₂)/(u₁ × u₂)·(−u₁y, u₁x), t = ∂E/∂θ. u₁ × u₂ vanishes where the distal links lie in one line.
+//! ∂p/∂θ₁ = (u₁·t₁)/(u₁ × u₂)·(u₂y, −u₂x), ∂p/∂θ₂ = (u₂·t₂)/(u₁ × u₂)·(−u₁y, u₁x), t = ∂E/∂θ. u₁ × u₂ vanishes where the distal links lie in one
+//! line.
 
 use glam::{Mat3, Quat, Vec2, Vec3};
 use mortise_protocol::limits::MAX_JOINTS;

@@ -1,4 +1,5 @@
-//! Yaw at the base, then two links that move in the plane the yaw turns, both driven from the base by wires (WoodenHaptics, Forsslund et al., TEI 2015).
+//! Yaw at the base, then two links that move in the plane the yaw turns, both driven from the base by wires (WoodenHaptics, Forsslund et al., TEI
+//! 2015).
 //!
 //! θ₂ is the upper link's angle from straight up, θ₃ the lower link's from straight down, both against the frame:
 //!

@@ -128,8 +128,9 @@ proptest! {
         }
     }
 
-    /// J and both sets of axes against central differences. With a step of 2⁻⁸ rad the difference errs by h²/6·p''' and by rounding: 0.06 µm·√2/h = 2·10⁻⁵ m/rad;
-    /// p''' is at most 0.5 m for the arm and, above isotropy 0.3, 40 m for the linkage: 10⁻⁴ m/rad. Orientations likewise: 2·10⁻⁷/h + h²/6·|ω|³.
+    /// J and both sets of axes against central differences. With a step of 2⁻⁸ rad the difference errs by h²/6·p''' and by rounding: 0.06 µm·√2/h =
+    /// 2·10⁻⁵ m/rad; p''' is at most 0.5 m for the arm and, above isotropy 0.3, 40 m for the linkage: 10⁻⁴ m/rad. Orientations likewise: 2·10⁻⁷/h +
+    /// h²/6·|ω|³.
     #[test]
     fn jacobians_are_derivatives((model, q, w) in worked()) {
         const H: f32 = 1.0 / 256.0;
@@ -168,15 +169,16 @@ proptest! {
         prop_assert_eq!(posture.share(), 1.0);
     }
 
-    /// Wherever the links go, whatever the angles: a force within the limit asks for torques within a bound, because what is given fades before J grows.
+    /// Wherever the links go, whatever the angles: a force within the limit asks for torques within a bound, because what is given fades before J
+    /// grows.
     #[test]
     fn no_posture_asks_for_endless_torque(kind in 0..3usize, a in -6.3f32..6.3, b in -6.3f32..6.3, c in -6.3f32..6.3, force in vector(20.0)) {
         let (kinematics, home) = [(ARM, [0.0, 0.0, 1.5]), (LINKAGE, [2.3, 0.8, 0.0]), (PADDLE, [0.0; 3])][kind];
         let model = Model::new(&rig(kinematics, home, [0.0; 3])).unwrap();
         if let Some(posture) = model.posture([a, b, c], [0.0; 3]) {
             let torques = Vec3::from_array(posture.torques(force * posture.share()));
-            // Isotropy m bounds the largest singular value by the smallest of n: for two joints σ₁ ≤ (2/m)·σ₂, and σ₂ ≤ √(σ₁σ₂) with the linkage's σ₁σ₂ ≤ l₁l₂
-            // over the sine of the distal links' angle. For the arm J has no column longer than its reach.
+            // Isotropy m bounds the largest singular value by the smallest of n: for two joints σ₁ ≤ (2/m)·σ₂, and σ₂ ≤ √(σ₁σ₂) with the linkage's
+            // σ₁σ₂ ≤ l₁l₂ over the sine of the distal links' angle. For the arm J has no column longer than its reach.
             prop_assert!(torques.is_finite() && torques.length() <= 20.0 * 1.733 * 2.0, "{torques}");
         }
     }

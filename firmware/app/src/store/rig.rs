@@ -5,9 +5,9 @@
 //! record: magic "MRIG0001" | sequence u32 | length u32 | CRC-32 of the description u32 | layout u32 | zero u32 | record CRC-32 u32   (little-endian)
 //! ```
 //!
-//! As with scenes the record is one flash word and written last, into the slot that is not in use: cut off at any moment, the description before is found again.
-//! A whole record over bytes that are not what it says, or of another release's layout, is **damaged**: which mechanism this board drives is then unknown, and the
-//! board does not arm until a description is sent.
+//! As with scenes the record is one flash word and written last, into the slot that is not in use: cut off at any moment, the description before is
+//! found again. A whole record over bytes that are not what it says, or of another release's layout, is **damaged**: which mechanism this board
+//! drives is then unknown, and the board does not arm until a description is sent.
 
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_MESSAGE;

@@ -48,8 +48,8 @@ impl TestFlash {
         unsafe { (*word).0[offset % WRITE_SIZE] ^= 0x10 };
     }
 
-    /// The same under whoever is reading: the chip is exchanged for one with the same content but for that byte. References handed out before go on seeing
-    /// the old one, since memory behind a shared reference must not change; who asks the flash again sees the damage.
+    /// The same under whoever is reading: the chip is exchanged for one with the same content but for that byte. References handed out before go on
+    /// seeing the old one, since memory behind a shared reference must not change; who asks the flash again sees the damage.
     pub fn damage_in_use(&self, slot: usize, offset: usize) {
         // SAFETY: whole and initialised; only read here.
         let content = unsafe { *self.memory.get().0.get() };

@@ -60,8 +60,8 @@ pub fn configuration() -> (embassy_stm32::Config, u32) {
     (config, hz)
 }
 
-/// Locks HSI48 to the frames of the port in use. The HAL selects those of the other one (OTG_HS, "USB1"), which never come, and the oscillator alone is
-/// not within the 0.25 % that USB asks. After the HAL's `init`.
+/// Locks HSI48 to the frames of the port in use. The HAL selects those of the other one (OTG_HS, "USB1"), which never come, and the oscillator alone
+/// is not within the 0.25 % that USB asks. After the HAL's `init`.
 pub fn lock_usb_clock() {
     use embassy_stm32::pac::crs::vals::Syncsrc;
     // CRS_CFGR.SYNCSRC of OTG_FS ("USB2"): 0b11; on the older silicon 0b00 (ST's stm32h7xx_hal_rcc_ex.h).

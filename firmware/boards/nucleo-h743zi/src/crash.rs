@@ -1,7 +1,7 @@
 //! What happens when the firmware fails: motors off, a record that survives, restart.
 //!
-//! Three ways in: a Rust panic, a processor fault (hard fault, or any exception nobody handles), the watchdog. The first two come here. The order is always
-//! motors first; the record second; reset last. If the processor locks up instead, the timer's break input cuts the motors in
+//! Three ways in: a Rust panic, a processor fault (hard fault, or any exception nobody handles), the watchdog. The first two come here. The order is
+//! always motors first; the record second; reset last. If the processor locks up instead, the timer's break input cuts the motors in
 //! hardware ([`crate::motors`]) and the watchdog resets.
 
 use core::arch::naked_asm;
@@ -58,7 +58,8 @@ fn panic(info: &PanicInfo) -> ! {
 
 /// Hard fault. Bus, memory and usage faults escalate here.
 ///
-/// Naked: after a stack overflow the first push of an ordinary function would fault again and lock the processor up. The stack starts anew; nothing returns.
+/// Naked: after a stack overflow the first push of an ordinary function would fault again and lock the processor up. The stack starts anew; nothing
+/// returns.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() -> ! {

@@ -2,8 +2,8 @@
 //!
 //! The usual implementation masks all interrupts, so that a long section anywhere (USB, log) delays the tick. This one raises BASEPRI to the
 //! level just below the tick. The price is a rule: **the tick and the stop handler use no critical section** and nothing that has
-//! one inside (embassy wakers, defmt); they talk to the rest through atomics and single-producer queues only. Breaking the rule is a panic, which turns the
-//! motors off, not a silent race.
+//! one inside (embassy wakers, defmt); they talk to the rest through atomics and single-producer queues only. Breaking the rule is a panic, which
+//! turns the motors off, not a silent race.
 
 use core::arch::asm;
 

@@ -1,7 +1,8 @@
 //! From joint torques to what the current drivers are told.
 //!
 //! Each driver (maxon ESCON or the like) regulates its motor's current to a set value given as duty cycle and direction. Duty maps linearly to
-//! current between [`Driver::zero_duty`] and [`Driver::full_duty`]; the margins at both ends let a driver tell a broken wire (0 % or 100 %) from a command.
+//! current between [`Driver::zero_duty`] and [`Driver::full_duty`]; the margins at both ends let a driver tell a broken wire (0 % or 100 %) from a
+//! command.
 
 use glam::Vec3;
 

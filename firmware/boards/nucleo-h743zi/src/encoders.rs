@@ -6,8 +6,8 @@
 //! | B (upper link) | TIM3 | PB4 (D25) | PB5 (D22) |
 //! | C (lower link) | TIM8 | PC6 (D16) | PC7 (D21) |
 //!
-//! All four edges count. Inputs have pull-ups for open-collector encoders and are filtered: a level must hold for 8 timer clocks (33 ns), so edges up to
-//! 10 MHz pass and spikes do not.
+//! All four edges count. Inputs have pull-ups for open-collector encoders and are filtered: a level must hold for 8 timer clocks (33 ns), so edges up
+//! to 10 MHz pass and spikes do not.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::Pull;

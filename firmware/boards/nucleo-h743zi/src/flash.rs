@@ -4,10 +4,11 @@
 //! FLASH_CCR), so that one error would refuse every later write, and it knows nothing of caches.
 //!
 //! - Erasing a sector takes up to 2 s, writing a word about 0.1 ms. Both wait here, at the lowest priority; the tick goes on.
-//! - A read of bank 2 during an erasure would stop the processor until it is over. So [`erasing`] tells the tick to leave the control plane alone (motors are
-//!   off then: the application stores scenes only so), and the bank is device memory meanwhile, which the processor does not read on speculation.
-//! - A word whose writing was cut off by a power failure may fail its error correction for ever after, and reading it is a bus fault. [`SceneFlash::new`]
-//!   looks for such words before anything else reads the slots, and erases their sectors.
+//! - A read of bank 2 during an erasure would stop the processor until it is over. So [`erasing`] tells the tick to leave the control plane alone
+//!   (motors are off then: the application stores scenes only so), and the bank is device memory meanwhile, which the processor does not read on
+//!   speculation.
+//! - A word whose writing was cut off by a power failure may fail its error correction for ever after, and reading it is a bus fault.
+//!   [`SceneFlash::new`] looks for such words before anything else reads the slots, and erases their sectors.
 
 use core::ptr::write_volatile;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -124,7 +125,8 @@ impl SceneFlash {
     }
 }
 
-// SAFETY: slots are aligned to sectors, in memory-mapped flash that lives as long as the program; only `erase` and `write` of the same slot change it.
+// SAFETY: slots are aligned to sectors, in memory-mapped flash that lives as long as the program; only `erase` and `write` of the same slot change
+// it.
 unsafe impl Flash<'static> for SceneFlash {
     fn capacity(&self) -> usize {
         SLOT_LENGTH as usize

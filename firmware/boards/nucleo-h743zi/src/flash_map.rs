@@ -6,9 +6,9 @@
 //!         0x0818_0000  512 KiB scene slot 1   (4 sectors of 128 KiB)
 //! ```
 //!
-//! Why this split: the chip erases one bank while it executes from the other, so with all code in bank 1 and all scenes in bank 2 an upload never stops
-//! the tick. A slot in what is left of bank 1 would be 768 KiB, but erasing it would stop the processor for up to two seconds a sector. Two slots
-//! are needed because the old scene must survive a cut upload. So 512 KiB is the largest scene.
+//! Why this split: the chip erases one bank while it executes from the other, so with all code in bank 1 and all scenes in bank 2 an upload never
+//! stops the tick. A slot in what is left of bank 1 would be 768 KiB, but erasing it would stop the processor for up to two seconds a sector. Two
+//! slots are needed because the old scene must survive a cut upload. So 512 KiB is the largest scene.
 
 /// Bytes erased at once.
 pub const SECTOR: u32 = 128 * 1024;

@@ -108,8 +108,8 @@ pub fn forget(address: u32, length: u32) {
     }
 }
 
-/// Paints the free part of the stack anew, so that [`deepest_stack`] leaves out what start-up needed (it moves large values about). Once, when `idle` begins.
-/// Interrupts are off for about 0.1 ms.
+/// Paints the free part of the stack anew, so that [`deepest_stack`] leaves out what start-up needed (it moves large values about). Once, when `idle`
+/// begins. Interrupts are off for about 0.1 ms.
 pub fn repaint_stack() {
     unsafe extern "C" {
         static _stack_end: u32;

@@ -158,8 +158,8 @@ impl Motors {
         }
     }
 
-    /// Sets all three motors and switches the outputs on if they are off. Takes effect with the next PWM period (200 µs); the direction at once, which only
-    /// matters where a current changes sign, and there the slew limit keeps it small.
+    /// Sets all three motors and switches the outputs on if they are off. Takes effect with the next PWM period (200 µs); the direction at once,
+    /// which only matters where a current changes sign, and there the slew limit keeps it small.
     pub fn drive(&mut self, setpoints: [Setpoint; AXES]) {
         let mut forward = 0u32;
         for (axis, setpoint) in setpoints.iter().enumerate() {

@@ -50,7 +50,8 @@ impl Outbound for Out {
 
     fn write(&mut self, frame: &[u8]) {
         let mut rest = frame;
-        // At most two pieces: the ring's end divides them. An error would mean a caller that did not ask `room`: the rest is lost, the frame damaged and counted.
+        // At most two pieces: the ring's end divides them. An error would mean a caller that did not ask `room`: the rest is lost, the frame damaged
+        // and counted.
         while !rest.is_empty() {
             let Ok(written) = self.0.try_write(rest) else {
                 return;

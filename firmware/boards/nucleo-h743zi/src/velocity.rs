@@ -1,8 +1,8 @@
 //! Velocity from encoder counts: first-order adaptive windowing (Janabi-Sharifi, Hayward & Chen 2000).
 //!
 //! A difference over one tick is off by up to one count per tick; over n ticks by 1/n of it but late by n/2 ticks. The estimate uses the
-//! longest window, up to [`WINDOW`] ticks, whose chord passes within one count of every sample in it: long at rest and at steady speed, short where the
-//! speed changes. No tuning constant depends on the speed.
+//! longest window, up to [`WINDOW`] ticks, whose chord passes within one count of every sample in it: long at rest and at steady speed, short where
+//! the speed changes. No tuning constant depends on the speed.
 //!
 //! Error at steady speed with a window of n ticks: at most 2/n counts per tick. Cost: at most `WINDOW²/2` = 128 comparisons.
 

@@ -34,15 +34,15 @@ pub const WARM: f64 = 0.25;
 const SCRIPT_TICKS: u32 = 5_000;
 /// Ticks asked for at once: bounds the telemetry that waits.
 const BATCH_TICKS: u32 = 500;
-/// Most a program's memory may grow from one quarter to the next, KiB: scenes differ in size, and baking leaves pages with the allocator. A leak of ten bytes
-/// a tick would be 9 MiB in a quarter of an hour.
+/// Most a program's memory may grow from one quarter to the next, KiB: scenes differ in size, and baking leaves pages with the allocator. A leak of
+/// ten bytes a tick would be 9 MiB in a quarter of an hour.
 const GROWTH_KIB: f64 = 8_192.0;
 const TICKS_PER_S: u32 = 1_000;
 /// Ticks in which the handle is brought to the part, and in which motors fade out.
 const REACH_TICKS: u32 = 500;
 const FADE_TICKS: u32 = 150;
-/// Farthest the hand goes from where it took hold along each axis, m; with at least [`KEY_TICKS`] from place to place it stays under 0.7 m/s, far below
-/// the speed limit.
+/// Farthest the hand goes from where it took hold along each axis, m; with at least [`KEY_TICKS`] from place to place it stays under 0.7 m/s, far
+/// below the speed limit.
 const ROOM_M: f32 = 0.05;
 const KEY_TICKS: u32 = 250;
 /// A script's last keyframe comes no later, and is where its first one is: whichever scripts the link loses or holds back, the hand never jumps.

@@ -1,5 +1,5 @@
-//! Scenes nobody has seen before: one part to move, above one to three others, all any way up, in one of the two kinds of field. It starts clear of them:
-//! a part that starts inside another is thrown out, which is faster than a handle may be.
+//! Scenes nobody has seen before: one part to move, above one to three others, all any way up, in one of the two kinds of field. It starts clear of
+//! them: a part that starts inside another is thrown out, which is faster than a handle may be.
 
 use std::ops::ControlFlow;
 

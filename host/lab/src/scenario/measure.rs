@@ -23,7 +23,8 @@ fn vector(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))
 }
 
-/// Largest force commanded from the second tick after the one in which a fault was seen, N. A sample carries the ticks that are done: its own is one less.
+/// Largest force commanded from the second tick after the one in which a fault was seen, N. A sample carries the ticks that are done: its own is one
+/// less.
 pub(crate) fn force_after(samples: &[Telemetry], fault_tick: u32) -> f64 {
     (samples.iter())
         .filter(|sample| sample.tick > fault_tick + 2)
@@ -198,8 +199,8 @@ impl Felt {
     }
 }
 
-/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Exact between neighbouring ticks, whose wrench is held from
-/// the first to the second, as far as the poses are; else trapezoids: what happens between two samples is not seen.
+/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Exact between neighbouring ticks, whose
+/// wrench is held from the first to the second, as far as the poses are; else trapezoids: what happens between two samples is not seen.
 pub(crate) fn energy(felt: &[Felt]) -> (f64, f64) {
     let (mut given, mut largest, mut passed) = (0.0f64, 0.0f64, 0.0f64);
     for pair in felt.windows(2) {

@@ -49,8 +49,8 @@ pub struct Outcome {
     pub energy_given_mj: f64,
     /// Work that went through the handle either way, mJ.
     pub energy_passed_mj: f64,
-    /// Whether both are of the handle's true motion, which takes every tick's sample of a simulated handle. Else they are of its encoders' readings, whose rounding (5 µm)
-    /// makes them too large by some 10 µW on each axis that moves.
+    /// Whether both are of the handle's true motion, which takes every tick's sample of a simulated handle. Else they are of its encoders' readings,
+    /// whose rounding (5 µm) makes them too large by some 10 µW on each axis that moves.
     pub energy_exact: bool,
     /// Most net work contacts had done on the object at any time, mJ; exact where each tick is heard, else trapezoids between samples.
     pub contact_given_mj: f64,

@@ -1,13 +1,14 @@
 //! Where the simulated handle truly was, which its encoders round.
 //!
-//! Work of the device on the handle is Σ F_k·(x_{k+1} − x_k), with F_k held over the tick and x the handle's true position. Taken with readings q = x + e in its place it is
-//! wrong by Σ F_k·(e_{k+1} − e_k), and not on average right: a count of size u shows at once in the force by −g₀·u, which over the ticks until the next count resists a motion that
-//! readings do not have. While the handle moves by about a count a tick e is nearly white, uniform within ±u/2, and
+//! Work of the device on the handle is Σ F_k·(x_{k+1} − x_k), with F_k held over the tick and x the handle's true position. Taken with readings
+//! q = x + e in its place it is wrong by Σ F_k·(e_{k+1} − e_k), and not on average right: a count of size u shows at once in the force by −g₀·u,
+//! which over the ticks until the next count resists a motion that readings do not have. While the handle moves by about a count a tick e is nearly
+//! white, uniform within ±u/2, and
 //!
 //! P = g₀·u²/(12·h) on each axis, g₀ = m/(m + h·B)·(k + B·a/h), B = b + h·k, a = h/(τ + h) of the speed's filter
 //!
-//! is made out of nothing: 10.8 µW for 5 µm, 5.2 N/mm and 1 ms, 32 µW on three axes that tremble. So the mechanism is played again instead, with the script and the wrenches of
-//! the recording. It computes the same bits on every rig; that it does, to the last reading, is checked.
+//! is made out of nothing: 10.8 µW for 5 µm, 5.2 N/mm and 1 ms, 32 µW on three axes that tremble. So the mechanism is played again instead, with the
+//! script and the wrenches of the recording. It computes the same bits on every rig; that it does, to the last reading, is checked.
 
 use mortise_firmware::board::{Drive, Mechanism};
 use mortise_firmware::simulated::Simulated;
@@ -19,8 +20,8 @@ use super::measure::Felt;
 
 /// What the motors did and where the handle truly was, tick by tick.
 ///
-/// The mechanism starts as new, with nothing driven while `before` leads it for so many ticks; then `script` does, under the wrenches of `samples`. `None` unless every reading is the one recorded
-/// there: a tick is missing, inputs were made to fail, or the rig has another mechanism.
+/// The mechanism starts as new, with nothing driven while `before` leads it for so many ticks; then `script` does, under the wrenches of `samples`.
+/// `None` unless every reading is the one recorded there: a tick is missing, inputs were made to fail, or the rig has another mechanism.
 pub(super) fn replay(
     before: (&HandScript, u32),
     script: &HandScript,
@@ -85,7 +86,8 @@ mod tests {
         stiffness * u * u / (12.0 * h)
     }
 
-    /// A part carried through free air by a hand that trembles by a few counts a tick: nothing is made in truth, and what readings make is what theory says.
+    /// A part carried through free air by a hand that trembles by a few counts a tick: nothing is made in truth, and what readings make is what
+    /// theory says.
     #[test]
     fn readings_make_what_rounding_makes_and_the_true_motion_nothing() {
         const SECONDS: f64 = 6.0;

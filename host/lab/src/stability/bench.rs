@@ -1,8 +1,9 @@
 //! A closed loop on one axis: a handle on a sampled force law, which is the product's own tick with a part in hand.
 //!
-//! The handle moves along z and does not turn. m·v̇ = F_device(held) + F_hand − b·v − f_c·sign(v), F_hand = k_h·(x_w − x) + b_h·(v_w − v) + push, integrated by
-//! Runge and Kutta's fourth order in `SUBSTEPS` steps a tick in double precision; where dry friction can hold the handle, it does. The encoder rounds, the speed comes
-//! from its differences, and the force is given out so many ticks late. The work of the device is exact, because its force is held.
+//! The handle moves along z and does not turn. m·v̇ = F_device(held) + F_hand − b·v − f_c·sign(v), F_hand = k_h·(x_w − x) + b_h·(v_w − v) + push,
+//! integrated by Runge and Kutta's fourth order in `SUBSTEPS` steps a tick in double precision; where dry friction can hold the handle, it does. The
+//! encoder rounds, the speed comes from its differences, and the force is given out so many ticks late. The work of the device is exact, because its
+//! force is held.
 
 use mortise_haptics::{Input, Output, Passivity, Pose, Quat, Settings, State, Twist, Vec3, tick};
 use mortise_protocol::image::SceneImage;

@@ -1,7 +1,8 @@
 //! Where a wall becomes unstable, found by experiment on the product's own tick.
 //!
-//! The hand presses the part on a slab until it lies still, lets go of all damping of its own but the plant's, and flicks the handle. Whether the trembling that
-//! follows dies out or grows is what is looked at: linear theory's own question, asked of the whole loop with its encoder, its coupling and its contacts.
+//! The hand presses the part on a slab until it lies still, lets go of all damping of its own but the plant's, and flicks the handle. Whether the
+//! trembling that follows dies out or grows is what is looked at: linear theory's own question, asked of the whole loop with its encoder, its
+//! coupling and its contacts.
 
 use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
@@ -24,7 +25,8 @@ const GROWN: f64 = 20.0;
 
 /// A wall rendered by the product's coupling, its object pinned by contact, without the valve: settings, and what the sensor tells of the speed.
 ///
-/// The coupling looks a period ahead: it gives K·x + (b_T + T·K)·v̂. A textbook's wall of damping B is one with b_T = 0 that is told B/(T·K) of the speed.
+/// The coupling looks a period ahead: it gives K·x + (b_T + T·K)·v̂. A textbook's wall of damping B is one with b_T = 0 that is told B/(T·K) of the
+/// speed.
 pub fn settings(law: Law, wall: &Wall, stiffness: f64) -> (Settings, Sensor) {
     let mut settings = open(wall.period_s);
     settings.coupling.k_t_n_per_m = stiffness as f32;
@@ -63,7 +65,8 @@ pub struct Flick {
     pub first_m: f64,
     /// See `first_m`.
     pub last_m: f64,
-    /// Deviation of the flick in a linear loop without damping, v·√(m/K), m: trembling that has grown to what limits it may fall again, but not so far.
+    /// Deviation of the flick in a linear loop without damping, v·√(m/K), m: trembling that has grown to what limits it may fall again, but not so
+    /// far.
     pub linear_m: f64,
     /// Work of the device on the handle since the flick.
     pub energy: Energy,

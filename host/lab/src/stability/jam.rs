@@ -1,14 +1,17 @@
 //! How far to the side a hand may push a peg that is still to go in: jamming and wedging.
 //!
-//! A peg of diameter d stands l deep in a hole of diameter D, leans, and touches twice: its side the hole's rim, its tip's edge the wall across. A hand pushes a place on its axis sideways
-//! with F_x and in with F_z and leaves it free to turn. Oracles, both for a rigid peg in the plane of the tilt:
+//! A peg of diameter d stands l deep in a hole of diameter D, leans, and touches twice: its side the hole's rim, its tip's edge the wall across. A
+//! hand pushes a place on its axis sideways with F_x and in with F_z and leaves it free to turn. Oracles, both for a rigid peg in the plane of the
+//! tilt:
 //!
-//! * with dry friction μ at the walls it **jams** where F_x/F_z > 1/(μ·(1 + 2·(h − μ·d/2)/l)), h the height of the push above the rim: two-point contact of the classical diagram,
-//!   F_x/F_z against M/(r·F_z) with λ = l/(2·r·μ), for this push (D. E. Whitney, *Quasi-static assembly of compliantly supported rigid parts*, J. Dyn. Sys. Meas. Control 104(1), 1982);
-//! * without friction the work done by the push decides: D·cos θ − l·sin θ = d ties depth to tilt, and the peg goes in where F_z·dz > F_x·dx. With a wide gap even a slippery
-//!   peg is pushed out by a hand that tilts it.
+//! * with dry friction μ at the walls it **jams** where F_x/F_z > 1/(μ·(1 + 2·(h − μ·d/2)/l)), h the height of the push above the rim: two-point
+//!   contact of the classical diagram, F_x/F_z against M/(r·F_z) with λ = l/(2·r·μ), for this push (D. E. Whitney, *Quasi-static assembly of
+//!   compliantly supported rigid parts*, J. Dyn. Sys. Meas. Control 104(1), 1982);
+//! * without friction the work done by the push decides: D·cos θ − l·sin θ = d ties depth to tilt, and the peg goes in where F_z·dz > F_x·dx. With a
+//!   wide gap even a slippery peg is pushed out by a hand that tilts it.
 //!
-//! **Wedging**, two-point contact that holds though nobody pushes, needs μ > l/d: contact here has no friction, so a peg must come out again however it was pushed in.
+//! **Wedging**, two-point contact that holds though nobody pushes, needs μ > l/d: contact here has no friction, so a peg must come out again however
+//! it was pushed in.
 
 use mortise_bake::Grabbable;
 use mortise_protocol::message::{HandScript, Keyframe, ToDevice, WirePose};
@@ -153,7 +156,8 @@ impl Stage {
         })
     }
 
-    /// How deep the peg is, mm, when it has been leant `aside_mm` and then pushed so, N, for so long each, s; `None` when it took the handle out of the workspace.
+    /// How deep the peg is, mm, when it has been leant `aside_mm` and then pushed so, N, for so long each, s; `None` when it took the handle out of
+    /// the workspace.
     fn pushed(&self, aside_mm: f64, pushes: &[(f64, [f64; 3])]) -> Result<Option<f64>, LabError> {
         let client = Client::connect(&RigSpec::Simulated { realtime: false })?;
         client.upload(&self.scene.image, &mut |_| {})?;

@@ -1,8 +1,8 @@
 //! Where closed loops become unstable, by theory and by experiment, and where each method fails.
 //!
-//! [`mod@bench`] closes a loop round the product's tick on one axis; [`oracle`] says what the linear loop must do; [`boundary`] finds what the whole one does.
-//! [`limits`] and [`quantisation`] are the maps that hold the two together, [`press`], [`impact`], [`shell`] and [`jam`] are those where methods are compared;
-//! [`lapses`] is about targets that are late or lost.
+//! [`mod@bench`] closes a loop round the product's tick on one axis; [`oracle`] says what the linear loop must do; [`boundary`] finds what the whole
+//! one does. [`limits`] and [`quantisation`] are the maps that hold the two together, [`press`], [`impact`], [`shell`] and [`jam`] are those where
+//! methods are compared; [`lapses`] is about targets that are late or lost.
 
 pub mod bench;
 pub mod boundary;

@@ -1,9 +1,10 @@
 //! What theory says of a sampled wall: spectral radius of the closed loop, and the closed forms of Colgate and Schenkel.
 //!
 //! Plant m·ẍ + b·ẋ + k·x = u (k and part of b are the hand's), u held from tick to tick and given out d ticks late; wall u = −K·x − B·v̂ with v̂ the
-//! difference quotient of the samples, through a first-order low-pass of time constant τ where that is not 0. The loop is linear, so it is stable exactly if no
-//! eigenvalue of its step is larger than 1: that is the truth the closed forms bound. Sources: J. E. Colgate and G. G. Schenkel, *Passivity of a class of
-//! sampled-data systems*, J. Robotic Systems 14(1), 1997; J. J. Gil et al., *Stability boundary for haptic rendering*, IEEE T-RO 25(6), 2009.
+//! difference quotient of the samples, through a first-order low-pass of time constant τ where that is not 0. The loop is linear, so it is stable
+//! exactly if no eigenvalue of its step is larger than 1: that is the truth the closed forms bound. Sources: J. E. Colgate and G. G. Schenkel,
+//! *Passivity of a class of sampled-data systems*, J. Robotic Systems 14(1), 1997; J. J. Gil et al., *Stability boundary for haptic rendering*, IEEE
+//! T-RO 25(6), 2009.
 
 /// Largest delay, ticks.
 pub const MAX_DELAY: usize = 4;

@@ -1,13 +1,14 @@
 //! Encoder steps against dry friction: up to which stiffness a pressed wall lets the handle rest.
 //!
-//! An encoder of step Δ makes of a wall K a stair: its force jumps by K·Δ. Pressed with a force half-way between two stairs the handle has no place to rest unless dry friction
-//! f_c holds the half step that is left, K·Δ/2. With viscous friction b against the sampled wall the whole condition is
+//! An encoder of step Δ makes of a wall K a stair: its force jumps by K·Δ. Pressed with a force half-way between two stairs the handle has no place
+//! to rest unless dry friction f_c holds the half step that is left, K·Δ/2. With viscous friction b against the sampled wall the whole condition is
 //!
 //! K ≤ min(2·b/T, 2·f_c/Δ)
 //!
-//! (J. J. Abbott and A. M. Okamura, *Effects of position quantization and sampling rate on virtual-wall passivity*, IEEE T-RO 21(5), 2005; N. Diolaiti, G. Niemeyer, F. Barbagli and
-//! J. K. Salisbury, *Stability of haptic rendering: discretization, quantization, time delay, and Coulomb effects*, IEEE T-RO 22(2), 2006). The second bound is sharp, which is what the experiment
-//! shows; beyond the first one dry friction still bears small motions, so that the marks may lie above it.
+//! (J. J. Abbott and A. M. Okamura, *Effects of position quantization and sampling rate on virtual-wall passivity*, IEEE T-RO 21(5), 2005; N.
+//! Diolaiti, G. Niemeyer, F. Barbagli and J. K. Salisbury, *Stability of haptic rendering: discretization, quantization, time delay, and Coulomb
+//! effects*, IEEE T-RO 22(2), 2006). The second bound is sharp, which is what the experiment shows; beyond the first one dry friction still bears
+//! small motions, so that the marks may lie above it.
 
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;

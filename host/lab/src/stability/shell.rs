@@ -1,7 +1,7 @@
 //! Where a surface is felt: the textbook's pointshell shrunk by part of a voxel, voxel by voxel, against the exact surface.
 //!
-//! A voxel's centre lies up to half a voxel inside the surface, so a shell of them feels a wall before it is there (phantom force); shrunk by more than half a voxel it
-//! passes through what it should touch.
+//! A voxel's centre lies up to half a voxel inside the surface, so a shell of them feels a wall before it is there (phantom force); shrunk by more
+//! than half a voxel it passes through what it should touch.
 
 use mortise_bake::{Method, PointshellKind};
 use mortise_haptics::{Settings, Vec3};

@@ -1,8 +1,9 @@
 //! Whether a feature's size matters: 62 trials with pegs of 15 to 95 mm, voxels of 2.0 and 0.4 mm.
 //!
-//! Chapter 7 of Faas 2010 has 62 trials over these diameters and voxels. Here each combination is tried six times, with a hand drawn anew, and the smallest
-//! peg a seventh time with each voxel. Peg and block are as large as their hole: the block 3 × 3 × 1.5 diameters, the peg 2 diameters long, 1 mm
-//! clearance (ours). Contact is the textbook's, its points moved inward by [`SHRINK_PERCENT`] unless said otherwise: where they are not, no trial goes.
+//! Chapter 7 of Faas 2010 has 62 trials over these diameters and voxels. Here each combination is tried six times, with a hand drawn anew, and the
+//! smallest peg a seventh time with each voxel. Peg and block are as large as their hole: the block 3 × 3 × 1.5 diameters, the peg 2 diameters long,
+//! 1 mm clearance (ours). Contact is the textbook's, its points moved inward by [`SHRINK_PERCENT`] unless said otherwise: where they are not, no
+//! trial goes.
 
 use std::fmt;
 

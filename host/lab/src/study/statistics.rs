@@ -12,8 +12,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 const STEPS: usize = 60;
 /// Converged: the deviance changes by less.
 const CONVERGED: f64 = 1e-10;
-/// As good as certain: |η| beyond this, a chance of one in a hundred million. No sample of a hundred trials shows so much; some term or sum of terms tells
-/// trials apart entirely, and coefficients grow without bound.
+/// As good as certain: |η| beyond this, a chance of one in a hundred million. No sample of a hundred trials shows so much; some term or sum of terms
+/// tells trials apart entirely, and coefficients grow without bound.
 const CERTAIN: f64 = 18.4;
 /// A ridge on the information matrix, for trials told apart: far below what any coefficient is known to.
 const RIDGE: f64 = 1e-12;
@@ -192,8 +192,8 @@ mod tests {
         assert!((a - b).abs() <= within, "{a} instead of {b}");
     }
 
-    /// Hours of study against passing, the example of the English Wikipedia's "Logistic regression": β = −4.0777 and 1.5046, standard errors 1.7610 and
-    /// 0.6287, log likelihood −8.02988, p = 0.0006 against the model without hours.
+    /// Hours of study against passing, the example of the English Wikipedia's "Logistic regression": β = −4.0777 and 1.5046, standard errors 1.7610
+    /// and 0.6287, log likelihood −8.02988, p = 0.0006 against the model without hours.
     #[test]
     fn hours_of_study() {
         let failed = [0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5];

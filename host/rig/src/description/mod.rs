@@ -1,7 +1,7 @@
 //! A rig's description as a file: read, checked, written, and what follows from it.
 //!
-//! The file is TOML with millimetres and degrees (`docs/rigs.md`); the wire form has SI units. What is wrong is said with its key, its value, its range, and what
-//! to do; a file that passes here passes on the board, because both ask the same code.
+//! The file is TOML with millimetres and degrees (`docs/rigs.md`); the wire form has SI units. What is wrong is said with its key, its value, its
+//! range, and what to do; a file that passes here passes on the board, because both ask the same code.
 
 mod abilities;
 mod file;

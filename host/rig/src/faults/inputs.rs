@@ -1,6 +1,7 @@
 //! What goes wrong at the inputs of a simulated board: encoders, drivers, stop input, supply.
 //!
-//! Not part of the line: the board is told beforehand ([`ToDevice::SimulatedInputs`]) and does it by itself, tick for tick alike in-process and emulated.
+//! Not part of the line: the board is told beforehand ([`ToDevice::SimulatedInputs`]) and does it by itself, tick for tick alike in-process and
+//! emulated.
 
 use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{self, InputFaultKind, ToDevice};

@@ -141,9 +141,9 @@ pub(super) fn real_parts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<()
     paths.retain(|path| !plan.quick || small(path));
     let mut files = Vec::new();
     let (mut baked, mut long) = (0usize, 0usize);
-    let mut refused = |path: &Path, error: &LabError| {
+    let mut refused = |error: &LabError| {
         let text = error.to_string();
-        eprintln!("{}: {text}", path.display());
+        eprintln!("{text}");
         long += usize::from(text.contains('\n'));
     };
     for path in &paths {
@@ -152,11 +152,11 @@ pub(super) fn real_parts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<()
             Ok(model) => {
                 match bake(&model, &BakeOptions::default(), &|_| ControlFlow::Continue(())) {
                     Ok(_) => baked += 1,
-                    Err(source) => refused(&path, &refusal(&path)(source)),
+                    Err(source) => refused(&refusal(&path)(source)),
                 }
                 files.push(RealFile { path, model });
             }
-            Err(error) => refused(&path, &error.into()),
+            Err(error) => refused(&error.into()),
         }
     }
     out(Row::within(

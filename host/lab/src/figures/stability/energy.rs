@@ -9,6 +9,7 @@ use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::scenario::{Outcome, Scenario, run};
+use crate::stability::lapses;
 
 /// Most net energy at the handle, mJ, and of what passed, %.
 const MADE_MJ: f64 = 1.0;
@@ -77,6 +78,25 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             MADE_MJ,
         ));
     }
+    lapses::sweep(true, &mut |held| {
+        let what = format!(
+            "peg held 1 mm and 2° off at rest, {}, {:.0} % of refreshes lost",
+            held.case,
+            100.0 * held.lost
+        );
+        out(Row::at_most(
+            format!("{what}: net energy made at the handle since the grab"),
+            held.handle_made_mj,
+            "mJ",
+            MADE_MJ,
+        ));
+        out(Row::at_most(
+            format!("{what}: of the {:.3} mJ that passed", held.handle_passed_mj),
+            100.0 * held.handle_made_mj / held.handle_passed_mj,
+            "%",
+            MADE_PERCENT,
+        ));
+    })?;
     Ok(())
 }
 
@@ -92,7 +112,8 @@ fn play(name: &str, text: &str, step: &Path) -> Result<Outcome, LabError> {
 mod tests {
     use super::*;
 
-    /// The presses in which least passes, where a constant amount made weighs most: the ramp after the grab made an eleventh of it while it scaled the wrench.
+    /// The presses in which least passes, where a constant amount made weighs most: the ramp after the grab made an eleventh of it while it scaled
+    /// the wrench.
     #[test]
     fn what_passes_little_makes_little() {
         let pair = concat!(
@@ -115,7 +136,8 @@ mod tests {
         }
     }
 
-    /// A target that takes hold of a part beside its axis brings the energy of its pull from there; the observer must see it, and it is all there may be.
+    /// A target that takes hold of a part beside its axis brings the energy of its pull from there; the observer must see it, and it is all there may
+    /// be.
     #[test]
     fn targets_are_seen_at_the_object_and_give_little() {
         let tight = Fit::thesis(0.02).engaged(-20.0).file().expect("written");

@@ -1,9 +1,10 @@
 //! Random inputs to the tick, and every force command looked at.
 //!
-//! Unsafe is a command that is not finite, one beyond the limits in force, and one that gives power into a wall: the peg is pressed onto the slab, the
-//! handle beyond it and on its way further, and the force points that way too. Left out of that last count are ticks in which the slew limit
-//! still takes an earlier force back, and those in which the peg does not touch or falls ahead of the handle. One input in twenty is absurd (not a number, infinite, out of
-//! all proportion, not a rotation); limits and gains change at random every 500 inputs. The implicit step, which is the board's default.
+//! Unsafe is a command that is not finite, one beyond the limits in force, and one that gives power into a wall: the peg is pressed onto the slab,
+//! the handle beyond it and on its way further, and the force points that way too. Left out of that last count are ticks in which the slew limit
+//! still takes an earlier force back, and those in which the peg does not touch or falls ahead of the handle. One input in twenty is absurd (not a
+//! number, infinite, out of all proportion, not a rotation); limits and gains change at random every 500 inputs. The implicit step, which is the
+//! board's default.
 
 use std::thread;
 
@@ -195,8 +196,8 @@ fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsaf
         }
         let taking_back = output.work.flags.intersects(Flags::SLEW_LIMITED);
         let into = input.handle.position.z < -BEYOND_M && input.handle_twist.linear.z < 0.0;
-        // Speed of the peg's point under the handle; `object` is about the peg's own frame, the twist about its centre of mass. Falling flat onto the slab from
-        // its rim the peg may run ahead of the handle, and drags it along as a body does: that is no wall's doing.
+        // Speed of the peg's point under the handle; `object` is about the peg's own frame, the twist about its centre of mass. Falling flat onto the
+        // slab from its rim the peg may run ahead of the handle, and drags it along as a body does: that is no wall's doing.
         let peg = output.object_twist;
         let arm = input.handle.position - output.object.position;
         let ahead = (peg.linear + peg.angular.cross(arm)).z < input.handle_twist.linear.z;
