@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Integrated like the free handle ([`crate::simulated`]) with [`SUBSTEPS`] backward-Euler steps a tick: one 3×3 system with springs, dampers and
-//! viscous friction implicit and J frozen over the step. Coulomb friction then takes h·Σ f_c|θ̇| out of the kinetic energy, all joints slowing by one
-//! factor, until there is none. Joints end at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's
+//! viscous friction implicit and J frozen over the step. Dry friction is then, of all impulses within ±h·f_c at the joints, the one that leaves the least
+//! energy (the principle of maximum dissipation), so that a joint stands exactly where no more than its own friction is asked of it. Joints end at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's
 //! orientation through the same equation. Sensing and currents are [`Joints`], the code of a real rig.
 
 use glam::{Mat3, Vec3};
@@ -32,6 +32,8 @@ const WRIST_VISCOUS: f32 = 1e-3;
 const STOP: f32 = 0.03;
 /// No joint turns faster, rad/s: keeps a step below a turn whatever the hand does.
 const RATE_MAX: f32 = 2_000.0;
+/// Rounds over the joints in which friction is found. Each takes energy out, so that few are a matter of accuracy alone.
+const FRICTION_ROUNDS: usize = 12;
 
 /// See the module.
 #[derive(Clone, Debug)]
@@ -209,15 +211,7 @@ impl Links {
         let yields = grip.damping + H * grip.stiffness;
         let system = self.mass_matrix() + (Mat3::from_diagonal(self.viscous) + back * jacobian * yields) * H;
         let momentum = self.mass_matrix() * self.rates + (motors + back * pull) * H;
-        let moving = solve(system, momentum);
-        // Friction's power out of the energy of the step; nothing moves where it would take more.
-        let energy = moving.dot(system * moving);
-        let lost = H * self.coulomb.dot(moving.abs());
-        self.rates = if lost >= energy {
-            Vec3::ZERO
-        } else {
-            moving * (1.0 - lost / energy)
-        };
+        self.rates = solve(system, momentum - friction(system, momentum, self.coulomb * H));
 
         let axes = self.posture.wrist_axes;
         let turn = rotation::log_continuous(
@@ -281,6 +275,24 @@ impl Links {
             }
         }
     }
+}
+
+/// Impulse f of dry friction, |fᵢ| ≤ `most`ᵢ, that leaves the least of ½·(p − f)ᵀA⁻¹(p − f): coordinate after coordinate (projected Gauss–Seidel). All of
+/// the momentum p, exactly, where friction can hold it.
+fn friction(system: Mat3, momentum: Vec3, most: Vec3) -> Vec3 {
+    if momentum.abs().cmple(most).all() {
+        return momentum;
+    }
+    let inverse = system.inverse();
+    let mut friction = Vec3::ZERO;
+    for _ in 0..FRICTION_ROUNDS {
+        for joint in 0..MAX_JOINTS {
+            let rate = inverse.row(joint).dot(momentum - friction);
+            let wanted = friction[joint] + rate / inverse.col(joint)[joint];
+            friction[joint] = wanted.clamp(-most[joint], most[joint]);
+        }
+    }
+    friction
 }
 
 /// x of A·x = b, each part within ±[`RATE_MAX`]; zero where there is none.

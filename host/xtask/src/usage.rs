@@ -54,7 +54,10 @@ const COMMANDS: &[Command] = &[
         name: "fuzz",
         what: "Random bytes, guided by coverage, for what reads frames, scenes, rigs and STEP files; all of them, or TARGET",
         arguments: "[TARGET]",
-        options: &[("--minutes <N>", "How long each runs; 1 by default")],
+        options: &[
+            ("--minutes <N>", "How long each runs; 1 by default"),
+            ("--json", "Print the result as rows of figures"),
+        ],
     },
     Command {
         name: "firmware",

@@ -14,6 +14,9 @@ const HIL_BENCH: &str = "bench";
 /// Tables whose shorter form is measured.
 const FIGURES: [&str; 1] = ["end-to-end"];
 const FUZZ_EACH: Duration = Duration::from_secs(15);
+/// What property tests draw their cases from, unless the environment says otherwise: a commit passes or fails here as it does everywhere. Plain
+/// `cargo test` draws anew each time.
+const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
 const BOARD_SIDE: [&str; 3] = ["mortise-protocol", "mortise-haptics", "mortise-firmware"];
 
 pub fn format(bench: &mut Bench) -> Result<String> {
@@ -128,9 +131,13 @@ pub fn fuzz(bench: &mut Bench) -> Result<String> {
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
         return Ok("not run: set up for Linux on x86-64 alone".to_owned());
     }
-    let fuzzed = fuzz::run(&bench.root, FUZZ_EACH, None)?;
-    let words: Vec<String> = fuzzed.iter().map(ToString::to_string).collect();
-    Ok(words.join("; "))
+    let (mut words, mut crashed) = (Vec::new(), false);
+    fuzz::run(&bench.root, FUZZ_EACH, None, |fuzzed| {
+        words.push(fuzzed.to_string());
+        crashed |= fuzzed.crashed();
+    })?;
+    let words = words.join("; ");
+    if crashed { bail!("{words}") } else { Ok(words) }
 }
 
 pub fn docs(bench: &mut Bench) -> Result<String> {
@@ -187,6 +194,10 @@ fn host_triple(root: &Path) -> Result<String> {
 
 /// Runs tests and counts them, failed ones too; none at all is a failure, as it says nothing.
 fn counted(bench: &mut Bench, command: &mut Command) -> Result<String> {
+    let (name, seed) = PROPERTY_SEED;
+    if std::env::var_os(name).is_none() {
+        command.env(name, seed);
+    }
     shell::run_lines(command, |line| {
         println!("{line}");
         bench.counts.add_line(line);

@@ -5,6 +5,7 @@ mod contacts;
 mod endurance;
 mod energy;
 pub mod faults;
+mod fuzzing;
 mod impact;
 mod rate;
 pub mod unsafe_commands;
@@ -21,5 +22,6 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     rate::measure(out)?;
     faults::measure(plan, out)?;
     unsafe_commands::measure(plan, out)?;
+    fuzzing::measure(plan, out)?;
     endurance::hour(plan, out)
 }
