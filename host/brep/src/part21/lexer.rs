@@ -21,6 +21,15 @@ pub fn parse(text: &[u8]) -> Result<Exchange, Part21Error> {
     Ok(lexer.out)
 }
 
+/// What a list's last token was.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Last {
+    /// `(`, `)` or a comma.
+    Mark,
+    Keyword,
+    Value,
+}
+
 struct Lexer<'a> {
     text: &'a [u8],
     at: usize,
@@ -186,10 +195,21 @@ impl Lexer<'_> {
             return Err(self.unexpected("where ( is due"));
         }
         let mut depth = 0;
+        // Space is left out of what is kept: two values without a comma between them would read as one.
+        let mut last = Last::Mark;
         loop {
             self.space()?;
             let Some(byte) = self.peek() else {
                 return Err(self.truncated("an entity is not closed"));
+            };
+            let separates = matches!(byte, b',' | b')') || (last == Last::Keyword && byte == b'(');
+            if last != Last::Mark && !separates {
+                return Err(self.unexpected("where a comma or ) is due"));
+            }
+            last = match byte {
+                b'(' | b')' | b',' => Last::Mark,
+                b'A'..=b'Z' | b'a'..=b'z' | b'_' | b'!' => Last::Keyword,
+                _ => Last::Value,
             };
             match byte {
                 b'(' => {
@@ -241,12 +261,15 @@ impl Lexer<'_> {
             self.at += 1;
         }
         let number = &self.text[start..self.at];
-        // Upper case: the kernel (7.6) takes 6.1e-17, which some writers give for 6.1E-17, for 6.1.
-        out.extend(number.iter().map(u8::to_ascii_uppercase));
         let value = std::str::from_utf8(number)
             .ok()
             .and_then(|n| n.parse::<f64>().ok());
-        if !value.is_some_and(f64::is_finite) {
+        if value.is_some_and(f64::is_finite) {
+            // Upper case: the kernel (7.6) takes 6.1e-17, which some writers give for 6.1E-17, for 6.1.
+            out.extend(number.iter().map(u8::to_ascii_uppercase));
+        } else {
+            // The check refuses it where it counts; elsewhere the kernel, which crashes on some, gets "not given".
+            out.push(b'$');
             self.out
                 .bad_numbers
                 .push((entity, String::from_utf8_lossy(number).into_owned()));
@@ -481,6 +504,24 @@ mod tests {
                 what: "#1 is defined twice, first at line 2".into()
             }
         );
+    }
+
+    #[test]
+    fn values_without_a_comma_between_them_are_not_one_value() {
+        let text =
+            |list: &str| format!("ISO-10303-21;HEADER;ENDSEC;DATA;\n#1=A({list});\nENDSEC;END-ISO-10303-21;");
+        for list in [
+            "'a' 'b'", "''#2", "1. 2.", "#2 3", ".T. .F.", "1.A('b')", "B #2", "$ 'a'", "'a'(1)", ". T.",
+        ] {
+            let error = parse(text(list).as_bytes()).unwrap_err();
+            assert!(
+                matches!(&error, Part21Error::Invalid { line: 2, what } if what.contains("where a comma or ) is due")),
+                "{list}: {error:?}"
+            );
+        }
+        for list in ["'a',B(1.),(),(#2,$)", "", "B ( 'a' )"] {
+            assert!(parse(text(list).as_bytes()).is_ok(), "{list}");
+        }
     }
 
     proptest! {
