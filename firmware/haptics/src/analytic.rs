@@ -255,11 +255,11 @@ pub(crate) fn closed_form(shape: &Shape<'_>) -> bool {
     shape.faces.iter().all(|face| face.kind != surface_kind::OTHER)
 }
 
-/// Distance from `p` to a shape's faces and edges, all of [`closed_form`], and with `corners` to samples of edges and corners too (one corner
-/// against another is found in no other way), never negative; none when no foot was found.
+/// Distance from `p` to a shape's faces and edges, all of [`closed_form`], never negative; none when nothing was found. Where an edge has ended short of
+/// its foot, where there is no foot at all, or with `corners`, to samples of edges and corners too: one corner against another is found in no other way.
 ///
 /// Where it is no less than `enough`, it is given as `enough`.
-pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, corners: bool, enough: f32) -> Option<f32> {
+pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, mut corners: bool, enough: f32) -> Option<f32> {
     let near_edge = NEAR_EDGE_CELLS * shape.field.record().cell;
     let mut best = enough;
     // Faces that are near; one whose foot is not unique may be.
@@ -271,15 +271,11 @@ pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, corners: bool, enoug
         };
         let distance = foot_a.distance.abs();
         near += usize::from(distance < enough);
-        if distance < best && on_surface(shape, foot_a.point) {
-            let beyond = shape.faces.iter().enumerate().any(|(b, other)| {
-                a != b
-                    && foot(other, foot_a.point).is_some_and(|o| o.distance.abs() < near_edge)
-                    && beyond_edge(shape, face, other, foot_a.point, near_edge)
-            });
-            if !beyond {
-                best = distance;
-            }
+        if distance < best
+            && on_surface(shape, foot_a.point)
+            && !beyond(shape, [a; 2], foot_a.point, near_edge)
+        {
+            best = distance;
         }
     }
     // An edge or corner lies on two faces at least, and is no nearer than they.
@@ -291,19 +287,27 @@ pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, corners: bool, enoug
         if !nearer(face, best) {
             continue;
         }
-        for other in shape.faces.iter().skip(a + 1) {
+        for (b, other) in shape.faces.iter().enumerate().skip(a + 1) {
             if nearer(other, best)
                 && let Some(edge) = edge_foot(face, other, p)
                 && on_surface(shape, edge)
             {
                 let distance = length(p - edge);
                 if distance < best {
-                    best = distance;
+                    // Past a corner the two surfaces still cross, but the edge has ended.
+                    if [[a, b], [b, a]]
+                        .iter()
+                        .any(|&of| beyond(shape, of, edge, near_edge))
+                    {
+                        corners = true;
+                    } else {
+                        best = distance;
+                    }
                 }
             }
         }
     }
-    if corners {
+    if corners || best.is_infinite() {
         best = nearest_edge_point(shape, p, best);
     }
     best.is_finite().then_some(best)
@@ -340,6 +344,18 @@ fn on_surface(shape: &Shape<'_>, p: Vec3) -> bool {
         Lookup::Near(sample) => sample.distance.abs() <= ON_SURFACE_CELLS * shape.field.record().cell,
         Lookup::Far { .. } => false,
     }
+}
+
+/// Whether `p` on the surface of face `of[0]` lies beyond its edge with another face that is near, `of[1]` left aside.
+fn beyond(shape: &Shape<'_>, of: [usize; 2], p: Vec3, near_edge: f32) -> bool {
+    let Some(face) = shape.faces.get(of[0]) else {
+        return false;
+    };
+    shape.faces.iter().enumerate().any(|(b, other)| {
+        !of.contains(&b)
+            && foot(other, p).is_some_and(|o| o.distance.abs() < near_edge)
+            && beyond_edge(shape, face, other, p, near_edge)
+    })
 }
 
 /// Whether `p` on the surface of `face` lies beyond its edge with `other`, when there is one within `near_edge`.
