@@ -7,9 +7,10 @@
 //! ```
 //!
 //! Integrated like the free handle ([`crate::simulated`]) with [`SUBSTEPS`] backward-Euler steps a tick: one 3×3 system with springs, dampers and
-//! viscous friction implicit and J frozen over the step. Dry friction is then, of all impulses within ±h·f_c at the joints, the one that leaves the least
-//! energy (the principle of maximum dissipation), so that a joint stands exactly where no more than its own friction is asked of it. Joints end at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's
-//! orientation through the same equation. Sensing and currents are [`Joints`], the code of a real rig.
+//! viscous friction implicit and J frozen over the step. Dry friction is then, of all impulses within ±h·f_c at the joints, the one that leaves the
+//! least energy (the principle of maximum dissipation), so that a joint stands exactly where no more than its own friction is asked of it. Joints end
+//! at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's orientation through the same equation.
+//! Sensing and currents are [`Joints`], the code of a real rig.
 
 use glam::{Mat3, Vec3};
 use mortise_haptics::{Pose, Wrench, rotation};
@@ -277,8 +278,8 @@ impl Links {
     }
 }
 
-/// Impulse f of dry friction, |fᵢ| ≤ `most`ᵢ, that leaves the least of ½·(p − f)ᵀA⁻¹(p − f): coordinate after coordinate (projected Gauss–Seidel). All of
-/// the momentum p, exactly, where friction can hold it.
+/// Impulse f of dry friction, |fᵢ| ≤ `most`ᵢ, that leaves the least of ½·(p − f)ᵀA⁻¹(p − f): coordinate after coordinate (projected Gauss–Seidel).
+/// All of the momentum p, exactly, where friction can hold it.
 fn friction(system: Mat3, momentum: Vec3, most: Vec3) -> Vec3 {
     if momentum.abs().cmple(most).all() {
         return momentum;

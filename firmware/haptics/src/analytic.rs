@@ -255,8 +255,9 @@ pub(crate) fn closed_form(shape: &Shape<'_>) -> bool {
     shape.faces.iter().all(|face| face.kind != surface_kind::OTHER)
 }
 
-/// Distance from `p` to a shape's faces and edges, all of [`closed_form`], never negative; none when nothing was found. Where an edge has ended short of
-/// its foot, where there is no foot at all, or with `corners`, to samples of edges and corners too: one corner against another is found in no other way.
+/// Distance from `p` to a shape's faces and edges, all of [`closed_form`], never negative; none when nothing was found. Where an edge has ended short
+/// of its foot, where there is no foot at all, or with `corners`, to samples of edges and corners too: one corner against another is found in no
+/// other way.
 ///
 /// Where it is no less than `enough`, it is given as `enough`.
 pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, mut corners: bool, enough: f32) -> Option<f32> {

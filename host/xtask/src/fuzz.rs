@@ -283,7 +283,8 @@ fn fuzz(root: &Path, place: &Path, target: &Target, program: &Path, each: Durati
         .expect("there are workers"))
 }
 
-/// Inputs tried, edges taken and edges there are, from libFuzzer's log: `… (12345 inline 8-bit counters)…`, `#99 … cov: 432 ft: …`, `stat::number_of_executed_units: 99`.
+/// Inputs tried, edges taken and edges there are, from libFuzzer's log: `… (12345 inline 8-bit counters)…`, `#99 … cov: 432 ft: …`,
+/// `stat::number_of_executed_units: 99`.
 fn read_log(said: &str) -> Option<(u64, (u64, u64))> {
     let number = |text: &str| text.split_whitespace().next()?.parse().ok();
     let all = said
