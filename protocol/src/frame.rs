@@ -1,6 +1,6 @@
-//! Frames: `COBS( sequence: u16 LE | message: postcard | CRC-32/ISO-HDLC: u32 LE ) 0x00`.
+//! Frames: `COBS( sequence: u16 LE | message: postcard | stamp | CRC-32/ISO-HDLC: u32 LE ) 0x00`.
 //!
-//! The checksum covers sequence and message. The delimiter never occurs inside a frame, so a reader that
+//! The [`Stamp`] (session: u32 LE, count: u32 LE) is absent from every frame of a board and from a host's greeting. The checksum covers all before it. The delimiter never occurs inside a frame, so a reader that
 //! has lost its place finds it again at the next zero: at most one good frame is lost to garbage before it.
 
 use serde::Serialize;
@@ -11,6 +11,44 @@ use crate::limits::MAX_FRAME;
 
 const SEQUENCE: usize = 2;
 const CHECKSUM: usize = 4;
+
+/// Tells a new command from one that was repeated, delayed, or sent to an earlier session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Stamp {
+    /// [`crate::message::Capabilities::session`] of the session the command is meant for.
+    pub session: u32,
+    /// Rises with every frame the host sends in that session.
+    pub count: u32,
+}
+
+impl Stamp {
+    /// Bytes in a frame.
+    pub const BYTES: usize = 8;
+
+    fn to_bytes(self) -> [u8; Self::BYTES] {
+        let word = u64::from(self.session) | u64::from(self.count) << 32;
+        word.to_le_bytes()
+    }
+
+    fn from_bytes(bytes: [u8; Self::BYTES]) -> Self {
+        let word = u64::from_le_bytes(bytes);
+        Self {
+            session: word as u32,
+            count: (word >> 32) as u32,
+        }
+    }
+}
+
+/// What a sound frame carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Received<M> {
+    /// Sequence number.
+    pub sequence: u16,
+    /// Where the sender gave one.
+    pub stamp: Option<Stamp>,
+    /// The message.
+    pub message: M,
+}
 
 /// Why bytes between two delimiters are no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,15 +67,29 @@ pub enum FrameError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge;
 
-/// Writes one frame with delimiter into `out`, which is best [`MAX_FRAME`] long; returns the used part.
+/// Writes one frame with delimiter and without a stamp into `out`, which is best [`MAX_FRAME`] long; returns the used part.
 pub fn encode<'o, M: Serialize>(sequence: u16, message: &M, out: &'o mut [u8]) -> Result<&'o [u8], TooLarge> {
-    let mut raw = [0u8; crate::limits::MAX_MESSAGE + SEQUENCE + CHECKSUM];
+    encode_stamped(sequence, None, message, out)
+}
+
+/// As [`encode`], with a stamp.
+pub fn encode_stamped<'o, M: Serialize>(
+    sequence: u16,
+    stamp: Option<Stamp>,
+    message: &M,
+    out: &'o mut [u8],
+) -> Result<&'o [u8], TooLarge> {
+    let mut raw = [0u8; crate::limits::MAX_MESSAGE + SEQUENCE + Stamp::BYTES + CHECKSUM];
     raw[..SEQUENCE].copy_from_slice(&sequence.to_le_bytes());
     let room = SEQUENCE + crate::limits::MAX_MESSAGE;
     let body = postcard::to_slice(message, &mut raw[SEQUENCE..room])
         .map_err(|_| TooLarge)?
         .len();
-    let end = SEQUENCE + body;
+    let mut end = SEQUENCE + body;
+    if let Some(stamp) = stamp {
+        raw[end..end + Stamp::BYTES].copy_from_slice(&stamp.to_bytes());
+        end += Stamp::BYTES;
+    }
     let crc = CRC.checksum(&raw[..end]);
     raw[end..end + CHECKSUM].copy_from_slice(&crc.to_le_bytes());
     if out.len() < cobs::max_encoding_length(end + CHECKSUM) + 1 {
@@ -73,8 +125,14 @@ impl Decoder {
     }
 
     /// Takes one byte; at a delimiter says what came before it. Empty frames (repeated delimiters) are passed over, so a sender may start
-    /// with a delimiter to flush garbage.
+    /// with a delimiter to flush garbage. The stamp, if any, is read and passed over.
     pub fn push<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<(u16, M), FrameError>> {
+        let received = self.push_stamped(byte)?;
+        Some(received.map(|frame| (frame.sequence, frame.message)))
+    }
+
+    /// As [`Self::push`], with the stamp.
+    pub fn push_stamped<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<Received<M>, FrameError>> {
         if byte != 0 {
             if let Some(place) = self.buffer.get_mut(self.used) {
                 *place = byte;
@@ -95,7 +153,7 @@ impl Decoder {
     }
 }
 
-fn decode<M: DeserializeOwned>(cobs_bytes: &mut [u8]) -> Result<(u16, M), FrameError> {
+fn decode<M: DeserializeOwned>(cobs_bytes: &mut [u8]) -> Result<Received<M>, FrameError> {
     let length = cobs::decode_in_place(cobs_bytes).map_err(|_| FrameError::Malformed)?;
     let raw = &cobs_bytes[..length];
     let body_end = length
@@ -107,8 +165,15 @@ fn decode<M: DeserializeOwned>(cobs_bytes: &mut [u8]) -> Result<(u16, M), FrameE
         return Err(FrameError::Crc);
     }
     let sequence = u16::from_le_bytes([covered[0], covered[1]]);
-    match postcard::take_from_bytes(&covered[SEQUENCE..]) {
-        Ok((message, [])) => Ok((sequence, message)),
-        _ => Err(FrameError::Undecodable(sequence)),
-    }
+    let undecodable = FrameError::Undecodable(sequence);
+    let (message, rest) = postcard::take_from_bytes(&covered[SEQUENCE..]).map_err(|_| undecodable)?;
+    let stamp = match rest {
+        [] => None,
+        _ => Some(Stamp::from_bytes(rest.try_into().map_err(|_| undecodable)?)),
+    };
+    Ok(Received {
+        sequence,
+        stamp,
+        message,
+    })
 }

@@ -2,8 +2,8 @@
 
 /// Largest message in postcard form, bytes.
 pub const MAX_MESSAGE: usize = 768;
-/// Largest frame on the wire: sequence number, message and checksum, COBS overhead, delimiter.
-pub const MAX_FRAME: usize = MAX_MESSAGE + 2 + 4 + (MAX_MESSAGE + 6).div_ceil(254) + 1;
+/// Largest frame on the wire: sequence number, message, stamp and checksum, COBS overhead, delimiter.
+pub const MAX_FRAME: usize = MAX_MESSAGE + 2 + 8 + 4 + (MAX_MESSAGE + 14).div_ceil(254) + 1;
 /// Scene bytes in one chunk.
 pub const MAX_CHUNK: usize = 512;
 /// Parts in a scene.

@@ -83,7 +83,7 @@ const fn release() -> [u16; 3] {
     ]
 }
 
-/// Host to board.
+/// Host to board. Those that [must be fresh](ToDevice::must_be_fresh) need a stamp.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum ToDevice {
     /// First message, always answered by [`FromDevice::Hello`]. When the schemas differ both sides stop there, able to name each other.
@@ -175,6 +175,45 @@ pub enum ToDevice {
     SetRig(Rig),
     /// Ask for [`FromDevice::Rig`].
     GetRig,
+}
+
+impl ToDevice {
+    /// Carried out only once, in its own session and in the order sent: the frame must carry a [stamp](crate::frame::Stamp) whose count is above that
+    /// of every such message before. These are the messages that bring the motors nearer to being driven, or change what drives them. One that
+    /// stops or asks needs none.
+    pub const fn must_be_fresh(&self) -> bool {
+        match self {
+            Self::Arm
+            | Self::ClearFault
+            | Self::Home
+            | Self::SetParameter { .. }
+            | Self::Grab { .. }
+            | Self::SceneBegin { .. }
+            | Self::SceneCommit
+            | Self::Restart
+            | Self::SetRig(_) => true,
+            Self::Hello(_)
+            | Self::GetCapabilities
+            | Self::Disarm
+            | Self::Stop
+            | Self::Heartbeat
+            | Self::GetParameter(_)
+            | Self::Release
+            | Self::ResetScene
+            | Self::SceneChunk { .. }
+            | Self::SceneAbort
+            // A target carries a number of its own that rises with every message about it.
+            | Self::SetTarget(_)
+            | Self::ClearTarget { .. }
+            | Self::SetTelemetry { .. }
+            | Self::GetStatistics { .. }
+            | Self::SimulatedHand(_)
+            | Self::SimulatedInputs(_)
+            | Self::Lockstep(_)
+            | Self::Run { .. }
+            | Self::GetRig => false,
+        }
+    }
 }
 
 /// Board to host.
@@ -272,6 +311,8 @@ pub struct Capabilities {
     pub reset: ResetReason,
     /// Its state.
     pub state: DeviceState,
+    /// Names this session: what the host's [stamps](crate::frame::Stamp) carry. Differs in every session and after every start.
+    pub session: u32,
 }
 
 /// What tick costs are counted in.
@@ -346,7 +387,7 @@ pub enum Fault {
         /// Axis.
         axis: u8,
     },
-    /// An encoder did not move by a single count while its motor pushed hard: it is stuck or unplugged, or the mechanism is jammed.
+    /// An encoder did not follow a small push of its motor: it is stuck or unplugged, or the mechanism is jammed.
     EncoderStuck {
         /// Axis.
         axis: u8,
@@ -376,8 +417,16 @@ pub enum Fault {
     TickOverrun,
     /// The scene does not pass its checks any more.
     SceneDamaged,
-    /// A number in the loop is not finite.
+    /// The computed wrench is not finite.
     NonFinite,
+    /// The handle turns faster than allowed.
+    AngularOverSpeed,
+    /// The encoders no longer know where the handle is, though none of them jumped.
+    ReferenceLost,
+    /// The encoders say where the links cannot be.
+    ImpossiblePosture,
+    /// A sensor reading is not finite, or out of all proportion.
+    BadReading,
 }
 
 /// Why a message was not carried out.
@@ -454,6 +503,8 @@ pub enum Refusal {
     RigFixed,
     /// The description in flash is damaged or of another release: send it again.
     RigDamaged,
+    /// The command carries no stamp of this session, or one that was seen before, or the board has stopped or faulted since it came.
+    Outdated,
 }
 
 /// A rigid pose.
@@ -542,32 +593,49 @@ pub struct Guidance {
     pub wrench: WireWrench,
 }
 
-/// Bits of [`Telemetry::flags`].
-pub mod flag {
+macro_rules! flags {
+    ($($(#[doc = $doc:literal])+ $name:ident = $bit:literal;)+) => {
+        /// Bits of [`Telemetry::flags`], each one fact.
+        pub mod flag {
+            $($(#[doc = $doc])+ pub const $name: u16 = 1 << $bit;)+
+
+            /// Every bit with its name and what it says, ascending.
+            pub const ALL: &[(u16, &str, &str)] = &[$(($name, stringify!($name), concat!($($doc),+)),)+];
+        }
+    };
+}
+
+flags! {
     /// The point budget was reached: some points were not looked at this tick.
-    pub const BUDGET: u16 = 1;
+    BUDGET = 0;
     /// The force limit acted.
-    pub const FORCE_LIMIT: u16 = 1 << 1;
+    FORCE_LIMIT = 1;
     /// The torque limit acted.
-    pub const TORQUE_LIMIT: u16 = 1 << 2;
-    /// The slew limit acted.
-    pub const SLEW_LIMIT: u16 = 1 << 3;
-    /// A number was not finite and was replaced.
-    pub const NON_FINITE: u16 = 1 << 4;
+    TORQUE_LIMIT = 2;
+    /// The limit on the change of force acted.
+    FORCE_SLEW = 3;
+    /// A computed number was not finite: the wrench is zero.
+    NON_FINITE = 4;
     /// More face pairs touch than the message holds.
-    pub const PAIRS: u16 = 1 << 5;
+    PAIRS = 5;
     /// More contacts than the board stores.
-    pub const CONTACTS: u16 = 1 << 6;
-    /// The coupling's own force limit acted.
-    pub const COUPLING_LIMIT: u16 = 1 << 7;
+    CONTACTS = 6;
+    /// The coupling slipped at its largest force.
+    COUPLING_FORCE = 7;
     /// The handle's wrench is turned down because the loop made energy.
-    pub const SOFTENED: u16 = 1 << 8;
+    SOFTENED = 8;
     /// The part was held to its largest speed, or to what was looked at.
-    pub const SPEED_LIMIT: u16 = 1 << 9;
+    SPEED_LIMIT = 9;
     /// A point is so deep inside that no way out is known.
-    pub const DEEP: u16 = 1 << 10;
+    DEEP = 10;
     /// The step's touching points had not come to rest.
-    pub const UNSETTLED: u16 = 1 << 11;
+    UNSETTLED = 11;
+    /// The coupling slipped at its largest torque.
+    COUPLING_TORQUE = 12;
+    /// A sensor reading was not finite or out of all proportion.
+    BAD_INPUT = 13;
+    /// The limit on the change of torque acted.
+    TORQUE_SLEW = 14;
 }
 
 /// Counters since start or the last reset of the counters.
@@ -593,6 +661,8 @@ pub struct Statistics {
     pub frames: u32,
     /// Frames thrown away: damaged, too long, or undecodable.
     pub bad_frames: u32,
+    /// Messages thrown away because there was no room for their answer: the host does not read.
+    pub unanswered: u32,
     /// Telemetry messages dropped.
     pub dropped: u32,
     /// Largest stack depth seen, bytes; 0 where not measured.

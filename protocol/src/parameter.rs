@@ -77,6 +77,8 @@ parameters! {
     TorqueSlew = "N·m/s", 0.1, 1_000.0, 200.0;
     /// Handle speed that counts as a fault.
     SpeedLimit = "m/s", 0.1, 5.0, 2.0;
+    /// Handle rotation speed that counts as a fault: that of a point 50 mm off the axis at the speeds of SpeedLimit.
+    AngularSpeedLimit = "rad/s", 2.0, 100.0, 40.0;
     /// Largest mechanical power the motors may put into the handle, force and torque together.
     PowerLimit = "W", 0.1, 100.0, 10.0;
     /// Distance of the handle from the world's origin that counts as a fault; beyond it no force points outwards.
@@ -91,6 +93,8 @@ parameters! {
     Guidance = "choice", 0.0, 2.0, 1.0, ["off", "capped", "thesis"];
     /// Whether mating faces that an engaged target keeps apart leave the work: 0 no, 1 yes. Nothing is felt of it; for comparing what ticks cost.
     Joints = "choice", 0.0, 1.0, 1.0, ["off", "on"];
+    /// How far points of the part in hand are moved inward before voxmaps are looked up; the textbook's pointshell shrinking, for comparing.
+    Shrinking = "voxels", 0.0, 1.0, 0.0;
 }
 
 impl ParameterId {

@@ -69,7 +69,7 @@ fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
             assert!(
                 !voxel.bound.is_nan() && voxel.center.iter().zip(p).all(|(c, p)| !c.is_nan() || p.is_nan())
             );
-            sum += voxel.bound + f32::from(voxel.face);
+            sum += voxel.bound + f32::from(voxel.faces[0]);
         }
     }
     sum

@@ -63,7 +63,7 @@ fn golden_voxmap_reads_back() {
             for (found, wanted) in sample.center.iter().zip(center) {
                 assert!((found - wanted).abs() < 2e-9, "{z}: {sample:?}");
             }
-            assert_eq!(sample.face, 0);
+            assert_eq!(sample.faces, [0, NO_FACE]);
         }
     }
     // Beside the box: the distance to it.

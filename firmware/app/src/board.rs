@@ -28,7 +28,9 @@ pub struct Sensed {
     pub driver_fault: Option<DriverFault>,
     /// Encoder axis whose reading jumped further than the mechanism can move in a tick.
     pub encoder_jump: Option<u8>,
-    /// Encoder axis that stands still though its motor pushes hard, see [`crate::encoder::Stall`].
+    /// The encoders say where the links cannot be.
+    pub impossible_posture: bool,
+    /// Encoder axis that does not follow its motor, see [`crate::encoder_watch`].
     pub encoder_stuck: Option<u8>,
     /// The encoders know where the handle is: absolute ones always do, counting ones since [`Mechanism::home`] and until they jump.
     pub referenced: bool,
@@ -43,6 +45,7 @@ impl Sensed {
         supply_low: false,
         driver_fault: None,
         encoder_jump: None,
+        impossible_posture: false,
         encoder_stuck: None,
         referenced: true,
     };
@@ -92,6 +95,10 @@ pub trait Mechanism {
 
     /// Sets the motors. Applied at once; holds until the next call.
     fn drive(&mut self, drive: Drive);
+
+    /// A part is felt from here on, or is not. Only while one is felt the mechanism may probe its encoders ([`crate::encoder_watch`]). Called in each tick
+    /// before [`Self::drive`].
+    fn watch_encoders(&mut self, _felt: bool) {}
 
     /// Counts of the encoders at the handle, at most: m and rad. Readings are within half of this; 0: not known.
     fn count(&self) -> [f32; 2] {
@@ -197,4 +204,6 @@ pub struct Identity {
     pub overrun_ticks: u8,
     /// What this rig's motors and links bear, whatever the parameters say.
     pub ceilings: Ceilings,
+    /// Differs at every start, by the chip's random numbers where it has any: names of sessions are made from it. Nothing else may depend on it.
+    pub entropy: u64,
 }

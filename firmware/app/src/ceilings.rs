@@ -24,6 +24,8 @@ pub struct Ceilings {
     pub power_w: f32,
     /// Handle speed, m/s.
     pub speed_m_per_s: f32,
+    /// Handle rotation, rad/s.
+    pub angular_speed_rad_per_s: f32,
     /// Distance of the handle from the world's origin, m.
     pub workspace_m: f32,
 }
@@ -37,6 +39,7 @@ impl Ceilings {
         torque_slew_nm_per_s: ParameterId::TorqueSlew.row().max,
         power_w: ParameterId::PowerLimit.row().max,
         speed_m_per_s: ParameterId::SpeedLimit.row().max,
+        angular_speed_rad_per_s: ParameterId::AngularSpeedLimit.row().max,
         workspace_m: ParameterId::WorkspaceRadius.row().max,
     };
 
@@ -61,6 +64,7 @@ impl Ceilings {
             ParameterId::TorqueSlew => self.torque_slew_nm_per_s,
             ParameterId::PowerLimit => self.power_w,
             ParameterId::SpeedLimit => self.speed_m_per_s,
+            ParameterId::AngularSpeedLimit => self.angular_speed_rad_per_s,
             ParameterId::WorkspaceRadius => self.workspace_m,
             _ => f32::INFINITY,
         };
@@ -110,11 +114,15 @@ pub fn restrain(wrench: Wrench, handle: Vec3, twist: &Twist, bounds: &Bounds) ->
     let mut force = wrench.force.clamp_length_max(bounds.force_n);
     let mut torque = wrench.torque.clamp_length_max(bounds.torque_nm);
     if is_outside(handle, bounds.workspace_m) {
-        let outwards = handle / libm::sqrtf(handle.length_squared());
+        // Scaled first: the square of a large component is infinite.
+        let scaled = handle / handle.abs().max_element();
+        let outwards = scaled / libm::sqrtf(scaled.length_squared());
         force -= outwards * force.dot(outwards).max(0.0);
     }
     let power = force.dot(twist.linear) + torque.dot(twist.angular);
-    if power > bounds.power_w {
+    // Infinite products may cancel to no number, which is not within the limit either; the share is then none, and the wrench becomes zero.
+    let within = power <= bounds.power_w;
+    if !within {
         let share = bounds.power_w / power;
         force *= share;
         torque *= share;

@@ -3,7 +3,7 @@
 //! The link plane sends finished [`Command`]s; the control plane takes them at the start of a tick, in order, and answers each
 //! with a [`Reply`]. Neither ever waits for the other.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -13,6 +13,7 @@ use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{
     ConstraintTarget, DeviceState, Fault, HandScript, InputFault, Refusal, Statistics, Telemetry,
 };
+use mortise_protocol::parameter::ParameterId;
 
 use crate::parameters::ControlSettings;
 
@@ -30,12 +31,21 @@ pub const EVENTS_AT_ONCE: usize = 8;
 pub struct Command<'s> {
     /// Sequence number of the message it came in; its reply carries it.
     pub seq: u16,
-    /// [`Shared::stops`] when it was made: an older `Arm` or `ClearFault` must not undo a newer stop.
-    pub stops: u32,
-    /// [`Shared::sessions`] when it was made: what an earlier host asked for is dropped, unanswered.
+    /// [`Shared::epoch`] when its message came: an older command must not undo a newer stop or fault.
+    pub epoch: Epoch,
+    /// [`Shared::sessions`] when it was made: what an earlier host asked for is dropped, unanswered, but for what is valid in every session.
     pub session: u32,
     /// What to do.
     pub kind: CommandKind<'s>,
+}
+
+/// What had turned the motors off for good so far: changes with every stop and every fault.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Epoch {
+    /// [`Shared::stops`].
+    pub stops: u32,
+    /// [`Shared::halts`].
+    pub halts: u32,
 }
 
 /// What a command asks for. Everything in it has been checked as far as the link plane can.
@@ -45,14 +55,18 @@ pub struct Command<'s> {
     reason = "nothing to allocate from; eight of the largest are 5 kB"
 )]
 pub enum CommandKind<'s> {
-    /// See [`mortise_protocol::message::ToDevice::Arm`].
-    Arm,
+    /// See [`mortise_protocol::message::ToDevice::Arm`]. Carries the number of the scene whose checksum was found right after the message came: the
+    /// control plane arms that scene and no other.
+    Arm(u32),
     /// See [`mortise_protocol::message::ToDevice::Disarm`].
     Disarm,
     /// See [`mortise_protocol::message::ToDevice::ClearFault`].
     ClearFault,
-    /// Take these settings.
+    /// Take these settings. Valid in every session, so that the link plane's copy of the parameters, from which the next settings are made, cannot
+    /// differ from what is in force.
     Settings(ControlSettings),
+    /// Reply with the parameter in force.
+    Parameter(ParameterId),
     /// Grab a part.
     Grab(u16),
     /// Let go.
@@ -64,7 +78,12 @@ pub enum CommandKind<'s> {
     /// Let a constraint target fade.
     ClearTarget(u16),
     /// Use this scene, all checks passed. Answered by [`Event::SceneTaken`]; valid in every session.
-    UseScene(SceneImage<'s>),
+    UseScene {
+        /// The scene.
+        image: SceneImage<'s>,
+        /// Names it to [`CommandKind::Arm`].
+        number: u32,
+    },
     /// The scene did not pass its check when read again: a fault. Not answered; valid in every session.
     SceneDamaged,
     /// Telemetry every so many ticks; 0: none.
@@ -125,8 +144,22 @@ pub enum Reply {
     Done,
     /// Not carried out.
     Refused(Refusal),
-    /// To [`CommandKind::Statistics`]; the link's own counters are still 0.
-    Statistics(Statistics),
+    /// To [`CommandKind::Parameter`].
+    Parameter {
+        /// Which.
+        id: ParameterId,
+        /// In its unit.
+        value: f32,
+    },
+    /// To [`CommandKind::Statistics`].
+    Statistics {
+        /// The link's own counters are still 0.
+        statistics: Statistics,
+        /// Counting starts anew.
+        reset: bool,
+    },
+    /// To [`CommandKind::Restart`]: no motor is driven from here on until a new session begins.
+    MayRestart,
     /// To [`CommandKind::Run`].
     Ran {
         /// Ticks since start.
@@ -141,6 +174,10 @@ pub enum Reply {
 pub struct Shared {
     /// Stops asked for. Counted by the link, looked at in every tick before anything else.
     stops: AtomicU32,
+    /// Stops and faults so far. Counted by the control plane.
+    halts: AtomicU32,
+    /// `Arm` commands dealt with. Counted by the control plane.
+    arms: AtomicU32,
     /// Hosts that greeted.
     sessions: AtomicU32,
     /// Sound frames heard.
@@ -149,6 +186,8 @@ pub struct Shared {
     dropped: AtomicU32,
     /// Motors may be driven.
     live: AtomicBool,
+    /// Flash may be written.
+    storing: AtomicBool,
 }
 
 impl Shared {
@@ -160,6 +199,34 @@ impl Shared {
     /// Motors off at the next tick (or its next poll in lockstep), whatever waits in the queue. Safe from any context.
     pub fn stop(&self) {
         self.stops.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// Times the motors went off, or began to fade, by a stop or a fault.
+    pub fn halts(&self) -> u32 {
+        self.halts.load(Ordering::Acquire)
+    }
+
+    /// From the control plane, with every such change of state.
+    pub(crate) fn halt(&self) {
+        self.halts.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// What has turned the motors off so far.
+    pub fn epoch(&self) -> Epoch {
+        Epoch {
+            stops: self.stops(),
+            halts: self.halts(),
+        }
+    }
+
+    /// `Arm` commands dealt with so far, whatever came of them.
+    pub fn arms(&self) -> u32 {
+        self.arms.load(Ordering::Acquire)
+    }
+
+    /// From the control plane, behind each of them.
+    pub(crate) fn count_arm(&self) {
+        self.arms.fetch_add(1, Ordering::AcqRel);
     }
 
     /// Sessions begun so far.
@@ -194,7 +261,39 @@ impl Shared {
 
     /// From the control plane, with every change of state.
     pub(crate) fn set_live(&self, live: bool) {
-        self.live.store(live, Ordering::Release);
+        self.live.store(live, Ordering::SeqCst);
+    }
+
+    /// From the control plane, before motors are driven: `false` when flash may be written.
+    ///
+    /// Each plane first says what it wants and then looks at the other's word (Dekker's way, sequentially consistent), so both cannot get theirs.
+    pub(crate) fn claim_motors(&self) -> bool {
+        self.live.store(true, Ordering::SeqCst);
+        let free = !self.storing.load(Ordering::SeqCst);
+        if !free {
+            self.live.store(false, Ordering::SeqCst);
+        }
+        free
+    }
+
+    /// From the link plane, before flash is written: `false` when motors may be driven. Holds until [`Self::release_flash`].
+    pub(crate) fn claim_flash(&self) -> bool {
+        self.storing.store(true, Ordering::SeqCst);
+        let free = !self.live.load(Ordering::SeqCst);
+        if !free {
+            self.storing.store(false, Ordering::SeqCst);
+        }
+        free
+    }
+
+    /// Whether flash may be written now.
+    pub fn storing(&self) -> bool {
+        self.storing.load(Ordering::Acquire)
+    }
+
+    /// From the link plane: flash is not written any more.
+    pub(crate) fn release_flash(&self) {
+        self.storing.store(false, Ordering::SeqCst);
     }
 
     /// A sample found no room.
@@ -230,10 +329,13 @@ impl<'s> Channels<'s> {
             samples: Queue::new(),
             shared: Shared {
                 stops: AtomicU32::new(0),
+                halts: AtomicU32::new(0),
+                arms: AtomicU32::new(0),
                 sessions: AtomicU32::new(0),
                 heard: AtomicU32::new(0),
                 dropped: AtomicU32::new(0),
                 live: AtomicBool::new(false),
+                storing: AtomicBool::new(false),
             },
         }
     }

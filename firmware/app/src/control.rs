@@ -8,18 +8,20 @@
 //! done: what came before `Run` in the stream has taken effect before its first tick, whatever the timing of bytes and interrupts. That makes
 //! the in-process rig and the emulated board compute the same bits. The host's silence is not counted there, since time waits for the host.
 
+mod fingerprint;
 mod report;
+mod simulation;
 mod watch;
 
 use mortise_haptics::{self as haptics, GrabError, Input, Output, TargetError, Twist, Wrench};
 use mortise_protocol::image::SceneImage;
-use mortise_protocol::message::{ConstraintTarget, Fault, HandScript, InputFault, Refusal, Statistics};
+use mortise_protocol::message::{ConstraintTarget, Fault, Refusal, Statistics};
 
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
 use crate::ceilings::{Ceilings, restrain};
-use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Event, Reply};
+use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Epoch, Event, Reply};
 use crate::parameters::{ControlSettings, Parameters};
-use crate::safety::{Action, Event as SafetyEvent, Motors, Safety};
+use crate::safety::{Action, AfterSoftStop, Event as SafetyEvent, Motors, Safety};
 use crate::statistics::{StateHash, count_tick};
 
 /// Ticks in which what the coupling can hold grows from nothing to its settings after arming or grabbing; what it cannot hold slips in the hand.
@@ -59,6 +61,8 @@ pub struct ControlPlane<'c, 's, M, C> {
     safety: Safety,
     settings: ControlSettings,
     scene: Option<SceneImage<'s>>,
+    /// Names the scene, see [`CommandKind::Arm`].
+    scene_number: u32,
     sensed: Sensed,
     /// A reading of this tick was not finite and was replaced.
     replaced: bool,
@@ -83,6 +87,8 @@ pub struct ControlPlane<'c, 's, M, C> {
     silent_ticks: u32,
     stops: u32,
     session: u32,
+    /// A restart was granted in this session.
+    restarting: bool,
     reported: Safety,
     unreported_fault: Option<(u32, Fault)>,
 }
@@ -106,6 +112,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             safety: Safety::Boot,
             settings,
             scene: None,
+            scene_number: 0,
             sensed: Sensed::AT_REST,
             replaced: false,
             output: None,
@@ -126,6 +133,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             silent_ticks: 0,
             stops: 0,
             session: 0,
+            restarting: false,
             reported: Safety::Boot,
             unreported_fault: None,
         }
@@ -134,6 +142,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
     /// The safety state.
     pub fn safety(&self) -> Safety {
         self.safety
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &ControlSettings {
+        &self.settings
     }
 
     /// Ticks run since start.
@@ -201,6 +214,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             self.telemetry_every = 0;
             self.lockstep = false;
             self.credit = 0;
+            self.restarting = false;
             self.apply(SafetyEvent::Disarm);
         }
     }
@@ -215,24 +229,38 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             let Some(command) = self.ends.commands.dequeue() else {
                 return;
             };
-            let current = command.session == self.session;
-            if current || matches!(command.kind, CommandKind::UseScene(_) | CommandKind::SceneDamaged) {
+            let arm = matches!(command.kind, CommandKind::Arm(_));
+            let every_session = matches!(
+                command.kind,
+                CommandKind::UseScene { .. } | CommandKind::SceneDamaged | CommandKind::Settings(_)
+            );
+            if every_session || command.session == self.session {
                 self.carry_out(command);
+            }
+            if arm {
+                self.ends.shared.count_arm();
             }
         }
     }
 
     fn carry_out(&mut self, command: Command<'s>) {
-        let Command { seq, stops, kind, .. } = command;
-        let outdated = stops != self.stops;
+        let Command {
+            seq,
+            epoch,
+            session,
+            kind,
+        } = command;
+        let now = Epoch {
+            stops: self.stops,
+            halts: self.ends.shared.halts(),
+        };
         let result = match kind {
-            CommandKind::Arm | CommandKind::ClearFault if outdated => {
-                Err(Refusal::State(self.safety.reported()))
+            CommandKind::Arm(_) | CommandKind::ClearFault | CommandKind::Grab(_) | CommandKind::Home
+                if epoch != now =>
+            {
+                Err(Refusal::Outdated)
             }
-            CommandKind::Arm => {
-                let scene = self.scene.is_some();
-                self.request(SafetyEvent::Arm { scene })
-            }
+            CommandKind::Arm(number) => self.arm(number),
             CommandKind::Disarm => self.request(SafetyEvent::Disarm),
             CommandKind::ClearFault => {
                 let cause_gone = self.persistent_cause().is_none();
@@ -250,8 +278,13 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.ends.law.clear_target(id);
                 Ok(())
             }
-            CommandKind::UseScene(scene) => {
-                let taken = self.use_scene(scene);
+            CommandKind::Parameter(id) => {
+                let value = self.settings.parameters.get(id);
+                self.reply(seq, session, Reply::Parameter { id, value });
+                return;
+            }
+            CommandKind::UseScene { image, number } => {
+                let taken = self.use_scene(image, number);
                 self.send(Event::SceneTaken(taken));
                 return;
             }
@@ -282,16 +315,42 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 return;
             }
             CommandKind::Restart if self.safety.live() => Err(Refusal::State(self.safety.reported())),
-            CommandKind::Restart => Ok(()),
+            CommandKind::Restart => {
+                self.restarting = true;
+                self.reply(seq, session, Reply::MayRestart);
+                return;
+            }
         };
         self.report();
         self.reply(
             seq,
+            session,
             match result {
                 Ok(()) => Reply::Done,
                 Err(reason) => Reply::Refused(reason),
             },
         );
+    }
+
+    /// Drives the motors if everything that must be so is so now; `number` is of the scene whose checksum was found right.
+    fn arm(&mut self, number: u32) -> Result<(), Refusal> {
+        if self.restarting {
+            return Err(Refusal::Busy);
+        }
+        if self.scene.is_some() && number != self.scene_number {
+            return Err(Refusal::Outdated);
+        }
+        let event = SafetyEvent::Arm {
+            scene: self.scene.is_some(),
+            referenced: self.sensed.referenced,
+        };
+        if let (_, Action::Refuse(reason)) = self.safety.step(event) {
+            return Err(reason);
+        }
+        if !self.ends.shared.claim_motors() {
+            return Err(Refusal::Busy);
+        }
+        self.request(event)
     }
 
     fn grab(&mut self, part: u16) -> Result<(), Refusal> {
@@ -337,12 +396,13 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         Ok(())
     }
 
-    fn use_scene(&mut self, scene: SceneImage<'s>) -> Result<(), Refusal> {
+    fn use_scene(&mut self, scene: SceneImage<'s>, number: u32) -> Result<(), Refusal> {
         if self.safety.live() {
             return Err(Refusal::State(self.safety.reported()));
         }
         self.ends.law.load_scene(&scene);
         self.scene = Some(scene);
+        self.scene_number = number;
         self.start_anew();
         Ok(())
     }
@@ -358,36 +418,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.hash = StateHash::new();
     }
 
-    fn set_lockstep(&mut self, on: bool) -> Result<(), Refusal> {
-        if !M::SIMULATED {
-            return Err(Refusal::NotSimulated);
-        }
-        self.lockstep = on;
-        self.silent_ticks = 0;
-        Ok(())
-    }
-
     fn home(&mut self) -> Result<(), Refusal> {
         if self.safety.live() {
             return Err(Refusal::State(self.safety.reported()));
         }
         self.mechanism.home();
-        Ok(())
-    }
-
-    fn set_input_faults(&mut self, faults: &[InputFault]) -> Result<(), Refusal> {
-        if !M::SIMULATED {
-            return Err(Refusal::NotSimulated);
-        }
-        self.mechanism.set_input_faults(faults);
-        Ok(())
-    }
-
-    fn set_hand(&mut self, script: &HandScript) -> Result<(), Refusal> {
-        if !M::SIMULATED {
-            return Err(Refusal::NotSimulated);
-        }
-        self.mechanism.set_hand(Some(script));
         Ok(())
     }
 
@@ -415,10 +450,10 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 &self.settings.law
             };
             let output = haptics::tick(self.ends.law, scene, law, &input);
-            // A reading out of all proportion is as good as none.
-            let mut bad = haptics::Flags::NON_FINITE;
-            bad.insert(haptics::Flags::BAD_INPUT);
-            if output.work.flags.intersects(bad) || !output.handle.is_finite() {
+            if output.work.flags.intersects(haptics::Flags::BAD_INPUT) {
+                self.apply(SafetyEvent::Fault(Fault::BadReading));
+            }
+            if output.work.flags.intersects(haptics::Flags::NON_FINITE) || !output.handle.is_finite() {
                 self.apply(SafetyEvent::Fault(Fault::NonFinite));
             }
             self.output = Some(output);
@@ -432,6 +467,8 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         };
         let allowed = wanted.map(|wrench| self.restrained(wrench));
         self.commanded = allowed.unwrap_or(Wrench::ZERO);
+        self.mechanism
+            .watch_encoders(self.safety.motors() == Motors::Rendered);
         self.mechanism.drive(allowed.map_or(Drive::Off, Drive::Wrench));
         if self.safety.motors() == Motors::Fading && self.fade.0 >= SOFT_STOP_TICKS {
             self.apply(SafetyEvent::SoftStopOver);
@@ -478,8 +515,14 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         {
             self.unreported_fault = Some((self.tick, fault));
         }
+        let halted = matches!(
+            next,
+            Safety::Stopped | Safety::Fault(_) | Safety::SoftStop(AfterSoftStop::Fault(_))
+        );
+        if halted && next != self.safety {
+            self.ends.shared.halt();
+        }
         self.safety = next;
-        self.ends.shared.set_live(next.live());
         match action {
             Action::None | Action::Refuse(_) => {}
             Action::Enable => {
@@ -502,6 +545,8 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.ends.law.restart_slew();
             }
         }
+        // Behind the motors: what may be done only without them waits for this.
+        self.ends.shared.set_live(next.live());
         // Nobody is to arm in the tick that cleared a fault of the encoders.
         if self.safety == Safety::Idle && !self.sensed.referenced {
             self.apply(SafetyEvent::ReferenceLost);
@@ -532,9 +577,11 @@ impl ControlSettings {
         parameters.settings().unwrap_or_else(|_| Self {
             law: haptics::Settings::default(),
             speed_limit_m_per_s: 0.0,
+            angular_speed_limit_rad_per_s: 0.0,
             power_limit_w: 0.0,
             workspace_m: 0.0,
             host_timeout_ticks: 0,
+            parameters,
         })
     }
 }

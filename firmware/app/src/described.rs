@@ -19,12 +19,12 @@ use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::{Rig, RigFault};
 
 use crate::board::{Drive, Mechanism, Sensed, TICK_S};
-use crate::encoder::Stall;
+use crate::encoder_watch::{EncoderWatch, probed};
 use crate::hand::{Grip, Hand, Wish};
 use crate::input_faults::{AXES, InputScript, Wiring};
 use crate::joints::{ENCODERS, Joints, Reading};
 use crate::kinematics::Posture;
-use crate::simulated::{STALL_TICKS, SUBSTEPS};
+use crate::simulated::SUBSTEPS;
 
 /// Inertia of the handle about a wrist axis, kg·m², and its bearings' friction, N·m·s/rad.
 const WRIST_INERTIA: f32 = 1e-5;
@@ -46,11 +46,15 @@ pub struct Described {
     joints: Joints,
     counts: [i32; ENCODERS],
     offsets: [i32; ENCODERS],
-    stalls: [Stall; MAX_JOINTS],
     referenced: bool,
     hand: Option<Hand>,
     hand_wrench: Wrench,
+    /// What the motors were driven with, and what they do with the probes in it.
+    driven: [f32; MAX_JOINTS],
     currents: [f32; MAX_JOINTS],
+    /// A part is felt.
+    felt: bool,
+    watch: EncoderWatch<ENCODERS>,
 }
 
 /// The true mechanism.
@@ -111,11 +115,13 @@ impl Described {
             joints,
             counts: [0; ENCODERS],
             offsets: [0; ENCODERS],
-            stalls: [Stall::new(STALL_TICKS); MAX_JOINTS],
             referenced: true,
             hand: None,
             hand_wrench: Wrench::ZERO,
+            driven: [0.0; MAX_JOINTS],
             currents: [0.0; MAX_JOINTS],
+            felt: false,
+            watch: EncoderWatch::new(),
         })
     }
 
@@ -129,7 +135,7 @@ impl Described {
         self.links.kinetic_energy()
     }
 
-    /// What the motors are given, A.
+    /// What the motors are given, A, with the encoders' probes.
     pub fn currents(&self) -> [f32; MAX_JOINTS] {
         self.currents
     }
@@ -149,6 +155,7 @@ impl Described {
         };
     }
 
+    /// What the encoders say, and the first that does not follow its motor.
     fn read(&mut self, wiring: &Wiring) -> (Reading, Option<u8>) {
         for encoder in 0..ENCODERS {
             // As many encoders as the free handle has axes.
@@ -162,16 +169,15 @@ impl Described {
             }
         }
         let reading = self.joints.read(&self.counts);
-        let mut stuck = None;
-        for joint in 0..self.joints.model().joints() {
-            let moved = reading.moved[joint] != 0 || reading.jump == Some(joint as u8);
-            let loaded = self.joints.loaded(&self.currents, joint);
-            if self.stalls[joint].update(moved, loaded) && stuck.is_none() {
-                stuck = Some(joint as u8);
-            }
-        }
-        self.referenced &= reading.jump.is_none();
-        (reading, stuck)
+        let dead = if self.felt {
+            self.watch
+                .update(&self.joints.axis_ticks(&reading.moved, &self.driven))
+        } else {
+            self.watch.rest();
+            None
+        };
+        self.referenced &= reading.jump.is_none() && !reading.impossible;
+        (reading, dead)
     }
 }
 
@@ -318,6 +324,7 @@ impl Mechanism for Described {
             handle: reading.handle,
             twist: reading.twist,
             encoder_jump: reading.jump,
+            impossible_posture: reading.impossible,
             encoder_stuck: stuck,
             referenced: self.referenced,
             ..Sensed::AT_REST
@@ -325,10 +332,23 @@ impl Mechanism for Described {
     }
 
     fn drive(&mut self, drive: Drive) {
-        self.currents = match drive {
+        self.driven = match drive {
             Drive::Off => [0.0; MAX_JOINTS],
             Drive::Wrench(wrench) => self.joints.currents(wrench.force),
         };
+        self.currents = self.driven;
+        if drive == Drive::Off || !self.felt {
+            return;
+        }
+        for (joint, current) in self.currents.iter_mut().enumerate() {
+            if let Some(amplitude) = self.joints.probe(joint) {
+                *current = probed(*current, amplitude, self.watch.share(joint));
+            }
+        }
+    }
+
+    fn watch_encoders(&mut self, felt: bool) {
+        self.felt = felt;
     }
 
     fn count(&self) -> [f32; 2] {
@@ -346,7 +366,7 @@ impl Mechanism for Described {
     /// The simulated operator knows exactly where the joints are.
     fn home(&mut self) {
         self.offsets = [0; ENCODERS];
-        self.stalls = [Stall::new(STALL_TICKS); MAX_JOINTS];
+        self.watch.rest();
         for encoder in 0..ENCODERS {
             self.counts[encoder] = self.joints.count(encoder, self.links.angle(encoder));
         }
@@ -369,10 +389,12 @@ impl Mechanism for Described {
         self.script = InputScript::new();
         self.counts = [0; ENCODERS];
         self.offsets = [0; ENCODERS];
-        self.stalls = [Stall::new(STALL_TICKS); MAX_JOINTS];
+        self.watch.rest();
+        self.felt = false;
         self.referenced = true;
         self.hand = None;
         self.hand_wrench = Wrench::ZERO;
+        self.driven = [0.0; MAX_JOINTS];
         self.currents = [0.0; MAX_JOINTS];
         Some(self.links.pose())
     }

@@ -25,7 +25,7 @@
 //! let mut channels = Box::new(Channels::new());
 //! let identity = Identity {
 //!     board: "simulated", force_axes: 3, torque_axes: 3, cost_unit: CostUnit::Nanoseconds, cost_budget: 0,
-//!     reset: ResetReason::PowerOn, overrun_ticks: 0, ceilings: Ceilings::LARGEST,
+//!     reset: ResetReason::PowerOn, overrun_ticks: 0, ceilings: Ceilings::LARGEST, entropy: 1,
 //! };
 //! let (mut link, mut control) = start(&mut channels, RamFlash::new(&mut flash), Simulated::new(), NoClock, identity);
 //! let mut out = Wire(Vec::new());

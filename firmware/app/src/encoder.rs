@@ -36,34 +36,6 @@ impl Counter {
     }
 }
 
-/// Tells an encoder that stands still under load.
-///
-/// A hand that holds a handle against a motor trembles by far more than a count. No count at all for [`Stall::new`]'s ticks, while the motor pushes
-/// with more than half of what it can, therefore means that the encoder is stuck or unplugged, or the mechanism jammed. In either case the coupling
-/// no longer sees what its force does. Below half load nothing is told: there a hand is stronger by far, and simulated hands need not tremble.
-#[derive(Clone, Copy, Debug)]
-pub struct Stall {
-    ticks: u16,
-    patience: u16,
-}
-
-impl Stall {
-    /// Told after `patience` ticks.
-    pub const fn new(patience: u16) -> Self {
-        Self { ticks: 0, patience }
-    }
-
-    /// One tick: whether the encoder moved, and whether its motor pushes with more than half of what it can. True while stuck.
-    pub fn update(&mut self, moved: bool, loaded: bool) -> bool {
-        self.ticks = if moved || !loaded {
-            0
-        } else {
-            self.ticks.saturating_add(1)
-        };
-        self.ticks >= self.patience
-    }
-}
-
 /// Time constant of the speed estimate, s.
 ///
 /// The difference of two readings of resolution Δ is quantised to Δ/h; the filter leaves h/(τ+h) of it: with 5 µm and 3 ms 1.25 mm/s. It delays the
@@ -104,23 +76,6 @@ mod tests {
         assert_eq!(counter.update(i32::MIN + 8), step(0, true));
         assert_eq!(counter.update(i32::MIN + 7), step(-1, false));
         assert_eq!(counter.update(0), step(0, true));
-    }
-
-    #[test]
-    fn a_stall_is_told_after_its_patience_and_only_under_load() {
-        let mut stall = Stall::new(3);
-        let told = |stall: &mut Stall, script: &[(bool, bool)]| {
-            (script.iter())
-                .map(|&(moved, loaded)| stall.update(moved, loaded))
-                .filter(|&told| told)
-                .count()
-        };
-        let (held, free, moving) = ((false, true), (false, false), (true, true));
-        assert_eq!(
-            told(&mut stall, &[held, held, moving, held, held, free, held, held]),
-            0
-        );
-        assert_eq!(told(&mut stall, &[held, held, moving]), 2);
     }
 
     #[test]

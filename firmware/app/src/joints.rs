@@ -7,12 +7,22 @@ use mortise_protocol::rig::{Rig, RigFault};
 
 use crate::board::TICK_S;
 use crate::encoder::{Counter, Velocity};
+use crate::encoder_watch::{AxisTick, amplitude};
 use crate::kinematics::{Model, Posture};
 
 /// Encoders of a description: joints, then wrist axes. Those that are not there count nothing.
 pub const ENCODERS: usize = MAX_JOINTS + 3;
-/// Fastest a wrist axis turns, rad/s: no wrist of a person's does 50.
-const WRIST_RATE: f32 = 100.0;
+/// Rate of a wrist axis beyond which a reading is taken for a jump, rad/s: above any speed limit that can be set.
+const WRIST_RATE: f32 = 200.0;
+/// Stiffest hand whose handle a probe moves, N/m: a tensed arm. Less than a free handle's ([`crate::encoder_watch::STIFFEST_HAND`]), because a joint's
+/// counts are ten times as coarse and take ten times the force.
+const STIFFEST_HAND: f32 = 5_000.0;
+/// Most of a motor's current that a probe of its encoder takes.
+const PROBE_SHARE: f32 = 0.5;
+/// Softest hand that must still answer a probe, N/m; where that takes more the joint's encoder is not judged.
+const LEAST_STIFFEST_HAND: f32 = 1_000.0;
+/// Counts from the end of its range within which a joint is taken to be at its stop.
+const STOP_COUNTS: f32 = 4.0;
 
 /// Everything between counts and the handle.
 #[derive(Clone, Debug)]
@@ -25,8 +35,12 @@ pub struct Joints {
     velocities: [Velocity; ENCODERS],
     torque_per_ampere: [f32; MAX_JOINTS],
     current_limit: [f32; MAX_JOINTS],
+    coulomb: [f32; MAX_JOINTS],
+    range: [[f32; 2]; MAX_JOINTS],
     force_ceiling: f32,
     posture: Posture,
+    /// Joint angles of the last reading.
+    angles: [f32; MAX_JOINTS],
 }
 
 /// What the encoders say in one tick.
@@ -36,8 +50,10 @@ pub struct Reading {
     pub handle: Pose,
     /// Its velocity.
     pub twist: Twist,
-    /// First encoder that moved further than it can, or says where the links cannot be.
+    /// First encoder that moved further than it can.
     pub jump: Option<u8>,
+    /// The links cannot be where the encoders say.
+    pub impossible: bool,
     /// Counts each encoder moved.
     pub moved: [i32; ENCODERS],
 }
@@ -54,6 +70,8 @@ impl Joints {
         let mut farthest = [0; ENCODERS];
         let mut torque_per_ampere = [1.0; MAX_JOINTS];
         let mut current_limit = [0.0; MAX_JOINTS];
+        let mut coulomb = [0.0; MAX_JOINTS];
+        let mut range = [[0.0; 2]; MAX_JOINTS];
         for (number, joint) in rig.joints.iter().enumerate() {
             home[number] = joint.home;
             radians_per_count[number] = joint.radians_per_count();
@@ -61,6 +79,8 @@ impl Joints {
             farthest[number] = (joint.counts_per_tick() + 1.0) as u32;
             torque_per_ampere[number] = joint.torque_per_ampere();
             current_limit[number] = joint.current_limit;
+            coulomb[number] = joint.coulomb;
+            range[number] = joint.range;
         }
         if let Some(wrist) = &rig.wrist {
             for axis in 0..3 {
@@ -80,8 +100,11 @@ impl Joints {
             velocities: [Velocity::new(); ENCODERS],
             torque_per_ampere,
             current_limit,
+            coulomb,
+            range,
             force_ceiling: rig.ceilings.force,
             posture,
+            angles: [home[0], home[1], home[2]],
         };
         joints.start();
         Ok(joints)
@@ -104,6 +127,7 @@ impl Joints {
         if let Some(posture) = posture(&self.model, &angles) {
             self.posture = posture;
         }
+        self.angles = [angles[0], angles[1], angles[2]];
     }
 
     /// The model.
@@ -141,7 +165,7 @@ impl Joints {
         [moved.max_element(), turned.max_element()]
     }
 
-    /// Takes the counts of one tick. Where the links cannot be so, the last posture stays and the first joint is told as having jumped.
+    /// Takes the counts of one tick. Where the links cannot be so, the last posture stays.
     pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Reading {
         let mut jump = None;
         let mut rates = [0.0; ENCODERS];
@@ -157,10 +181,11 @@ impl Joints {
                 self.velocities[encoder].update(step.counts as f32 * self.radians_per_count[encoder]);
             angles[encoder] = self.angle(encoder, counts[encoder]);
         }
-        match posture(&self.model, &angles) {
-            Some(posture) => self.posture = posture,
-            None => jump = jump.or(Some(0)),
+        let found = posture(&self.model, &angles);
+        if let Some(posture) = found {
+            self.posture = posture;
         }
+        self.angles = [angles[0], angles[1], angles[2]];
         let [a, b, c, d, e, f] = rates;
         Reading {
             handle: Pose::new(self.posture.position, self.posture.orientation),
@@ -169,6 +194,7 @@ impl Joints {
                 angular: self.posture.angular_velocity([a, b, c], [d, e, f]),
             },
             jump,
+            impossible: found.is_none(),
             moved,
         }
     }
@@ -204,9 +230,39 @@ impl Joints {
         }))
     }
 
-    /// A motor gives more than half of what it can.
-    pub fn loaded(&self, currents: &[f32; MAX_JOINTS], joint: usize) -> bool {
-        currents[joint].abs() > 0.5 * self.current_limit[joint]
+    /// Amplitude of the probe of a joint's encoder, A; `None` for an encoder that is not judged: it has no motor, stands at a stop or near a singular
+    /// posture, or its motor is too weak for its friction and resolution.
+    ///
+    /// A hand of stiffness k at the handle is one of k·|J_j|² at joint j while the others stand.
+    pub fn probe(&self, encoder: usize) -> Option<f32> {
+        if encoder >= self.model.joints() || self.posture.share() < 1.0 {
+            return None;
+        }
+        let count = self.radians_per_count[encoder].abs();
+        let [from, to] = self.range[encoder];
+        let (angle, margin) = (self.angles[encoder], STOP_COUNTS * count);
+        if angle <= from + margin || angle >= to - margin {
+            return None;
+        }
+        let lever2 = self.posture.jacobian.col(encoder).length_squared();
+        let for_hand = |stiffness: f32| {
+            amplitude(stiffness * lever2, count, self.coulomb[encoder])
+                / self.torque_per_ampere[encoder].abs()
+        };
+        let most = PROBE_SHARE * self.current_limit[encoder];
+        (for_hand(LEAST_STIFFEST_HAND) <= most).then(|| for_hand(STIFFEST_HAND).min(most))
+    }
+
+    /// What each encoder did in a tick in which `moved` was read under `currents`.
+    pub fn axis_ticks(&self, moved: &[i32; ENCODERS], currents: &[f32; MAX_JOINTS]) -> [AxisTick; ENCODERS] {
+        core::array::from_fn(|encoder| AxisTick {
+            moved: moved[encoder],
+            effort: match (currents.get(encoder), self.current_limit.get(encoder)) {
+                (Some(current), Some(&limit)) if limit > 0.0 => current / limit,
+                _ => 0.0,
+            },
+            able: self.probe(encoder).is_some(),
+        })
     }
 }
 

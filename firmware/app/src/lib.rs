@@ -13,7 +13,7 @@
 //! | [`link`], [`parameters`], [`wire`] | messages; values and settings; conversions |
 //! | [`store`], [`ram_flash`] | A/B scene slots, the rig's description; flash in RAM |
 //! | [`kinematics`], [`joints`] | of a described rig: angles to pose and force to torques; counts to angles and torques to currents |
-//! | [`simulated`], [`hand`], [`input_faults`], [`encoder`] | simulated mechanism and hand, what goes wrong at its inputs; encoder counts |
+//! | [`simulated`], [`hand`], [`input_faults`], [`encoder`], [`encoder_watch`] | simulated mechanism and hand, what goes wrong at its inputs; encoder counts; dead encoders |
 //! | [`described`], [`simulated_rig`] | simulated mechanism of a described rig; whichever a simulated board has |
 #![no_std]
 
@@ -27,6 +27,7 @@ pub mod control;
 pub mod described;
 pub mod device;
 pub mod encoder;
+pub mod encoder_watch;
 pub mod hand;
 pub mod input_faults;
 pub mod joints;

@@ -1,11 +1,18 @@
 //! The link plane: bytes in, frames out, everything checked before the control plane hears of it.
 //!
-//! Runs at low priority, never waits for the control plane and holds bounded memory: input is taken only while there is room for the answer,
-//! and what the board's queue cannot hold is refused as [`Refusal::Busy`]. A command is acknowledged when the control plane has carried it
-//! out. `Stop` does not queue: it is counted in [`crate::channel::Shared`] and seen by the next tick before anything else.
+//! Runs at low priority, never waits for the control plane and holds bounded memory: input is always taken, and what the board's queue cannot hold
+//! is refused as [`Refusal::Busy`]. A command is acknowledged when the control plane has carried it out. `Stop` does not queue and needs no room for
+//! its answer: it is counted in [`crate::channel::Shared`] and seen by the next tick before anything else.
+//!
+//! Work between two looks at the input is bounded while motors may be driven: the checksum of a scene is computed, and flash erased, only when they
+//! are off and no command is on its way that could drive them.
+
+mod answers;
+mod fingerprint;
+mod freshness;
 
 use heapless::String;
-use mortise_protocol::frame::{Decoder, FrameError, encode};
+use mortise_protocol::frame::{Decoder, FrameError, Received, encode};
 use mortise_protocol::image::LAYOUT_VERSION;
 use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS};
 use mortise_protocol::message::{
@@ -13,13 +20,16 @@ use mortise_protocol::message::{
 };
 
 use crate::board::{Flash, Identity, Outbound, TICK_HZ};
-use crate::channel::{Command, CommandKind, EVENTS, Event, LinkEnds, Reply, SAMPLES};
+use crate::channel::{Command, CommandKind, EVENTS, Epoch, Event, LinkEnds, Reply, SAMPLES};
 use crate::hand::check_script;
 use crate::input_faults::check_input_faults;
 use crate::kinematics::Model;
 use crate::parameters::Parameters;
 use crate::store::Store;
 use crate::store::rig::Kept;
+
+use answers::{Answer, Answers};
+use freshness::Freshness;
 
 /// Room an [`Outbound`] must have when empty: telemetry leaves one frame's room for answers.
 pub const OUTBOUND_MIN: usize = 2 * MAX_FRAME;
@@ -38,18 +48,20 @@ pub struct LinkPlane<'c, 's, F> {
     sequence: u16,
     greeted: bool,
     session: u32,
-    /// An `Arm` that the control plane has not replied to.
-    arming: Option<u16>,
+    freshness: Freshness,
+    answers: Answers,
+    /// When the message that is being handled came.
+    epoch: Epoch,
+    /// `Arm` commands given to the control plane.
+    arms: u32,
     state: DeviceState,
     /// Sequence number of the commit that waits for the control plane, and the session it belongs to.
     commit: Option<(u16, u32)>,
-    restart: Option<u16>,
     restarting: bool,
     frames: u32,
     bad_frames: u32,
+    unanswered: u32,
     dropped_before: u32,
-    /// Sequence number of the question after whose answer the link's counters start anew.
-    count_anew: Option<u16>,
     stack_max: u32,
 }
 
@@ -77,57 +89,78 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             sequence: 0,
             greeted: false,
             session: 0,
-            arming: None,
+            freshness: Freshness::new(identity.entropy),
+            answers: Answers::new(),
+            epoch: Epoch::default(),
+            arms: 0,
             state: DeviceState::Boot,
             commit: None,
-            restart: None,
             restarting: false,
             frames: 0,
             bad_frames: 0,
+            unanswered: 0,
             dropped_before: 0,
-            count_anew: None,
             stack_max: 0,
         };
         if let Some(stored) = plane.store.current() {
-            let scene = stored.image;
+            let (image, number) = (stored.image, stored.sequence);
             // The queue is new and empty.
-            let _ = plane.enqueue(0, CommandKind::UseScene(scene));
+            let _ = plane.enqueue(0, CommandKind::UseScene { image, number });
         }
         plane
     }
 
-    /// Takes received bytes, answers into `out`; returns how many were taken. The rest is to be offered again when `out` has emptied.
-    pub fn receive(&mut self, bytes: &[u8], out: &mut impl Outbound) -> usize {
-        for (taken, &byte) in bytes.iter().enumerate() {
-            // Only the end of a frame can cause an answer.
-            if byte == 0 && out.room() < MAX_FRAME {
-                return taken;
-            }
-            match self.decoder.push::<ToDevice>(byte) {
-                None => {}
-                Some(Ok((seq, message))) => {
+    /// Takes all of `bytes`; answers go into `out` as far as it has room, and wait in a bounded queue for more.
+    pub fn receive(&mut self, bytes: &[u8], out: &mut impl Outbound) {
+        for &byte in bytes {
+            match self.decoder.push_stamped(byte) {
+                None => continue,
+                Some(Ok(frame)) => {
                     self.frames = self.frames.saturating_add(1);
                     self.ends.shared.hear();
-                    if let Some(answer) = self.handle(seq, message) {
-                        self.send(&answer, out);
-                    }
+                    self.handle(frame);
                 }
                 Some(Err(error)) => {
                     self.bad_frames = self.bad_frames.saturating_add(1);
                     if let FrameError::Undecodable(seq) = error {
                         self.ends.shared.hear();
                         let reason = Refusal::Undecodable;
-                        self.send(&FromDevice::Refused { seq, reason }, out);
+                        self.answers.push(Answer::Refused { seq, reason });
                     }
                 }
             }
+            self.answer(out);
         }
-        bytes.len()
+    }
+
+    /// Sends answers that wait, as far as there is room; returns how many.
+    fn answer(&mut self, out: &mut impl Outbound) -> usize {
+        let mut sent = 0;
+        while out.room() >= MAX_FRAME
+            && let Some(answer) = self.answers.pop()
+        {
+            sent += 1;
+            let message = match answer {
+                Answer::Hello => FromDevice::Hello(Version::own()),
+                Answer::Capabilities => FromDevice::Capabilities(self.capabilities()),
+                Answer::Rig => {
+                    let kept = self.store.rig();
+                    FromDevice::Rig {
+                        in_use: kept == self.rig,
+                        rig: kept.rig().cloned(),
+                    }
+                }
+                Answer::Ack { seq } => FromDevice::Ack { seq },
+                Answer::Refused { seq, reason } => FromDevice::Refused { seq, reason },
+            };
+            self.send(&message, out);
+        }
+        sent
     }
 
     /// Passes on what the control plane has to say, as far as there is room; returns how much that was.
     pub fn poll(&mut self, out: &mut impl Outbound) -> usize {
-        let mut passed = 0;
+        let mut passed = self.answer(out);
         for _ in 0..EVENTS {
             if out.room() < MAX_FRAME {
                 return passed;
@@ -176,6 +209,11 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         self.stack_max = self.stack_max.max(bytes);
     }
 
+    /// Names the session that the last greeting began: what the stamps of its commands carry.
+    pub fn session(&self) -> u32 {
+        self.freshness.session()
+    }
+
     /// The scene store.
     pub fn store(&self) -> &Store<'s, F> {
         &self.store
@@ -195,23 +233,44 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         self.sequence = self.sequence.wrapping_add(1);
     }
 
-    fn handle(&mut self, seq: u16, message: ToDevice) -> Option<FromDevice> {
-        // STOP is for everyone, greeted or not.
+    fn handle(&mut self, frame: Received<ToDevice>) {
+        let Received {
+            sequence: seq,
+            stamp,
+            message,
+        } = frame;
+        // STOP is for everyone, greeted or not, and whether its answer has a place or not.
         if message == ToDevice::Stop {
             self.ends.shared.stop();
-            return Some(FromDevice::Ack { seq });
+            self.answers.push(Answer::Ack { seq });
+            return;
         }
         if let ToDevice::Hello(version) = message {
             self.greet(version);
-            return Some(FromDevice::Hello(Version::own()));
+            return;
         }
-        if !self.greeted {
-            let reason = Refusal::NotGreeted;
-            return Some(FromDevice::Refused { seq, reason });
+        if !self.answers.has_place() {
+            self.unanswered = self.unanswered.saturating_add(1);
+            return;
         }
-        match self.carry_out(seq, message) {
-            Ok(answer) => answer,
-            Err(reason) => Some(FromDevice::Refused { seq, reason }),
+        self.epoch = self.ends.shared.epoch();
+        let fresh = if message.must_be_fresh() {
+            self.freshness.take(stamp)
+        } else {
+            Ok(())
+        };
+        let done = if self.greeted {
+            fresh.and_then(|()| self.carry_out(seq, message))
+        } else {
+            Err(Refusal::NotGreeted)
+        };
+        if !self.store.busy() {
+            self.ends.shared.release_flash();
+        }
+        let answer = done.unwrap_or_else(|reason| Some(Answer::Refused { seq, reason }));
+        if let Some(answer) = answer {
+            // There was a place.
+            self.answers.push(answer);
         }
     }
 
@@ -219,41 +278,37 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
     fn greet(&mut self, version: Version) {
         self.greeted = version.schema == Version::own().schema;
         self.store.abort();
+        if !self.store.busy() {
+            self.ends.shared.release_flash();
+        }
         self.ends.shared.begin_session();
-        self.session = self.ends.shared.sessions();
         // What waits in the queue belongs to the old session and will be dropped.
-        self.arming = None;
-        self.restart = None;
+        self.session = self.ends.shared.sessions();
+        self.freshness.begin(self.session);
+        // Their numbers would be taken for the new host's.
+        self.answers.clear();
+        self.answers.push(Answer::Hello);
     }
 
     /// `Ok(None)`: the control plane will reply.
-    fn carry_out(&mut self, seq: u16, message: ToDevice) -> Result<Option<FromDevice>, Refusal> {
-        let ack = Ok(Some(FromDevice::Ack { seq }));
+    fn carry_out(&mut self, seq: u16, message: ToDevice) -> Result<Option<Answer>, Refusal> {
+        let ack = Ok(Some(Answer::Ack { seq }));
         let kind = match message {
             // Handled before.
             ToDevice::Hello(_) | ToDevice::Stop | ToDevice::Heartbeat => return ack,
-            ToDevice::GetCapabilities => return Ok(Some(FromDevice::Capabilities(self.capabilities()))),
-            ToDevice::GetParameter(id) => {
-                let value = self.parameters.get(id);
-                return Ok(Some(FromDevice::Parameter { id, value }));
-            }
-            ToDevice::GetRig => {
-                let kept = self.store.rig();
-                let in_use = kept == self.rig;
-                let rig = kept.rig().cloned();
-                return Ok(Some(FromDevice::Rig { rig, in_use }));
-            }
+            ToDevice::GetCapabilities => return Ok(Some(Answer::Capabilities)),
+            ToDevice::GetRig => return Ok(Some(Answer::Rig)),
             ToDevice::SetRig(rig) => {
                 if !self.described {
                     return Err(Refusal::RigFixed);
                 }
-                self.may_store()?;
+                self.claim_flash()?;
                 Model::new(&rig).map_err(Refusal::Rig)?;
                 self.store.keep_rig(&rig)?;
                 return ack;
             }
             ToDevice::SceneBegin { length, crc, layout } => {
-                self.may_store()?;
+                self.claim_flash()?;
                 self.store.begin(length, crc, layout)?;
                 return ack;
             }
@@ -262,9 +317,10 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                 return ack;
             }
             ToDevice::SceneCommit => {
-                self.may_store()?;
+                self.claim_flash()?;
                 let stored = self.store.commit()?;
-                if let Err(reason) = self.enqueue(seq, CommandKind::UseScene(stored.image)) {
+                let (image, number) = (stored.image, stored.sequence);
+                if let Err(reason) = self.enqueue(seq, CommandKind::UseScene { image, number }) {
                     self.store.not_taken_over()?;
                     return Err(reason);
                 }
@@ -283,18 +339,21 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             }
 
             ToDevice::Arm => {
-                self.may_arm()?;
-                self.enqueue(seq, CommandKind::Arm)?;
-                self.arming = Some(seq);
+                let scene = self.checked_scene()?;
+                self.enqueue(seq, CommandKind::Arm(scene))?;
+                self.arms = self.arms.wrapping_add(1);
                 return Ok(None);
             }
             ToDevice::SetParameter { id, value } => {
                 let parameters = self.parameters.with(id, value)?;
                 let settings = parameters.settings()?;
                 self.enqueue(seq, CommandKind::Settings(settings))?;
+                // Will be in force, whatever happens until then.
                 self.parameters = parameters;
                 return Ok(None);
             }
+            // The control plane says what is in force.
+            ToDevice::GetParameter(id) => CommandKind::Parameter(id),
             ToDevice::SetTarget(target) => CommandKind::SetTarget(target),
             ToDevice::ClearTarget { id } => CommandKind::ClearTarget(id),
             ToDevice::Disarm => CommandKind::Disarm,
@@ -304,13 +363,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::Release => CommandKind::Release,
             ToDevice::ResetScene => CommandKind::ResetScene,
             ToDevice::SetTelemetry { every_ticks } => CommandKind::Telemetry(every_ticks),
-            ToDevice::GetStatistics { reset } => {
-                self.enqueue(seq, CommandKind::Statistics { reset })?;
-                if reset {
-                    self.count_anew = Some(seq);
-                }
-                return Ok(None);
-            }
+            ToDevice::GetStatistics { reset } => CommandKind::Statistics { reset },
             ToDevice::SimulatedHand(script) => {
                 check_script(&script)?;
                 CommandKind::Hand(script)
@@ -321,54 +374,55 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             }
             ToDevice::Lockstep(on) => CommandKind::Lockstep(on),
             ToDevice::Run { ticks } => CommandKind::Run(ticks),
-            ToDevice::Restart => {
-                self.enqueue(seq, CommandKind::Restart)?;
-                self.restart = Some(seq);
-                return Ok(None);
-            }
+            ToDevice::Restart => CommandKind::Restart,
         };
         self.enqueue(seq, kind)?;
         Ok(None)
     }
 
-    /// Scenes are stored only while the motors are off and nothing is on its way that could switch them on: flash may stall the processor.
-    fn may_store(&self) -> Result<(), Refusal> {
-        match self.state {
-            DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop => {
-                Err(Refusal::State(self.state))
-            }
-            // The change of state is on its way here.
-            _ if self.ends.shared.live() || self.arming.is_some() => Err(Refusal::Busy),
-            DeviceState::Boot
-            | DeviceState::Homing
-            | DeviceState::Idle
-            | DeviceState::Stopped
-            | DeviceState::Fault(_) => Ok(()),
+    /// Keeps the motors off while flash is written, which may stall the processor: until the store has nothing under way any more. Refused when they
+    /// are driven, or a command waits that could drive them.
+    fn claim_flash(&self) -> Result<(), Refusal> {
+        if self.arms == self.ends.shared.arms() && self.ends.shared.claim_flash() {
+            Ok(())
+        } else {
+            Err(self.refused_by_motors())
         }
     }
 
-    /// No motors while flash is written, and none for a scene that has changed in flash. Reads the whole scene: about 10 instructions a byte.
-    fn may_arm(&mut self) -> Result<(), Refusal> {
-        if self.store.busy() || self.arming.is_some() {
+    /// What keeps a message that wants the motors off from being carried out.
+    fn refused_by_motors(&self) -> Refusal {
+        match self.state {
+            DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop => Refusal::State(self.state),
+            // The change of state is on its way here.
+            _ => Refusal::Busy,
+        }
+    }
+
+    /// Number of the scene in use, whose checksum has just been found right. Reads all of it: about 10 instructions a byte, spent only while no motor
+    /// is driven nor can be before this returns.
+    fn checked_scene(&mut self) -> Result<u32, Refusal> {
+        if self.store.busy() || self.restarting || self.arms != self.ends.shared.arms() {
             return Err(Refusal::Busy);
+        }
+        if self.ends.shared.live() {
+            return Err(self.refused_by_motors());
         }
         if self.rig == Kept::Damaged {
             return Err(Refusal::RigDamaged);
         }
-        if self.store.current().is_none() {
-            return Err(Refusal::NoScene);
-        }
-        if self.state == DeviceState::Idle && !self.store.is_sound() {
+        let number = self.store.current().ok_or(Refusal::NoScene)?.sequence;
+        if !self.store.is_sound() {
             self.enqueue(0, CommandKind::SceneDamaged)?;
             return Err(Refusal::State(DeviceState::Fault(Fault::SceneDamaged)));
         }
-        Ok(())
+        Ok(number)
     }
 
     fn enqueue(&mut self, seq: u16, kind: CommandKind<'s>) -> Result<(), Refusal> {
         let command = Command {
             seq,
-            stops: self.ends.shared.stops(),
+            epoch: self.epoch,
             session: self.session,
             kind,
         };
@@ -390,6 +444,9 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                     }
                     Err(reason) => self.store.not_taken_over().and(Err(reason)),
                 };
+                if !self.store.busy() {
+                    self.ends.shared.release_flash();
+                }
                 let (seq, _) = self
                     .commit
                     .take()
@@ -401,36 +458,26 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             }
             // What an earlier host asked for.
             Event::Reply { session, .. } if session != self.session => None,
-            Event::Reply { seq, reply, .. } => {
-                if self.arming == Some(seq) {
-                    self.arming = None;
-                }
-                Some(self.translate(seq, reply))
-            }
+            Event::Reply { seq, reply, .. } => Some(self.translate(seq, reply)),
         }
     }
 
     fn translate(&mut self, seq: u16, reply: Reply) -> FromDevice {
         match reply {
-            Reply::Done => {
-                if self.restart == Some(seq) {
-                    self.restarting = true;
-                }
+            Reply::Done => FromDevice::Ack { seq },
+            Reply::MayRestart => {
+                self.restarting = true;
                 FromDevice::Ack { seq }
             }
-            Reply::Refused(reason) => {
-                if self.restart == Some(seq) {
-                    self.restart = None;
-                }
-                FromDevice::Refused { seq, reason }
-            }
+            Reply::Refused(reason) => FromDevice::Refused { seq, reason },
             Reply::Ran { tick, state_hash } => FromDevice::Ran { tick, state_hash },
-            Reply::Statistics(statistics) => {
+            Reply::Parameter { id, value } => FromDevice::Parameter { id, value },
+            Reply::Statistics { statistics, reset } => {
                 let statistics = self.complete(statistics);
-                if self.count_anew == Some(seq) {
-                    self.count_anew = None;
+                if reset {
                     self.frames = 0;
                     self.bad_frames = 0;
+                    self.unanswered = 0;
                     self.dropped_before = self.ends.shared.dropped();
                 }
                 FromDevice::Statistics(statistics)
@@ -443,6 +490,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         Statistics {
             frames: self.frames,
             bad_frames: self.bad_frames,
+            unanswered: self.unanswered,
             dropped: self.ends.shared.dropped().wrapping_sub(self.dropped_before),
             stack_max: self.stack_max,
             ..statistics
@@ -471,6 +519,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             max_targets: MAX_TARGETS as u8,
             reset: self.identity.reset,
             state: self.state,
+            session: self.freshness.session(),
         }
     }
 }

@@ -14,12 +14,16 @@ pub struct ControlSettings {
     pub law: Settings,
     /// Handle speed that is a fault, m/s.
     pub speed_limit_m_per_s: f32,
+    /// Handle rotation that is a fault, rad/s.
+    pub angular_speed_limit_rad_per_s: f32,
     /// Most power into the handle, W.
     pub power_limit_w: f32,
     /// Distance of the handle from the world's origin that is a fault, m.
     pub workspace_m: f32,
     /// Ticks without a word from the host, motors live, that are a fault.
     pub host_timeout_ticks: u32,
+    /// The values all this was made from: what a host reads back.
+    pub parameters: Parameters,
 }
 
 /// The value of every parameter.
@@ -75,6 +79,7 @@ impl Parameters {
         law.contact.stiffness_n_per_m = self.get(P::ContactStiffness);
         law.contact.damping_s = self.get(P::ContactDamping);
         law.contact.point_budget = self.get(P::PointBudget) as u32;
+        law.contact.shrinking = self.get(P::Shrinking);
         law.object.mass_kg = self.get(P::ObjectMass);
         law.limits.force_n = self.get(P::ForceLimit);
         law.limits.torque_nm = self.get(P::TorqueLimit);
@@ -99,9 +104,11 @@ impl Parameters {
         Ok(ControlSettings {
             law,
             speed_limit_m_per_s: self.get(P::SpeedLimit),
+            angular_speed_limit_rad_per_s: self.get(P::AngularSpeedLimit),
             power_limit_w: self.get(P::PowerLimit),
             workspace_m: self.get(P::WorkspaceRadius),
             host_timeout_ticks: (self.get(P::HostTimeout) * f32::from(TICK_HZ)) as u32,
+            parameters: *self,
         })
     }
 }
@@ -127,6 +134,7 @@ mod tests {
         let ceilings = Ceilings {
             force_n: 6.0,
             speed_m_per_s: 1.0,
+            angular_speed_rad_per_s: 30.0,
             workspace_m: 0.1,
             ..Ceilings::LARGEST
         };
@@ -136,6 +144,7 @@ mod tests {
         for (id, most) in [
             (ParameterId::ForceLimit, 6.0),
             (ParameterId::SpeedLimit, 1.0),
+            (ParameterId::AngularSpeedLimit, 30.0),
             (ParameterId::WorkspaceRadius, 0.1),
         ] {
             let min = id.row().min;

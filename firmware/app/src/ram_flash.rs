@@ -74,6 +74,7 @@ unsafe impl<'s> Flash<'s> for RamFlash<'s> {
         ERASE_SIZE
     }
 
+    // SAFETY: the trait's contract is the caller's: the slot is not written while the slice lives.
     unsafe fn slot(&self, slot: usize) -> &'s [u8] {
         let (start, length) = self.place(slot);
         // SAFETY: within the memory, initialised; the caller uses it for nothing while the slot changes.

@@ -57,10 +57,12 @@ pub enum Event {
     Referenced,
     /// They no longer do.
     ReferenceLost,
-    /// The host asks to arm; whether there is a scene to feel.
+    /// The host asks to arm.
     Arm {
-        /// A scene is loaded.
+        /// There is a scene to feel, and its checksum was found right.
         scene: bool,
+        /// The encoders know where the handle is.
+        referenced: bool,
     },
     /// The host asks to disarm.
     Disarm,
@@ -167,8 +169,15 @@ impl Safety {
             (Idle, Event::ReferenceLost) => (Homing, Action::None),
             (_, Event::ReferenceLost) => (self, Action::None),
 
-            (Idle, Event::Arm { scene: true }) => (Armed, Action::Enable),
-            (Idle, Event::Arm { scene: false }) => (self, Action::Refuse(Refusal::NoScene)),
+            (
+                Idle,
+                Event::Arm {
+                    scene: true,
+                    referenced: true,
+                },
+            ) => (Armed, Action::Enable),
+            (Idle, Event::Arm { scene: false, .. }) => (self, Action::Refuse(Refusal::NoScene)),
+            (Idle, Event::Arm { .. }) => (self, Action::Refuse(Refusal::State(DeviceState::Homing))),
             (Armed, Event::Grab) => (Active, Action::Couple),
             (Active, Event::Release) => (Armed, Action::Uncouple),
             (Armed, Event::Release) => (self, Action::None),
@@ -203,7 +212,7 @@ mod tests {
     const FADING: Fault = Fault::HostSilent { silent_ms: 500 };
     const SUDDEN: Fault = Fault::StopInput;
 
-    const FAULTS: [Fault; 13] = [
+    const FAULTS: [Fault; 17] = [
         Fault::StopInput,
         Fault::HostSilent { silent_ms: 1 },
         Fault::EncoderJump { axis: 0 },
@@ -217,6 +226,10 @@ mod tests {
         Fault::TickOverrun,
         Fault::SceneDamaged,
         Fault::NonFinite,
+        Fault::AngularOverSpeed,
+        Fault::ReferenceLost,
+        Fault::ImpossiblePosture,
+        Fault::BadReading,
     ];
 
     const STATES: [(&str, Safety); 9] = [
@@ -234,12 +247,30 @@ mod tests {
         ("Fault", Safety::Fault(Fault::OverSpeed)),
     ];
 
-    const EVENTS: [(&str, Event); 14] = [
+    const ARM: Event = Event::Arm {
+        scene: true,
+        referenced: true,
+    };
+
+    const EVENTS: [(&str, Event); 15] = [
         ("ready", Event::Ready),
         ("reference known", Event::Referenced),
         ("reference lost", Event::ReferenceLost),
-        ("arm", Event::Arm { scene: true }),
-        ("arm, no scene", Event::Arm { scene: false }),
+        ("arm", ARM),
+        (
+            "arm, no sound scene",
+            Event::Arm {
+                scene: false,
+                referenced: true,
+            },
+        ),
+        (
+            "arm, no reference",
+            Event::Arm {
+                scene: true,
+                referenced: false,
+            },
+        ),
         ("disarm", Event::Disarm),
         ("STOP", Event::Stop),
         ("clear", Event::Clear { cause_gone: true }),
@@ -296,16 +327,12 @@ mod tests {
     }
 
     #[test]
-    fn motors_come_alive_only_by_arming_from_idle_with_a_scene() {
+    fn motors_come_alive_only_by_arming_from_idle_with_scene_and_reference() {
         for (_, state) in STATES {
             for (what, event) in EVENTS {
                 let (next, action) = state.step(event);
                 if !state.live() && next.live() {
-                    assert_eq!(
-                        (state, event),
-                        (Safety::Idle, Event::Arm { scene: true }),
-                        "{what}"
-                    );
+                    assert_eq!((state, event), (Safety::Idle, ARM), "{what}");
                     assert_eq!(action, Action::Enable);
                 }
             }
@@ -355,7 +382,11 @@ mod tests {
                 | Fault::OverTemperature { .. }
                 | Fault::SupplyLow
                 | Fault::TickOverrun
-                | Fault::NonFinite => false,
+                | Fault::NonFinite
+                | Fault::AngularOverSpeed
+                | Fault::ReferenceLost
+                | Fault::ImpossiblePosture
+                | Fault::BadReading => false,
             };
             assert_eq!(fades(fault), fading, "{fault:?}");
             for (_, state) in STATES {

@@ -10,7 +10,8 @@ use mortise_haptics::{Pose, Twist, Wrench, rotation};
 use mortise_protocol::message::{HandScript, InputFault};
 
 use crate::board::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
-use crate::encoder::{Counter, Stall, Velocity};
+use crate::encoder::{Counter, Velocity};
+use crate::encoder_watch::{AxisTick, EncoderWatch, STIFFEST_HAND, STIFFEST_WRIST, amplitude, probed};
 use crate::hand::{Grip, Hand, Wish, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
 
@@ -40,8 +41,10 @@ pub const MOTOR_TORQUE: f32 = 0.6;
 const JUMP_SPEED: f32 = 20.0;
 const JUMP_ANGULAR_SPEED: f32 = 200.0;
 
-/// Ticks without a count under load that are a stall. Longer than a real rig's: a scripted hand may hold perfectly still.
-pub(crate) const STALL_TICKS: u16 = 500;
+/// Amplitude of the encoders' probe, N: 0.145.
+const PROBE_FORCE: f32 = amplitude(STIFFEST_HAND, RESOLUTION, COULOMB);
+/// Likewise about an axis, N·m: 0.006.
+const PROBE_TORQUE: f32 = amplitude(STIFFEST_WRIST, ANGULAR_RESOLUTION, ANGULAR_COULOMB);
 
 /// See the module.
 #[derive(Clone, Debug)]
@@ -53,7 +56,12 @@ pub struct Simulated {
     encoders: Encoders,
     hand: Option<Hand>,
     hand_wrench: Wrench,
+    /// What the motors were driven with, and what they do with the probe in it.
+    driven: Wrench,
     motors: Wrench,
+    /// A part is felt, and since then.
+    felt: bool,
+    watch: EncoderWatch<AXES>,
 }
 
 /// The true handle.
@@ -69,7 +77,6 @@ struct Encoders {
     /// Of the last reading.
     counts: [i32; 3],
     offset: [i32; 3],
-    stalls: [Stall; AXES],
     /// Nothing jumped since the counters were set.
     referenced: bool,
     linear: [Velocity; 3],
@@ -97,7 +104,10 @@ impl Simulated {
             encoders: Encoders::new(),
             hand: None,
             hand_wrench: Wrench::ZERO,
+            driven: Wrench::ZERO,
             motors: Wrench::ZERO,
+            felt: false,
+            watch: EncoderWatch::new(),
         }
     }
 
@@ -106,9 +116,24 @@ impl Simulated {
         self.body.pose
     }
 
-    /// What the motors do after saturation; zero when off.
+    /// What the motors do, after saturation and with the encoders' probe; zero when off.
     pub fn motors(&self) -> Wrench {
         self.motors
+    }
+
+    /// The first encoder that does not follow its motor.
+    fn dead_encoder(&mut self, moved: [i32; AXES]) -> Option<u8> {
+        if !self.felt {
+            self.watch.rest();
+            return None;
+        }
+        let forces = self.driven.force.to_array().map(|f| f / MOTOR_FORCE);
+        let torques = self.driven.torque.to_array().map(|t| t / MOTOR_TORQUE);
+        self.watch.update(&core::array::from_fn(|axis| AxisTick {
+            moved: moved[axis],
+            effort: if axis < 3 { forces[axis] } else { torques[axis - 3] },
+            able: true,
+        }))
     }
 
     fn advance(&mut self) {
@@ -209,7 +234,6 @@ impl Encoders {
             position: [Counter::new(farthest); 3],
             counts: [0; 3],
             offset: [0; 3],
-            stalls: [Stall::new(STALL_TICKS); AXES],
             referenced: true,
             linear: [Velocity::new(); 3],
             angular: [Velocity::new(); 3],
@@ -217,11 +241,10 @@ impl Encoders {
         }
     }
 
-    /// Reads the true pose through `wiring`, the motors pushing with `motors`.
-    fn read(&mut self, pose: &Pose, wiring: &Wiring, motors: &Wrench) -> Reading {
-        let (mut jump, mut stuck) = (None, None);
-        let force = motors.force.to_array().map(|f| f.abs() > 0.5 * MOTOR_FORCE);
-        let torque = motors.torque.to_array().map(|t| t.abs() > 0.5 * MOTOR_TORQUE);
+    /// Reads the true pose through `wiring`.
+    fn read(&mut self, pose: &Pose, wiring: &Wiring) -> Reading {
+        let mut jump = None;
+        let mut steps = [0; AXES];
         let (mut position, mut linear) = ([0.0; 3], [0.0; 3]);
         for (axis, x) in pose.position.to_array().into_iter().enumerate() {
             self.offset[axis] = self.offset[axis].saturating_add(wiring.glitch[axis]);
@@ -236,9 +259,7 @@ impl Encoders {
             if step.jumped && jump.is_none() {
                 jump = Some(axis as u8);
             }
-            if self.stalls[axis].update(step.counts != 0 || step.jumped, force[axis]) {
-                stuck = Some(axis as u8);
-            }
+            steps[axis] = step.counts;
             position[axis] = count as f32 * RESOLUTION;
             linear[axis] = self.linear[axis].update(step.counts as f32 * RESOLUTION);
         }
@@ -253,9 +274,8 @@ impl Encoders {
             let whole = rounded(angle / ANGULAR_RESOLUTION) + wiring.glitch[3 + axis] as f32;
             let counts = if wiring.stuck[3 + axis] { 0.0 } else { whole };
             moved[axis] = counts * ANGULAR_RESOLUTION;
-            if self.stalls[3 + axis].update(counts != 0.0, torque[axis]) {
-                stuck = Some(3 + axis as u8);
-            }
+            // A float too large saturates.
+            steps[3 + axis] = counts as i32;
             if moved[axis].abs() > JUMP_ANGULAR_SPEED * TICK_S && jump.is_none() {
                 jump = Some(3 + axis as u8);
             }
@@ -275,7 +295,7 @@ impl Encoders {
             handle: seen,
             twist,
             jump,
-            stuck,
+            steps,
         }
     }
 }
@@ -285,7 +305,8 @@ struct Reading {
     handle: Pose,
     twist: Twist,
     jump: Option<u8>,
-    stuck: Option<u8>,
+    /// Counts each axis moved.
+    steps: [i32; AXES],
 }
 
 /// To the nearest whole number, halves away from zero, without a library call; larger than 2²³ comes out as it is.
@@ -303,12 +324,13 @@ impl Mechanism for Simulated {
         self.advance();
         let wiring = self.script.advance(self.wiring);
         self.wiring.glitch = [0; AXES];
-        let reading = self.encoders.read(&self.body.pose, &wiring, &self.motors);
+        let reading = self.encoders.read(&self.body.pose, &wiring);
+        let encoder_stuck = self.dead_encoder(reading.steps);
         wiring.through(Sensed {
             handle: reading.handle,
             twist: reading.twist,
             encoder_jump: reading.jump,
-            encoder_stuck: reading.stuck,
+            encoder_stuck,
             referenced: self.encoders.referenced,
             ..Sensed::AT_REST
         })
@@ -316,13 +338,26 @@ impl Mechanism for Simulated {
 
     fn drive(&mut self, drive: Drive) {
         let (force, torque) = (Vec3::splat(MOTOR_FORCE), Vec3::splat(MOTOR_TORQUE));
-        self.motors = match drive {
+        self.driven = match drive {
             Drive::Off => Wrench::ZERO,
             Drive::Wrench(w) => Wrench {
                 force: w.force.clamp(-force, force),
                 torque: w.torque.clamp(-torque, torque),
             },
         };
+        self.motors = self.driven;
+        if drive == Drive::Off || !self.felt {
+            return;
+        }
+        for axis in 0..3 {
+            let (force, torque) = (&mut self.motors.force[axis], &mut self.motors.torque[axis]);
+            *force = probed(*force, PROBE_FORCE, self.watch.share(axis));
+            *torque = probed(*torque, PROBE_TORQUE, self.watch.share(3 + axis));
+        }
+    }
+
+    fn watch_encoders(&mut self, felt: bool) {
+        self.felt = felt;
     }
 
     fn count(&self) -> [f32; 2] {

@@ -52,6 +52,10 @@ impl Mechanism for SimulatedRig {
         each!(self, mechanism => mechanism.drive(drive));
     }
 
+    fn watch_encoders(&mut self, felt: bool) {
+        each!(self, mechanism => mechanism.watch_encoders(felt));
+    }
+
     fn count(&self) -> [f32; 2] {
         each!(self, mechanism => mechanism.count())
     }

@@ -10,6 +10,8 @@
 
 pub mod rig;
 
+use core::hash::{Hash, Hasher};
+
 use mortise_protocol::image::{CRC, Header, ImageError, LAYOUT_VERSION, SceneImage};
 use mortise_protocol::limits::MAX_PARTS;
 use mortise_protocol::message::Refusal;
@@ -83,7 +85,8 @@ pub struct Stored<'s> {
     /// Of the image, bytes.
     length: usize,
     slot: usize,
-    sequence: u32,
+    /// Of its commit record: differs from that of the scene before.
+    pub sequence: u32,
 }
 
 /// An upload under way.
@@ -315,6 +318,17 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
     /// The flash, for a test that looks at it.
     pub fn into_flash(self) -> F {
         self.flash
+    }
+
+    /// Adds what is in use and under way to `hasher`.
+    pub(crate) fn fingerprint(&self, hasher: &mut impl Hasher) {
+        self.current
+            .map(|scene| (scene.slot, scene.sequence))
+            .hash(hasher);
+        self.next.map(|scene| (scene.slot, scene.sequence)).hash(hasher);
+        self.upload
+            .map(|upload| (upload.slot, upload.received))
+            .hash(hasher);
     }
 
     fn memory(&self, slot: usize) -> &'s [u8] {

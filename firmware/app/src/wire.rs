@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 use heapless::Vec;
-use mortise_haptics::{FacePair, Flags, GuidanceState, LimitSettings, Pose, Wrench};
+use mortise_haptics::{FacePair, Flags, GuidanceState, Pose, Wrench};
 use mortise_protocol::limits::MAX_PAIRS;
 use mortise_protocol::message::{Guidance, TouchingPair, WirePose, WireWrench, flag};
 
@@ -64,33 +64,28 @@ pub fn pairs_to_wire(pairs: &[FacePair]) -> Vec<TouchingPair, MAX_PAIRS> {
         .collect()
 }
 
-/// What the force law says was out of the ordinary, in the wire's bits. It has one flag for both limits: the one that `wrench` lies at is named.
-pub fn flags_to_wire(flags: Flags, wrench: &Wrench, limits: &LimitSettings) -> u16 {
-    let table = [
-        (Flags::BUDGET_EXCEEDED, flag::BUDGET),
-        (Flags::CONTACTS_DROPPED, flag::CONTACTS),
-        (Flags::SATURATED_FORCE, flag::COUPLING_LIMIT),
-        (Flags::SATURATED_TORQUE, flag::COUPLING_LIMIT),
-        (Flags::SLEW_LIMITED, flag::SLEW_LIMIT),
-        (Flags::SPEED_LIMITED, flag::SPEED_LIMIT),
-        (Flags::SOFTENED, flag::SOFTENED),
-        (Flags::DEEP, flag::DEEP),
-        (Flags::UNSETTLED, flag::UNSETTLED),
-        (Flags::BAD_INPUT, flag::NON_FINITE),
-        (Flags::NON_FINITE, flag::NON_FINITE),
-    ];
+/// Each flag of the force law and its bit on the wire.
+pub const FLAGS_ON_WIRE: [(Flags, u16); Flags::NAMES.len()] = [
+    (Flags::BUDGET_EXCEEDED, flag::BUDGET),
+    (Flags::CONTACTS_DROPPED, flag::CONTACTS),
+    (Flags::UNSETTLED, flag::UNSETTLED),
+    (Flags::DEEP, flag::DEEP),
+    (Flags::SPEED_LIMITED, flag::SPEED_LIMIT),
+    (Flags::SATURATED_FORCE, flag::COUPLING_FORCE),
+    (Flags::SATURATED_TORQUE, flag::COUPLING_TORQUE),
+    (Flags::FORCE_LIMITED, flag::FORCE_LIMIT),
+    (Flags::TORQUE_LIMITED, flag::TORQUE_LIMIT),
+    (Flags::FORCE_SLEW_LIMITED, flag::FORCE_SLEW),
+    (Flags::TORQUE_SLEW_LIMITED, flag::TORQUE_SLEW),
+    (Flags::BAD_INPUT, flag::BAD_INPUT),
+    (Flags::NON_FINITE, flag::NON_FINITE),
+    (Flags::SOFTENED, flag::SOFTENED),
+];
+
+/// What the force law says was out of the ordinary, in the wire's bits.
+pub fn flags_to_wire(flags: Flags) -> u16 {
     let mut wire = 0;
-    if flags.intersects(Flags::LIMITED) {
-        // A thousandth below the limit is at it: scaling to a length rounds.
-        let at = |length2: f32, limit: f32| length2 >= limit * limit * 0.998;
-        if at(wrench.force.length_squared(), limits.force_n) {
-            wire |= flag::FORCE_LIMIT;
-        }
-        if at(wrench.torque.length_squared(), limits.torque_nm) {
-            wire |= flag::TORQUE_LIMIT;
-        }
-    }
-    for (ours, theirs) in table {
+    for (ours, theirs) in FLAGS_ON_WIRE {
         if flags.intersects(ours) {
             wire |= theirs;
         }
@@ -102,29 +97,20 @@ pub fn flags_to_wire(flags: Flags, wrench: &Wrench, limits: &LimitSettings) -> u
 mod tests {
     use super::*;
 
-    /// Whatever the force law flags reaches the host, each by itself and told from nothing.
+    /// Whatever the force law flags reaches the host as one bit that nothing else sets.
     #[test]
-    fn no_flag_is_lost() {
-        let limits = LimitSettings {
-            force_n: 10.0,
-            torque_nm: 0.5,
-            ..mortise_haptics::Settings::default().limits
-        };
-        let at = |force: f32, torque: f32| Wrench {
-            force: Vec3::new(0.0, force, 0.0),
-            torque: Vec3::new(torque, 0.0, 0.0),
-        };
+    fn each_flag_has_a_bit_of_its_own() {
+        let mut taken = 0u16;
         for (flag, name) in Flags::NAMES {
-            assert_ne!(flags_to_wire(flag, &at(10.0, 0.0), &limits), 0, "{name}");
+            let bit = flags_to_wire(flag);
+            assert_eq!(bit.count_ones(), 1, "{name}");
+            assert_eq!(taken & bit, 0, "{name} shares its bit");
+            assert!(flag::ALL.iter().any(|(known, ..)| *known == bit), "{name}");
+            taken |= bit;
         }
-        assert_eq!(flags_to_wire(Flags::empty(), &at(10.0, 0.5), &limits), 0);
-        assert_eq!(
-            flags_to_wire(Flags::LIMITED, &at(10.0, 0.1), &limits),
-            flag::FORCE_LIMIT
-        );
-        assert_eq!(
-            flags_to_wire(Flags::LIMITED, &at(1.0, 0.5), &limits),
-            flag::TORQUE_LIMIT
-        );
+        assert_eq!(flags_to_wire(Flags::empty()), 0);
+        // The one bit that the board sets and the force law does not.
+        let all = flag::ALL.iter().fold(0, |all, (bit, ..)| all | bit);
+        assert_eq!(all & !taken, flag::PAIRS);
     }
 }

@@ -3,11 +3,8 @@
 mod support;
 
 use glam::Vec3;
-use mortise_firmware::board::{Clock, Drive, DriverFault, DriverFaultKind, Identity, Outbound, Sensed};
-use mortise_firmware::channel::Channels;
-use mortise_firmware::control::{ControlPlane, FADE_TICKS, RAMP_TICKS, SOFT_STOP_TICKS, Ticked};
-use mortise_firmware::device::start;
-use mortise_firmware::simulated::Simulated;
+use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Sensed};
+use mortise_firmware::control::{FADE_TICKS, RAMP_TICKS, SOFT_STOP_TICKS, Ticked};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::*;
 use mortise_protocol::parameter::ParameterId;
@@ -73,7 +70,9 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
             ("encoder", Fault::EncoderJump { axis: 1 }),
             ("stuck", Fault::EncoderStuck { axis: 2 }),
             ("speed", Fault::OverSpeed),
-            ("nan", Fault::NonFinite),
+            ("nan", Fault::BadReading),
+            ("rotation", Fault::AngularOverSpeed),
+            ("posture", Fault::ImpossiblePosture),
         ] {
             let mut bench = make();
             bench.strings.pull(|s| match fault {
@@ -85,6 +84,8 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
                 Fault::EncoderJump { axis } => s.encoder_jump = Some(axis),
                 Fault::EncoderStuck { axis } => s.encoder_stuck = Some(axis),
                 Fault::OverSpeed => s.twist.linear = Vec3::new(0.0, 2.1, 0.0),
+                Fault::AngularOverSpeed => s.twist.angular = Vec3::new(0.0, 40.1, 0.0),
+                Fault::ImpossiblePosture => s.impossible_posture = true,
                 _ => s.handle.position.z = f32::NAN,
             });
             bench.tick();
@@ -96,7 +97,11 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
             assert_eq!(bench.request(&ToDevice::Arm), Err(state), "{name}");
             let lasts = !matches!(
                 fault,
-                Fault::EncoderJump { .. } | Fault::EncoderStuck { .. } | Fault::OverSpeed
+                Fault::EncoderJump { .. }
+                    | Fault::EncoderStuck { .. }
+                    | Fault::OverSpeed
+                    | Fault::AngularOverSpeed
+                    | Fault::ImpossiblePosture
             );
             if lasts {
                 assert_eq!(bench.request(&ToDevice::ClearFault), Err(state), "{name}");
@@ -107,6 +112,8 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
                 s.driver_fault = None;
                 s.encoder_jump = None;
                 s.encoder_stuck = None;
+                s.impossible_posture = false;
+                s.twist.angular = Vec3::ZERO;
                 s.twist.linear = Vec3::ZERO;
                 s.handle.position.z = 0.0;
             });
@@ -116,6 +123,19 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
             bench.request(&ToDevice::Arm).unwrap();
         }
     }
+}
+
+/// Without a jump no axis is at fault, and none is named.
+#[test]
+fn a_lost_reference_is_reported_as_itself() {
+    let mut bench = active();
+    bench.strings.pull(|s| s.referenced = false);
+    bench.tick();
+    assert_eq!(bench.strings.last(), Drive::Off);
+    assert_eq!(bench.state(), DeviceState::Fault(Fault::ReferenceLost));
+    assert_eq!(bench.fault_heard(), Some(Fault::ReferenceLost));
+    bench.request(&ToDevice::ClearFault).unwrap();
+    assert_eq!(bench.state(), DeviceState::Homing);
 }
 
 #[test]
@@ -485,116 +505,4 @@ fn resetting_is_refused_while_live_and_puts_everything_back() {
     bench.request(&ToDevice::Stop).unwrap();
     bench.tick();
     bench.request(&ToDevice::ResetScene).unwrap();
-}
-
-struct NoClock;
-
-impl Clock for NoClock {
-    fn begin(&mut self) -> u32 {
-        0
-    }
-
-    fn cost(&mut self) -> u32 {
-        0
-    }
-}
-
-struct Sink;
-
-impl Outbound for Sink {
-    fn room(&self) -> usize {
-        1 << 16
-    }
-
-    fn write(&mut self, _: &[u8]) {}
-}
-
-/// The same scenario after different histories gives the same bits.
-#[test]
-fn a_reset_forgets_the_past_to_the_bit() {
-    let run = |history: u32| {
-        let channels = Box::leak(Box::new(Channels::new()));
-        let identity = Identity {
-            overrun_ticks: 0,
-            ..IDENTITY
-        };
-        let (mut link, mut control): (_, ControlPlane<'_, 'static, Simulated, NoClock>) =
-            start(channels, TestFlash::leaked(), Simulated::new(), NoClock, identity);
-        let mut seq = 0;
-        let mut say = |link: &mut mortise_firmware::link::LinkPlane<'_, 'static, TestFlash>,
-                       control: &mut ControlPlane<'_, 'static, Simulated, NoClock>,
-                       message: &ToDevice| {
-            let mut frame = [0; mortise_protocol::limits::MAX_FRAME];
-            seq += 1;
-            let bytes = mortise_protocol::frame::encode(seq, message, &mut frame).unwrap();
-            assert_eq!(link.receive(bytes, &mut Sink), bytes.len());
-            control.tick();
-            link.poll(&mut Sink);
-        };
-        let image = two_parts(1);
-        say(&mut link, &mut control, &ToDevice::Hello(Version::own()));
-        let begin = ToDevice::SceneBegin {
-            length: image.len() as u32,
-            crc: mortise_protocol::image::CRC.checksum(&image),
-            layout: mortise_protocol::image::LAYOUT_VERSION,
-        };
-        say(&mut link, &mut control, &begin);
-        for (i, piece) in image.chunks(512).enumerate() {
-            let chunk = ToDevice::SceneChunk {
-                offset: (i * 512) as u32,
-                data: heapless::Vec::from_slice(piece).unwrap(),
-            };
-            say(&mut link, &mut control, &chunk);
-        }
-        say(&mut link, &mut control, &ToDevice::SceneCommit);
-        let pose = |x: f32| WirePose {
-            position: [x, 0.01, 0.0],
-            orientation: [0.0, 0.0, 0.0, 1.0],
-        };
-        let script = |x: f32| {
-            let frames = [(0, 0.0), (50, x)].map(|(tick, x)| Keyframe {
-                tick,
-                pose: pose(x),
-                push: [0.0, 0.5, 0.0],
-            });
-            ToDevice::SimulatedHand(HandScript {
-                stiffness: 400.0,
-                damping: 5.0,
-                angular_stiffness: 1.0,
-                angular_damping: 0.01,
-                tremor: 1e-4,
-                tremor_hz: 9.0,
-                keyframes: heapless::Vec::from_slice(&frames).unwrap(),
-            })
-        };
-        for message in [script(0.05), ToDevice::Arm, ToDevice::Grab { part: 1 }] {
-            say(&mut link, &mut control, &message);
-        }
-        for _ in 0..history {
-            control.tick();
-        }
-        for message in [ToDevice::Disarm, ToDevice::Heartbeat] {
-            say(&mut link, &mut control, &message);
-        }
-        for _ in 0..200 {
-            control.tick();
-        }
-        for message in [
-            ToDevice::Lockstep(true),
-            ToDevice::ResetScene,
-            script(0.02),
-            ToDevice::Arm,
-            ToDevice::Grab { part: 1 },
-            ToDevice::Run { ticks: 400 },
-        ] {
-            say(&mut link, &mut control, &message);
-        }
-        while control.tick() == Ticked::Ran {}
-        control.state_hash()
-    };
-    let hash = run(0);
-    assert_ne!(hash, mortise_firmware::statistics::StateHash::new().value());
-    for history in [1, 77, 499] {
-        assert_eq!(run(history), hash, "after {history} ticks");
-    }
 }

@@ -21,7 +21,8 @@
 //! stay as they are, and so do planes and cones: they stop a part, and a push above the cap must not go 0.1 mm into a stop.
 //!
 //! [`GuidanceMethod::Thesis`] is the blend of Faas 2010 (eqs. 13–19), for comparison: a spring of 0.8·k_T without a cap, weighted with
-//! x = ½e^(−θ/θ₀) + ½e^(−d/d₀), θ₀ = voxel/insertion depth, d₀ = voxel, and the contacts of those faces weighted with 1 − x.
+//! x = ½e^(−θ/θ₀) + ½e^(−d/d₀), θ₀ = voxel/insertion depth, d₀ = voxel, and the contacts of those faces weighted with 1 − x. A target whose caps
+//! are 0 pulls with nothing there too, and contacts alone give way: her hybrid method “without constraint evaluation” (section 8.2.2).
 
 use glam::Vec3;
 use heapless::Vec;
@@ -243,11 +244,11 @@ impl Guidance {
             let (offset, angle) = match self.method {
                 GuidanceMethod::Thesis => {
                     let stiffness = THESIS_SHARE * at.coupling_stiffness * self.weight(slot, &alignment, at);
-                    let law = Law::Spring {
-                        stiffness,
+                    let law = |cap: f32| Law::Spring {
+                        stiffness: if cap > 0.0 { stiffness } else { 0.0 },
                         ahead: at.period_s,
                     };
-                    (law, law)
+                    (law(target.force_cap), law(target.torque_cap))
                 }
                 GuidanceMethod::Off | GuidanceMethod::Capped => {
                     let law = |cap: f32, a: f32| Law::Capped {

@@ -102,19 +102,23 @@ impl Flags {
     pub const SATURATED_FORCE: Self = Self(1 << 5);
     /// The coupling slipped at its largest torque.
     pub const SATURATED_TORQUE: Self = Self(1 << 6);
-    /// The handle's force or torque was cut to its limit.
-    pub const LIMITED: Self = Self(1 << 7);
-    /// The change of the handle's force or torque was cut to its limit.
-    pub const SLEW_LIMITED: Self = Self(1 << 8);
+    /// The handle's force was cut to its limit.
+    pub const FORCE_LIMITED: Self = Self(1 << 7);
+    /// The change of the handle's force was cut to its limit.
+    pub const FORCE_SLEW_LIMITED: Self = Self(1 << 8);
     /// The input was not finite, out of all proportion, or not a rotation: zero wrench, nothing moved.
     pub const BAD_INPUT: Self = Self(1 << 9);
     /// The step came out non-finite: zero wrench, object stopped where it was.
     pub const NON_FINITE: Self = Self(1 << 10);
     /// The coupling had made energy: the handle's wrench is turned down.
     pub const SOFTENED: Self = Self(1 << 11);
+    /// The handle's torque was cut to its limit.
+    pub const TORQUE_LIMITED: Self = Self(1 << 12);
+    /// The change of the handle's torque was cut to its limit.
+    pub const TORQUE_SLEW_LIMITED: Self = Self(1 << 13);
 
     /// Every flag with its name, in order of bits.
-    pub const NAMES: [(Self, &'static str); 12] = [
+    pub const NAMES: [(Self, &'static str); 14] = [
         (Self::BUDGET_EXCEEDED, "budget exceeded"),
         (Self::CONTACTS_DROPPED, "contacts dropped"),
         (Self::UNSETTLED, "unsettled"),
@@ -122,11 +126,13 @@ impl Flags {
         (Self::SPEED_LIMITED, "speed limited"),
         (Self::SATURATED_FORCE, "saturated force"),
         (Self::SATURATED_TORQUE, "saturated torque"),
-        (Self::LIMITED, "limited"),
-        (Self::SLEW_LIMITED, "slew limited"),
+        (Self::FORCE_LIMITED, "force limited"),
+        (Self::FORCE_SLEW_LIMITED, "force slew limited"),
         (Self::BAD_INPUT, "bad input"),
         (Self::NON_FINITE, "non-finite"),
         (Self::SOFTENED, "softened"),
+        (Self::TORQUE_LIMITED, "torque limited"),
+        (Self::TORQUE_SLEW_LIMITED, "torque slew limited"),
     ];
 
     /// None.

@@ -21,9 +21,10 @@
 //! | `joint` | what an engaged target keeps apart leaves the work |
 //! | `counted` | work on a motion that is told in an encoder's counts |
 //! | `passivity` | observer of the energy the coupling makes, and the valve that stops it |
-//! | `grip` | what targets would give the hand that it never brought: the part gives way in it instead |
+//! | `grip` | energy account of the handle while targets pull: what they would give that the hand never brought slips or is not passed on |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
+//! | `observer` | energy that the hand was given and nobody brought, seen from outside: for measuring, not for the tick |
 //! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
 //!
 //! Symbols are those of `docs/notation.md`.
@@ -39,6 +40,7 @@ mod contact;
 mod counted;
 mod coupling;
 mod explicit;
+mod facing;
 mod grip;
 mod guidance;
 mod io;
@@ -48,6 +50,7 @@ mod leaf;
 mod limits;
 mod linear;
 mod nearest;
+pub mod observer;
 mod occupancy;
 mod overload;
 mod passivity;

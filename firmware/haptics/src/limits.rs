@@ -56,8 +56,10 @@ pub(crate) fn limit(
         force: cut(force, settings.force_n).0,
         torque: cut(torque, settings.torque_nm).0,
     };
-    flags.insert_if(cut_force || cut_torque, Flags::LIMITED);
-    flags.insert_if(slow_force || slow_torque, Flags::SLEW_LIMITED);
+    flags.insert_if(cut_force, Flags::FORCE_LIMITED);
+    flags.insert_if(cut_torque, Flags::TORQUE_LIMITED);
+    flags.insert_if(slow_force, Flags::FORCE_SLEW_LIMITED);
+    flags.insert_if(slow_torque, Flags::TORQUE_SLEW_LIMITED);
     if out.is_finite() {
         out
     } else {

@@ -7,17 +7,27 @@
 //!
 //! As in the paper: points of the held part only, none of the other's; *interior* voxels push nothing, they are flagged [`Flags::DEEP`]; *proximity*
 //! voxels only brake, and only with [`crate::Integrator::Explicit`]. Unlike it, the force layer is where the surface is, not two voxels outside.
+//!
+//! *Shrinking* (McNeely et al.; Faas 2010, section 4.1.1) moves the points inward along their normals, by up to a voxel of the held part. It is a
+//! setting of the running law ([`crate::ContactSettings::shrinking`]): it grows at once, which only lets contacts go, and falls so slowly that points
+//! coming out push no faster than a hand would.
+//!
+//! A point and a voxel name the faces that cross them, two each: the contact of a point and a voxel of guided faces is guided, as in the hybrid method
+//! of Faas 2010, section 5.4.
 
 use glam::Vec3;
-use mortise_protocol::image::{NO_FACE, PointRecord, Voxel, VoxelSample, oct_decode};
+use mortise_protocol::image::{Field, PointRecord, Voxel, VoxelSample, oct_decode};
 
 use crate::contact::Phase;
+use crate::guidance::Mating;
 use crate::io::Flags;
 use crate::job::Job;
 use crate::linear::inverse_sqrt;
 use crate::nearest::SoFar;
 use crate::probe::Nearest;
-use crate::proximity::{Leaf, Walk};
+use crate::proximity::{Leaf, MATING, Walk};
+use crate::settings::{ContactSettings, Settings};
+use crate::state::State;
 
 /// The plane a point meets.
 struct TangentPlane {
@@ -27,17 +37,46 @@ struct TangentPlane {
     push: Vec3,
 }
 
+/// Speed at which points come out again when shrinking falls, m/s.
+const COMES_OUT_M_PER_S: f32 = 0.01;
+
+/// Inward normal of a point, tree frame.
+#[inline]
+fn inward(point: &PointRecord) -> Vec3 {
+    let code = Vec3::from_array(oct_decode(point.normal));
+    // The code is no shorter than 1/√3 (the octahedron's faces).
+    code * -inverse_sqrt(code.length_squared())
+}
+
 impl TangentPlane {
     /// Through the centre of the voxel that `p` (field frame) lies in.
     #[inline]
-    fn of(job: &Job<'_>, point: &PointRecord, p: Vec3, voxel: &VoxelSample) -> Self {
-        let code = Vec3::from_array(oct_decode(point.normal));
-        // The code is no shorter than 1/√3 (the octahedron's faces).
-        let inward = code * -inverse_sqrt(code.length_squared());
+    fn of(job: &Job<'_>, inward: Vec3, p: Vec3, voxel: &VoxelSample) -> Self {
         let in_field = job.to_field.turn(inward);
         Self {
             gap: (p - Vec3::from_array(voxel.center)).dot(in_field),
             push: job.to_arm.turn(inward),
+        }
+    }
+}
+
+/// Where a point is that was moved inward by so much, tree frame.
+#[inline]
+fn shrunk(point: &PointRecord, by_m: f32) -> [f32; 3] {
+    if by_m > 0.0 {
+        (Vec3::from_array(point.position) + inward(point) * by_m).to_array()
+    } else {
+        point.position
+    }
+}
+
+impl ContactSettings {
+    /// How far points of the part with this field are moved inward, m.
+    pub(crate) fn shrunk_m(&self, field: &Field<'_>) -> f32 {
+        if field.is_occupancy() {
+            self.shrinking * field.record().cell
+        } else {
+            0.0
         }
     }
 }
@@ -52,7 +91,8 @@ impl Job<'_> {
 impl Walk<'_, '_, '_> {
     /// Looks one point up and offers it as a contact; how far it is from any surface voxel at least, m.
     pub fn voxel(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
-        let p = job.to_field.apply(point.position);
+        let position = shrunk(point, self.search.shrunk_m);
+        let p = job.to_field.apply(position);
         let sample = job.field.voxel(p.to_array());
         let braking_m = self.search.braking_m;
         match sample.voxel {
@@ -65,14 +105,16 @@ impl Walk<'_, '_, '_> {
             Voxel::Proximity | Voxel::Surface => {}
         }
         self.near += 1;
-        let plane = TangentPlane::of(job, point, p, &sample);
-        let arm = job.to_arm.apply(point.position);
+        let plane = TangentPlane::of(job, inward(point), p, &sample);
+        let arm = job.to_arm.apply(position);
         let n = plane.push;
         let turn = arm.cross(n) * self.search.inverse_length;
         let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
         let approach = self.search.approach(&row);
+        let mating = self.mating_of_voxels(job, leaf, point, &sample);
         let (gap, wanted) = if sample.voxel == Voxel::Surface {
-            (plane.gap, plane.gap < self.search.slack + approach)
+            let gap = plane.gap + mating.room;
+            (gap, gap < self.search.slack + approach)
         } else {
             // As near as braking begins, for all the method knows; wanted while it comes nearer.
             (braking_m, approach > 0.0)
@@ -88,26 +130,57 @@ impl Walk<'_, '_, '_> {
             contact.arm = arm;
             contact.rate = 0.0;
             contact.phase = Phase::Free;
-            // Faces are known too seldom for guidance to make room between them.
-            contact.guided = false;
-            (contact.moving_face, contact.static_face) = (point.face, sample.face);
-            (contact.moving_edge_face, contact.static_edge_face) = (point.edge_face, NO_FACE);
+            contact.guided = mating.guided;
+            (contact.moving_face, contact.static_face) = (point.face, sample.faces[0]);
+            (contact.moving_edge_face, contact.static_edge_face) = (point.edge_face, sample.faces[1]);
             contact.leaf = leaf;
         }
         0.0
+    }
+
+    /// What guidance says of the faces that cross a point's voxel and this one.
+    fn mating_of_voxels(
+        &mut self,
+        job: &Job<'_>,
+        leaf: Leaf,
+        point: &PointRecord,
+        sample: &VoxelSample,
+    ) -> Mating {
+        if !job.guided {
+            return Mating::NONE;
+        }
+        self.spent += MATING;
+        let moving = [point.face, point.edge_face];
+        self.mating_of(leaf, moving, sample.faces)
+    }
+}
+
+impl State {
+    /// How far points of the held part, of this field, are moved inward in this tick, m.
+    pub(crate) fn shrink(&mut self, settings: &Settings, field: &Field<'_>) -> f32 {
+        let wanted = settings.contact.shrunk_m(field);
+        let least = self.shrunk_m - COMES_OUT_M_PER_S * settings.period_s;
+        let now = if wanted > least { wanted } else { least };
+        let moved = now - self.shrunk_m;
+        if moved != 0.0 {
+            // What is known of distances counts on points staying where they are in their part. Each call is a round of its own.
+            self.coherence.travelled(if moved < 0.0 { -moved } else { moved });
+        }
+        self.shrunk_m = now;
+        now
     }
 }
 
 /// The deepest point of a job against a voxmap, as the method has it: depth to a tangent plane, else no more than a lower bound of the gap.
 ///
 /// Looks at every point that is not known to be farther from all surface voxels than the nearest so far.
-pub(crate) fn nearest_voxel(job: &Job<'_>, so_far: &mut SoFar) {
+pub(crate) fn nearest_voxel(job: &Job<'_>, shrunk_m: f32, so_far: &mut SoFar) {
     let SoFar { best, work } = so_far;
     let mut index = 0;
     while let Some(node) = job.nodes.get(index) {
         work.nodes += 1;
         let center = job.to_field.apply(node.center);
-        if job.field.bound(center.to_array()) - node.radius > best.distance_m {
+        if job.field.bound(center.to_array()) - (node.radius + shrunk_m) > best.distance_m {
             index = node.skip as usize;
             continue;
         }
@@ -117,7 +190,8 @@ pub(crate) fn nearest_voxel(job: &Job<'_>, so_far: &mut SoFar) {
         }
         for point in node.points(job.points) {
             work.points += 1;
-            let p = job.to_field.apply(point.position);
+            let position = shrunk(point, shrunk_m);
+            let p = job.to_field.apply(position);
             let sample = job.field.voxel(p.to_array());
             let (distance_m, in_band) = match sample.voxel {
                 Voxel::Free => (sample.bound, false),
@@ -127,7 +201,7 @@ pub(crate) fn nearest_voxel(job: &Job<'_>, so_far: &mut SoFar) {
                     (0.0, false)
                 }
                 Voxel::Surface => {
-                    let gap = TangentPlane::of(job, point, p, &sample).gap;
+                    let gap = TangentPlane::of(job, inward(point), p, &sample).gap;
                     if gap < best.field_distance_m {
                         best.field_distance_m = gap;
                     }
@@ -141,9 +215,9 @@ pub(crate) fn nearest_voxel(job: &Job<'_>, so_far: &mut SoFar) {
                     field_distance_m: best.field_distance_m,
                     exact: false,
                     in_band,
-                    arm: job.to_arm.apply(point.position),
+                    arm: job.to_arm.apply(position),
                     moving_face: point.face,
-                    fixed_face: sample.face,
+                    fixed_face: sample.faces[0],
                 };
             }
         }

@@ -13,8 +13,8 @@
 //! and it works where an added damper would not because speed itself is late. Turning it down frees s·U, which goes to the tank; turning it up again
 //! costs as much, is paid by the tank, and takes 20 s in contact and half a second out of it.
 //!
-//! What is behind the coupling is the object's port: targets that take hold there make energy of nothing, and what the hand is given of it `grip`
-//! keeps from it, by the same account of W.
+//! What is behind the coupling is the object's port: targets that take hold there make energy of nothing, and `grip` keeps it from the hand, with an
+//! account of its own.
 //!
 //! A wrench that reaches the motors late works on another motion than it was made for: rigs whose drivers take ticks to answer say so in
 //! [`crate::PassivitySettings::delay_ticks`]. So do those whose encoders count ([`crate::PassivitySettings::position_count_m`]): a sum over
@@ -36,7 +36,7 @@ use crate::coupling::Coupling;
 use crate::grip::{Grip, Hold};
 use crate::limits::length;
 use crate::pose::{Pose, Twist, Wrench};
-use crate::settings::{CouplingSettings, MAX_DELAY_TICKS, PassivitySettings, Settings};
+use crate::settings::{CouplingSettings, MAX_DELAY_TICKS, Settings};
 
 /// The most the valve closes in a tick, once the tank is empty.
 const CLOSING: f32 = 0.25;
@@ -123,7 +123,7 @@ impl Tank {
             let told = &settings.passivity;
             let to_handle = self.linear.work(acting.force, moved, told.position_count_m)
                 + (self.angular).work(acting.torque, turned, told.angle_count_rad);
-            self.grip.gave(to_handle);
+            self.grip.gave(acting, moved, turned, told);
             let made = to_handle + open * (self.to_object + stored - self.stored);
             let rubbed = settings.passivity.damping * handle_twist.linear.dot(moved)
                 + settings.passivity.angular_damping * handle_twist.angular.dot(turned);
@@ -149,26 +149,31 @@ impl Tank {
         self.given[delay_ticks.min(MAX_DELAY_TICKS)]
     }
 
+    /// See [`crate::State::given_way`].
+    pub fn given_way(&self) -> Twist {
+        self.grip.given_way()
+    }
+
     /// See [`Grip::measure`]; before [`Self::balance`].
     pub fn measure(&self, coupling: &mut Coupling, handle: Quat) {
         self.grip.measure(coupling, handle);
     }
 
     /// See [`Grip::give_way`]; after [`Self::balance`].
-    pub fn give_way(
-        &mut self,
-        coupling: &mut Coupling,
-        handle: Quat,
-        hold: Hold,
-        settings: &Settings,
-    ) -> f32 {
+    pub fn give_way(&mut self, coupling: &mut Coupling, handle: Quat, hold: Hold, settings: &Settings) {
         let open = 1.0 - self.seen.softened;
-        (self.grip).give_way(coupling, &mut self.stored, handle, hold, open, settings)
+        (self.grip).give_way(coupling, &mut self.stored, handle, hold, open, settings);
     }
 
-    /// See [`Grip::keep`].
-    pub fn keep(&mut self, behind: f32, settings: &PassivitySettings) {
-        self.grip.keep(self.stored, behind, settings);
+    /// See [`Grip::keep`]; `moving`: energy of the object's motion, J.
+    pub fn keep(&mut self, moving: f32) {
+        self.grip.keep((1.0 - self.seen.softened) * self.stored + moving);
+    }
+
+    /// See [`Grip::bound`].
+    pub fn bound(&self, wrench: Wrench, motion: Twist, settings: &Settings) -> Wrench {
+        let pending = (settings.passivity.delay_ticks as usize).min(MAX_DELAY_TICKS);
+        self.grip.bound(wrench, &self.given[..pending], motion, settings)
     }
 
     /// After the step: the object moved with `twist` under `pull`.
@@ -178,7 +183,9 @@ impl Tank {
 
     /// Nothing acts on the handle, or something else did: the account begins anew.
     pub fn forget(&mut self) {
-        *self = Self::new();
+        let mut grip = self.grip;
+        grip.forget();
+        *self = Self { grip, ..Self::new() };
     }
 
     fn account(&mut self, drawn: f32, stored: f32, object_energy: f32, period_s: f32, size: f32) {

@@ -168,11 +168,13 @@ impl Prober {
         };
         let mut touched = Work::default();
         let guidance = Guidance::new();
+        let shrunk_m = settings.shrunk_m(&held.field);
         let search = Search {
             scene,
             parts: &[],
             held: moving,
             held_shape: scene.shape_of_part(usize::from(moving)),
+            shrunk_m,
             pose,
             center,
             margin: 0.0,
@@ -200,7 +202,7 @@ impl Prober {
             if !job.field.is_occupancy() {
                 search.walk(&mut so_far, &mut touching);
             } else if !job.left_out() {
-                nearest_voxel(job, &mut so_far);
+                nearest_voxel(job, shrunk_m, &mut so_far);
             }
         }
         for search in &mut searches {

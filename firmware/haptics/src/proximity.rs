@@ -20,6 +20,7 @@ use crate::above::Above;
 use crate::analytic::{OnFace, exact_on_face, on_face, with_room};
 use crate::coherence::{ALL, Coherence, Due, Known, SHORTEST_SHARE};
 use crate::contact::{Contacts, Phase};
+use crate::facing::faces_away;
 use crate::guidance::{Guidance, Mated, Mating};
 use crate::io::{Flags, Work};
 use crate::job::Job;
@@ -46,7 +47,7 @@ const EDGE: u32 = 6;
 /// A point within the margin, besides.
 const NEAR: u32 = 6;
 /// Where targets guide, besides, to ask for the faces' mating,
-const MATING: u32 = 2;
+pub(crate) const MATING: u32 = 2;
 /// and at an edge for the room its faces have.
 const ROOM: u32 = 8;
 /// A point that may touch, besides: half of them do, and in most ticks two solves are enough.
@@ -91,6 +92,8 @@ pub(crate) struct Search<'s, 'i> {
     /// Index of the held part.
     pub held: u16,
     pub held_shape: Shape<'i>,
+    /// Its points are this far inward of where they are stored, to voxmaps, m.
+    pub shrunk_m: f32,
     pub pose: Pose,
     /// World position of its centre of mass, m.
     pub center: Vec3,
@@ -179,7 +182,7 @@ impl<'i> Search<'_, 'i> {
         let part = index / 2;
         let other = self.parts.get(usize::from(part))?;
         let held = self.parts.get(usize::from(self.held))?;
-        let apart = held.radius + other.radius + self.margin;
+        let apart = held.radius + other.radius + self.margin + self.shrunk_m;
         let held_center = self.pose.transform_point(held.local_center);
         if part == self.held || (held_center - other.center).length_squared() > apart * apart {
             return None;
@@ -304,7 +307,10 @@ impl Walk<'_, '_, '_> {
         if job.left_out() {
             return None;
         }
-        let edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
+        let mut edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
+        if job.field.is_occupancy() {
+            edge_error += self.search.shrunk_m;
+        }
         let limit = LOOKUP.saturating_mul(self.search.budget);
         let keys = job.keys;
         let mut above = Above::new();
@@ -431,7 +437,9 @@ impl Walk<'_, '_, '_> {
                     let room = |face| self.mating(job, leaf, point, face).room;
                     found = with_room(found, job.faces, nearby, p, most, room);
                 }
-                self.near(job, leaf, point, &found);
+                if !faces_away(job, nearby, point, found.normal) {
+                    self.near(job, leaf, point, &found);
+                }
             }
             return distance;
         }
@@ -501,6 +509,12 @@ impl Walk<'_, '_, '_> {
     /// What guidance says of a point and a face.
     fn mating(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, face: u16) -> Mating {
         let (moving, fixed) = sides(job, point, face);
+        self.mating_of(leaf, moving, fixed)
+    }
+
+    /// What guidance says of these faces of the held part and of the other one.
+    #[inline]
+    pub fn mating_of(&mut self, leaf: Leaf, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
         let search = self.search;
         (search.guidance).mating_after(
             &mut self.mated,

@@ -31,8 +31,6 @@ pub(crate) struct Pull {
     /// Σ e·Jᵀ.
     along: [f32; 6],
     law: Law,
-    /// |e|² now, m².
-    error2: f32,
     /// Largest force of the damper that lets go, N.
     damper_n: f32,
 }
@@ -69,9 +67,8 @@ impl Pull {
     /// Of which target, and whether of its angle; `damper_n`: largest force of the damper that lets go.
     pub fn new((slot, turns): (u8, bool), rows: Rows, law: Law, damper_n: f32) -> Self {
         let mut product = Symmetric6::ZERO;
-        let (mut along, mut error2) = ([0.0; 6], 0.0);
+        let mut along = [0.0; 6];
         for (row, error) in &rows.rows {
-            error2 += error * error;
             product.add_outer(1.0, row);
             for (a, j) in along.iter_mut().zip(row) {
                 *a += error * j;
@@ -84,25 +81,7 @@ impl Pull {
             product,
             along,
             law,
-            error2,
             damper_n,
-        }
-    }
-
-    /// Energy in it now, J: F·(√(s² + |e|²) − s) with s = F/k, of a plain spring k·|e|²/2. About 40 instructions.
-    pub fn stored(&self) -> f32 {
-        match self.law {
-            Law::Spring { stiffness, .. } => 0.5 * stiffness * self.error2,
-            Law::Capped { stiffness, cap, .. } => {
-                let slack = cap / stiffness;
-                // No difference of what is nearly the same.
-                let length = root(slack * slack + self.error2) + slack;
-                if length > 0.0 {
-                    cap * self.error2 / length
-                } else {
-                    0.0
-                }
-            }
         }
     }
 

@@ -46,6 +46,8 @@ pub struct State {
     pub(crate) finest_cell_m: f32,
     /// Smallest voxel of any voxmap in the scene, m; 0 when there is none.
     pub(crate) finest_voxel_m: f32,
+    /// How far points of the held part are moved inward before voxmaps are asked, m.
+    pub(crate) shrunk_m: f32,
     /// Constraint targets.
     pub(crate) guidance: Guidance,
     /// Nodes that need not be looked at yet.
@@ -126,6 +128,7 @@ impl State {
             pushing: 0,
             finest_cell_m: 0.0,
             finest_voxel_m: 0.0,
+            shrunk_m: 0.0,
             guidance: Guidance::new(),
             coherence: Coherence::new(),
             contacts: Contacts::new(),
@@ -139,7 +142,7 @@ impl State {
         self.release();
         self.last_object = None;
         self.parts.clear();
-        (self.finest_cell_m, self.finest_voxel_m) = (0.0, 0.0);
+        (self.finest_cell_m, self.finest_voxel_m, self.shrunk_m) = (0.0, 0.0, 0.0);
         for (index, record) in scene.parts().iter().enumerate().take(MAX_PARTS) {
             let Shape {
                 record: shape, field, ..
@@ -244,6 +247,12 @@ impl State {
     /// How passive the coupling is.
     pub fn passivity(&self) -> Passivity {
         self.tank.seen
+    }
+
+    /// How far the part has slipped in the hand because guidance's pull was not paid for: stretch (m) and angle (rad) of the coupling, handle's axes.
+    /// Zero without targets.
+    pub fn given_way(&self) -> Twist {
+        self.tank.given_way()
     }
 
     /// Whether the part slips in the hand for good where the coupling would have to pull harder than it may, instead of being pulled back with all it

@@ -16,7 +16,6 @@ use crate::linear::inverse_sqrt;
 use crate::overload::Searched;
 use crate::pose::{Pose, Twist, Wrench, renormalize};
 use crate::proximity::{Leaf, Search};
-use crate::pull::Pull;
 use crate::rotation;
 use crate::settings::{CouplingSettings, Integrator, Settings};
 use crate::state::State;
@@ -57,10 +56,11 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
 /// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-22, thesis pair with 20 µm clearance baked at 0.5 mm cells
-/// with a pointshell of 25 µm: 72,480 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s; 18,440 in free motion. A peg of 0.7 m
+/// with a pointshell of 25 µm: 72,540 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s, 18,480 in free motion; with a
+/// pointshell of 5 µm 112,320, points left out in 96 % of the ticks, and 19,100. A peg of 0.7 m
 /// with 0.2 mm clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below
-/// 120,000. Guided into a fit of 0.2 mm, joints asked about on the way: 104,360 at worst, of 0.02 mm 118,720
-/// (`mortise lab figures constraints --quick`); by collision alone into the latter some 138,000 (`mortise lab rate --quick`).
+/// 120,000. Into a fit of 0.02 mm: 123,900 guided, 115,700 by collision alone; 121,580 with four different targets
+/// (`mortise lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {
@@ -75,13 +75,12 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         .filter(|g| usize::from(g.part) < scene.parts().len())
     else {
         let mut out = state.still(work);
-        out.handle = state.hand_over(Wrench::ZERO, input.enabled, settings, &mut out.work.flags);
+        out.handle = state.hand_over(Wrench::ZERO, input, settings, &mut out.work.flags);
         return out;
     };
     let limits = state.slipping.then_some(&settings.coupling);
     let (mut grabbed, mut coupling) = take_hold(grabbed, handle, input.handle_twist, limits);
     let object_energy = grabbed.moving_energy(settings.object.mass_kg);
-    let mut held = settings.coupling;
     let open = if input.enabled {
         (state.tank).measure(&mut coupling, handle.orientation);
         let open = (state.tank).balance(
@@ -97,9 +96,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
             (true, 0) => Hold::Nothing,
             (true, _) => Hold::Contacts,
         };
-        let share = (state.tank).give_way(&mut coupling, handle.orientation, hold, settings);
-        held.b_t *= share;
-        held.b_r *= share;
+        (state.tank).give_way(&mut coupling, handle.orientation, hold, settings);
         open
     } else {
         state.tank.forget();
@@ -123,13 +120,12 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     };
     let mut pulls = Vec::new();
     state.guidance.add_pulls(&at, &mut pulls);
-    let pulled: f32 = pulls.iter().map(Pull::stored).sum();
     let turning = grabbed.turning_energy(settings.object.mass_kg, gyration2);
-    (state.tank).keep(object_energy + turning + pulled, &settings.passivity);
+    state.tank.keep(object_energy + turning);
     let guided_share = state.guidance.share(&at);
     let step = Step {
         coupling: &coupling,
-        settings: &held,
+        settings: &settings.coupling,
         period_s: settings.period_s,
         mass_kg: settings.object.mass_kg,
         gyration2,
@@ -178,7 +174,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         return state.still(work);
     }
     let pull = slipping(
-        coupling.pull(&held, settings.period_s, twist),
+        coupling.pull(&settings.coupling, settings.period_s, twist),
         settings,
         &mut work.flags,
     );
@@ -217,7 +213,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         .travelled(settings.period_s * point_speed(twist, reach));
     state.grabbed = Some(grabbed);
     state.settle();
-    out.handle = state.hand_over(wanted, input.enabled, settings, &mut work.flags);
+    out.handle = state.hand_over(wanted, input, settings, &mut work.flags);
     out.work = work;
     out
 }
@@ -258,11 +254,14 @@ impl State {
         let reserved = solve_cost(pulls) * u32::from(free.solves + LEAST_SOLVES) + PULL * pulls as u32;
         // Whatever pulls, contact is looked for.
         let reserved = reserved.min(budget / 2);
+        let held_shape = scene.shape_of_part(usize::from(grabbed.part));
+        let shrunk_m = self.shrink(settings, &held_shape.field);
         let search = Search {
             scene,
             parts: &self.parts,
             held: grabbed.part,
-            held_shape: scene.shape_of_part(usize::from(grabbed.part)),
+            held_shape,
+            shrunk_m,
             pose: grabbed.pose(),
             center: grabbed.center,
             margin,
@@ -356,15 +355,16 @@ impl State {
     }
 
     /// The wrench for the mechanism; remembered for the slew limit.
-    fn hand_over(&mut self, wanted: Wrench, enabled: bool, settings: &Settings, flags: &mut Flags) -> Wrench {
-        let out = if enabled {
-            limit(
+    fn hand_over(&mut self, wanted: Wrench, input: &Input, settings: &Settings, flags: &mut Flags) -> Wrench {
+        let out = if input.enabled {
+            let out = limit(
                 wanted,
                 self.previous_wrench,
                 &settings.limits,
                 settings.period_s,
                 flags,
-            )
+            );
+            self.tank.bound(out, input.handle_twist, settings)
         } else {
             Wrench::ZERO
         };

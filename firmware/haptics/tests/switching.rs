@@ -225,6 +225,7 @@ fn work(wrench: &Wrench, hand: &Hand) -> f64 {
 fn unwanted() -> Flags {
     let mut flags = Flags::NON_FINITE;
     flags.insert(Flags::UNSETTLED);
-    flags.insert(Flags::SLEW_LIMITED);
+    flags.insert(Flags::FORCE_SLEW_LIMITED);
+    flags.insert(Flags::TORQUE_SLEW_LIMITED);
     flags
 }

@@ -2,6 +2,7 @@
 //!
 //! The textbook representation of voxel sampling (McNeely, Puterbaugh & Troy 1999, table of voxel values): a voxel is free, interior, surface or
 //! proximity. It lies in the same grid of bricks as a distance field, 8³ voxels in 128 bytes, a voxel where a distance field has a cell.
+//! Which faces cross a voxel is a palette entry of its brick, as for the cells of a distance field: [`Nearby::Convex`] where there are several.
 //! Cost: one load and a shift once the brick is known.
 
 use super::field::{Field, Place};
@@ -41,8 +42,8 @@ pub struct VoxelSample {
     pub voxel: Voxel,
     /// Its centre, m, shape frame. Only where the voxel is stored; else the position asked for.
     pub center: [f32; 3],
-    /// Face that crosses it, counted from the shape's first, or [`NO_FACE`] when several or none do.
-    pub face: u16,
+    /// Faces that cross it, counted from the shape's first: the one nearest to its centre and another, [`NO_FACE`] where there is none.
+    pub faces: [u16; 2],
     /// No surface voxel is nearer than this, m; 0 in a surface voxel and where nothing is known.
     pub bound: f32,
 }
@@ -63,7 +64,7 @@ impl Field<'_> {
         let nothing = |voxel, bound| VoxelSample {
             voxel,
             center: p,
-            face: NO_FACE,
+            faces: [NO_FACE; 2],
             bound,
         };
         if !self.is_occupancy() {
@@ -84,7 +85,7 @@ impl Field<'_> {
                 VoxelSample {
                     voxel,
                     center: [center(0), center(1), center(2)],
-                    face: self.nearby_in(brick, cell).face(),
+                    faces: self.nearby_in(brick, cell).two_faces(),
                     bound: if voxel == Voxel::Free {
                         self.record.band
                     } else {

@@ -258,6 +258,14 @@ impl Nearby {
         }
     }
 
+    /// The nearest face and one more that is near, each [`NO_FACE`] where there is none.
+    pub const fn two_faces(self) -> [u16; 2] {
+        match self {
+            Self::Convex([first, second, _]) | Self::Reentrant([first, second, _]) => [first, second],
+            Self::Unknown | Self::Face(_) | Self::Roughly(_) => [self.face(), NO_FACE],
+        }
+    }
+
     /// One of the nearest faces, or [`NO_FACE`].
     pub const fn face(self) -> u16 {
         match self {

@@ -88,7 +88,7 @@ impl Random {
     }
 
     fn fault(&mut self) -> Fault {
-        match self.below(13) {
+        match self.below(17) {
             0 => Fault::StopInput,
             1 => Fault::HostSilent {
                 silent_ms: self.u16(),
@@ -103,6 +103,10 @@ impl Random {
             9 => Fault::SupplyLow,
             10 => Fault::TickOverrun,
             11 => Fault::SceneDamaged,
+            12 => Fault::AngularOverSpeed,
+            13 => Fault::ReferenceLost,
+            14 => Fault::ImpossiblePosture,
+            15 => Fault::BadReading,
             _ => Fault::NonFinite,
         }
     }
@@ -145,7 +149,7 @@ impl Random {
     }
 
     fn refusal(&mut self) -> Refusal {
-        match self.below(23) {
+        match self.below(24) {
             0 => Refusal::NotGreeted,
             1 => Refusal::State(self.state()),
             2 => Refusal::NoScene,
@@ -174,6 +178,7 @@ impl Random {
             18 => Refusal::Rig(self.rig_fault()),
             19 => Refusal::RigFixed,
             20 => Refusal::RigDamaged,
+            21 => Refusal::Outdated,
             _ => Refusal::Undecodable,
         }
     }
@@ -378,6 +383,7 @@ impl Random {
             state_hash: self.u64(),
             frames: self.u32(),
             bad_frames: self.u32(),
+            unanswered: self.u32(),
             dropped: self.u32(),
             stack_max: self.u32(),
         }
@@ -406,6 +412,7 @@ impl Random {
                 _ => ResetReason::Unknown,
             },
             state: self.state(),
+            session: self.u32(),
         }
     }
 }

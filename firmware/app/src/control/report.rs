@@ -36,8 +36,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         }
     }
 
-    pub(super) fn reply(&mut self, seq: u16, reply: Reply) {
-        let session = self.session;
+    pub(super) fn reply(&mut self, seq: u16, session: u32, reply: Reply) {
         self.send(Event::Reply { seq, session, reply });
     }
 
@@ -46,7 +45,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             tick: self.tick,
             state_hash: self.hash.value(),
         };
-        self.reply(self.run_seq, ran);
+        self.reply(self.run_seq, self.session, ran);
     }
 
     pub(super) fn send_statistics(&mut self, seq: u16, reset: bool) {
@@ -54,7 +53,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             state_hash: self.hash.value(),
             ..self.statistics
         };
-        self.reply(seq, Reply::Statistics(statistics));
+        self.reply(seq, self.session, Reply::Statistics { statistics, reset });
         if reset {
             self.statistics = Statistics::default();
         }
@@ -80,11 +79,9 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
 
     fn telemetry(&mut self) -> Telemetry {
         let output = self.output.as_ref();
-        let mut flags = output.map_or(0, |o| {
-            flags_to_wire(o.work.flags, &o.handle, &self.settings.law.limits)
-        });
+        let mut flags = output.map_or(0, |o| flags_to_wire(o.work.flags));
         if self.replaced {
-            flags |= flag::NON_FINITE;
+            flags |= flag::BAD_INPUT;
         }
         if output.is_some_and(|o| o.pairs.is_full()) {
             flags |= flag::PAIRS;

@@ -36,7 +36,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
                 DriverFaultKind::OverTemperature => Fault::OverTemperature { axis },
             });
         }
-        self.replaced.then_some(Fault::NonFinite)
+        self.replaced.then_some(Fault::BadReading)
     }
 
     /// Looks for faults, worst first, and runs the safety state machine.
@@ -70,8 +70,11 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         if let Some(axis) = self.sensed.encoder_jump {
             return Some(Fault::EncoderJump { axis });
         }
+        if self.sensed.impossible_posture {
+            return Some(Fault::ImpossiblePosture);
+        }
         if !self.sensed.referenced {
-            return Some(Fault::EncoderJump { axis: 0 });
+            return Some(Fault::ReferenceLost);
         }
         if let Some(axis) = self.sensed.encoder_stuck {
             return Some(Fault::EncoderStuck { axis });
@@ -79,6 +82,10 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         let limit = self.settings.speed_limit_m_per_s;
         if self.sensed.twist.linear.length_squared() > limit * limit {
             return Some(Fault::OverSpeed);
+        }
+        let limit = self.settings.angular_speed_limit_rad_per_s;
+        if self.sensed.twist.angular.length_squared() > limit * limit {
+            return Some(Fault::AngularOverSpeed);
         }
         if is_outside(self.sensed.handle.position, self.settings.workspace_m) {
             return Some(Fault::Workspace);

@@ -57,6 +57,20 @@ impl TestFlash {
         self.damage(slot, offset);
     }
 
+    /// The same chip as new. Nothing may be reading it.
+    pub fn erase_all(&self) {
+        // SAFETY: the tests are single-threaded, and no reference into the memory is in use.
+        unsafe { *self.memory.get().0.get() = [ERASED; WORDS] };
+        self.fuse.set(None);
+        self.operations.set(0);
+    }
+
+    /// A copy of a slot as it is now.
+    pub fn content(&self, slot: usize) -> Vec<u8> {
+        // SAFETY: SLOT bytes from the slot's first word; nothing writes meanwhile, the tests are single-threaded.
+        unsafe { std::slice::from_raw_parts(self.word(slot, 0).cast::<u8>(), SLOT) }.to_vec()
+    }
+
     fn word(&self, slot: usize, offset: usize) -> *mut FlashWord {
         assert!(slot < ALL && offset < SLOT && offset.is_multiple_of(WRITE_SIZE));
         let index = (slot * SLOT + offset) / WRITE_SIZE;
@@ -99,6 +113,7 @@ unsafe impl Flash<'static> for TestFlash {
         SECTOR
     }
 
+    // SAFETY: the trait's contract is the caller's: the slot is not written while the slice lives.
     unsafe fn slot(&self, slot: usize) -> &'static [u8] {
         // SAFETY: SLOT bytes from the slot's first word.
         unsafe { std::slice::from_raw_parts(self.word(slot, 0).cast::<u8>(), SLOT) }

@@ -16,7 +16,7 @@ use mortise_firmware::channel::Channels;
 use mortise_firmware::control::{ControlPlane, Ticked};
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_protocol::frame::{Decoder, encode};
+use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::*;
 
@@ -29,6 +29,7 @@ pub const IDENTITY: Identity = Identity {
     reset: ResetReason::PowerOn,
     overrun_ticks: 3,
     ceilings: Ceilings::LARGEST,
+    entropy: 1,
 };
 
 /// A wire with room for a few frames.
@@ -74,6 +75,8 @@ pub struct Bench<const SIMULATED: bool = true> {
     pub wire: Wire,
     decoder: Decoder,
     seq: u16,
+    /// Count of the last message's stamp.
+    pub count: u32,
     pub heard: VecDeque<FromDevice>,
 }
 
@@ -111,26 +114,36 @@ impl<const SIMULATED: bool> Bench<SIMULATED> {
             },
             decoder: Decoder::new(),
             seq: 0,
+            count: 0,
             heard: VecDeque::new(),
         }
     }
 
     /// Sends a message without letting the control plane run; returns its sequence number.
     pub fn send(&mut self, message: &ToDevice) -> u16 {
-        self.seq = self.seq.wrapping_add(1);
-        let mut frame = [0; MAX_FRAME];
-        let bytes = encode(self.seq, message, &mut frame).expect("fits").to_vec();
+        let bytes = self.frame(message);
         self.feed(&bytes);
         self.seq
     }
 
+    /// The frame of a new message, not sent.
+    pub fn frame(&mut self, message: &ToDevice) -> Vec<u8> {
+        self.seq = self.seq.wrapping_add(1);
+        self.count += 1;
+        let stamp = Stamp {
+            session: self.link.session(),
+            count: self.count,
+        };
+        let mut frame = [0; MAX_FRAME];
+        encode_stamped(self.seq, Some(stamp), message, &mut frame)
+            .expect("fits")
+            .to_vec()
+    }
+
     /// Bytes as they are.
-    pub fn feed(&mut self, mut bytes: &[u8]) {
-        while !bytes.is_empty() {
-            let taken = self.link.receive(bytes, &mut self.wire);
-            bytes = &bytes[taken..];
-            self.listen();
-        }
+    pub fn feed(&mut self, bytes: &[u8]) {
+        self.link.receive(bytes, &mut self.wire);
+        self.listen();
     }
 
     /// Takes in what is on the wire.

@@ -28,8 +28,14 @@ const REQUESTED: u32 = 1;
 const PANIC: u32 = 2;
 const HARD_FAULT: u32 = 3;
 
+// SAFETY: the section exists in the linker script and start-up leaves it alone; every bit pattern is a valid `MaybeUninit`.
 #[unsafe(link_section = ".uninit.REASON")]
 static mut REASON: MaybeUninit<Reason> = MaybeUninit::uninit();
+
+/// Starts since power-on, and the complement that says so.
+// SAFETY: as above.
+#[unsafe(link_section = ".uninit.STARTS")]
+static mut STARTS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 
 fn check(kind: u32, place: u32) -> u32 {
     !MAGIC.wrapping_add(kind).wrapping_add(place)
@@ -63,6 +69,20 @@ pub fn reset_reason() -> ResetReason {
     }
 }
 
+/// Starts since power-on, this one included. Call once.
+pub fn starts() -> u32 {
+    // SAFETY: plain words, every pattern is valid; nothing else runs yet.
+    let [starts, check] = unsafe { read_volatile((&raw const STARTS).cast::<[u32; 2]>()) };
+    let starts = if check == !starts {
+        starts.wrapping_add(1)
+    } else {
+        1
+    };
+    // SAFETY: as above.
+    unsafe { write_volatile((&raw mut STARTS).cast::<[u32; 2]>(), [starts, !starts]) };
+    starts
+}
+
 /// Restarts because the host asked.
 pub fn restart() -> ! {
     motors::off();
@@ -78,6 +98,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     SCB::sys_reset()
 }
 
+// SAFETY: only the processor calls it; it touches registers and `REASON`, and never returns to what it interrupted.
 #[cortex_m_rt::exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     motors::off();

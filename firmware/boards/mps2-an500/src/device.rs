@@ -31,6 +31,7 @@ unsafe impl InterruptNumber for Interrupt {
 
 /// The interrupt part of the vector table.
 mod vectors {
+    // SAFETY: handlers without arguments: RTIC defines the first three, cortex-m-rt the default. Only their addresses are used here.
     unsafe extern "C" {
         fn UART0RX();
         fn UART0TX();
@@ -40,10 +41,14 @@ mod vectors {
 
     const COUNT: usize = 32;
 
+    // SAFETY: only the processor calls through it.
+    type Handler = unsafe extern "C" fn();
+
+    // SAFETY: the name and section cortex-m-rt reserves for the interrupt table, defined once; every entry is a handler.
     #[unsafe(link_section = ".vector_table.interrupts")]
     #[unsafe(no_mangle)]
-    static __INTERRUPTS: [unsafe extern "C" fn(); COUNT] = {
-        let mut table: [unsafe extern "C" fn(); COUNT] = [DefaultHandler; COUNT];
+    static __INTERRUPTS: [Handler; COUNT] = {
+        let mut table: [Handler; COUNT] = [DefaultHandler; COUNT];
         table[super::Interrupt::UART0RX as usize] = UART0RX;
         table[super::Interrupt::UART0TX as usize] = UART0TX;
         table[super::Interrupt::TIMER0 as usize] = TIMER0;

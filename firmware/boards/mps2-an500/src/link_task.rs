@@ -26,6 +26,7 @@ const STACK_EVERY: u32 = TICK_HZ as u32;
 /// Bytes taken from the pipe at once.
 const PIECE: usize = 64;
 
+// SAFETY: the name and signature embassy-executor calls; defined once.
 #[unsafe(export_name = "__pender")]
 fn pender(_: *mut ()) {
     PENDING.store(true, Ordering::Release);
@@ -91,8 +92,7 @@ async fn serve(mut link: Link, mut bytes: Consumer<'static, u8>) {
         // Bounded by what was there when the loop began.
         for _ in 0..=bytes.len() / PIECE {
             piece.fill(|| bytes.dequeue());
-            let taken = link.receive(piece.as_slice(), sender);
-            piece.drop_front(taken);
+            link.receive(piece.as_slice(), sender);
         }
         uart::resume(&bytes);
         if timer::is_stopped() {
@@ -140,11 +140,8 @@ impl Piece {
         &self.bytes[self.start..self.end]
     }
 
-    /// Adds up to [`PIECE`] bytes when empty.
+    /// Replaces the content by up to [`PIECE`] bytes.
     fn fill(&mut self, mut next: impl FnMut() -> Option<u8>) {
-        if self.start < self.end {
-            return;
-        }
         (self.start, self.end) = (0, 0);
         while self.end < PIECE
             && let Some(byte) = next()

@@ -74,8 +74,10 @@ unsafe impl defmt::Logger for Logger {
         log.encoder = encoder;
     }
 
+    // SAFETY: does nothing.
     unsafe fn flush() {}
 
+    // SAFETY: defmt calls it once after `acquire`, which holds the critical section until here.
     unsafe fn release() {
         // SAFETY: still inside the section taken in `acquire`.
         let log = unsafe { log() };
@@ -93,6 +95,7 @@ unsafe impl defmt::Logger for Logger {
         unsafe { critical_section::release(restore) };
     }
 
+    // SAFETY: defmt calls it between `acquire` and `release`, inside the critical section.
     unsafe fn write(bytes: &[u8]) {
         // SAFETY: between acquire and release.
         let log = unsafe { log() };

@@ -39,6 +39,7 @@ pub fn guard_stack(mpu: &mut MPU) {
     cortex_m::asm::isb();
 }
 
+// SAFETY: symbols of the linker script; only their addresses are used.
 unsafe extern "C" {
     static _stack_start: u32;
     static _stack_end: u32;

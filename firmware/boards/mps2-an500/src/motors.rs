@@ -50,6 +50,10 @@ impl Mechanism for Motors {
         self.mechanism.drive(drive);
     }
 
+    fn watch_encoders(&mut self, felt: bool) {
+        self.mechanism.watch_encoders(felt);
+    }
+
     fn count(&self) -> [f32; 2] {
         self.mechanism.count()
     }

@@ -16,6 +16,7 @@ use nucleo_h743zi::boot::{Crash, CrashRecord, RECORD_WORDS, crash, record};
 use crate::motors;
 
 /// Record and one spare word. The memory's error correction holds back the last write until the next one: the spare takes that place.
+// SAFETY: the section exists in memory.x and start-up leaves it alone; every bit pattern is a valid `MaybeUninit`.
 #[unsafe(link_section = ".crash.record")]
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS + 1]> = MaybeUninit::uninit();
 
@@ -60,6 +61,8 @@ fn panic(info: &PanicInfo) -> ! {
 ///
 /// Naked: after a stack overflow the first push of an ordinary function would fault again and lock the processor up. The stack starts anew; nothing
 /// returns.
+// SAFETY: the name cortex-m-rt puts into the vector table. Only the processor calls it; it needs no stack before it sets a new one, and does not
+// return.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() -> ! {
@@ -74,14 +77,20 @@ unsafe extern "C" fn HardFault() -> ! {
 }
 
 /// Exceptions nobody handles: an NMI (clock or memory failure), an interrupt that should not be enabled.
+// SAFETY: the name cortex-m-rt puts into the vector table; only the processor calls it, and it does not return.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn DefaultHandler() -> ! {
+    // SAFETY: a null frame lies outside the stack, so `fault` does not read it.
     unsafe { fault(core::ptr::null()) }
 }
 
 /// `frame`: the stack pointer at the fault, whose sixth word is the faulting instruction's address if the stack still held.
+///
+/// # Safety
+/// Nothing else may run afterwards. Any `frame` is allowed: one outside the stack is not read.
 unsafe extern "C" fn fault(frame: *const u32) -> ! {
     motors::cut();
+    // SAFETY: symbols of the linker script; only their addresses are used.
     unsafe extern "C" {
         static _stack_end: u32;
         static _stack_start: u32;

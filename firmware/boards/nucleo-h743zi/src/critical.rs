@@ -25,9 +25,11 @@ critical_section::set_impl!(BelowTick);
 // SAFETY: single core; all users run at hardware level 2 or lower (see the module's rule), so raising BASEPRI to level 2 keeps every other user out
 // until it is restored. Sections nest because the old value is restored. Compiler fences: `asm!` without `nomem`.
 unsafe impl critical_section::Impl for BelowTick {
+    // SAFETY: see the `impl`.
     unsafe fn acquire() -> RawRestoreState {
         let (old, running): (u32, u32);
         // BASEPRI_MAX only raises the mask. The barrier makes it effective before the next instruction.
+        // SAFETY: reads and raises BASEPRI and reads IPSR; no memory, no stack, no flags.
         unsafe {
             asm!(
                 "mrs {old}, BASEPRI",
@@ -44,7 +46,9 @@ unsafe impl critical_section::Impl for BelowTick {
         old as u8
     }
 
+    // SAFETY: the caller passes what `acquire` returned, in reverse order of nesting.
     unsafe fn release(old: RawRestoreState) {
+        // SAFETY: restores the BASEPRI that `acquire` read; no memory, no stack, no flags.
         unsafe {
             asm!("msr BASEPRI, {old}", old = in(reg) u32::from(old), options(nostack, preserves_flags));
         }

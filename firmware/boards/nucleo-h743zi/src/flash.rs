@@ -136,6 +136,7 @@ unsafe impl Flash<'static> for SceneFlash {
         SECTOR as usize
     }
 
+    // SAFETY: the trait's contract is the caller's: the slot is not written while the slice lives.
     unsafe fn slot(&self, slot: usize) -> &'static [u8] {
         match flash_map::address(slot, 0, SLOT_LENGTH, SECTOR) {
             // SAFETY: a slot is SLOT_LENGTH bytes of flash.

@@ -1,7 +1,7 @@
 //! The link plane's task: bytes from the port to the link plane, frames back, once a millisecond and whenever bytes arrive.
 
 use cortex_m::peripheral::SCB;
-use embassy_futures::select::select;
+use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use mortise_firmware::link::LinkPlane;
@@ -26,23 +26,13 @@ const RESTART_AFTER: u32 = 50;
 pub async fn run(mut plane: Link, incoming: &'static InPipe, outgoing: &'static OutPipe) -> ! {
     let mut out = Out(outgoing);
     let mut buffer = [0u8; IN_BYTES];
-    // Bytes in `buffer` that the plane has not taken.
-    let mut held = 0;
     let mut passes = 0u32;
     let mut quiet = 0u32;
     loop {
-        if held < buffer.len() {
-            let free = &mut buffer[held..];
-            match select(incoming.read(free), TICKED.wait()).await {
-                embassy_futures::select::Either::First(length) => held += length,
-                embassy_futures::select::Either::Second(()) => {}
-            }
-        } else {
-            TICKED.wait().await;
+        // Taken whether or not there is room for answers: a STOP may be in it.
+        if let Either::First(length) = select(incoming.read(&mut buffer), TICKED.wait()).await {
+            plane.receive(&buffer[..length], &mut out);
         }
-        let taken = plane.receive(&buffer[..held], &mut out);
-        buffer.copy_within(taken..held, 0);
-        held -= taken;
         plane.poll(&mut out);
         #[cfg(not(feature = "rtt"))]
         crate::log::drain(|bytes| plane.log(bytes, &mut out));

@@ -46,6 +46,7 @@ fn collect(frame: &mut Vec<u8, MAX_LOG>, too_long: &mut bool, bytes: &[u8]) {
 // SAFETY: from `acquire` to `release` a critical section is held, so the state has one user; defmt calls them in this order.
 unsafe impl defmt::Logger for LinkLogger {
     fn acquire() {
+        // SAFETY: the critical section is held from the first line until `release`, so this is the only reference to the log.
         unsafe {
             let restore = critical_section::acquire();
             let log = &mut *LOG.0.get();
@@ -65,9 +66,12 @@ unsafe impl defmt::Logger for LinkLogger {
         }
     }
 
+    // SAFETY: does nothing.
     unsafe fn flush() {}
 
+    // SAFETY: defmt calls it once after `acquire`, which holds the critical section until here.
     unsafe fn release() {
+        // SAFETY: inside the critical section of `acquire`; it ends with the last line, after the last use of the log.
         unsafe {
             let log = &mut *LOG.0.get();
             let Log {
@@ -85,7 +89,9 @@ unsafe impl defmt::Logger for LinkLogger {
         }
     }
 
+    // SAFETY: defmt calls it between `acquire` and `release`.
     unsafe fn write(bytes: &[u8]) {
+        // SAFETY: inside the critical section of `acquire`, so this is the only reference to the log.
         unsafe {
             let log = &mut *LOG.0.get();
             let Log {

@@ -19,6 +19,7 @@ mod clocks;
 mod crash;
 mod critical;
 mod encoders;
+mod entropy;
 mod flash;
 mod link;
 #[cfg(not(feature = "rtt"))]
@@ -62,7 +63,7 @@ mod app {
     use crate::motors::{self, Motors};
     use crate::tick_timer::{self, Cycles};
     use crate::usb::{InPipe, OutPipe, Port};
-    use crate::{BOARD, OVERRUN_TICKS, WATCHDOG_US, clocks, crash, encoders, memory, reset};
+    use crate::{BOARD, OVERRUN_TICKS, WATCHDOG_US, clocks, crash, encoders, entropy, memory, reset};
 
     type Control = ControlPlane<'static, 'static, HapticArm, Cycles>;
 
@@ -72,6 +73,7 @@ mod app {
     static PENDING: AtomicBool = AtomicBool::new(true);
 
     /// Called by the executor's wakers, also from interrupts.
+    // SAFETY: the name and signature embassy-executor calls; defined once.
     #[unsafe(export_name = "__pender")]
     fn pender(_context: *mut ()) {
         PENDING.store(true, Ordering::Release);
@@ -149,6 +151,7 @@ mod app {
             reset: reset_reason(flags, last_crash),
             overrun_ticks: OVERRUN_TICKS,
             ceilings: nucleo_h743zi::rig::RIG.ceilings,
+            entropy: entropy::entropy(),
         };
         let (plane, control) = start(
             CHANNELS.take(),

@@ -1,7 +1,7 @@
 //! The arm as the application sees it: handle pose and velocity in, force on the handle out.
 
 use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, TICK_S};
-use mortise_firmware::encoder::Stall;
+use mortise_firmware::encoder_watch::{AxisTick, EncoderWatch, LOADED, probed};
 use mortise_haptics::{Pose, Quat, Twist, Vec3};
 use nucleo_h743zi::drive::{AXES, currents};
 use nucleo_h743zi::kinematics::Posture;
@@ -11,8 +11,9 @@ use nucleo_h743zi::velocity::Estimator;
 use crate::encoders::Encoders;
 use crate::motors::{self, Motors};
 
-/// Ticks without a count under load that are a stall. A hand trembles at 8 Hz and more: it never holds still for so long.
-const STALL_TICKS: u16 = 200;
+/// Amplitude of the encoders' probe, as a share of a motor's current limit, 0.28 N·m: twice a dry friction of 0.03 N·m (assumed), and 2.5 counts of
+/// 2.6·10⁻⁴ rad at a lever of 0.245 m against a hand of 5,000 N/m, which take 0.26 N·m.
+const PROBE_SHARE: f32 = 0.3;
 
 /// Encoders, kinematics and motors together.
 pub struct HapticArm {
@@ -21,9 +22,11 @@ pub struct HapticArm {
     estimators: [Estimator; AXES],
     /// Of the last `sense`: torques belong to it.
     posture: Posture,
-    stalls: [Stall; AXES],
+    /// A part is felt.
+    felt: bool,
+    watch: EncoderWatch<AXES>,
     counts: [i32; AXES],
-    /// Currents of the last `drive`, A.
+    /// Currents of the last `drive` without the probes, A.
     currents: [f32; AXES],
     /// The arm was in its home posture when told so, and nothing jumped since. Counting encoders know nothing at power-on.
     referenced: bool,
@@ -38,7 +41,8 @@ impl HapticArm {
             motors,
             estimators: counts.map(Estimator::new),
             posture: posture(counts),
-            stalls: [Stall::new(STALL_TICKS); AXES],
+            felt: false,
+            watch: EncoderWatch::new(),
             counts,
             currents: [0.0; AXES],
             referenced: false,
@@ -58,19 +62,32 @@ impl Mechanism for HapticArm {
         let readings = self.encoders.read();
         self.posture = posture(readings.map(|reading| reading.count));
         let mut rates = Vec3::ZERO;
-        let (mut jump, mut stuck) = (None, None);
+        let mut jump = None;
+        let mut ticks = [AxisTick {
+            moved: 0,
+            effort: 0.0,
+            able: false,
+        }; AXES];
         for (axis, reading) in readings.iter().enumerate() {
-            let moved = reading.count != self.counts[axis];
-            let loaded = self.currents[axis].abs() > 0.5 * RIG.drivers[axis].current_limit;
-            if self.stalls[axis].update(moved, loaded) {
-                stuck = Some(axis as u8);
-            }
+            let effort = self.currents[axis] / RIG.drivers[axis].current_limit;
+            ticks[axis] = AxisTick {
+                moved: reading.count.wrapping_sub(self.counts[axis]),
+                effort,
+                // Where the arm's end stops are is not known: only a joint that is pushed is judged.
+                able: effort.abs() > LOADED,
+            };
             if reading.jump && jump.is_none() {
                 jump = Some(axis as u8);
             }
             self.counts[axis] = reading.count;
             rates[axis] = self.estimators[axis].update(reading.count) * RIG.radians_per_count(axis) / TICK_S;
         }
+        let encoder_stuck = if self.felt {
+            self.watch.update(&ticks)
+        } else {
+            self.watch.rest();
+            None
+        };
         self.referenced &= jump.is_none();
         Sensed {
             // The gimbal's orientation is not sensed: the handle keeps the world's.
@@ -87,9 +104,15 @@ impl Mechanism for HapticArm {
                 kind: DriverFaultKind::Any,
             }),
             encoder_jump: jump,
-            encoder_stuck: stuck,
+            // Any three angles are a posture of this arm.
+            impossible_posture: false,
+            encoder_stuck,
             referenced: self.referenced,
         }
+    }
+
+    fn watch_encoders(&mut self, felt: bool) {
+        self.felt = felt;
     }
 
     fn count(&self) -> [f32; 2] {
@@ -113,7 +136,11 @@ impl Mechanism for HapticArm {
             }
             Drive::Wrench(wrench) => {
                 self.currents = currents(&RIG.drivers, self.posture.torques(wrench.force));
-                let setpoint = |axis: usize| RIG.drivers[axis].setpoint(self.currents[axis]);
+                let setpoint = |axis: usize| {
+                    let (driver, current) = (&RIG.drivers[axis], self.currents[axis]);
+                    let share = if self.felt { self.watch.share(axis) } else { 0.0 };
+                    driver.setpoint(probed(current, PROBE_SHARE * driver.current_limit, share))
+                };
                 self.motors.drive(core::array::from_fn(setpoint));
             }
         }

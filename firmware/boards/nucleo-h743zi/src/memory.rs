@@ -75,6 +75,7 @@ pub fn set_bank_2(how: Bank2) {
 
 /// Protects memory and switches both caches on. Once, first thing in `init`.
 pub fn protect_and_cache(core: &mut Peripherals) {
+    // SAFETY: symbols of the linker script; only their addresses are used.
     unsafe extern "C" {
         static _stack_end: u32;
     }
@@ -111,6 +112,7 @@ pub fn forget(address: u32, length: u32) {
 /// Paints the free part of the stack anew, so that [`deepest_stack`] leaves out what start-up needed (it moves large values about). Once, when `idle`
 /// begins. Interrupts are off for about 0.1 ms.
 pub fn repaint_stack() {
+    // SAFETY: symbols of the linker script; only their addresses are used.
     unsafe extern "C" {
         static _stack_end: u32;
     }
@@ -129,6 +131,7 @@ pub fn repaint_stack() {
 
 /// Deepest the stack has been since [`repaint_stack`], bytes: looks for paint.
 pub fn deepest_stack() -> u32 {
+    // SAFETY: symbols of the linker script; only their addresses are used.
     unsafe extern "C" {
         static _stack_end: u32;
         static _stack_start: u32;

@@ -2,7 +2,7 @@
 //!
 //! Four tasks of one executor, polled from `idle` at the lowest priority: the USB device, a reader and a writer that each move packets between
 //! the port and a bounded pipe, and the link between the pipes ([`crate::link`]). A slow or absent host fills the outgoing pipe and nothing else:
-//! the link plane then drops telemetry and stops taking messages.
+//! the link plane then drops telemetry and answers, and goes on reading.
 
 use embassy_executor::Spawner;
 use embassy_stm32::peripherals::{PA11, PA12, USB_OTG_FS};

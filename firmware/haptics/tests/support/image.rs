@@ -209,21 +209,31 @@ impl Writer {
             ];
             pad(&mut self.blob);
             let samples = self.blob.len();
-            self.blob.resize(samples + VOXEL_BRICK_BYTES, 0);
+            let indices = samples + VOXEL_BRICK_BYTES;
+            self.blob.resize(indices + CELLS_PER_BRICK / 2, 0);
             for i in 0..CELLS_PER_BRICK {
                 let (n, n2) = (BRICK_CELLS, BRICK_CELLS * BRICK_CELLS);
                 let at = [i % n + n * b[0], i / n % n + n * b[1], i / n2 + n * b[2]];
                 self.blob[samples + i / 4] |= (voxmap.at(at) as u8) << (2 * (i % 4));
+                let center: [f64; 3] =
+                    std::array::from_fn(|a| voxmap.origin[a] + (at[a] as f64 + 0.5) * cell);
+                // The nearest face; the last entry of the palette is none.
+                let face = match voxmap.at(at) {
+                    Voxel::Surface => solid.face(center) as u8,
+                    _ => 15,
+                };
+                self.blob[indices + i / 2] |= face << (4 * (i % 2));
             }
             self.grid.push(GridEntry::Brick(index as u16).to_bits());
             self.bricks.push(BrickRecord {
                 samples: samples as u32,
-                indices: 0,
+                indices: indices as u32,
                 palette: self.palette.len() as u32,
-                palette_len: 1,
-                index_bits: 0,
+                palette_len: 16,
+                index_bits: 4,
             });
         }
+        self.palette.extend(0..15);
         self.palette.push(NO_FACE);
         self.fields.push(FieldRecord {
             origin: voxmap.origin.map(|x| x as f32),

@@ -1,0 +1,29 @@
+//! What decides how the control plane goes on, for the enumeration of message orders.
+
+use core::hash::{Hash, Hasher};
+use core::mem::discriminant;
+
+use mortise_protocol::parameter::PARAMETERS;
+
+use super::ControlPlane;
+use crate::board::{Clock, Mechanism};
+use crate::safety::{AfterSoftStop, Safety};
+
+impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
+    /// Adds the plane's state to `hasher`, as far as it decides when motors are driven: without the force law's state, without counters of what was.
+    pub fn fingerprint(&self, hasher: &mut impl Hasher) {
+        let shared = self.ends.shared;
+        discriminant(&self.safety).hash(hasher);
+        if let Safety::Fault(fault) | Safety::SoftStop(AfterSoftStop::Fault(fault)) = &self.safety {
+            discriminant(fault).hash(hasher);
+        }
+        (self.fade.0, self.silent_ticks, self.restarting).hash(hasher);
+        (self.scene.is_some(), self.scene_number, self.sensed.referenced).hash(hasher);
+        (self.stops == shared.stops(), self.session == shared.sessions()).hash(hasher);
+        (self.persistent_cause().is_some(), self.ends.events.len()).hash(hasher);
+        (self.lockstep, self.credit, self.reported == self.safety).hash(hasher);
+        for row in PARAMETERS {
+            self.settings.parameters.get(row.id).to_bits().hash(hasher);
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! A board made of memory, cheap to build: flash of two small slots, a mechanism that senses what the enumeration wants, a line that can be full.
+
+use std::cell::{Cell, UnsafeCell};
+
+use mortise_firmware::board::{
+    Clock, Drive, Flash, FlashError, Identity, Mechanism, Outbound, SLOTS, Sensed, WRITE_SIZE,
+};
+use mortise_firmware::ceilings::Ceilings;
+use mortise_firmware::ram_flash::{ERASED, FlashWord};
+use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
+use mortise_protocol::image::CRC;
+use mortise_protocol::limits::MAX_FRAME;
+use mortise_protocol::message::{CostUnit, ResetReason};
+
+/// Bytes of a slot, erased at once: one record and one small scene.
+const SLOT: usize = 512;
+const WORDS: usize = SLOTS * SLOT / WRITE_SIZE;
+
+pub(crate) const IDENTITY: Identity = Identity {
+    board: "enumeration",
+    force_axes: 3,
+    torque_axes: 3,
+    cost_unit: CostUnit::Nanoseconds,
+    cost_budget: 0,
+    reset: ResetReason::PowerOn,
+    overrun_ticks: 0,
+    ceilings: Ceilings::LARGEST,
+    entropy: 0,
+};
+
+/// The smallest scene of the protocol's tests, its one part made grabbable.
+pub(crate) fn scene() -> Vec<u8> {
+    let mut image = include_bytes!("../../../protocol/tests/golden/occupancy.scene").to_vec();
+    let word = |at: usize| u32::from_le_bytes([image[at], image[at + 1], image[at + 2], image[at + 3]]);
+    // The parts' section is the first after magic, layout, length, checksum and a reserved word.
+    let flags = word(24) as usize + 4;
+    image[flags] |= mortise_protocol::image::PART_GRABBABLE as u8;
+    let crc = CRC.checksum(&image[20..]);
+    image[16..20].copy_from_slice(&crc.to_le_bytes());
+    image
+}
+
+/// The flash chip, and a second one with the same content but for one byte: memory behind a shared reference must not change, so damage exchanges
+/// the chip. References handed out before go on seeing the old one; who asks the flash again sees the damage.
+pub(crate) struct Chip {
+    words: [UnsafeCell<[FlashWord; WORDS]>; 2],
+    in_use: Cell<usize>,
+}
+
+impl Chip {
+    /// With `scene` in slot 0.
+    pub fn with(scene: &[u8]) -> Self {
+        let mut words = [ERASED; WORDS];
+        let mut bytes = commit_record(1, scene).to_vec();
+        bytes.extend_from_slice(scene);
+        assert!(bytes.len() <= SLOT && IMAGE_OFFSET == WRITE_SIZE);
+        for (word, piece) in words.iter_mut().zip(bytes.chunks(WRITE_SIZE)) {
+            word.0[..piece.len()].copy_from_slice(piece);
+        }
+        Self {
+            words: [UnsafeCell::new(words), UnsafeCell::new([ERASED; WORDS])],
+            in_use: Cell::new(0),
+        }
+    }
+
+    /// Changes one byte of the scene in each slot. Once.
+    pub fn damage(&self) {
+        if self.in_use.replace(1) == 1 {
+            return;
+        }
+        // SAFETY: one thread; nobody has seen the second chip yet.
+        unsafe {
+            let mut words = *self.words[0].get();
+            for slot in 0..SLOTS {
+                words[(slot * SLOT + 200) / WRITE_SIZE].0[8] ^= 0x10;
+            }
+            *self.words[1].get() = words;
+        }
+    }
+
+    fn word(&self, slot: usize, offset: usize) -> Result<*mut FlashWord, FlashError> {
+        if slot >= SLOTS || offset >= SLOT || !offset.is_multiple_of(WRITE_SIZE) {
+            return Err(FlashError);
+        }
+        let index = (slot * SLOT + offset) / WRITE_SIZE;
+        // SAFETY: inside the array.
+        Ok(unsafe { self.words[self.in_use.get()].get().cast::<FlashWord>().add(index) })
+    }
+}
+
+/// The flash as the store sees it. Notes when it is changed while motors are driven.
+pub(crate) struct ChipFlash<'s> {
+    pub chip: &'s Chip,
+    pub rig: &'s Rig,
+}
+
+// SAFETY: aligned words that live for 's; `erase` and `write` stay in their slot.
+unsafe impl<'s> Flash<'s> for ChipFlash<'s> {
+    fn capacity(&self) -> usize {
+        SLOT
+    }
+
+    fn erase_size(&self) -> usize {
+        SLOT
+    }
+
+    // SAFETY: the trait's contract is the caller's: the slot is not written while the slice lives.
+    unsafe fn slot(&self, slot: usize) -> &'s [u8] {
+        match self.chip.word(slot, 0) {
+            // SAFETY: SLOT bytes from the slot's first word.
+            Ok(first) => unsafe { std::slice::from_raw_parts(first.cast::<u8>(), SLOT) },
+            // No slots for a rig's description.
+            Err(FlashError) => &[],
+        }
+    }
+
+    fn erase(&mut self, slot: usize, offset: usize) -> Result<(), FlashError> {
+        self.rig.note_flash();
+        for at in (offset..SLOT).step_by(WRITE_SIZE) {
+            // SAFETY: inside the slot; one thread.
+            unsafe { *self.chip.word(slot, at)? = ERASED };
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, slot: usize, offset: usize, word: &[u8; WRITE_SIZE]) -> Result<(), FlashError> {
+        self.rig.note_flash();
+        // SAFETY: inside the slot; one thread.
+        unsafe { *self.chip.word(slot, offset)? = FlashWord(*word) };
+        Ok(())
+    }
+}
+
+/// What the mechanism senses and was last told to do.
+pub(crate) struct Rig {
+    pub sensed: Cell<Sensed>,
+    pub driven: Cell<bool>,
+    pub flash_while_driven: Cell<bool>,
+}
+
+impl Rig {
+    pub fn at_rest() -> Self {
+        Self {
+            sensed: Cell::new(Sensed::AT_REST),
+            driven: Cell::new(false),
+            flash_while_driven: Cell::new(false),
+        }
+    }
+
+    pub fn sense(&self, change: impl FnOnce(&mut Sensed)) {
+        let mut sensed = self.sensed.get();
+        change(&mut sensed);
+        self.sensed.set(sensed);
+    }
+
+    fn note_flash(&self) {
+        if self.driven.get() {
+            self.flash_while_driven.set(true);
+        }
+    }
+}
+
+pub(crate) struct Puppet<'s>(pub &'s Rig);
+
+impl Mechanism for Puppet<'_> {
+    const SIMULATED: bool = false;
+
+    fn sense(&mut self) -> Sensed {
+        self.0.sensed.get()
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.0.driven.set(drive != Drive::Off);
+    }
+
+    fn home(&mut self) {
+        self.0.sense(|sensed| sensed.referenced = true);
+    }
+}
+
+/// No time passes but in ticks.
+pub(crate) struct NoClock;
+
+impl Clock for NoClock {
+    fn begin(&mut self) -> u32 {
+        0
+    }
+
+    fn cost(&mut self) -> u32 {
+        0
+    }
+}
+
+/// The line to the host.
+#[derive(Default)]
+pub(crate) struct Line {
+    pub bytes: Vec<u8>,
+    pub full: bool,
+}
+
+impl Outbound for Line {
+    fn room(&self) -> usize {
+        if self.full { 0 } else { 64 * MAX_FRAME }
+    }
+
+    fn write(&mut self, frame: &[u8]) {
+        self.bytes.extend_from_slice(frame);
+    }
+}

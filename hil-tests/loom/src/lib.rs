@@ -1,0 +1,1 @@
+//! Models of the planes for the loom model checker; they are the tests of this package.
