@@ -127,16 +127,22 @@ fn cells(
     cells
 }
 
-struct Packed {
-    palette: Vec<u16>,
-    palette_len: u16,
-    index_bits: u16,
-    indices: Vec<u8>,
+/// What lies nearest to the cells of a brick, as stored.
+#[derive(Clone)]
+pub(crate) struct Packed {
+    /// Entries, ascending, then the groups of faces they refer to.
+    pub palette: Vec<u16>,
+    /// Entries, groups apart.
+    pub palette_len: u16,
+    /// 0, 4 or 8.
+    pub index_bits: u16,
+    /// Palette indices; empty for 0 bits.
+    pub indices: Vec<u8>,
 }
 
 /// More than 256 entries in one brick: the most frequent 255 stay, the others become
 /// [`Nearby::Unknown`].
-fn pack(cells: &[Nearby; CELLS_PER_BRICK]) -> Packed {
+pub(crate) fn pack(cells: &[Nearby; CELLS_PER_BRICK]) -> Packed {
     let mut entries = cells.to_vec();
     entries.sort_unstable();
     entries.dedup();

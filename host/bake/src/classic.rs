@@ -3,12 +3,12 @@
 //! The textbook baseline (McNeely, Puterbaugh & Troy 1999; Faas & Vance 2010): points lie on the voxels' grid, up to half a voxel's diagonal from
 //! the surface, and their normals are the voxels' own, the direction in which the 26 voxels round them are more free and less solid. Shrinking
 //! moves each point inward along its normal by up to a voxel, which takes back clearance that voxels have eaten. Only what moves has points: the
-//! method looks one way. Cost: a few tens of exact queries for each voxel, in parallel.
+//! method looks one way. A point names the faces that cross its voxel, two of them at most. Cost: a few tens of exact queries for each voxel, in parallel.
 
 use std::collections::HashMap;
 
 use glam::DVec3;
-use mortise_protocol::image::{BRICK_CELLS, NO_FACE, Voxel};
+use mortise_protocol::image::{BRICK_CELLS, Voxel};
 use rayon::prelude::*;
 
 use crate::bounds::{Class, classify};
@@ -52,29 +52,32 @@ pub fn classic_pointshell(
     let near: Vec<[u32; 3]> = positions(&grid)
         .filter(|&at| classes[grid.index(at)] == Class::Stored)
         .collect();
-    let bricks: Vec<Vec<(Place, Voxel)>> = near
+    let bricks: Vec<Vec<(Place, Voxel, [u16; 2])>> = near
         .par_iter()
         .map(|&at| {
-            let kinds = voxels(surface, &grid, at).kinds;
-            let of = |(i, kind)| {
+            let voxels = voxels(surface, &grid, at);
+            let of = |(i, (kind, faces)): (usize, (Voxel, [u16; 3]))| {
                 let own = place(i);
                 let along = |axis: usize| i64::from(at[axis]) * BRICK_CELLS as i64 + own[axis] as i64;
-                ([along(0), along(1), along(2)], kind)
+                ([along(0), along(1), along(2)], kind, [faces[0], faces[1]])
             };
-            kinds.into_iter().enumerate().map(of).collect()
+            let each = voxels.kinds.into_iter().zip(voxels.faces);
+            each.enumerate().map(of).collect()
         })
         .collect();
-    let kinds: HashMap<Place, Voxel> = bricks.iter().flatten().copied().collect();
-    let crossed: Vec<Place> = bricks
+    let kinds: HashMap<Place, Voxel> = (bricks.iter().flatten())
+        .map(|&(at, kind, _)| (at, kind))
+        .collect();
+    let crossed: Vec<(Place, [u16; 2])> = bricks
         .into_iter()
         .flatten()
-        .filter(|&(_, kind)| kind == Voxel::Surface)
-        .map(|(at, _)| at)
+        .filter(|&(_, kind, _)| kind == Voxel::Surface)
+        .map(|(at, _, faces)| (at, faces))
         .collect();
     let inward = shrink_percent / 100.0 * grid.cell();
     let (points, offsets): (Vec<ShellPoint>, Vec<f64>) = crossed
         .par_iter()
-        .filter_map(|&at| {
+        .filter_map(|&(at, [face, edge_face])| {
             let center = grid.at(DVec3::from_array(at.map(|x| x as f64 + 0.5)));
             let nearest = surface.nearest(center)?;
             let exact = (center - nearest.point) * nearest.distance.signum();
@@ -82,8 +85,8 @@ pub fn classic_pointshell(
             let point = ShellPoint {
                 position: center - normal * inward,
                 normal,
-                face: nearest.face as u16,
-                edge_face: NO_FACE,
+                face,
+                edge_face,
             };
             Some((point, nearest.distance - inward))
         })

@@ -7,6 +7,10 @@
 //!
 //! The grid is laid so that the largest plane faces across x, y and z run through voxel centres: there the tangent-plane depth is exact, the best the
 //! method can do. Cost: an exact query for each voxel of a stored brick, in parallel, and a few tens where a voxel is nearly crossed.
+//!
+//! A surface voxel names the faces that cross it, as section 5.2 of Faas 2010 has it: there a cube as large as the voxel is collided with each face,
+//! here the nearest points to the voxel's centre and corners tell. A face that is nearest to none of the nine, or only outside of the voxel, is
+//! not named.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -14,13 +18,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 use mortise_protocol::image::{
-    BRICK_CELLS, BrickRecord, CELLS_PER_BRICK, FORMAT_OCCUPANCY, FieldRecord, GridEntry, NO_FACE,
+    BRICK_CELLS, BrickRecord, CELLS_PER_BRICK, FORMAT_OCCUPANCY, FieldRecord, GridEntry, NO_FACE, Nearby,
     VOXEL_BRICK_BYTES, Voxel,
 };
 use rayon::prelude::*;
 
 use crate::bounds::Class;
-use crate::distance::{ExactSurface, Scratch};
+use crate::bricks::{self, Packed};
+use crate::distance::{ExactSurface, Nearest, Scratch};
 use crate::error::BakeError;
 use crate::field::{BakedField, NearSurface, append_aligned, check_brick_count};
 use crate::grid::Grid;
@@ -32,11 +37,14 @@ const HALVINGS: u32 = 5;
 /// A voxel may count as crossed when the surface is this near to it, in voxels: the diagonal of its smallest part.
 pub const CROSSING_TOLERANCE_CELLS: f64 = 1.733 / (1 << HALVINGS) as f64;
 
+/// Most faces that a voxel names.
+const FACES: usize = 3;
+
 /// Voxels of one brick, x fastest.
 pub(crate) struct Voxels {
     pub kinds: [Voxel; CELLS_PER_BRICK],
-    /// The face nearest to all its surface voxels, if it is one.
-    face: u16,
+    /// Faces that cross its surface voxels, nearest first, [`NO_FACE`] where there are no more.
+    pub faces: [[u16; FACES]; CELLS_PER_BRICK],
 }
 
 /// Classifies the voxels near `surface`. `part` names it in errors; `progress` as for [`crate::bake_field`]. The result does not depend on the
@@ -82,7 +90,7 @@ pub fn bake_occupancy(
 pub(crate) fn voxels(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Voxels {
     let mut scratch = Scratch::default();
     let mut kinds = [Voxel::Free; CELLS_PER_BRICK];
-    let mut face = None;
+    let mut faces = [[NO_FACE; FACES]; CELLS_PER_BRICK];
     for (i, kind) in kinds.iter_mut().enumerate() {
         let [x, y, z] = place(i);
         let center = grid.sample(at, [x, y, z]) + DVec3::splat(0.5 * grid.cell());
@@ -91,12 +99,7 @@ pub(crate) fn voxels(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Voxel
         };
         let half = 0.5 * grid.cell();
         *kind = if crosses(surface, center, half, HALVINGS, &mut scratch) {
-            let own = nearest.face as u16;
-            face = Some(if face.is_none_or(|f| f == own) {
-                own
-            } else {
-                NO_FACE
-            });
+            faces[i] = crossing(surface, center, half, &nearest, &mut scratch);
             Voxel::Surface
         } else if nearest.distance < 0.0 {
             Voxel::Interior
@@ -104,10 +107,56 @@ pub(crate) fn voxels(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Voxel
             Voxel::Free
         };
     }
-    Voxels {
-        kinds,
-        face: face.unwrap_or(NO_FACE),
+    Voxels { kinds, faces }
+}
+
+/// Faces that cross the voxel of half edge `half` about `center`, that of its `nearest` point first.
+fn crossing(
+    surface: &ExactSurface,
+    center: DVec3,
+    half: f64,
+    nearest: &Nearest,
+    scratch: &mut Scratch,
+) -> [u16; FACES] {
+    let mut faces = [nearest.face as u16, NO_FACE, NO_FACE];
+    let mut count = 1;
+    // The surface crosses the voxel or its tolerance: it is no farther from a corner than the diagonal, and a little.
+    let within = 2.1 * half * 3f64.sqrt();
+    for corner in 0..8 {
+        let side = |axis: u32| if corner >> axis & 1 == 0 { -half } else { half };
+        let Some(other) = surface.query(center + DVec3::new(side(0), side(1), side(2)), within, scratch)
+        else {
+            continue;
+        };
+        let face = other.face as u16;
+        let inside = (other.point - center).abs().max_element() <= half + 1e-6;
+        if inside && count < FACES && !faces[..count].contains(&face) {
+            faces[count] = face;
+            count += 1;
+        }
     }
+    faces
+}
+
+/// What a brick's palette says of its voxels. Where all that are crossed are crossed by one face, it stands for the whole brick and takes no bytes.
+fn named(voxels: &Voxels) -> Packed {
+    let own = |faces: &[u16; FACES]| match *faces {
+        [NO_FACE, ..] => Nearby::Unknown,
+        faces if (faces.iter()).any(|&face| face != NO_FACE && face > Nearby::MAX_FACES) => Nearby::Unknown,
+        [face, NO_FACE, _] => Nearby::Face(face),
+        faces => Nearby::Convex(faces),
+    };
+    let mut cells = [Nearby::Unknown; CELLS_PER_BRICK];
+    for (cell, faces) in cells.iter_mut().zip(&voxels.faces) {
+        *cell = own(faces);
+    }
+    let mut crossed = voxels.faces.iter().filter(|faces| faces[0] != NO_FACE).map(own);
+    if let Some(first) = crossed.next()
+        && crossed.all(|other| other == first)
+    {
+        cells = [first; CELLS_PER_BRICK];
+    }
+    bricks::pack(&cells)
 }
 
 /// Whether the surface meets the cube of half edge `half` about `center`, its boundary included. By halves: a cube is left out when the surface
@@ -204,8 +253,10 @@ fn pack(
     let mut bricks: Vec<BrickRecord> = Vec::new();
     let mut palette: Vec<u16> = Vec::new();
     let mut blob: Vec<u8> = Vec::new();
-    let mut by_bytes: HashMap<[u8; VOXEL_BRICK_BYTES], u32> = HashMap::new();
-    let mut by_record: HashMap<(u32, u16), u16> = HashMap::new();
+    let mut by_bytes: HashMap<Vec<u8>, u32> = HashMap::new();
+    let mut by_palette: HashMap<Vec<u16>, u32> = HashMap::new();
+    let mut by_record: HashMap<(u32, u32, u32, u16), u16> = HashMap::new();
+    let mut sample_bytes = 0;
     let mut stored_entries = 0;
     for ((&at, kinds), voxels) in near.stored.iter().zip(kinds).zip(crossed) {
         let all = |kind| kinds.iter().all(|&k| k == kind);
@@ -219,25 +270,35 @@ fn pack(
             continue;
         }
         stored_entries += 1;
-        let mut bytes = [0; VOXEL_BRICK_BYTES];
+        let mut bytes = vec![0; VOXEL_BRICK_BYTES];
         for (i, &kind) in kinds.iter().enumerate() {
             bytes[i / 4] |= (kind as u8) << (2 * (i % 4));
         }
-        let samples = *by_bytes
-            .entry(bytes)
-            .or_insert_with_key(|bytes| append_aligned(&mut blob, bytes));
-        let number = *by_record.entry((samples, voxels.face)).or_insert_with(|| {
-            let known = palette.iter().position(|&face| face == voxels.face);
+        let samples = *by_bytes.entry(bytes).or_insert_with_key(|bytes| {
+            sample_bytes += bytes.len();
+            append_aligned(&mut blob, bytes)
+        });
+        let named = named(voxels);
+        let indices = if named.index_bits == 0 {
+            0
+        } else {
+            *by_bytes
+                .entry(named.indices)
+                .or_insert_with_key(|bytes| append_aligned(&mut blob, bytes))
+        };
+        let palette_at = *by_palette.entry(named.palette).or_insert_with_key(|run| {
+            palette.extend_from_slice(run);
+            (palette.len() - run.len()) as u32
+        });
+        let record = (samples, indices, palette_at, named.index_bits);
+        let number = *by_record.entry(record).or_insert_with(|| {
             bricks.push(BrickRecord {
                 samples,
-                indices: 0,
-                palette: known.unwrap_or(palette.len()) as u32,
-                palette_len: 1,
-                index_bits: 0,
+                indices,
+                palette: palette_at,
+                palette_len: named.palette_len,
+                index_bits: named.index_bits,
             });
-            if known.is_none() {
-                palette.push(voxels.face);
-            }
             // Numbers past the limit wrap here; the caller refuses such a field.
             (bricks.len() - 1) as u16
         });
@@ -256,7 +317,7 @@ fn pack(
             brick_count: bricks.len() as u32,
         },
         grid: grid_entries,
-        sample_bytes: blob.len(),
+        sample_bytes,
         bricks,
         palette,
         blob,

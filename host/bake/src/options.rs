@@ -13,6 +13,8 @@ pub struct BakeOptions {
     /// Cell edge, mm. `None`: a hundredth of the largest part, rounded to 1, 2 or 5, finer for parts much smaller than that, and coarser
     /// until the image fits [`Self::image_limit_bytes`].
     pub cell_mm: Option<f64>,
+    /// Cell edges of single parts by their names, mm, in place of [`Self::cell_mm`], which must then be given. Of parts of one shape the first counts.
+    pub part_cells_mm: Vec<(String, f64)>,
     /// Depth and height, in cells, to which the surface's neighbourhood is stored.
     pub band_cells: f64,
     /// Number format of samples.
@@ -37,6 +39,7 @@ impl Default for BakeOptions {
         Self {
             method: Method::DistanceField,
             cell_mm: None,
+            part_cells_mm: Vec::new(),
             band_cells: 2.0,
             format: SampleFormat::Int16,
             shell: PointshellKind::ErrorBounded,
@@ -63,7 +66,8 @@ impl BakeOptions {
                 })
             }
         };
-        if let Some(cell) = self.cell_mm {
+        let cells = self.part_cells_mm.iter().map(|(_, cell)| *cell);
+        for cell in cells.chain(self.cell_mm) {
             within("cell_mm", cell, 1e-3, 1e3, "0.001 to 1000 mm")?;
         }
         // Below one diagonal the cells next to the surface would not all be stored.

@@ -145,10 +145,13 @@ impl Scene {
     pub fn cells(&self, model: &CadModel, options: &BakeOptions) -> Vec<f64> {
         let sides = self.shapes.iter().map(|&s| longest_side(&model.shapes[s]));
         let largest = sides.clone().fold(0.0, f64::max);
+        let own = |name: &String| (options.part_cells_mm.iter()).find(|(part, _)| part == name);
         sides
-            .map(|side| {
-                options
-                    .cell_mm
+            .zip(&self.names)
+            .map(|(side, name)| {
+                own(name)
+                    .map(|(_, cell)| *cell)
+                    .or(options.cell_mm)
                     .unwrap_or_else(|| round_down_125((largest / 100.0).min(side / 20.0)).clamp(1e-3, 1e3))
             })
             .collect()

@@ -163,7 +163,8 @@ fn a_brick_takes_128_bytes() {
     for map in [&*BLOCK, &*SPHERE] {
         let shape = &map.report.shapes[0];
         assert_eq!(shape.method, Method::Occupancy);
-        assert_eq!((shape.bytes.samples % 128, shape.bytes.indices), (0, 0));
+        // Four bits a voxel where several faces cross a brick; there are fewer than 16 sets of faces.
+        assert_eq!((shape.bytes.samples % 128, shape.bytes.indices % 256), (0, 0));
         assert!(shape.bytes.samples <= 128 * shape.bricks, "{shape:?}");
     }
 }
@@ -196,8 +197,8 @@ proptest! {
         let wall = DVec3::new(9.375 * a.cos(), 9.375 * a.sin(), t) / 1e3;
         let on_wall = BLOCK.field.voxel(wall.as_vec3().to_array());
         prop_assert_eq!(on_wall.voxel, Voxel::Surface);
-        // The face of a voxel is told where the whole brick has only one.
-        prop_assert!(on_wall.face == 6 || on_wall.face == u16::MAX, "{:?}", on_wall);
+        // The wall crosses this voxel; at a rim another face may be nearer to its centre.
+        prop_assert!(on_wall.faces.contains(&6), "{:?}", on_wall);
     }
 
     /// No surface voxel is nearer than the bound, in the grid and outside.

@@ -1,12 +1,15 @@
 //! From a file's bytes to a [`CadModel`]: check the text, let the kernel read it, name the parts, account for
 //! every solid.
 
+use crate::external::{self, Joined, text_error};
 use crate::kernel::{self, RawPart, RawResult};
 use crate::part21::check::{self, Content};
-use crate::part21::{self, Exchange, Part21Error, operators, render, text, units};
+use crate::part21::structure::Structure;
+use crate::part21::{Exchange, operators, render, text};
 use crate::{BrepError, CadModel, EDGE_TOLERANCE_MM, LoadOptions, Part, free_form, shape};
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
 /// Names that say nothing: what writers put where a body or occurrence has no name of its own.
 const MEANINGLESS: &[&str] = &["", "NONE", "SOLID", "COMPOUND", "COMPSOLID", "SHELL", "SHAPE"];
@@ -16,53 +19,68 @@ struct Source {
     file: Exchange,
     content: Content,
     units: Vec<String>,
+    files: Vec<PathBuf>,
     document: cxx::UniquePtr<kernel::Document>,
 }
 
-/// Checks and rewrites a STEP text and lets the kernel read it. The caller holds [`kernel::lock`].
-fn read(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<Source, BrepError> {
-    if bytes.is_empty() {
-        return Err(BrepError::Empty { path: path.into() });
-    }
-    let mut file = part21::parse(bytes).map_err(|e| text_error(path, e))?;
-    let content = check::check(&file).map_err(|e| text_error(path, e))?;
+/// Checks and rewrites a STEP file and those it refers to, and lets the kernel read them. The caller holds [`kernel::lock`].
+fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
+    let shown = path.display().to_string();
+    let Joined {
+        mut file,
+        content,
+        units,
+        files,
+        missing,
+    } = external::load(path, options)?;
     if content.solids.is_empty() && content.surfaces.is_empty() {
-        return Err(BrepError::NoShape {
-            path: path.into(),
-            found: found_instead(&file),
+        let mut found = found_instead(&file);
+        if !missing.is_empty() {
+            found = format!("{found}; missing beside it: {}", missing.join(", "));
+        }
+        return Err(BrepError::NoShape { path: shown, found });
+    }
+    // Before the kernel, which would unfold it.
+    let parts = Structure::of(&file).unfolded();
+    if parts > options.max_parts as u64 {
+        return Err(BrepError::TooManyParts {
+            path: shown,
+            found: parts,
+            limit: options.max_parts,
         });
     }
-    let units = units::length_units(&file).map_err(|e| text_error(path, e))?;
-    operators::split(&mut file).map_err(|e| text_error(path, e))?;
+    operators::split(&mut file).map_err(|e| text_error(&shown, e))?;
     let rendered = render::render(&file);
-    let document = kernel::read_document(&rendered, options.max_parts).map_err(|e| kernel_error(path, &e))?;
+    let document =
+        kernel::read_document(&rendered, options.max_parts).map_err(|e| kernel_error(&shown, &e))?;
     Ok(Source {
         file,
         content,
         units,
+        files,
         document,
     })
 }
 
-/// Reads a STEP text and asks the kernel something about its shape `shape`, numbered as in [`CadModel::shapes`].
+/// Reads a STEP file and asks the kernel something about its shape `shape`, numbered as in [`CadModel::shapes`].
 pub fn ask<T>(
-    path: &str,
-    bytes: &[u8],
+    path: &Path,
     options: &LoadOptions,
     shape: usize,
     question: impl FnOnce(&kernel::Document) -> Result<T, cxx::Exception>,
 ) -> Result<T, BrepError> {
     let _kernel = kernel::lock();
-    let document = read(path, bytes, options)?.document;
+    let document = read(path, options)?.document;
+    let shown = path.display().to_string();
     let count = document.shape_count();
     if shape >= count {
         return Err(BrepError::NoSuchShape {
-            path: path.into(),
+            path: shown,
             shape,
             count,
         });
     }
-    question(&document).map_err(|e| kernel_error(path, &e))
+    question(&document).map_err(|e| kernel_error(&shown, &e))
 }
 
 fn kernel_error(path: &str, e: &cxx::Exception) -> BrepError {
@@ -76,15 +94,18 @@ fn kernel_error(path: &str, e: &cxx::Exception) -> BrepError {
     }
 }
 
-/// Reads a STEP text. `path` is for messages only.
-pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadModel, BrepError> {
+/// Reads a STEP file and those it refers to.
+pub fn assemble(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
     let _kernel = kernel::lock();
     let Source {
         file,
         content,
         units,
+        files,
         document,
-    } = read(path, bytes, options)?;
+    } = read(path, options)?;
+    let path = path.display().to_string();
+    let path = path.as_str();
 
     let mut warnings = file.warnings.clone();
     warnings.extend(content.warnings.iter().cloned());
@@ -142,16 +163,8 @@ pub fn assemble(path: &str, bytes: &[u8], options: &LoadOptions) -> Result<CadMo
         shapes,
         parts,
         warnings,
+        files,
     })
-}
-
-fn text_error(path: &str, error: Part21Error) -> BrepError {
-    let path = path.into();
-    match error {
-        Part21Error::NotStep(found) => BrepError::NotStep { path, found },
-        Part21Error::Truncated { line, missing } => BrepError::Truncated { path, line, missing },
-        Part21Error::Invalid { line, what } => BrepError::Invalid { path, line, what },
-    }
 }
 
 fn found_instead(file: &Exchange) -> String {

@@ -3,7 +3,12 @@
 //! The program starts itself again with a request in its environment; the copy sees it in [`init`], reads the
 //! file, writes a framed [`postcard`] result to standard output and exits. A frame is eight bytes of magic, the
 //! payload's length (64 bits, little-endian) and the payload: whatever the kernel prints around it is skipped.
-//! A question about a shape comes on standard input.
+//! A question about a shape comes on standard input, after its length. That pipe then stays open for as long as the parent lives:
+//! its end ends the copy, however the parent ended. On Linux the system kills the copy besides, when the thread that started it ends;
+//! that thread waits here until the copy is gone.
+//!
+//! Limits: processor time ([`LoadOptions::time_limit_s`]) and address space by the system, `PATIENCE` times the processor time
+//! by the parent's clock, and the length of the answer.
 
 use crate::oracle::{self, Answer, Question};
 use crate::{BrepError, CadModel, LoadOptions, kernel, load_in_process};
@@ -13,6 +18,7 @@ use std::ffi::OsStr;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -25,10 +31,15 @@ const STDERR_TAIL: usize = 4096;
 /// How often the parent looks whether the child has ended.
 const POLL: Duration = Duration::from_millis(2);
 
+/// By how much the time by the clock may exceed the processor time: other programs want their share of the machine too.
+const PATIENCE: u32 = 4;
+
 /// What the environment asks for.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Request {
     options: LoadOptions,
+    /// Process that asks.
+    parent: u32,
     /// A [`Question`] is to be read from standard input; else the model is asked for.
     question: bool,
 }
@@ -62,22 +73,42 @@ fn serve(path: &Path, request: &OsStr) -> ! {
         .and_then(from_hex)
         .and_then(|b| postcard::from_bytes::<Request>(&b).ok());
     let written = match request {
-        Some(Request { options, question }) => {
-            // The parent's clock decides; this one only ends a process whose parent is gone. Sixteen threads' worth.
-            kernel::limit_process(
-                options.memory_limit_bytes,
-                options.time_limit_s.saturating_mul(16),
-            );
-            if question {
-                let question = postcard::from_bytes::<Question>(&read_all(std::io::stdin().lock()));
-                respond(&question.map_or_else(|_| Err(damaged()), |q| oracle::answer(path, &options, &q)))
-            } else {
-                respond(&load_in_process(path, &options))
+        Some(Request {
+            options,
+            parent,
+            question,
+        }) => {
+            kernel::end_with_parent(parent);
+            kernel::limit_process(options.memory_limit_bytes, options.time_limit_s);
+            let question = question.then(|| read_question(std::io::stdin().lock()));
+            // Without the thread the system still ends this process at the end of its processor time.
+            let _ = thread::Builder::new().spawn(|| end_with_pipe(std::io::stdin().lock()));
+            match question {
+                None => respond(&load_in_process(path, &options)),
+                Some(None) => respond(&Err::<(), _>(damaged())),
+                Some(Some(question)) => respond(&oracle::answer(path, &options, &question)),
             }
         }
         None => respond(&Err::<(), _>(damaged())),
     };
     std::process::exit(if written { 0 } else { 3 })
+}
+
+/// Ends this process when the other end of `pipe` is closed, whatever the kernel is doing.
+fn end_with_pipe(mut pipe: impl Read) {
+    // Nothing more is sent: this returns when the parent is gone.
+    let _ = pipe.read(&mut [0]);
+    kernel::end_now();
+}
+
+fn read_question(mut pipe: impl Read) -> Option<Question> {
+    let mut length = [0; 8];
+    pipe.read_exact(&mut length).ok()?;
+    let mut question = Vec::new();
+    let length = u64::from_le_bytes(length);
+    (pipe.take(length).read_to_end(&mut question).ok()? as u64 == length)
+        .then(|| postcard::from_bytes(&question).ok())
+        .flatten()
 }
 
 /// Whether the frame got out.
@@ -109,34 +140,49 @@ fn run<T: DeserializeOwned>(
     options: &LoadOptions,
     question: Option<Vec<u8>>,
 ) -> Result<T, BrepError> {
-    let mut child =
-        spawn(path, options, question.is_some()).map_err(|e| process_error(path, &e.to_string()))?;
-    if let (Some(mut pipe), Some(question)) = (child.stdin.take(), question) {
-        // A child that dies early breaks the pipe; how it ended is told below.
-        thread::spawn(move || pipe.write_all(&question));
-    }
-    let output = child
-        .stdout
-        .take()
-        .map(|pipe| thread::spawn(move || read_all(pipe)));
+    let child = spawn(path, options, question.is_some()).map_err(|e| process_error(path, &e.to_string()))?;
+    let mut child = Reader(child);
+    // Held until the end: its closing ends the child.
+    let _line = child.0.stdin.take().map(|mut pipe| {
+        thread::spawn(move || {
+            if let Some(question) = question {
+                // A child that dies early breaks the pipe; how it ended is told below.
+                let _ = pipe.write_all(&(question.len() as u64).to_le_bytes());
+                let _ = pipe.write_all(&question);
+            }
+            pipe
+        })
+    });
+    let flooded = Arc::new(AtomicBool::new(false));
+    let answer_limit = options.answer_limit_bytes;
+    let output = child.0.stdout.take().map(|pipe| {
+        let flooded = Arc::clone(&flooded);
+        thread::spawn(move || read_answer(pipe, answer_limit, &flooded))
+    });
     let errors = child
+        .0
         .stderr
         .take()
         .map(|pipe| thread::spawn(move || read_tail(pipe)));
-    let limit = Duration::from_secs(options.time_limit_s);
-    let status = match wait(&mut child, limit) {
+    let limit = Duration::from_secs(options.time_limit_s).saturating_mul(PATIENCE);
+    let timed_out = || BrepError::TimedOut {
+        path: path.display().to_string(),
+        seconds: options.time_limit_s,
+    };
+    let status = match wait(&mut child.0, limit, &flooded) {
         Ok(Some(status)) => status,
-        Ok(None) => {
-            // Both fail only when the child is already gone.
-            let _ = child.kill();
-            let _ = child.wait();
-            return Err(BrepError::TimedOut {
+        Ok(None) if flooded.load(Ordering::Acquire) => {
+            return Err(BrepError::AnswerTooLong {
                 path: path.display().to_string(),
-                seconds: options.time_limit_s,
+                megabytes: answer_limit >> 20,
             });
         }
+        Ok(None) => return Err(timed_out()),
         Err(e) => return Err(process_error(path, &e.to_string())),
     };
+    if used_up_its_time(status) {
+        return Err(timed_out());
+    }
     let output = output.and_then(|t| t.join().ok()).unwrap_or_default();
     let errors = errors.and_then(|t| t.join().ok()).unwrap_or_default();
     match payload(&output) {
@@ -149,39 +195,56 @@ fn run<T: DeserializeOwned>(
     }
 }
 
+/// Ends the reading process when dropped.
+struct Reader(Child);
+
+impl Drop for Reader {
+    fn drop(&mut self) {
+        // Both fail only when it is already gone.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 fn spawn(path: &Path, options: &LoadOptions, question: bool) -> std::io::Result<Child> {
     let request = Request {
         options: options.clone(),
+        parent: std::process::id(),
         question,
     };
     let request = postcard::to_allocvec(&request).map_err(std::io::Error::other)?;
     Command::new(std::env::current_exe()?)
         .env(PATH_VARIABLE, path)
         .env(REQUEST_VARIABLE, to_hex(&request))
-        .stdin(if question { Stdio::piped() } else { Stdio::null() })
+        .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
 }
 
-/// `None` when the child is still running after `limit`.
-fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
+/// `None` when the child is still running after `limit`, or when it is `flooded`.
+fn wait(child: &mut Child, limit: Duration, flooded: &AtomicBool) -> std::io::Result<Option<ExitStatus>> {
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(Some(status));
         }
-        if start.elapsed() >= limit {
+        if start.elapsed() >= limit || flooded.load(Ordering::Acquire) {
             return Ok(None);
         }
         thread::sleep(POLL);
     }
 }
 
-fn read_all(mut pipe: impl Read) -> Vec<u8> {
+/// At most `limit` bytes; sets `flooded` when there are more.
+fn read_answer(pipe: impl Read, limit: u64, flooded: &AtomicBool) -> Vec<u8> {
     let mut bytes = Vec::new();
     // A broken pipe leaves a frame without its end, which is then no frame.
-    let _ = pipe.read_to_end(&mut bytes);
+    let _ = pipe.take(limit.saturating_add(1)).read_to_end(&mut bytes);
+    if bytes.len() as u64 > limit {
+        flooded.store(true, Ordering::Release);
+        bytes.clear();
+    }
     bytes
 }
 
@@ -213,6 +276,20 @@ fn ending(status: ExitStatus, errors: &[u8]) -> String {
     }
 }
 
+/// The system ended it at the end of its processor time.
+fn used_up_its_time(status: ExitStatus) -> bool {
+    #[cfg(unix)]
+    {
+        // SIGXCPU on Linux and macOS.
+        std::os::unix::process::ExitStatusExt::signal(&status) == Some(24)
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = status;
+        false
+    }
+}
+
 #[cfg(unix)]
 fn how(status: ExitStatus) -> String {
     use std::os::unix::process::ExitStatusExt;
@@ -222,7 +299,6 @@ fn how(status: ExitStatus) -> String {
         Some(8) => "arithmetic fault".into(),
         Some(9) => "killed, perhaps for want of memory".into(),
         Some(7 | 11) => "memory access fault".into(),
-        Some(24) => "processor time used up".into(),
         Some(signal) => format!("signal {signal}"),
         None => status.to_string(),
     }
@@ -276,10 +352,20 @@ mod tests {
                 max_parts: 7,
                 ..LoadOptions::default()
             },
+            parent: 1,
             question: true,
         };
         let bytes = from_hex(&to_hex(&postcard::to_allocvec(&request).unwrap())).unwrap();
         assert_eq!(postcard::from_bytes::<Request>(&bytes).unwrap(), request);
+    }
+
+    #[test]
+    fn an_answer_that_is_too_long_is_cut_off() {
+        let flooded = AtomicBool::new(false);
+        assert_eq!(read_answer(&[7; 100][..], 100, &flooded), [7; 100]);
+        assert!(!flooded.load(Ordering::Acquire));
+        assert!(read_answer(std::io::repeat(7), 100, &flooded).is_empty());
+        assert!(flooded.load(Ordering::Acquire));
     }
 
     #[test]

@@ -94,12 +94,46 @@ pub enum BrepError {
         how: String,
     },
     /// The process that reads the file took longer than allowed.
-    #[error("{path}: not read within {seconds} s; simplify it or allow more time")]
+    #[error(
+        "{path}: not read within {seconds} s of processor time; simplify it, or allow more with --timeout"
+    )]
     TimedOut {
         /// The path asked for.
         path: String,
         /// The limit.
         seconds: u64,
+    },
+    /// The process that reads the file gave a longer answer than allowed.
+    #[error(
+        "{path}: gives more than {megabytes} MiB of parts and triangles; simplify it or read a part of it"
+    )]
+    AnswerTooLong {
+        /// The path asked for.
+        path: String,
+        /// The limit.
+        megabytes: u64,
+    },
+    /// The assembly has more parts than allowed.
+    #[error(
+        "{path}: unfolds to {found} parts where at most {limit} are read; read one of its sub-assemblies instead"
+    )]
+    TooManyParts {
+        /// The path asked for.
+        path: String,
+        /// How many, [`u64::MAX`] for that many or more.
+        found: u64,
+        /// The limit.
+        limit: usize,
+    },
+    /// A file that another one refers to cannot be used.
+    #[error("{path}: line {line}: {what}")]
+    Reference {
+        /// The file that refers to it.
+        path: String,
+        /// Line of the reference, from 1.
+        line: u32,
+        /// What is wrong, and what to do.
+        what: String,
     },
     /// The process that reads the file could not be started or understood.
     #[error("{path}: cannot run the reading process: {reason}")]

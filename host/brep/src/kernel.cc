@@ -38,6 +38,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <iostream>
 #include <locale>
 #include <map>
@@ -51,6 +52,12 @@
 
 #if defined(__unix__) || defined(__APPLE__)
 #include <sys/resource.h>
+#endif
+#if defined(__linux__)
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <csignal>
 #endif
 
 namespace mortise {
@@ -392,6 +399,18 @@ bool limit_process(std::uint64_t memory_bytes, std::uint64_t cpu_seconds) {
   return false;
 #endif
 }
+
+void end_with_parent(std::uint32_t parent) {
+#if defined(__linux__)
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // Had it ended before, no signal would come.
+  if (std::uint32_t(getppid()) != parent) end_now();
+#else
+  (void)parent;
+#endif
+}
+
+void end_now() { std::_Exit(3); }
 
 void flush_output() {
   std::cout.flush();

@@ -56,6 +56,8 @@ class Document {
 std::unique_ptr<Document> read_document(rust::Slice<const std::uint8_t> text, std::size_t max_parts);
 bool limit_process(std::uint64_t memory_bytes, std::uint64_t cpu_seconds);
 void flush_output();
+void end_with_parent(std::uint32_t parent);
+void end_now();
 
 }  // namespace brep
 }  // namespace mortise

@@ -141,6 +141,7 @@ mod ffi {
         curves: Vec<RawCurve>,
     }
 
+    // SAFETY: the signatures of kernel.h, which cxx checks when it compiles the bridge; none keeps a reference after it returns.
     unsafe extern "C++" {
         include!("kernel.h");
 
@@ -169,6 +170,11 @@ mod ffi {
         /// Caps address space (bytes) and processor time (seconds) of this process where the system can; 0 for none.
         fn limit_process(memory_bytes: u64, cpu_seconds: u64) -> bool;
         fn flush_output();
+        /// On Linux the system kills this process when the thread of `parent` that started it ends; ends it at once when `parent`
+        /// is gone already.
+        fn end_with_parent(parent: u32);
+        /// Ends this process without running anything more of it.
+        fn end_now();
     }
 }
 

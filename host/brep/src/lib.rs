@@ -21,8 +21,10 @@
 mod assemble;
 pub mod child;
 mod error;
+mod external;
 mod free_form;
 mod kernel;
+mod machine;
 mod model;
 mod options;
 pub mod oracle;
@@ -34,7 +36,7 @@ mod topology;
 
 pub use error::BrepError;
 pub use model::*;
-pub use options::LoadOptions;
+pub use options::{LoadOptions, set_time_limit_s};
 
 use std::path::Path;
 
@@ -63,13 +65,5 @@ pub fn load_step_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<C
 }
 
 fn load_in_process(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
-    let bytes = read_file(path)?;
-    assemble::assemble(&path.display().to_string(), &bytes, options)
-}
-
-fn read_file(path: &Path) -> Result<Vec<u8>, BrepError> {
-    std::fs::read(path).map_err(|e| BrepError::Unreadable {
-        path: path.display().to_string(),
-        reason: e.to_string(),
-    })
+    assemble::assemble(path, options)
 }

@@ -5,6 +5,7 @@
 
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// A STEP file: distinct shapes, and the parts that place them.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -17,6 +18,8 @@ pub struct CadModel {
     pub parts: Vec<Part>,
     /// What the import noticed or lost, in words.
     pub warnings: Vec<String>,
+    /// Files that were read: the one asked for, then those it refers to.
+    pub files: Vec<PathBuf>,
 }
 
 /// One placed part: a leaf of the assembly.

@@ -3,7 +3,7 @@
 //! Lengths mm, in the shape's frame. Each call reads the file anew, in a child process where there is one (see [`child`]), and asks point
 //! by point. Cost: [`classify`] shoots one ray at a point, 10 to 500 µs; [`nearest`] looks at every face near enough, about ten times that.
 
-use crate::{BrepError, LoadOptions, assemble, child, read_file};
+use crate::{BrepError, LoadOptions, assemble, child};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -109,11 +109,9 @@ fn ask(
 
 /// Asks the kernel in this process.
 pub(crate) fn answer(path: &Path, options: &LoadOptions, question: &Question) -> Result<Answer, BrepError> {
-    let bytes = read_file(path)?;
-    let name = path.display().to_string();
     let flat: Vec<f64> = question.points.iter().flat_map(|p| p.to_array()).collect();
     let shape = question.shape;
-    assemble::ask(&name, &bytes, options, shape, |document| {
+    assemble::ask(path, options, shape, |document| {
         Ok(match question.kind {
             Kind::Sides { tolerance_mm } => Answer::Sides(
                 document

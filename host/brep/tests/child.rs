@@ -4,15 +4,25 @@
 
 mod support;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use libtest_mimic::{Arguments, Failed, Trial};
 use mortise_brep::oracle::{self, Side};
 use mortise_brep::{BrepError, LoadOptions, child, load_step, load_step_with};
-use std::process::{Command, ExitCode};
+use std::process::{Command, ExitCode, Stdio};
+use std::time::{Duration, Instant};
+use support::StepText;
+
+/// Names a file that this program is to read, and nothing else.
+const SLOW_VARIABLE: &str = "MORTISE_BREP_TEST_SLOW";
 
 fn main() -> ExitCode {
     child::init();
-    let tests: [(&str, fn()); 8] = [
+    if let Some(path) = std::env::var_os(SLOW_VARIABLE) {
+        let read = load_step(path).map(|model| model.parts.len());
+        println!("{read:?}");
+        return ExitCode::SUCCESS;
+    }
+    let tests: [(&str, fn()); 12] = [
         (
             "a_child_reads_what_the_program_itself_would",
             a_child_reads_what_the_program_itself_would,
@@ -23,6 +33,19 @@ fn main() -> ExitCode {
         ),
         ("a_hang_ends_at_the_time_limit", a_hang_ends_at_the_time_limit),
         ("memory_is_limited", memory_is_limited),
+        (
+            "processor_time_is_limited_and_the_process_ends_with_its_parent",
+            processor_time_is_limited_and_the_process_ends_with_its_parent,
+        ),
+        ("an_answer_is_limited", an_answer_is_limited),
+        (
+            "an_assembly_bomb_is_refused_at_once",
+            an_assembly_bomb_is_refused_at_once,
+        ),
+        (
+            "coordinates_beyond_all_sizes_are_refused_at_once",
+            coordinates_beyond_all_sizes_are_refused_at_once,
+        ),
         (
             "the_kernel_classifies_points_and_finds_the_nearest",
             the_kernel_classifies_points_and_finds_the_nearest,
@@ -105,6 +128,125 @@ fn memory_is_limited() {
         .unwrap_err()
         .to_string();
     assert!(error.contains("memory") && !error.contains('\n'), "{error}");
+}
+
+/// A file that takes the kernel several seconds.
+fn slow_file() -> tempfile::TempPath {
+    let mut text = StepText::millimetres();
+    let solids: Vec<u64> = (1..=2500u32)
+        .map(|i| text.solid_box("", DVec3::splat(f64::from(i)), true))
+        .collect();
+    text.part("many", &solids);
+    support::file(&text.finish())
+}
+
+fn processor_time_is_limited_and_the_process_ends_with_its_parent() {
+    assert_eq!(LoadOptions::default().time_limit_s, 60);
+    let file = slow_file();
+    let options = LoadOptions {
+        time_limit_s: 1,
+        ..LoadOptions::default()
+    };
+    let error = load_step_with(&file, &options)
+        .map(|model| model.parts.len())
+        .unwrap_err();
+    assert!(matches!(error, BrepError::TimedOut { seconds: 1, .. }), "{error}");
+    if !cfg!(target_os = "linux") {
+        println!("not looked at: which processes there are is read from /proc");
+        return;
+    }
+    let mut parent = Command::new(std::env::current_exe().unwrap())
+        .env(SLOW_VARIABLE, &file as &std::path::Path)
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let children = format!("/proc/{0}/task/{0}/children", parent.id());
+    let child = (0..1000)
+        .find_map(|_| {
+            std::thread::sleep(Duration::from_millis(2));
+            let text = std::fs::read_to_string(&children).ok()?;
+            text.split_whitespace().next().map(str::to_owned)
+        })
+        .expect("a reading process");
+    // A process whose parent does not ask how it ended stays in the list as a zombie.
+    let runs = || {
+        std::fs::read_to_string(format!("/proc/{child}/stat"))
+            .is_ok_and(|stat| !stat.rsplit(')').next().is_some_and(|rest| rest.starts_with(" Z")))
+    };
+    assert!(runs());
+    // SIGKILL: nothing of the parent runs any more.
+    parent.kill().unwrap();
+    parent.wait().unwrap();
+    let killed = Instant::now();
+    while runs() {
+        assert!(
+            killed.elapsed() < Duration::from_secs(1),
+            "the reading process outlives its parent"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn an_answer_is_limited() {
+    let options = LoadOptions {
+        answer_limit_bytes: 1000,
+        ..LoadOptions::default()
+    };
+    let file = support::data("pair_d18.75_clear1.00.step");
+    let error = load_step_with(file, &options)
+        .map(|model| model.parts.len())
+        .unwrap_err();
+    assert!(matches!(error, BrepError::AnswerTooLong { .. }), "{error}");
+}
+
+/// The refusal of `text`, within the 5 s that are promised.
+fn refused_at_once(text: StepText) -> BrepError {
+    let file = support::file(&text.finish());
+    let begun = Instant::now();
+    let error = load_step(file).map(|model| model.parts.len()).unwrap_err();
+    assert!(
+        begun.elapsed() < Duration::from_secs(5),
+        "{error}: after {:?}",
+        begun.elapsed()
+    );
+    error
+}
+
+fn an_assembly_bomb_is_refused_at_once() {
+    let mut text = StepText::millimetres();
+    let solid = text.solid_box("", DVec3::splat(1.0), true);
+    let mut child = text.part("leaf", &[solid]);
+    for level in 0..24 {
+        let parent = text.assembly(&format!("level {level}"));
+        text.component("left", parent, child, DAffine3::IDENTITY);
+        text.component("right", parent, child, DAffine3::from_translation(DVec3::X));
+        child = parent;
+    }
+    let error = refused_at_once(text);
+    assert!(
+        matches!(
+            error,
+            BrepError::TooManyParts {
+                found: 16_777_216,
+                ..
+            }
+        ),
+        "{error}"
+    );
+}
+
+fn coordinates_beyond_all_sizes_are_refused_at_once() {
+    for size in [1e308, -1e308, 1e100, 2e9] {
+        let mut text = StepText::millimetres();
+        let solid = text.solid_box("", DVec3::new(1.0, 1.0, size), true);
+        text.part("endless", &[solid]);
+        let error = refused_at_once(text);
+        let words = error.to_string();
+        assert!(
+            words.contains("CARTESIAN_POINT has the number") && words.contains("beyond the largest"),
+            "{words}"
+        );
+    }
 }
 
 /// The block of the pair against its closed form: 50 × 50 × 40 with a hole of 18.75.

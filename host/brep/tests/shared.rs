@@ -45,6 +45,8 @@ const OPTIONS: LoadOptions = LoadOptions {
     recognise_mm: 1e-4,
     time_limit_s: 300,
     memory_limit_bytes: 8 << 30,
+    answer_limit_bytes: 1 << 30,
+    text_limit_bytes: 1 << 30,
     max_parts: 100_000,
     allow_lost_solids: false,
 };

@@ -16,6 +16,11 @@ pub const SOLIDS: &[&str] = &[
 /// Surface models: what a file without solids may hold.
 pub const SURFACES: &[&str] = &["SHELL_BASED_SURFACE_MODEL", "FACE_BASED_SURFACE_MODEL"];
 
+/// Largest coordinate or radius, in the file's unit: a thousand kilometres in millimetres, where a double still tells 0.1 µm apart.
+pub const LARGEST_LENGTH: f64 = 1e9;
+/// Largest number of another kind, such as a knot or a vector's length: its square and cube are still finite.
+const LARGEST_NUMBER: f64 = 1e30;
+
 /// What a sound text holds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Content {
@@ -30,12 +35,13 @@ pub struct Content {
 /// Checks the text and lists its solids.
 ///
 /// # Errors
-/// [`Part21Error::Invalid`] for a dangling, cyclic or mistyped reference, a number that is no finite double, a
+/// [`Part21Error::Invalid`] for a dangling, cyclic or mistyped reference, a number that is no finite double or beyond all sizes, a
 /// radius that is not positive, or an assembly that contains itself.
 pub fn check(file: &Exchange) -> Result<Content, Part21Error> {
     let matters = reachable(file, |kinds| kinds.iter().any(|kind| is_root(kind)));
     let mut warnings = Vec::new();
     bad_numbers(file, &matters, &mut warnings)?;
+    large_numbers(file, &matters)?;
     dangling(file, &matters, &mut warnings)?;
     cycles(file, &matters)?;
     schema::check(file, &matters)?;
@@ -110,6 +116,30 @@ fn bad_numbers(file: &Exchange, matters: &[bool], warnings: &mut Vec<String>) ->
             return Err(at(file, *entity as usize, what));
         }
         warnings.push(what);
+    }
+    Ok(())
+}
+
+/// The kernel computes for minutes, and then nothing of use, with lengths that are no lengths.
+fn large_numbers(file: &Exchange, matters: &[bool]) -> Result<(), Part21Error> {
+    for &(entity, number) in &file.large_numbers {
+        let entity = entity as usize;
+        if !matters.get(entity).copied().unwrap_or(false) {
+            continue;
+        }
+        let kind = file.kind(entity);
+        let is_length = kind == "CARTESIAN_POINT"
+            || kind == "CIRCLE"
+            || kind == "ELLIPSE"
+            || (kind.ends_with("_SURFACE") && !kind.contains("SPLINE"));
+        let largest = if is_length { LARGEST_LENGTH } else { LARGEST_NUMBER };
+        if number.abs() > largest {
+            let what = format!(
+                "{} has the number {number:e}, beyond the largest that is read, {largest:e}",
+                file.label(entity)
+            );
+            return Err(at(file, entity, what));
+        }
     }
     Ok(())
 }
@@ -314,6 +344,20 @@ mod tests {
         assert!(
             fault(&with("#5=PLANE('',#6);#6=AXIS2_PLACEMENT_3D('',#5,$,$);")).contains("refer to each other")
         );
+    }
+
+    #[test]
+    fn numbers_beyond_all_sizes_are_named() {
+        let with = |x: &str| {
+            format!(
+                "{SOLID}#4=ADVANCED_FACE('',(),#5,.T.);#5=PLANE('',#6);#6=AXIS2_PLACEMENT_3D('',#7,$,$);\
+                 #7=CARTESIAN_POINT('',({x},0.,0.));"
+            )
+        };
+        assert!(checked(&with("-1.E9")).is_ok());
+        assert!(fault(&with("1.E308")).contains("#7 CARTESIAN_POINT has the number 1e308"));
+        assert!(fault(&with("-1.1E9")).contains("beyond the largest"));
+        assert!(checked(&format!("{SOLID}#4=FACE();#20=NOTE(1.E308);")).is_ok());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Bytes to entities: one pass, no recursion, no look-behind.
 
+use super::check::LARGEST_LENGTH;
 use super::{Entity, Exchange, Part21Error};
 
 /// Deepest nesting of parentheses; real files have fewer than ten.
@@ -182,6 +183,8 @@ impl Lexer<'_> {
         let references = first..self.out.references.len();
         self.out.entities.push(Entity {
             id,
+            written: id,
+            file: 0,
             line,
             body,
             references,
@@ -264,7 +267,10 @@ impl Lexer<'_> {
         let value = std::str::from_utf8(number)
             .ok()
             .and_then(|n| n.parse::<f64>().ok());
-        if value.is_some_and(f64::is_finite) {
+        if let Some(value) = value.filter(|value| value.is_finite()) {
+            if value.abs() > LARGEST_LENGTH {
+                self.out.large_numbers.push((entity, value));
+            }
             // Upper case: the kernel (7.6) takes 6.1e-17, which some writers give for 6.1E-17, for 6.1.
             out.extend(number.iter().map(u8::to_ascii_uppercase));
         } else {

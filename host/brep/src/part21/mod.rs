@@ -7,10 +7,13 @@
 //! here ([`text`]).
 
 pub mod check;
+pub mod documents;
 mod lexer;
+mod merge;
 pub mod operators;
 pub mod render;
 pub mod schema;
+pub mod structure;
 pub mod text;
 pub mod units;
 
@@ -43,8 +46,12 @@ pub enum Part21Error {
 /// One entity instance: `#id = body;`.
 #[derive(Clone, Debug)]
 pub struct Entity {
-    /// Its number in the file.
+    /// Its number, unique in the [`Exchange`].
     pub id: u64,
+    /// Its number as the file says it.
+    pub written: u64,
+    /// 0, or 1 + the index of its file in [`Exchange::files`].
+    pub file: u32,
     /// Its line in the file.
     pub line: u32,
     /// Its body in [`Exchange::bodies`].
@@ -70,6 +77,10 @@ pub struct Exchange {
     pub index: HashMap<u64, u32>,
     /// Entities with a number that is no finite double, and the number.
     pub bad_numbers: Vec<(u32, String)>,
+    /// Entities with a number beyond [`check::LARGEST_LENGTH`], and the number.
+    pub large_numbers: Vec<(u32, f64)>,
+    /// Names of the files appended to the first.
+    pub files: Vec<String>,
     /// Signed scale of occurrences that mirror (negative) or scale; see [`operators`].
     pub scales: HashMap<usize, f64>,
     /// What was left out, in words.
@@ -129,7 +140,15 @@ impl Exchange {
 
     /// "#12 CYLINDRICAL_SURFACE": an entity for a message.
     pub fn label(&self, entity: usize) -> String {
-        format!("#{} {}", self.entities[entity].id, self.kinds(entity).join("+"))
+        let Entity { written, file, .. } = &self.entities[entity];
+        let label = format!("#{written} {}", self.kinds(entity).join("+"));
+        match (*file as usize)
+            .checked_sub(1)
+            .and_then(|file| self.files.get(file))
+        {
+            Some(name) => format!("{label} of {name}"),
+            None => label,
+        }
     }
 }
 

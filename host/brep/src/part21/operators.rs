@@ -258,7 +258,7 @@ fn argument(file: &Exchange, entity: usize, number: usize) -> Option<usize> {
 
 impl Exchange {
     /// Adds an entity and returns its number, which is beyond all others.
-    fn push(&mut self, body: String) -> u64 {
+    pub fn push(&mut self, body: String) -> u64 {
         // 2⁶⁴ − 1 as a number in the file would repeat here; the entity pushed then hides the file's last.
         let id = self.largest.saturating_add(1);
         self.largest = id;
@@ -266,6 +266,8 @@ impl Exchange {
         self.index.insert(id, self.entities.len() as u32);
         self.entities.push(super::Entity {
             id,
+            written: id,
+            file: 0,
             line,
             body: 0..0,
             references: 0..0,
@@ -275,7 +277,7 @@ impl Exchange {
     }
 
     /// Gives an entity another body; references are needed for checks only, which are over.
-    fn replace(&mut self, entity: usize, body: String) {
+    pub fn replace(&mut self, entity: usize, body: String) {
         let start = self.bodies.len();
         self.bodies.extend_from_slice(body.as_bytes());
         self.entities[entity].body = start..self.bodies.len();

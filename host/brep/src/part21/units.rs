@@ -63,6 +63,41 @@ fn factor(file: &Exchange, measure: usize) -> Option<(f64, usize)> {
     (value > 0.0 && value.is_finite()).then_some((value, file.find(reference(arguments[1])?)?))
 }
 
+/// Millimetres in one length unit of a representation's context.
+pub fn millimetres(file: &Exchange, representation: usize) -> Option<f64> {
+    let context = file.find(reference(file.arguments(representation).get(2)?)?)?;
+    let units = file.arguments_as(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT")?;
+    let unit = references(units.first()?)
+        .into_iter()
+        .filter_map(|id| file.find(id))
+        .find(|&unit| file.kinds(unit).contains(&"LENGTH_UNIT"))?;
+    let Some(arguments) = file.arguments_as(unit, "CONVERSION_BASED_UNIT") else {
+        return si_millimetres(file, unit);
+    };
+    let measure = file.find(reference(arguments.get(1)?)?)?;
+    let (factor, base) = factor(file, measure)?;
+    Some(factor * si_millimetres(file, base)?)
+}
+
+fn si_millimetres(file: &Exchange, unit: usize) -> Option<f64> {
+    let name = si_unit(file, unit)?;
+    let exponent = match name.strip_suffix("metre")? {
+        "" => 0,
+        "deci" => -1,
+        "centi" => -2,
+        "milli" => -3,
+        "micro" => -6,
+        "nano" => -9,
+        "pico" => -12,
+        "deca" => 1,
+        "hecto" => 2,
+        "kilo" => 3,
+        "mega" => 6,
+        _ => return None,
+    };
+    Some(10f64.powi(exponent + 3))
+}
+
 fn si_unit(file: &Exchange, unit: usize) -> Option<String> {
     let arguments = file.arguments_as(unit, "SI_UNIT")?;
     let word = |i: usize| {

@@ -248,6 +248,41 @@ impl StepText {
         self.related(shape, parent, child, transformation);
     }
 
+    /// Puts `child` into `parent` so that the axis `from` of the child lies on `to` of the parent.
+    pub fn component_by_axes(
+        &mut self,
+        name: &str,
+        parent: Product,
+        child: Product,
+        [from, to]: [DAffine3; 2],
+    ) {
+        let occurrence = self.add(&format!(
+            "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
+            parent.definition, child.definition
+        ));
+        let shape = self.add(&format!("PRODUCT_DEFINITION_SHAPE('','',#{occurrence})"));
+        let [from, to] = [from, to]
+            .map(|motion| self.axis(motion.translation, motion.matrix3.z_axis, motion.matrix3.x_axis));
+        let transformation = self.add(&format!("ITEM_DEFINED_TRANSFORMATION('','',#{from},#{to})"));
+        self.related(shape, parent, child, transformation);
+    }
+
+    /// Says that the shape of `product` is in the file `name`, as CATIA writes it.
+    pub fn in_file(&mut self, product: Product, name: &str) {
+        let kind = self.add("DOCUMENT_TYPE('geometry')");
+        let document = self.add(&format!("DOCUMENT_FILE('{name}','','',#{kind},'',$)"));
+        let source = self.add("EXTERNAL_SOURCE(IDENTIFIER(''))");
+        let role = self.add("IDENTIFICATION_ROLE('external document id and location',$)");
+        self.add(&format!(
+            "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT('{name}',#{role},#{source},(#{document}))"
+        ));
+        self.add(&format!("DOCUMENT_REPRESENTATION_TYPE('digital',#{document})"));
+        self.add(&format!(
+            "APPLIED_DOCUMENT_REFERENCE(#{document},'',(#{}))",
+            product.definition
+        ));
+    }
+
     /// Puts `child` into `parent` with a transformation operator.
     pub fn component_by_operator(&mut self, name: &str, parent: Product, child: Product, operator: u64) {
         let occurrence = self.add(&format!(
