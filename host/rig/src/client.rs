@@ -5,19 +5,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use mortise_protocol::message::{Capabilities, DeviceState, FromDevice, Statistics, ToDevice};
+use mortise_protocol::message::{Capabilities, DeviceState, FromDevice, Statistics, ToDevice, Version};
 use mortise_protocol::parameter::ParameterId;
 use mortise_protocol::rig::Rig;
 
 use crate::error::RigError;
-use crate::event::Events;
+use crate::event::{Event, Events};
 use crate::exchange::{Patience, greet, no_answer, obtain, patience_for, started_anew};
 use crate::faults::FaultLine;
 use crate::heartbeat::{HEARTBEAT, HEARTBEAT_COUNTED, Heartbeat};
 use crate::link::{Answer, Link, Reader};
 use crate::spec::{EmulatedMode, RigSpec};
 use crate::transport::Transport;
-use crate::{emulator, serial, simulated};
+use crate::{emulator, real_time, serial, simulated};
 
 /// Answer to [`ToDevice::Run`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +84,9 @@ impl Client {
             RigSpec::Simulated { realtime } => {
                 let transport = through(simulated::simulate(&simulated::Flash::default(), *realtime)?)?;
                 let client = Self::over(transport, &name, Patience::long(), None)?;
+                if let Some(refusal) = real_time::take_refusal() {
+                    client.link.events.push(Event::Log(refusal));
+                }
                 client.in_lockstep(!realtime)
             }
             RigSpec::Emulated { mode, firmware } => {
@@ -197,8 +200,16 @@ impl Client {
     /// `Refused`, `Timeout`, `LinkLost`, `TooLarge`.
     pub fn request(&self, message: ToDevice) -> Result<(), RigError> {
         match &message {
-            ToDevice::Hello(_)
-            | ToDevice::GetCapabilities
+            // Who greets by hand has begun another session, unless the board does not speak with this version.
+            ToDevice::Hello(version) => {
+                let own = *version == Version::own();
+                self.ask(&message)?;
+                if own {
+                    self.link.begin_session(self.refresh_capabilities()?.session);
+                }
+                Ok(())
+            }
+            ToDevice::GetCapabilities
             | ToDevice::GetParameter(_)
             | ToDevice::GetStatistics { .. }
             | ToDevice::GetRig

@@ -63,7 +63,6 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::Disarm
         | ToDevice::Stop
         | ToDevice::Heartbeat
-        | ToDevice::Home
         | ToDevice::SetParameter { .. }
         | ToDevice::GetParameter(_)
         | ToDevice::Release
@@ -80,6 +79,8 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::Lockstep(_) => true,
         ToDevice::Arm
         | ToDevice::ClearFault
+        // The handle may have left its reference pose meanwhile.
+        | ToDevice::Home
         | ToDevice::Grab { .. }
         | ToDevice::SceneCommit
         | ToDevice::GetStatistics { reset: true }
@@ -88,6 +89,14 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::Run { .. }
         | ToDevice::Restart => false,
     }
+}
+
+/// It brings the motors nearer to being driven: only as long as what the operator saw still holds.
+fn rearms(message: &ToDevice) -> bool {
+    matches!(
+        message,
+        ToDevice::Arm | ToDevice::ClearFault | ToDevice::Home | ToDevice::Grab { .. }
+    )
 }
 
 pub(crate) fn patience_for(message: &ToDevice, patience: &Patience) -> Duration {
@@ -112,6 +121,8 @@ pub(crate) fn obtain(link: &Link, message: &ToDevice, patience: &Patience) -> Re
     let wait = patience_for(message, patience);
     let attempts = if repeatable(message) { ATTEMPTS } else { 1 };
     let mut busy = 0;
+    let mut outdated = 0;
+    let decided = link.halts();
     'anew: loop {
         let ticket = link.post(message)?;
         for attempt in 0..attempts {
@@ -122,6 +133,18 @@ pub(crate) fn obtain(link: &Link, message: &ToDevice, patience: &Patience) -> Re
                 Some(Answer::Refused(Refusal::Busy)) if busy < BUSY_ATTEMPTS => {
                     busy += 1;
                     std::thread::sleep(BUSY_PAUSE);
+                    // After a stop or a fault it is for the operator to decide anew.
+                    if rearms(message) && link.halts() != decided {
+                        return Err(RigError::Refused {
+                            what: message.words(),
+                            reason: Refusal::Outdated,
+                        });
+                    }
+                    continue 'anew;
+                }
+                // Another thread's message overtook it on the way; nothing was changed.
+                Some(Answer::Refused(Refusal::Outdated)) if outdated + 1 < attempts => {
+                    outdated += 1;
                     continue 'anew;
                 }
                 Some(Answer::Refused(reason)) => {
@@ -165,6 +188,7 @@ pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capa
             match obtain(link, &ToDevice::GetCapabilities, patience) {
                 Ok(Answer::Value(value)) => {
                     if let FromDevice::Capabilities(capabilities) = *value {
+                        link.begin_session(capabilities.session);
                         link.set_greeted(seq);
                         return Ok(capabilities);
                     }

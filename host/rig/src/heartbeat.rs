@@ -10,6 +10,7 @@ use mortise_protocol::message::ToDevice;
 use crate::error::RigError;
 use crate::exchange::started_anew;
 use crate::link::Link;
+use crate::real_time;
 
 /// Between two heartbeats: a fifth of the default silence the board bears while armed.
 pub(crate) const HEARTBEAT: Duration = Duration::from_millis(100);
@@ -35,32 +36,36 @@ impl Heartbeat {
             .name("mortise-heartbeat".into())
             .spawn({
                 let (ending, name) = (ending.clone(), name.to_owned());
-                move || loop {
-                    let ended = ending.0.lock().unwrap_or_else(PoisonError::into_inner);
-                    let (ended, _) = ending
-                        .1
-                        .wait_timeout_while(ended, period, |ended| !*ended)
-                        .unwrap_or_else(PoisonError::into_inner);
-                    if *ended {
-                        return;
-                    }
-                    drop(ended);
-                    if link.has_started_anew() {
-                        started_anew(&link, &name);
-                        return;
-                    }
-                    // In lockstep the board waits for the host, however long that takes.
-                    if lockstep.load(Ordering::Relaxed) {
-                        link.forgive_silence();
-                        continue;
-                    }
-                    if link.silent_for() >= period && link.send(&ToDevice::Heartbeat).is_err() {
-                        return;
-                    }
-                    let unheard = link.unheard_for();
-                    if unheard > silence {
-                        link.lose(&format!("nothing was heard for {:.1} s", unheard.as_secs_f64()));
-                        return;
+                move || {
+                    // A board whose clock goes on while this thread waits for a busy computer stops its motors.
+                    real_time::ask();
+                    loop {
+                        let ended = ending.0.lock().unwrap_or_else(PoisonError::into_inner);
+                        let (ended, _) = ending
+                            .1
+                            .wait_timeout_while(ended, period, |ended| !*ended)
+                            .unwrap_or_else(PoisonError::into_inner);
+                        if *ended {
+                            return;
+                        }
+                        drop(ended);
+                        if link.has_started_anew() {
+                            started_anew(&link, &name);
+                            return;
+                        }
+                        // In lockstep the board waits for the host, however long that takes.
+                        if lockstep.load(Ordering::Relaxed) {
+                            link.forgive_silence();
+                            continue;
+                        }
+                        if link.silent_for() >= period && link.send(&ToDevice::Heartbeat).is_err() {
+                            return;
+                        }
+                        let unheard = link.unheard_for();
+                        if unheard > silence {
+                            link.lose(&format!("nothing was heard for {:.1} s", unheard.as_secs_f64()));
+                            return;
+                        }
                     }
                 }
             })

@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use mortise_protocol::frame::{self, Decoder};
+use mortise_protocol::frame::{self, Decoder, Stamp};
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{DeviceState, FromDevice, Refusal, ToDevice};
 use mortise_protocol::parameter::ParameterId;
@@ -84,6 +84,8 @@ struct Desk {
 struct Writer {
     port: Box<dyn std::io::Write + Send>,
     last: Instant,
+    /// Of the last frame; without one the board has not told the session's name yet.
+    stamp: Option<Stamp>,
 }
 
 /// Whether the board still knows this program.
@@ -107,6 +109,8 @@ pub(crate) struct Link {
     closing: AtomicBool,
     state: Mutex<Option<DeviceState>>,
     greeted: Mutex<Greeted>,
+    /// Stops this program sent, and stops and faults the board told of.
+    halts: AtomicU64,
     /// Messages sent; a sequence number is the lowest 16 bits of it.
     sent: AtomicU64,
     heard: Mutex<Instant>,
@@ -141,6 +145,7 @@ impl Link {
             writer: Mutex::new(Writer {
                 port: writer,
                 last: Instant::now(),
+                stamp: None,
             }),
             desk: Mutex::default(),
             answered: Condvar::new(),
@@ -148,6 +153,7 @@ impl Link {
             closing: AtomicBool::new(false),
             state: Mutex::new(None),
             greeted: Mutex::default(),
+            halts: AtomicU64::new(0),
             sent: AtomicU64::new(0),
             heard: Mutex::new(Instant::now()),
             frames: AtomicU64::new(0),
@@ -214,9 +220,15 @@ impl Link {
             FromDevice::Telemetry(sample) => self.events.push(Event::Telemetry(Box::new(sample))),
             FromDevice::State { tick, state } => {
                 *lock(&self.state) = Some(state);
+                if matches!(state, DeviceState::Stopped | DeviceState::Fault(_)) {
+                    self.halts.fetch_add(1, Ordering::SeqCst);
+                }
                 self.events.push(Event::State { tick, state });
             }
-            FromDevice::Fault { tick, fault } => self.events.push(Event::Fault { tick, fault }),
+            FromDevice::Fault { tick, fault } => {
+                self.halts.fetch_add(1, Ordering::SeqCst);
+                self.events.push(Event::Fault { tick, fault });
+            }
             FromDevice::Log(bytes) => lines.take(&bytes, |line| self.events.push(Event::Log(line))),
             value => {
                 let value = Box::new(value);
@@ -305,8 +317,16 @@ impl Link {
 
     fn write(&self, writer: &mut Writer, seq: u16, message: &ToDevice) -> Result<(), RigError> {
         self.check()?;
+        if *message == ToDevice::Stop {
+            self.halts.fetch_add(1, Ordering::SeqCst);
+        }
         let mut out = [0u8; MAX_FRAME];
-        let bytes = frame::encode(seq, message, &mut out).map_err(|_| RigError::TooLarge {
+        // Under the writer's lock, so that counts rise in the order of the frames. A greeting has the frozen layout, without a stamp.
+        if let Some(stamp) = &mut writer.stamp {
+            stamp.count = stamp.count.wrapping_add(1);
+        }
+        let stamp = writer.stamp.filter(|_| !matches!(message, ToDevice::Hello(_)));
+        let bytes = frame::encode_stamped(seq, stamp, message, &mut out).map_err(|_| RigError::TooLarge {
             what: message.words(),
         })?;
         writer.last = Instant::now();
@@ -336,6 +356,16 @@ impl Link {
     pub(crate) fn close(&self) {
         self.closing.store(true, Ordering::Relaxed);
         lock(&self.writer).port = Box::new(std::io::sink());
+    }
+
+    /// The board has named the session: from here on frames are stamped with it.
+    pub(crate) fn begin_session(&self, session: u32) {
+        lock(&self.writer).stamp = Some(Stamp { session, count: 0 });
+    }
+
+    /// Changes with every stop and fault this program knows of: what was decided before must not be sent afterwards.
+    pub(crate) fn halts(&self) -> u64 {
+        self.halts.load(Ordering::SeqCst)
     }
 
     /// Time since a frame went out.

@@ -83,9 +83,10 @@ impl Read for PipeReader {
     }
 }
 
-impl Write for PipeWriter {
-    fn write(&mut self, data: &[u8]) -> io::Result<usize> {
-        let mut bytes = wait(&self.0, READ_WAIT, |bytes| {
+impl PipeWriter {
+    /// Puts in what there is room for, after waiting for room no longer than `timeout`; `TimedOut` when there is none.
+    pub fn write_within(&mut self, data: &[u8], timeout: Duration) -> io::Result<usize> {
+        let mut bytes = wait(&self.0, timeout, |bytes| {
             bytes.waiting.len() >= PIPE_CAPACITY && !bytes.closed
         });
         if bytes.closed {
@@ -99,6 +100,12 @@ impl Write for PipeWriter {
         drop(bytes);
         self.0.1.notify_all();
         Ok(count)
+    }
+}
+
+impl Write for PipeWriter {
+    fn write(&mut self, data: &[u8]) -> io::Result<usize> {
+        self.write_within(data, READ_WAIT)
     }
 
     fn flush(&mut self) -> io::Result<()> {

@@ -2,8 +2,9 @@
 //! the same protocol bytes as a board.
 
 use std::cell::Cell;
-use std::io::{self, Write};
+use std::io;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -20,7 +21,8 @@ use mortise_firmware::store;
 use mortise_protocol::message::{CostUnit, ResetReason};
 
 use crate::error::RigError;
-use crate::pipe::{PipeReader, PipeWriter, pipe};
+use crate::pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};
+use crate::real_time;
 use crate::transport::{READ_WAIT, Transport, is_quiet};
 
 /// Bytes of a scene slot: far more than a board has, so that a PC can feel scenes no board could hold yet.
@@ -29,9 +31,13 @@ const SLOT: usize = 256 * ERASE_SIZE;
 const ALL: usize = SLOTS * (SLOT + ERASE_SIZE);
 /// Bytes a board's output buffer holds.
 const OUTBOUND: usize = 4 * OUTBOUND_MIN;
+/// Boards started in this process.
+static STARTS: AtomicU64 = AtomicU64::new(0);
 const TICK: Duration = Duration::from_micros(1_000_000 / TICK_HZ as u64);
 /// Ticks a paced rig makes up for after this computer was busy; the rest count as missed.
 const CATCH_UP: u32 = 4;
+/// Pause after missed ticks: a scene too large for this computer must not take a whole core from everything else, real-time priority or not.
+const BREATH: Duration = Duration::from_micros(250);
 
 /// Flash of a simulated board: survives its restarts, and outlives the connection when the caller keeps a clone.
 #[derive(Clone, Debug, Default)]
@@ -73,6 +79,9 @@ impl Drop for Board {
 
 /// Power on, and again after each restart.
 fn run(flash: &Flash, realtime: bool, mut from_host: PipeReader, mut to_host: PipeWriter) {
+    if realtime {
+        real_time::ask();
+    }
     let mut memory = flash.0.lock().unwrap_or_else(PoisonError::into_inner);
     if memory.is_empty() {
         memory.resize(ALL / size_of::<FlashWord>(), ERASED);
@@ -112,6 +121,8 @@ fn power_on(
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
         ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
+        // Boards of other processes cannot be reached by frames meant for this one.
+        entropy: STARTS.fetch_add(1, Ordering::Relaxed),
     };
     let (mut link, mut control) = device::start(
         &mut channels,
@@ -123,33 +134,32 @@ fn power_on(
     let mut out = Wire {
         pending: Vec::with_capacity(OUTBOUND),
     };
-    let mut input = [0u8; 4096];
-    let (mut from, mut to) = (0, 0);
+    // All a host can have written: what it wrote before a tick is read before that tick.
+    let mut input = vec![0u8; PIPE_CAPACITY];
     let mut patience = Duration::ZERO;
     loop {
-        if from == to {
-            from = 0;
-            to = match from_host.read_within(&mut input, patience) {
-                Ok(0) => return Err(io::ErrorKind::BrokenPipe.into()),
-                Ok(count) => count,
-                Err(error) if is_quiet(&error) => 0,
-                Err(error) => return Err(error),
-            };
+        match from_host.read_within(&mut input, patience) {
+            Ok(0) => return Err(io::ErrorKind::BrokenPipe.into()),
+            Ok(count) => link.receive(&input[..count], &mut out),
+            Err(error) if is_quiet(&error) => {}
+            Err(error) => return Err(error),
         }
-        from += link.receive(&input[from..to], &mut out);
-        patience = pace.until_next();
+        patience = pace.until_next().max(pace.breath.take());
         if patience.is_zero() && control.tick() == Ticked::Waiting && !realtime {
             patience = READ_WAIT;
         }
         link.poll(&mut out);
-        let said_something = !out.pending.is_empty();
+        let waiting = out.pending.len();
         out.flush(to_host)?;
         if link.restart_requested() && out.pending.is_empty() {
             return Ok(());
         }
-        if said_something || from < to {
+        if out.pending.len() < waiting {
             // What was held back for want of room can go on now.
             patience = Duration::ZERO;
+        } else if waiting > 0 {
+            // The host does not read: look again soon.
+            patience = patience.min(TICK);
         }
     }
 }
@@ -160,11 +170,12 @@ struct Wire {
 }
 
 impl Wire {
+    /// Never waits: ticks do not wait for a host that does not read.
     fn flush(&mut self, to: &mut PipeWriter) -> io::Result<()> {
         if self.pending.is_empty() {
             return Ok(());
         }
-        match to.write(&self.pending) {
+        match to.write_within(&self.pending, Duration::ZERO) {
             Ok(written) => {
                 self.pending.drain(..written);
                 Ok(())
@@ -190,6 +201,8 @@ struct Pace {
     realtime: bool,
     begun: Cell<Instant>,
     due: Cell<Instant>,
+    /// To wait before the next tick although it is late.
+    breath: Cell<Duration>,
 }
 
 impl Pace {
@@ -199,6 +212,7 @@ impl Pace {
             realtime,
             begun: Cell::new(now),
             due: Cell::new(now),
+            breath: Cell::default(),
         }
     }
 
@@ -221,6 +235,9 @@ impl Pace {
         let behind = (late.as_nanos() / TICK.as_nanos()) as u32;
         let skipped = behind.saturating_sub(CATCH_UP);
         self.due.set(self.due.get() + TICK * (skipped + 1));
+        if skipped > 0 {
+            self.breath.set(BREATH);
+        }
         skipped
     }
 }

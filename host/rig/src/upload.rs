@@ -2,6 +2,7 @@
 //! where the board says it stands; the scene in use stays until the commit.
 
 use std::collections::VecDeque;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use heapless::Vec as Bounded;
@@ -69,23 +70,45 @@ impl Client {
     /// `NotAScene`; `Refused` with the board's reason (armed, too large, other layout, damaged); `Timeout`, `LinkLost`. The scene that
     /// was in use stays in use after any of them.
     pub fn upload(&self, image: &[u8], progress: &mut dyn FnMut(UploadProgress)) -> Result<(), RigError> {
-        self.request(begin_message(image)?)?;
-        let sent = self.send_chunks(image, progress);
-        if sent.is_err() {
-            // Frees the board's buffer; what went wrong is said by the error itself.
-            let _ = self.send(ToDevice::SceneAbort);
-        }
-        sent?;
-        self.request(ToDevice::SceneCommit)
+        let mut go_on = |now| {
+            progress(now);
+            ControlFlow::Continue(())
+        };
+        self.upload_while(image, &mut go_on).map(|_| ())
     }
 
-    fn send_chunks(&self, image: &[u8], progress: &mut dyn FnMut(UploadProgress)) -> Result<(), RigError> {
+    /// As [`Self::upload`], until `progress` ends it: the board then forgets what it has of the new scene, and the one in use stays.
+    ///
+    /// # Errors
+    /// As [`Self::upload`].
+    pub fn upload_while(
+        &self,
+        image: &[u8],
+        progress: &mut dyn FnMut(UploadProgress) -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, RigError> {
+        self.request(begin_message(image)?)?;
+        let sent = self.send_chunks(image, progress);
+        if !matches!(sent, Ok(ControlFlow::Continue(()))) {
+            // Frees the board's buffer; what went wrong is said by the error itself.
+            let _ = self.send(ToDevice::SceneAbort);
+            return sent;
+        }
+        self.request(ToDevice::SceneCommit)?;
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn send_chunks(
+        &self,
+        image: &[u8],
+        progress: &mut dyn FnMut(UploadProgress) -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, RigError> {
         let total = image.len();
         let mut taken = 0;
         let mut setbacks = 0;
         while taken < total {
             match self.send_run(image, taken, &mut |sent| progress(UploadProgress { sent, total }))? {
-                Run::Done => return Ok(()),
+                Run::Done => break,
+                Run::Ended => return Ok(ControlFlow::Break(())),
                 Run::StandsAt { offset, why } => {
                     setbacks = if offset > taken { 0 } else { setbacks + 1 };
                     if setbacks > MAX_SETBACKS || offset > total {
@@ -95,11 +118,16 @@ impl Client {
                 }
             }
         }
-        Ok(())
+        Ok(ControlFlow::Continue(()))
     }
 
     /// Sends from `start` to the end with a window; stops at the first chunk that was not taken.
-    fn send_run(&self, image: &[u8], start: usize, taken: &mut dyn FnMut(usize)) -> Result<Run, RigError> {
+    fn send_run(
+        &self,
+        image: &[u8],
+        start: usize,
+        taken: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Run, RigError> {
         let mut position = start;
         let mut next = start;
         let mut window = VecDeque::with_capacity(UPLOAD_WINDOW);
@@ -121,7 +149,9 @@ impl Client {
             match ticket.wait(wait)? {
                 Some(Answer::Done | Answer::Value(_)) => {
                     position = end;
-                    taken(position);
+                    if taken(position).is_break() {
+                        return Ok(Run::Ended);
+                    }
                 }
                 Some(Answer::Refused(reason @ Refusal::ChunkOrder { expected })) => {
                     let (offset, why) = (expected as usize, refused(reason));
@@ -145,6 +175,8 @@ impl Client {
 
 enum Run {
     Done,
+    /// By whoever hears of the progress.
+    Ended,
     /// The board has taken all before `offset`; `why` it went no further.
     StandsAt {
         offset: usize,

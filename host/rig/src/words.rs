@@ -1,6 +1,6 @@
 //! What the board says, in words for the operator: what happened, and what to do.
 
-use mortise_protocol::message::{DeviceState, Fault, Refusal, ResetReason, ToDevice};
+use mortise_protocol::message::{DeviceState, Fault, Refusal, ResetReason, ToDevice, flag};
 
 /// Something of the protocol that can be said in words.
 pub trait Words {
@@ -17,6 +17,35 @@ impl<W: Words> Words for &W {
     fn words(&self) -> String {
         (**self).words()
     }
+}
+
+/// Each flag of the telemetry in words, most important first.
+pub const FLAG_WORDS: [(u16, &str); flag::ALL.len()] = [
+    (flag::NON_FINITE, "the computed force was not finite"),
+    (
+        flag::BAD_INPUT,
+        "a sensor reading was not a number or out of proportion",
+    ),
+    (flag::FORCE_LIMIT, "force limit acts"),
+    (flag::TORQUE_LIMIT, "torque limit acts"),
+    (flag::FORCE_SLEW, "limit on change of force acts"),
+    (flag::TORQUE_SLEW, "limit on change of torque acts"),
+    (flag::COUPLING_FORCE, "the coupling slips: force"),
+    (flag::COUPLING_TORQUE, "the coupling slips: torque"),
+    (flag::SPEED_LIMIT, "speed limit acts"),
+    (flag::SOFTENED, "damped for stability"),
+    (flag::DEEP, "penetration too deep"),
+    (flag::UNSETTLED, "contacts had not settled"),
+    (flag::BUDGET, "point budget reached"),
+    (flag::CONTACTS, "more contacts than fit"),
+    (flag::PAIRS, "more touching faces than are shown"),
+];
+
+/// What the flags of a telemetry sample say, most important first.
+pub fn describe_flags(flags: u16) -> impl Iterator<Item = &'static str> {
+    (FLAG_WORDS.into_iter())
+        .filter(move |(bit, _)| flags & bit != 0)
+        .map(|(_, words)| words)
 }
 
 impl Words for DeviceState {
@@ -47,7 +76,7 @@ impl Words for Fault {
                 format!("the encoder of axis {axis} jumped further than the mechanism can move: check its plug and cable, then clear the fault")
             }
             Self::EncoderStuck { axis } => {
-                format!("the encoder of axis {axis} stood still while its motor pushed: check its plug and look for a jam, then clear the fault")
+                format!("the encoder of axis {axis} does not follow its motor: check its plug and look for a jam, then clear the fault")
             }
             Self::OverSpeed => "the handle moved faster than allowed: hold it still, then clear the fault".into(),
             Self::Workspace => "the handle left the workspace: bring it back, then clear the fault".into(),
@@ -65,7 +94,17 @@ impl Words for Fault {
                 "a tick took longer than its millisecond: use a smaller point budget or a coarser scene, then clear the fault".into()
             }
             Self::SceneDamaged => "the scene in the board's flash no longer passes its checks: upload it again".into(),
-            Self::NonFinite => "a number in the force loop is not finite: reset the scene, then clear the fault".into(),
+            Self::NonFinite => "the computed force is not finite: reset the scene, then clear the fault".into(),
+            Self::AngularOverSpeed => "the handle turned faster than allowed: hold it still, then clear the fault".into(),
+            Self::ReferenceLost => {
+                "the encoders no longer know where the handle is: clear the fault, bring the handle to its marked pose, then set the reference".into()
+            }
+            Self::ImpossiblePosture => {
+                "the encoders say where the links cannot be: check their plugs and the reference, then clear the fault".into()
+            }
+            Self::BadReading => {
+                "a sensor reading is not a number or out of all proportion: check the sensors' cables, then clear the fault".into()
+            }
         }
     }
 }
@@ -124,6 +163,9 @@ impl Words for Refusal {
             Self::Rig(fault) => fault.words(),
             Self::RigFixed => "this board's mechanism is compiled into its firmware: change it there, or use a board that takes a description".into(),
             Self::RigDamaged => "the description of the rig in the board's flash is damaged or of another release: send it again (`mortise rig send`)".into(),
+            Self::Outdated => {
+                "the command came late, twice, or from before the board's last stop, fault or greeting, and was not carried out: look at the rig, then give it again; if it repeats, connect again".into()
+            }
             Self::Undecodable => "the board did not understand the message: flash the firmware of this release".into(),
         }
     }
@@ -185,6 +227,26 @@ mod tests {
 
     use super::*;
 
+    const FAULTS: [Fault; 17] = [
+        Fault::StopInput,
+        Fault::HostSilent { silent_ms: 77 },
+        Fault::EncoderJump { axis: 77 },
+        Fault::EncoderStuck { axis: 77 },
+        Fault::OverSpeed,
+        Fault::Workspace,
+        Fault::Driver { axis: 77 },
+        Fault::OverCurrent { axis: 77 },
+        Fault::OverTemperature { axis: 77 },
+        Fault::SupplyLow,
+        Fault::TickOverrun,
+        Fault::SceneDamaged,
+        Fault::NonFinite,
+        Fault::AngularOverSpeed,
+        Fault::ReferenceLost,
+        Fault::ImpossiblePosture,
+        Fault::BadReading,
+    ];
+
     /// One line each, long enough to mean something, and without a full stop: it goes into the middle of messages.
     fn is_a_sentence(words: &str) {
         assert!(words.len() > 12, "{words}");
@@ -194,24 +256,47 @@ mod tests {
 
     #[test]
     fn every_fault_says_what_to_do() {
-        for fault in [
-            Fault::StopInput,
-            Fault::HostSilent { silent_ms: 501 },
-            Fault::EncoderJump { axis: 2 },
-            Fault::EncoderStuck { axis: 0 },
-            Fault::OverSpeed,
-            Fault::Workspace,
-            Fault::Driver { axis: 1 },
-            Fault::OverCurrent { axis: 1 },
-            Fault::OverTemperature { axis: 1 },
-            Fault::SupplyLow,
-            Fault::TickOverrun,
-            Fault::SceneDamaged,
-            Fault::NonFinite,
-        ] {
+        for fault in FAULTS {
             let words = describe(fault);
             is_a_sentence(&words);
             assert!(words.contains(": "), "what, then what to do: {words}");
+        }
+    }
+
+    #[test]
+    fn each_flag_has_words_of_its_own() {
+        let mut said = std::collections::BTreeSet::new();
+        for (bit, name, _) in flag::ALL {
+            let words: Vec<_> = describe_flags(*bit).collect();
+            assert_eq!(words.len(), 1, "{name}: {words:?}");
+            assert!(said.insert(words[0]), "{name}: {words:?} is said of another too");
+        }
+        assert_eq!(describe_flags(u16::MAX).count(), flag::ALL.len());
+        assert_eq!(describe_flags(0).count(), 0);
+    }
+
+    /// What the page on safety says the operator reads, and the flags of the page on the protocol, are what the code has.
+    #[test]
+    fn the_pages_have_the_same_words() {
+        let read = |name: &str| {
+            let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/").to_owned() + name;
+            std::fs::read_to_string(path).expect("the page is there")
+        };
+        let safety = read("safety.md");
+        for fault in FAULTS {
+            // The page says axis n, and n ms.
+            let words = describe(fault).replace(" 77", " n");
+            assert!(safety.contains(&format!("\"{words}\"")), "{words}");
+        }
+        let protocol = read("protocol.md");
+        for (bit, name, says) in flag::ALL {
+            let words = describe_flags(*bit).next().expect("tested above");
+            let row = format!(
+                "| {} | `{name}` | {} | {words} |",
+                bit.trailing_zeros(),
+                says.trim()
+            );
+            assert!(protocol.contains(&row), "{row}");
         }
     }
 
@@ -249,6 +334,7 @@ mod tests {
             Refusal::RigFixed,
             Refusal::RigDamaged,
             Refusal::Undecodable,
+            Refusal::Outdated,
         ] {
             is_a_sentence(&describe(refusal));
         }

@@ -32,6 +32,7 @@ fn capabilities(state: DeviceState) -> Capabilities {
         max_targets: 0,
         reset: ResetReason::PowerOn,
         state,
+        session: 1,
     }
 }
 
