@@ -37,6 +37,17 @@ fn shared() -> Option<PathBuf> {
     folder.join("cad").is_dir().then_some(folder)
 }
 
+/// No window opens for any of these; with a display the program would otherwise run until it is closed.
+#[test]
+fn a_mistyped_command_gets_a_suggestion_and_no_window() {
+    refused(&["opne"], "did you mean `open`?");
+    refused(&["insepct"], "did you mean `inspect`?");
+    refused(&["gearbox"], "neither a command nor a file");
+    refused(&["no-such.step"], "there is no file no-such.step");
+    refused(&["open", "no-such.step"], "there is no file no-such.step");
+    refused(&["."], "is a folder");
+}
+
 #[test]
 fn inspect_says_what_is_in_the_file() {
     let report = json(&mortise(&["inspect", SAMPLE, "--json"]));
@@ -169,6 +180,7 @@ fn bake_writes_an_image_a_board_would_take() {
             SAMPLE,
             "-o",
             &out.to_string_lossy(),
+            "--force",
             "--grabbable",
             "handle",
         ],

@@ -2,6 +2,7 @@
 //! Controls are found by what a screen reader would find.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 mod common;
@@ -10,6 +11,7 @@ use common::{arm, click, connect, harness, open_sample, until, worst};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
+use mortise::session::insertion::hold;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
@@ -50,6 +52,16 @@ fn from_an_empty_window_to_a_felt_insertion_and_stop() {
         "the plots have something to show"
     );
     assert!(worst(session) < Severity::Warning, "nothing to complain about");
+    until(&mut harness, "the verdict", |s| s.verdict.is_some());
+    let said = harness.state().session.verdict.as_ref().map(ToString::to_string);
+    let said = said.expect("just seen");
+    assert!(
+        said.starts_with("Goes in: 40.0 mm, clearance 1.000 mm, peak ") && said.ends_with(" N"),
+        "{said}"
+    );
+    harness.get_all_by_label(&said).next().expect("on screen");
+    let told = |s: &Session| s.notes.iter().filter(|n| n.text.starts_with("Goes in")).count();
+    assert_eq!(told(&harness.state().session), 1);
 
     click(&mut harness, "STOP");
     until(&mut harness, "stopped", |s| {
@@ -77,6 +89,103 @@ fn the_demonstration_goes_from_nothing_to_an_inserted_peg_and_plays_again() {
     until(&mut harness, "the peg is back", |s| lowest(s) > 79.0);
     until(&mut harness, "the peg is in again", |s| lowest(s) < 20.0 + 0.1);
     assert!(worst(&harness.state().session) < Severity::Warning);
+}
+
+/// Beside the hole, pushed down: the peg stands on the plate, or on the rim.
+#[test]
+fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
+    for aside_mm in [0.9, 6.0] {
+        let mut harness = harness();
+        open_sample(&mut harness);
+        connect(&mut harness);
+        let off = Intent::SetParameter(ParameterId::Guidance, 0.0);
+        harness.state_mut().session.act(off);
+        arm(&mut harness);
+        harness.state_mut().session.act(Intent::Grab(1));
+        until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+        let handle = harness.state().session.handle().expect("told");
+        // 20 mm down to the block, and 4 mm into it: 1.6 N of the hand's 400 N/m.
+        let shifted = |down_mm: f64| {
+            let mut pose = handle;
+            pose.translation += DVec3::new(aside_mm, 0.0, -down_mm);
+            pose
+        };
+        harness.state_mut().session.move_hand(hold(&shifted(10.0)));
+        until(&mut harness, "beside the axis", |s| {
+            s.document
+                .as_ref()
+                .is_some_and(|d| d.poses[1].translation.z < 71.0)
+        });
+        harness.state_mut().session.move_hand(hold(&shifted(24.0)));
+        until(&mut harness, "the verdict", |s| s.verdict.is_some());
+        let said = harness.state().session.verdict.as_ref().map(ToString::to_string);
+        let said = said.expect("just seen");
+        // On the rim a tilted peg's wall may overlap the hole's by a little; whether the rim or the face beside it bears more is as it comes.
+        let at_the_mouth = said.starts_with("Stuck at 0.0 mm: ") || said.starts_with("Stuck at 0.1 mm: ");
+        assert!(at_the_mouth && said.ends_with(" of block"), "{said}");
+    }
+}
+
+#[test]
+fn sending_the_scene_can_be_cancelled_and_begun_again() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    // As large a scene as fits: the same one again is sent for long enough to be cancelled.
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::Upload);
+    assert_eq!(obstacle(session, &Intent::CancelUpload), None);
+    session.act(Intent::CancelUpload);
+    until(&mut harness, "the sending has ended", |s| {
+        s.connection().is_some_and(|c| c.upload.is_none())
+    });
+    let session = &harness.state().session;
+    let newest = session.notes.newest().expect("a message");
+    assert!(newest.text.starts_with("Sending cancelled"), "{}", newest.text);
+    assert!(
+        session.scene_is_on_board(),
+        "the scene the board had stays in use"
+    );
+    assert!(worst(session) < Severity::Warning);
+    harness.state_mut().session.act(Intent::Upload);
+    until(&mut harness, "sent whole", |s| {
+        s.notes
+            .newest()
+            .is_some_and(|n| n.text == "The scene is on the board")
+    });
+}
+
+/// With the motors off and nothing moving, the window is woken every ten seconds, not with every sample: with software rendering each picture
+/// costs up to half a second of a core.
+#[test]
+fn an_idle_rig_hardly_wakes_the_window() {
+    let woken = Arc::new(AtomicU32::new(0));
+    let count = Arc::clone(&woken);
+    let mut session = Session::new(Arc::new(move || {
+        count.fetch_add(1, Ordering::Relaxed);
+    }));
+    session.act(Intent::Connect);
+    let wait = |session: &mut Session, seconds: f64| {
+        let begun = std::time::Instant::now();
+        while begun.elapsed().as_secs_f64() < seconds {
+            session.poll();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    while session.device() != Some(DeviceState::Idle) {
+        wait(&mut session, 0.05);
+    }
+    wait(&mut session, 0.5);
+    let (samples, wakes) = (session.history.iter().len(), woken.load(Ordering::Relaxed));
+    wait(&mut session, 12.0);
+    let samples = session.history.iter().len() - samples;
+    let wakes = woken.load(Ordering::Relaxed) - wakes;
+    // 62.5 samples a second.
+    assert!(samples > 360, "{samples} samples arrive all the same");
+    assert!(
+        (1..=2).contains(&wakes),
+        "woken {wakes} times in 12 s by {samples} samples"
+    );
 }
 
 #[test]
@@ -162,6 +271,8 @@ fn what_is_not_possible_says_why() {
         Intent::Arm,
         Intent::Disarm,
         Intent::Upload,
+        Intent::CancelUpload,
+        Intent::Reconnect,
         Intent::Grab(0),
         Intent::Release,
         Intent::ResetScene,

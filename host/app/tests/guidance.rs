@@ -14,6 +14,7 @@ use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
 use mortise::viewport::camera::Camera;
 use mortise::viewport::compose::compose;
+use mortise::viewport::picture::Ground;
 use mortise_guide::{GuideSettings, List, Row, Standing, When};
 use mortise_mating::Axis;
 use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId, TargetKind};
@@ -183,7 +184,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     }
     session.telemetry = Some(telemetry);
     let document = session.document.as_ref().expect("the sample");
-    let items = compose(session, document, Camera::default(), false, 1.0).items;
+    let items = compose(session, document, Camera::default(), false, Ground::Dark, 1.0).items;
     assert_eq!(
         items[1].lit_edges,
         [[0, 2]],
@@ -227,7 +228,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     session.guidance = odd;
     let document = session.document.as_ref().expect("open");
     let camera = Camera::default();
-    let picture = compose(session, document, camera, true, 1.0);
+    let picture = compose(session, document, camera, true, Ground::Dark, 1.0);
     assert!(picture.items.iter().all(|item| item.mates.is_empty()));
     harness.step();
 

@@ -7,7 +7,7 @@ use glam::DVec3;
 use mortise::session::document::Document;
 use mortise::viewport::camera::{Camera, View};
 use mortise::viewport::mesh::meeting;
-use mortise::viewport::picture::{Arrow, Item, Picture};
+use mortise::viewport::picture::{Arrow, Ground, Item, Picture};
 use mortise::viewport::renderer::Renderer;
 
 const SIZE: [u32; 2] = [320, 240];
@@ -87,6 +87,7 @@ fn picture(document: &Document, camera: Camera) -> Picture {
     Picture {
         camera,
         extent: document.extent,
+        ground: Ground::Dark,
         items,
         arrows: Vec::new(),
         line_width: 1.5,
@@ -245,6 +246,7 @@ fn nothing_to_draw_is_no_trouble() {
     renderer.render(&Picture {
         camera: Camera::default(),
         extent: Default::default(),
+        ground: Ground::Dark,
         items: vec![],
         arrows: vec![],
         line_width: 1.0,
@@ -254,6 +256,7 @@ fn nothing_to_draw_is_no_trouble() {
     renderer.render(&Picture {
         camera: Camera::default(),
         extent: Default::default(),
+        ground: Ground::Dark,
         items: vec![
             Item {
                 shape: 0,

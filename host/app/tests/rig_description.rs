@@ -106,15 +106,19 @@ fn check_says_what_is_wrong_where_and_what_to_do() {
     );
 }
 
+/// Two programs, one after the other: neither may claim that a simulated rig keeps what it was sent.
 #[test]
-fn a_board_shows_what_it_keeps_and_says_when_it_keeps_nothing() {
-    refused(
-        &["rig", "show", "--rig", "sim"],
-        &["keeps no description", "mortise rig send"],
-    );
+fn a_simulated_rig_says_that_it_keeps_a_description_only_as_long_as_the_program_runs() {
     let file = example("haply_2diy.toml");
     let output = mortise(&["rig", "send", text(&file), "--rig", "sim"]);
     assert!(output.status.success(), "{output:?}");
     let said = String::from_utf8(output.stdout).expect("UTF-8");
-    assert!(said.contains("keeps `") && said.contains("drives it"), "{said}");
+    assert!(
+        said.contains("until this program ended") && !said.contains("keeps `"),
+        "{said}"
+    );
+    refused(
+        &["rig", "show", "--rig", "sim"],
+        &["keeps no description", "ends with it"],
+    );
 }

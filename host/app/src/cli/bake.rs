@@ -7,8 +7,9 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use mortise_bake::{BakeOptions, BakeReport, Grabbable, Method, Planned, PointshellKind, Progress, Request};
+use mortise_output::{Existing, Output};
 
-use super::{output, units};
+use super::{Reading, output, units};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -18,8 +19,16 @@ pub struct Args {
     /// Scene image to write
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
+    /// Replace OUT where it is there already
+    #[arg(long)]
+    force: bool,
     /// Cell edge, mm [default: chosen so that the image fits]
-    #[arg(long, value_name = "MM", conflicts_with = "accuracy")]
+    #[arg(
+        long,
+        value_name = "MM",
+        conflicts_with = "accuracy",
+        allow_negative_numbers = true
+    )]
     cell: Option<f64>,
     /// Most that gaps and depths may err where parts fit, such as 5um (ten times that elsewhere): plans the coarsest model that does
     #[arg(long, value_name = "LENGTH", value_parser = units::length_mm)]
@@ -28,7 +37,7 @@ pub struct Args {
     #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes)]
     flash: Option<u64>,
     /// Most instructions of a tick, by estimate
-    #[arg(long, value_name = "INSTRUCTIONS", requires = "accuracy")]
+    #[arg(long, value_name = "INSTRUCTIONS", requires = "accuracy", value_parser = clap::value_parser!(u64).range(1..))]
     tick: Option<u64>,
     /// Contact method: distance-field or occupancy (the textbook's)
     #[arg(long, value_name = "METHOD", default_value_t = Method::DistanceField, conflicts_with = "accuracy")]
@@ -37,14 +46,21 @@ pub struct Args {
     #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"], conflicts_with = "accuracy")]
     shell: String,
     /// Voxel edge of the classic shell, mm [default: the cell]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     voxel: Option<f64>,
     /// How far points of the classic shell are moved inward, percent of a voxel
-    #[arg(long, value_name = "PERCENT", default_value_t = 0.0)]
+    #[arg(
+        long,
+        value_name = "PERCENT",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
     shrink: f64,
     /// Part that may be grabbed, by name; can be given several times [default: all but the largest]
     #[arg(long, value_name = "NAME")]
     grabbable: Vec<String>,
+    #[command(flatten)]
+    reading: Reading,
     /// One JSON object: bytes by part and kind
     #[arg(long)]
     json: bool,
@@ -52,7 +68,11 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    args.reading.apply();
+    let existing = Existing::from_force(args.force);
+    let mut target = Output::new(&args.output, existing, &[&args.file])?;
     let model = mortise_brep::load_step(&args.file)?;
+    target.add_inputs(&model.files)?;
     let mut options = BakeOptions {
         method: args.method,
         cell_mm: args.cell,
@@ -99,12 +119,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let result = mortise_bake::plan(&model, &request, &progress);
         clear(terminal);
         let planned = result.with_context(in_file)?;
-        return tell_plan(args, &request, &planned, &model.warnings);
+        return tell_plan(args, &target, &request, &planned, &model.warnings);
     }
     let result = mortise_bake::bake(&model, &options, &progress);
     clear(terminal);
     let baked = result.with_context(in_file)?;
-    write(args, &baked.image)?;
+    target.write(&baked.image)?;
     if args.json {
         output::json(&baked.report)?;
         return Ok(ExitCode::SUCCESS);
@@ -151,13 +171,14 @@ fn tell_warnings(model: &[String], report: &BakeReport) -> anyhow::Result<()> {
 /// What was planned, in words or as JSON; writes the image when the request is met.
 fn tell_plan(
     args: &Args,
+    target: &Output,
     request: &Request,
     planned: &Planned,
     warnings: &[String],
 ) -> anyhow::Result<ExitCode> {
     let plan = &planned.plan;
     if planned.met {
-        write(args, &planned.image)?;
+        target.write(&planned.image)?;
     }
     let code = if planned.met {
         ExitCode::SUCCESS
@@ -234,23 +255,4 @@ fn count(what: &str, faces: usize) -> String {
         0 => String::new(),
         n => format!("{what}: {n} faces"),
     }
-}
-
-/// The image, all or nothing.
-fn write(args: &Args, image: &[u8]) -> anyhow::Result<()> {
-    replace(&args.output, image)
-        .with_context(|| format!("cannot write the scene image to {}", args.output.display()))
-}
-
-/// All or nothing: written beside, then moved into place.
-fn replace(path: &std::path::Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let beside = PathBuf::from(beside);
-    let written = std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, path));
-    if written.is_err() {
-        // Whatever part of it there is helps nobody.
-        let _ = std::fs::remove_file(&beside);
-    }
-    written
 }

@@ -8,7 +8,7 @@ use mortise_brep::{CadModel, LoadOptions};
 use mortise_mating::{Axis, Contact, Tolerances, identify};
 use serde::Serialize;
 
-use super::output;
+use super::{Reading, output};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -19,11 +19,13 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     /// Largest distance between two surfaces that touch, mm
-    #[arg(long, default_value_t = Tolerances::default().linear_mm, value_name = "MM", value_parser = positive)]
+    #[arg(long, default_value_t = Tolerances::default().linear_mm, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
     tolerance: f64,
     /// Largest distance between a spline and the plane, cylinder, cone or sphere recognised in it, mm
-    #[arg(long, default_value_t = 1e-3, value_name = "MM", value_parser = positive)]
+    #[arg(long, default_value_t = 1e-3, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
     fit: f64,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -84,6 +86,7 @@ struct AxisReport {
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    args.reading.apply();
     let options = LoadOptions {
         recognise_mm: args.fit,
         ..LoadOptions::default()

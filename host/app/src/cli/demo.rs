@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use mortise_lab::scenario::{self, Outcome, Scenario};
 use mortise_rig::{EmulatedMode, RigSpec};
 
-use super::{Picture, output};
+use super::{Picture, Reading, output};
 use crate::session::Intent;
 use crate::ui::app;
 
@@ -25,18 +25,24 @@ pub struct Args {
     #[arg(long, requires = "headless")]
     json: bool,
     #[command(flatten)]
+    reading: Reading,
+    #[command(flatten)]
     picture: Picture,
 }
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    args.reading.apply();
     if args.headless {
         return headless(&args);
+    }
+    if let Some(file) = &args.file {
+        super::mistyped::check_file(file)?;
     }
     let mut first = Vec::new();
     first.extend(args.file.map(Intent::Open));
     first.push(Intent::Demo(args.rig));
-    let mut options = args.picture.options(first);
+    let mut options = args.picture.options(first)?;
     // What happens in a hole is seen through its walls.
     options.see_through = true;
     app::run(options)?;

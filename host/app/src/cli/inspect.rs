@@ -7,13 +7,15 @@ use std::process::ExitCode;
 use mortise_brep::{CadModel, Part, Surface};
 use serde::Serialize;
 
-use super::output;
+use super::{Reading, output};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// STEP file
     file: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     /// One JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -44,6 +46,7 @@ struct PartReport<'a> {
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    args.reading.apply();
     let model = mortise_brep::load_step(&args.file)?;
     let report = Report {
         unit: &model.unit,

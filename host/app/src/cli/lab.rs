@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::Subcommand;
-use mortise_lab::figures::{self, Plan, Row, Value};
+use mortise_lab::figures::{self, Claims, Count, Plan, Row, Value, Verdict};
 use mortise_lab::study::{feature_size, shrink};
-use mortise_lab::table::{prepare_folder, write_csv};
-use mortise_lab::{blend, clearance, endurance, pareto, rate, stability};
+use mortise_lab::table::write_csv;
+use mortise_lab::{blend, clearance, endurance, hybrid, pareto, rate, stability};
+use mortise_output::{Existing, Folder};
 use mortise_rig::RigSpec;
 
 use super::output;
@@ -34,11 +35,19 @@ enum Experiment {
         /// One JSON object a row
         #[arg(long)]
         json: bool,
+        /// Where the claims that rows are judged by come from
+        #[arg(long, value_enum, default_value = "kept")]
+        claims: ClaimSource,
     },
     /// Keep a board busy for an hour of its own time, and see whether anything wears; exit code 1 when it does
     Endurance {
         /// Virtual time
-        #[arg(long, default_value_t = 1.0, value_name = "HOURS")]
+        #[arg(
+            long,
+            default_value_t = 1.0,
+            allow_negative_numbers = true,
+            value_name = "HOURS"
+        )]
         hours: f64,
         /// Three minutes of virtual time instead
         #[arg(long, conflicts_with = "hours")]
@@ -69,16 +78,22 @@ enum Experiment {
     },
     /// Show the rate that a tick allows over an insertion: collision only, guided, guided with recognition; emulated board
     Rate(Sweep),
-    /// Which voxels let a peg into its hole, and what shrinking does: 27 trials by a simulated operator, textbook voxmap
+    /// Which voxels let a peg into its hole, and what shrinking does: designs of 27 trials by a simulated operator, beside table 3 of the thesis
     Shrink(Sweep),
-    /// Whether a feature's size matters: 62 trials by a simulated operator, textbook voxmap
-    FeatureSize {
-        #[command(flatten)]
-        sweep: Sweep,
-        /// How far points of the shell are moved inward, percent of a voxel
-        #[arg(long, value_name = "PERCENT", default_value_t = feature_size::SHRINK_PERCENT)]
-        shrink: f64,
-    },
+    /// Whether a feature's size matters: 62 trials by a simulated operator, beside tables 4 and 5 of the thesis
+    FeatureSize(Sweep),
+    /// The thesis' hybrid method on voxmaps: its three methods on its two pegs, beside table 6 and fig. 35
+    Hybrid(Sweep),
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum ClaimSource {
+    /// Those in the program; a row without one makes the last row fail
+    Kept,
+    /// Those in the program; of a row without one, what is measured
+    Completed,
+    /// What is measured
+    Measured,
 }
 
 /// How a sweep is made and where it goes.
@@ -93,6 +108,9 @@ struct Sweep {
     /// Folder for tables (CSV) and charts (SVG and PNG); made where there is none
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    /// Replace tables and charts that are there already
+    #[arg(long, requires = "out")]
+    force: bool,
 }
 
 impl Experiment {
@@ -105,13 +123,57 @@ impl Experiment {
             | Self::Stability { sweep, .. }
             | Self::Rate(sweep)
             | Self::Shrink(sweep)
-            | Self::FeatureSize { sweep, .. } => Some(sweep),
+            | Self::FeatureSize(sweep)
+            | Self::Hybrid(sweep) => Some(sweep),
             Self::Figures { .. } | Self::Endurance { .. } => None,
         }
     }
 }
 
+impl Experiment {
+    /// Names of the files that it may write: tables, then charts.
+    fn files(&self) -> Vec<String> {
+        let (tables, charts): (Vec<String>, Vec<String>) = match self {
+            Self::Clearance(_) => (words(&["clearance"]), words(&["clearance"])),
+            Self::Pareto(_) => (words(&["pareto"]), words(&["pareto-ticks", "pareto-time"])),
+            Self::Blend(_) => {
+                let charts = blend::CLEARANCES_MM.map(|clearance| format!("blend-{clearance}mm"));
+                (words(&["blend"]), charts.into())
+            }
+            Self::Stability { map, .. } => {
+                let mut maps = words(&stability::names());
+                maps.retain(|name| map.as_ref().is_none_or(|only| only == name));
+                (maps.clone(), maps)
+            }
+            Self::Rate(_) => (words(&["rate"]), words(&rate::PAIRS.map(|pair| pair.name))),
+            Self::Shrink(_) => (words(&["shrink", "shrink-table-3"]), words(&["shrink"])),
+            Self::FeatureSize(_) => (
+                words(&["feature-size", "feature-size-model", "feature-size-tables-4-5"]),
+                words(&["feature-size"]),
+            ),
+            Self::Hybrid(_) => (
+                words(&["hybrid", "hybrid-rate", "hybrid-table-6"]),
+                words(&["hybrid"]),
+            ),
+            Self::Figures { .. } | Self::Endurance { .. } => (Vec::new(), Vec::new()),
+        };
+        let tables = tables.iter().map(|name| format!("{name}.csv"));
+        let charts = (charts.iter()).flat_map(|name| ["svg", "png"].map(|kind| format!("{name}.{kind}")));
+        tables.chain(charts).collect()
+    }
+}
+
+fn words(names: &[&str]) -> Vec<String> {
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
 impl Sweep {
+    /// Where tables and charts go, if anywhere; `files` are those that may be written.
+    fn folder(&self, files: &[String]) -> anyhow::Result<Option<Folder>> {
+        let folder = |path| Folder::new(path, Existing::from_force(self.force), files);
+        Ok(self.out.as_ref().map(folder).transpose()?)
+    }
+
     fn tell(&self, row: &(impl serde::Serialize + std::fmt::Display)) -> anyhow::Result<()> {
         if self.json {
             output::json(row)
@@ -123,11 +185,17 @@ impl Sweep {
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    if let Some(folder) = args.experiment.sweep().and_then(|sweep| sweep.out.as_ref()) {
-        prepare_folder(folder)?;
-    }
+    let files = args.experiment.files();
+    // Before the first trial: a sweep of half an hour must not end in nothing.
+    let out = (args.experiment.sweep()).map_or(Ok(None), |sweep| sweep.folder(&files))?;
+    let out = out.as_ref();
     match &args.experiment {
-        Experiment::Figures { name, quick, json } => figures(name, *quick, *json),
+        Experiment::Figures {
+            name,
+            quick,
+            json,
+            claims,
+        } => figures(name, *quick, *json, *claims),
         Experiment::Endurance {
             hours,
             quick,
@@ -138,13 +206,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let seconds = if *quick { 180.0 } else { 3600.0 * hours };
             endurance(rig, seconds, *seed, *json)
         }
-        Experiment::Clearance(sweep) => clearance(sweep),
-        Experiment::Pareto(sweep) => pareto(sweep),
-        Experiment::Blend(sweep) => blend(sweep),
-        Experiment::Stability { sweep, map } => stability(sweep, map.as_deref()),
-        Experiment::Rate(sweep) => rate(sweep),
-        Experiment::Shrink(sweep) => shrink(sweep),
-        Experiment::FeatureSize { sweep, shrink } => feature_size(sweep, *shrink),
+        Experiment::Clearance(sweep) => clearance(sweep, out),
+        Experiment::Pareto(sweep) => pareto(sweep, out),
+        Experiment::Blend(sweep) => blend(sweep, out),
+        Experiment::Stability { sweep, map } => stability(sweep, map.as_deref(), out),
+        Experiment::Rate(sweep) => rate(sweep, out),
+        Experiment::Shrink(sweep) => shrink(sweep, out),
+        Experiment::FeatureSize(sweep) => feature_size(sweep, out),
+        Experiment::Hybrid(sweep) => hybrid(sweep, out),
     }
 }
 
@@ -167,14 +236,14 @@ fn endurance(rig: &RigSpec, seconds: f64, seed: u64, json: bool) -> anyhow::Resu
     if json {
         output::json(&report)?;
     }
-    let mut holds = true;
+    let mut count = Count::default();
     for row in report.rows() {
-        holds &= row.holds;
+        count.add(&row);
         if !json {
             tell_row(&row)?;
         }
     }
-    Ok(if holds {
+    Ok(if count.all_hold() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
@@ -182,18 +251,27 @@ fn endurance(rig: &RigSpec, seconds: f64, seed: u64, json: bool) -> anyhow::Resu
 }
 
 fn tell_row(row: &Row) -> anyhow::Result<()> {
-    let mark = if row.holds { "ok  " } else { "FAIL" };
+    let mark = match row.verdict() {
+        Verdict::Holds => "ok  ",
+        Verdict::Fails => "FAIL",
+        Verdict::Unbounded => "    ",
+        Verdict::Skipped => "skip",
+    };
     let value = match &row.value {
         Value::Number(number) => format!("{number}"),
         Value::Text(text) => text.clone(),
     };
     output::line(&format!(
-        "{mark} {}: {value} {} ({})",
-        row.what, row.unit, row.bound
+        "{mark} {}: {value} {} (bound: {}){}{}",
+        row.what,
+        row.unit,
+        row.bound(),
+        row.remark().map_or("", |_| "; "),
+        row.remark().unwrap_or_default()
     ))
 }
 
-fn clearance(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+fn clearance(sweep: &Sweep, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
     let mut trials = Vec::new();
     let mut written = Ok(());
     for variant in clearance::variants(sweep.quick) {
@@ -205,14 +283,14 @@ fn clearance(sweep: &Sweep) -> anyhow::Result<ExitCode> {
         })?;
     }
     written?;
-    if let Some(folder) = &sweep.out {
+    if let Some(folder) = out {
         write_csv(&trials, folder, "clearance")?;
         clearance::chart(&trials).write(folder, "clearance")?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn pareto(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+fn pareto(sweep: &Sweep, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
     let entries = pareto::sweep(sweep.quick, &mut |entry| {
         if written.is_ok() {
@@ -220,7 +298,7 @@ fn pareto(sweep: &Sweep) -> anyhow::Result<ExitCode> {
         }
     })?;
     written?;
-    if let Some(folder) = &sweep.out {
+    if let Some(folder) = out {
         write_csv(&entries, folder, "pareto")?;
         pareto::ticks_chart(&entries).write(folder, "pareto-ticks")?;
         pareto::time_chart(&entries).write(folder, "pareto-time")?;
@@ -228,7 +306,7 @@ fn pareto(sweep: &Sweep) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn blend(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+fn blend(sweep: &Sweep, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
     let courses = blend::sweep(sweep.quick, &mut |course| {
         if written.is_ok() {
@@ -236,7 +314,7 @@ fn blend(sweep: &Sweep) -> anyhow::Result<ExitCode> {
         }
     })?;
     written?;
-    if let Some(folder) = &sweep.out {
+    if let Some(folder) = out {
         let moments: Vec<&blend::Moment> = courses.iter().flat_map(|course| &course.moments).collect();
         write_csv(&moments, folder, "blend")?;
         blend::draw(&courses, folder)?;
@@ -244,7 +322,7 @@ fn blend(sweep: &Sweep) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn rate(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+fn rate(sweep: &Sweep, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
     let courses = rate::sweep(sweep.quick, &mut |course| {
         if written.is_ok() {
@@ -252,7 +330,7 @@ fn rate(sweep: &Sweep) -> anyhow::Result<ExitCode> {
         }
     })?;
     written?;
-    if let Some(folder) = &sweep.out {
+    if let Some(folder) = out {
         let windows: Vec<&rate::Window> = courses.iter().flat_map(|course| &course.windows).collect();
         write_csv(&windows, folder, "rate")?;
         for pair in &rate::PAIRS {
@@ -264,7 +342,7 @@ fn rate(sweep: &Sweep) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn shrink(sweep: &Sweep) -> anyhow::Result<ExitCode> {
+fn shrink(sweep: &Sweep, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
     let study = shrink::study(sweep.quick, &mut |found| {
         if written.is_ok() {
@@ -272,35 +350,54 @@ fn shrink(sweep: &Sweep) -> anyhow::Result<ExitCode> {
         }
     })?;
     written?;
-    if let Some(folder) = &sweep.out {
-        let trials: Vec<&shrink::Trial> = study.trials.iter().chain(&study.ours).collect();
-        write_csv(&trials, folder, "shrink")?;
-        if !study.rules.is_empty() {
-            write_csv(&study.terms, folder, "shrink-model")?;
-            write_csv(&study.largest, folder, "shrink-rule")?;
-            shrink::chart(&study).write(folder, "shrink")?;
-        }
+    if let Some(folder) = out {
+        write_csv(&study.trials, folder, "shrink")?;
+        write_csv(&study.table, folder, "shrink-table-3")?;
+        shrink::chart(&study).write(folder, "shrink")?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn feature_size(sweep: &Sweep, shrink: f64) -> anyhow::Result<ExitCode> {
+fn feature_size(sweep: &Sweep, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
-    let study = feature_size::study(sweep.quick, shrink, &mut |found| {
+    let study = feature_size::study(sweep.quick, &mut |found| {
         if written.is_ok() {
             written = sweep.tell(&found);
         }
     })?;
     written?;
-    if let Some(folder) = &sweep.out {
+    if let Some(folder) = out {
         write_csv(&study.trials, folder, "feature-size")?;
+        write_csv(&study.table, folder, "feature-size-tables-4-5")?;
         write_csv(&study.terms, folder, "feature-size-model")?;
         feature_size::chart(&study).write(folder, "feature-size")?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn stability(sweep: &Sweep, only: Option<&str>) -> anyhow::Result<ExitCode> {
+fn hybrid(sweep: &Sweep, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
+    let counts = hybrid::counts()?;
+    for count in &counts {
+        sweep.tell(count)?;
+    }
+    let mut written = Ok(());
+    let courses = hybrid::sweep(sweep.quick, &mut |course| {
+        if written.is_ok() {
+            written = sweep.tell(course);
+        }
+    })?;
+    written?;
+    if let Some(folder) = out {
+        write_csv(&counts, folder, "hybrid-table-6")?;
+        write_csv(&courses, folder, "hybrid")?;
+        let windows: Vec<&hybrid::Window> = courses.iter().flat_map(|course| &course.windows).collect();
+        write_csv(&windows, folder, "hybrid-rate")?;
+        hybrid::chart(&courses).write(folder, "hybrid")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn stability(sweep: &Sweep, only: Option<&str>, out: Option<&Folder>) -> anyhow::Result<ExitCode> {
     let mut written = Ok(());
     let maps = stability::maps(sweep.quick, only, &mut |trial| {
         if written.is_ok() {
@@ -308,7 +405,7 @@ fn stability(sweep: &Sweep, only: Option<&str>) -> anyhow::Result<ExitCode> {
         }
     })?;
     written?;
-    if let Some(folder) = &sweep.out {
+    if let Some(folder) = out {
         for map in &maps {
             map.write(folder)?;
         }
@@ -316,7 +413,7 @@ fn stability(sweep: &Sweep, only: Option<&str>) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn figures(name: &str, quick: bool, json: bool) -> anyhow::Result<ExitCode> {
+fn figures(name: &str, quick: bool, json: bool, claims: ClaimSource) -> anyhow::Result<ExitCode> {
     let program = std::env::current_exe().context("finding this program")?;
     let sample = sample::File::write().context("writing the sample to a temporary file")?;
     let plan = Plan {
@@ -324,17 +421,25 @@ fn figures(name: &str, quick: bool, json: bool) -> anyhow::Result<ExitCode> {
         program: &program,
         pair: sample.path(),
     };
-    let mut holds = true;
+    let claims = match claims {
+        ClaimSource::Kept => Claims::kept()?,
+        ClaimSource::Completed => Claims::completed()?,
+        ClaimSource::Measured => Claims::measured(),
+    };
     let mut written = Ok(());
-    figures::figures(name, &plan, &mut |row| {
-        holds &= row.holds;
+    let count = figures::figures(name, &plan, &claims, &mut |row| {
         let line = if json { output::json(&row) } else { tell_row(&row) };
         if written.is_ok() {
             written = line;
         }
     })?;
     written?;
-    Ok(if holds {
+    if json {
+        eprintln!("{count}");
+    } else {
+        output::line(&count.to_string())?;
+    }
+    Ok(if count.all_hold() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

@@ -8,21 +8,26 @@ mod contacts;
 mod demo;
 mod inspect;
 mod lab;
+mod mistyped;
 mod output;
 mod ports;
 mod probe;
+mod reading;
 mod rig;
 mod units;
+mod usage;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
+use mortise_output::{Existing, Output};
 use mortise_rig::RigSpec;
 
 use crate::session::Intent;
 use crate::ui::app::{self, Options, Screenshot};
+use reading::Reading;
 
 /// Feel whether CAD parts go together, before anything is made.
 ///
@@ -64,6 +69,8 @@ struct Open {
     /// STEP file to open
     file: Option<PathBuf>,
     #[command(flatten)]
+    reading: Reading,
+    #[command(flatten)]
     picture: Picture,
 }
 
@@ -73,34 +80,56 @@ struct Picture {
     /// Write a PNG of the window, then end
     #[arg(long, hide = true, value_name = "PNG")]
     screenshot: Option<PathBuf>,
+    /// Replace the PNG where it is there already
+    #[arg(long, hide = true, requires = "screenshot")]
+    force: bool,
     /// Seconds from the start to the picture
     #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
     after: f64,
     /// Draw fixed parts as glass
     #[arg(long, hide = true)]
     see_through: bool,
+    /// Connect to a rig at once
+    #[arg(long, hide = true, value_name = "RIG", value_parser = rig)]
+    connect: Option<RigSpec>,
 }
 
 impl Picture {
-    fn options(self, first: Vec<Intent>) -> Options {
-        let after = Duration::try_from_secs_f64(self.after).unwrap_or_default();
-        Options {
-            first,
-            screenshot: self.screenshot.map(|file| Screenshot { file, after }),
-            see_through: self.see_through,
+    fn options(self, mut first: Vec<Intent>) -> anyhow::Result<Options> {
+        if let Some(rig) = self.connect {
+            first.extend([Intent::ChooseRig(rig), Intent::Connect]);
         }
+        let existing = Existing::from_force(self.force);
+        let check = |file| Output::new(file, existing, &[""; 0]);
+        let file = self.screenshot.map(check).transpose()?;
+        let after = Duration::try_from_secs_f64(self.after).unwrap_or_default();
+        Ok(Options {
+            first,
+            screenshot: file.map(|file| Screenshot { file, after }),
+            see_through: self.see_through,
+        })
     }
 }
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let result = match Cli::parse() {
-        Cli { command: None, open } => window(open),
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage::tell(&error),
+    };
+    let result = match cli {
+        Cli { command: None, open } => {
+            let checked = open.file.as_deref().map_or(Ok(()), mistyped::check_lone);
+            checked.and_then(|()| window(open))
+        }
         Cli {
             command: Some(command),
             ..
         } => match command {
-            Command::Open(open) => window(open),
+            Command::Open(open) => {
+                let checked = open.file.as_deref().map_or(Ok(()), mistyped::check_file);
+                checked.and_then(|()| window(open))
+            }
             Command::Inspect(args) => inspect::run(&args),
             Command::Contacts(args) => contacts::run(&args),
             Command::Bake(args) => bake::run(&args),
@@ -136,8 +165,9 @@ fn one_line(error: &anyhow::Error) -> String {
 }
 
 fn window(open: Open) -> anyhow::Result<ExitCode> {
+    open.reading.apply();
     let first = open.file.map(Intent::Open).into_iter().collect();
-    app::run(open.picture.options(first))?;
+    app::run(open.picture.options(first)?)?;
     Ok(ExitCode::SUCCESS)
 }
 

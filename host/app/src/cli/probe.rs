@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use mortise_bake::{Method, PointshellKind};
 use mortise_lab::probe::{self, Model, ProbeScene};
 
-use super::output;
+use super::{Reading, output};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, value_name = "CSV")]
     poses: PathBuf,
     /// Cell edge of a STEP file's scene, mm [default: chosen so that the image fits]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     cell: Option<f64>,
     /// How contact is found in a STEP file's scene: distance-field or occupancy [default: distance-field]
     #[arg(long, value_name = "METHOD")]
@@ -32,8 +32,15 @@ pub struct Args {
     #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"])]
     shell: String,
     /// How far points of the classic shell are moved inward, percent of a voxel
-    #[arg(long, value_name = "PERCENT", default_value_t = 0.0)]
+    #[arg(
+        long,
+        value_name = "PERCENT",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
     shrink: f64,
+    #[command(flatten)]
+    reading: Reading,
     /// One JSON object a pose
     #[arg(long)]
     json: bool,
@@ -41,6 +48,7 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    args.reading.apply();
     // Cheap first: a mistake in the poses need not wait for a bake.
     let poses = probe::read_poses(&args.poses)?;
     let model = Model {

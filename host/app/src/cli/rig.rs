@@ -67,7 +67,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let client = client.restart()?;
             match client.rig()? {
                 (Some(kept), true) if kept == rig => {
-                    output::line(&format!("{} keeps `{}` and drives it", client.name(), rig.name))?;
+                    output::line(&sent(spec, &client, &rig.name))?;
                 }
                 _ => anyhow::bail!("the board does not use what was sent: send it again"),
             }
@@ -76,6 +76,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let client = Client::connect(spec)?;
             match client.rig()? {
                 (Some(rig), _) => output::line(write_rig(&rig).trim_end())?,
+                (None, _) if forgets(spec) => anyhow::bail!(
+                    "{} keeps no description: it lives in this program and ends with it, so what `mortise rig send` gave it is gone; a serial port keeps its own",
+                    client.name()
+                ),
                 (None, _) => anyhow::bail!(
                     "{} keeps no description (or a damaged one): its mechanism is the firmware's own; send one with `mortise rig send`",
                     client.name()
@@ -84,6 +88,22 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A rig of this program's own, in-process or emulated: what it keeps is gone when the program ends.
+fn forgets(spec: &RigSpec) -> bool {
+    matches!(spec, RigSpec::Simulated { .. } | RigSpec::Emulated { .. })
+}
+
+fn sent(spec: &RigSpec, client: &Client, name: &str) -> String {
+    if forgets(spec) {
+        format!(
+            "{} took `{name}` and drove it until this program ended; being part of the program it keeps nothing, a serial port does",
+            client.name()
+        )
+    } else {
+        format!("{} keeps `{name}` and drives it", client.name())
+    }
 }
 
 fn tell(found: &Abilities) -> anyhow::Result<()> {

@@ -22,6 +22,13 @@ pub fn bytes(text: &str) -> Result<u64, String> {
     Ok(value as u64)
 }
 
+/// Whole seconds, of processor time: `90` or `90s`.
+pub fn seconds(text: &str) -> Result<u64, String> {
+    let digits = text.trim().trim_end_matches('s');
+    let value = digits.parse::<u64>().ok().filter(|v| (1..=86_400).contains(v));
+    value.ok_or_else(|| format!("`{text}` is no time limit; give whole seconds from 1 to 86400"))
+}
+
 /// The value of a number followed by one of `units`.
 fn number(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     let text = text.trim();
@@ -43,6 +50,14 @@ mod tests {
         }
         for text in ["5", "um", "5 m", "NaNmm", "infmm", ""] {
             assert!(length_mm(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn time_limits() {
+        assert_eq!((seconds("1"), seconds("90s")), (Ok(1), Ok(90)));
+        for text in ["", "0", "-1", "1.5", "NaN", "86401", "1e9", "s"] {
+            assert!(seconds(text).is_err(), "{text}");
         }
     }
 

@@ -10,6 +10,7 @@ use mortise_brep::CadModel;
 
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
+use super::verdict::Watch;
 use crate::viewport::camera::Extent;
 use crate::viewport::mesh::{ShapeMesh, shown};
 
@@ -50,6 +51,8 @@ pub struct Document {
     pub poses: Vec<DAffine3>,
     /// A peg before a hole, if there is one.
     pub insertion: Option<Insertion>,
+    /// Says how insertions of the part in hand end.
+    pub watch: Watch,
     /// The scene image, once baked.
     pub baked: Option<Arc<Baked>>,
 }
@@ -97,6 +100,7 @@ impl Document {
             colors: colors(&model),
             poses,
             insertion,
+            watch: Watch::of(&model),
             baked: None,
             model: Arc::new(model),
         }

@@ -24,6 +24,8 @@ pub struct Sample {
     pub contact_nm: f32,
     /// Cost of the tick, in the board's unit.
     pub cost: f32,
+    /// Ticks that came too late since the board started.
+    pub late: u32,
 }
 
 impl Sample {
@@ -39,6 +41,7 @@ impl Sample {
             handle_nm: torque(&telemetry.wrench),
             contact_nm: torque(&telemetry.contact),
             cost: telemetry.cost as f32,
+            late: telemetry.missed,
         }
     }
 }
@@ -86,6 +89,12 @@ impl History {
         self.samples.back()
     }
 
+    /// Ticks that came too late within the span.
+    pub fn late(&self) -> u32 {
+        let ends = self.samples.front().zip(self.samples.back());
+        ends.map_or(0, |(oldest, newest)| newest.late.saturating_sub(oldest.late))
+    }
+
     /// Forgets all.
     pub fn clear(&mut self) {
         self.samples.clear();
@@ -109,6 +118,7 @@ mod tests {
             handle_nm: 0.0,
             contact_nm: 0.0,
             cost: 0.0,
+            late: 0,
         }
     }
 
@@ -125,6 +135,26 @@ mod tests {
         }
         assert_eq!(history.iter().len(), MAX_SAMPLES);
         assert!((history.largest(|s| s.handle_n) - 54.999_9).abs() < 1e-4);
+    }
+
+    /// A sum since the start would never go back to none.
+    #[test]
+    fn late_ticks_are_those_of_the_span() {
+        let mut history = History::default();
+        for i in 0..30 {
+            let late = if i < 5 { 3 * i } else { 15 };
+            history.add(Sample {
+                late,
+                ..at(f64::from(i))
+            });
+            let expected = match i {
+                0..5 => late,
+                5..=10 => 15,
+                11..15 => 15 - 3 * (i - 10),
+                _ => 0,
+            };
+            assert_eq!(history.late(), expected, "at {i} s");
+        }
     }
 
     #[test]

@@ -4,13 +4,15 @@
 //! faces: it only serves to show an insertion without anybody at the handle.
 
 use glam::{DAffine3, DQuat, DVec3};
-use mortise_brep::{CadModel, Surface};
+use mortise_brep::{CadModel, Shape, Surface};
 use mortise_protocol::message::{HandScript, Keyframe};
 
 use super::pose::{moved, to_wire};
 
 /// Axes may lean by this much, rad.
 const LEAN: f64 = 0.02;
+/// Walls nearer than this, mm and rad, are one.
+const SAME: f64 = 1e-6;
 /// The hole may be wider by this fraction.
 const SLACK: f64 = 0.2;
 
@@ -57,19 +59,65 @@ impl Default for Manner {
     }
 }
 
-struct Wall {
-    part: usize,
-    origin: DVec3,
-    axis: DVec3,
-    radius: f64,
+/// A wall of a cylinder, outer or inner.
+#[derive(Clone, Debug)]
+pub struct Wall {
+    /// Whose.
+    pub part: usize,
+    /// A point of the axis, mm.
+    pub origin: DVec3,
+    /// Along it, unit vector.
+    pub axis: DVec3,
+    /// mm.
+    pub radius: f64,
     /// Ends along the axis from the origin, mm.
-    ends: (f64, f64),
-    inner: bool,
+    pub ends: (f64, f64),
+    /// Of a bore.
+    pub inner: bool,
+    /// The part's faces it consists of: a modeller may split a wall in halves.
+    pub faces: Vec<u32>,
 }
 
 impl Wall {
-    fn middle(&self) -> DVec3 {
+    /// Middle of the axis between the ends.
+    pub fn middle(&self) -> DVec3 {
         self.origin + 0.5 * (self.ends.0 + self.ends.1) * self.axis
+    }
+
+    /// mm.
+    pub fn length(&self) -> f64 {
+        self.ends.1 - self.ends.0
+    }
+
+    /// The same where `pose` has it.
+    pub fn moved(&self, pose: &DAffine3) -> Self {
+        Self {
+            origin: pose.transform_point3(self.origin),
+            axis: pose.transform_vector3(self.axis),
+            ..self.clone()
+        }
+    }
+
+    /// Takes `other` in when it is another face of the same wall.
+    fn absorb(&mut self, other: &Self) -> bool {
+        let apart = other.origin - self.origin;
+        let shift = apart.dot(self.axis);
+        let same = (self.part, self.inner) == (other.part, other.inner)
+            && (self.radius - other.radius).abs() < SAME
+            && self.axis.cross(other.axis).length() < SAME
+            && (apart - shift * self.axis).length() < SAME;
+        if !same {
+            return false;
+        }
+        let along = other.axis.dot(self.axis).signum();
+        let [a, b] = [other.ends.0, other.ends.1].map(|end| shift + along * end);
+        // Two bores one after the other are two.
+        if a.min(b) > self.ends.1 + SAME || a.max(b) < self.ends.0 - SAME {
+            return false;
+        }
+        self.ends = (self.ends.0.min(a.min(b)), self.ends.1.max(a.max(b)));
+        self.faces.extend(&other.faces);
+        true
     }
 }
 
@@ -119,40 +167,56 @@ fn pair(peg: &Wall, hole: &Wall) -> Option<Insertion> {
 }
 
 fn walls(model: &CadModel, poses: &[DAffine3]) -> Vec<Wall> {
-    let mut walls = Vec::new();
-    for (index, (part, pose)) in model.parts.iter().zip(poses).enumerate() {
-        let Some(shape) = model.shapes.get(part.shape) else {
-            continue;
-        };
-        for (id, face) in shape.faces.iter().enumerate() {
-            let Surface::Cylinder { frame, radius } = face.surface else {
-                continue;
-            };
-            let along = |v: DVec3| (v - frame.origin).dot(frame.z);
-            let mut ends = (f64::INFINITY, f64::NEG_INFINITY);
-            for (corners, _) in (shape.mesh.triangles.iter().zip(&shape.mesh.triangle_face))
-                .filter(|&(_, &f)| f as usize == id)
-            {
-                for point in corners
-                    .iter()
-                    .filter_map(|&c| shape.mesh.vertices.get(c as usize))
-                {
-                    ends = (ends.0.min(along(*point)), ends.1.max(along(*point)));
-                }
-            }
-            if ends.1 - ends.0 > 1e-6 {
-                walls.push(Wall {
-                    part: index,
-                    origin: pose.transform_point3(frame.origin),
-                    axis: pose.transform_vector3(frame.z),
-                    radius,
-                    ends,
-                    inner: face.reversed,
-                });
+    (local_walls(model).iter())
+        .filter_map(|wall| Some(wall.moved(poses.get(wall.part)?)))
+        .collect()
+}
+
+/// Every cylinder wall, in its part's own frame, part by part in the order of their faces.
+pub fn local_walls(model: &CadModel) -> Vec<Wall> {
+    let mut walls: Vec<Wall> = Vec::new();
+    for (index, part) in model.parts.iter().enumerate() {
+        let first = walls.len();
+        for wall in (model.shapes.get(part.shape)).map_or_else(Vec::new, |shape| walls_of(shape, index)) {
+            if !walls[first..].iter_mut().any(|known| known.absorb(&wall)) {
+                walls.push(wall);
             }
         }
     }
     walls
+}
+
+fn walls_of(shape: &Shape, part: usize) -> Vec<Wall> {
+    let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); shape.faces.len()];
+    for (corners, &face) in shape.mesh.triangles.iter().zip(&shape.mesh.triangle_face) {
+        let Some((face, ends)) = shape.faces.get(face as usize).zip(ends.get_mut(face as usize)) else {
+            continue;
+        };
+        let Surface::Cylinder { frame, .. } = &face.surface else {
+            continue;
+        };
+        for point in corners
+            .iter()
+            .filter_map(|&c| shape.mesh.vertices.get(c as usize))
+        {
+            let along = (*point - frame.origin).dot(frame.z);
+            *ends = (ends.0.min(along), ends.1.max(along));
+        }
+    }
+    (shape.faces.iter().zip(ends).enumerate())
+        .filter_map(|(id, (face, ends))| match face.surface {
+            Surface::Cylinder { frame, radius } if ends.1 - ends.0 > SAME => Some(Wall {
+                part,
+                origin: frame.origin,
+                axis: frame.z,
+                radius,
+                ends,
+                inner: face.reversed,
+                faces: vec![id as u32],
+            }),
+            _ => None,
+        })
+        .collect()
 }
 
 /// The hand's script: first aside and tilted, in all the way, then pushed to the wall. `handle` is where the handle is now; the part is
@@ -216,7 +280,7 @@ pub fn hold(pose: &DAffine3) -> HandScript {
 
 #[cfg(test)]
 mod tests {
-    use mortise_brep::{Face, Frame, Mesh, Part, Shape};
+    use mortise_brep::{Face, Frame, Mesh, Part};
 
     use super::*;
 
@@ -275,6 +339,23 @@ mod tests {
         assert!((found.direction + DVec3::Z).length() < 1e-12);
         assert!((found.travel_mm - 60.0).abs() < 1e-9 && (found.hole_mm - 40.0).abs() < 1e-9);
         assert!((found.clearance_mm - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn halves_of_a_wall_are_one_and_bores_in_a_row_are_two() {
+        let (mut model, _) = model(20.0);
+        let half = model.shapes[0].faces[0].clone();
+        let shape = &mut model.shapes[0];
+        shape.faces.push(half);
+        let corners = shape.mesh.triangles[0];
+        shape.mesh.triangles.push(corners);
+        shape.mesh.triangle_face.push(1);
+        let walls = local_walls(&model);
+        assert_eq!(walls.len(), 2);
+        assert_eq!(walls[0].faces, [0, 1]);
+        let mut below = walls[0].clone();
+        below.ends = (-50.0, -10.0);
+        assert!(!below.absorb(&walls[0]));
     }
 
     #[test]

@@ -35,10 +35,14 @@ pub enum Intent {
     ChooseRig(RigSpec),
     /// Connect to the chosen rig.
     Connect,
+    /// Connect again to the rig whose link was lost.
+    Reconnect,
     /// Let the rig go.
     Disconnect,
     /// Send the scene to the board.
     Upload,
+    /// End the sending under way; the scene in use stays.
+    CancelUpload,
     /// Motors on.
     Arm,
     /// Motors off.
@@ -126,11 +130,20 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             _ => no("Disconnect first"),
         },
         Intent::Connect => connect(session),
+        Intent::Reconnect => match (&session.lost, &session.link) {
+            (None, _) => no("No link was lost"),
+            (Some(_), Link::None) => None,
+            (Some(_), _) => no("Connecting"),
+        },
         Intent::Disconnect => match session.link {
             Link::None => no(NO_RIG),
             _ => None,
         },
         Intent::Upload => upload(session),
+        Intent::CancelUpload => match session.connection() {
+            Some(connection) if connection.upload.is_some() => None,
+            _ => no("Nothing is being sent"),
+        },
         Intent::Arm => arm(session),
         Intent::Disarm => match session.device() {
             None => no(NO_RIG),

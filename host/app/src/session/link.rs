@@ -3,7 +3,9 @@
 //! One thread connects and then carries out commands one after another; another passes on what the board says unasked.
 //! STOP goes past both: it is written by whoever calls [`Connection::stop`], even while a scene is being sent.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -16,10 +18,20 @@ use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 
 use super::document::Document;
 use super::guidance::Tap;
-use super::work::{Outbox, Update};
+use super::work::{Cancel, Outbox, Update};
 
 /// Ticks between telemetry messages: some 60 a second, half of what an emulated UART carries.
 pub const TELEMETRY_TICKS: u16 = 16;
+
+/// Between two pictures for samples while the motors are off and the handle rests, as long as what the readout of late ticks covers. With software
+/// rendering a picture of 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
+const CALM: Duration = Duration::from_secs(10);
+
+/// A silent link is noticed within this after the first answer that is missing.
+const NOTICED: Duration = Duration::from_secs(1);
+
+/// Motion of the handle that is worth a picture at once, m: a digit of what is shown.
+const MOVED_M: f32 = 1e-4;
 
 /// Longest wait for a connection to end when the program does: longer than a rig is greeted, so that an emulator that has just been
 /// started is ended as well. The window is gone by then.
@@ -35,6 +47,8 @@ pub enum Command {
         baked: Arc<Baked>,
         /// Of which document.
         generation: u64,
+        /// Ends it early.
+        cancel: Cancel,
     },
     /// Ask for the counters.
     Statistics,
@@ -62,14 +76,16 @@ pub enum LinkUpdate {
         /// One line why not.
         result: Result<(), String>,
     },
+    /// Not answered because the link is gone, which [`Event::LinkLost`] tells once; or a question of the window's own that nobody waits for.
+    Unanswered,
     /// How much of the scene is there.
     Uploading(UploadProgress),
     /// The scene was sent, or why not.
     Uploaded {
         /// Of which document.
         generation: u64,
-        /// One line why not.
-        result: Result<(), String>,
+        /// `false`: the operator ended it. An error is one line why not.
+        result: Result<bool, String>,
     },
     /// The counters.
     Statistics(Statistics),
@@ -110,10 +126,13 @@ pub struct Connection {
     pub refused_scene_of: Option<u64>,
     /// The scene being sent.
     pub upload: Option<UploadProgress>,
+    /// Since when.
+    pub upload_since: Instant,
     /// Counters, asked for now and then.
     pub statistics: Option<Statistics>,
     /// To the thread that guides.
     pub tap: Tap,
+    upload_cancel: Cancel,
     client: Arc<Client>,
     commands: Sender<Command>,
     thread: Option<JoinHandle<()>>,
@@ -158,7 +177,14 @@ pub fn connect(outbox: &Outbox, id: u64, spec: RigSpec) -> Link {
 
 /// Connects, then does what it is told until the other end is dropped.
 fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
-    let say = |update: LinkUpdate| outbox.send(Update::Link { id, update });
+    let say = |update: LinkUpdate| match update {
+        // Worth no picture of its own.
+        LinkUpdate::Statistics(_) | LinkUpdate::Unanswered => {
+            outbox.send_quietly(Update::Link { id, update })
+        }
+        update => outbox.send(Update::Link { id, update }),
+    };
+    Closing::wait();
     let client = match Client::connect(spec) {
         Ok(client) => Arc::new(client),
         Err(error) => {
@@ -183,10 +209,10 @@ fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
         return;
     }
     let passing_on = {
-        let outbox = outbox.clone();
+        let (outbox, state) = (outbox.clone(), client.state());
         std::thread::Builder::new()
             .name("mortise-events".into())
-            .spawn(move || pass_on(&outbox, id, &events, &tap))
+            .spawn(move || pass_on(&outbox, id, &events, &tap, state))
     };
     if let Err(error) = passing_on {
         say(LinkUpdate::Event(Event::LinkLost(
@@ -213,11 +239,18 @@ fn introduce(client: &Client) -> Result<Vec<(ParameterId, f32)>, RigError> {
 
 fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool) -> LinkUpdate {
     match command {
-        Command::Request(message) => {
-            let result = client.request((*message).clone()).map_err(|e| e.to_string());
-            LinkUpdate::Answered { message, result }
-        }
-        Command::Upload { baked, generation } => {
+        Command::Request(message) => match client.request((*message).clone()) {
+            Err(error) if is_the_links(client, &error) => LinkUpdate::Unanswered,
+            result => LinkUpdate::Answered {
+                message,
+                result: result.map_err(|error| error.to_string()),
+            },
+        },
+        Command::Upload {
+            baked,
+            generation,
+            cancel,
+        } => {
             let mut last = 0;
             let mut progress = |now: UploadProgress| {
                 // A hundred steps are enough to look at.
@@ -225,32 +258,86 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
                     last = now.sent;
                     say(LinkUpdate::Uploading(now));
                 }
+                match cancel.is_set() {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
             };
-            let result = client
-                .upload(&baked.image, &mut progress)
-                .map_err(|e| e.to_string());
-            LinkUpdate::Uploaded { generation, result }
+            match client.upload_while(&baked.image, &mut progress) {
+                Err(error) if is_the_links(client, &error) => LinkUpdate::Unanswered,
+                result => LinkUpdate::Uploaded {
+                    generation,
+                    result: result
+                        .map(|end| end.is_continue())
+                        .map_err(|error| error.to_string()),
+                },
+            }
         }
         Command::Statistics => match client.statistics(false) {
             Ok(statistics) => LinkUpdate::Statistics(statistics),
-            Err(error) => LinkUpdate::Answered {
-                message: Box::new(ToDevice::GetStatistics { reset: false }),
-                result: Err(error.to_string()),
-            },
+            Err(_) => LinkUpdate::Unanswered,
         },
     }
 }
 
+/// The link is gone, or going: an answer that does not come in time is followed by the link's end when the board is silent altogether.
+fn is_the_links(client: &Client, error: &RigError) -> bool {
+    match error {
+        RigError::LinkLost { .. } => true,
+        RigError::Timeout { .. } => {
+            std::thread::sleep(NOTICED);
+            matches!(client.send(ToDevice::Heartbeat), Err(RigError::LinkLost { .. }))
+        }
+        _ => false,
+    }
+}
+
+/// Motors may push: every sample is worth a picture.
+fn is_live(state: DeviceState) -> bool {
+    matches!(
+        state,
+        DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop
+    )
+}
+
 /// Passes events on until there are no more.
-fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap) {
+///
+/// While the motors are off and the handle rests nothing in a sample moves on screen but the traces, so the window is woken for one of many:
+/// drawing each would keep a core busy where there is no graphics card.
+fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, state: DeviceState) {
+    let mut live = is_live(state);
+    let mut woken = Instant::now();
+    let mut seen = [0.0; 3];
     loop {
         match events.recv_timeout(Duration::from_secs(1)) {
             Ok(event) => {
                 if let Event::Telemetry(sample) = &event {
                     tap.offer(sample);
                 }
+                if let Event::State { state, .. } = &event {
+                    live = is_live(*state);
+                }
+                let quiet = match &event {
+                    Event::Telemetry(sample) if !live && woken.elapsed() < CALM => {
+                        let at = sample.handle.position;
+                        at.iter()
+                            .zip(seen)
+                            .all(|(now, then)| (now - then).abs() < MOVED_M)
+                    }
+                    _ => false,
+                };
+                if let (Event::Telemetry(sample), false) = (&event, quiet) {
+                    seen = sample.handle.position;
+                }
                 let update = LinkUpdate::Event(event);
-                if !outbox.send(Update::Link { id, update }) {
+                let update = Update::Link { id, update };
+                let heard = if quiet {
+                    outbox.send_quietly(update)
+                } else {
+                    woken = Instant::now();
+                    outbox.send(update)
+                };
+                if !heard {
                     return;
                 }
             }
@@ -278,6 +365,8 @@ impl Connection {
             scene_of: None,
             refused_scene_of: None,
             upload: None,
+            upload_since: Instant::now(),
+            upload_cancel: Cancel::default(),
             statistics: None,
             tap,
             client,
@@ -301,6 +390,24 @@ impl Connection {
         self.command(Command::Request(Box::new(message)));
     }
 
+    /// Starts sending a scene.
+    pub fn send_scene(&mut self, baked: Arc<Baked>, generation: u64) {
+        let total = baked.image.len();
+        self.upload = Some(UploadProgress { sent: 0, total });
+        self.upload_since = Instant::now();
+        self.upload_cancel = Cancel::default();
+        self.command(Command::Upload {
+            baked,
+            generation,
+            cancel: self.upload_cancel.clone(),
+        });
+    }
+
+    /// Ends the sending under way; the scene in use stays.
+    pub fn cancel_upload(&self) {
+        self.upload_cancel.set();
+    }
+
     /// Starts to guide in the scene that is on the board now.
     pub fn guide(&self, document: &Document, settings: GuideSettings, outbox: &Outbox) {
         let Some(baked) = &document.baked else { return };
@@ -319,10 +426,12 @@ impl Connection {
     pub fn stop(&self, outbox: &Outbox) {
         let (client, outbox, id) = (Arc::clone(&self.client), outbox.clone(), self.id);
         super::work::spawn("mortise-stop", move || {
-            let result = client.stop().map_err(|error| error.to_string());
-            let update = LinkUpdate::Answered {
-                message: Box::new(ToDevice::Stop),
-                result,
+            let update = match client.stop() {
+                Err(RigError::LinkLost { .. }) => LinkUpdate::Unanswered,
+                result => LinkUpdate::Answered {
+                    message: Box::new(ToDevice::Stop),
+                    result: result.map_err(|error| error.to_string()),
+                },
             };
             outbox.send(Update::Link { id, update });
         });
@@ -381,6 +490,34 @@ impl Connection {
     }
 }
 
+/// Connections of this program that are being closed.
+static CLOSINGS: AtomicUsize = AtomicUsize::new(0);
+/// Longest wait for them before the next connection.
+const CLOSING_WAIT: Duration = Duration::from_secs(5);
+
+/// One connection that is being closed. Until it is, its thread may read from the port, and would take the answers to the next connection's greeting.
+struct Closing;
+
+impl Closing {
+    fn begin() -> Self {
+        CLOSINGS.fetch_add(1, Ordering::AcqRel);
+        Self
+    }
+
+    fn wait() {
+        let begun = Instant::now();
+        while CLOSINGS.load(Ordering::Acquire) > 0 && begun.elapsed() < CLOSING_WAIT {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Closing {
+    fn drop(&mut self) {
+        CLOSINGS.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
 impl Link {
     /// Ends the connection: motors off, threads and emulator ended. Waits for them when `wait` is set, but no longer
     /// than 40 s, else lets them end by themselves.
@@ -393,7 +530,9 @@ impl Link {
                 (Some(connection.client), connection.commands, connection.thread)
             }
         };
+        let closing = Closing::begin();
         let end = move || {
+            let _closing = closing;
             if let Some(client) = &client {
                 // Past whatever the other thread is doing; a lost link stops the board by itself.
                 let _ = client.stop();

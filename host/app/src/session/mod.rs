@@ -11,16 +11,19 @@ pub mod intent;
 pub mod link;
 pub mod notes;
 pub mod pose;
+pub mod remaining;
 pub mod touch;
 mod tour;
 pub mod tree;
 mod update;
+pub mod verdict;
 pub mod work;
 
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 use mortise_bake::{BakeOptions, Method};
@@ -33,9 +36,10 @@ use self::document::Document;
 use self::guidance::Wish;
 use self::history::History;
 pub use self::intent::{Intent, obstacle};
-use self::link::{Command, Connection, Link};
+use self::link::{Connection, Link};
 use self::notes::{Notes, Severity};
 use self::tour::Tour;
+use self::verdict::Verdict;
 use self::work::{Cancel, Outbox, Update};
 
 /// The force guidance may be limited to, N: from hardly felt to well below the coupling's.
@@ -48,8 +52,19 @@ pub struct Job {
     pub doing: String,
     /// 0 to 1 where it is known.
     pub fraction: Option<f32>,
+    /// Since when.
+    pub since: Instant,
     generation: u64,
     cancel: Cancel,
+}
+
+/// A link that was lost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lost {
+    /// To where.
+    pub spec: RigSpec,
+    /// Why, in words.
+    pub why: String,
 }
 
 /// Everything the window shows.
@@ -64,6 +79,10 @@ pub struct Session {
     pub chosen: RigSpec,
     /// The connection.
     pub link: Link,
+    /// The link was lost, and there is no new one yet.
+    pub lost: Option<Lost>,
+    /// How the last insertion ended, until the next one.
+    pub verdict: Option<Verdict>,
     /// Marked part.
     pub selected: Option<usize>,
     /// The last sample of the loop.
@@ -103,6 +122,8 @@ impl Session {
             rigs: Vec::new(),
             chosen: RigSpec::Simulated { realtime: true },
             link: Link::None,
+            lost: None,
+            verdict: None,
             selected: None,
             telemetry: None,
             history: History::default(),
@@ -163,12 +184,20 @@ impl Session {
             }
             Intent::RefreshRigs => work::list_rigs(&self.outbox),
             Intent::ChooseRig(spec) => self.chosen = spec,
-            Intent::Connect => {
-                self.link_id += 1;
-                self.link = link::connect(&self.outbox, self.link_id, self.chosen.clone());
+            Intent::Connect => self.connect(),
+            Intent::Reconnect => {
+                if let Some(lost) = &self.lost {
+                    self.chosen = lost.spec.clone();
+                    self.connect();
+                }
             }
             Intent::Disconnect => self.disconnect(),
             Intent::Upload => self.upload(),
+            Intent::CancelUpload => {
+                if let Some(connection) = self.connection() {
+                    connection.cancel_upload();
+                }
+            }
             Intent::Arm => self.request(ToDevice::Arm),
             Intent::Disarm => self.request(ToDevice::Disarm),
             Intent::Stop => self.stop(),
@@ -256,10 +285,16 @@ impl Session {
         self.job = Some(Job {
             doing,
             fraction: None,
+            since: Instant::now(),
             generation,
             cancel: cancel.clone(),
         });
         cancel
+    }
+
+    fn connect(&mut self) {
+        self.link_id += 1;
+        self.link = link::connect(&self.outbox, self.link_id, self.chosen.clone());
     }
 
     fn disconnect(&mut self) {
@@ -279,9 +314,29 @@ impl Session {
     /// What only a connection knows is gone; parts stay where they were last seen.
     fn forget_board(&mut self) {
         self.telemetry = None;
-        self.grip = None;
+        self.let_go();
         self.history.clear();
         self.guidance = List::default();
+    }
+
+    /// No part is in hand any more.
+    fn let_go(&mut self) {
+        self.grip = None;
+        let verdict = self.document.as_mut().and_then(|d| d.watch.let_go());
+        self.tell(verdict);
+    }
+
+    /// How an insertion ended: a message, and a card until the next one.
+    fn tell(&mut self, verdict: Option<Verdict>) {
+        if let Some(verdict) = verdict {
+            self.notes.add(verdict.severity(), verdict.to_string());
+            self.verdict = Some(verdict);
+        }
+    }
+
+    /// Longest a file is read.
+    pub fn reading_limit(&self) -> Duration {
+        Duration::from_secs(mortise_brep::LoadOptions::default().time_limit_s)
     }
 
     /// Guides in the scene that is on the board now.
@@ -310,10 +365,8 @@ impl Session {
         let (Some(baked), generation) = (document.baked.clone(), document.generation) else {
             return;
         };
-        let total = baked.image.len();
         if let Some(connection) = self.connection_mut() {
-            connection.upload = Some(mortise_rig::UploadProgress { sent: 0, total });
-            connection.command(Command::Upload { baked, generation });
+            connection.send_scene(baked, generation);
         }
     }
 

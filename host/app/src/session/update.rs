@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
 use mortise_bake::Baked;
 use mortise_protocol::message::{DeviceState, ResetReason, Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
@@ -10,10 +11,13 @@ use mortise_rig::{Client, Event, describe};
 use super::document::Document;
 use super::guidance::{Tap, Wish};
 use super::history::Sample;
+use super::insertion::Wall;
 use super::link::{Command, Connection, Link, LinkUpdate};
 use super::notes::Severity;
+use super::touch::Touch;
+use super::verdict::Moment;
 use super::work::Update;
-use super::{Intent, Session, pose};
+use super::{Intent, Lost, Session, pose};
 
 /// Samples between two questions for the counters: about two seconds.
 const STATISTICS_EVERY: u32 = 120;
@@ -97,6 +101,7 @@ fn opened(session: &mut Session, document: Document) {
         session.notes.add(Severity::Warning, warning.clone());
     }
     session.selected = None;
+    session.verdict = None;
     session.document = Some(document);
     session.forget_board();
     session.bake();
@@ -135,10 +140,14 @@ fn link(session: &mut Session, update: LinkUpdate) {
         LinkUpdate::Failed(why) => {
             std::mem::replace(&mut session.link, Link::None).close(false);
             session.tour = None;
+            if let Some(lost) = &mut session.lost {
+                lost.why.clone_from(&why);
+            }
             session.notes.add(Severity::Error, why);
         }
         LinkUpdate::Event(event) => self::event(session, event),
         LinkUpdate::Answered { message, result } => answered(session, &message, result),
+        LinkUpdate::Unanswered => {}
         LinkUpdate::Uploading(progress) => {
             if let Some(connection) = session.connection_mut() {
                 connection.upload = Some(progress);
@@ -164,6 +173,7 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
         return;
     };
     let connection = Connection::new(id, spec, client, tap, commands, thread);
+    session.lost = None;
     session.notes.add(
         Severity::Good,
         format!(
@@ -217,10 +227,14 @@ fn event(session: &mut Session, event: Event) {
             }
             connection.state = state;
             if state != DeviceState::Active {
-                session.grip = None;
+                session.let_go();
+            }
+            // The fault itself was reported in the tick it was seen.
+            if matches!(state, DeviceState::Fault(_)) {
+                return;
             }
             let severity = match state {
-                DeviceState::Stopped | DeviceState::Fault(_) => Severity::Error,
+                DeviceState::Stopped => Severity::Error,
                 DeviceState::Armed => Severity::Good,
                 _ => Severity::Info,
             };
@@ -231,12 +245,19 @@ fn event(session: &mut Session, event: Event) {
         Event::Fault { fault, .. } => session.notes.add(Severity::Error, describe(fault)),
         Event::Log(line) => session.notes.add(Severity::Info, format!("Board: {line}")),
         Event::LinkLost(why) => {
-            std::mem::replace(&mut session.link, Link::None).close(false);
+            let link = std::mem::replace(&mut session.link, Link::None);
+            if let Link::Connected(connection) = &link {
+                session.lost = Some(Lost {
+                    spec: connection.spec.clone(),
+                    why: why.clone(),
+                });
+            }
+            link.close(false);
             session.forget_board();
             session.tour = None;
             session.notes.add(
                 Severity::Error,
-                format!("The link to the board is lost: {why}; the board switches its motors off by itself; connect again"),
+                format!("The link to the board is lost: {why}; the board switches its motors off by itself; press Reconnect"),
             );
         }
     }
@@ -257,7 +278,9 @@ fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
         }
         if session.grip.is_none_or(|(held, _)| held != part) {
             session.grip = Some((part, pose::from_wire(&telemetry.handle).inverse() * object));
+            session.verdict = None;
         }
+        watch(session, part, &telemetry, &sample);
     }
     session.telemetry = Some(telemetry);
     session.samples_since_statistics += 1;
@@ -266,6 +289,58 @@ fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
         if let Some(connection) = session.connection() {
             connection.command(Command::Statistics);
         }
+    }
+}
+
+/// Whether the part in hand has gone in, or is stuck.
+fn watch(session: &mut Session, held: usize, telemetry: &Telemetry, sample: &Sample) {
+    let Some(document) = &mut session.document else {
+        return;
+    };
+    let moment = Moment {
+        time_s: sample.time_s,
+        held,
+        contact_n: DVec3::from(telemetry.contact.force.map(f64::from)),
+        handle_n: f64::from(sample.handle_n),
+    };
+    // Taken out, because what it meets is a question to the rest of the document.
+    let mut watch = std::mem::take(&mut document.watch);
+    let verdict = watch.sample(&document.poses, &moment, |walls| {
+        blocker(document, held, telemetry, walls)
+    });
+    document.watch = watch;
+    session.tell(verdict);
+}
+
+/// What the part in hand meets, in words: “rim of plate, hole 2”.
+fn blocker(document: &Document, held: usize, telemetry: &Telemetry, walls: &[Wall]) -> String {
+    let Some((pair, part)) = (telemetry.pairs.first())
+        .and_then(|pair| document.model_part(pair.static_part).map(|part| (pair, part)))
+    else {
+        return "nothing that is seen".to_owned();
+    };
+    let faces = [pair.static_face, pair.static_edge_face];
+    let touch = Touch::of(document, part, faces, pose::point_from_wire(pair.point));
+    let bores: Vec<&Wall> = (walls.iter())
+        .filter(|wall| wall.part == part && wall.inner)
+        .collect();
+    let met = (bores.iter()).position(|bore| faces.iter().any(|&f| bore.faces.contains(&u32::from(f))));
+    let what = match (touch, met) {
+        (Touch::Edge, Some(_)) => "rim".to_owned(),
+        (Touch::Face, Some(_)) => "wall".to_owned(),
+        (other, _) => other.to_string(),
+    };
+    let name = document.part_name(part);
+    let own = Touch::of(
+        document,
+        held,
+        [pair.moving_face, pair.moving_edge_face],
+        pose::point_from_wire(pair.point),
+    );
+    match met {
+        Some(index) if bores.len() > 1 => format!("{what} of {name}, hole {}", index + 1),
+        Some(_) => format!("{what} of {name}"),
+        None => format!("{own} on {what} of {name}"),
     }
 }
 
@@ -280,18 +355,28 @@ fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String
     }
     if let (ToDevice::ResetScene, Some(document)) = (message, &mut session.document) {
         document.reset_poses();
+        session.verdict = None;
         session.guide_wish(Wish::PutBack);
     }
 }
 
-fn uploaded(session: &mut Session, generation: u64, result: Result<(), String>) {
+fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>) {
     let current = session.document.as_ref().map(|d| d.generation);
     let Some(connection) = session.connection_mut() else {
         return;
     };
     connection.upload = None;
     match result {
-        Ok(()) => {
+        Ok(false) => {
+            // Sent again only when the operator wants it.
+            connection.refused_scene_of = Some(generation);
+            session.tour = None;
+            session.notes.add(
+                Severity::Info,
+                "Sending cancelled: the scene the board had stays in use",
+            );
+        }
+        Ok(true) => {
             connection.scene_of = Some(generation);
             connection.refused_scene_of = None;
             if current == Some(generation) {

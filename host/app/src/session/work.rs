@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread;
 
 use mortise_bake::{BakeError, BakeOptions, Baked, Progress, Stage};
@@ -84,6 +84,16 @@ impl Outbox {
         let sent = self.sender.send(update).is_ok();
         (self.wake)();
         sent
+    }
+
+    /// Sends without waking the window: it is taken in with whatever wakes it next. `false` when nobody listens any more.
+    pub fn send_quietly(&self, update: Update) -> bool {
+        match self.sender.try_send(update) {
+            Ok(()) => true,
+            // A window that takes nothing in is woken, and waited for.
+            Err(TrySendError::Full(update)) => self.send(update),
+            Err(TrySendError::Disconnected(_)) => false,
+        }
     }
 
     /// Sends, unless too much waits already; says whether it did.

@@ -1,13 +1,13 @@
 //! The program's window: ties [`Window`] to eframe, and takes the screenshot automation asks for.
 
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use egui::{ColorImage, Vec2, ViewportCommand};
+use mortise_output::Output;
 
-use super::{Window, theme};
+use super::{Window, fonts, theme};
 use crate::session::{Intent, Session};
 use crate::viewport::surface::Surface;
 
@@ -15,7 +15,7 @@ use crate::viewport::surface::Surface;
 #[derive(Clone, Debug)]
 pub struct Screenshot {
     /// PNG file to write.
-    pub file: PathBuf,
+    pub file: Output,
     /// After the window appeared.
     pub after: Duration,
 }
@@ -55,9 +55,13 @@ pub fn run(options: Options) -> anyhow::Result<()> {
             .with_title("Mortise")
             .with_app_id("mortise")
             .with_inner_size(Vec2::new(1520.0, 940.0))
-            .with_min_inner_size(Vec2::new(980.0, 640.0))
+            // Small enough for the smallest screen at the largest scale, or the window would be larger than the screen.
+            .with_min_inner_size(Vec2::new(240.0, 180.0))
+            .with_clamp_size_to_monitor_size(true)
             .with_icon(icon()),
         renderer: eframe::Renderer::Wgpu,
+        // Done by `fonts::install`, which tests use as well.
+        system_font_fallback: false,
         ..Default::default()
     };
     eframe::run_native(
@@ -65,6 +69,7 @@ pub fn run(options: Options) -> anyhow::Result<()> {
         native,
         Box::new(move |creation| {
             theme::apply(&creation.egui_ctx);
+            fonts::install(&creation.egui_ctx);
             let ctx = creation.egui_ctx.clone();
             let mut window = Window::new(Session::new(Arc::new(move || ctx.request_repaint())));
             window.view.see_through = options.see_through;
@@ -105,8 +110,9 @@ impl eframe::App for App {
         self.take_screenshot(ui.ctx());
     }
 
-    fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
-        theme::GROUND.to_normalized_gamma_f32()
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        let theme = egui::Theme::from_dark_mode(visuals.dark_mode);
+        theme::palette(theme).ground.to_normalized_gamma_f32()
     }
 }
 
@@ -153,11 +159,11 @@ impl App {
     }
 }
 
-fn write_png(path: &std::path::Path, image: &ColorImage) -> anyhow::Result<()> {
-    let what = || format!("cannot write the screenshot to {}", path.display());
-    let file = std::fs::File::create(path).with_context(what)?;
+fn write_png(target: &Output, image: &ColorImage) -> anyhow::Result<()> {
+    let what = || format!("cannot write the screenshot to {}", target.path().display());
     let [width, height] = image.size.map(|n| n as u32);
-    let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), width, height);
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     let bytes: Vec<u8> = (image.pixels.iter())
@@ -165,12 +171,14 @@ fn write_png(path: &std::path::Path, image: &ColorImage) -> anyhow::Result<()> {
         .collect();
     let mut writer = encoder.write_header().with_context(what)?;
     writer.write_image_data(&bytes).with_context(what)?;
-    writer.finish().with_context(what)
+    writer.finish().with_context(what)?;
+    target.write(&file).with_context(what)
 }
 
 /// The mark, 64 pixels a side: a tenon over its mortise.
 fn icon() -> egui::IconData {
     const SIDE: usize = 64;
+    let ink = theme::palette(egui::Theme::Dark);
     let mut rgba = vec![0u8; 4 * SIDE * SIDE];
     let mut fill = |x: std::ops::Range<usize>, y: std::ops::Range<usize>, color: egui::Color32| {
         for row in y {
@@ -179,10 +187,10 @@ fn icon() -> egui::IconData {
             }
         }
     };
-    fill(23..41, 3..33, theme::HELD);
-    fill(6..21, 37..62, theme::TEXT);
-    fill(43..58, 37..62, theme::TEXT);
-    fill(6..58, 52..62, theme::TEXT);
+    fill(23..41, 3..33, ink.held);
+    fill(6..21, 37..62, ink.text);
+    fill(43..58, 37..62, ink.text);
+    fill(6..58, 52..62, ink.text);
     egui::IconData {
         rgba,
         width: SIDE as u32,

@@ -1,5 +1,6 @@
 //! Small building blocks: buttons that know what stands in their way, chips, section headings.
 
+use egui::text::{LayoutJob, TextWrapping};
 use egui::{
     Align2, Button, Color32, CornerRadius, FontId, Response, RichText, Role, Sense, Stroke, Ui, Vec2,
     WidgetInfo,
@@ -30,17 +31,21 @@ pub fn intent_button(
 }
 
 /// A button in the accent colour: the next thing to do.
-pub fn primary(text: &str) -> Button<'_> {
-    Button::new(RichText::new(text).color(theme::TEXT_STRONG)).fill(theme::ACCENT_DIM)
+pub fn primary<'a>(ui: &Ui, text: &'a str) -> Button<'a> {
+    let ink = theme::of(ui);
+    Button::new(RichText::new(text).color(ink.text_strong)).fill(ink.accent_dim)
 }
 
-/// A small rounded label with a dot: a state at a glance.
-pub fn chip(ui: &mut Ui, color: Color32, text: &str) -> Response {
-    let font = FontId::proportional(13.0);
-    let galley = ui
-        .painter()
-        .layout_no_wrap(text.to_owned(), font, theme::TEXT_STRONG);
-    let size = Vec2::new(galley.size().x + 34.0, 28.0);
+/// Narrowest chip, points: a short word stays as easy to find as a long one.
+const CHIP_MIN: f32 = 64.0;
+
+/// A small rounded label with a dot: a state at a glance, never wider than `width` unless that is less than [`CHIP_MIN`].
+pub fn chip(ui: &mut Ui, color: Color32, text: &str, width: f32) -> Response {
+    let ink = theme::of(ui).text_strong;
+    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(13.0), ink);
+    job.wrap = TextWrapping::truncate_at_width((width - 34.0).max(0.0));
+    let galley = ui.painter().layout_job(job);
+    let size = Vec2::new((galley.size().x + 34.0).max(CHIP_MIN), 28.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let painter = ui.painter();
     painter.rect(
@@ -52,7 +57,7 @@ pub fn chip(ui: &mut Ui, color: Color32, text: &str) -> Response {
     );
     painter.circle_filled(rect.left_center() + Vec2::new(14.0, 0.0), 4.0, color);
     let at = rect.left_center() + Vec2::new(24.0, -0.5 * galley.size().y);
-    painter.galley(at, galley, theme::TEXT_STRONG);
+    painter.galley(at, galley, ink);
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
     response
 }
@@ -62,7 +67,7 @@ pub fn section(ui: &mut Ui, text: &str) {
     ui.label(
         RichText::new(text.to_uppercase())
             .size(11.0)
-            .color(theme::TEXT_WEAK)
+            .color(theme::of(ui).text_weak)
             .strong(),
     );
 }
@@ -71,8 +76,11 @@ pub fn section(ui: &mut Ui, text: &str) {
 pub fn divider(ui: &mut Ui) {
     ui.add_space(8.0);
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 1.0), Sense::hover());
-    ui.painter()
-        .hline(rect.x_range(), rect.center().y, Stroke::new(1.0, theme::LINE));
+    ui.painter().hline(
+        rect.x_range(),
+        rect.center().y,
+        Stroke::new(1.0, theme::of(ui).line),
+    );
     ui.add_space(8.0);
 }
 
@@ -86,7 +94,7 @@ pub fn rich_row(ui: &mut Ui, name: &str, value: RichText) -> Response {
     ui.scope(|ui| {
         ui.spacing_mut().interact_size.y = 21.0;
         ui.horizontal(|ui| {
-            ui.label(RichText::new(name).color(theme::TEXT_WEAK));
+            ui.label(RichText::new(name).color(theme::of(ui).text_weak));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 ui.add(egui::Label::new(value).truncate());
             });
@@ -96,16 +104,16 @@ pub fn rich_row(ui: &mut Ui, name: &str, value: RichText) -> Response {
 }
 
 /// The mark of the program: a tenon over its mortise.
-pub fn mark(painter: &egui::Painter, rect: egui::Rect, color: Color32) {
+pub fn mark(ui: &Ui, rect: egui::Rect, color: Color32) {
     let at = |x: f32, y: f32| rect.min + Vec2::new(x * rect.width(), y * rect.height());
     let fill = |a: (f32, f32), b: (f32, f32), color: Color32| {
-        painter.rect_filled(
+        ui.painter().rect_filled(
             egui::Rect::from_two_pos(at(a.0, a.1), at(b.0, b.1)),
             CornerRadius::same((rect.width() * 0.05) as u8),
             color,
         );
     };
-    fill((0.36, 0.02), (0.64, 0.50), theme::HELD);
+    fill((0.36, 0.02), (0.64, 0.50), theme::of(ui).held);
     fill((0.08, 0.56), (0.32, 0.98), color);
     fill((0.68, 0.56), (0.92, 0.98), color);
     fill((0.08, 0.82), (0.92, 0.98), color);

@@ -1,12 +1,13 @@
 //! STEP files dragged onto the window.
 
-use egui::{Color32, CornerRadius, Id, LayerId, Order, Stroke};
+use egui::{Color32, CornerRadius, Id, LayerId, Order, Stroke, Ui};
 
-use super::{control, theme};
+use super::{control, header, theme};
 use crate::session::{Intent, Session, obstacle};
 
 /// Shows where a dragged file would go, and opens what was dropped.
-pub fn show(ctx: &egui::Context, session: &mut Session, wanted: &mut Vec<Intent>) {
+pub fn show(ui: &Ui, session: &mut Session, wanted: &mut Vec<Intent>) {
+    let ctx = ui.ctx();
     let (hovering, dropped) = ctx.input(|i| {
         let dropped: Vec<_> = (i.raw.dropped_files.iter())
             .map(|file| file.path().to_owned())
@@ -14,20 +15,22 @@ pub fn show(ctx: &egui::Context, session: &mut Session, wanted: &mut Vec<Intent>
         (!i.raw.hovered_files.is_empty(), dropped)
     });
     if hovering {
-        let rect = ctx.content_rect();
+        // Below the bar: STOP and the state stay as they are.
+        let mut rect = ctx.content_rect();
+        rect.min.y += header::height(rect.width());
         let painter = ctx.layer_painter(LayerId::new(Order::Foreground, Id::unique("drop")));
         painter.rect(
             rect.shrink(10.0),
             CornerRadius::same(12),
             Color32::from_black_alpha(170),
-            Stroke::new(2.0, theme::ACCENT),
+            Stroke::new(2.0, theme::of(ui).accent),
             egui::StrokeKind::Inside,
         );
         let text = match obstacle(session, &Intent::OpenSample) {
             None => "Drop to open".to_owned(),
             Some(reason) => reason,
         };
-        control::centered(&painter, rect, &text, 26.0, theme::TEXT_STRONG);
+        control::centered(&painter, rect, &text, 26.0, Color32::WHITE);
     }
     match dropped.len() {
         0 => {}

@@ -8,47 +8,103 @@ use super::{control, stop, theme};
 use crate::session::link::Link;
 use crate::session::{Intent, Session};
 
-/// Draws it.
+/// Narrower than this, points, the bar has two rows.
+const ONE_ROW: f32 = 760.0;
+/// The state's label is never wider than this, points.
+const STATE_WIDTH: f32 = 260.0;
+/// Between two things of the bar, points.
+const GAP: f32 = 8.0;
+
+/// What the bar of a window of `width` points looks like.
+struct Shape {
+    rows: usize,
+    margin: egui::Margin,
+    stop: Vec2,
+    arm: Vec2,
+}
+
+impl Shape {
+    fn of(width: f32) -> Self {
+        if width >= ONE_ROW {
+            Self {
+                rows: 1,
+                margin: egui::Margin::symmetric(14, 10),
+                stop: Vec2::new(148.0, 44.0),
+                arm: Vec2::new(104.0, 36.0),
+            }
+        } else {
+            Self {
+                rows: 2,
+                margin: egui::Margin::symmetric(8, 6),
+                stop: Vec2::new(112.0, 40.0),
+                arm: Vec2::new(96.0, 30.0),
+            }
+        }
+    }
+
+    fn height(&self) -> f32 {
+        let second = if self.rows == 1 { 0.0 } else { self.arm.y + 4.0 };
+        self.stop.y + second + self.margin.sum().y
+    }
+}
+
+/// Height of the bar in a window of `width` points.
+pub fn height(width: f32) -> f32 {
+    Shape::of(width).height()
+}
+
+/// Draws it. STOP and the state come first, at the right and as wide as they need; everything else takes what is left.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let shape = Shape::of(ui.max_rect().width());
     egui::Panel::top("header")
-        .exact_size(64.0)
+        .exact_size(shape.height())
         .resizable(false)
         .show_separator_line(false)
-        .frame(theme::panel().inner_margin(egui::Margin::symmetric(14, 10)))
+        .frame(theme::panel(theme::of(ui)).inner_margin(shape.margin))
         .show(ui, |ui| {
-            ui.horizontal_centered(|ui| {
-                let (rect, _) = ui.allocate_exact_size(Vec2::splat(26.0), egui::Sense::hover());
-                control::mark(ui.painter(), rect, theme::TEXT);
-                ui.label(
-                    RichText::new("mortise")
-                        .size(19.0)
-                        .color(theme::TEXT_STRONG)
-                        .strong(),
-                );
-                ui.add_space(10.0);
-                let open = egui::Button::new("Open…").min_size(Vec2::new(72.0, 32.0));
-                control::intent_button(
-                    ui,
-                    session,
-                    wanted,
-                    open,
-                    Intent::Browse,
-                    "Open a STEP file (Ctrl+O)",
-                );
-                title(ui, session);
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    stop::button(ui, session, wanted);
-                    ui.add_space(4.0);
-                    arm(ui, session, wanted);
-                    ui.add_space(4.0);
-                    state(ui, session);
-                });
+            ui.spacing_mut().item_spacing = Vec2::new(GAP, 4.0);
+            let row = Vec2::new(ui.available_width(), shape.stop.y);
+            let from_right = Layout::right_to_left(Align::Center);
+            ui.allocate_ui_with_layout(row, from_right, |ui| {
+                stop::button(ui, session, wanted, shape.stop);
+                if shape.rows == 1 {
+                    arm(ui, session, wanted, shape.arm);
+                }
+                state(ui, session, ui.available_width().min(STATE_WIDTH));
+                if shape.rows == 1 {
+                    let left = Layout::left_to_right(Align::Center);
+                    ui.with_layout(left, |ui| file(ui, session, wanted, shape.arm.y - 4.0));
+                }
             });
+            if shape.rows == 2 {
+                let row = Vec2::new(ui.available_width(), shape.arm.y);
+                ui.allocate_ui_with_layout(row, from_right, |ui| {
+                    arm(ui, session, wanted, shape.arm);
+                    let left = Layout::left_to_right(Align::Center);
+                    ui.with_layout(left, |ui| file(ui, session, wanted, shape.arm.y));
+                });
+            }
         });
 }
 
+/// The program and what is open.
+fn file(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
+    if ui.available_width() > 220.0 {
+        let (rect, _) = ui.allocate_exact_size(Vec2::splat(26.0), egui::Sense::hover());
+        control::mark(ui, rect, theme::of(ui).text);
+        let name = RichText::new("mortise").size(19.0).strong();
+        ui.label(name.color(theme::of(ui).text_strong));
+        ui.add_space(4.0);
+    }
+    let open = egui::Button::new("Open…").min_size(Vec2::new(72.0, height));
+    let hint = "Open a STEP file (Ctrl+O)";
+    control::intent_button(ui, session, wanted, open, Intent::Browse, hint);
+    if ui.available_width() > 40.0 {
+        title(ui, session);
+    }
+}
+
 fn title(ui: &mut Ui, session: &Session) {
-    ui.add_space(6.0);
     let Some(document) = &session.document else {
         return;
     };
@@ -57,22 +113,23 @@ fn title(ui: &mut Ui, session: &Session) {
         None => "The sample that comes with the program".to_owned(),
     };
     ui.vertical(|ui| {
-        ui.add_space(4.0);
+        ui.add_space((0.5 * ui.available_height() - 18.0).max(0.0));
         ui.spacing_mut().item_spacing.y = 1.0;
-        let name = RichText::new(&document.title).color(theme::TEXT_STRONG);
+        let name = RichText::new(&document.title).color(theme::of(ui).text_strong);
         ui.add(egui::Label::new(name).truncate()).on_hover_text(hover);
         let parts = document.model.parts.len();
         let mut text = format!("{parts} part{}", if parts == 1 { "" } else { "s" });
         if let Some(baked) = &document.baked {
             text += &format!(", scene {} KiB", baked.image.len().div_ceil(1024));
         }
-        ui.label(RichText::new(text).small().color(theme::TEXT_WEAK));
+        let text = RichText::new(text).small().color(theme::of(ui).text_weak);
+        ui.add(egui::Label::new(text).truncate());
     });
 }
 
-fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
-    let size = Vec2::new(104.0, 36.0);
-    let text = |text: &str| RichText::new(text).size(15.0).color(theme::TEXT_STRONG);
+fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Vec2) {
+    let ink = theme::of(ui);
+    let text = |text: &str| RichText::new(text).size(15.0).color(ink.text_strong);
     match session.device() {
         Some(DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop) => {
             let button = egui::Button::new(text("Disarm")).min_size(size);
@@ -87,7 +144,7 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         }
         Some(DeviceState::Stopped | DeviceState::Fault(_)) => {
             let button = egui::Button::new(text("Clear stop"))
-                .fill(theme::ACCENT_DIM)
+                .fill(ink.accent_dim)
                 .min_size(size);
             control::intent_button(
                 ui,
@@ -100,15 +157,13 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         }
         Some(DeviceState::Homing) => {
             let button = egui::Button::new(text("Set home"))
-                .fill(theme::ACCENT_DIM)
+                .fill(ink.accent_dim)
                 .min_size(size);
             let hint = "Bring the handle to its marked pose first: the board counts from there";
             control::intent_button(ui, session, wanted, button, Intent::Home, hint);
         }
         _ => {
-            let button = egui::Button::new(text("Arm"))
-                .fill(theme::ACCENT_DIM)
-                .min_size(size);
+            let button = egui::Button::new(text("Arm")).fill(ink.accent_dim).min_size(size);
             control::intent_button(
                 ui,
                 session,
@@ -121,26 +176,27 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     }
 }
 
-fn state(ui: &mut Ui, session: &Session) {
+fn state(ui: &mut Ui, session: &Session, width: f32) {
+    let ink = theme::of(ui);
     let (color, text, hover) = match (&session.link, session.device()) {
         (Link::Connecting { spec, .. }, _) => (
-            theme::ACCENT,
+            ink.accent,
             "Connecting".to_owned(),
             format!("Waiting for {spec} to answer"),
         ),
         (_, None) => (
-            theme::TEXT_WEAK,
+            ink.text_weak,
             "No rig".to_owned(),
             "Choose a rig on the right and connect".to_owned(),
         ),
         (_, Some(device)) => {
             let (color, text) = match device {
-                DeviceState::Boot => (theme::ACCENT, "Starting"),
-                DeviceState::Homing => (theme::WARNING, "No reference"),
-                DeviceState::Idle => (theme::TEXT_WEAK, "Idle"),
-                DeviceState::Armed => (theme::GOOD, "Armed"),
-                DeviceState::Active => (theme::HELD, "In hand"),
-                DeviceState::SoftStop => (theme::WARNING, "Stopping"),
+                DeviceState::Boot => (ink.accent, "Starting"),
+                DeviceState::Homing => (ink.warning, "No reference"),
+                DeviceState::Idle => (ink.text_weak, "Idle"),
+                DeviceState::Armed => (ink.good, "Armed"),
+                DeviceState::Active => (ink.held, "In hand"),
+                DeviceState::SoftStop => (ink.warning, "Stopping"),
                 DeviceState::Stopped => (theme::STOP_HOVER, "Stopped"),
                 DeviceState::Fault(_) => (theme::STOP_HOVER, "Fault"),
             };
@@ -151,5 +207,5 @@ fn state(ui: &mut Ui, session: &Session) {
             (color, named.unwrap_or_else(|| text.to_owned()), describe(device))
         }
     };
-    control::chip(ui, color, &text).on_hover_text(hover);
+    control::chip(ui, color, &text, width).on_hover_text(hover);
 }

@@ -7,11 +7,11 @@ use crate::session::Session;
 use crate::session::notes::{Note, Severity};
 
 /// Colour of a severity.
-pub fn color(severity: Severity) -> Color32 {
+pub fn color(palette: &theme::Palette, severity: Severity) -> Color32 {
     match severity {
-        Severity::Info => theme::TEXT_WEAK,
-        Severity::Good => theme::GOOD,
-        Severity::Warning => theme::WARNING,
+        Severity::Info => palette.text_weak,
+        Severity::Good => palette.good,
+        Severity::Warning => palette.warning,
         Severity::Error => theme::STOP_HOVER,
     }
 }
@@ -22,8 +22,8 @@ pub fn show(ui: &mut Ui, session: &mut Session) {
         control::section(ui, "Messages");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             if session.notes.iter().len() > 0 {
-                let button =
-                    egui::Button::new(RichText::new("Clear").small().color(theme::TEXT_WEAK)).frame(false);
+                let button = egui::Button::new(RichText::new("Clear").small().color(theme::of(ui).text_weak))
+                    .frame(false);
                 if ui.add(button).on_hover_text("Forget all messages").clicked() {
                     session.notes.clear();
                 }
@@ -45,12 +45,12 @@ fn line(ui: &mut Ui, note: &Note) {
     ui.horizontal_top(|ui| {
         let (rect, _) = ui.allocate_exact_size(Vec2::new(8.0, 16.0), egui::Sense::hover());
         ui.painter()
-            .circle_filled(rect.center(), 3.5, color(note.severity));
+            .circle_filled(rect.center(), 3.5, color(theme::of(ui), note.severity));
         ui.vertical(|ui| {
             let ink = match note.severity {
-                Severity::Error => theme::FAULT_TEXT,
-                Severity::Info => theme::TEXT,
-                _ => theme::TEXT_STRONG,
+                Severity::Error => theme::of(ui).fault_text,
+                Severity::Info => theme::of(ui).text,
+                _ => theme::of(ui).text_strong,
             };
             let mut text = note.text.clone();
             if note.times > 1 {

@@ -1,8 +1,11 @@
 //! The window: draws a [`Session`] and hands it the operator's wishes. Works without a graphics device, so that tests can drive it.
 
 pub mod app;
+mod arrange;
+mod cards;
 mod control;
 mod drop;
+pub mod fonts;
 mod guidance;
 mod header;
 mod messages;
@@ -17,6 +20,7 @@ mod view;
 
 use egui::{Key, Modifiers, Ui};
 
+use self::arrange::Arrangement;
 use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 use crate::viewport::surface::Surface;
@@ -28,6 +32,7 @@ pub struct Window {
     /// From where.
     pub view: Viewpoint,
     path: open::PathDialog,
+    tab: arrange::Tab,
 }
 
 impl Window {
@@ -37,6 +42,7 @@ impl Window {
             session,
             view: Viewpoint::default(),
             path: open::PathDialog::default(),
+            tab: arrange::Tab::default(),
         }
     }
 
@@ -46,44 +52,115 @@ impl Window {
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
         shortcuts(ui, &mut wanted);
-        let session = &mut self.session;
-        header::show(ui, session, &mut wanted);
-        egui::Panel::bottom("below")
-            .default_size(216.0)
-            .size_range(140.0..=420.0)
-            .frame(theme::panel())
-            .show(ui, |ui| {
-                egui::Panel::right("messages")
-                    .default_size(400.0)
-                    .size_range(220.0..=700.0)
-                    .frame(egui::Frame::NONE.inner_margin(egui::Margin {
-                        left: 14,
-                        ..Default::default()
-                    }))
-                    .show(ui, |ui| messages::show(ui, session));
-                egui::CentralPanel::default()
-                    .frame(egui::Frame::NONE.inner_margin(egui::Margin {
-                        right: 14,
-                        ..Default::default()
-                    }))
-                    .show(ui, |ui| plots::show(ui, session));
-            });
-        parts::show(ui, session, &mut wanted);
-        rig::show(ui, session, &mut wanted);
-        egui::CentralPanel::default()
-            .frame(egui::Frame::NONE.fill(theme::GROUND))
-            .show(ui, |ui| {
-                let rect = ui.available_rect_before_wrap();
-                view::show(ui, session, &mut self.view, surface, &mut wanted);
-                open::job(ui, rect, session, &mut wanted);
-            });
-        drop::show(ui.ctx(), session, &mut wanted);
-        self.path.show(ui.ctx(), session, &mut wanted);
+        let size = ui.max_rect().size();
+        header::show(ui, &self.session, &mut wanted);
+        match Arrangement::of(size) {
+            Arrangement::Wide => self.wide(ui, surface, &mut wanted),
+            other => self.compact(ui, other, surface, &mut wanted),
+        }
+        drop::show(ui, &mut self.session, &mut wanted);
+        self.path.show(ui, &mut self.session, &mut wanted);
         // STOP first, whatever else was wanted in the same picture.
         wanted.sort_by_key(|intent| *intent != Intent::Stop);
         for intent in wanted {
             self.session.act(intent);
         }
+    }
+
+    /// Every panel about the view.
+    fn wide(&mut self, ui: &mut Ui, surface: Option<&mut Surface>, wanted: &mut Vec<Intent>) {
+        let session = &mut self.session;
+        let side = |left, right| {
+            egui::Frame::NONE.inner_margin(egui::Margin {
+                left,
+                right,
+                ..Default::default()
+            })
+        };
+        egui::Panel::bottom("below")
+            .default_size(216.0)
+            .size_range(140.0..=420.0)
+            .frame(theme::panel(theme::of(ui)))
+            .show(ui, |ui| {
+                egui::Panel::right("messages")
+                    .default_size(400.0)
+                    .size_range(220.0..=700.0)
+                    .frame(side(14, 0))
+                    .show(ui, |ui| messages::show(ui, session));
+                egui::CentralPanel::default()
+                    .frame(side(0, 14))
+                    .show(ui, |ui| plots::show(ui, session));
+            });
+        egui::Panel::left("parts")
+            .default_size(248.0)
+            .size_range(180.0..=420.0)
+            .frame(theme::panel(theme::of(ui)))
+            .show(ui, |ui| parts::show(ui, session, wanted));
+        egui::Panel::right("rig")
+            .exact_size(336.0)
+            .resizable(false)
+            .frame(theme::panel(theme::of(ui)))
+            .show(ui, |ui| rig::show(ui, session, wanted));
+        self.picture(ui, surface, wanted);
+    }
+
+    /// One panel at a time.
+    fn compact(
+        &mut self,
+        ui: &mut Ui,
+        arrangement: Arrangement,
+        surface: Option<&mut Surface>,
+        wanted: &mut Vec<Intent>,
+    ) {
+        self.tab = self.tab.under(arrangement);
+        let tight = theme::panel(theme::of(ui)).inner_margin(egui::Margin::symmetric(8, 6));
+        if let Arrangement::Beside(width) = arrangement {
+            egui::Panel::right("beside")
+                .exact_size(width)
+                .resizable(false)
+                .frame(tight)
+                .show(ui, |ui| {
+                    arrange::tabs(ui, arrangement, &mut self.tab);
+                    self.panel(ui, wanted);
+                });
+            self.picture(ui, surface, wanted);
+            return;
+        }
+        egui::Panel::top("tabs")
+            .resizable(false)
+            .frame(tight)
+            .show(ui, |ui| arrange::tabs(ui, arrangement, &mut self.tab));
+        if self.tab == arrange::Tab::View {
+            self.picture(ui, surface, wanted);
+        } else {
+            egui::CentralPanel::default()
+                .frame(tight)
+                .show(ui, |ui| self.panel(ui, wanted));
+        }
+    }
+
+    /// The chosen panel.
+    fn panel(&mut self, ui: &mut Ui, wanted: &mut Vec<Intent>) {
+        let session = &mut self.session;
+        match self.tab {
+            arrange::Tab::View => {}
+            arrange::Tab::Rig => rig::show(ui, session, wanted),
+            arrange::Tab::Parts => parts::show(ui, session, wanted),
+            arrange::Tab::Messages => messages::show(ui, session),
+            arrange::Tab::Plots => plots::show(ui, session),
+        }
+    }
+
+    /// The view and what lies over it.
+    fn picture(&mut self, ui: &mut Ui, surface: Option<&mut Surface>, wanted: &mut Vec<Intent>) {
+        let session = &mut self.session;
+        egui::CentralPanel::default()
+            .frame(egui::Frame::NONE.fill(theme::of(ui).ground))
+            .show(ui, |ui| {
+                let rect = ui.available_rect_before_wrap();
+                view::show(ui, session, &mut self.view, surface, wanted);
+                cards::show(ui, rect, session, wanted);
+            });
     }
 }
 

@@ -1,11 +1,14 @@
-//! Opening by path where there is no file dialog, and the card that shows how far reading or baking is.
+//! Opening by path where there is no file dialog.
 
 use std::path::PathBuf;
 
-use egui::{Align2, Id, Key, Modal, Rect, RichText, TextEdit, Ui, Vec2};
+use egui::{Align2, Id, Key, Modal, RichText, TextEdit, Ui, Vec2};
 
-use super::{control, theme};
+use super::{control, header, theme};
 use crate::session::{Intent, Session};
+
+/// Between the dialog's edge and what is in it, points.
+const MARGIN: f32 = 20.0;
 
 /// Asks for a path.
 #[derive(Clone, Debug, Default)]
@@ -16,25 +19,37 @@ pub struct PathDialog {
 
 impl PathDialog {
     /// Shows it while the session wants a path.
-    pub fn show(&mut self, ctx: &egui::Context, session: &mut Session, wanted: &mut Vec<Intent>) {
+    pub fn show(&mut self, ui: &Ui, session: &mut Session, wanted: &mut Vec<Intent>) {
+        let ctx = ui.ctx();
         if !session.wants_path {
             self.fresh = true;
             return;
         }
         let mut done = false;
+        // Below the bar, so that STOP and the state stay in sight.
+        let size = ctx.content_rect().size();
+        let below = header::height(size.x) + 4.0;
+        let room = egui::Rect::from_min_max(egui::pos2(0.0, below), size.to_pos2());
+        let area = Modal::default_area(Id::unique("path"))
+            .anchor(Align2::CENTER_TOP, Vec2::new(0.0, below.max(0.3 * size.y)))
+            .constrain_to(room);
         let modal = Modal::new(Id::unique("path"))
-            .frame(theme::card().fill(theme::CARD).inner_margin(20))
+            .area(area)
+            .frame(theme::card(theme::of(ui)).fill(theme::of(ui).card).inner_margin(MARGIN))
             .backdrop_color(egui::Color32::from_black_alpha(90))
             .show(ctx, |ui| {
-                ui.set_width(460.0);
+                ui.set_width(460.0f32.min(size.x - 60.0).max(120.0));
+                // What does not fit under the bar scrolls: the area would slide over STOP otherwise.
+                let height = (room.height() - 2.0 * MARGIN - 4.0).max(20.0);
+                egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
                 ui.label(
                     RichText::new("Open STEP file")
                         .size(18.0)
-                        .color(theme::TEXT_STRONG),
+                        .color(theme::of(ui).text_strong),
                 );
                 ui.label(
                     RichText::new("This desktop offers no file dialog: give the path, or drop the file onto the window.")
-                        .color(theme::TEXT_WEAK),
+                        .color(theme::of(ui).text_weak),
                 );
                 ui.add_space(6.0);
                 let edit = TextEdit::singleline(&mut self.text)
@@ -50,7 +65,7 @@ impl PathDialog {
                 ui.add_space(8.0);
                 ui.horizontal(|ui| {
                     let path = self.text.trim();
-                    let open = control::primary("Open").min_size(Vec2::new(96.0, 30.0));
+                    let open = control::primary(ui, "Open").min_size(Vec2::new(96.0, 30.0));
                     let open = ui.add_enabled(!path.is_empty(), open);
                     if (open.clicked() || entered) && !path.is_empty() {
                         wanted.push(Intent::Open(PathBuf::from(path)));
@@ -64,40 +79,10 @@ impl PathDialog {
                         done = true;
                     }
                 });
+                });
             });
         if done || modal.should_close() {
             session.wants_path = false;
         }
     }
-}
-
-/// How far reading or baking is, over the lower middle of the view.
-pub fn job(ui: &Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
-    let Some(job) = &session.job else { return };
-    egui::Area::new(Id::unique("job"))
-        .pivot(Align2::CENTER_BOTTOM)
-        .fixed_pos(rect.center_bottom() - Vec2::new(0.0, 44.0))
-        .order(egui::Order::Middle)
-        .show(ui.ctx(), |ui| {
-            theme::card().show(ui, |ui| {
-                ui.set_width(380.0);
-                ui.horizontal(|ui| {
-                    ui.add(egui::Spinner::new().size(16.0).color(theme::ACCENT));
-                    let text = RichText::new(&job.doing).color(theme::TEXT_STRONG);
-                    let room = ui.available_width() - 70.0;
-                    ui.add_sized(
-                        Vec2::new(room, 20.0),
-                        egui::Label::new(text).truncate().halign(egui::Align::Min),
-                    );
-                    let cancel = egui::Button::new("Cancel").small();
-                    control::intent_button(ui, session, wanted, cancel, Intent::CancelWork, "");
-                });
-                let bar = match job.fraction {
-                    Some(fraction) => egui::ProgressBar::new(fraction),
-                    // How long the CAD kernel takes it does not tell.
-                    None => egui::ProgressBar::new(1.0).animate(true),
-                };
-                ui.add(bar.desired_height(6.0).fill(theme::ACCENT));
-            });
-        });
 }

@@ -107,7 +107,7 @@ fn combo(
     };
     ui.add_enabled_ui(reason.is_none(), |ui| {
         ui.horizontal(|ui| {
-            let label = ui.label(RichText::new(name).small().color(theme::TEXT_WEAK));
+            let label = ui.label(RichText::new(name).small().color(theme::of(ui).text_weak));
             let list = ComboBox::from_id_salt(name)
                 .selected_text(names.get(known).copied().unwrap_or_default())
                 .show_index(ui, &mut chosen, names.len(), |i| names[i].to_owned());
@@ -135,9 +135,9 @@ fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parame
     ui.spacing_mut().item_spacing.y = 1.0;
     let label = ui.horizontal(|ui| {
         let color = if known == row.default {
-            theme::TEXT_WEAK
+            theme::of(ui).text_weak
         } else {
-            theme::TEXT_STRONG
+            theme::of(ui).text_strong
         };
         let label = ui.label(RichText::new(&name).small().color(color));
         label.on_hover_text(&hover)

@@ -11,33 +11,27 @@ use crate::session::{Intent, Session, obstacle};
 
 /// Draws it.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
-    egui::Panel::left("parts")
-        .default_size(248.0)
-        .size_range(180.0..=420.0)
-        .frame(theme::panel())
+    ui.take_available_width();
+    control::section(ui, "Parts");
+    ui.add_space(4.0);
+    let Some(document) = &session.document else {
+        ui.label(RichText::new("Nothing is open").color(theme::of(ui).text_weak));
+        return;
+    };
+    let details = session.selected.filter(|&p| p < document.model.parts.len());
+    let room = if details.is_some() { 188.0 } else { 0.0 };
+    ScrollArea::vertical()
+        .id_salt("tree")
+        .auto_shrink([false, false])
+        .max_height((ui.available_height() - room).max(80.0))
         .show(ui, |ui| {
-            ui.take_available_width();
-            control::section(ui, "Parts");
-            ui.add_space(4.0);
-            let Some(document) = &session.document else {
-                ui.label(RichText::new("Nothing is open").color(theme::TEXT_WEAK));
-                return;
-            };
-            let details = session.selected.filter(|&p| p < document.model.parts.len());
-            let room = if details.is_some() { 188.0 } else { 0.0 };
-            ScrollArea::vertical()
-                .id_salt("tree")
-                .auto_shrink([false, false])
-                .max_height((ui.available_height() - room).max(80.0))
-                .show(ui, |ui| {
-                    ui.spacing_mut().item_spacing.y = 2.0;
-                    branches(ui, session, document, wanted, &document.tree, Id::unique("parts"));
-                });
-            if let Some(part) = details {
-                control::divider(ui);
-                self::details(ui, session, document, wanted, part);
-            }
+            ui.spacing_mut().item_spacing.y = 2.0;
+            branches(ui, session, document, wanted, &document.tree, Id::unique("parts"));
         });
+    if let Some(part) = details {
+        control::divider(ui);
+        self::details(ui, session, document, wanted, part);
+    }
 }
 
 fn branches(
@@ -55,7 +49,9 @@ fn branches(
                 let id = id.with((index, name));
                 CollapsingState::load_with_default_open(ui.ctx(), id, true)
                     .show_header(ui, |ui| {
-                        ui.add(egui::Label::new(RichText::new(name).color(theme::TEXT_WEAK)).truncate());
+                        ui.add(
+                            egui::Label::new(RichText::new(name).color(theme::of(ui).text_weak)).truncate(),
+                        );
                     })
                     .body(|ui| self::branches(ui, session, document, wanted, children, id));
             }
@@ -70,9 +66,9 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, selected, name));
     let painter = ui.painter_at(rect);
     let fill = match (held, selected, response.hovered()) {
-        (true, ..) => theme::HELD.gamma_multiply(0.22),
-        (_, true, _) => theme::ACCENT_DIM.gamma_multiply(0.8),
-        (_, _, true) => theme::CARD,
+        (true, ..) => theme::of(ui).held.gamma_multiply(0.22),
+        (_, true, _) => theme::of(ui).accent_dim.gamma_multiply(0.8),
+        (_, _, true) => theme::of(ui).card,
         _ => Color32::TRANSPARENT,
     };
     painter.rect_filled(rect, CornerRadius::same(6), fill);
@@ -80,9 +76,9 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     let [r, g, b] = color;
     painter.rect_filled(swatch, CornerRadius::same(3), Color32::from_rgb(r, g, b));
     let note = if held {
-        Some(("in hand", theme::HELD))
+        Some(("in hand", theme::of(ui).held))
     } else if document.baked.is_some() && !document.is_grabbable(part) {
-        Some(("fixed", theme::TEXT_WEAK))
+        Some(("fixed", theme::of(ui).text_weak))
     } else {
         None
     };
@@ -99,12 +95,12 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     }
     let mut job = egui::text::LayoutJob::single_section(
         name.to_owned(),
-        egui::TextFormat::simple(egui::FontId::proportional(13.5), theme::TEXT_STRONG),
+        egui::TextFormat::simple(egui::FontId::proportional(13.5), theme::of(ui).text_strong),
     );
     job.wrap = egui::text::TextWrapping::truncate_at_width((right - swatch.right() - 8.0).max(10.0));
     let galley = painter.layout_job(job);
     let at = egui::Pos2::new(swatch.right() + 8.0, rect.center().y - 0.5 * galley.size().y);
-    painter.galley(at, galley, theme::TEXT_STRONG);
+    painter.galley(at, galley, theme::of(ui).text_strong);
     if response.clicked() {
         wanted.push(Intent::Select(Some(part)));
     }
@@ -115,7 +111,7 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
         ui.label(name);
         let hint = obstacle(session, &Intent::Grab(part))
             .unwrap_or_else(|| "Double click to take it in hand".into());
-        ui.label(RichText::new(hint).small().color(theme::TEXT_WEAK));
+        ui.label(RichText::new(hint).small().color(theme::of(ui).text_weak));
     });
 }
 
@@ -124,7 +120,7 @@ fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
         return;
     };
     ui.spacing_mut().item_spacing.y = 3.0;
-    let name = RichText::new(document.part_name(part)).color(theme::TEXT_STRONG);
+    let name = RichText::new(document.part_name(part)).color(theme::of(ui).text_strong);
     ui.add(egui::Label::new(name).truncate());
     control::row(ui, "Faces", shape.faces.len().to_string());
     let exact = shape
@@ -157,7 +153,7 @@ fn grab(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, part: usize) {
             "The part stays where it is",
         );
     } else {
-        let button = control::primary("Grab").min_size(wide);
+        let button = control::primary(ui, "Grab").min_size(wide);
         control::intent_button(
             ui,
             session,

@@ -7,6 +7,9 @@ use super::{rig, theme};
 use crate::session::Session;
 use crate::session::history::{SPAN_S, Sample};
 
+/// Narrowest plot that can be read beside others, points.
+const LEAST_WIDTH: f32 = 150.0;
+
 struct Trace {
     name: &'static str,
     color: Color32,
@@ -45,14 +48,14 @@ pub fn show(ui: &mut Ui, session: &Session) {
         factor,
     };
     let force = [
-        trace("contacts", theme::CONTACT, |s| s.contact_n, 1.0),
-        trace("handle", theme::ACCENT, |s| s.handle_n, 1.0),
+        trace("contacts", theme::of(ui).contact, |s| s.contact_n, 1.0),
+        trace("handle", theme::of(ui).accent, |s| s.handle_n, 1.0),
     ];
     let torque = [
-        trace("contacts", theme::CONTACT, |s| s.contact_nm, 1e3),
-        trace("handle", theme::ACCENT, |s| s.handle_nm, 1e3),
+        trace("contacts", theme::of(ui).contact, |s| s.contact_nm, 1e3),
+        trace("handle", theme::of(ui).accent, |s| s.handle_nm, 1e3),
     ];
-    let cost = [trace("tick", theme::GOOD, |s| s.cost, factor)];
+    let cost = [trace("tick", theme::of(ui).good, |s| s.cost, factor)];
     let panel = |title, unit, least, traces, budget| Panel {
         title,
         unit,
@@ -60,15 +63,25 @@ pub fn show(ui: &mut Ui, session: &Session) {
         traces,
         budget,
     };
+    let panels = [
+        panel("Force", "N", 1.0, &force[..], None),
+        panel("Torque", "mN·m", 10.0, &torque[..], None),
+        panel("Cost of a tick", cost_unit, 10.0, &cost[..], budget),
+    ];
+    if ui.available_width() < 3.0 * LEAST_WIDTH {
+        // One above the other where they would be too narrow side by side.
+        let high = ((ui.available_height() - 12.0) / 3.0).max(20.0);
+        for panel in &panels {
+            let size = egui::Vec2::new(ui.available_width(), high);
+            ui.allocate_ui(size, |ui| plot(ui, session, panel));
+        }
+        return;
+    }
     ui.spacing_mut().item_spacing.x = 26.0;
-    ui.columns_const(|[left, middle, right]| {
-        plot(left, session, &panel("Force", "N", 1.0, &force, None));
-        plot(middle, session, &panel("Torque", "mN·m", 10.0, &torque, None));
-        plot(
-            right,
-            session,
-            &panel("Cost of a tick", cost_unit, 10.0, &cost, budget),
-        );
+    ui.columns_const(|columns: &mut [Ui; 3]| {
+        for (ui, panel) in columns.iter_mut().zip(&panels) {
+            plot(ui, session, panel);
+        }
     });
 }
 
@@ -85,8 +98,8 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
     // Names give way first; colours and the tooltip still tell.
     let narrow = ui.available_width() < 270.0;
     ui.horizontal(|ui| {
-        ui.label(RichText::new(title).color(theme::TEXT_STRONG));
-        ui.label(RichText::new(unit).small().color(theme::TEXT_WEAK));
+        ui.label(RichText::new(title).color(theme::of(ui).text_strong));
+        ui.label(RichText::new(unit).small().color(theme::of(ui).text_weak));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             for trace in traces.iter().rev() {
                 if let Some(newest) = history.newest() {
@@ -99,7 +112,7 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
                     ui.label(RichText::new(text).monospace().color(trace.color));
                 }
                 if !narrow {
-                    ui.label(RichText::new(trace.name).small().color(theme::TEXT_WEAK));
+                    ui.label(RichText::new(trace.name).small().color(theme::of(ui).text_weak));
                     ui.add_space(2.0);
                 }
             }
@@ -132,7 +145,7 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
         .sense(egui::Sense::hover())
         .set_margin_fraction(egui::Vec2::ZERO)
         .grid_spacing(egui::Rangef::new(4.0, 5.0))
-        .grid_color(theme::LINE)
+        .grid_color(theme::of(ui).line)
         .grid_fade(0.0)
         .y_axis_min_width(34.0)
         .x_grid_spacer(|_| (-4..=0).map(|n| mark(2.5 * f64::from(n), 2.5)).collect())

@@ -7,40 +7,34 @@ use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
 
 use super::{control, guidance, parameters, theme};
 use crate::session::link::{Connection, Link};
-use crate::session::{Intent, Session, obstacle};
+use crate::session::{Intent, Session, obstacle, remaining};
 
 /// Width of the list of rigs, points.
 const CHOOSER_WIDTH: f32 = 380.0;
 
 /// Draws it.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
-    egui::Panel::right("rig")
-        .exact_size(336.0)
-        .resizable(false)
-        .frame(theme::panel())
+    ScrollArea::vertical()
+        .id_salt("rig")
+        .auto_shrink([false, false])
         .show(ui, |ui| {
-            ScrollArea::vertical()
-                .id_salt("rig")
-                .auto_shrink([false, false])
-                .show(ui, |ui| {
-                    control::section(ui, "Rig");
-                    ui.add_space(2.0);
-                    chooser(ui, session, wanted);
-                    connect(ui, session, wanted);
-                    if let Some(connection) = session.connection() {
-                        ui.add_space(4.0);
-                        facts(ui, session, connection);
-                        scene(ui, session, connection, wanted);
-                    }
-                    control::divider(ui);
-                    control::section(ui, "Hand");
-                    ui.add_space(2.0);
-                    hand(ui, session, wanted);
-                    control::divider(ui);
-                    guidance::show(ui, session, wanted);
-                    control::divider(ui);
-                    parameters::show(ui, session, wanted);
-                });
+            control::section(ui, "Rig");
+            ui.add_space(2.0);
+            chooser(ui, session, wanted);
+            connect(ui, session, wanted);
+            if let Some(connection) = session.connection() {
+                ui.add_space(4.0);
+                facts(ui, session, connection);
+                scene(ui, session, connection, wanted);
+            }
+            control::divider(ui);
+            control::section(ui, "Hand");
+            ui.add_space(2.0);
+            hand(ui, session, wanted);
+            control::divider(ui);
+            guidance::show(ui, session, wanted);
+            control::divider(ui);
+            parameters::show(ui, session, wanted);
         });
 }
 
@@ -88,8 +82,8 @@ fn chooser(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
 /// Two lines: what it is called, and what it is or what keeps it from being used.
 fn choice(ui: &mut Ui, entry: &RigEntry, chosen: bool) -> Response {
     let (ink, text, color) = match &entry.available {
-        Ok(()) => (theme::TEXT_STRONG, &entry.detail, theme::TEXT_WEAK),
-        Err(hint) => (theme::TEXT_WEAK, hint, theme::WARNING),
+        Ok(()) => (theme::of(ui).text_strong, &entry.detail, theme::of(ui).text_weak),
+        Err(hint) => (theme::of(ui).text_weak, hint, theme::of(ui).warning),
     };
     let mut job = LayoutJob::default();
     let format = |size, color| TextFormat::simple(FontId::proportional(size), color);
@@ -110,17 +104,17 @@ fn connect_button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let wide = Vec2::new(0.0, 32.0);
     match &session.link {
         Link::None => {
-            let button = control::primary("Connect").min_size(wide);
+            let button = control::primary(ui, "Connect").min_size(wide);
             let hint = "Open the link and greet the board. Motors stay off until armed";
             control::intent_button(ui, session, wanted, button, Intent::Connect, hint);
             let chosen = session.rigs.iter().find(|entry| entry.spec == session.chosen);
             if let Some(Err(hint)) = chosen.map(|entry| &entry.available) {
-                ui.label(RichText::new(hint).small().color(theme::WARNING));
+                ui.label(RichText::new(hint).small().color(theme::of(ui).warning));
             }
         }
         Link::Connecting { .. } => {
             ui.horizontal(|ui| {
-                ui.add(egui::Spinner::new().size(18.0).color(theme::ACCENT));
+                ui.add(egui::Spinner::new().size(18.0).color(theme::of(ui).accent));
                 ui.label("Waiting for the board to answer");
             });
             let button = egui::Button::new("Cancel").min_size(wide);
@@ -140,8 +134,13 @@ fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
     control::row(ui, "Board", can.board.to_string());
     control::row(ui, "Loop", format!("{} Hz", can.tick_hz));
     control::row(ui, "Handle", handle(can));
-    if let Some(telemetry) = &session.telemetry {
-        missed(ui, connection, telemetry.missed);
+    if let Some(at) = session.handle().map(|pose| pose.translation) {
+        let text = format!("{:.1}, {:.1}, {:.1} mm", at.x, at.y, at.z);
+        control::row(ui, "Position", text)
+            .on_hover_text("Of the handle: x forward, y left, z up, from the centre of the workspace");
+    }
+    if session.history.newest().is_some() {
+        late(ui, connection, session.history.late());
     }
     if let Some(statistics) = &connection.statistics {
         let (factor, unit) = cost_scale(connection);
@@ -154,22 +153,22 @@ fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
     }
 }
 
-fn missed(ui: &mut Ui, connection: &Connection, missed: u32) {
-    let hint = match (missed, &connection.spec) {
-        (0, _) => "Every tick was done within its time",
+fn late(ui: &mut Ui, connection: &Connection, late: u32) {
+    let hint = match (late, &connection.spec) {
+        (0, _) => "Every tick of the last ten seconds was done within its time",
         (_, RigSpec::Simulated { .. }) => {
-            "This computer was busy with other things: its simulation is paced by the clock, but not hard real time"
+            "This computer was busy with other things: the simulation is paced by its clock"
         }
         (_, RigSpec::Emulated { .. }) => {
             "The emulator runs at about the clock's speed: counted mode tells what the board would do"
         }
         (_, RigSpec::Serial { .. }) => "A smaller point budget or a coarser scene makes a tick cheaper",
     };
-    let text = match missed {
+    let text = match late {
         0 => RichText::new("none"),
-        n => RichText::new(n.to_string()).color(theme::WARNING),
+        n => RichText::new(n.to_string()).color(theme::of(ui).warning),
     };
-    control::rich_row(ui, "Missed ticks", text).on_hover_text(hint);
+    control::rich_row(ui, "Late ticks, last 10 s", text).on_hover_text(hint);
 }
 
 fn handle(can: &Capabilities) -> String {
@@ -207,17 +206,23 @@ pub fn cost_scale(connection: &Connection) -> (f32, &'static str) {
 fn scene(ui: &mut Ui, session: &Session, connection: &Connection, wanted: &mut Vec<Intent>) {
     if let Some(upload) = connection.upload {
         let part = upload.sent as f32 / upload.total.max(1) as f32;
+        let left = remaining::left(connection.upload_since.elapsed(), part).map(remaining::words);
+        let (sent, total) = (upload.sent / 1024, upload.total.div_ceil(1024));
+        let text = format!("{sent} of {total} KiB, {}", left.as_deref().unwrap_or("…"));
         ui.add_space(2.0);
-        ui.add(
-            egui::ProgressBar::new(part)
-                .desired_height(18.0)
-                .fill(theme::ACCENT_DIM)
-                .text(format!(
-                    "Sending the scene, {} of {} KiB",
-                    upload.sent / 1024,
-                    upload.total.div_ceil(1024)
-                )),
-        );
+        control::row(ui, "Scene", "being sent");
+        ui.horizontal(|ui| {
+            let bar = egui::ProgressBar::new(part)
+                .desired_width(ui.available_width() - 74.0)
+                .desired_height(24.0)
+                .fill(theme::of(ui).accent_dim)
+                .text(text);
+            ui.add(bar);
+            let cancel = egui::Button::new("Cancel").min_size(Vec2::new(64.0, 24.0));
+            let hint = "The scene the board has stays in use";
+            control::intent_button(ui, session, wanted, cancel, Intent::CancelUpload, hint)
+                .accessible_name("Cancel sending");
+        });
         return;
     }
     let state = if session.scene_is_on_board() {
@@ -256,5 +261,5 @@ fn hand(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         (false, _) if session.connection().is_some() => "The handle of the rig is the hand.",
         (false, _) => "Connect a rig to feel the parts, or to watch a simulated hand.",
     };
-    ui.label(RichText::new(text).small().color(theme::TEXT_WEAK));
+    ui.label(RichText::new(text).small().color(theme::of(ui).text_weak));
 }

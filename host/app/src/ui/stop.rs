@@ -9,8 +9,8 @@ use super::theme;
 use crate::session::{Intent, Session};
 
 /// Draws it. A press counts, not a click: it acts when the button goes down.
-pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) -> Response {
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(148.0, 44.0), Sense::click());
+pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Vec2) -> Response {
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let down = response.is_pointer_button_down_on();
     let fill = match (down, response.hovered()) {
         (true, _) => Color32::from_rgb(170, 30, 34),
@@ -25,7 +25,10 @@ pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) -> Respo
         Stroke::new(1.0, Color32::from_rgb(255, 140, 134)),
         egui::StrokeKind::Inside,
     );
-    let sign = Rect::from_center_size(rect.left_center() + Vec2::new(28.0, 0.0), Vec2::splat(13.0));
+    let sign = Rect::from_center_size(
+        rect.left_center() + Vec2::new(0.19 * size.x, 0.0),
+        Vec2::splat(13.0),
+    );
     painter.rect_filled(sign, CornerRadius::same(2), Color32::WHITE);
     painter.text(
         rect.center() + Vec2::new(14.0, 0.0),

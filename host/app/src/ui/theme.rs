@@ -1,56 +1,121 @@
-//! Colours, type and spacing, in one place. Dark, quiet, one accent; red is kept for STOP and faults, orange for what is in hand or touches.
+//! Colours, type and spacing, in one place: quiet, one accent; red is kept for STOP and faults, orange for what is in hand or touches.
+//!
+//! Dark or light as the system has it; [`of`] gives the colours of the theme a [`Ui`] is drawn in.
 
 use egui::{
-    Color32, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Vec2, Visuals,
+    Color32, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Theme,
+    ThemePreference, Ui, Vec2, Visuals,
 };
 
-/// Behind everything.
-pub const GROUND: Color32 = Color32::from_rgb(19, 21, 25);
-/// Panels.
-pub const PANEL: Color32 = Color32::from_rgb(27, 30, 36);
-/// Cards on panels.
-pub const CARD: Color32 = Color32::from_rgb(34, 38, 45);
-/// Lines between things.
-pub const LINE: Color32 = Color32::from_rgb(48, 53, 62);
-/// Controls at rest.
-pub const CONTROL: Color32 = Color32::from_rgb(50, 56, 66);
-/// Controls under the pointer.
-pub const CONTROL_HOVER: Color32 = Color32::from_rgb(64, 72, 84);
-/// Text.
-pub const TEXT: Color32 = Color32::from_rgb(214, 219, 226);
-/// Text that matters.
-pub const TEXT_STRONG: Color32 = Color32::from_rgb(244, 247, 250);
-/// Text that explains.
-pub const TEXT_WEAK: Color32 = Color32::from_rgb(146, 154, 166);
-/// The accent.
-pub const ACCENT: Color32 = Color32::from_rgb(92, 164, 245);
-/// The accent as a ground.
-pub const ACCENT_DIM: Color32 = Color32::from_rgb(38, 82, 132);
-/// In hand, and touching.
-pub const HELD: Color32 = Color32::from_rgb(245, 166, 66);
-/// All is well.
-pub const GOOD: Color32 = Color32::from_rgb(104, 200, 132);
-/// Look here.
-pub const WARNING: Color32 = Color32::from_rgb(240, 196, 88);
-/// STOP and faults.
+/// STOP, in both themes; what is written on it is white.
 pub const STOP: Color32 = Color32::from_rgb(214, 48, 49);
-/// The same under the pointer.
+/// The same under the pointer, and the mark of a fault.
 pub const STOP_HOVER: Color32 = Color32::from_rgb(235, 70, 68);
-/// Text about faults: red that can be read on dark.
-pub const FAULT_TEXT: Color32 = Color32::from_rgb(255, 122, 112);
-/// Forces of contacts, in plots and as arrows.
-pub const CONTACT: Color32 = Color32::from_rgb(255, 112, 72);
 
-/// Surfaces that are guided onto each other: far from [`CONTACT`] for every kind of colour vision, and hatched in the picture.
-pub const MATES: Color32 = Color32::from_rgb(56, 204, 166);
-
-/// Sets everything.
-pub fn apply(ctx: &egui::Context) {
-    ctx.set_theme(egui::Theme::Dark);
-    ctx.all_styles_mut(|style| *style = style_of(style.clone()));
+/// The colours of one theme.
+#[derive(Debug)]
+pub struct Palette {
+    /// Behind everything.
+    pub ground: Color32,
+    /// Panels.
+    pub panel: Color32,
+    /// Cards on panels.
+    pub card: Color32,
+    /// Lines between things.
+    pub line: Color32,
+    /// Controls at rest.
+    pub control: Color32,
+    /// Controls under the pointer.
+    pub control_hover: Color32,
+    /// Text.
+    pub text: Color32,
+    /// Text that matters.
+    pub text_strong: Color32,
+    /// Text that explains.
+    pub text_weak: Color32,
+    /// The accent.
+    pub accent: Color32,
+    /// The accent behind text.
+    pub accent_dim: Color32,
+    /// In hand, and touching.
+    pub held: Color32,
+    /// All is well.
+    pub good: Color32,
+    /// Look here.
+    pub warning: Color32,
+    /// Text about faults.
+    pub fault_text: Color32,
+    /// Forces of contacts, in plots and as arrows.
+    pub contact: Color32,
+    /// Surfaces that are guided onto each other: far from `contact` for every kind of colour vision, and hatched in the picture.
+    pub mates: Color32,
 }
 
-fn style_of(mut style: Style) -> Style {
+const DARK: Palette = Palette {
+    ground: Color32::from_rgb(19, 21, 25),
+    panel: Color32::from_rgb(27, 30, 36),
+    card: Color32::from_rgb(34, 38, 45),
+    line: Color32::from_rgb(48, 53, 62),
+    control: Color32::from_rgb(50, 56, 66),
+    control_hover: Color32::from_rgb(64, 72, 84),
+    text: Color32::from_rgb(214, 219, 226),
+    text_strong: Color32::from_rgb(244, 247, 250),
+    text_weak: Color32::from_rgb(146, 154, 166),
+    accent: Color32::from_rgb(92, 164, 245),
+    accent_dim: Color32::from_rgb(38, 82, 132),
+    held: Color32::from_rgb(245, 166, 66),
+    good: Color32::from_rgb(104, 200, 132),
+    warning: Color32::from_rgb(240, 196, 88),
+    fault_text: Color32::from_rgb(255, 122, 112),
+    contact: Color32::from_rgb(255, 112, 72),
+    mates: Color32::from_rgb(56, 204, 166),
+};
+
+const LIGHT: Palette = Palette {
+    ground: Color32::from_rgb(229, 233, 239),
+    panel: Color32::from_rgb(245, 246, 248),
+    card: Color32::from_rgb(255, 255, 255),
+    line: Color32::from_rgb(206, 212, 220),
+    control: Color32::from_rgb(222, 227, 234),
+    control_hover: Color32::from_rgb(206, 213, 223),
+    text: Color32::from_rgb(44, 50, 60),
+    text_strong: Color32::from_rgb(14, 18, 24),
+    text_weak: Color32::from_rgb(86, 95, 108),
+    accent: Color32::from_rgb(20, 94, 190),
+    accent_dim: Color32::from_rgb(166, 203, 245),
+    held: Color32::from_rgb(158, 84, 0),
+    good: Color32::from_rgb(16, 116, 54),
+    warning: Color32::from_rgb(134, 88, 0),
+    fault_text: Color32::from_rgb(176, 26, 22),
+    contact: Color32::from_rgb(190, 58, 16),
+    mates: Color32::from_rgb(0, 116, 90),
+};
+
+/// Colours of a theme.
+pub const fn palette(theme: Theme) -> &'static Palette {
+    match theme {
+        Theme::Dark => &DARK,
+        Theme::Light => &LIGHT,
+    }
+}
+
+/// Colours of the theme `ui` is drawn in.
+pub fn of(ui: &Ui) -> &'static Palette {
+    palette(Theme::from_dark_mode(ui.visuals().dark_mode))
+}
+
+/// Sets everything. The theme follows the system; where the window library is told none, as on Linux, it is dark.
+pub fn apply(ctx: &egui::Context) {
+    ctx.options_mut(|options| {
+        options.theme_preference = ThemePreference::System;
+        options.fallback_theme = Theme::Dark;
+    });
+    for theme in [Theme::Dark, Theme::Light] {
+        ctx.style_mut_of(theme, |style| *style = style_of(style.clone(), theme));
+    }
+}
+
+fn style_of(mut style: Style, theme: Theme) -> Style {
     style.text_styles = [
         (TextStyle::Small, 11.5, FontFamily::Proportional),
         (TextStyle::Body, 13.5, FontFamily::Proportional),
@@ -74,32 +139,33 @@ fn style_of(mut style: Style) -> Style {
     style.interaction.tooltip_delay = 0.35;
     style.interaction.selectable_labels = false;
     style.animation_time = 0.12;
-    style.visuals = visuals();
+    style.visuals = visuals(theme);
     style
 }
 
-fn visuals() -> Visuals {
-    let mut v = Visuals::dark();
-    v.panel_fill = PANEL;
-    v.window_fill = CARD;
-    v.window_stroke = Stroke::new(1.0, LINE);
+fn visuals(theme: Theme) -> Visuals {
+    let p = palette(theme);
+    let mut v = theme.default_visuals();
+    v.panel_fill = p.panel;
+    v.window_fill = p.card;
+    v.window_stroke = Stroke::new(1.0, p.line);
     v.window_corner_radius = CornerRadius::same(10);
     v.menu_corner_radius = CornerRadius::same(8);
     v.window_shadow = Shadow {
         offset: [0, 8],
         blur: 24,
         spread: 0,
-        color: Color32::from_black_alpha(110),
+        color: Color32::from_black_alpha(if theme == Theme::Dark { 110 } else { 50 }),
     };
     v.popup_shadow = v.window_shadow;
-    v.extreme_bg_color = GROUND;
-    v.faint_bg_color = CARD;
-    v.weak_text_color = Some(TEXT_WEAK);
-    v.warn_fg_color = WARNING;
-    v.error_fg_color = FAULT_TEXT;
-    v.hyperlink_color = ACCENT;
-    v.selection.bg_fill = ACCENT_DIM;
-    v.selection.stroke = Stroke::new(1.0, TEXT_STRONG);
+    v.extreme_bg_color = p.ground;
+    v.faint_bg_color = p.card;
+    v.weak_text_color = Some(p.text_weak);
+    v.warn_fg_color = p.warning;
+    v.error_fg_color = p.fault_text;
+    v.hyperlink_color = p.accent;
+    v.selection.bg_fill = p.accent_dim;
+    v.selection.stroke = Stroke::new(1.0, p.text_strong);
     v.slider_trailing_fill = true;
     v.handle_shape = egui::style::HandleShape::Circle;
     v.indent_has_left_vline = false;
@@ -108,11 +174,11 @@ fn visuals() -> Visuals {
     v.interact_cursor = None;
     let corner = CornerRadius::same(6);
     for (widget, fill, text) in [
-        (&mut v.widgets.noninteractive, PANEL, TEXT),
-        (&mut v.widgets.inactive, CONTROL, TEXT),
-        (&mut v.widgets.hovered, CONTROL_HOVER, TEXT_STRONG),
-        (&mut v.widgets.active, ACCENT_DIM, TEXT_STRONG),
-        (&mut v.widgets.open, CONTROL_HOVER, TEXT_STRONG),
+        (&mut v.widgets.noninteractive, p.panel, p.text),
+        (&mut v.widgets.inactive, p.control, p.text),
+        (&mut v.widgets.hovered, p.control_hover, p.text_strong),
+        (&mut v.widgets.active, p.accent_dim, p.text_strong),
+        (&mut v.widgets.open, p.control_hover, p.text_strong),
     ] {
         widget.bg_fill = fill;
         widget.weak_bg_fill = fill;
@@ -121,22 +187,72 @@ fn visuals() -> Visuals {
         widget.corner_radius = corner;
         widget.expansion = 0.0;
     }
-    v.widgets.noninteractive.bg_stroke = Stroke::new(1.0, LINE);
+    v.widgets.noninteractive.bg_stroke = Stroke::new(1.0, p.line);
     v
 }
 
 /// Frame of a side panel.
-pub fn panel() -> egui::Frame {
+pub fn panel(palette: &Palette) -> egui::Frame {
     egui::Frame::NONE
-        .fill(PANEL)
+        .fill(palette.panel)
         .inner_margin(Margin::symmetric(14, 12))
 }
 
 /// Frame of a card over the picture.
-pub fn card() -> egui::Frame {
+pub fn card(palette: &Palette) -> egui::Frame {
     egui::Frame::NONE
-        .fill(CARD.gamma_multiply(0.94))
-        .stroke(Stroke::new(1.0, LINE))
+        .fill(palette.card.gamma_multiply(0.94))
+        .stroke(Stroke::new(1.0, palette.line))
         .corner_radius(10)
         .inner_margin(Margin::symmetric(14, 10))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Relative luminance of WCAG 2: sRGB made linear, weighted.
+    fn luminance(color: Color32) -> f64 {
+        let linear = |c: u8| {
+            let c = f64::from(c) / 255.0;
+            if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            }
+        };
+        0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
+    }
+
+    fn contrast(a: Color32, b: Color32) -> f64 {
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    /// WCAG 2 asks 4.5 of text of this size, 3 of large text: STOP is 21 points.
+    #[test]
+    fn text_can_be_read_in_both_themes() {
+        for (name, p) in [("dark", &DARK), ("light", &LIGHT)] {
+            for (what, ink) in [
+                ("text", p.text),
+                ("strong", p.text_strong),
+                ("weak", p.text_weak),
+                ("held", p.held),
+                ("good", p.good),
+                ("warning", p.warning),
+                ("fault", p.fault_text),
+                ("contact", p.contact),
+                ("mates", p.mates),
+            ] {
+                for (on, fill) in [("panel", p.panel), ("card", p.card), ("ground", p.ground)] {
+                    let ratio = contrast(ink, fill);
+                    assert!(ratio >= 4.5, "{name}: {what} on {on}: {ratio:.2}");
+                }
+            }
+            for fill in [p.control, p.control_hover, p.accent_dim] {
+                assert!(contrast(p.text_strong, fill) >= 4.5, "{name}: text on a control");
+            }
+        }
+        assert!(contrast(Color32::WHITE, STOP) >= 3.0);
+    }
 }

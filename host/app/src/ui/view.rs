@@ -5,7 +5,7 @@ use egui::{
     WidgetInfo,
 };
 use glam::DVec3;
-use mortise_protocol::message::flag;
+use mortise_rig::describe_flags;
 
 use super::{control, theme};
 use crate::session::pose::point_from_wire;
@@ -14,6 +14,7 @@ use crate::session::{Intent, Session};
 use crate::viewport::camera::View;
 use crate::viewport::compose::{compose, touching_points};
 use crate::viewport::gesture::{Viewpoint, on_screen};
+use crate::viewport::picture::Ground;
 use crate::viewport::surface::Surface;
 
 /// Draws it.
@@ -27,7 +28,8 @@ pub fn show(
     let rect = ui.available_rect_before_wrap();
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
-    ui.painter().rect_filled(rect, CornerRadius::ZERO, theme::GROUND);
+    ui.painter()
+        .rect_filled(rect, CornerRadius::ZERO, theme::of(ui).ground);
     if session.document.is_none() {
         empty(ui, rect, session, wanted);
         return;
@@ -37,7 +39,12 @@ pub fn show(
     if let Some(surface) = surface {
         let scale = ui.pixels_per_point();
         let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
-        let picture = compose(session, document, view.camera, view.see_through, scale);
+        let ground = if ui.visuals().dark_mode {
+            Ground::Dark
+        } else {
+            Ground::Light
+        };
+        let picture = compose(session, document, view.camera, view.see_through, ground, scale);
         if let Some(texture) = surface.show(&document.meshes, picture, size) {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(texture, rect, whole, Color32::WHITE);
@@ -58,7 +65,7 @@ pub fn show(
         Align2::RIGHT_BOTTOM,
         hint,
         FontId::proportional(11.5),
-        theme::TEXT_WEAK.gamma_multiply(0.8),
+        theme::of(ui).text_weak.gamma_multiply(0.8),
     );
 }
 
@@ -66,26 +73,36 @@ fn empty(ui: &mut Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
     if session.is_busy() {
         return;
     }
-    let card = Rect::from_center_size(rect.center(), Vec2::new(400.0, 290.0));
-    dashed(ui, card.expand(18.0));
+    let full = Vec2::new(400.0, 290.0);
+    let card = Rect::from_center_size(rect.center(), full.min(rect.size() - Vec2::splat(12.0)));
+    if card.size() == full {
+        dashed(ui, card.expand(18.0));
+    }
     ui.scope_builder(UiBuilder::new().max_rect(card), |ui| {
+        ui.set_clip_rect(rect);
+        let roomy = card.size() == full;
         ui.vertical_centered(|ui| {
-            ui.add_space(12.0);
-            let (mark, _) = ui.allocate_exact_size(Vec2::splat(72.0), Sense::hover());
-            control::mark(ui.painter(), mark, theme::TEXT_WEAK);
-            ui.add_space(14.0);
+            if roomy {
+                ui.add_space(12.0);
+                let (mark, _) = ui.allocate_exact_size(Vec2::splat(72.0), Sense::hover());
+                control::mark(ui, mark, theme::of(ui).text_weak);
+                ui.add_space(14.0);
+            }
             ui.label(
                 RichText::new("Drop a STEP file here")
                     .size(22.0)
-                    .color(theme::TEXT_STRONG),
+                    .color(theme::of(ui).text_strong),
             );
             ui.label(
                 RichText::new("Feel whether its parts go together, before anything is made")
-                    .color(theme::TEXT_WEAK),
+                    .color(theme::of(ui).text_weak),
             );
-            ui.add_space(16.0);
-            let wide = Vec2::new(220.0, 36.0);
-            let open = control::primary("Open STEP file…").min_size(wide);
+            ui.add_space(if roomy { 16.0 } else { 2.0 });
+            let wide = Vec2::new(
+                220.0f32.min(ui.available_width()),
+                if roomy { 36.0 } else { 28.0 },
+            );
+            let open = control::primary(ui, "Open STEP file…").min_size(wide);
             control::intent_button(ui, session, wanted, open, Intent::Browse, "Ctrl+O");
             ui.add_space(2.0);
             let sample = egui::Button::new("Open the sample").min_size(wide);
@@ -103,7 +120,7 @@ fn dashed(ui: &Ui, rect: Rect) {
         rect.left_bottom(),
         rect.left_top(),
     ];
-    let stroke = Stroke::new(1.5, theme::LINE);
+    let stroke = Stroke::new(1.5, theme::of(ui).line);
     ui.painter()
         .extend(egui::Shape::dashed_line(&corners, stroke, 7.0, 6.0));
 }
@@ -119,7 +136,7 @@ fn touching(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
     let painter = ui.painter_at(rect);
     for point in touching_points(telemetry) {
         if let Some(at) = on_screen(&view.camera, rect, point) {
-            painter.circle(at, 3.5, theme::CONTACT, Stroke::new(1.0, Color32::WHITE));
+            painter.circle(at, 3.5, theme::of(ui).contact, Stroke::new(1.0, Color32::WHITE));
         }
     }
 }
@@ -153,13 +170,15 @@ fn triad(ui: &Ui, rect: Rect, view: &Viewpoint) {
 
 fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
     let Some(document) = &session.document else { return };
-    let place = Rect::from_min_size(rect.min + Vec2::splat(12.0), Vec2::new(430.0, 34.0));
+    let wide = 430.0f32.min(rect.width() - 24.0).max(0.0);
+    let place = Rect::from_min_size(rect.min + Vec2::splat(12.0), Vec2::new(wide, 34.0));
+    let ink = theme::of(ui);
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = Vec2::new(9.0, 4.0);
             let flat = |text: &str| {
-                egui::Button::new(RichText::new(text).size(12.5)).fill(theme::CONTROL.gamma_multiply(0.85))
+                egui::Button::new(RichText::new(text).size(12.5)).fill(ink.control.gamma_multiply(0.85))
             };
             if ui.add(flat("Fit")).on_hover_text("See everything (F)").clicked() {
                 view.fit(document.extent, rect);
@@ -174,9 +193,9 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
             let through = egui::Button::new(RichText::new("See through").size(12.5))
                 .selected(view.see_through)
                 .fill(if view.see_through {
-                    theme::ACCENT_DIM
+                    ink.accent_dim
                 } else {
-                    theme::CONTROL.gamma_multiply(0.85)
+                    ink.control.gamma_multiply(0.85)
                 });
             let hint = "Draw fixed parts as glass, to see what happens inside a hole";
             if ui.add(through).on_hover_text(hint).clicked() {
@@ -195,9 +214,9 @@ fn legend(ui: &mut Ui, rect: Rect, session: &Session) {
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
         ui.horizontal(|ui| {
             let touches = "Faces that touch now, in both parts, and edges where it is an edge that touches";
-            swatch(ui, theme::CONTACT, false, "touches", touches);
+            swatch(ui, theme::of(ui).contact, false, "touches", touches);
             let fits = "Faces that fit: guided onto each other, or kept together by contact (hatched)";
-            swatch(ui, theme::MATES, true, "fits", fits);
+            swatch(ui, theme::of(ui).mates, true, "fits", fits);
         });
     });
 }
@@ -222,24 +241,10 @@ fn swatch(ui: &mut Ui, color: Color32, hatched: bool, text: &str, hint: &str) {
         }
     }
     response.on_hover_text(hint);
-    let label = ui.label(RichText::new(text).size(12.0).color(theme::TEXT));
+    let label = ui.label(RichText::new(text).size(12.0).color(theme::of(ui).text));
     label.on_hover_text(hint);
     ui.add_space(6.0);
 }
-
-/// What the board reports of the tick, in words.
-const FLAGS: [(u16, &str); 10] = [
-    (flag::FORCE_LIMIT, "force limit acts"),
-    (flag::TORQUE_LIMIT, "torque limit acts"),
-    (flag::SLEW_LIMIT, "slew limit acts"),
-    (flag::COUPLING_LIMIT, "the coupling slips"),
-    (flag::BUDGET, "point budget reached"),
-    (flag::CONTACTS, "more contacts than fit"),
-    (flag::SPEED_LIMIT, "speed limit acts"),
-    (flag::SOFTENED, "turned down: the loop made energy"),
-    (flag::DEEP, "too deep inside to find a way out"),
-    (flag::NON_FINITE, "a number was not finite"),
-];
 
 /// Force now and which faces touch, in the upper right corner, while a part is in hand.
 fn readout(ui: &Ui, rect: Rect, session: &Session) {
@@ -249,21 +254,19 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         return;
     };
     let sample = session.history.newest();
-    let mut lines = vec![(document.part_name(part).to_owned(), theme::HELD, 14.5)];
+    let mut lines = vec![(document.part_name(part).to_owned(), theme::of(ui).held, 14.5)];
     if let Some(sample) = sample {
         lines.push((
             format!("{:.2} N on the handle", sample.handle_n),
-            theme::TEXT_STRONG,
+            theme::of(ui).text_strong,
             13.0,
         ));
     }
     if telemetry.pairs.is_empty() {
-        lines.push(("touches nothing".to_owned(), theme::TEXT_WEAK, 12.5));
+        lines.push(("touches nothing".to_owned(), theme::of(ui).text_weak, 12.5));
     }
-    for (bit, words) in FLAGS {
-        if telemetry.flags & bit != 0 {
-            lines.push((words.to_owned(), theme::WARNING, 12.5));
-        }
+    for words in describe_flags(telemetry.flags) {
+        lines.push((words.to_owned(), theme::of(ui).warning, 12.5));
     }
     for pair in telemetry.pairs.iter().take(3) {
         let at = point_from_wire(pair.point);
@@ -274,7 +277,7 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         });
         let touched = touched.as_deref().unwrap_or("?");
         let text = format!("{own} on {touched}, {:.0} µm deep", 1e6 * pair.depth.max(0.0));
-        lines.push((text, theme::CONTACT, 12.5));
+        lines.push((text, theme::of(ui).contact, 12.5));
     }
     if telemetry.guidance.active > 0 {
         let [x, y, z] = telemetry.guidance.wrench.force.map(f64::from);
@@ -282,7 +285,7 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         let targets = telemetry.guidance.active;
         let word = if targets == 1 { "target" } else { "targets" };
         let text = format!("guided by {targets} {word}, {pull:.2} N");
-        lines.push((text, theme::MATES, 12.5));
+        lines.push((text, theme::of(ui).mates, 12.5));
     }
     let painter = ui.painter_at(rect);
     let galleys: Vec<_> = lines
@@ -298,14 +301,14 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
     painter.rect(
         card,
         CornerRadius::same(8),
-        theme::CARD.gamma_multiply(0.9),
-        Stroke::new(1.0, theme::LINE),
+        theme::of(ui).card.gamma_multiply(0.9),
+        Stroke::new(1.0, theme::of(ui).line),
         egui::StrokeKind::Inside,
     );
     let mut at = card.min + Vec2::new(13.0, 9.0);
     for galley in galleys {
         let height = galley.size().y;
-        painter.galley(at, galley, theme::TEXT);
+        painter.galley(at, galley, theme::of(ui).text);
         at.y += height + 3.0;
     }
 }

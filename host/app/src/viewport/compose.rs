@@ -7,7 +7,7 @@ use mortise_protocol::message::Telemetry;
 
 use super::camera::{Camera, Extent};
 use super::mesh::meeting;
-use super::picture::{Arrow, Item, MAX_LIT, MAX_LIT_EDGES, Picture};
+use super::picture::{Arrow, Ground, Item, MAX_LIT, MAX_LIT_EDGES, Picture};
 use crate::session::Session;
 use crate::session::document::Document;
 use crate::session::pose::point_from_wire;
@@ -20,6 +20,10 @@ const EDGE_GLASS: [f32; 4] = [0.66, 0.72, 0.80, 0.55];
 const EDGE_MARKED: [f32; 4] = [0.45, 0.72, 1.0, 1.0];
 /// Edges of the part in hand.
 const EDGE_HELD: [f32; 4] = [1.0, 0.80, 0.45, 1.0];
+/// The same three on the light ground, where light lines would be lost.
+const EDGE_GLASS_LIGHT: [f32; 4] = [0.22, 0.27, 0.34, 0.60];
+const EDGE_MARKED_LIGHT: [f32; 4] = [0.05, 0.32, 0.72, 1.0];
+const EDGE_HELD_LIGHT: [f32; 4] = [0.55, 0.28, 0.0, 1.0];
 /// Mixed into the part in hand, and how much.
 const TINT_HELD: [f32; 4] = [0.96, 0.65, 0.26, 0.55];
 /// The ghost: where the hand would have the part.
@@ -38,8 +42,13 @@ pub fn compose(
     document: &Document,
     camera: Camera,
     see_through: bool,
+    ground: Ground,
     scale: f32,
 ) -> Picture {
+    let [marked_line, held_line, glass_line] = match ground {
+        Ground::Dark => [EDGE_MARKED, EDGE_HELD, EDGE_GLASS],
+        Ground::Light => [EDGE_MARKED_LIGHT, EDGE_HELD_LIGHT, EDGE_GLASS_LIGHT],
+    };
     let held = session.grabbed();
     let touching = session.telemetry.as_deref().filter(|_| held.is_some());
     let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
@@ -54,9 +63,9 @@ pub fn compose(
                 opacity: if glass { SEEN_THROUGH } else { 1.0 },
                 tint: if in_hand { TINT_HELD } else { [0.0; 4] },
                 line: match (in_hand, marked) {
-                    (true, _) => EDGE_HELD,
-                    (_, true) => EDGE_MARKED,
-                    _ if glass => EDGE_GLASS,
+                    (true, _) => held_line,
+                    (_, true) => marked_line,
+                    _ if glass => glass_line,
                     _ => EDGE,
                 },
                 lit: touching.map_or_else(Vec::new, |t| lit(document, t, index, in_hand)),
@@ -83,6 +92,7 @@ pub fn compose(
     Picture {
         camera,
         extent: document.extent,
+        ground,
         items,
         arrows: touching.map_or_else(Vec::new, |t| arrows(document, t)),
         line_width: 1.25 * scale,

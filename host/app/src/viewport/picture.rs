@@ -45,6 +45,26 @@ pub struct Arrow {
     pub color: [f32; 4],
 }
 
+/// What is behind the parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Ground {
+    /// Of the dark theme.
+    #[default]
+    Dark,
+    /// Of the light theme.
+    Light,
+}
+
+impl Ground {
+    /// At the top and at the bottom, sRGB.
+    pub fn sky(self) -> [[f32; 4]; 2] {
+        match self {
+            Self::Dark => [[0.135, 0.150, 0.180, 1.0], [0.075, 0.082, 0.098, 1.0]],
+            Self::Light => [[0.955, 0.965, 0.980, 1.0], [0.845, 0.865, 0.895, 1.0]],
+        }
+    }
+}
+
 /// One picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
@@ -52,6 +72,8 @@ pub struct Picture {
     pub camera: Camera,
     /// About all of it: sets the depth range.
     pub extent: Extent,
+    /// Behind them.
+    pub ground: Ground,
     /// Parts and ghosts.
     pub items: Vec<Item>,
     /// Forces.

@@ -20,8 +20,6 @@ const _: () = assert!(size_of::<Draw>() as u64 <= DRAW_STRIDE);
 const LINE_LIFT: f64 = 6e-4;
 /// What no edge has: an edge without faces has twice the last number.
 const NO_EDGE: [u32; 2] = [u32::MAX, 0];
-/// Background at the top and at the bottom, sRGB.
-const SKY: [[f32; 4]; 2] = [[0.135, 0.150, 0.180, 1.0], [0.075, 0.082, 0.098, 1.0]];
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -230,8 +228,8 @@ fn globals(picture: &Picture, size: [u32; 2]) -> Globals {
         fill: direction(0.4 * viewer - 0.2 * up + right),
         viewer: direction(viewer),
         screen: [size[0] as f32, size[1] as f32, picture.line_width, lift as f32],
-        top: SKY[0],
-        bottom: SKY[1],
+        top: picture.ground.sky()[0],
+        bottom: picture.ground.sky()[1],
     }
 }
 

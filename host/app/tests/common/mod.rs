@@ -1,4 +1,6 @@
 //! What tests of the window share: a window without a display, and what an operator does first.
+// Each test program uses a part of it.
+#![allow(dead_code)]
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,10 +18,15 @@ const PATIENCE: Duration = Duration::from_secs(300);
 
 /// A window with nothing open.
 pub fn harness() -> Harness<'static, Window> {
+    harness_with(theme::apply)
+}
+
+/// The same, set up by `setup`.
+pub fn harness_with(setup: impl FnOnce(&egui::Context) + 'static) -> Harness<'static, Window> {
     Harness::builder()
         .with_size(egui::vec2(1500.0, 940.0))
         .with_max_steps(1)
-        .with_context_setup(theme::apply)
+        .with_context_setup(setup)
         .build_ui_state(
             |ui, window: &mut Window| window.show(ui, None),
             Window::new(Session::new(Arc::new(|| {}))),

@@ -55,7 +55,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
 }
 
 fn explain(ui: &mut Ui, text: &str) {
-    ui.label(RichText::new(text).small().color(theme::TEXT_WEAK));
+    ui.label(RichText::new(text).small().color(theme::of(ui).text_weak));
 }
 
 fn when(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
@@ -80,7 +80,11 @@ fn cap(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let mut newton = session.guide.force_cap_n;
     ui.horizontal(|ui| {
         let hint = "Guidance never pulls harder: push harder than this, and the part leaves its axis";
-        let label = ui.label(RichText::new("Pulls up to").small().color(theme::TEXT_WEAK));
+        let label = ui.label(
+            RichText::new("Pulls up to")
+                .small()
+                .color(theme::of(ui).text_weak),
+        );
         let label = label.on_hover_text(hint);
         ui.spacing_mut().slider_width = (ui.available_width() - 82.0).max(60.0);
         let slider = Slider::new(&mut newton, GUIDE_CAP_N)
@@ -95,17 +99,17 @@ fn cap(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
 
 fn line(ui: &mut Ui, session: &Session, document: &Document, row: &Row, wanted: &mut Vec<Intent>) {
     let color = match &row.standing {
-        Standing::Sent => theme::MATES,
-        Standing::ByContact | Standing::Waiting => theme::TEXT,
-        Standing::Candidate | Standing::Off => theme::TEXT_WEAK,
-        Standing::Conflict(_) | Standing::Refused(_) => theme::WARNING,
+        Standing::Sent => theme::of(ui).mates,
+        Standing::ByContact | Standing::Waiting => theme::of(ui).text,
+        Standing::Candidate | Standing::Off => theme::of(ui).text_weak,
+        Standing::Conflict(_) | Standing::Refused(_) => theme::of(ui).warning,
     };
     let edge = match row.standing {
-        Standing::Sent => theme::MATES.gamma_multiply(0.6),
-        _ => theme::LINE,
+        Standing::Sent => theme::of(ui).mates.gamma_multiply(0.6),
+        _ => theme::of(ui).line,
     };
     let card = Frame::NONE
-        .fill(theme::CARD)
+        .fill(theme::of(ui).card)
         .stroke(Stroke::new(1.0, edge))
         .corner_radius(CornerRadius::same(6))
         .inner_margin(Margin::symmetric(9, 6));
@@ -115,18 +119,18 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, row: &Row, wanted: 
         let title = words::title(document, &row.target);
         choices(ui, session, row, &title, wanted);
         let small = |text: String, color| egui::Label::new(RichText::new(text).small().color(color));
-        ui.add(small(words::surfaces(&row.target), theme::TEXT_WEAK).truncate());
+        ui.add(small(words::surfaces(&row.target), theme::of(ui).text_weak).truncate());
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().interact_size.y = 0.0;
             let standing = words::standing(document, &session.guidance, row, session.guides());
             ui.add(small(standing, color).wrap());
-            ui.add(small(format!("· {}", words::misfit(row)), theme::TEXT_WEAK).wrap());
+            ui.add(small(format!("· {}", words::misfit(row)), theme::of(ui).text_weak).wrap());
         });
     });
     inside.response.on_hover_ui(|ui| {
         ui.label(words::title(document, &row.target));
         ui.label(words::surfaces(&row.target));
-        ui.label(RichText::new(words::faces(document, &row.target)).color(theme::TEXT_WEAK));
+        ui.label(RichText::new(words::faces(document, &row.target)).color(theme::of(ui).text_weak));
     });
 }
 
@@ -155,7 +159,11 @@ fn choices(ui: &mut Ui, session: &Session, row: &Row, title: &str, wanted: &mut 
             control::intent_button(ui, session, wanted, switch("Pin", row.pinned), wish, hint)
                 .accessible_name(format!("{name} {title}"));
             ui.with_layout(Layout::left_to_right(egui::Align::Center), |ui| {
-                let ink = if off { theme::TEXT_WEAK } else { theme::TEXT_STRONG };
+                let ink = if off {
+                    theme::of(ui).text_weak
+                } else {
+                    theme::of(ui).text_strong
+                };
                 ui.add(egui::Label::new(RichText::new(title).color(ink)).truncate());
             });
         });

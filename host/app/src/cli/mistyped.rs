@@ -1,0 +1,114 @@
+//! A lone argument that is neither a command nor a file: an error with a suggestion instead of a window that opens nothing.
+
+use std::path::Path;
+
+use clap::CommandFactory as _;
+
+use super::Cli;
+
+/// Edits (one character added, left out, replaced, or two swapped) that still count as a mistyped command.
+const MAX_EDITS: usize = 2;
+
+/// Checks a lone argument before a window opens for it.
+///
+/// # Errors
+/// One line: there is no such file, with the command that was probably meant when the argument could be one.
+pub(super) fn check_lone(argument: &Path) -> anyhow::Result<()> {
+    let typed = argument.as_os_str().to_string_lossy();
+    if argument.exists() || !could_be_a_command(&typed) {
+        return check_file(argument);
+    }
+    let command = Cli::command();
+    let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+    match nearest(&typed, &names) {
+        Some(name) => anyhow::bail!("`{typed}` is neither a command nor a file; did you mean `{name}`?"),
+        None => anyhow::bail!(
+            "`{typed}` is neither a command nor a file; commands: {}",
+            names.join(", ")
+        ),
+    }
+}
+
+/// Checks that there is a file to open, before a window opens.
+///
+/// # Errors
+/// One line: there is no such file, or it is a folder.
+pub(super) fn check_file(file: &Path) -> anyhow::Result<()> {
+    if file.is_dir() {
+        anyhow::bail!("{} is a folder: name one STEP file", file.display());
+    }
+    if !file.exists() {
+        anyhow::bail!("there is no file {}", file.display());
+    }
+    Ok(())
+}
+
+/// No folder and no extension: a word.
+fn could_be_a_command(typed: &str) -> bool {
+    !typed.contains(['/', '\\', '.'])
+}
+
+/// The name fewest edits away; the first of equally near ones.
+fn nearest<'a>(typed: &str, names: &[&'a str]) -> Option<&'a str> {
+    let typed = typed.to_lowercase();
+    (names.iter())
+        .map(|name| (edits(&typed, name), *name))
+        // Half of a short word changed is another word.
+        .filter(|(edits, name)| *edits <= MAX_EDITS && 2 * edits < name.len().max(typed.len()))
+        .min_by_key(|(edits, _)| *edits)
+        .map(|(_, name)| name)
+}
+
+/// Damerau's distance with adjacent swaps (optimal string alignment): rows of the textbook's table, one a letter of `a`.
+fn edits(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut table = vec![vec![0; b.len() + 1]; a.len() + 1];
+    for i in 0..=a.len() {
+        for j in 0..=b.len() {
+            table[i][j] = if i == 0 || j == 0 {
+                i + j
+            } else {
+                let replaced = table[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+                let least = replaced.min(table[i - 1][j] + 1).min(table[i][j - 1] + 1);
+                let swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+                if swapped {
+                    least.min(table[i - 2][j - 2] + 1)
+                } else {
+                    least
+                }
+            };
+        }
+    }
+    table[a.len()][b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edits_are_counted() {
+        for (a, b, count) in [
+            ("open", "open", 0),
+            ("opne", "open", 1),
+            ("ope", "open", 1),
+            ("bakee", "bake", 1),
+            ("inpsct", "inspect", 2),
+            ("", "lab", 3),
+        ] {
+            assert_eq!(edits(a, b), count, "{a} {b}");
+            assert_eq!(edits(b, a), count, "{b} {a}");
+        }
+    }
+
+    #[test]
+    fn near_words_are_suggested_and_far_ones_are_not() {
+        let names = ["inspect", "bake", "lab", "open", "probe"];
+        assert_eq!(nearest("opne", &names), Some("open"));
+        assert_eq!(nearest("Insepct", &names), Some("inspect"));
+        assert_eq!(nearest("lb", &names), Some("lab"));
+        for far in ["gear", "ab.step", "x", ""] {
+            assert_eq!(nearest(far, &names), None, "{far}");
+        }
+    }
+}

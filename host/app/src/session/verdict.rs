@@ -1,0 +1,396 @@
+//! How an insertion ended, in words: it goes in, it is stuck and on what, or it was let go. Pure.
+//!
+//! A shaft and a bore are an outer and a wider inner cylinder of two parts, one of them in hand. The depth is the length over which the two
+//! overlap along the bore's axis; all the way in is the shorter of both. Costs one pass over the pairs that the part in hand has.
+
+use std::fmt;
+
+use glam::{DAffine3, DVec3};
+use mortise_brep::CadModel;
+
+use super::insertion::{Wall, local_walls};
+use super::notes::Severity;
+
+/// This near the end counts as in, mm: what the coupling's spring lags behind a hand that arrives.
+const NEAR_END_MM: f64 = 0.1;
+/// Motion along the axis that counts as progress, mm.
+const PROGRESS_MM: f64 = 0.05;
+/// Without progress for this long near the end: it has arrived, s.
+const ARRIVED_S: f64 = 0.4;
+/// Without progress for this long under a push: it is stuck, s.
+const STUCK_S: f64 = 1.0;
+/// A push that the contact answers with at least this along the axis, N.
+const PUSH_N: f64 = 0.3;
+/// Before the bore by less than this an insertion has begun, mm.
+const BEGUN_MM: f64 = 1.0;
+/// Axes may lean by this much, rad; beyond, a part is not being inserted.
+const LEAN: f64 = 0.2;
+/// The bore may be wider by this fraction of its radius.
+const SLACK: f64 = 0.4;
+/// Most pairs looked at; an assembly with more shafts of one size than this is watched in part.
+const MAX_PAIRS: usize = 4096;
+
+/// How it ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// All the way.
+    GoesIn {
+        /// Depth, mm.
+        depth_mm: f64,
+        /// Difference of the diameters, mm.
+        clearance_mm: f64,
+        /// Largest force on the handle on the way, N.
+        peak_n: f64,
+    },
+    /// Pushed, and no further.
+    Stuck {
+        /// Depth, mm.
+        depth_mm: f64,
+        /// What it meets.
+        on: String,
+    },
+    /// Let go on the way.
+    LetGo {
+        /// Depth, mm.
+        depth_mm: f64,
+        /// Of, mm.
+        full_mm: f64,
+    },
+}
+
+impl Verdict {
+    /// How much it matters.
+    pub fn severity(&self) -> Severity {
+        match self {
+            Self::GoesIn { .. } => Severity::Good,
+            Self::Stuck { .. } => Severity::Warning,
+            Self::LetGo { .. } => Severity::Info,
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::GoesIn {
+                depth_mm,
+                clearance_mm,
+                peak_n,
+            } => write!(
+                f,
+                "Goes in: {depth_mm:.1} mm, clearance {clearance_mm:.3} mm, peak {peak_n:.1} N"
+            ),
+            Self::Stuck { depth_mm, on } => write!(f, "Stuck at {depth_mm:.1} mm: {on}"),
+            Self::LetGo { depth_mm, full_mm } => write!(f, "Let go at {depth_mm:.1} of {full_mm:.1} mm"),
+        }
+    }
+}
+
+/// One sample of the part in hand.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// Board time, s.
+    pub time_s: f64,
+    /// Part in hand.
+    pub held: usize,
+    /// Force of the contacts on it, N.
+    pub contact_n: DVec3,
+    /// Force on the handle, N.
+    pub handle_n: f64,
+}
+
+/// Where a shaft is in a bore.
+#[derive(Clone, Copy, Debug)]
+struct Depth {
+    /// Below 0: still this far before it, mm.
+    depth_mm: f64,
+    full_mm: f64,
+    /// The way out for the part in hand, unit vector.
+    out: DVec3,
+}
+
+#[derive(Clone, Debug)]
+struct Attempt {
+    pair: (usize, usize),
+    deepest_mm: f64,
+    since_s: f64,
+    peak_n: f64,
+    last: Depth,
+    /// Told at this depth; the next one after it has moved on.
+    told_at_mm: Option<f64>,
+}
+
+/// Watches the part in hand.
+#[derive(Clone, Debug, Default)]
+pub struct Watch {
+    walls: Vec<Wall>,
+    held: Option<usize>,
+    pairs: Vec<(usize, usize)>,
+    attempt: Option<Attempt>,
+}
+
+impl Watch {
+    /// For a model.
+    pub fn of(model: &CadModel) -> Self {
+        Self {
+            walls: local_walls(model),
+            ..Self::default()
+        }
+    }
+
+    /// Takes one sample; `on` says what the part in hand meets.
+    pub fn sample(
+        &mut self,
+        poses: &[DAffine3],
+        moment: &Moment,
+        on: impl FnOnce(&[Wall]) -> String,
+    ) -> Option<Verdict> {
+        if self.held != Some(moment.held) {
+            self.held = Some(moment.held);
+            self.attempt = None;
+            self.pairs = self.pairs_of(moment.held);
+        }
+        let (pair, now) = self.nearest(poses, moment.held)?;
+        let attempt = match &mut self.attempt {
+            Some(attempt) if attempt.pair == pair => attempt,
+            other => other.insert(Attempt {
+                pair,
+                deepest_mm: now.depth_mm,
+                since_s: moment.time_s,
+                peak_n: 0.0,
+                // A part that is taken in hand where it belongs has not been inserted.
+                told_at_mm: (now.depth_mm > now.full_mm - NEAR_END_MM).then_some(now.depth_mm),
+                last: now,
+            }),
+        };
+        attempt.last = now;
+        attempt.peak_n = attempt.peak_n.max(moment.handle_n);
+        if attempt
+            .told_at_mm
+            .is_some_and(|at| (now.depth_mm - at).abs() > BEGUN_MM)
+        {
+            *attempt = Attempt {
+                deepest_mm: now.depth_mm,
+                since_s: moment.time_s,
+                told_at_mm: None,
+                ..attempt.clone()
+            };
+        }
+        if now.depth_mm > attempt.deepest_mm + PROGRESS_MM {
+            attempt.deepest_mm = now.depth_mm;
+            attempt.since_s = moment.time_s;
+        }
+        let still_s = moment.time_s - attempt.since_s;
+        let near_end = now.depth_mm > now.full_mm - NEAR_END_MM;
+        let pushed = moment.contact_n.dot(now.out) > PUSH_N;
+        let verdict = if attempt.told_at_mm.is_some() {
+            None
+        } else if near_end && (still_s > ARRIVED_S || now.depth_mm >= now.full_mm) {
+            let [shaft, bore] = [pair.0, pair.1].map(|i| self.walls[i].radius);
+            Some(Verdict::GoesIn {
+                depth_mm: now.depth_mm,
+                clearance_mm: 2.0 * (bore - shaft),
+                peak_n: attempt.peak_n,
+            })
+        } else if !near_end && pushed && still_s > STUCK_S {
+            Some(Verdict::Stuck {
+                depth_mm: now.depth_mm.max(0.0),
+                on: on(&self.walls),
+            })
+        } else {
+            None
+        };
+        if verdict.is_some() {
+            attempt.told_at_mm = Some(now.depth_mm);
+        }
+        verdict
+    }
+
+    /// No part is in hand any more.
+    pub fn let_go(&mut self) -> Option<Verdict> {
+        self.held = None;
+        let attempt = self.attempt.take()?;
+        let Depth {
+            depth_mm, full_mm, ..
+        } = attempt.last;
+        let on_the_way = depth_mm > PROGRESS_MM && depth_mm <= full_mm - NEAR_END_MM;
+        (on_the_way && attempt.told_at_mm.is_none()).then_some(Verdict::LetGo { depth_mm, full_mm })
+    }
+
+    /// Shafts and bores that could belong together by their sizes, one of each pair of `held`.
+    fn pairs_of(&self, held: usize) -> Vec<(usize, usize)> {
+        let all = || self.walls.iter().enumerate();
+        let fits = |shaft: &Wall, bore: &Wall| {
+            let play = bore.radius - shaft.radius;
+            (shaft.part == held) != (bore.part == held) && (0.0..=SLACK * bore.radius).contains(&play)
+        };
+        (all().filter(|(_, shaft)| !shaft.inner))
+            .flat_map(|(i, shaft)| {
+                (all().filter(|(_, bore)| bore.inner))
+                    .filter(move |(_, bore)| fits(shaft, bore))
+                    .map(move |(j, _)| (i, j))
+            })
+            .take(MAX_PAIRS)
+            .collect()
+    }
+
+    /// The pair that is deepest in each other; of equals the one with the least play.
+    fn nearest(&self, poses: &[DAffine3], held: usize) -> Option<((usize, usize), Depth)> {
+        let mut best: Option<((usize, usize), Depth, f64)> = None;
+        for &(i, j) in &self.pairs {
+            let (shaft, bore) = (&self.walls[i], &self.walls[j]);
+            let Some(now) = depth(shaft, bore, poses, held) else {
+                continue;
+            };
+            let play = bore.radius - shaft.radius;
+            let deeper = best.is_none_or(|(_, b, p)| (now.depth_mm, -play) > (b.depth_mm, -p));
+            if deeper {
+                best = Some(((i, j), now, play));
+            }
+        }
+        best.map(|(pair, depth, _)| (pair, depth))
+    }
+}
+
+/// `None` when the shaft is nowhere near the bore.
+fn depth(shaft: &Wall, bore: &Wall, poses: &[DAffine3], held: usize) -> Option<Depth> {
+    let [s, b] = [shaft, bore].map(|wall| poses.get(wall.part).map(|pose| wall.moved(pose)));
+    let (s, b) = (s?, b?);
+    if s.axis.cross(b.axis).length() > LEAN {
+        return None;
+    }
+    let between = s.middle() - b.middle();
+    let along = between.dot(b.axis);
+    if (between - along * b.axis).length() > b.radius {
+        return None;
+    }
+    let lengths = [s.length(), b.length()];
+    let full_mm = lengths[0].min(lengths[1]);
+    let depth_mm = (0.5 * (lengths[0] + lengths[1]) - along.abs()).min(full_mm);
+    let out = if (along >= 0.0) == (shaft.part == held) {
+        b.axis
+    } else {
+        -b.axis
+    };
+    (depth_mm > -BEGUN_MM).then_some(Depth {
+        depth_mm,
+        full_mm,
+        out,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wall(part: usize, radius: f64, length: f64, inner: bool) -> Wall {
+        Wall {
+            part,
+            origin: DVec3::ZERO,
+            axis: DVec3::Z,
+            radius,
+            ends: (0.0, length),
+            inner,
+            faces: vec![0],
+        }
+    }
+
+    /// A bore of 40 mm from z = −40, a shaft of 60 mm; `z` is where the shaft's lower end is.
+    struct Bench {
+        watch: Watch,
+        time_s: f64,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            let walls = vec![wall(0, 9.375, 40.0, true), wall(1, 8.875, 60.0, false)];
+            Self {
+                watch: Watch {
+                    walls,
+                    ..Watch::default()
+                },
+                time_s: 0.0,
+            }
+        }
+
+        fn at(&mut self, z: f64, push_n: f64) -> Option<Verdict> {
+            self.time_s += 0.016;
+            let poses = [-40.0, z].map(|z| DAffine3::from_translation(z * DVec3::Z));
+            let moment = Moment {
+                time_s: self.time_s,
+                held: 1,
+                contact_n: push_n * DVec3::Z,
+                handle_n: push_n,
+            };
+            self.watch
+                .sample(&poses, &moment, |_| "rim of plate, hole 2".to_owned())
+        }
+
+        fn hold(&mut self, z: f64, push_n: f64, seconds: f64) -> Vec<Verdict> {
+            let samples = (seconds / 0.016) as usize;
+            (0..samples).filter_map(|_| self.at(z, push_n)).collect()
+        }
+    }
+
+    #[test]
+    fn what_goes_in_says_how_far_and_how_hard_once() {
+        let mut bench = Bench::new();
+        let mut said = Vec::new();
+        for step in 0..=600 {
+            let z = 20.0 - 0.1 * f64::from(step);
+            said.extend(bench.at(z, if step == 300 { 0.84 } else { 0.0 }));
+        }
+        said.extend(bench.hold(-40.0, 0.0, 2.0));
+        let words: Vec<String> = said.iter().map(ToString::to_string).collect();
+        assert_eq!(words, ["Goes in: 40.0 mm, clearance 1.000 mm, peak 0.8 N"]);
+        // A spring's lag before the end is the end, once it rests there.
+        let mut bench = Bench::new();
+        bench.at(0.0, 0.0);
+        assert_eq!(bench.hold(-39.93, 0.0, 0.3), []);
+        assert_eq!(bench.hold(-39.93, 0.0, 0.3).len(), 1);
+        // Out and in again is said again.
+        assert_eq!(bench.hold(-20.0, 0.0, 0.2), []);
+        assert_eq!(bench.hold(-40.0, 0.0, 0.2).len(), 1);
+    }
+
+    #[test]
+    fn what_is_stuck_says_where_and_on_what_once_for_each_place() {
+        let mut bench = Bench::new();
+        bench.at(0.5, 0.0);
+        assert_eq!(bench.hold(-12.3, 1.0, 0.9), []);
+        let said = bench.hold(-12.3, 1.0, 3.0);
+        let words: Vec<String> = said.iter().map(ToString::to_string).collect();
+        assert_eq!(words, ["Stuck at 12.3 mm: rim of plate, hole 2"]);
+        assert_eq!(bench.hold(-15.0, 1.0, 3.0).len(), 1, "another place");
+        assert_eq!(bench.watch.let_go(), None, "said already");
+        // Without a push it only rests.
+        let mut bench = Bench::new();
+        assert_eq!(bench.hold(-12.3, 0.0, 5.0), []);
+        let said = bench.watch.let_go().map(|v| v.to_string());
+        assert_eq!(said.as_deref(), Some("Let go at 12.3 of 40.0 mm"));
+    }
+
+    #[test]
+    fn a_part_taken_in_hand_where_it_belongs_has_not_been_inserted() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.hold(-40.0, 1.0, 3.0), []);
+        assert_eq!(bench.watch.let_go(), None);
+    }
+
+    #[test]
+    fn beside_or_far_from_the_bore_nothing_is_said() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.hold(15.0, 1.0, 3.0), []);
+        let poses =
+            [DVec3::new(0.0, 0.0, -40.0), DVec3::new(12.0, 0.0, -12.0)].map(DAffine3::from_translation);
+        for tick in 0..300 {
+            let moment = Moment {
+                time_s: 100.0 + 0.016 * f64::from(tick),
+                held: 1,
+                contact_n: DVec3::Z,
+                handle_n: 1.0,
+            };
+            assert_eq!(bench.watch.sample(&poses, &moment, |_| String::new()), None);
+        }
+    }
+}

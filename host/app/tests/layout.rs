@@ -1,0 +1,145 @@
+//! STOP and the state at every size of window and every scale: whole, on screen, and nothing over them.
+
+mod common;
+
+use common::{arm, click, connect, harness, open_sample, until};
+use egui::{Rect, Role, Vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use mortise::ui::Window;
+
+/// Pixels of common screens, from the smallest projector to 4K.
+const SCREENS: [(f32, f32); 9] = [
+    (800.0, 600.0),
+    (1024.0, 768.0),
+    (1280.0, 720.0),
+    (1366.0, 768.0),
+    (1600.0, 1000.0),
+    (1920.0, 1080.0),
+    (2560.0, 1440.0),
+    (3440.0, 1440.0),
+    (3840.0, 2160.0),
+];
+const SCALES: [f32; 6] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
+
+/// What can be under the pointer or read: everything but what only groups others.
+fn is_leaf(role: Role) -> bool {
+    matches!(
+        role,
+        Role::Button
+            | Role::Label
+            | Role::Image
+            | Role::ComboBox
+            | Role::Slider
+            | Role::TextInput
+            | Role::CheckBox
+            | Role::SpinButton
+            | Role::ListBoxOption
+    )
+}
+
+/// A window of `size` points.
+fn resize(harness: &mut Harness<'_, Window>, size: Vec2, scale: f32) {
+    // A new scale stretches the window of before, so the size comes second.
+    harness.set_pixels_per_point(scale);
+    harness.step();
+    harness.set_size(size);
+    // Panels know their sizes from the second picture on.
+    harness.run_steps(3);
+    let off = harness.ctx.content_rect().size() - size;
+    // A window has whole pixels.
+    assert!(off.length() < 1.0 / scale, "{off}");
+}
+
+/// STOP's and the state's rectangles; fails when they are not as they should be.
+fn check(harness: &mut Harness<'_, Window>, state: &str, what: &str) {
+    for &(width, height) in &SCREENS {
+        for scale in SCALES {
+            let size = Vec2::new(width, height) / scale;
+            resize(harness, size, scale);
+            let screen = Rect::from_min_size(egui::Pos2::ZERO, size);
+            let at = format!("{what}, {width} × {height} at {scale}");
+            let stop = harness.get_by_role_and_label(Role::Button, "STOP");
+            // The chip is the only one of its words in the bar, and higher than a line of text.
+            let chip = harness
+                .get_all_by_role(Role::Label)
+                .find(|node| {
+                    let node_itself = node.accesskit_node();
+                    let words = node_itself.value().or_else(|| node_itself.label());
+                    words.is_some_and(|l| l.starts_with(state)) && node.rect().height() > 26.0
+                })
+                .unwrap_or_else(|| panic!("{at}: no state"));
+            for (name, rect, least) in [("STOP", stop.rect(), 100.0), ("state", chip.rect(), 60.0)] {
+                // Rounding to pixels: half of one each side.
+                let slack = 0.5 / scale;
+                assert!(
+                    screen.expand(slack).contains_rect(rect),
+                    "{at}: {name} at {rect} of {screen}"
+                );
+                assert!(
+                    rect.width() >= least && rect.height() >= 27.0,
+                    "{at}: {name} is {rect}"
+                );
+                for other in harness.root().children_recursive() {
+                    let node = other.accesskit_node();
+                    // Without a place it is not drawn.
+                    let placed = node.raw_bounds().is_some();
+                    if !is_leaf(node.role()) || !placed || other.rect() == rect {
+                        continue;
+                    }
+                    let shared = other.rect().intersect(rect);
+                    assert!(
+                        !(shared.width() > 2.0 * slack && shared.height() > 2.0 * slack),
+                        "{at}: {:?} {:?} at {} lies over {name} at {rect}",
+                        node.role(),
+                        node.label(),
+                        other.rect()
+                    );
+                }
+            }
+        }
+    }
+    resize(harness, Vec2::new(1500.0, 940.0), 1.0);
+}
+
+#[test]
+fn stop_and_the_state_are_on_screen_at_every_size_and_scale() {
+    let mut harness = harness();
+    harness.run_steps(2);
+    check(&mut harness, "No rig", "nothing open");
+    open_sample(&mut harness);
+    // A name longer than any bar.
+    {
+        let document = harness.state_mut().session.document.as_mut().expect("open");
+        document.title = "left-bearing-housing-with-extra-long-name-revision-12.step".repeat(3);
+        let model = std::sync::Arc::make_mut(&mut document.model);
+        model.parts[1].name = "peg of a name that no bar of any window has room for ".repeat(4);
+    }
+    connect(&mut harness);
+    check(&mut harness, "Idle", "connected");
+    arm(&mut harness);
+    harness.state_mut().session.act(mortise::session::Intent::Grab(1));
+    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    check(&mut harness, "In hand", "in hand");
+    // The dialog that asks for a path lies over everything else.
+    harness.state_mut().session.wants_path = true;
+    harness.run_steps(2);
+    check(&mut harness, "In hand", "a dialog is open");
+    click(&mut harness, "STOP");
+}
+
+/// The same press at the smallest window there is.
+#[test]
+fn stop_works_in_the_smallest_window() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    arm(&mut harness);
+    resize(&mut harness, Vec2::new(266.0, 200.0), 3.0);
+    let at = harness.get_by_label("STOP").rect().center();
+    assert!(at.x < 266.0 && at.y < 200.0, "{at}");
+    harness.drag_at(at);
+    until(&mut harness, "stopped", |s| {
+        s.device() == Some(mortise_protocol::message::DeviceState::Stopped)
+    });
+}

@@ -1,0 +1,163 @@
+//! A lost link in the window: told once, with the reason, and a button that connects again. The board is a simulated one behind a
+//! pseudo-terminal, so that its cable can be cut.
+#![cfg(unix)]
+
+use std::io::{ErrorKind, Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+mod common;
+
+use common::{arm, click, harness, open_sample, until};
+use egui_kittest::kittest::Queryable as _;
+use mortise::session::notes::Severity;
+use mortise::session::{Intent, Session};
+use mortise_protocol::message::{DeviceState, ToDevice};
+use mortise_rig::{Flash, RigSpec, Transport, simulate};
+use serialport::{SerialPort as _, TTYPort};
+
+/// Bytes to and fro between a pseudo-terminal and a simulated board; none while it is cut.
+struct Cable {
+    over: Arc<AtomicBool>,
+    cut: Arc<AtomicBool>,
+    port: String,
+    threads: Vec<std::thread::JoinHandle<()>>,
+    /// Keeps the terminal alive while no program has it open.
+    _slave: std::fs::File,
+}
+
+fn copy(mut from: Box<dyn Read + Send>, mut to: Box<dyn Write + Send>, over: &AtomicBool, cut: &AtomicBool) {
+    let mut bytes = [0; 256];
+    while !over.load(Ordering::Relaxed) {
+        match from.read(&mut bytes) {
+            Ok(0) => return,
+            Ok(count) if !cut.load(Ordering::Relaxed) => {
+                if to.write_all(&bytes[..count]).is_err() {
+                    return;
+                }
+            }
+            Ok(_) => {}
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => {}
+            Err(_) => return,
+        }
+    }
+}
+
+impl Cable {
+    fn new() -> Self {
+        let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+        master.set_timeout(Duration::from_millis(20)).expect("a timeout");
+        let port = slave.name().expect("it has a name");
+        let held = std::fs::OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(&port)
+            .expect("it opens");
+        drop(slave);
+        let Transport { reader, writer, keep } = simulate(&Flash::default(), true).expect("a thread");
+        let (over, cut) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+        let from_host: Box<dyn Read + Send> = master.try_clone().expect("a handle");
+        let ends: [(Box<dyn Read + Send>, Box<dyn Write + Send>); 2] =
+            [(from_host, writer), (reader, Box::new(master))];
+        let mut threads: Vec<_> = ends
+            .into_iter()
+            .map(|(from, to)| {
+                let (over, cut) = (over.clone(), cut.clone());
+                std::thread::spawn(move || copy(from, to, &over, &cut))
+            })
+            .collect();
+        // The board ends when both of its pipes are gone.
+        threads.push(std::thread::spawn(move || drop(keep)));
+        Self {
+            over,
+            cut,
+            port,
+            threads,
+            _slave: held,
+        }
+    }
+}
+
+impl Drop for Cable {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            thread.join().expect("it ends");
+        }
+    }
+}
+
+fn errors(session: &Session) -> Vec<String> {
+    (session.notes.iter())
+        .filter(|note| note.severity == Severity::Error)
+        .flat_map(|note| vec![note.text.clone(); note.times as usize])
+        .collect()
+}
+
+#[test]
+fn a_lost_link_is_told_once_with_its_reason_and_reconnect_mends_it() {
+    let cable = Cable::new();
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let spec: RigSpec = cable.port.parse().expect("a port's name");
+    harness.state_mut().session.act(Intent::ChooseRig(spec.clone()));
+    click(&mut harness, "Connect");
+    until(
+        &mut harness,
+        "the scene is on the board",
+        Session::scene_is_on_board,
+    );
+    arm(&mut harness);
+    assert_eq!(errors(&harness.state().session), [""; 0]);
+
+    cable.cut.store(true, Ordering::Relaxed);
+    // Wishes that are under way when the link goes must not be told beside it.
+    harness.state_mut().session.act(Intent::Disarm);
+    until(&mut harness, "the loss is noticed", |s| s.lost.is_some());
+    // What else was under way has time to complain.
+    for _ in 0..100 {
+        harness.step();
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let session = &harness.state().session;
+    let told = errors(session);
+    assert_eq!(told.len(), 1, "{told:#?}");
+    assert!(told[0].contains("nothing was heard for"), "{told:?}");
+    assert_eq!(session.device(), None);
+    harness.get_by_label("Link lost");
+    // In the card and among the messages.
+    assert_eq!(
+        harness.get_all_by_label_contains("nothing was heard for").count(),
+        2
+    );
+
+    cable.cut.store(false, Ordering::Relaxed);
+    click(&mut harness, "Reconnect");
+    until(&mut harness, "connected again", |s| s.device().is_some());
+    let session = &harness.state().session;
+    assert_eq!(session.lost, None);
+    assert_eq!(session.connection().expect("there").spec, spec);
+    assert!(harness.query_by_label("Reconnect").is_none());
+    assert!(!session.is_armed(), "motors stay off until armed");
+}
+
+/// A board that starts anew is a link lost with the board's own reason.
+#[test]
+fn a_board_that_starts_anew_is_told_once_and_reached_again() {
+    let cable = Cable::new();
+    let mut harness = harness();
+    let spec: RigSpec = cable.port.parse().expect("a port's name");
+    harness.state_mut().session.act(Intent::ChooseRig(spec));
+    click(&mut harness, "Connect");
+    until(&mut harness, "connected", |s| {
+        s.device() == Some(DeviceState::Idle)
+    });
+    (harness.state().session.connection().expect("there")).request(ToDevice::Restart);
+    until(&mut harness, "the loss is noticed", |s| s.lost.is_some());
+    harness.run_steps(20);
+    let told = errors(&harness.state().session);
+    assert!(told.len() == 1 && told[0].contains("started anew"), "{told:#?}");
+    click(&mut harness, "Reconnect");
+    until(&mut harness, "connected again", |s| s.device().is_some());
+}
