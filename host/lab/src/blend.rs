@@ -21,8 +21,8 @@ use crate::scenario::{PreparedScene, Recording, Scenario, depth, pose_mm};
 use crate::table::rounded;
 use crate::variant::Variant;
 
-/// Clearances, mm: one that any hand gets in, and one that none does.
-const CLEARANCES_MM: [f64; 2] = [1.0, 0.02];
+/// Clearances, mm: one that any hand gets in, and one that none does; a chart each.
+pub const CLEARANCES_MM: [f64; 2] = [1.0, 0.02];
 /// Cell of the field, mm: d₀ of the thesis.
 const CELL_MM: f64 = 0.5;
 /// Stiffness of the thesis' constraint spring over the coupling's.
@@ -270,7 +270,7 @@ fn charts(courses: &[&Course]) -> Vec<Chart> {
 ///
 /// # Errors
 /// `Unwritable`.
-pub fn draw(courses: &[Course], folder: &std::path::Path) -> Result<(), LabError> {
+pub fn draw(courses: &[Course], folder: &mortise_output::Folder) -> Result<(), LabError> {
     for clearance in CLEARANCES_MM {
         let of: Vec<&Course> = (courses.iter())
             .filter(|course| course.clearance_mm == clearance)

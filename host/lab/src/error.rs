@@ -21,6 +21,9 @@ pub enum LabError {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A table or chart is not written.
+    #[error(transparent)]
+    Output(#[from] mortise_output::OutputError),
     /// A scenario is not written as it should be.
     #[error("{name}: {what}")]
     Scenario {

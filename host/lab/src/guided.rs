@@ -10,6 +10,7 @@ use mortise_rig::{EmulatedMode, RigSpec};
 use tempfile::{Builder, NamedTempFile};
 
 use crate::LabError;
+use crate::exact_fit::ExactFit;
 use crate::fit::Fit;
 use crate::scenario::{Depth, Key, PreparedScene, Recording, Scenario, connect, depth, pose_mm, record};
 
@@ -157,8 +158,21 @@ pub(crate) struct Inserted {
     pub hole_mm: f64,
     /// When it was through, from the hand's start, s; NaN: never.
     pub after_s: f64,
+    /// How much later that was than the handle would have been there were the hand alone, s: what it waited, not the script.
+    pub behind_s: f64,
     /// Farthest off the axis once guidance had settled, mm; NaN: it never did.
     pub off_axis_mm: f64,
+}
+
+/// When the script itself has the middle of the part through, s from its start: the hand's way down is straight between keyframes.
+fn hand_through_s(scenario: &Scenario, way_mm: f64) -> f64 {
+    let down = |key: &Key| -key.offset_mm[2];
+    (scenario.hand.keyframes.windows(2))
+        .find(|pair| down(&pair[0]) <= way_mm && way_mm <= down(&pair[1]))
+        .map_or(f64::NAN, |pair| {
+            let share = (way_mm - down(&pair[0])) / (down(&pair[1]) - down(&pair[0]));
+            pair[0].t_s + share * (pair[1].t_s - pair[0].t_s)
+        })
 }
 
 /// Looks at an insertion's samples.
@@ -167,6 +181,7 @@ pub(crate) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Te
         depth_mm: f64::NAN,
         hole_mm: f64::NAN,
         after_s: f64::NAN,
+        behind_s: f64::NAN,
         off_axis_mm: f64::NAN,
     };
     let first = samples.first().map_or(0, |sample| sample.tick);
@@ -182,11 +197,47 @@ pub(crate) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Te
         if deep >= hole && seen.after_s.is_nan() {
             let every = u32::from(scenario.run.telemetry_every_ticks);
             seen.after_s = 1e-3 * f64::from(sample.tick - first + every);
+            let start = samples.iter().find_map(|sample| sample.object.as_ref());
+            let begun = start.and_then(|(_, pose)| depth(scene, scenario.depth.as_ref()?, &pose_mm(pose)));
+            let way = begun.map_or(f64::NAN, |(deep, ..)| hole - deep);
+            seen.behind_s = seen.after_s - hand_through_s(scenario, way);
         }
         if sample.guidance.engagement < 1.0 {
             engaged_since = None;
         } else if sample.tick - *engaged_since.get_or_insert(sample.tick) > SETTLING_TICKS {
             seen.off_axis_mm = seen.off_axis_mm.max(off);
+        }
+    }
+    seen
+}
+
+/// How straight a peg stood once guidance had settled; NaN: it never did.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Course {
+    /// Deepest penetration, mm.
+    pub penetration_mm: f64,
+    /// Largest tilt, degrees, and farthest of the leading end's middle off the axis, mm.
+    pub tilt_deg: f64,
+    pub tip_off_mm: f64,
+}
+
+/// Looks at every sample by closed form.
+pub(crate) fn course(exact: &ExactFit, samples: &[Telemetry]) -> Course {
+    let mut seen = Course {
+        penetration_mm: f64::NAN,
+        tilt_deg: f64::NAN,
+        tip_off_mm: f64::NAN,
+    };
+    let mut engaged_since = None;
+    for sample in samples {
+        let Some((_, pose)) = &sample.object else { continue };
+        if sample.guidance.engagement < 1.0 {
+            engaged_since = None;
+        } else if sample.tick - *engaged_since.get_or_insert(sample.tick) > SETTLING_TICKS {
+            let (tilt_deg, tip_off_mm) = exact.leaning(&pose_mm(pose));
+            seen.penetration_mm = seen.penetration_mm.max(exact.penetration_mm(&pose_mm(pose)));
+            seen.tilt_deg = seen.tilt_deg.max(tilt_deg);
+            seen.tip_off_mm = seen.tip_off_mm.max(tip_off_mm);
         }
     }
     seen

@@ -129,6 +129,8 @@ pub struct Course {
     pub instructions_max: u32,
     /// The rate that it allows, Hz.
     pub slowest_hz: f64,
+    /// Ticks that left out points, %.
+    pub left_out_percent: f64,
     /// Ticks that came too late on the emulated board.
     pub missed_ticks: u32,
     /// What happened when.
@@ -237,6 +239,7 @@ fn course(pair: &Pair, mode: Mode, scenario: &Scenario, scene: &PreparedScene) -
         ),
         instructions_max: most,
         slowest_hz: allowed_hz(most),
+        left_out_percent: rounded(recording.outcome.degraded_percent, 1),
         missed_ticks: recording.outcome.missed_ticks,
         windows: windows(pair, mode, &scenario, scene, &recording),
     })

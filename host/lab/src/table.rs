@@ -1,43 +1,28 @@
 //! Results as CSV: one line a row, names of the fields first.
 
-use std::path::Path;
-
+use mortise_output::Folder;
 use serde::Serialize;
 
 use crate::error::LabError;
 
-/// Makes `folder` where there is none and sees that files can be made in it, so that a sweep of half an hour does not end in nothing.
-///
-/// # Errors
-/// `Unwritable`.
-pub fn prepare_folder(folder: &Path) -> Result<(), LabError> {
-    let probe = folder.join(format!(".mortise-{}", std::process::id()));
-    let made = std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::File::create(&probe))
-        .and_then(|_| std::fs::remove_file(&probe));
-    made.map_err(|source| LabError::Unwritable {
-        path: folder.to_path_buf(),
-        source,
-    })
-}
-
 /// Writes rows, plain structs of numbers, words and booleans, to `NAME.csv` in `folder`; what is absent is an empty cell.
 ///
 /// # Errors
-/// `Unwritable`.
-pub fn write_csv<T: Serialize>(rows: &[T], folder: &Path, name: &str) -> Result<(), LabError> {
-    let path = folder.join(format!("{name}.csv"));
-    let write = || -> std::io::Result<()> {
-        let mut writer = csv::Writer::from_path(&path)?;
+/// `Output`; `Unwritable` for rows that are no table.
+pub fn write_csv<T: Serialize>(rows: &[T], folder: &Folder, name: &str) -> Result<(), LabError> {
+    let name = format!("{name}.csv");
+    let table = || -> std::io::Result<Vec<u8>> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
         for row in rows {
             writer.serialize(row)?;
         }
-        writer.flush()
+        writer.into_inner().map_err(csv::IntoInnerError::into_error)
     };
-    write().map_err(|source| LabError::Unwritable {
-        path: path.clone(),
+    let table = table().map_err(|source| LabError::Unwritable {
+        path: folder.path().join(&name),
         source,
-    })
+    })?;
+    Ok(folder.write(name, &table)?)
 }
 
 /// `value` with so many digits behind the point: what a table shows, and no more than was measured.

@@ -7,10 +7,9 @@ mod axis;
 mod draw;
 mod labels;
 
-use std::io::BufWriter;
-use std::path::Path;
 use std::sync::Once;
 
+use mortise_output::Folder;
 use plotters::backend::{BitMapBackend, DrawingBackend, SVGBackend};
 use plotters::coord::Shift;
 use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
@@ -169,7 +168,7 @@ impl Chart {
     ///
     /// # Errors
     /// `Unwritable`; `Input` for a chart without a point.
-    pub fn write(&self, folder: &Path, name: &str) -> Result<(), LabError> {
+    pub fn write(&self, folder: &Folder, name: &str) -> Result<(), LabError> {
         write_stack(std::slice::from_ref(self), folder, name)
     }
 
@@ -186,7 +185,7 @@ impl Chart {
 ///
 /// # Errors
 /// `Unwritable`; `Input` for a chart without a point.
-pub fn write_stack(charts: &[Chart], folder: &Path, name: &str) -> Result<(), LabError> {
+pub fn write_stack(charts: &[Chart], folder: &Folder, name: &str) -> Result<(), LabError> {
     static FONT: Once = Once::new();
     FONT.call_once(|| {
         for style in [FontStyle::Normal, FontStyle::Bold] {
@@ -195,28 +194,27 @@ pub fn write_stack(charts: &[Chart], folder: &Path, name: &str) -> Result<(), La
         }
     });
     let size = size(charts.len());
-    let svg = folder.join(format!("{name}.svg"));
     let mut text = String::new();
     draw_stack(
         charts,
         &SVGBackend::with_string(&mut text, size).into_drawing_area(),
         1,
     )?;
-    let unwritable = |path: &Path| {
-        let path = path.to_owned();
-        move |source| LabError::Unwritable { path, source }
-    };
-    std::fs::write(&svg, text).map_err(unwritable(&svg))?;
+    folder.write(format!("{name}.svg"), text.as_bytes())?;
 
-    let png = folder.join(format!("{name}.png"));
+    let name = format!("{name}.png");
     let pixels = pixels(charts)?;
-    let file = std::fs::File::create(&png).map_err(unwritable(&png))?;
-    let mut encoder = png::Encoder::new(BufWriter::new(file), size.0 * SHARPNESS, size.1 * SHARPNESS);
+    let mut png = Vec::new();
+    let mut encoder = png::Encoder::new(&mut png, size.0 * SHARPNESS, size.1 * SHARPNESS);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_compression(png::Compression::High);
     (encoder.write_header())
         .and_then(|mut writer| writer.write_image_data(&pixels))
-        .map_err(|error| unwritable(&png)(error.into()))
+        .map_err(|error| LabError::Unwritable {
+            path: folder.path().join(&name),
+            source: error.into(),
+        })?;
+    Ok(folder.write(name, &png)?)
 }
 
 fn size(charts: usize) -> (u32, u32) {
@@ -286,11 +284,15 @@ mod tests {
         }
     }
 
+    fn out(path: &std::path::Path) -> Folder {
+        Folder::new(path, mortise_output::Existing::Keep, &[""; 0]).expect("a folder")
+    }
+
     #[test]
     fn both_files_are_written_and_read_back() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         chart(&[(1.0, 20.0), (10.0, 2.0)])
-            .write(folder.path(), "test")
+            .write(&out(folder.path()), "test")
             .expect("two points");
         let svg = std::fs::read_to_string(folder.path().join("test.svg")).expect("written");
         for words in ["<svg", "x, mm", "y, µm", "10 here", "one"] {
@@ -337,7 +339,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         for points in [&[][..], &[(0.0, 1.0), (1.0, f64::NAN), (-1.0, 2.0)]] {
             let error = chart(points)
-                .write(folder.path(), "none")
+                .write(&out(folder.path()), "none")
                 .expect_err("nothing to draw");
             assert!(error.to_string().contains("no point"), "{error}");
         }

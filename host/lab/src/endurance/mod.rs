@@ -177,13 +177,14 @@ impl Report {
             ("the emulator's", self.emulator_kib),
         ] {
             if last > 0 {
-                rows.push(Row::told(format!("{run}: {whose} memory"), last as f64, "KiB"));
-                rows.push(Row::at_most(
+                rows.push(Row::told(format!("{run}: {whose} memory"), last as f64, "KiB").varies());
+                let growth = Row::at_most(
                     format!("{run}: growth of {whose} memory from the third to the last quarter"),
                     last as f64 - before as f64,
                     "KiB",
                     GROWTH_KIB,
-                ));
+                );
+                rows.push(growth.varies());
             }
         }
         rows

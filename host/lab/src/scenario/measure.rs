@@ -1,13 +1,10 @@
-//! Figures from telemetry: depth, penetration by the exact surfaces, press forces, energy at the handle.
+//! Figures from telemetry: depth, press forces, impulses, energy at the handle.
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_protocol::message::{Telemetry, WirePose, WireWrench};
 
 use super::scene::{Body, PreparedScene};
 use super::{Depth, Press};
-
-/// Poses whose penetration is looked up at most; evenly spread over the run, the last always among them.
-const PENETRATION_POSES: usize = 160;
 
 /// A wire pose in millimetres.
 pub(crate) fn pose_mm(pose: &WirePose) -> DAffine3 {
@@ -19,7 +16,7 @@ pub(crate) fn pose_mm(pose: &WirePose) -> DAffine3 {
     )
 }
 
-fn vector(v: [f32; 3]) -> DVec3 {
+pub(super) fn vector(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))
 }
 
@@ -51,51 +48,7 @@ pub(crate) fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> 
     Some((tip - mouth, bottom - mouth, (off - off.dot(axis) * axis).length()))
 }
 
-/// Deepest point of the moving part in any other, or of any other in it, mm, at `moving`; 0 when nowhere inside.
-fn penetration(scene: &PreparedScene, moving: &DAffine3) -> f64 {
-    let bodies = scene.bodies();
-    let Some(part) = bodies.get(usize::from(scene.part)) else {
-        return 0.0;
-    };
-    let here = moving.transform_point3(part.center);
-    let mut deepest: f64 = 0.0;
-    for (index, other) in bodies.iter().enumerate() {
-        let there = other.placement.transform_point3(other.center);
-        if index == usize::from(scene.part) || here.distance(there) > part.radius + other.radius {
-            continue;
-        }
-        let to_other = other.placement.inverse() * *moving;
-        deepest = deepest
-            .max(depth_in(&part.points, &to_other, other))
-            .max(depth_in(&other.points, &to_other.inverse(), part));
-    }
-    deepest
-}
-
-/// Deepest of `points` (moved by `to_body`) inside `body`, mm.
-fn depth_in(points: &[DVec3], to_body: &DAffine3, body: &Body) -> f64 {
-    points
-        .iter()
-        .map(|&point| to_body.transform_point3(point))
-        .filter(|point| point.distance(body.center) < body.radius)
-        .filter_map(|point| body.surface.nearest(point))
-        .map(|nearest| -nearest.distance)
-        .fold(0.0, f64::max)
-}
-
-/// Deepest penetration over the run, mm.
-pub(crate) fn deepest(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
-    let step = samples.len().div_ceil(PENETRATION_POSES).max(1);
-    samples
-        .iter()
-        .rev()
-        .step_by(step)
-        .filter_map(|sample| sample.object.as_ref())
-        .map(|(_, pose)| penetration(scene, &pose_mm(pose)))
-        .fold(0.0, f64::max)
-}
-
-/// The same as the board told it, mm.
+/// Deepest penetration as the board told it, mm.
 pub(crate) fn board_deepest(samples: &[Telemetry]) -> f64 {
     let depths = samples.iter().filter_map(|sample| sample.pairs.first());
     depths.map(|pair| 1e3 * f64::from(pair.depth)).fold(0.0, f64::max)
@@ -122,6 +75,33 @@ pub(crate) fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> 
         .iter()
         .fold((0.0, 0.0), |(a, b), &(handle, hand)| (a + handle, b + hand));
     Some((handle / count, hand / count))
+}
+
+/// What contacts did to the object and the handle to the hand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Impulse {
+    /// ∫|contact force| dt, N s.
+    pub contact_ns: f64,
+    /// Largest contact force, N.
+    pub contact_peak_n: f64,
+    /// |∫(contact force − force on the handle) dt|, N s: what the object gives to the hand less than it gets, which is its momentum (plus what the
+    /// limits and the valve took).
+    pub lost_ns: f64,
+}
+
+/// Impulses over samples, each of which stands for the time since the one before.
+pub(crate) fn impulse(samples: &[Telemetry]) -> Impulse {
+    let mut found = Impulse::default();
+    let mut lost = DVec3::ZERO;
+    for pair in samples.windows(2) {
+        let seconds = 1e-3 * f64::from(pair[1].tick.wrapping_sub(pair[0].tick));
+        let contact = vector(pair[1].contact.force);
+        found.contact_ns += contact.length() * seconds;
+        found.contact_peak_n = found.contact_peak_n.max(contact.length());
+        lost += (contact + vector(pair[1].guidance.wrench.force) - vector(pair[1].wrench.force)) * seconds;
+    }
+    found.lost_ns = lost.length();
+    found
 }
 
 /// Most net work done on the object at any time, mJ.

@@ -3,8 +3,10 @@
 //! Lengths in a scenario file are millimetres, angles degrees, forces newtons, times seconds; the names say so. The hand takes hold of the
 //! part at `grip_mm` and moves relative to that point.
 
+mod law;
 mod measure;
 mod outcome;
+mod overlap;
 mod run;
 mod scene;
 mod truth;
@@ -20,6 +22,7 @@ use serde::Deserialize;
 
 use crate::error::LabError;
 
+pub(crate) use law::pushed;
 pub(crate) use measure::{depth, energy, object_energy, pose_mm};
 pub use outcome::{Outcome, Verdict};
 pub use run::{Listener, Recording, connect, record, run, run_on};

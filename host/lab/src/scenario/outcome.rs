@@ -41,10 +41,16 @@ pub struct Outcome {
     pub press_hand_n: Option<f64>,
     /// How much they differ, share of the hand's, percent.
     pub press_error_percent: Option<f64>,
-    /// Deepest point of one part inside another by the exact surfaces, both ways, over all looked-at samples, mm; 0 when never inside.
+    /// Deepest point of one part inside another by the exact surfaces, both ways, over all samples, mm; 0 when never inside.
     pub penetration_mm: f64,
     /// The same as the board saw it, mm.
     pub board_penetration_mm: f64,
+    /// Integral of the amount of the contact force on the object, N·s.
+    pub contact_impulse_ns: f64,
+    /// Largest contact force on the object, N.
+    pub peak_contact_n: f64,
+    /// Amount of the integral of the forces on the object by contacts and targets less that on the handle, N·s: what of it the hand did not feel.
+    pub impulse_lost_ns: f64,
     /// Most net work the device had done on the handle at any time, mJ: positive when it gave energy that nobody put in.
     pub energy_given_mj: f64,
     /// Work that went through the handle either way, mJ.
@@ -145,6 +151,9 @@ quantities! {
     press_error_percent => |o| o.press_error_percent;
     penetration_mm => |o| Some(o.penetration_mm);
     board_penetration_mm => |o| Some(o.board_penetration_mm);
+    contact_impulse_ns => |o| Some(o.contact_impulse_ns);
+    peak_contact_n => |o| Some(o.peak_contact_n);
+    impulse_lost_ns => |o| Some(o.impulse_lost_ns);
     energy_given_mj => |o| Some(o.energy_given_mj);
     energy_passed_mj => |o| Some(o.energy_passed_mj);
     contact_given_mj => |o| Some(o.contact_given_mj);

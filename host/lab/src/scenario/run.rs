@@ -12,7 +12,7 @@ use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe}
 use super::measure::Felt;
 use super::outcome::Outcome;
 use super::scene::PreparedScene;
-use super::{Hand, Key, Scenario, measure, parameter_named, truth};
+use super::{Hand, Key, Scenario, measure, overlap, parameter_named, truth};
 use crate::error::LabError;
 
 /// Ticks in a second of every simulated rig.
@@ -412,6 +412,7 @@ fn outcome(
         .and_then(|press| measure::press(press, settled));
     let (energy_given_mj, energy_passed_mj) = measure::energy(felt);
     let object = measure::object_energy(scene, samples);
+    let impulse = measure::impulse(samples);
     let counted = capabilities.cost_unit == CostUnit::Instructions;
     Outcome {
         scenario: scenario.name.clone(),
@@ -432,8 +433,11 @@ fn outcome(
         press_handle_n: press.map(|(handle, _)| handle),
         press_hand_n: press.map(|(_, hand)| hand),
         press_error_percent: press.map(|(handle, hand)| 100.0 * (handle - hand).abs() / hand.abs().max(1e-9)),
-        penetration_mm: measure::deepest(scene, samples),
+        penetration_mm: overlap::deepest(scene, samples),
         board_penetration_mm: measure::board_deepest(samples),
+        contact_impulse_ns: impulse.contact_ns,
+        peak_contact_n: impulse.contact_peak_n,
+        impulse_lost_ns: impulse.lost_ns,
         energy_given_mj,
         energy_passed_mj,
         energy_exact,

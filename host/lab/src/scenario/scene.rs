@@ -12,6 +12,8 @@ use mortise_guide::{Guide, GuideSettings};
 
 use super::Scenario;
 use crate::error::LabError;
+use crate::exact_fit::ExactFit;
+use crate::fit::Fit;
 
 /// Chord error of the points that penetration is measured at, as a share of the part's radius: 5 µm on a part of 100 mm, a tenth of the 0.05 mm that
 /// matter there.
@@ -30,6 +32,8 @@ pub struct PreparedScene {
     /// Index of the part to grab, in the image.
     pub part: u16,
     bodies: Vec<Body>,
+    /// Its two parts in closed form, where they are a peg and a block.
+    closed_form: Option<ExactFit>,
 }
 
 /// A part as measuring sees it.
@@ -97,7 +101,28 @@ impl PreparedScene {
             report: baked.report,
             part: index,
             bodies,
+            closed_form: None,
         })
+    }
+
+    /// The same, known to be made from `fit`: penetration is then measured in closed form.
+    pub(crate) fn made_from(self, fit: Fit) -> Self {
+        let exact = self.exact_fit(fit);
+        Self {
+            closed_form: Some(exact),
+            ..self
+        }
+    }
+
+    /// The peg and the hole of `fit`, from which this scene was made, in closed form.
+    pub(crate) fn exact_fit(&self, fit: Fit) -> ExactFit {
+        let placed = self.bodies.get(usize::from(self.part)).map(|part| part.placement);
+        ExactFit::new(fit, placed.unwrap_or_default())
+    }
+
+    /// See [`Self::made_from`].
+    pub(crate) fn closed_form(&self) -> Option<&ExactFit> {
+        self.closed_form.as_ref()
     }
 
     /// What recognises and sends constraints in this scene.

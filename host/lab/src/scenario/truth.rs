@@ -37,6 +37,8 @@ pub(super) fn replay(
     let felt = samples.iter().zip(0..).map(|(sample, age)| {
         let reading = pose_to_wire(&mechanism.sense().handle);
         let handle = pose_to_wire(&mechanism.true_pose());
+        // Encoders are watched while a part is in hand.
+        mechanism.watch_encoders(sample.object.is_some());
         mechanism.drive(Drive::Wrench(Wrench {
             force: Vec3::from_array(sample.wrench.force),
             torque: Vec3::from_array(sample.wrench.torque),

@@ -107,6 +107,8 @@ pub struct Bench<'a> {
     pub position: f64,
     /// v, m/s.
     pub speed: f64,
+    /// How the handle is turned, which this loop leaves as it is.
+    pub orientation: Quat,
     last_read: f64,
     estimate: f64,
     under_way: Vec<f64>,
@@ -153,6 +155,7 @@ impl<'a> Bench<'a> {
             state,
             position: 0.0,
             speed: 0.0,
+            orientation: Quat::IDENTITY,
             last_read: 0.0,
             estimate: 0.0,
             under_way: vec![0.0; rig.delay_ticks],
@@ -180,7 +183,7 @@ impl<'a> Bench<'a> {
         self.last_read = read;
         let along = |z: f64| Vec3::new(0.0, 0.0, z as f32);
         let input = Input {
-            handle: Pose::new(along(read), Quat::IDENTITY),
+            handle: Pose::new(along(read), self.orientation),
             handle_twist: Twist {
                 linear: along(self.estimate * sensor.share),
                 angular: Vec3::ZERO,

@@ -1,6 +1,7 @@
 //! A blow on a thin wall: how deep the part goes, whether it comes through, what the handle feels.
 
-use mortise_haptics::{Integrator, Settings};
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_haptics::{Integrator, Quat, Settings};
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;
 
@@ -13,6 +14,8 @@ use crate::variant::Variant;
 /// Thickness of the wall, mm, and how far above it the part starts.
 pub const WALL_MM: f64 = 1.0;
 const GAP_MM: f64 = 20.0;
+/// Ticks in which a part comes to the tilt it strikes with.
+const TILT_TICKS: u32 = 400;
 /// How far beyond touching the hand wants to be, mm, and how long it stays there, s.
 const BEYOND_MM: f64 = 5.0;
 const STAY_S: f64 = 0.5;
@@ -26,7 +29,9 @@ pub struct Blow {
     pub method: &'static str,
     /// m/s.
     pub speed: f64,
-    /// Deepest, µm; negative when it stopped above the wall.
+    /// Angle of the part's axis off the wall's normal, degrees.
+    pub tilt_deg: f64,
+    /// How far the part's lowest point was below the wall's face at most, closed form, µm; negative when it stopped above the wall.
     pub penetration_um: f64,
     /// Whether it was ever past the wall's middle.
     pub tunnelled: bool,
@@ -69,28 +74,55 @@ pub const METHODS: [(&str, Variant, Integrator); 3] = [
 ///
 /// # Errors
 /// Anything that keeps it from being baked.
-pub fn wall(variant: &Variant) -> Result<Slab, LabError> {
-    Slab::bake(variant, WALL_MM, GAP_MM)
+pub fn wall(variant: &Variant, thick_mm: f64) -> Result<Slab, LabError> {
+    Slab::bake(variant, thick_mm, GAP_MM)
 }
 
-/// Strikes at `speed`, m/s.
-pub fn strike(
-    scene: &SceneImage<'_>,
-    part: u16,
-    method: &'static str,
-    integrator: Integrator,
-    speed: f64,
-) -> Blow {
+/// What strikes what.
+#[derive(Clone, Copy)]
+pub struct Strike<'a> {
+    /// The wall, and its scene.
+    pub slab: &'a Slab,
+    /// See above.
+    pub scene: &'a SceneImage<'a>,
+    /// Thickness of the wall, mm.
+    pub thick_mm: f64,
+    /// Angle of the part's axis off the wall's normal, degrees.
+    pub tilt_deg: f64,
+    /// Name of the model.
+    pub method: &'static str,
+    /// How the part is moved.
+    pub integrator: Integrator,
+    /// m/s.
+    pub speed: f64,
+}
+
+/// One blow: the part comes to its tilt at rest, then goes down.
+pub fn strike(blow: &Strike<'_>) -> Blow {
+    let &Strike {
+        slab,
+        scene,
+        thick_mm,
+        tilt_deg,
+        method,
+        integrator,
+        speed,
+    } = blow;
     let settings = Settings {
         integrator,
         ..Settings::default()
     };
     let period = f64::from(settings.period_s);
-    let mut bench = Bench::new(scene, part, settings, Rig::held());
+    let mut bench = Bench::new(scene, slab.part, settings, Rig::held());
+    bench.orientation = Quat::from_rotation_y(tilt_deg.to_radians() as f32);
+    if tilt_deg != 0.0 {
+        for _ in 0..TILT_TICKS {
+            bench.step(&Wish::default());
+        }
+    }
     bench.speed = -speed;
     let end = -1e-3 * (GAP_MM + BEYOND_MM);
     let ticks = ((-end / speed + STAY_S) / period) as u32;
-    let start = f64::from(scene.parts()[usize::from(part)].position[2]);
     let (mut deepest, mut peak) = (f64::NEG_INFINITY, 0.0f64);
     for i in 0..ticks {
         let wanted = -speed * period * f64::from(i);
@@ -99,15 +131,19 @@ pub fn strike(
             speed: if wanted > end { -speed } else { 0.0 },
             push: 0.0,
         });
-        let z = f64::from(out.object.position.z);
-        deepest = deepest.max(start - z - 1e-3 * GAP_MM);
+        let position = 1e3 * DVec3::from_array(out.object.position.to_array().map(f64::from));
+        let [x, y, z, w] = out.object.orientation.to_array().map(f64::from);
+        let rotation = DQuat::from_xyzw(x, y, z, w).normalize();
+        let pose = DAffine3::from_rotation_translation(rotation, position);
+        deepest = deepest.max(slab.exact.depth_mm(&pose));
         peak = peak.max(f64::from(out.handle.force.length()));
     }
     Blow {
         method,
         speed,
-        penetration_um: 1e6 * deepest,
-        tunnelled: deepest > 0.5e-3 * WALL_MM,
+        tilt_deg,
+        penetration_um: 1e3 * deepest,
+        tunnelled: deepest > 0.5 * thick_mm,
         peak_force_n: peak,
         handle_made_mj: 1e3 * bench.energy.made,
     }
@@ -120,11 +156,19 @@ pub fn strike(
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Blow)) -> Result<Vec<Blow>, LabError> {
     let mut blows = Vec::new();
     for (method, variant, integrator) in METHODS {
-        let slab = wall(&variant)?;
+        let slab = wall(&variant, WALL_MM)?;
         let scene = slab.scene()?;
         let speeds = if quick { &SPEEDS[4..] } else { &SPEEDS[..] };
         for &speed in speeds {
-            let blow = strike(&scene, slab.part, method, integrator, speed);
+            let blow = strike(&Strike {
+                slab: &slab,
+                scene: &scene,
+                thick_mm: WALL_MM,
+                tilt_deg: 0.0,
+                method,
+                integrator,
+                speed,
+            });
             out(&blow);
             blows.push(blow);
         }

@@ -1,4 +1,4 @@
-//! How far to the side a hand may push a peg that is still to go in: jamming and wedging.
+//! How far to the side a hand may push a peg that is still to go in: jamming and wedging. Contact here has no friction.
 //!
 //! A peg of diameter d stands l deep in a hole of diameter D, leans, and touches twice: its side the hole's rim, its tip's edge the wall across. A
 //! hand pushes a place on its axis sideways with F_x and in with F_z and leaves it free to turn. Oracles, both for a rigid peg in the plane of the
@@ -335,7 +335,7 @@ pub fn chart(found: &[Push]) -> Chart {
     }
     Chart {
         title: "How far to the side a peg may be pushed and still goes in".into(),
-        note: "Peg ø18.75 mm, 10 mm deep, pushed with 2 N 40 mm above the rim, free to turn. Arrows: at the largest ratio tried. Leftmost: exact fit.".into(),
+        note: "Peg ø18.75 mm, 10 mm deep, pushed with 2 N 40 mm above the rim, free to turn; contact has no friction. Arrows: at the largest ratio tried. Leftmost: exact fit.".into(),
         x: Axis::new("diametral clearance, mm"),
         y: Axis::new("largest force sideways over force in"),
         series,

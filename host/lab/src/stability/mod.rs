@@ -16,9 +16,9 @@ pub mod quantisation;
 pub mod shell;
 pub mod slab;
 
-use std::path::Path;
 use std::rc::Rc;
 
+use mortise_output::Folder;
 use serde::Serialize;
 
 use crate::chart::{Chart, write_stack};
@@ -73,7 +73,7 @@ impl Map {
     ///
     /// # Errors
     /// `Unwritable`.
-    pub fn write(&self, folder: &Path) -> Result<(), LabError> {
+    pub fn write(&self, folder: &Folder) -> Result<(), LabError> {
         write_csv(&self.trials, folder, self.name)?;
         write_stack(&self.charts, folder, self.name)
     }

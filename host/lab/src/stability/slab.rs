@@ -4,6 +4,7 @@ use mortise_bake::Grabbable;
 use mortise_protocol::image::SceneImage;
 
 use crate::error::LabError;
+use crate::exact_fit::ExactFit;
 use crate::fit::Fit;
 use crate::scenario::{PreparedScene, Scenario};
 use crate::variant::Variant;
@@ -13,6 +14,8 @@ pub struct Slab {
     words: Vec<u32>,
     /// Index of the peg.
     pub part: u16,
+    /// Peg and slab in closed form.
+    pub(crate) exact: ExactFit,
 }
 
 impl Slab {
@@ -38,6 +41,7 @@ impl Slab {
         Ok(Self {
             words,
             part: scene.part,
+            exact: scene.exact_fit(fit),
         })
     }
 

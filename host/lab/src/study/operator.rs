@@ -87,13 +87,27 @@ impl Task {
     /// # Errors
     /// As [`PreparedScene::with`].
     pub fn new(fit: &Fit, variant: &Variant) -> Result<Self, LabError> {
+        Self::with(fit, variant, None)
+    }
+
+    /// Bakes the fit for the textbook's method, peg and hole with voxels of their own, mm.
+    ///
+    /// # Errors
+    /// As [`PreparedScene::with`].
+    pub fn voxels(fit: &Fit, peg_mm: f64, hole_mm: f64) -> Result<Self, LabError> {
+        Self::with(fit, &Variant::textbook(hole_mm), Some(peg_mm))
+    }
+
+    fn with(fit: &Fit, variant: &Variant, peg_cell_mm: Option<f64>) -> Result<Self, LabError> {
         let fit = fit.engaged(-ABOVE_MM);
         let file = fit.file()?;
         let mut scenario = Scenario::parse(SCENARIO, "operator")?;
         scenario.scene.step = file.path().to_owned();
         let budget = ParameterId::PointBudget.row();
         scenario.parameters.insert(budget.name.to_owned(), budget.max);
-        let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
+        let mut options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
+        let own = peg_cell_mm.map(|cell| (scenario.scene.part.clone(), cell));
+        options.part_cells_mm.extend(own);
         let scene = PreparedScene::with(&scenario, &options)?;
         Ok(Self {
             fit,
@@ -108,12 +122,14 @@ impl Task {
         self.scene.image.len()
     }
 
-    /// One trial, in-process.
+    /// One trial, in-process, with points moved inward by this share of the peg's voxel.
     ///
     /// # Errors
     /// Anything that keeps it from being played but a fault of the board: the operator pushed until it gave up.
-    pub fn tried(&self, hand: &Hand) -> Result<Went, LabError> {
+    pub fn tried(&self, hand: &Hand, shrinking: f64) -> Result<Went, LabError> {
         let mut scenario = self.scenario.clone();
+        let name = ParameterId::Shrinking.row().name.to_owned();
+        scenario.parameters.insert(name, shrinking as f32);
         let (fit, play) = (&self.fit, 0.5 * self.fit.clearance_mm());
         let through = ABOVE_MM + fit.height_mm + BEYOND_MM;
         scenario.hand.grip_mm = [0.0, 0.0, ABOVE_MM + 0.5 * fit.length_mm];
@@ -164,7 +180,7 @@ mod tests {
         let fit = Fit::thesis(1.0);
         let through = |variant: Variant| {
             let task = Task::new(&fit, &variant).expect("baked");
-            task.tried(&Hand::WORST).expect("played").through
+            task.tried(&Hand::WORST, 0.0).expect("played").through
         };
         assert!(!through(Variant::textbook(2.0)));
         assert!(through(Variant::field(2.0)));

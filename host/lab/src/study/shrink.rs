@@ -1,188 +1,144 @@
-//! Which voxels let a peg into its hole, and what shrinking the pointshell does: 27 trials, and the rule for a voxel's size.
+//! Which voxels let a peg into its hole, and what shrinking the pointshell does: the first study of Faas 2010, chapter 7, repeated.
 //!
-//! Chapter 7 of Faas 2010 varies voxel, clearance (2.5, 1.4, 1.0 mm) and shrinking in 27 trials and fits a rule for the voxel's size by least squares
-//! (eq. 20). The trials here are all combinations of three of each, by the textbook's voxmap and pointshell; voxels and shares shrunk are ours.
-//! The rule comes from the largest voxel that goes in at each clearance, with the operator's worst hand.
+//! Her factors and levels (table 1), 27 trials a design, her model (logistic, one linear term a factor) and her test (χ² of each term's likelihood
+//! ratio). Which design her software drew is not said; we draw space-filling ones, which use all of the levels she names, and D-optimal ones, and
+//! each anew from several seeds, so that the χ² of one design of 27 has a spread to be compared with. The peg and the hole have voxels of their own;
+//! shrinking is a parameter of the running board. Each trial has a hand of its own, drawn ([`super::operator`]).
+//!
+//! What makes a difference is found by changing one thing at a time: [`VARIATIONS`].
 
 use std::fmt;
 
 use serde::Serialize;
 
+use super::design::Design;
+use super::faas::TABLE_3;
 use super::operator::{Hand, Task};
-use super::statistics::{LeastSquares, Logistic, Term};
+use super::statistics::{Logistic, Term};
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::fit::Fit;
 use crate::table::rounded;
-use crate::variant::Variant;
 
 /// Diametral clearances, mm.
 pub const CLEARANCES_MM: [f64; 3] = [2.5, 1.4, 1.0];
-/// Voxels, mm.
-const VOXELS_MM: [f64; 3] = [2.0, 1.0, 0.5];
-/// How far points are moved inward, percent of a voxel.
-const SHRINKS_PERCENT: [f64; 3] = [0.0, 50.0, 100.0];
-/// Those the rule is looked for with.
-const RULES_PERCENT: [f64; 2] = [0.0, 100.0];
-/// Voxels over clearance that the rule is looked for among, descending.
-const LADDER: [f64; 12] = [2.0, 1.7, 1.4, 1.2, 1.0, 0.85, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25];
+/// Names of the factors, in the order of a trial's levels.
+pub const FACTORS: [&str; 4] = [
+    "peg voxel, mm",
+    "hole voxel, mm",
+    "clearance, mm",
+    "shrinking, voxels",
+];
+/// Levels of the factors: 10 voxels from 0.25 to 2.0 mm at equal intervals, twice; the clearances; 0 to 1 by tenths.
+const LEVELS: [usize; 4] = [10, 10, 3, 11];
+/// Trials of a design.
+const RUNS: usize = 27;
+/// Designs drawn of each variation.
+const SEEDS: u64 = 4;
+/// Baked scenes kept: a D-optimal design comes back to the same eight.
+const KEPT: usize = 8;
 
-/// Eq. 20 of Faas 2010 as printed: voxel over clearance.
-const EQ_20: LeastSquares = LeastSquares {
-    slope: 0.027,
-    intercept: -0.001,
-    r_squared: f64::NAN,
-};
-/// Its units are not said with it: a centimetre, should it give centimetres for millimetres.
-const MM_PER_CM: f64 = 10.0;
+/// What is changed from the first to the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Variation {
+    /// In words.
+    pub name: &'static str,
+    /// How trials are chosen.
+    pub design: Design,
+    /// Hands that may try before a trial counts as stuck: hers had as long as it liked.
+    pub hands: u64,
+}
+
+/// One thing changed at a time, the first one as it is.
+pub const VARIATIONS: [Variation; 3] = [
+    Variation {
+        name: "space-filling",
+        design: Design::SpaceFilling,
+        hands: 1,
+    },
+    Variation {
+        name: "space-filling, five hands may try",
+        design: Design::SpaceFilling,
+        hands: 5,
+    },
+    Variation {
+        name: "D-optimal",
+        design: Design::DOptimal,
+        hands: 1,
+    },
+];
 
 /// One insertion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
-    /// Method.
-    pub method: &'static str,
-    /// Edge of voxels or cells, mm.
-    pub voxel_mm: f64,
+    /// Of [`VARIATIONS`].
+    pub variation: &'static str,
+    /// Design, by its seed.
+    pub seed: u64,
+    /// Edge of the peg's voxels, mm.
+    pub peg_voxel_mm: f64,
+    /// Edge of the hole's voxels, mm.
+    pub hole_voxel_mm: f64,
     /// Hole's diameter less the peg's, mm.
     pub clearance_mm: f64,
-    /// How far points were moved inward, percent of a voxel; absent where points lie on the exact surface.
-    pub shrink_percent: Option<f64>,
-    /// Whether the peg came through.
+    /// How far points were moved inward, in voxels of the peg.
+    pub shrinking: f64,
+    /// Whether the peg came through: her “1”.
     pub through: bool,
-    /// How far it came, mm; the hole is 40 mm deep.
+    /// Hands that tried.
+    pub hands: u64,
+    /// How far the last came, mm; the hole is 40 mm deep.
     pub inserted_mm: Option<f64>,
-    /// Largest force on the handle, N.
+    /// Largest force on its handle, N.
     pub peak_n: Option<f64>,
     /// Share of ticks that left out points, %.
     pub degraded_percent: Option<f64>,
 }
 
-/// The largest voxel that goes in.
+/// A term of table 3, hers and ours.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Largest {
-    /// Percent of a voxel.
-    pub shrink_percent: f64,
-    /// Hole's diameter less the peg's, mm.
-    pub clearance_mm: f64,
-    /// The voxel, mm; absent when none of the ladder does.
-    pub voxel_mm: Option<f64>,
-}
-
-/// The rule for a voxel's size: voxel = slope·clearance + intercept.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Rule {
-    /// Percent of a voxel.
-    pub shrink_percent: f64,
-    /// Voxel over clearance, mm/mm, and mm.
-    #[serde(flatten)]
-    pub line: LeastSquares,
+pub struct Compared {
+    /// Of [`VARIATIONS`].
+    pub variation: &'static str,
+    /// Factor.
+    pub source: &'static str,
+    /// χ² and p of table 3.
+    pub faas_chi_squared: f64,
+    /// See `faas_chi_squared`.
+    pub faas_p: f64,
+    /// Of our designs of 27: the median, the least and the largest χ².
+    pub median_chi_squared: f64,
+    /// See `median_chi_squared`.
+    pub least_chi_squared: f64,
+    /// See `median_chi_squared`.
+    pub most_chi_squared: f64,
+    /// p of the median.
+    pub median_p: f64,
+    /// Designs in which the term has p ≤ 0.05, of `designs`.
+    pub significant: usize,
+    /// Designs.
+    pub designs: usize,
+    /// Of them, those whose terms tell all 27 trials apart.
+    pub separated: usize,
+    /// χ² of the trials of all designs together.
+    pub pooled_chi_squared: f64,
+    /// Its p.
+    pub pooled_p: f64,
+    /// Coefficient of the pooled model, per unit of the factor; absent where there is no finite one.
+    pub pooled_coefficient: Option<f64>,
+    /// Its standard error.
+    pub pooled_error: Option<f64>,
+    /// Share of all trials that came through.
+    pub share_through: f64,
 }
 
 /// What the study found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Study {
-    /// By the textbook, 27 unless quick.
+    /// All trials.
     pub trials: Vec<Trial>,
-    /// By the distance field, one for each voxel and clearance.
-    pub ours: Vec<Trial>,
-    /// What voxel, clearance and shrinking explain.
-    pub terms: Vec<Term>,
-    /// What the rules are made of.
-    pub largest: Vec<Largest>,
-    /// One for each share shrunk.
-    pub rules: Vec<Rule>,
-}
-
-/// Makes the study; `quick` has one clearance only and no rule. What is found goes to `out` as words and rows.
-///
-/// # Errors
-/// Anything that keeps a trial from being played.
-pub fn study(quick: bool, out: &mut dyn FnMut(Found<'_>)) -> Result<Study, LabError> {
-    let clearances = &CLEARANCES_MM[..if quick { 1 } else { CLEARANCES_MM.len() }];
-    let mut study = Study::default();
-    for &clearance in clearances {
-        for voxel in VOXELS_MM {
-            for shrink in SHRINKS_PERCENT {
-                let hand = Hand::of(study.trials.len() as u64);
-                let trial = trial(&Variant::shrunk(voxel, shrink), clearance, Some(shrink), &hand)?;
-                out(Found::Trial(&trial));
-                study.trials.push(trial);
-            }
-            let trial = trial(&Variant::field(voxel), clearance, None, &Hand::WORST)?;
-            out(Found::Trial(&trial));
-            study.ours.push(trial);
-        }
-    }
-    let (values, went): (Vec<Vec<f64>>, Vec<bool>) = (study.trials.iter())
-        .map(|t| {
-            (
-                vec![t.voxel_mm, t.clearance_mm, t.shrink_percent.unwrap_or(0.0)],
-                t.through,
-            )
-        })
-        .unzip();
-    if !quick {
-        let names = ["voxel, mm", "clearance, mm", "shrinking, %"];
-        study.terms = Logistic::terms(&names, &values, &went).unwrap_or_default();
-        study.terms.iter().for_each(|term| out(Found::Term(term)));
-        for shrink in RULES_PERCENT {
-            let rule = rule(shrink, &mut study.largest, out)?;
-            study.rules.extend(rule);
-        }
-        study.rules.iter().for_each(|rule| out(Found::Rule(rule)));
-    }
-    Ok(study)
-}
-
-fn trial(variant: &Variant, clearance: f64, shrink: Option<f64>, hand: &Hand) -> Result<Trial, LabError> {
-    let went = Task::new(&Fit::thesis(clearance), variant)?.tried(hand)?;
-    Ok(Trial {
-        method: variant.kind(),
-        voxel_mm: variant.cell_mm,
-        clearance_mm: clearance,
-        shrink_percent: shrink,
-        through: went.through,
-        inserted_mm: went.inserted_mm.map(|deep| rounded(deep, 3)),
-        peak_n: went.peak_n.map(|force| rounded(force, 3)),
-        degraded_percent: went.degraded_percent.map(|share| rounded(share, 1)),
-    })
-}
-
-/// The largest voxel of the ladder at each clearance, and the line through them.
-fn rule(
-    shrink: f64,
-    largest: &mut Vec<Largest>,
-    out: &mut dyn FnMut(Found<'_>),
-) -> Result<Option<Rule>, LabError> {
-    let mut points = Vec::new();
-    for clearance in CLEARANCES_MM {
-        let mut found = Largest {
-            shrink_percent: shrink,
-            clearance_mm: clearance,
-            voxel_mm: None,
-        };
-        for ratio in LADDER {
-            let voxel = rounded(ratio * clearance, 3);
-            if trial(
-                &Variant::shrunk(voxel, shrink),
-                clearance,
-                Some(shrink),
-                &Hand::WORST,
-            )?
-            .through
-            {
-                found.voxel_mm = Some(voxel);
-                points.push((clearance, voxel));
-                break;
-            }
-        }
-        out(Found::Largest(&found));
-        largest.push(found);
-    }
-    Ok(LeastSquares::through(&points).map(|line| Rule {
-        shrink_percent: shrink,
-        line,
-    }))
+    /// Table 3.
+    pub table: Vec<Compared>,
 }
 
 /// Something the study found.
@@ -191,120 +147,256 @@ fn rule(
 pub enum Found<'s> {
     /// A trial.
     Trial(&'s Trial),
-    /// What a term explains.
-    Term(&'s Term),
-    /// The largest voxel that goes in.
-    Largest(&'s Largest),
-    /// A rule.
-    Rule(&'s Rule),
+    /// A term.
+    Term(&'s Compared),
 }
 
-/// Largest voxel over clearance, with the lines through them, beside eq. 20.
-pub fn chart(study: &Study) -> Chart {
-    let looks = [Look::VermilionSquare, Look::BlueDisc];
-    let span = [CLEARANCES_MM[2], CLEARANCES_MM[0]];
-    let mut series: Vec<Series> = (study.rules.iter().zip(looks))
-        .map(|(rule, look)| Series {
-            name: format!(
-                "shrunk by {} %: {:.2}·C {} {:.2}",
-                rule.shrink_percent,
-                rule.line.slope,
-                if rule.line.intercept < 0.0 { '−' } else { '+' },
-                rule.line.intercept.abs()
-            ),
-            look,
-            line: Line::None,
-            points: (study.largest.iter())
-                .filter(|largest| largest.shrink_percent == rule.shrink_percent)
-                .filter_map(|largest| {
-                    let voxel = largest.voxel_mm?;
-                    Some(Point {
-                        x: largest.clearance_mm,
-                        y: voxel,
-                        label: format!("{voxel} mm"),
-                        // None larger was tried.
-                        at_least: voxel > 0.999 * LADDER[0] * largest.clearance_mm,
-                    })
-                })
-                .collect(),
+/// Makes the study; `quick` draws one space-filling design. What is found goes to `out` as words and rows.
+///
+/// # Errors
+/// Anything that keeps a trial from being played.
+pub fn study(quick: bool, out: &mut dyn FnMut(Found<'_>)) -> Result<Study, LabError> {
+    let mut study = Study::default();
+    let (variations, seeds) = if quick {
+        (&VARIATIONS[..1], 1)
+    } else {
+        (&VARIATIONS[..], SEEDS)
+    };
+    for variation in variations {
+        let first = study.trials.len();
+        let mut tasks = Tasks::default();
+        for seed in 0..seeds {
+            for (run, levels) in variation.design.drawn(&LEVELS, RUNS, seed).iter().enumerate() {
+                let hands = 1000 * seed + variation.hands * run as u64;
+                let trial = trial(variation, seed, levels, hands, &mut tasks)?;
+                out(Found::Trial(&trial));
+                study.trials.push(trial);
+            }
+        }
+        let rows = compared(variation, &study.trials[first..]);
+        rows.iter().for_each(|row| out(Found::Term(row)));
+        study.table.extend(rows);
+    }
+    Ok(study)
+}
+
+/// Values of the levels, in the order of [`FACTORS`].
+fn values(levels: &[usize]) -> [f64; 4] {
+    let voxel = |level: usize| rounded(0.25 + 1.75 / 9.0 * level as f64, 4);
+    [
+        voxel(levels[0]),
+        voxel(levels[1]),
+        CLEARANCES_MM[levels[2]],
+        rounded(0.1 * levels[3] as f64, 1),
+    ]
+}
+
+/// Scenes baked lately.
+#[derive(Default)]
+struct Tasks(Vec<([f64; 3], Task)>);
+
+impl Tasks {
+    fn of(&mut self, peg: f64, hole: f64, clearance: f64) -> Result<&Task, LabError> {
+        let key = [peg, hole, clearance];
+        if let Some(place) = self.0.iter().position(|(known, _)| *known == key) {
+            return Ok(&self.0[place].1);
+        }
+        if self.0.len() == KEPT {
+            self.0.remove(0);
+        }
+        self.0
+            .push((key, Task::voxels(&Fit::thesis(clearance), peg, hole)?));
+        Ok(&self.0[self.0.len() - 1].1)
+    }
+}
+
+/// One trial of these levels; hands are drawn from the seed `first` on.
+fn trial(
+    variation: &Variation,
+    seed: u64,
+    levels: &[usize],
+    first: u64,
+    tasks: &mut Tasks,
+) -> Result<Trial, LabError> {
+    let [peg, hole, clearance, shrinking] = values(levels);
+    let task = tasks.of(peg, hole, clearance)?;
+    let mut hands = 1;
+    let mut went = task.tried(&Hand::of(first), shrinking)?;
+    while !went.through && hands < variation.hands {
+        went = task.tried(&Hand::of(first + hands), shrinking)?;
+        hands += 1;
+    }
+    Ok(Trial {
+        variation: variation.name,
+        seed,
+        peg_voxel_mm: peg,
+        hole_voxel_mm: hole,
+        clearance_mm: clearance,
+        shrinking,
+        through: went.through,
+        hands,
+        inserted_mm: went.inserted_mm.map(|deep| rounded(deep, 3)),
+        peak_n: went.peak_n.map(|force| rounded(force, 3)),
+        degraded_percent: went.degraded_percent.map(|share| rounded(share, 1)),
+    })
+}
+
+/// What each factor explains of these trials, and whether they are told apart.
+fn terms(trials: &[&Trial]) -> Option<(Vec<Term>, bool)> {
+    let (x, went): (Vec<Vec<f64>>, Vec<bool>) = (trials.iter())
+        .map(|t| {
+            let x = vec![t.peg_voxel_mm, t.hole_voxel_mm, t.clearance_mm, t.shrinking];
+            (x, t.through)
+        })
+        .unzip();
+    let separated = Logistic::fit(&x, &went)?.separated;
+    Some((Logistic::terms(&FACTORS, &x, &went)?, separated))
+}
+
+/// Table 3 of one variation. Designs in which all trials went alike say nothing and count as χ² = 0.
+fn compared(variation: &Variation, trials: &[Trial]) -> Vec<Compared> {
+    let seeds = trials.iter().map(|trial| trial.seed + 1).max().unwrap_or(0);
+    let each: Vec<Option<(Vec<Term>, bool)>> = (0..seeds)
+        .map(|seed| {
+            terms(
+                &trials
+                    .iter()
+                    .filter(|trial| trial.seed == seed)
+                    .collect::<Vec<_>>(),
+            )
         })
         .collect();
-    let line = |of: &LeastSquares, unit: f64, name: &str, look, line| Series {
-        name: name.to_owned(),
-        look,
-        line,
-        points: span
-            .map(|x| Point {
-                x,
-                y: unit * of.at(x),
-                ..Point::default()
-            })
-            .to_vec(),
-    };
-    for (rule, look) in study.rules.iter().zip(looks) {
-        series.push(line(&rule.line, 1.0, "", look, Line::Trace));
-    }
-    let printed = "Faas 2010, eq. 20: 0.027·C − 0.001";
-    series.push(line(&EQ_20, 1.0, printed, Look::Black, Line::DashedTrace));
-    series.push(line(
-        &EQ_20,
-        MM_PER_CM,
-        "the same, read as centimetres for millimetres",
-        Look::PurpleDiamond,
-        Line::DashedTrace,
-    ));
+    let pooled = terms(&trials.iter().collect::<Vec<_>>());
+    let through = trials.iter().filter(|trial| trial.through).count();
+    (TABLE_3.iter().enumerate())
+        .map(|(factor, printed)| {
+            let mut found: Vec<(f64, f64)> = (each.iter())
+                .map(|design| {
+                    design.as_ref().map_or((0.0, 1.0), |(terms, _)| {
+                        (terms[factor].chi_squared, terms[factor].p)
+                    })
+                })
+                .collect();
+            found.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let median = found
+                .get(found.len() / 2)
+                .copied()
+                .unwrap_or((f64::NAN, f64::NAN));
+            let pooled = pooled.as_ref().map(|(terms, _)| &terms[factor]);
+            Compared {
+                variation: variation.name,
+                source: printed.source,
+                faas_chi_squared: printed.statistic,
+                faas_p: printed.p,
+                median_chi_squared: rounded(median.0, 3),
+                least_chi_squared: rounded(found.first().map_or(f64::NAN, |found| found.0), 3),
+                most_chi_squared: rounded(found.last().map_or(f64::NAN, |found| found.0), 3),
+                median_p: rounded(median.1, 4),
+                significant: found.iter().filter(|found| found.1 <= 0.05).count(),
+                designs: found.len(),
+                separated: each.iter().flatten().filter(|(_, separated)| *separated).count(),
+                pooled_chi_squared: pooled.map_or(f64::NAN, |term| rounded(term.chi_squared, 3)),
+                pooled_p: pooled.map_or(f64::NAN, |term| term.p),
+                pooled_coefficient: pooled.and_then(|term| term.coefficient).map(|b| rounded(b, 3)),
+                pooled_error: pooled.and_then(|term| term.error).map(|e| rounded(e, 3)),
+                share_through: rounded(through as f64 / trials.len().max(1) as f64, 3),
+            }
+        })
+        .collect()
+}
+
+/// Share of the trials of the first variation that went through over shrinking, a line for each clearance.
+pub fn chart(study: &Study) -> Chart {
+    const STEPS: [(f64, f64); 4] = [(0.0, 0.2), (0.3, 0.5), (0.6, 0.7), (0.8, 1.0)];
+    let of: Vec<&Trial> = (study.trials.iter())
+        .filter(|trial| trial.variation == VARIATIONS[0].name)
+        .collect();
     Chart {
-        title: "Largest voxel that lets a peg through its hole, textbook voxmap".into(),
-        note: "Peg in ø18.75 mm × 40 mm, unguided; hand off by half the play and 0.5° tilted, 0.1 mm tremor. Lines: least squares.".into(),
-        x: Axis::new("diametral clearance C, mm").with_ticks(&[1.0, 1.4, 2.5]),
-        y: Axis::new("voxel, mm"),
-        series,
+        title: "Which pegs go in? Shrinking and clearance, textbook voxmap".into(),
+        note: format!(
+            "{} trials in her factors' levels, voxels of 0.25 to 2.0 mm each for peg and hole, ø18.75 mm × 40 mm, one hand a trial.",
+            of.len()
+        ),
+        x: Axis::new("pointshell shrinking, voxels of the peg").linear(),
+        y: Axis::new("share of trials that went through")
+            .linear()
+            .with_ticks(&[0.0, 0.25, 0.5, 0.75, 1.0]),
+        series: (CLEARANCES_MM.iter().enumerate())
+            .map(|(number, &clearance)| Series {
+                name: format!("{clearance} mm clearance"),
+                look: Look::nth(number),
+                line: Line::Solid,
+                points: (STEPS.iter())
+                    .filter_map(|&(from, to)| {
+                        let in_step = |t: &&&Trial| {
+                            t.clearance_mm == clearance
+                                && t.shrinking >= from - 0.01
+                                && t.shrinking <= to + 0.01
+                        };
+                        let all = of.iter().filter(in_step).count();
+                        let went = of.iter().filter(in_step).filter(|t| t.through).count();
+                        (all > 0).then(|| Point {
+                            x: 0.5 * (from + to),
+                            y: went as f64 / all as f64,
+                            label: format!("{went} of {all}"),
+                            at_least: false,
+                        })
+                    })
+                    .collect(),
+            })
+            .collect(),
     }
 }
 
 impl fmt::Display for Found<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Trial(trial) => {
+            Self::Trial(t) => {
                 write!(
                     f,
-                    "{}, voxel {} mm, clearance {} mm",
-                    trial.method, trial.voxel_mm, trial.clearance_mm
+                    "{}, design {}: voxels of {} mm (peg) and {} mm (hole), clearance {} mm, shrunk by {}: {}",
+                    t.variation,
+                    t.seed,
+                    t.peg_voxel_mm,
+                    t.hole_voxel_mm,
+                    t.clearance_mm,
+                    t.shrinking,
+                    if t.through { "through" } else { "stuck" }
                 )?;
-                if let Some(shrink) = trial.shrink_percent {
-                    write!(f, ", shrunk by {shrink} %")?;
-                }
-                write!(f, ": {}", if trial.through { "through" } else { "stuck" })?;
-                match (trial.inserted_mm, trial.peak_n) {
+                match (t.inserted_mm, t.peak_n) {
                     (Some(deep), Some(force)) => write!(f, ", {deep:.1} mm in, at most {force:.2} N"),
                     _ => write!(f, ", the board gave up"),
                 }
             }
-            Self::Term(term) => write!(f, "{term}"),
-            Self::Largest(largest) => {
-                write!(
-                    f,
-                    "shrunk by {} %, clearance {} mm: ",
-                    largest.shrink_percent, largest.clearance_mm
-                )?;
-                match largest.voxel_mm {
-                    Some(voxel) => write!(f, "the largest voxel that goes is {voxel} mm"),
-                    None => write!(
-                        f,
-                        "no voxel down to {} of the clearance goes",
-                        LADDER[LADDER.len() - 1]
-                    ),
-                }
-            }
-            Self::Rule(rule) => write!(
+            Self::Term(row) => write!(
                 f,
-                "shrunk by {} %: voxel = {:.3}·C {} {:.3} mm (R² = {:.3}); eq. 20 of the thesis: 0.027·C − 0.001, its units not said",
-                rule.shrink_percent,
-                rule.line.slope,
-                if rule.line.intercept < 0.0 { '−' } else { '+' },
-                rule.line.intercept.abs(),
-                rule.line.r_squared
+                "{}, {}: Faas χ² {} (p {}); ours median {} ({} to {}; p {}), p ≤ 0.05 in {} of {} designs; pooled {} (p {:.1e})",
+                row.variation,
+                row.source,
+                row.faas_chi_squared,
+                row.faas_p,
+                row.median_chi_squared,
+                row.least_chi_squared,
+                row.most_chi_squared,
+                row.median_p,
+                row.significant,
+                row.designs,
+                row.pooled_chi_squared,
+                row.pooled_p
             ),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Table 1.
+    #[test]
+    fn levels_are_those_of_table_1() {
+        let last: Vec<usize> = LEVELS.iter().map(|count| count - 1).collect();
+        assert_eq!(values(&[0; 4]), [0.25, 0.25, 2.5, 0.0]);
+        assert_eq!(values(&last), [2.0, 2.0, 1.0, 1.0]);
     }
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 /// Newton's steps at most: it doubles the digits with each; of trials told apart entirely the deviance falls by e with each.
 const STEPS: usize = 60;
@@ -151,6 +151,82 @@ impl std::fmt::Display for Term {
     }
 }
 
+/// Least squares with several terms and an intercept, and what each of them explains.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Regression {
+    /// β₀, then one for each term.
+    pub coefficients: Vec<f64>,
+    /// Sum of squares that the model explains.
+    pub model: f64,
+    /// Sum of squares that is left.
+    pub error: f64,
+    /// Degrees of freedom of both.
+    pub freedom: [usize; 2],
+    /// For each term: the sum of squares lost without it, its F ratio and p with one degree of freedom.
+    pub effects: Vec<[f64; 3]>,
+}
+
+impl Regression {
+    /// Fits `y` by the terms of `x`, one row a trial; `None` when there are too few trials or terms depend on each other.
+    pub fn fit(x: &[Vec<f64>], y: &[f64]) -> Option<Self> {
+        let (coefficients, error) = residual(x, y)?;
+        let terms = coefficients.len() - 1;
+        let left = y.len().checked_sub(terms + 1).filter(|&left| left > 0)?;
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        let model = y.iter().map(|y| (y - mean).powi(2)).sum::<f64>() - error;
+        let distribution = FisherSnedecor::new(1.0, left as f64).ok()?;
+        let effects = (0..terms).map(|term| {
+            let without: Vec<Vec<f64>> = (x.iter())
+                .map(|row| {
+                    let mut row = row.clone();
+                    row.remove(term);
+                    row
+                })
+                .collect();
+            let lost = residual(&without, y)?.1 - error;
+            let f = lost / (error / left as f64);
+            Some([lost, f, distribution.sf(f.max(0.0))])
+        });
+        let effects = effects.collect::<Option<_>>()?;
+        Some(Self {
+            coefficients,
+            model,
+            error,
+            freedom: [terms, left],
+            effects,
+        })
+    }
+
+    /// F ratio of the whole model.
+    pub fn f_ratio(&self) -> f64 {
+        let [model, error] = self.freedom.map(|n| n as f64);
+        self.model / model / (self.error / error)
+    }
+
+    /// Share of the variance that it explains.
+    pub fn r_squared(&self) -> f64 {
+        self.model / (self.model + self.error)
+    }
+}
+
+/// Coefficients and the sum of squares that is left.
+fn residual(x: &[Vec<f64>], y: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let count = x.first()?.len() + 1;
+    let design = DMatrix::from_fn(
+        x.len(),
+        count,
+        |row, column| {
+            if column == 0 { 1.0 } else { x[row][column - 1] }
+        },
+    );
+    let y = DVector::from_column_slice(y);
+    let beta = (design.transpose() * &design)
+        .cholesky()?
+        .solve(&(design.transpose() * &y));
+    let error = (&y - &design * &beta).norm_squared();
+    Some((beta.iter().copied().collect(), error))
+}
+
 /// The straight line with the least sum of squares through points (x, y).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LeastSquares {
@@ -276,6 +352,20 @@ mod tests {
             1e-10,
         );
         assert_eq!(chi_squared_p(1.0, 0.0), None);
+    }
+
+    /// Anscombe's first again, as a regression of one term: R² = 0.6665, F = 17.99 and p = 0.00217 with 9 degrees of freedom.
+    #[test]
+    fn a_regression_of_one_term_is_anscombes() {
+        let x = [10.0, 8.0, 13.0, 9.0, 11.0, 14.0, 6.0, 4.0, 12.0, 7.0, 5.0];
+        let y = [8.04, 6.95, 7.58, 8.81, 8.33, 9.96, 7.24, 4.26, 10.84, 4.82, 5.68];
+        let rows: Vec<Vec<f64>> = x.iter().map(|&x| vec![x]).collect();
+        let found = Regression::fit(&rows, &y).expect("fits");
+        close(found.r_squared(), 0.6665, 5e-5);
+        close(found.f_ratio(), 17.99, 5e-3);
+        close(found.effects[0][1], found.f_ratio(), 1e-9);
+        close(found.effects[0][2], 0.00217, 5e-6);
+        assert_eq!(found.freedom, [1, 9]);
     }
 
     #[test]

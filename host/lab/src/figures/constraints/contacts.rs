@@ -62,9 +62,9 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         let what = format!("{file}: time for them after reading");
         out(if plan.quick {
             // A time is held to a bound where a person runs it, not in a test that other programs may slow down.
-            Row::told(what, found.seconds, "s")
+            Row::told(what, found.seconds, "s").varies()
         } else {
-            Row::at_most(what, found.seconds, "s", most)
+            Row::at_most(what, found.seconds, "s", most).varies()
         });
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! What targets cost the board: the dearest tick with four of them in force against the same motion without.
 
 use mortise_bake::Grabbable;
-use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Telemetry, ToDevice};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
@@ -12,26 +12,58 @@ use crate::rate::{self, Mode};
 use crate::scenario::{PreparedScene, Recording};
 use crate::variant::Variant;
 
-const TARGETS: u16 = 4;
+const TARGETS: f64 = 4.0;
 /// Times the instructions without.
 const RATIO: f64 = 1.2;
-/// In a guided tick, at most.
-const INSTRUCTIONS: f64 = 120_000.0;
+/// Most instructions of a tick with targets, and without: a quarter of the 480,000 of a millisecond, and as much as 10 µs are worth.
+const GUIDED: f64 = 125_000.0;
+const UNGUIDED: f64 = GUIDED;
 /// Ticks between refreshes, and until a target that is not refreshed expires.
 const REFRESH_TICKS: u32 = 100;
 const EXPIRY_TICKS: u16 = 300;
 
-/// Sends one target under four numbers, again and again.
-fn four(target: &ConstraintTarget) -> impl FnMut(&Telemetry) -> Vec<ToDevice> {
-    let (target, mut due, mut sequence) = (target.clone(), None, 0u16);
+/// Four different targets that a peg on its axis keeps all at once: the hole's axis, its top's plane, and each end of the peg's axis on the hole's, as a
+/// ball in a bore and as a bore on a ball. Each takes rows of its own in every solve.
+fn different(axis: &ConstraintTarget, fit: &Fit) -> [ConstraintTarget; 4] {
+    let along = |by_mm: f64| {
+        let mut target = axis.clone();
+        let by = (1e-3 * by_mm) as f32;
+        for i in 0..3 {
+            target.moving.point[i] += by * target.moving.direction[i];
+        }
+        target.faces.clear();
+        target
+    };
+    let end = 0.25 * fit.length_mm;
+    [
+        axis.clone(),
+        ConstraintTarget {
+            kind: ConstraintKind::Coplanar,
+            ..along(0.0)
+        },
+        ConstraintTarget {
+            kind: ConstraintKind::Annular,
+            ..along(end)
+        },
+        ConstraintTarget {
+            kind: ConstraintKind::AnnularBore,
+            ..along(-end)
+        },
+    ]
+}
+
+/// Sends targets under numbers of their own, again and again.
+fn all_of(targets: [ConstraintTarget; 4]) -> impl FnMut(&Telemetry) -> Vec<ToDevice> {
+    let (mut due, mut sequence) = (None, 0u16);
     move |sample| {
         if due.is_some_and(|due| sample.tick < due) {
             return Vec::new();
         }
         due = Some(sample.tick + REFRESH_TICKS);
         sequence += 1;
-        (1..=TARGETS)
-            .map(|id| {
+        (1..)
+            .zip(&targets)
+            .map(|(id, target)| {
                 ToDevice::SetTarget(ConstraintTarget {
                     id,
                     sequence,
@@ -53,27 +85,37 @@ pub(super) fn peg_in_hole(fit: &Fit) -> Result<ConstraintTarget, LabError> {
     known_target(&scenario, &scene)
 }
 
-/// Insertions with a hand off by four fifths of the play, the target known from the start or recognised on the desktop: no tick may take more
-/// than contact alone is bounded by.
+/// Insertions with a hand off by four fifths of the play, by collision alone, the target known from the start, or recognised on the desktop.
 pub(super) fn guided_ticks(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let pairs = &rate::PAIRS[..rate::QUICK];
     let modes: &[Mode] = if plan.quick {
-        &[Mode::Recognised]
+        &[Mode::Collision, Mode::Recognised]
     } else {
-        &[Mode::Guided, Mode::Recognised]
+        &rate::MODES
     };
     for course in rate::played(pairs, modes, &mut |_| {})? {
         let pair = pairs.iter().find(|pair| pair.name == course.pair);
-        let what = format!(
-            "{}, {}, emulated board: largest instructions of a guided tick",
-            pair.map_or(course.pair, |pair| pair.what),
-            course.mode.name()
-        );
+        let what = |of: &str| {
+            format!(
+                "{}, {}, emulated board: {of}",
+                pair.map_or(course.pair, |pair| pair.what),
+                course.mode.name()
+            )
+        };
+        let most = match course.mode {
+            Mode::Collision => UNGUIDED,
+            Mode::Guided | Mode::Recognised => GUIDED,
+        };
         out(Row::at_most(
-            what,
+            what("largest instructions of a tick"),
             f64::from(course.instructions_max),
             "instructions",
-            INSTRUCTIONS,
+            most,
+        ));
+        out(Row::told(
+            what("ticks that left out points"),
+            course.left_out_percent,
+            "%",
         ));
     }
     Ok(())
@@ -82,7 +124,7 @@ pub(super) fn guided_ticks(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<
 /// The 20 µm fit pressed to the wall and slid, so that contact is at its dearest, and on its way in.
 pub(super) fn four_targets(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let fit = Fit::thesis(0.02);
-    let target = peg_in_hole(&fit.engaged(-20.0))?;
+    let axis = peg_in_hole(&fit.engaged(-20.0))?;
     let variant = Variant::field(0.5);
     let (pressed, mut scenario) = script(&fit, Motion::Pressed { mm_per_s: 10.0 })?;
     let file = pressed.file()?;
@@ -93,19 +135,28 @@ pub(super) fn four_targets(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         let mut silent = |_: &Telemetry| Vec::new();
         play_to(&scenario, &scene, &emulated(), &mut silent)?
     };
+    counted(
+        &|of| {
+            format!(
+                "20 µm fit fully inserted, {variant}, pressed with 5 N and slid, no target, emulated board: {of}"
+            )
+        },
+        &without,
+        out,
+    );
     // 4 × 0.5 N leave 3 of the 5 N to the wall: all contacts are still there. The default caps hold the peg off it.
-    for (cap_n, what) in [
+    for (cap_n, how) in [
         (0.5, "which the hand overcomes"),
-        (target.force_cap, "which hold it"),
+        (axis.force_cap, "which hold it"),
     ] {
-        let target = ConstraintTarget {
-            force_cap: cap_n,
-            ..target.clone()
-        };
-        let with = play_to(&scenario, &scene, &emulated(), &mut four(&target))?;
+        let mut targets = different(&axis, &fit);
+        for target in &mut targets {
+            target.force_cap = cap_n;
+        }
+        let with = play_to(&scenario, &scene, &emulated(), &mut all_of(targets))?;
         let what = |of: &str| {
             format!(
-                "20 µm fit fully inserted, pressed with 5 N and slid, {TARGETS} targets of {cap_n} N {what}, emulated board: {of}"
+                "20 µm fit fully inserted, {variant}, pressed with 5 N and slid, {TARGETS} different targets of {cap_n} N {how}, emulated board: {of}"
             )
         };
         let active = (with.samples.iter()).map(|sample| sample.guidance.active).max();
@@ -113,7 +164,7 @@ pub(super) fn four_targets(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             what("most targets active"),
             active.map_or(f64::NAN, f64::from),
             "targets",
-            f64::from(TARGETS),
+            TARGETS,
         ));
         out(Row::at_most(
             what("instructions of the longest tick over those without"),
@@ -121,13 +172,24 @@ pub(super) fn four_targets(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             "",
             RATIO,
         ));
+        counted(&what, &with, out);
     }
-    out(Row::told(
-        "the same without targets: instructions in the longest tick",
-        most(&without),
-        "instructions",
-    ));
     Ok(())
+}
+
+/// The longest tick, and what it left out.
+fn counted(what: &dyn Fn(&str) -> String, recording: &Recording, out: &mut dyn FnMut(Row)) {
+    out(Row::at_most(
+        what("instructions in the longest tick"),
+        most(recording),
+        "instructions",
+        GUIDED,
+    ));
+    out(Row::told(
+        what("ticks that left out points"),
+        recording.outcome.degraded_percent,
+        "%",
+    ));
 }
 
 fn most(recording: &Recording) -> f64 {

@@ -7,8 +7,8 @@ use mortise_rig::RigSpec;
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
-use crate::guided::{Inserted, SIM, emulated, inserted, insertion, key, play};
-use crate::scenario::{Outcome, PreparedScene};
+use crate::guided::{Course, Inserted, SIM, course, emulated, inserted, insertion, key, play};
+use crate::scenario::{Key, Outcome, PreparedScene};
 use crate::variant::Variant;
 
 /// Cells, mm.
@@ -17,6 +17,20 @@ const CELL_MM: f64 = 0.5;
 const SECONDS: f64 = 3.0;
 /// Farthest off the axis, µm.
 const OFF_AXIS_UM: f64 = 5.0;
+/// Most that a peg comes later than the hand leads it, ms: springs in series lag m/k's root, a landing as long as guidance takes.
+const BEHIND_MS: f64 = 50.0;
+/// Deepest, µm: contact between guided faces makes room of 0.1 mm, so that a target can pull the part through what it would stand on; and once guidance
+/// has settled, when a part is to lie where it belongs.
+const DEEPEST_UM: f64 = 100.0;
+const SETTLED_UM: f64 = 5.0;
+/// Leading end off the axis, µm, and tilt, degrees, once guidance has settled: the end of a peg that stands still within 5 µm and that angle.
+const TIP_UM: f64 = 10.0;
+const TILT_DEG: f64 = 0.02;
+/// The hand that pushes: its spring, N/m, damper, N s/m, and force, N; and how much longer than alone it may take.
+const PUSHED_N_PER_M: f32 = 10.0;
+const PUSHED_N_S_PER_M: f32 = 20.0;
+const PUSHED_N: f64 = 2.0;
+const PUSHED_TIMES: f64 = 1.5;
 /// Clearances of the thesis pair, mm; the last is an exact fit.
 const CLEARANCES_MM: [f64; 7] = [1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.0];
 /// The shorter form plays these on the emulated board; in-process it plays all.
@@ -35,6 +49,7 @@ fn iso_fit() -> Fit {
 
 struct Played {
     seen: Inserted,
+    course: Course,
     outcome: Outcome,
 }
 
@@ -54,14 +69,19 @@ fn played(fit: &Fit, variant: &Variant, thesis: bool, specs: &[RigSpec]) -> Resu
         let name = ParameterId::Guidance.row().name.to_owned();
         scenario.parameters.insert(name, THESIS);
     }
+    // Every tick is looked at; the guide hears each tenth, as before.
+    scenario.run.heed_every_ticks = Some(scenario.run.telemetry_every_ticks);
+    scenario.run.telemetry_every_ticks = 1;
     let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
-    let scene = PreparedScene::with(&scenario, &options)?;
+    let scene = PreparedScene::with(&scenario, &options)?.made_from(*fit);
+    let exact = scene.exact_fit(*fit);
     specs
         .iter()
         .map(|spec| {
             let recording = play(&scenario, &scene, spec)?;
             Ok(Played {
                 seen: inserted(&scenario, &scene, &recording.samples),
+                course: course(&exact, &recording.samples),
                 outcome: recording.outcome,
             })
         })
@@ -79,7 +99,7 @@ pub(super) fn fits(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
         })
         .chain([(iso_fit(), "H7/g6 at 18 mm, 6 µm clearance".to_owned(), true)]);
     let (mut missed, mut played_on_board) = (0u32, 0);
-    let mut farthest = 0.0f64;
+    let (mut farthest, mut tilt, mut tip, mut deep) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
     for (fit, name, quick) in fits {
         let specs = [SIM, emulated()];
         let specs = if plan.quick && !quick {
@@ -92,16 +112,31 @@ pub(super) fn fits(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
             .iter()
             .zip(["in-process", "emulated board"])
         {
-            let what = format!(
-                "guided insertion, hand 1 mm and 2° off, tremor 0.2 mm at 10 Hz, {name}, {on}: through after"
-            );
-            out(Row::at_most(what, played.seen.after_s, "s", SECONDS));
-            // NaN where guidance never settled.
-            farthest = if played.seen.off_axis_mm.is_nan() {
-                f64::NAN
-            } else {
-                farthest.max(played.seen.off_axis_mm)
+            let what = |of: &str| {
+                format!("guided insertion, hand 1 mm and 2° off, tremor 0.2 mm at 10 Hz, {name}, {on}: {of}")
             };
+            out(Row::at_most(
+                what("through after"),
+                played.seen.after_s,
+                "s",
+                SECONDS,
+            ));
+            out(Row::at_most(
+                what("through behind the hand's own way by"),
+                1e3 * played.seen.behind_s,
+                "ms",
+                BEHIND_MS,
+            ));
+            out(Row::at_most(
+                what("deepest penetration in any tick, closed form"),
+                1e3 * played.outcome.penetration_mm,
+                "µm",
+                DEEPEST_UM,
+            ));
+            tilt = worse(tilt, played.course.tilt_deg);
+            tip = worse(tip, played.course.tip_off_mm);
+            deep = worse(deep, played.course.penetration_mm);
+            farthest = worse(farthest, played.seen.off_axis_mm);
             if on != "in-process" {
                 missed += played.outcome.missed_ticks;
                 played_on_board += 1;
@@ -120,6 +155,25 @@ pub(super) fn fits(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
         "µm",
         OFF_AXIS_UM,
     ));
+    out(Row::at_most(
+        "all guided insertions: farthest of the leading end's middle off the axis once guidance has settled",
+        1e3 * tip,
+        "µm",
+        TIP_UM,
+    ));
+    out(Row::at_most(
+        "all guided insertions: largest tilt once guidance has settled",
+        tilt,
+        "°",
+        TILT_DEG,
+    ));
+    out(Row::at_most(
+        "all guided insertions: deepest penetration once guidance has settled, closed form",
+        1e3 * deep,
+        "µm",
+        SETTLED_UM,
+    ));
+    pushed(out)?;
     for clearance in [1.0, 0.02] {
         let fit = Fit::thesis(clearance).engaged(-20.0);
         let seen = played(&fit, &variant, true, &[SIM])?[0].seen;
@@ -129,6 +183,66 @@ pub(super) fn fits(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
             off if off.is_finite() => Row::told(what("farthest off the axis"), 1e3 * off, "µm"),
             _ => Row::noted(what("farthest off the axis"), "guidance never settled"),
         });
+    }
+    Ok(())
+}
+
+/// The larger of both; NaN where either was never measured.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() {
+        f64::NAN
+    } else {
+        a.max(b)
+    }
+}
+
+/// A hand that leads nobody down: it holds the handle 1 mm and 2° off by a soft spring and pushes with a force. How long the peg then takes is up to
+/// what it meets; a handle alone takes b/k·ln(1/(1 − k·z/F)), a spring and a damper pushed.
+fn pushed(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    for clearance in [1.0, 0.02] {
+        let fit = Fit::thesis(clearance).engaged(-20.0);
+        let file = fit.file()?;
+        let mut scenario = insertion(&fit, file.path())?;
+        let hand = &mut scenario.hand;
+        hand.stiffness_n_per_m = PUSHED_N_PER_M;
+        hand.damping_n_s_per_m = PUSHED_N_S_PER_M;
+        let still = |t: f64, push: f64| Key {
+            push_n: [0.0, 0.0, -push as f32],
+            ..key(t, [1.0, 0.0, 0.0], [0.0, 2.0, 0.0])
+        };
+        hand.keyframes = vec![
+            key(0.0, [0.0; 3], [0.0; 3]),
+            still(0.3, 0.0),
+            still(0.301, PUSHED_N),
+        ];
+        // Twice as long as a handle alone takes: so much later it is out at the other end.
+        scenario.run.duration_s = 1.7;
+        scenario.run.telemetry_every_ticks = 1;
+        scenario.run.heed_every_ticks = Some(10);
+        let options = Variant::field(CELL_MM).options(Grabbable::Named(vec!["peg".into()]));
+        let scene = PreparedScene::with(&scenario, &options)?.made_from(fit);
+        let recording = play(&scenario, &scene, &SIM)?;
+        let seen = inserted(&scenario, &scene, &recording.samples);
+        let what = |of: &str| {
+            format!(
+                "guided insertion, hand 1 mm and 2° off that pushes with {PUSHED_N} N instead of leading, {clearance} mm clearance, in-process: {of}"
+            )
+        };
+        let way_m = 1e-3 * (fit.height_mm - fit.engaged_mm);
+        let (k, b) = (f64::from(PUSHED_N_PER_M), f64::from(PUSHED_N_S_PER_M));
+        let alone = b / k * (1.0 / (1.0 - k * way_m / PUSHED_N)).ln();
+        out(Row::at_most(
+            what("through after the push began, times a handle alone"),
+            (seen.after_s - 0.3) / alone,
+            "",
+            PUSHED_TIMES,
+        ));
+        out(Row::at_most(
+            what("deepest penetration in any tick, closed form"),
+            1e3 * recording.outcome.penetration_mm,
+            "µm",
+            DEEPEST_UM,
+        ));
     }
     Ok(())
 }

@@ -36,9 +36,9 @@ pub(super) fn motor(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     // Times are told, not judged, in the shorter form: it is a test, and other programs run beside it.
     let timed = |what: String, value: f64, unit: &str, bound: f64| {
         if plan.quick {
-            Row::told(what, value, unit)
+            Row::told(what, value, unit).varies()
         } else {
-            Row::at_most(what, value, unit, bound)
+            Row::at_most(what, value, unit, bound).varies()
         }
     };
     if !plan.quick {

@@ -4,6 +4,7 @@
 //! thing go wrong, and looks at what the motors were told in the tick that saw it and the one after.
 
 use std::cell::{Cell, RefCell};
+use std::path::Path;
 use std::rc::Rc;
 
 use glam::Vec3;
@@ -16,7 +17,7 @@ use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
 use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
-use mortise_protocol::frame::{Decoder, encode};
+use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::{CostUnit, DeviceState, Fault, FromDevice, ResetReason, ToDevice, Version};
@@ -67,14 +68,18 @@ impl Before {
     }
 }
 
-/// What goes wrong. The damaged scene is seen when arming, which reads all of it, and has its own test (`firmware/app/tests/link.rs`).
-const FAULTS: [Fault; 12] = [
+/// What goes wrong. The damaged scene is seen when arming, which reads all of it, and has its own test (`firmware/app/tests/link.rs`); a computed wrench
+/// that is not finite is not known how to bring about.
+const FAULTS: [Fault; 15] = [
     Fault::StopInput,
     Fault::SupplyLow,
     Fault::Driver { axis: 0 },
     Fault::OverCurrent { axis: 1 },
     Fault::OverTemperature { axis: 2 },
-    Fault::NonFinite,
+    Fault::BadReading,
+    Fault::ImpossiblePosture,
+    Fault::ReferenceLost,
+    Fault::AngularOverSpeed,
     Fault::EncoderJump { axis: 1 },
     Fault::EncoderStuck { axis: 2 },
     Fault::OverSpeed,
@@ -92,8 +97,50 @@ fn seen_at_rest(fault: Fault) -> bool {
             | Fault::Driver { .. }
             | Fault::OverCurrent { .. }
             | Fault::OverTemperature { .. }
-            | Fault::NonFinite
+            | Fault::BadReading
     )
+}
+
+/// Longest time from the first reading of a handle that turns too fast to motors off, ticks.
+///
+/// # Errors
+/// Anything that keeps the scene from being baked.
+pub(crate) fn ticks_until_off_when_turning(pair: &Path) -> Result<u32, LabError> {
+    let scenario = Scenario::insertion(pair)?;
+    let scene = PreparedScene::of(&scenario)?;
+    let slot = scene.image.len().next_multiple_of(ERASE_SIZE) + ERASE_SIZE;
+    let mut flash = vec![ERASED; SLOTS * slot / size_of::<FlashWord>()];
+    Board::start(&mut Box::default(), &mut flash).upload(&scene.image);
+    let limit = ParameterId::AngularSpeedLimit.row().default;
+    let mut longest = 0;
+    let axes = [
+        Vec3::X,
+        Vec3::NEG_Y,
+        Vec3::Z,
+        Vec3::new(1.0, -2.0, 3.0).normalize(),
+    ];
+    for rate in [1.0025 * limit, 900.0] {
+        for state in [Before::Armed, Before::Active] {
+            for axis in axes {
+                let mut channels = Box::default();
+                let mut board = Board::start(&mut channels, &mut flash);
+                board.bring(state, scene.part);
+                // Just within the limit is no fault.
+                board.pull(|s| s.twist.angular = axis * (0.9975 * limit));
+                board.ticks(10);
+                let sound = board.control.safety().live();
+                board.pull(|s| s.twist.angular = axis * rate);
+                let mut ticks = 0;
+                while board.control.safety().live() && ticks < 1_000 {
+                    board.tick();
+                    ticks += 1;
+                }
+                let right = sound && board.state() == DeviceState::Fault(Fault::AngularOverSpeed);
+                longest = longest.max(if right { ticks } else { u32::MAX });
+            }
+        }
+    }
+    Ok(longest)
 }
 
 /// How many cases there were, and how many of them went wrong in which way.
@@ -246,6 +293,7 @@ impl<'c, 's> Board<'c, 's> {
             reset: ResetReason::PowerOn,
             overrun_ticks: OVERRUN_TICKS,
             ceilings: Ceilings::LARGEST,
+            entropy: 1,
         };
         let (link, control) = start(
             channels,
@@ -288,7 +336,11 @@ impl<'c, 's> Board<'c, 's> {
         let mut frame = [0; MAX_FRAME];
         self.seq = self.seq.wrapping_add(1);
         // Every message fits a frame, and the wire has room for sixteen answers.
-        if let Ok(bytes) = encode(self.seq, message, &mut frame) {
+        let stamp = Stamp {
+            session: self.link.session(),
+            count: u32::from(self.seq),
+        };
+        if let Ok(bytes) = encode_stamped(self.seq, Some(stamp), message, &mut frame) {
             self.link.receive(bytes, &mut self.wire);
         }
         self.tick();
@@ -388,7 +440,11 @@ impl<'c, 's> Board<'c, 's> {
             Fault::OverTemperature { axis } => {
                 self.pull(|s| s.driver_fault = report(axis, DriverFaultKind::OverTemperature));
             }
-            Fault::NonFinite => self.pull(|s| s.handle.position.y = f32::NAN),
+            // No reading makes the law compute what is not finite: what would is refused as a bad reading.
+            Fault::BadReading | Fault::NonFinite => self.pull(|s| s.handle.position.y = f32::NAN),
+            Fault::ImpossiblePosture => self.pull(|s| s.impossible_posture = true),
+            Fault::ReferenceLost => self.pull(|s| s.referenced = false),
+            Fault::AngularOverSpeed => self.pull(|s| s.twist.angular = Vec3::new(0.0, -41.0, 0.0)),
             Fault::EncoderJump { axis } => self.pull(|s| s.encoder_jump = Some(axis)),
             Fault::EncoderStuck { axis } => self.pull(|s| s.encoder_stuck = Some(axis)),
             Fault::OverSpeed => self.pull(|s| s.twist.linear = Vec3::new(0.0, 0.0, -3.0)),

@@ -1,0 +1,197 @@
+//! Claims: the figure that is stated for each row whose bound is not exact, kept in `docs/figures/claims.json`.
+//!
+//! A row is judged near its claim, see [`Row`]. A claim changes only where the file is changed: `cargo xtask figures NAME` adds those of new rows from
+//! what it measures and keeps the others, `--claim` takes all of them anew.
+
+use std::collections::BTreeMap;
+
+use super::row::{MOST_BOUND_OVER_CLAIM, Row, Verdict};
+use crate::LabError;
+
+const KEPT: &str = include_str!("../../../../docs/figures/claims.json");
+/// A ratio may be rounded: bounds are of four digits.
+const ROUNDING: f64 = 1.001;
+
+/// Claims by table and row.
+#[derive(Clone, Debug)]
+pub struct Claims {
+    tables: BTreeMap<String, BTreeMap<String, f64>>,
+    missing: Missing,
+}
+
+/// What becomes of rows that need a claim and have none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Missing {
+    /// They are counted, and the table's last row fails.
+    Counted,
+    /// What was measured is claimed.
+    Measured,
+}
+
+impl Claims {
+    /// Claims as they are kept.
+    ///
+    /// # Errors
+    /// `Input` where the file is no table of numbers.
+    pub fn kept() -> Result<Self, LabError> {
+        let tables = serde_json::from_str(KEPT).map_err(|error| LabError::Input {
+            name: "docs/figures/claims.json".into(),
+            what: error.to_string(),
+        })?;
+        Ok(Self {
+            tables,
+            missing: Missing::Counted,
+        })
+    }
+
+    /// Claims as they are kept, those that are missing taken from what is measured.
+    ///
+    /// # Errors
+    /// As [`Self::kept`].
+    pub fn completed() -> Result<Self, LabError> {
+        Ok(Self {
+            missing: Missing::Measured,
+            ..Self::kept()?
+        })
+    }
+
+    /// No claim is kept: all are taken from what is measured.
+    pub fn measured() -> Self {
+        Self {
+            tables: BTreeMap::new(),
+            missing: Missing::Measured,
+        }
+    }
+
+    /// The row with its claim.
+    pub(super) fn judge(&self, table: &str, row: Row) -> Row {
+        if !row.needs_claim() {
+            return row;
+        }
+        let kept = self
+            .tables
+            .get(table)
+            .and_then(|rows| rows.get(&row.key()))
+            .copied();
+        let measured = || {
+            row.supported_claim()
+                .filter(|_| self.missing == Missing::Measured)
+        };
+        match kept.or_else(measured) {
+            Some(claim) => row.claimed(claim),
+            None => row,
+        }
+    }
+}
+
+/// How many rows came to what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Count {
+    /// Rows with a bound.
+    pub bounded: usize,
+    /// Those of them that hold.
+    pub held: usize,
+    /// Rows without a bound.
+    pub unbounded: usize,
+    /// Rows that cannot be measured here.
+    pub skipped: usize,
+    /// Rows whose bound is farther from their claim than it may be, or that have none.
+    pub far: usize,
+}
+
+impl Count {
+    /// Counts one row.
+    pub fn add(&mut self, row: &Row) {
+        match row.verdict() {
+            Verdict::Holds => {
+                self.bounded += 1;
+                self.held += 1;
+            }
+            Verdict::Fails => self.bounded += 1,
+            Verdict::Unbounded => self.unbounded += 1,
+            Verdict::Skipped => self.skipped += 1,
+        }
+        if let Some(ratio) = row.bound_over_claim() {
+            self.far += usize::from(ratio.is_nan() || ratio > MOST_BOUND_OVER_CLAIM * ROUNDING);
+        }
+    }
+
+    /// True if no bound is broken; also when nothing was bounded.
+    pub fn all_hold(&self) -> bool {
+        self.held == self.bounded
+    }
+
+    /// The row that holds when every bound is near its claim.
+    pub(super) fn row(&self) -> Row {
+        Row::exactly(
+            format!(
+                "rows that have no claim, or a bound of more than {MOST_BOUND_OVER_CLAIM} times their claim"
+            ),
+            self.far as f64,
+            "rows",
+            0.0,
+        )
+    }
+}
+
+impl std::fmt::Display for Count {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            bounded,
+            held,
+            unbounded,
+            skipped,
+            ..
+        } = self;
+        write!(
+            formatter,
+            "{held} of {bounded} bounds hold, {unbounded} unbounded, {skipped} skipped"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kept_claims_are_positive_numbers_of_known_tables() {
+        let claims = Claims::kept().expect("reads");
+        for (table, rows) in &claims.tables {
+            assert!(super::super::NAMES.contains(&table.as_str()), "{table}");
+            for (key, claim) in rows {
+                assert!(claim.is_finite() && *claim >= 0.0, "{table}: {key}: {claim}");
+                assert_eq!(&Row::noted(key, "").key(), key, "{table}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_row_without_a_claim_breaks_the_last_row() {
+        let far = |claims: &Claims, row: Row| {
+            let mut count = Count::default();
+            count.add(&claims.judge("contact", row));
+            count.row().fails()
+        };
+        let row = || Row::at_most("a row of a test", 1.0, "mm", 5.0);
+        assert!(far(&Claims::kept().expect("reads"), row()));
+        assert!(!far(&Claims::completed().expect("reads"), row()));
+        let exact = Row::exactly("a row of a test", 1.0, "mm", 1.0);
+        assert!(!far(&Claims::kept().expect("reads"), exact));
+    }
+
+    #[test]
+    fn only_bounded_rows_are_counted_as_held() {
+        let mut count = Count::default();
+        for row in [
+            Row::exactly("", 1.0, "", 1.0),
+            Row::exactly("", 1.0, "", 2.0),
+            Row::told("", 1.0, ""),
+            Row::skipped("", "absent"),
+        ] {
+            count.add(&row);
+        }
+        assert_eq!(count.to_string(), "1 of 2 bounds hold, 1 unbounded, 1 skipped");
+        assert!(!count.all_hold());
+    }
+}

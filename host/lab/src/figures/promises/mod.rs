@@ -1,0 +1,21 @@
+//! Promises: what the pages on safety, protocol and files say, tried by somebody who wants it to fail.
+
+mod energy;
+mod files;
+mod orders;
+mod thesis;
+pub mod watch;
+mod window;
+
+use super::{Plan, Row};
+use crate::LabError;
+
+/// Measures every row.
+pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    orders::measure(plan, out)?;
+    watch::measure(plan, out)?;
+    energy::measure(plan, out)?;
+    files::measure(plan, out)?;
+    thesis::measure(plan, out)?;
+    window::measure(plan, out)
+}

@@ -1,0 +1,61 @@
+//! Orders of messages: the model checker's counts, one row a promise.
+
+use mortise_orders::{Broken, PROMISES, Report, enumerate, enumerate_topics};
+
+use crate::LabError;
+use crate::figures::{Plan, Row};
+
+/// Events of the whole alphabet in the longest orders.
+const DEPTH: usize = 4;
+/// Events of one topic in the longest orders.
+const TOPIC_DEPTH: usize = 8;
+
+/// Measures every row.
+pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    // The shorter form covers one event less of everything.
+    let depth = DEPTH - usize::from(plan.quick);
+    rows(
+        &format!("orders of messages, all events, to depth {depth}"),
+        &enumerate(depth),
+        out,
+    );
+    for (topic, report) in enumerate_topics(TOPIC_DEPTH) {
+        let what = format!(
+            "orders of messages, events on the {}, to depth {TOPIC_DEPTH}",
+            topic.name
+        );
+        rows(&what, &report, out);
+    }
+    Ok(())
+}
+
+fn rows(what: &str, report: &Report, out: &mut dyn FnMut(Row)) {
+    out(Row::told(
+        format!("{what}: orders covered"),
+        report.orders as f64,
+        "orders",
+    ));
+    for promise in PROMISES {
+        let broken = report.count(promise) as f64;
+        out(Row::exactly(
+            format!("{what}: {}", words(promise)),
+            broken,
+            "orders",
+            0.0,
+        ));
+    }
+}
+
+/// What an order that breaks the promise does.
+fn words(promise: Broken) -> &'static str {
+    match promise {
+        Broken::NoChecksum => "motors live without the scene's checksum",
+        Broken::NoReference => "motors live without a reference",
+        Broken::NotFresh => "motors live by a command that was late, repeated or of another session",
+        Broken::AfterStop => "motors live behind a stop or fault that no fresh command cleared",
+        Broken::StopLate => "motors live in the tick behind STOP",
+        Broken::ReadBack => "a parameter read back that is not in force",
+        Broken::FlashWhileLive => "flash written while motors are driven",
+        Broken::StateDiffers => "motors and reported state differ",
+    }
+}

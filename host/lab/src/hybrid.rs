@@ -1,0 +1,551 @@
+//! The hybrid method of Faas 2010, chapter 8, on voxmaps: tables 6 and fig. 35, and which of her two pegs goes in by which of her three methods.
+//!
+//! Voxels of 10 mm, a hole of 0.7 m, pegs of 0.65 and 0.69 m. Her methods: voxmap and pointshell alone; the hybrid method without constraint evaluation,
+//! in which the contacts of voxels of faces that can make a constraint give way; and with it, in which the constraint pulls besides (eqs. 13–19).
+//! Without evaluation her text does not say by how much contacts give way; here by the same x (eq. 15). Constraints are recognised from the faces
+//! that voxels in contact name, each tenth tick, as hers. Fourth, for comparison: the distance field with the default guidance.
+//!
+//! Her block's and pegs' other lengths are not printed. Lengths of 1 m for all give her numbers of voxels within a few percent ([`counts`]), so they are
+//! taken.
+//!
+//! Update rates are those that the time of a tick allows, in-process on one core of this computer: as hers, a figure of a computer, not of a board.
+
+use std::fmt;
+
+use mortise_bake::{Grabbable, Method, bake};
+use mortise_brep::load_step;
+use mortise_guide::GuideSettings;
+use mortise_protocol::image::{BRICK_CELLS, Field, NO_FACE, SceneImage, Voxel};
+use mortise_protocol::message::{Telemetry, ToDevice};
+use mortise_protocol::parameter::ParameterId;
+use serde::Serialize;
+
+use crate::LabError;
+use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::fit::Fit;
+use crate::guided::{SIM, inserted, key, play_to};
+use crate::scenario::{Depth, PreparedScene, Scenario, depth, pose_mm};
+use crate::study::faas::{FIG_35_HZ, TABLE_6};
+use crate::table::rounded;
+use crate::variant::Variant;
+
+/// Voxels, mm.
+const VOXEL_MM: f64 = 10.0;
+/// Diameters of the pegs, mm: high clearance, low clearance.
+pub const PEGS_MM: [f64; 2] = [650.0, 690.0];
+/// The peg ends so far beyond its hole, mm.
+const BEYOND_MM: f64 = 10.0;
+/// Speed of the hand, mm/s; until it is off the axis and at the end, s.
+const MM_PER_S: f64 = 400.0;
+const COMES_S: f64 = 0.3;
+const ENDS_S: f64 = 0.3;
+/// How an insertion begins: one thing changed at a time, the first as hers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Case {
+    /// In words.
+    pub name: &'static str,
+    /// How far the peg is in at the start, mm; negative above the hole.
+    engaged_mm: f64,
+    /// How far the hand is off: a share of the radial play, and degrees.
+    off: f64,
+    tilt_deg: f64,
+    /// Contact stiffness of a point, N/m; the default where there is none.
+    stiffness_n_per_m: Option<f32>,
+    /// The textbook's step: explicit, with ten points' worth of stiffness in all contacts together.
+    explicit: bool,
+}
+
+/// All of them. Every hand trembles by 0.1 mm.
+pub const CASES: [Case; 5] = [
+    FROM_ABOVE,
+    Case {
+        name: "from above, hand on the axis",
+        off: 0.0,
+        tilt_deg: 0.0,
+        ..FROM_ABOVE
+    },
+    Case {
+        name: "from 30 mm inside",
+        engaged_mm: 30.0,
+        ..FROM_ABOVE
+    },
+    Case {
+        name: "from above, points of 1 kN/m",
+        stiffness_n_per_m: Some(1e3),
+        ..FROM_ABOVE
+    },
+    Case {
+        name: "from above, points of 1 kN/m, explicit step",
+        stiffness_n_per_m: Some(1e3),
+        explicit: true,
+        ..FROM_ABOVE
+    },
+];
+const FROM_ABOVE: Case = Case {
+    name: "from above",
+    engaged_mm: -20.0,
+    off: 0.5,
+    tilt_deg: 0.25,
+    stiffness_n_per_m: None,
+    explicit: false,
+};
+/// Constraints are evaluated each tenth frame, as hers.
+const HEED_TICKS: u16 = 10;
+/// The median tick of so many is told.
+const WINDOW_TICKS: usize = 20;
+
+/// How contact is found and guided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Condition {
+    /// Voxmap and pointshell alone.
+    Voxels,
+    /// The hybrid method, contacts giving way, nothing pulling.
+    HybridWithoutEvaluation,
+    /// The hybrid method with the constraint's pull.
+    Hybrid,
+    /// Distance field, default guidance.
+    DistanceField,
+}
+
+/// All of them, hers first.
+pub const CONDITIONS: [Condition; 4] = [
+    Condition::Voxels,
+    Condition::HybridWithoutEvaluation,
+    Condition::Hybrid,
+    Condition::DistanceField,
+];
+
+/// Some ticks.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Window {
+    /// How it begins.
+    pub case: &'static str,
+    /// How contact is found and guided.
+    pub condition: Condition,
+    /// Diameter of the peg, mm.
+    pub peg_mm: f64,
+    /// Since the hand began to move, s.
+    pub t_s: f64,
+    /// How far the peg is in, mm; negative above the hole.
+    pub depth_mm: f64,
+    /// Force on the handle, N.
+    pub handle_n: f64,
+    /// Targets in force.
+    pub targets: u8,
+    /// Time of the median tick, µs.
+    pub tick_us: f64,
+    /// The rate that it allows, Hz.
+    pub rate_hz: f64,
+}
+
+/// An insertion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Course {
+    /// How it begins.
+    pub case: &'static str,
+    /// How contact is found and guided.
+    pub condition: Condition,
+    /// Diameter of the peg, mm.
+    pub peg_mm: f64,
+    /// Whether hers was assembled; absent for what she had not.
+    pub faas_through: Option<bool>,
+    /// Whether ours came through.
+    pub through: bool,
+    /// How far it came, mm; the hole is 1 m deep.
+    pub depth_mm: f64,
+    /// Largest force on the handle, N.
+    pub peak_n: f64,
+    /// Constraints that were recognised.
+    pub recognised: String,
+    /// Faces of peg and block that touch at the end.
+    pub touching: String,
+    /// Lowest update rate of hers in the low-clearance case, Hz: “above 800”, “not below 800”, “dropped to 100”.
+    pub faas_lowest_hz: Option<f64>,
+    /// Rate that the slowest window's median tick allows, Hz.
+    pub lowest_hz: f64,
+    /// What happened when.
+    #[serde(skip)]
+    pub windows: Vec<Window>,
+}
+
+/// Voxels of a part, hers and ours.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Count {
+    /// Part.
+    pub part: &'static str,
+    /// As printed in table 6.
+    pub faas: u32,
+    /// Surface voxels of ours.
+    pub ours: u32,
+    /// Ours over hers less one, %.
+    pub off_percent: f64,
+}
+
+/// Her pair, its lengths as in the module's documentation.
+fn fit(peg_mm: f64, engaged_mm: f64) -> Fit {
+    Fit {
+        width_mm: 1000.0,
+        height_mm: 1000.0,
+        hole_mm: 700.0,
+        peg_mm,
+        length_mm: 1000.0,
+        engaged_mm,
+    }
+}
+
+/// Table 6: surface voxels of the block and of both pegs.
+///
+/// # Errors
+/// Anything that keeps a part from being baked.
+pub fn counts() -> Result<Vec<Count>, LabError> {
+    let mut found = Vec::new();
+    for (number, &peg) in PEGS_MM.iter().enumerate() {
+        let file = fit(peg, CASES[0].engaged_mm).file()?;
+        let model = load_step(file.path())?;
+        let options = Variant::textbook(VOXEL_MM).options(Grabbable::Named(vec!["peg".into()]));
+        let named = |source| LabError::Bake {
+            step: "the pair of table 6".into(),
+            source,
+        };
+        let baked = bake(&model, &options, &|_| std::ops::ControlFlow::Continue(())).map_err(named)?;
+        let aligned: Vec<u32> = (baked.image.chunks(4))
+            .map(|bytes| {
+                let mut word = [0; 4];
+                word[..bytes.len()].copy_from_slice(bytes);
+                u32::from_ne_bytes(word)
+            })
+            .collect();
+        let scene = SceneImage::open(bytemuck::cast_slice(&aligned)).map_err(|error| LabError::Input {
+            name: "the pair of table 6".into(),
+            what: error.to_string(),
+        })?;
+        for (shape, part) in baked.report.shapes.iter().enumerate() {
+            let row = if part.name == "block" { 0 } else { 1 + number };
+            if row == 0 && number > 0 {
+                continue;
+            }
+            let (part, faas) = TABLE_6[row];
+            let ours = surface_voxels(&scene.shape(shape).field);
+            found.push(Count {
+                part,
+                faas,
+                ours,
+                off_percent: rounded(100.0 * (f64::from(ours) / f64::from(faas) - 1.0), 2),
+            });
+        }
+    }
+    Ok(found)
+}
+
+fn surface_voxels(field: &Field<'_>) -> u32 {
+    let record = field.record();
+    let [w, h, d] = record.brick_dims.map(|n| u32::from(n) * BRICK_CELLS as u32);
+    let at = |axis: usize, i: u32| record.origin[axis] + (i as f32 + 0.5) * record.cell;
+    let mut count = 0;
+    for z in 0..d {
+        for y in 0..h {
+            for x in 0..w {
+                let voxel = field.voxel([at(0, x), at(1, y), at(2, z)]).voxel;
+                count += u32::from(voxel == Voxel::Surface);
+            }
+        }
+    }
+    count
+}
+
+/// Plays every condition with both pegs, and the low-clearance one in every case; `quick` takes that one in the first case only. Each course goes to
+/// `out`.
+///
+/// # Errors
+/// Anything that keeps an insertion from being played.
+pub fn sweep(quick: bool, out: &mut dyn FnMut(&Course)) -> Result<Vec<Course>, LabError> {
+    let mut plays: Vec<(f64, Case)> = vec![(PEGS_MM[1], CASES[0])];
+    if !quick {
+        plays.insert(0, (PEGS_MM[0], CASES[0]));
+        plays.extend(CASES[1..].iter().map(|&case| (PEGS_MM[1], case)));
+    }
+    let mut courses = Vec::new();
+    for (peg, case) in plays {
+        let fit = fit(peg, case.engaged_mm);
+        let file = fit.file()?;
+        let scenario = scenario(&fit, &case, file.path())?;
+        let mut made: Option<(Method, PreparedScene)> = None;
+        for condition in CONDITIONS {
+            let variant = condition.variant();
+            if made.as_ref().is_none_or(|(method, _)| *method != variant.method) {
+                let options = variant.options(Grabbable::Named(vec!["peg".into()]));
+                made = Some((variant.method, PreparedScene::with(&scenario, &options)?));
+            }
+            if let Some((_, scene)) = &made {
+                let course = course((case.name, condition, peg), &scenario, scene)?;
+                out(&course);
+                courses.push(course);
+            }
+        }
+    }
+    Ok(courses)
+}
+
+fn scenario(fit: &Fit, case: &Case, step: &std::path::Path) -> Result<Scenario, LabError> {
+    let mut scenario = Scenario::insertion(step)?;
+    scenario.hand.tremor_mm = 0.1;
+    scenario.hand.tremor_hz = 10.0;
+    scenario.hand.grip_mm = [0.0, 0.0, 0.5 * fit.length_mm - fit.engaged_mm];
+    let through = fit.height_mm - fit.engaged_mm + BEYOND_MM;
+    let aside = case.off * 0.5 * fit.clearance_mm();
+    let arrives = COMES_S + through / MM_PER_S;
+    scenario.hand.keyframes = vec![
+        key(0.0, [0.0; 3], [0.0; 3]),
+        key(COMES_S, [aside, 0.0, 0.0], [0.0, case.tilt_deg, 0.0]),
+        key(arrives, [aside, 0.0, -through], [0.0, case.tilt_deg, 0.0]),
+    ];
+    scenario.depth = Some(Depth {
+        fixed: "block".into(),
+        axis: [0.0, 0.0, -1.0],
+        through_mm: [0.0; 3],
+    });
+    scenario.run.duration_s = arrives + ENDS_S;
+    scenario.run.telemetry_every_ticks = 1;
+    scenario.run.heed_every_ticks = Some(HEED_TICKS);
+    let mut set = |id: ParameterId, value: f32| scenario.parameters.insert(id.row().name.to_owned(), value);
+    set(ParameterId::PointBudget, ParameterId::PointBudget.row().max);
+    if let Some(stiffness) = case.stiffness_n_per_m {
+        set(ParameterId::ContactStiffness, stiffness);
+    }
+    if case.explicit {
+        set(ParameterId::Integrator, 1.0);
+    }
+    Ok(scenario)
+}
+
+fn course(
+    (case, condition, peg_mm): (&'static str, Condition, f64),
+    scenario: &Scenario,
+    scene: &PreparedScene,
+) -> Result<Course, LabError> {
+    let mut scenario = scenario.clone();
+    let mut guidance = |choice: f32| {
+        let name = ParameterId::Guidance.row().name.to_owned();
+        scenario.parameters.insert(name, choice);
+    };
+    let mut settings = GuideSettings::default();
+    match condition {
+        Condition::Voxels => guidance(0.0),
+        Condition::HybridWithoutEvaluation => {
+            guidance(2.0);
+            (settings.force_cap_n, settings.torque_cap_nm) = (0.0, 0.0);
+        }
+        Condition::Hybrid => guidance(2.0),
+        Condition::DistanceField => guidance(1.0),
+    }
+    let mut guide = scene.guide(settings);
+    let mut recognised = std::collections::BTreeSet::new();
+    let mut listener = |sample: &Telemetry| {
+        let messages = guide.hear(sample);
+        for message in &messages {
+            if let ToDevice::SetTarget(target) = message {
+                recognised.insert(format!("{:?} {:?}", target.kind, target.faces).to_lowercase());
+            }
+        }
+        messages
+    };
+    let recording = play_to(&scenario, scene, &SIM, &mut listener)?;
+    let seen = inserted(&scenario, scene, &recording.samples);
+    let first = recording.samples.first().map_or(0, |sample| sample.tick);
+    let windows: Vec<Window> = (recording.samples.chunks_exact(WINDOW_TICKS))
+        .filter_map(|ticks| {
+            let last = ticks.last()?;
+            let (deep, ..) = depth(
+                scene,
+                scenario.depth.as_ref()?,
+                &pose_mm(&last.object.as_ref()?.1),
+            )?;
+            let mut costs: Vec<u32> = ticks.iter().map(|sample| sample.cost).collect();
+            costs.sort_unstable();
+            let tick_us = 1e-3 * f64::from(costs[costs.len() / 2].max(1));
+            let force = glam::DVec3::from_array(last.wrench.force.map(f64::from)).length();
+            Some(Window {
+                case,
+                condition,
+                peg_mm,
+                t_s: rounded(1e-3 * f64::from(last.tick - first), 3),
+                depth_mm: rounded(deep, 3),
+                handle_n: rounded(force, 3),
+                targets: last.guidance.active,
+                tick_us: rounded(tick_us, 1),
+                rate_hz: rounded(1e6 / tick_us, 0),
+            })
+        })
+        .collect();
+    let place = CONDITIONS.iter().position(|of| *of == condition).unwrap_or(0);
+    let touching = recording.samples.last().map(|sample| {
+        let pairs = sample.pairs.iter();
+        let named = pairs.map(|p| {
+            let of = |faces: [u16; 2]| match faces {
+                [face, NO_FACE] => format!("{face}"),
+                [face, edge] => format!("{face}+{edge}"),
+            };
+            let [moving, fixed] = [
+                [p.moving_face, p.moving_edge_face],
+                [p.static_face, p.static_edge_face],
+            ]
+            .map(of);
+            format!("{moving} on {fixed} ({}×)", p.count)
+        });
+        named.collect::<Vec<_>>().join("; ")
+    });
+    Ok(Course {
+        case,
+        condition,
+        peg_mm,
+        faas_through: condition.faas_through(peg_mm),
+        through: seen.depth_mm >= seen.hole_mm,
+        depth_mm: rounded(seen.depth_mm, 3),
+        peak_n: recording.outcome.peak_force_n,
+        recognised: recognised.into_iter().collect::<Vec<_>>().join("; "),
+        touching: touching.unwrap_or_default(),
+        faas_lowest_hz: FIG_35_HZ.get(place).copied().filter(|_| peg_mm == PEGS_MM[1]),
+        lowest_hz: windows
+            .iter()
+            .map(|window| window.rate_hz)
+            .fold(f64::INFINITY, f64::min),
+        windows,
+    })
+}
+
+impl Condition {
+    fn variant(self) -> Variant {
+        match self {
+            Self::DistanceField => Variant::board(VOXEL_MM),
+            _ => Variant::textbook(VOXEL_MM),
+        }
+    }
+
+    /// Section 8.2: without evaluation both pegs were assembled, with it the low-clearance one was not, for want of update rate.
+    fn faas_through(self, peg_mm: f64) -> Option<bool> {
+        let high = peg_mm == PEGS_MM[0];
+        match self {
+            Self::Voxels | Self::Hybrid => Some(high),
+            Self::HybridWithoutEvaluation => Some(true),
+            Self::DistanceField => None,
+        }
+    }
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Voxels => "voxels alone",
+            Self::HybridWithoutEvaluation => "hybrid without evaluation",
+            Self::Hybrid => "hybrid with evaluation",
+            Self::DistanceField => "distance field, default guidance",
+        }
+    }
+}
+
+/// Fig. 35: the rate that ticks allow over the insertion of the low-clearance peg, hers beside.
+pub fn chart(courses: &[Course]) -> Chart {
+    let of: Vec<&Course> = courses
+        .iter()
+        .filter(|course| course.peg_mm == PEGS_MM[1] && course.case == CASES[0].name)
+        .collect();
+    let end =
+        (of.iter().flat_map(|course| &course.windows)).fold(0.0, |end: f64, window| end.max(window.t_s));
+    let looks = [
+        Look::VermilionSquare,
+        Look::BlueDisc,
+        Look::GreenTriangle,
+        Look::Black,
+    ];
+    let mut series: Vec<Series> = (of.iter().zip(looks))
+        .map(|(course, look)| Series {
+            name: format!("{}: {:.0} mm in", course.condition.name(), course.depth_mm),
+            look,
+            line: Line::Trace,
+            points: (course.windows.iter())
+                .map(|window| Point {
+                    x: window.t_s,
+                    y: window.rate_hz,
+                    ..Point::default()
+                })
+                .collect(),
+        })
+        .collect();
+    let hers = [
+        "Faas 2010, fig. 35: lowest, voxels and hybrid without evaluation",
+        "the same with evaluation",
+    ];
+    for ((name, hz), look) in hers
+        .iter()
+        .zip([FIG_35_HZ[0], FIG_35_HZ[2]])
+        .zip([Look::SkyRing, Look::OrangeCross])
+    {
+        series.push(Series {
+            name: (*name).into(),
+            look,
+            line: Line::DashedTrace,
+            points: [0.0, end]
+                .map(|x| Point {
+                    x,
+                    y: hz,
+                    ..Point::default()
+                })
+                .to_vec(),
+        });
+    }
+    Chart {
+        title: "Update rate over an insertion: peg of 0.69 m, hole of 0.7 m, voxels of 10 mm".into(),
+        note: format!(
+            "Median tick of {WINDOW_TICKS}, in-process on one core of this computer; hers are those of her computer of 2010."
+        ),
+        x: Axis::new("time, s").linear(),
+        y: Axis::new("rate that a tick allows, Hz"),
+        series,
+    }
+}
+
+impl fmt::Display for Course {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let went = |through| if through { "through" } else { "stuck" };
+        write!(
+            f,
+            "peg {} mm, {}, {}: ",
+            self.peg_mm,
+            self.case,
+            self.condition.name()
+        )?;
+        if let Some(through) = self.faas_through {
+            write!(f, "Faas {}; ", went(through))?;
+        }
+        write!(
+            f,
+            "ours {}, {:.1} mm in, at most {:.2} N, {}; ticks allow {} Hz at least",
+            went(self.through),
+            self.depth_mm,
+            self.peak_n,
+            if self.recognised.is_empty() {
+                "nothing recognised"
+            } else {
+                &self.recognised
+            },
+            self.lowest_hz
+        )?;
+        if let Some(hz) = self.faas_lowest_hz {
+            write!(f, " (Faas {hz} Hz)")?;
+        }
+        if self.touching.is_empty() {
+            return Ok(());
+        }
+        write!(f, "; touching at the end, peg on block: {}", self.touching)
+    }
+}
+
+impl fmt::Display for Count {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "table 6, {}: Faas {} voxels, ours {} ({:+.2} %)",
+            self.part, self.faas, self.ours, self.off_percent
+        )
+    }
+}

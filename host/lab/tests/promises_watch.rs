@@ -1,0 +1,30 @@
+//! The promises on still hands, dead encoders and rotation hold in their shorter form, and would not if nothing was measured.
+
+use std::path::Path;
+
+use mortise_lab::figures::promises::watch;
+use mortise_lab::figures::{Plan, Row};
+
+fn main() {
+    // First: this program is also the process that reads STEP files for itself.
+    mortise_brep::child::init();
+    let pair = Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../app/samples/pair_d18.75_clear1.00.step"
+    ));
+    let plan = Plan {
+        quick: std::env::var_os("PROMISES_FULL").is_none(),
+        program: Path::new("not asked for"),
+        pair,
+    };
+    let mut rows = Vec::new();
+    let mut keep = |row: Row| {
+        println!("{row:?}");
+        rows.push(row);
+    };
+    watch::measure(&plan, &mut keep).expect("measured");
+    let broken: Vec<&Row> = rows.iter().filter(|row| row.fails()).collect();
+    assert!(broken.is_empty(), "{broken:#?}");
+    assert_eq!(rows.len(), 5);
+    println!("test result: ok. 1 passed; 0 failed; 0 ignored; 0 measured; 0 filtered out");
+}
