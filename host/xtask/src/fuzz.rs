@@ -86,9 +86,10 @@ impl Fuzzed {
         );
         let crashes = u64::from(self.crashed());
         let (taken, all) = self.edges;
-        let row = |what: String, value: u64, bound: &str, holds: bool| {
+        let row = |what: String, value: u64, bound: &str, holds: Option<bool>| {
             let text = |text: String| JsonValue::from(text).stringify().expect("a string has a form");
             let (what, bound) = (text(what), text(bound.to_owned()));
+            let holds = holds.map_or("null".to_owned(), |holds| holds.to_string());
             format!(r#"{{"what":{what},"value":{value},"unit":"","bound":{bound},"holds":{holds}}}"#)
         };
         [
@@ -96,14 +97,14 @@ impl Fuzzed {
                 format!("{what}: crashes, hangs and reads beyond an end"),
                 crashes,
                 "= 0",
-                crashes == 0,
+                Some(crashes == 0),
             ),
-            row(format!("{what}: inputs"), self.runs, "told", self.runs > 0),
+            row(format!("{what}: inputs"), self.runs, "≥ 1", Some(self.runs > 0)),
             row(
                 format!("{what}: edges of the program taken, of {all}"),
                 taken,
-                "told",
-                taken > 0,
+                "≥ 1",
+                Some(taken > 0),
             ),
         ]
         .join("\n")

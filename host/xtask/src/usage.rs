@@ -9,15 +9,16 @@ struct Command {
 
 const YES: (&str, &str) = (
     "--yes",
-    "Install what is missing without asking (CI=true says the same)",
+    "Install what is missing without a question (CI=true says the same, and so does a missing terminal)",
 );
+const NO_INSTALL: (&str, &str) = ("--no-install", "Install nothing: say what is missing and stop");
 
 const COMMANDS: &[Command] = &[
     Command {
         name: "setup",
         what: "Check what is missing on this machine and install only that",
         arguments: "",
-        options: &[YES],
+        options: &[YES, NO_INSTALL],
     },
     Command {
         name: "demo",
@@ -25,6 +26,7 @@ const COMMANDS: &[Command] = &[
         arguments: "[ARGUMENTS OF mortise demo]...",
         options: &[
             YES,
+            NO_INSTALL,
             ("--headless", "Without a window: print the result"),
             ("--json", "Print the result as one JSON object"),
             (
@@ -39,6 +41,7 @@ const COMMANDS: &[Command] = &[
         arguments: "",
         options: &[
             YES,
+            NO_INSTALL,
             ("--list", "Name the steps and stop"),
             ("--only <STEP,...>", "Run these steps alone"),
             ("--from <STEP>", "Start at this step"),
@@ -47,8 +50,19 @@ const COMMANDS: &[Command] = &[
     Command {
         name: "figures",
         what: "Measure the figures NAME and write them to docs/figures/NAME.md",
-        arguments: "<NAME>",
-        options: &[("--quick", "The shorter form that CI runs")],
+        arguments: "[NAME]...",
+        options: &[
+            ("--quick", "The shorter form that CI runs"),
+            ("--check", "Compare what README and docs say with the quick form"),
+            (
+                "--renew",
+                "Make anew what is stale in docs/figures, or NAMEs of it, and say how long each took",
+            ),
+            (
+                "--claim",
+                "Claim what is measured; else claims are kept, and only those of new rows added",
+            ),
+        ],
     },
     Command {
         name: "fuzz",

@@ -7,6 +7,9 @@ use anyhow::{Context, Result};
 
 use super::packages::{Package, Sign};
 
+/// Folders of fonts lie this deep: by kind, then by family.
+const FONT_FOLDERS: usize = 3;
+
 /// The places looked at. Tests point `root` at a directory of their own.
 #[derive(Debug)]
 pub struct Machine {
@@ -88,6 +91,9 @@ impl Machine {
                     .iter()
                     .any(|file| file.extension().is_some_and(|end| end == "json"))
             }),
+            Sign::Font(names) => ["usr/share/fonts", "usr/local/share/fonts"]
+                .iter()
+                .any(|place| holds_font(&self.root.join(place), names, FONT_FOLDERS)),
         }
     }
 
@@ -105,6 +111,15 @@ impl Machine {
             })
             .collect()
     }
+}
+
+/// Whether a file below `folder`, at most `depth` folders down, begins with one of `names`.
+fn holds_font(folder: &Path, names: &[&str], depth: usize) -> bool {
+    entries(folder).iter().any(|entry| {
+        let name = entry.file_name().unwrap_or_default().to_string_lossy();
+        names.iter().any(|known| name.starts_with(known))
+            || (depth > 0 && holds_font(entry, names, depth - 1))
+    })
 }
 
 /// Names of the packages that a dpkg status file calls installed, without their architecture.

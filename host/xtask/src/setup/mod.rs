@@ -25,18 +25,26 @@ use crate::shell;
 /// What is asked of the user before something is installed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Consent {
-    /// Install without asking.
+    /// Install without a question.
     Given,
-    /// Ask at the terminal; without a terminal, do not install.
+    /// Ask at the terminal; without a terminal, install and say so.
     Ask,
+    /// Install nothing: say what is missing and stop.
+    Refused,
 }
 
 impl Consent {
-    /// Takes `--yes` out of `arguments`; `CI=true` says yes as well.
+    /// Takes `--yes` and `--no-install` out of `arguments`; the second one wins, and `CI=true` says yes as well.
     pub fn take(arguments: &mut Vec<String>) -> Self {
-        let before = arguments.len();
-        arguments.retain(|argument| argument != "--yes" && argument != "-y");
-        if arguments.len() < before || shell::is_ci() {
+        let mut given = |names: &[&str]| {
+            let before = arguments.len();
+            arguments.retain(|argument| !names.contains(&argument.as_str()));
+            arguments.len() < before
+        };
+        let (yes, refused) = (given(&["--yes", "-y"]), given(&["--no-install"]));
+        if refused {
+            Self::Refused
+        } else if yes || shell::is_ci() {
             Self::Given
         } else {
             Self::Ask
@@ -96,8 +104,8 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
 
 /// Sees to it that everything in `groups` is there. Says what it does.
 ///
-/// Returns false when something is still missing because the user declined, nobody could be asked,
-/// or this system has no installer known here; the reason has been printed.
+/// Returns false when something is still missing because the user declined or refused beforehand,
+/// or because this system has no installer known here; the reason has been printed.
 ///
 /// # Errors
 /// When an installer ran and failed.
@@ -125,7 +133,7 @@ pub fn ensure(groups: &[Group], consent: Consent) -> Result<bool> {
         return Ok(false);
     }
     let names: Vec<&str> = missing.packages.iter().map(|package| package.apt).collect();
-    if consent == Consent::Ask && !agreed(&names, &missing.rust)? {
+    if !agreed(consent, &names, &missing.rust)? {
         return Ok(false);
     }
     if !names.is_empty() {
@@ -140,20 +148,29 @@ pub fn ensure(groups: &[Group], consent: Consent) -> Result<bool> {
     Ok(true)
 }
 
-/// Asks at the terminal. Without one, prints the commands and returns false.
-fn agreed(names: &[&str], rust: &[rust::Part]) -> Result<bool> {
+/// Prints the commands and settles whether they run: asks at the terminal unless the answer was given beforehand.
+fn agreed(consent: Consent, names: &[&str], rust: &[rust::Part]) -> Result<bool> {
     let mut commands = Vec::new();
     if !names.is_empty() {
         commands.push(apt::install_line(names));
     }
     commands.extend(rust.iter().map(|part| part.add_line()));
-    eprintln!("\nThis would run:");
+    let asks = consent == Consent::Ask && std::io::stdin().is_terminal();
+    eprintln!(
+        "\n{}",
+        if consent == Consent::Refused {
+            "Not installed, because of --no-install. To install it, run:"
+        } else if asks {
+            "This would run:"
+        } else {
+            "Installing what is missing (--no-install refuses):"
+        }
+    );
     for line in &commands {
         eprintln!("  {line}");
     }
-    if !std::io::stdin().is_terminal() {
-        eprintln!("\nNobody can be asked here (standard input is not a terminal): add --yes to agree.");
-        return Ok(false);
+    if !asks {
+        return Ok(consent != Consent::Refused);
     }
     eprint!("Go ahead? [Y/n] ");
     std::io::stderr().flush()?;
@@ -172,5 +189,8 @@ mod tests {
         let mut arguments = vec!["--headless".to_owned(), "--yes".to_owned(), "--json".to_owned()];
         assert_eq!(Consent::take(&mut arguments), Consent::Given);
         assert_eq!(arguments, ["--headless", "--json"]);
+        let mut arguments = vec!["--yes".to_owned(), "--no-install".to_owned()];
+        assert_eq!(Consent::take(&mut arguments), Consent::Refused);
+        assert!(arguments.is_empty());
     }
 }

@@ -28,10 +28,12 @@ impl Group {
     pub fn purpose(self) -> &'static str {
         match self {
             Self::Build => "to compile the program: a C++ compiler and OpenCASCADE, which reads STEP files",
-            Self::Checks => "to check sources: rustfmt and clippy",
+            Self::Checks => "to check sources and dependencies: rustfmt, clippy and cargo-deny",
             Self::Board => "for the emulated board: QEMU, and Rust's target for the microcontroller",
             Self::Window => "to open a window: graphics drivers and input libraries",
-            Self::Screen => "to test the window without a display: Xvfb, xdotool, ImageMagick",
+            Self::Screen => {
+                "to test the window without a display: Xvfb, xdotool, ImageMagick, a Japanese font"
+            }
         }
     }
 }
@@ -47,6 +49,8 @@ pub enum Sign {
     Library(&'static str),
     /// A Vulkan driver's description (`*.json`) in the loader's directories.
     VulkanDriver,
+    /// A font file below the system's font folders whose name begins with one of these.
+    Font(&'static [&'static str]),
 }
 
 /// One package of Debian and Ubuntu with its counterparts elsewhere.
@@ -80,6 +84,17 @@ const fn package(
     }
 }
 
+/// Fonts that have Japanese, so that names of parts in it are seen to be drawn.
+const JAPANESE: &[&str] = &[
+    "DroidSansFallback",
+    "NotoSansCJK",
+    "NotoSansJP",
+    "SourceHanSans",
+    "VL-Gothic",
+    "TakaoGothic",
+    "ipag",
+];
+
 /// Everything needed from the system. `serialport` without udev, and a window system that loads
 /// its libraries when it runs, need no development packages.
 #[rustfmt::skip]
@@ -98,8 +113,10 @@ pub const PACKAGES: &[Package] = &[
     package(Group::Window, "libxcursor1", Sign::Library("libXcursor.so.1"), "libXcursor", "libxcursor"),
     package(Group::Window, "libxi6", Sign::Library("libXi.so.6"), "libXi", "libxi"),
     package(Group::Window, "libxrandr2", Sign::Library("libXrandr.so.2"), "libXrandr", "libxrandr"),
+    package(Group::Window, "libfontconfig1", Sign::Library("libfontconfig.so.1"), "fontconfig", "fontconfig"),
     package(Group::Window, "libx11-xcb1", Sign::Library("libX11-xcb.so.1"), "libX11-xcb", "libx11"),
     package(Group::Screen, "xvfb", Sign::Program("Xvfb"), "xorg-x11-server-Xvfb", "xorg-server-xvfb"),
     package(Group::Screen, "xdotool", Sign::Program("xdotool"), "xdotool", "xdotool"),
     package(Group::Screen, "imagemagick", Sign::Program("import"), "ImageMagick", "imagemagick"),
+    package(Group::Screen, "fonts-droid-fallback", Sign::Font(JAPANESE), "google-droid-sans-fonts", "noto-fonts-cjk"),
 ];

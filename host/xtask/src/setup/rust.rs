@@ -1,4 +1,4 @@
-//! Parts of the Rust toolchain: the microcontroller's target, rustfmt and clippy.
+//! Parts of the Rust toolchain: the microcontroller's target, rustfmt, clippy and cargo-deny.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,7 +11,7 @@ use crate::shell;
 /// Target of the boards' Cortex-M7 with its double-precision FPU, hard-float calls.
 pub const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Something rustup adds to a toolchain.
+/// Something rustup adds to a toolchain, or cargo installs beside it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The standard library for [`BOARD_TARGET`].
@@ -20,17 +20,20 @@ pub enum Part {
     Rustfmt,
     /// `cargo clippy`.
     Clippy,
+    /// `cargo deny`, of any version that reads `deny.toml`.
+    Deny,
 }
 
 impl Part {
-    const ALL: [Self; 3] = [Self::Target, Self::Rustfmt, Self::Clippy];
+    const ALL: [Self; 4] = [Self::Target, Self::Rustfmt, Self::Clippy, Self::Deny];
 
-    /// rustup's name for it.
+    /// rustup's or cargo's name for it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Target => BOARD_TARGET,
             Self::Rustfmt => "rustfmt",
             Self::Clippy => "clippy",
+            Self::Deny => "cargo-deny",
         }
     }
 
@@ -38,19 +41,23 @@ impl Part {
     pub fn group(self) -> Group {
         match self {
             Self::Target => Group::Board,
-            Self::Rustfmt | Self::Clippy => Group::Checks,
+            Self::Rustfmt | Self::Clippy | Self::Deny => Group::Checks,
         }
     }
 
     /// The command that adds it, as a person would type it in the repository.
     pub fn add_line(self) -> String {
-        format!("rustup {} add {}", self.kind(), self.name())
+        let (program, words) = self.adding();
+        format!("{program} {}", words.join(" "))
     }
 
-    fn kind(self) -> &'static str {
+    /// The program that adds it, and its arguments.
+    fn adding(self) -> (&'static str, Vec<&'static str>) {
         match self {
-            Self::Target => "target",
-            Self::Rustfmt | Self::Clippy => "component",
+            Self::Target => ("rustup", vec!["target", "add", self.name()]),
+            Self::Rustfmt | Self::Clippy => ("rustup", vec!["component", "add", self.name()]),
+            // The versions its own lock file names, so that it builds wherever it was built before.
+            Self::Deny => ("cargo", vec!["install", "--locked", self.name()]),
         }
     }
 
@@ -68,6 +75,7 @@ impl Part {
                 .is_dir(),
             Self::Rustfmt => program("rustfmt").is_file() && program("cargo-fmt").is_file(),
             Self::Clippy => program("clippy-driver").is_file() && program("cargo-clippy").is_file(),
+            Self::Deny => shell::find_program(self.name()).is_some(),
         }
     }
 }
@@ -99,18 +107,15 @@ pub fn missing(groups: &[Group], root: &Path) -> Result<Vec<Part>> {
 /// When there is no rustup, or it fails.
 pub fn add(parts: &[Part], root: &Path) -> Result<()> {
     for part in parts {
-        if shell::find_program("rustup").is_none() {
+        let (program, words) = part.adding();
+        if shell::find_program(program).is_none() {
             bail!(
                 "this Rust was not installed by rustup, so `{}` must come from where it did: {}",
                 part.name(),
                 part.add_line()
             );
         }
-        shell::run(
-            Command::new("rustup")
-                .args([part.kind(), "add", part.name()])
-                .current_dir(root),
-        )?;
+        shell::run(Command::new(program).args(words).current_dir(root))?;
     }
     Ok(())
 }
@@ -123,7 +128,8 @@ mod tests {
     fn parts_are_seen_by_their_files() {
         let place = tempfile::tempdir().unwrap();
         let sysroot = place.path();
-        assert!(Part::ALL.iter().all(|part| !part.is_in(sysroot)));
+        let parts = || Part::ALL.into_iter().filter(|part| *part != Part::Deny);
+        assert!(parts().all(|part| !part.is_in(sysroot)));
         std::fs::create_dir_all(sysroot.join("lib/rustlib/thumbv7em-none-eabihf/lib")).unwrap();
         std::fs::create_dir_all(sysroot.join("bin")).unwrap();
         for name in ["rustfmt", "cargo-fmt", "cargo-clippy"] {

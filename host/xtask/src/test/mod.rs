@@ -37,6 +37,7 @@ struct Bench {
 const STEPS: &[Step] = &[
     Step { name: "format", what: "rustfmt leaves every source as it is", run: steps::format },
     Step { name: "tidy", what: "paths named in docs exist, files are short, layers hold", run: steps::tidy },
+    Step { name: "dependencies", what: "licences, sources, advisories and versions of all that is built on", run: steps::dependencies },
     Step { name: "lint", what: "clippy finds nothing in host crates and their tests", run: steps::lint },
     Step { name: "no-std", what: "board-side crates compile for the microcontroller", run: steps::no_std },
     Step { name: "lint-boards", what: "clippy finds nothing in the boards' firmware", run: steps::lint_boards },
@@ -44,10 +45,11 @@ const STEPS: &[Step] = &[
     Step { name: "build", what: "the program, and every test", run: steps::build },
     Step { name: "unit", what: "unit, property and integration tests", run: steps::unit },
     Step { name: "unit-boards", what: "parts of boards that need no chip, tested here", run: steps::unit_boards },
+    Step { name: "interleavings", what: "every interleaving of the two planes' threads, by a model checker", run: steps::interleavings },
     Step { name: "hil", what: "scenarios on the simulated and the emulated rig", run: steps::hil },
     Step { name: "fuzz", what: "random bytes for what reads frames, scenes, rigs and STEP files, 15 s each", run: steps::fuzz },
     Step { name: "docs", what: "every public item's documentation builds; commands named in pages exist", run: steps::docs },
-    Step { name: "figures", what: "end-to-end figures, the quick form", run: steps::figures },
+    Step { name: "figures", what: "figures, the quick form: bounds hold, README and docs say what is measured", run: steps::figures },
     Step { name: "window", what: "the sample insertion moves in the program's window, on a virtual screen", run: window::run },
 ];
 

@@ -11,8 +11,6 @@ use crate::{figures, firmware as boards, fuzz, program, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
 const HIL_BENCH: &str = "bench";
-/// Tables whose shorter form is measured.
-const FIGURES: [&str; 1] = ["end-to-end"];
 const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// What property tests draw their cases from, unless the environment says otherwise: a commit passes or fails here as it does everywhere. Plain
 /// `cargo test` draws anew each time.
@@ -30,6 +28,43 @@ pub fn format(bench: &mut Bench) -> Result<String> {
 pub fn tidy(bench: &mut Bench) -> Result<String> {
     tidy::report(&tidy::check(&bench.root)?)?;
     Ok(String::new())
+}
+
+/// `cargo deny` over both workspaces that ship. The list of advisories comes from the network: where that cannot be reached, the step says so.
+pub fn dependencies(bench: &mut Bench) -> Result<String> {
+    let deny = |manifest: &str, checks: &[&str]| {
+        let mut command = shell::cargo(&bench.root);
+        command
+            .args([
+                "deny",
+                "--manifest-path",
+                manifest,
+                "check",
+                "--hide-inclusion-graph",
+            ])
+            // One list serves both trees: an exception the other one needs is no finding.
+            .args([
+                "--allow",
+                "unmatched-skip",
+                "--allow",
+                "license-exception-not-encountered",
+            ])
+            .args(checks);
+        command
+    };
+    let manifests = ["Cargo.toml", "firmware/boards/Cargo.toml"];
+    for manifest in manifests {
+        shell::run(&mut deny(manifest, &["licenses", "bans", "sources"]))?;
+    }
+    let mut fetch = shell::cargo(&bench.root);
+    fetch.args(["deny", "fetch", "db"]);
+    if shell::run(&mut fetch).is_err() {
+        return Ok("advisories not checked: their list cannot be fetched here".to_owned());
+    }
+    for manifest in manifests {
+        shell::run(&mut deny(manifest, &["advisories"]))?;
+    }
+    Ok("advisories checked".to_owned())
 }
 
 pub fn lint(bench: &mut Bench) -> Result<String> {
@@ -126,6 +161,17 @@ pub fn hil(bench: &mut Bench) -> Result<String> {
     counted(bench, &mut command)
 }
 
+/// The loom model checker: every interleaving of two planes' threads, weak memory included. A workspace of its own, since its atomics are loom's.
+pub fn interleavings(bench: &mut Bench) -> Result<String> {
+    let mut command = shell::cargo(&bench.root);
+    command
+        .current_dir(bench.root.join("hil-tests/loom"))
+        .env("RUST_BACKTRACE", "0")
+        .args(["test", "--release", "--tests", "--target-dir"])
+        .arg(tidy::target_directory(&bench.root)?.join("loom"));
+    counted(bench, &mut command)
+}
+
 /// The shorter form: long enough to find what a change broke near the kept corpora. `cargo xtask fuzz --minutes 10` goes on.
 pub fn fuzz(bench: &mut Bench) -> Result<String> {
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
@@ -153,23 +199,7 @@ pub fn docs(bench: &mut Bench) -> Result<String> {
 
 pub fn figures(bench: &mut Bench) -> Result<String> {
     let program = bench.program()?;
-    let mut held = 0;
-    for name in FIGURES {
-        let measured = figures::measure(&bench.root, &program, name, true)?;
-        let broken: Vec<_> = measured.rows.iter().filter(|row| !row.holds).collect();
-        if !broken.is_empty() {
-            bail!(
-                "{name}: {} of {} bounds do not hold",
-                broken.len(),
-                measured.rows.len()
-            );
-        }
-        if !measured.success {
-            bail!("{name}: every row holds, yet the program says by its exit code that one does not");
-        }
-        held += measured.rows.len();
-    }
-    Ok(format!("{held} bounds hold"))
+    figures::step(&bench.root, &program)
 }
 
 impl Bench {

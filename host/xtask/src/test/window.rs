@@ -1,5 +1,6 @@
 //! Plays the sample insertion in the real program's window, on a virtual screen, and looks whether it
-//! is drawn and moves.
+//! is drawn and moves; then, at twice the scale, whether the window fits the screen and how much of a core it
+//! takes with a rig connected and the motors off.
 //!
 //! Needs no display and no GPU: Xvfb is the screen, Mesa draws in software.
 
@@ -21,6 +22,16 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// edges, has more than this.
 const COLOURS_MIN: u32 = 64;
 
+/// The virtual screen, pixels.
+const SCREEN: (u32, u32) = (1600, 1000);
+const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
+/// Most of a core that an idle window may take with software rendering: a picture every ten seconds, and 1,000 ticks a second.
+const IDLE_MAX: f64 = 0.10;
+/// The in-process rig's thread: there once the rig is connected.
+const BOARD_THREAD: &str = "mortise-board";
+/// Over this long: two pictures at least, so that no span is judged by what lies between them.
+const IDLE_SPAN: Duration = Duration::from_secs(20);
+
 /// Different pictures to be seen: opening and baking the sample show a few, live plots one each time.
 const PICTURES_MIN: usize = 10;
 
@@ -34,21 +45,7 @@ pub fn run(bench: &mut Bench) -> Result<String> {
     std::fs::create_dir_all(&place)?;
     let screen = Screen::start(&place)?;
     let log = place.join("mortise.log");
-    let log_file = File::create(&log)?;
-    let mut child = Running(
-        Command::new(&program)
-            .args(["demo", "--rig", "sim"])
-            .current_dir(&bench.root)
-            .env("DISPLAY", &screen.display)
-            // Or the window would open on the desktop of whoever runs this.
-            .env_remove("WAYLAND_DISPLAY")
-            .env_remove("WAYLAND_SOCKET")
-            .stdin(Stdio::null())
-            .stdout(log_file.try_clone()?)
-            .stderr(log_file)
-            .spawn()
-            .with_context(|| format!("{} cannot be started", program.display()))?,
-    );
+    let mut child = start(&bench.root, &program, &screen, &log, 1, &["demo", "--rig", "sim"])?;
     let picture = place.join("window.png");
     let deadline = Instant::now() + PATIENCE;
     let mut seen = HashSet::new();
@@ -63,7 +60,13 @@ pub fn run(bench: &mut Bench) -> Result<String> {
                 seen.insert(look.signature);
                 if seen.len() >= PICTURES_MIN {
                     let picture = shown(&bench.root, &picture);
-                    return Ok(format!("drawn and moving, {} colours in {picture}", look.colours));
+                    drop(child);
+                    let share = idle_share(&bench.root, &program, &screen, &place)?;
+                    return Ok(format!(
+                        "drawn and moving, {} colours in {picture}; idle: {:.1} % of a core",
+                        look.colours,
+                        100.0 * share
+                    ));
                 }
             }
         }
@@ -78,6 +81,110 @@ pub fn run(bench: &mut Bench) -> Result<String> {
         }
         std::thread::sleep(Duration::from_millis(500));
     }
+}
+
+/// The program on the virtual screen.
+fn start(
+    root: &Path,
+    program: &Path,
+    screen: &Screen,
+    log: &Path,
+    scale: u32,
+    arguments: &[&str],
+) -> Result<Running> {
+    let log = File::create(log)?;
+    let child = Command::new(program)
+        .args(arguments)
+        .current_dir(root)
+        .env("DISPLAY", &screen.display)
+        .env("WINIT_X11_SCALE_FACTOR", scale.to_string())
+        // Or the window would open on the desktop of whoever runs this.
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .stdin(Stdio::null())
+        .stdout(log.try_clone()?)
+        .stderr(log)
+        .spawn()
+        .with_context(|| format!("{} cannot be started", program.display()))?;
+    Ok(Running(child))
+}
+
+/// Share of a core that the program takes with the sample open, the in-process rig connected, and its motors off: the least of several spans,
+/// since reading and baking come first.
+fn idle_share(root: &Path, program: &Path, screen: &Screen, place: &Path) -> Result<f64> {
+    let log = place.join("idle.log");
+    let arguments = ["open", SAMPLE, "--connect", "sim"];
+    let mut child = start(root, program, screen, &log, 2, &arguments)?;
+    let deadline = Instant::now() + PATIENCE;
+    let mut least = f64::INFINITY;
+    while Instant::now() < deadline {
+        if let Some(status) = child.0.try_wait()? {
+            bail!("the program ended by itself ({status}); it said:\n{}", tail(&log));
+        }
+        let Some(window) = visible_window(&screen.display) else {
+            std::thread::sleep(Duration::from_millis(500));
+            continue;
+        };
+        let (wide, high) = size_of(&screen.display, &window)?;
+        if wide > SCREEN.0 || high > SCREEN.1 {
+            bail!("at twice the scale the window is {wide} × {high}, larger than the screen");
+        }
+        if !has_thread(child.0.id(), BOARD_THREAD) {
+            std::thread::sleep(Duration::from_millis(500));
+            continue;
+        }
+        let before = processor_s(child.0.id())?;
+        std::thread::sleep(IDLE_SPAN);
+        let share = (processor_s(child.0.id())? - before) / IDLE_SPAN.as_secs_f64();
+        least = least.min(share);
+        if share <= IDLE_MAX {
+            take_picture(&screen.display, &window, &place.join("idle.png"))?;
+            return Ok(share);
+        }
+    }
+    bail!(
+        "idle, with a rig connected, the program takes {:.0} % of a core; bound: {:.0} %",
+        100.0 * least,
+        100.0 * IDLE_MAX
+    )
+}
+
+/// Whether a process has a thread of this name.
+fn has_thread(process: u32, name: &str) -> bool {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task"));
+    (threads.into_iter().flatten().flatten())
+        .filter_map(|thread| std::fs::read_to_string(thread.path().join("comm")).ok())
+        .any(|comm| comm.trim() == name)
+}
+
+/// Processor time of a process and its threads so far, s.
+fn processor_s(process: u32) -> Result<f64> {
+    let path = format!("/proc/{process}/stat");
+    let text = std::fs::read_to_string(&path).with_context(|| format!("reading {path}"))?;
+    // The name, in parentheses, may hold spaces; user and system time are the 12th and 13th after it, in hundredths of a second
+    // (USER_HZ, the same on every Linux).
+    let fields = text.rsplit_once(')').map_or("", |(_, fields)| fields);
+    let times: Vec<f64> = (fields.split_whitespace().skip(11).take(2))
+        .filter_map(|field| field.parse().ok())
+        .collect();
+    match times[..] {
+        [user, system] => Ok((user + system) / 100.0),
+        _ => bail!("{path} has no times: {text}"),
+    }
+}
+
+/// Pixels of a window.
+fn size_of(display: &str, window: &str) -> Result<(u32, u32)> {
+    let mut command = Command::new("xdotool");
+    command
+        .args(["getwindowgeometry", "--shell", window])
+        .env("DISPLAY", display);
+    let text = shell::read(&mut command)?;
+    let read = |key: &str| {
+        let line = text.lines().find_map(|line| line.strip_prefix(key));
+        line.and_then(|value| value.trim().parse().ok())
+    };
+    (read("WIDTH=").zip(read("HEIGHT="))).with_context(|| format!("`xdotool` printed `{}`", text.trim()))
 }
 
 /// A child that does not outlive its value.
@@ -106,7 +213,7 @@ impl Screen {
                     "1",
                     "-screen",
                     "0",
-                    "1600x1000x24",
+                    &format!("{}x{}x24", SCREEN.0, SCREEN.1),
                     "-nolisten",
                     "tcp",
                 ])

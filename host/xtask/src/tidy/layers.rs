@@ -33,6 +33,10 @@ const LAYERS: &[(&str, &[&str])] = &[
         &["mortise-firmware", "mortise-haptics", "mortise-protocol"],
     ),
     ("firmware/app", &["mortise-haptics", "mortise-protocol"]),
+    (
+        "firmware/orders",
+        &["mortise-firmware", "mortise-haptics", "mortise-protocol"],
+    ),
     ("firmware/haptics", &["mortise-protocol"]),
     ("firmware", &["mortise-haptics", "mortise-protocol"]),
     ("protocol", &[]),

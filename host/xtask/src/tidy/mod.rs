@@ -1,10 +1,11 @@
-//! Checks that keep the repository true: what docs name exists, files stay short, layers hold.
+//! Checks that keep the repository true: what docs name exists, files stay short, layers hold, no figure is stale.
 
 mod commands;
 mod docs;
 mod layers;
 mod sources;
 mod tree;
+mod unsafety;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,9 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
-use crate::{program, shell};
+pub use self::layers::target_directory;
+
+use crate::{figures, program, shell};
 
 /// Something that is not as it must be.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,7 +58,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks that need no program: paths in docs, length and words of sources, layers.
+/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, what figures were made from.
 ///
 /// # Errors
 /// When a file cannot be read, or cargo cannot describe the workspace.
@@ -64,9 +67,16 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
     for file in &files {
         findings.extend(sources::check(root, file)?);
+        findings.extend(unsafety::check(root, file)?);
     }
     findings.extend(docs::check_paths(root, &files)?);
     findings.extend(layers::check(root, &files)?);
+    let stale = figures::artefacts::complaints(root)?;
+    findings.extend(
+        stale
+            .into_iter()
+            .map(|(file, what)| Finding { file, line: 0, what }),
+    );
     Ok(findings)
 }
 
@@ -109,7 +119,7 @@ pub fn report(findings: &[Finding]) -> Result<()> {
 
 /// The desktop program, if an earlier build left one.
 fn built_program(root: &Path) -> Result<Option<PathBuf>> {
-    let target = layers::target_directory(root)?;
+    let target = target_directory(root)?;
     let path = target
         .join("release")
         .join(format!("{}{}", program::MORTISE, std::env::consts::EXE_SUFFIX));

@@ -18,7 +18,11 @@ pub fn files(root: &Path) -> Result<Vec<PathBuf>> {
             let path = directory.join(entry.file_name());
             // A link's own kind, so that one which leads out of the tree is not followed.
             let kind = entry.file_type()?;
-            if kind.is_dir() && entry.file_name() != "target" && entry.file_name() != ".git" {
+            // A directory, or in a linked work tree a file.
+            if entry.file_name() == ".git" {
+                continue;
+            }
+            if kind.is_dir() && entry.file_name() != "target" {
                 open.push(path);
             } else if kind.is_file() {
                 found.push(path);

@@ -1,0 +1,210 @@
+//! `cargo xtask figures NAME`: measures and keeps the figures of one part of the product.
+//!
+//! The program prints one JSON object a row, `{"what","value","unit","bound","holds"}`; this writes
+//! them as a table to `docs/figures/NAME.md`. `--check` compares what pages say with what is measured; `--renew` makes anew what is stale.
+
+pub mod artefacts;
+mod claims;
+mod page;
+mod quoted;
+mod renew;
+mod row;
+mod sources;
+
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context, Result, bail};
+
+use self::artefacts::{ARTEFACTS, Artefact, Made};
+use self::claims::Claims;
+pub use self::row::{Row, count};
+use crate::setup::{self, Consent, Group};
+use crate::{firmware, program, shell};
+
+/// What one run of `mortise lab figures` gave.
+#[derive(Debug)]
+pub struct Measured {
+    /// The rows, in the program's order.
+    pub rows: Vec<Row>,
+    /// True if the program ended with success.
+    pub success: bool,
+}
+
+/// What `mortise lab figures` judges rows by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// The claims it was built with; a row without one makes the last row fail.
+    Kept,
+    /// The same, and where there is none, what it measures.
+    Completed,
+    /// What it measures.
+    Measured,
+}
+
+impl By {
+    fn option(self) -> &'static str {
+        match self {
+            Self::Kept => "kept",
+            Self::Completed => "completed",
+            Self::Measured => "measured",
+        }
+    }
+}
+
+/// `cargo xtask figures [NAME] [--quick] [--claim]`, `--check` or `--renew [NAME]...`.
+pub fn command(arguments: &[String]) -> Result<ExitCode> {
+    let root = shell::root()?;
+    let mut arguments = arguments.to_vec();
+    let consent = Consent::take(&mut arguments);
+    let (options, names): (Vec<String>, Vec<String>) = arguments
+        .into_iter()
+        .partition(|argument| argument.starts_with('-'));
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let name = match (options.as_slice(), names.as_slice()) {
+        (["--check"], []) | (["--renew"], _) => None,
+        ([] | ["--quick"] | ["--claim"] | ["--quick", "--claim"] | ["--claim", "--quick"], [name]) => {
+            Some(name)
+        }
+        _ => bail!(
+            "say which figures, for example `cargo xtask figures end-to-end`, or `--check` or `--renew` alone; see `cargo xtask figures --help`"
+        ),
+    };
+    if !setup::ensure(&[Group::Build, Group::Board], consent)? {
+        return Ok(ExitCode::FAILURE);
+    }
+    firmware::build(&root, firmware::EMULATED)?;
+    let program = program::build_mortise(&root)?;
+    let all_hold = match name {
+        Some(name) => {
+            let by = if options.contains(&"--claim") {
+                By::Measured
+            } else {
+                By::Completed
+            };
+            write_page(&root, &program, name, options.contains(&"--quick"), by)?
+        }
+        None if options == ["--check"] => {
+            println!("{}", check(&root, &program)?);
+            true
+        }
+        None => renew::run(&root, &program, &names)?,
+    };
+    Ok(if all_hold {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+/// Measures a table, keeps the claims of new rows and writes the page; true if every bound holds.
+fn write_page(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<bool> {
+    let known = |artefact: &&Artefact| artefact.name == name && matches!(artefact.made, Made::Page { .. });
+    if !ARTEFACTS.iter().any(|artefact| known(&artefact)) {
+        bail!("there is no table `{name}`; `mortise lab figures --help` names them");
+    }
+    let measured = measure(root, program, name, quick, by)?;
+    let mut claims = Claims::read(root)?;
+    claims.take(name, &measured.rows);
+    claims.write(root)?;
+    let file = root.join(artefacts::FOLDER).join(format!("{name}.md"));
+    std::fs::write(&file, page::text(name, quick, &measured.rows))
+        .with_context(|| format!("writing {}", file.display()))?;
+    eprintln!("written: docs/figures/{name}.md");
+    Ok(measured.success && !measured.rows.iter().any(Row::fails))
+}
+
+/// The step of `cargo xtask test`: [`check`], once figures have been renewed for the first time; until then, whether the bounds of `end-to-end` hold.
+///
+/// # Errors
+/// As [`check`].
+pub fn step(root: &Path, program: &Path) -> Result<String> {
+    if artefacts::Manifest::read(root)?.is_some() {
+        return check(root, program);
+    }
+    let measured = measure(root, program, "end-to-end", true, By::Completed)?;
+    let count = count(&measured.rows);
+    if !measured.success || measured.rows.iter().any(Row::fails) {
+        bail!("end-to-end: {count}");
+    }
+    Ok(format!(
+        "end-to-end: {count}; README is not compared before `cargo xtask figures --renew`"
+    ))
+}
+
+/// Measures the shorter form of every table that README or another page quotes, and compares: bounds, claims, what pages quote, and the pages of
+/// figures.
+///
+/// # Errors
+/// When a bound does not hold, or a number differs; what and where was printed.
+pub fn check(root: &Path, program: &Path) -> Result<String> {
+    let quoted = quoted::of_pages(root)?;
+    let (mut said, mut wrong) = (Vec::new(), Vec::new());
+    for table in quoted::tables(&quoted) {
+        let measured = measure(root, program, &table, true, By::Kept)?;
+        let failing = measured.rows.iter().filter(|row| row.fails());
+        wrong.extend(failing.map(|row| format!("{table}: {}", row.line())));
+        if !measured.success && !measured.rows.iter().any(Row::fails) {
+            wrong.push(format!(
+                "{table}: the program says by its exit code that a bound does not hold"
+            ));
+        }
+        let file = format!("{}/{table}.md", artefacts::FOLDER);
+        let page = std::fs::read_to_string(root.join(&file))
+            .with_context(|| format!("reading {file}; `--renew` writes it"))?;
+        let page = quoted::page_rows(&page);
+        wrong.extend(quoted::differences(&table, &measured.rows, &page));
+        for quoted in quoted.iter().filter(|quoted| quoted.table == table) {
+            wrong.extend(
+                quoted
+                    .check(&measured.rows, &page)
+                    .err()
+                    .map(|error| format!("{error:#}")),
+            );
+        }
+        said.push(format!("{table}: {}", count(&measured.rows)));
+    }
+    for wrong in &wrong {
+        eprintln!("{wrong}");
+    }
+    if !wrong.is_empty() {
+        bail!("{} figures do not hold or differ", wrong.len());
+    }
+    said.push(format!("{} quoted figures agree", quoted.len()));
+    Ok(said.join("; "))
+}
+
+/// Runs `mortise lab figures NAME --json` and prints each row as it comes.
+///
+/// # Errors
+/// When the program cannot be started or prints no rows, or something that is not a row.
+pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<Measured> {
+    let mut command = Command::new(program);
+    command
+        .current_dir(root)
+        .args(["lab", "figures", name, "--json", "--claims", by.option()]);
+    if quick {
+        command.arg("--quick");
+    }
+    let mut rows = Vec::new();
+    let mut foreign = Vec::new();
+    let run = shell::run_lines(&mut command, |line| match Row::parse(line) {
+        Ok(row) => {
+            println!("  {}", row.line());
+            rows.push(row);
+        }
+        Err(_) if line.trim().is_empty() => {}
+        Err(error) => foreign.push(format!("{error:#}: {line}")),
+    });
+    if let Some(first) = foreign.first() {
+        bail!("`mortise lab figures {name} --json` printed what is not a row ({first})");
+    }
+    if rows.is_empty() {
+        run?;
+        bail!("`mortise lab figures {name} --json` printed no row");
+    }
+    Ok(Measured {
+        rows,
+        success: run.is_ok(),
+    })
+}

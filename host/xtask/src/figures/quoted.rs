@@ -1,0 +1,321 @@
+//! Figures that pages quote: each measured number in README or `docs/*.md` has a comment behind it that names its row,
+//!
+//! ```text
+//! stay within 9.06 µm<!-- row end-to-end: hole wall, 5 N + penetration -->
+//! ```
+//!
+//! the table, then parts of the row's text, all of which it must have and no other row. The number is right when the row's value, in the unit that stands
+//! behind the number, rounds to it as it is written; a value that the machine decides, when neither is more than 1.5 times the other.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use super::Row;
+
+const START: &str = "<!-- row ";
+const END: &str = "-->";
+/// How far values of one machine may lie from those of another, as a ratio.
+const VARIES: f64 = 1.5;
+/// How far a page's value may lie from the measured one that comes out the same everywhere, as a share: what another mathematical library makes of it.
+const SAME: f64 = 1e-3;
+
+/// A number that a page quotes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quoted {
+    /// The page, from the root.
+    pub page: PathBuf,
+    /// Line, counted from one.
+    pub line: usize,
+    /// The number as it is written.
+    pub number: String,
+    /// The word behind it.
+    unit: String,
+    /// The table it is from.
+    pub table: String,
+    parts: Vec<String>,
+}
+
+/// All numbers that README and the pages beside `docs/figures` quote.
+///
+/// # Errors
+/// When a page cannot be read or a comment is not as described.
+pub fn of_pages(root: &Path) -> Result<Vec<Quoted>> {
+    let mut pages = vec![
+        PathBuf::from("README.md"),
+        PathBuf::from("docs/figures/sweeps.md"),
+    ];
+    for entry in std::fs::read_dir(root.join("docs"))? {
+        let path = Path::new("docs").join(entry?.file_name());
+        if path.extension().is_some_and(|end| end == "md") {
+            pages.push(path);
+        }
+    }
+    let mut found = Vec::new();
+    for page in pages {
+        let text = std::fs::read_to_string(root.join(&page))
+            .with_context(|| format!("reading {}", page.display()))?;
+        found.extend(of_text(&page, &text)?);
+    }
+    Ok(found)
+}
+
+fn of_text(page: &Path, text: &str) -> Result<Vec<Quoted>> {
+    let mut found = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let mut rest = line;
+        while let Some((before, after)) = rest.split_once(START) {
+            let place = || format!("{}:{}", page.display(), index + 1);
+            let (name, after) = after
+                .split_once(END)
+                .with_context(|| format!("{}: the comment has no end", place()))?;
+            let (table, parts) = name.split_once(':').with_context(|| {
+                format!(
+                    "{}: the comment must be `{START}TABLE: PART + PART {END}`",
+                    place()
+                )
+            })?;
+            let Some((number, unit)) = last_number(before) else {
+                bail!("{}: there is no number before the comment", place());
+            };
+            found.push(Quoted {
+                page: page.to_path_buf(),
+                line: index + 1,
+                number,
+                unit,
+                table: table.trim().to_owned(),
+                parts: parts.split(" + ").map(|part| part.trim().to_owned()).collect(),
+            });
+            rest = after;
+        }
+    }
+    Ok(found)
+}
+
+/// The last number of a text and the word behind it.
+fn last_number(text: &str) -> Option<(String, String)> {
+    let end = text.rfind(|letter: char| letter.is_ascii_digit())? + 1;
+    let start = text[..end]
+        .rfind(|letter: char| !(letter.is_ascii_digit() || ",.".contains(letter)))
+        .map_or(0, |at| at + text[at..].chars().next().map_or(1, char::len_utf8));
+    let number = text[start..end].trim_start_matches([',', '.']);
+    let unit = text[end..].split_whitespace().next().unwrap_or("");
+    let unit = unit.trim_matches(|letter: char| !letter.is_alphanumeric() && letter != '%');
+    Some((number.to_owned(), unit.to_owned()))
+}
+
+impl Quoted {
+    /// The one row of its parts.
+    fn row<'a>(&self, rows: &'a [Row], place: &str) -> Result<&'a Row> {
+        let fits = |row: &&Row| self.parts.iter().all(|part| row.what.contains(part.as_str()));
+        let found: Vec<&Row> = rows.iter().filter(fits).collect();
+        match found.as_slice() {
+            [row] => Ok(row),
+            rows => bail!("{self}: {} rows of {place} have its parts, one must", rows.len()),
+        }
+    }
+
+    /// Fails when `row` does not round to the number.
+    fn agrees(&self, row: &Row, place: &str) -> Result<()> {
+        let written: f64 = self
+            .number
+            .replace(',', "")
+            .parse()
+            .with_context(|| format!("{self}: not a number"))?;
+        let value = row
+            .number()
+            .with_context(|| format!("{self}: {place} has `{}`", row.value))?;
+        let value = value * scale(&row.unit, &self.unit);
+        let digits = self.number.split_once('.').map_or(0, |(_, behind)| behind.len());
+        let agree = if row.varies {
+            value > 0.0 && written > 0.0 && (value / written).max(written / value) <= VARIES
+        } else {
+            (value - written).abs() <= 0.500_001 * 10f64.powi(-(digits as i32))
+        };
+        if !agree {
+            bail!("{self}: {place} has {value} {}", self.unit);
+        }
+        Ok(())
+    }
+
+    /// Fails when the number, the page of figures and what was measured differ.
+    ///
+    /// # Errors
+    /// Where they do, with all three.
+    pub fn check(&self, measured: &[Row], page: &[Row]) -> Result<()> {
+        let now = self.row(measured, "what was measured")?;
+        self.agrees(now, "what was measured")?;
+        let mut kept = self.row(page, "the page of figures")?.clone();
+        kept.varies = now.varies;
+        self.agrees(&kept, "the page of figures")
+    }
+}
+
+impl std::fmt::Display for Quoted {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            page,
+            line,
+            number,
+            unit,
+            table,
+            parts,
+        } = self;
+        write!(
+            formatter,
+            "{}:{line}: {number} {unit} ({table}: {})",
+            page.display(),
+            parts.join(" + ")
+        )
+    }
+}
+
+/// Factor from one unit of length to another; 1 between all others.
+fn scale(from: &str, to: &str) -> f64 {
+    let metres = |unit: &str| match unit {
+        "µm" => Some(1e-6),
+        "mm" => Some(1e-3),
+        "m" => Some(1.0),
+        _ => None,
+    };
+    match (metres(from), metres(to)) {
+        (Some(from), Some(to)) => from / to,
+        _ => 1.0,
+    }
+}
+
+/// Tables that pages quote, and those that promise something.
+pub fn tables(quoted: &[Quoted]) -> BTreeSet<String> {
+    let mut tables: BTreeSet<String> = quoted.iter().map(|quoted| quoted.table.clone()).collect();
+    tables.extend(["end-to-end", "promises"].map(str::to_owned));
+    tables
+}
+
+/// The rows of a page of figures.
+pub fn page_rows(text: &str) -> Vec<Row> {
+    let cells = |line: &str| -> Vec<String> {
+        let line = line.replace("\\|", "\u{0}");
+        let inner = line.trim().trim_matches('|');
+        inner
+            .split('|')
+            .map(|cell| cell.trim().replace('\u{0}', "|"))
+            .collect()
+    };
+    (text.lines().filter(|line| line.starts_with("| ")).skip(1))
+        .map(cells)
+        .filter(|cells| cells.len() >= 3)
+        .map(|cells| Row {
+            what: cells[0].clone(),
+            value: cells[1].clone(),
+            unit: cells[2].clone(),
+            ..Row::default()
+        })
+        .collect()
+}
+
+/// Numbers that come out the same everywhere and differ between a page of figures and what was measured, for rows of the same text.
+pub fn differences(table: &str, measured: &[Row], page: &[Row]) -> Vec<String> {
+    let mut found = Vec::new();
+    for row in measured.iter().filter(|row| !row.varies && row.claim.is_some()) {
+        let Some(kept) = page.iter().find(|kept| kept.key() == row.key()) else {
+            continue;
+        };
+        if let (Some(now), Some(then)) = (row.number(), kept.number())
+            && (now - then).abs() > SAME * then.abs().max(now.abs())
+        {
+            found.push(format!(
+                "{FOLDER}/{table}.md: {}: {then} there, {now} measured",
+                row.what
+            ));
+        }
+    }
+    found
+}
+
+const FOLDER: &str = super::artefacts::FOLDER;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(what: &str, value: f64, unit: &str) -> Row {
+        Row {
+            what: what.into(),
+            value: value.to_string(),
+            unit: unit.into(),
+            ..Row::default()
+        }
+    }
+
+    fn quoted(text: &str) -> Vec<Quoted> {
+        of_text(Path::new("README.md"), text).unwrap()
+    }
+
+    #[test]
+    fn numbers_and_their_rows_are_read() {
+        let found =
+            quoted("1 N | 9.06 µm<!-- row a: wall + depth -->, 72,480 instructions<!-- row b: tick -->");
+        assert_eq!(found.len(), 2);
+        assert_eq!((found[0].number.as_str(), found[0].unit.as_str()), ("9.06", "µm"));
+        assert_eq!(
+            (found[1].number.as_str(), found[1].table.as_str()),
+            ("72,480", "b")
+        );
+        assert_eq!(found[0].parts, ["wall", "depth"]);
+        assert!(of_text(Path::new("a"), "none <!-- row a: b -->").is_err());
+        assert!(of_text(Path::new("a"), "1 <!-- row a b -->").is_err());
+    }
+
+    /// The first sentence of README once said 2 µm where 9.06 µm were measured and the page said 1.62.
+    #[test]
+    fn a_number_that_is_not_measured_is_found() {
+        let depth = |value: f64| {
+            [
+                row("wall, 5 N: depth", value, "mm"),
+                row("wall, 1 N: depth", 0.0, "mm"),
+            ]
+        };
+        let said = |text: &str| quoted(&format!("{text}<!-- row a: 5 N + depth -->")).remove(0);
+        assert!(said("2 µm").check(&depth(0.00906), &depth(0.00162)).is_err());
+        assert!(said("9.06 µm").check(&depth(0.00906), &depth(0.00162)).is_err());
+        assert!(said("9.1 µm").check(&depth(0.00906), &depth(0.009_06)).is_ok());
+        assert!(said("9.2 µm").check(&depth(0.00906), &depth(0.009_06)).is_err());
+        let two = quoted("9 µm<!-- row a: depth -->").remove(0);
+        assert!(two.check(&depth(0.009), &depth(0.009)).is_err());
+    }
+
+    #[test]
+    fn values_of_a_machine_have_a_spread() {
+        let time = |value: f64| {
+            [Row {
+                varies: true,
+                ..row("ratio", value, "")
+            }]
+        };
+        let said = quoted("131<!-- row a: ratio -->").remove(0);
+        assert!(said.check(&time(100.0), &[row("ratio", 150.0, "")]).is_ok());
+        assert!(said.check(&time(80.0), &[row("ratio", 131.0, "")]).is_err());
+    }
+
+    #[test]
+    fn a_page_that_differs_from_the_run_is_found() {
+        let page = "| what | value | unit | claim | bound | holds |\n|---|---:|---|---:|---|---|\n| a\\|b (1) | 2 | mm | 2 | ≤ 2.2 | yes |\n";
+        let rows = page_rows(page);
+        assert_eq!(rows.last().map(|row| row.what.as_str()), Some("a|b (1)"));
+        let now = |value: f64| {
+            [Row {
+                claim: Some(2.0),
+                ..row("a|b (3)", value, "mm")
+            }]
+        };
+        assert!(differences("t", &now(2.0), &rows).is_empty());
+        assert_eq!(differences("t", &now(2.1), &rows).len(), 1);
+    }
+
+    #[test]
+    fn the_repositorys_own_comments_are_read() {
+        let root = crate::shell::root().unwrap();
+        assert!(!of_pages(&root).unwrap().is_empty());
+    }
+}

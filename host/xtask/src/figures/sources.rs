@@ -1,0 +1,292 @@
+//! A hash of the sources that an artefact depends on.
+//!
+//! Of Rust files the tokens count: comments, documentation, white space and what is compiled for tests alone do not, so that a change of words makes
+//! no chart stale. Other files count as they are. The hash is FNV-1a of 64 bits: it finds changes, and is no protection against somebody who
+//! wants none to be found.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+/// Hash of all files at and below `places`, paths from `root`; files of tests are left out.
+///
+/// # Errors
+/// When a place does not exist or cannot be read.
+pub fn hash(root: &Path, places: &[&str]) -> Result<String> {
+    let mut files = Vec::new();
+    for place in places {
+        let before = files.len();
+        collect(root, Path::new(place), &mut files)?;
+        if files.len() == before {
+            bail!(
+                "{place}, which a figure depends on, holds no file: correct host/xtask/src/figures/artefacts.rs"
+            );
+        }
+    }
+    files.sort();
+    files.dedup();
+    let mut hash = Fnv::default();
+    for file in files {
+        let bytes = std::fs::read(root.join(&file)).with_context(|| format!("reading {}", file.display()))?;
+        let name = file.to_string_lossy().replace('\\', "/");
+        hash.add(name.as_bytes());
+        if file.extension().is_some_and(|end| end == "rs") {
+            hash.add(tokens(&String::from_utf8_lossy(&bytes)).as_bytes());
+        } else {
+            hash.add(&bytes);
+        }
+    }
+    Ok(hash.text())
+}
+
+fn collect(root: &Path, place: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    let full = root.join(place);
+    let test = |path: &Path| path.file_stem().is_some_and(|name| name == "tests");
+    if full.is_file() {
+        files.push(place.to_path_buf());
+        return Ok(());
+    }
+    let entries = std::fs::read_dir(&full).with_context(|| {
+        format!(
+            "reading {}, which a figure depends on (host/xtask/src/figures/artefacts.rs)",
+            place.display()
+        )
+    })?;
+    for entry in entries {
+        let path = place.join(entry?.file_name());
+        if !test(&path) {
+            collect(root, &path, files)?;
+        }
+    }
+    Ok(())
+}
+
+/// FNV-1a, 64 bits (Fowler, Noll, Vo).
+pub struct Fnv(u64);
+
+impl Default for Fnv {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Fnv {
+    /// Adds bytes and where they end.
+    pub fn add(&mut self, bytes: &[u8]) {
+        for byte in bytes.iter().copied().chain((bytes.len() as u64).to_le_bytes()) {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+
+    /// The hash, 16 digits.
+    pub fn text(&self) -> String {
+        format!("{:016x}", self.0)
+    }
+}
+
+/// The tokens of a Rust source, separated by single spaces where it had any space between two words, without items under `#[cfg(test)]`.
+fn tokens(source: &str) -> String {
+    without_tests(&words(source)).join(" ")
+}
+
+/// Words, literals and single signs, without comments.
+fn words(source: &str) -> Vec<String> {
+    let letters: Vec<char> = source.chars().collect();
+    let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let mut found = Vec::new();
+    let mut at = 0;
+    while at < letters.len() {
+        let rest = &letters[at..];
+        let length = match rest[0] {
+            letter if letter.is_whitespace() => {
+                at += 1;
+                continue;
+            }
+            '/' if rest.starts_with(&['/', '/']) => {
+                at += rest
+                    .iter()
+                    .position(|&letter| letter == '\n')
+                    .unwrap_or(rest.len());
+                continue;
+            }
+            '/' if rest.starts_with(&['/', '*']) => {
+                at += block_comment(rest);
+                continue;
+            }
+            '"' => quoted(rest),
+            'r' | 'b' | 'c' if raw(rest).is_some() => raw(rest).unwrap_or(1),
+            '\'' => quote(rest),
+            letter if is_word(letter) => rest
+                .iter()
+                .position(|&letter| !is_word(letter))
+                .unwrap_or(rest.len()),
+            _ => 1,
+        };
+        found.push(rest[..length].iter().collect());
+        at += length;
+    }
+    found
+}
+
+/// Length of a comment, others within it included.
+fn block_comment(rest: &[char]) -> usize {
+    let (mut depth, mut at) = (0usize, 0);
+    while at < rest.len() {
+        if rest[at..].starts_with(&['/', '*']) {
+            depth += 1;
+            at += 2;
+        } else if rest[at..].starts_with(&['*', '/']) {
+            depth -= 1;
+            at += 2;
+            if depth == 0 {
+                break;
+            }
+        } else {
+            at += 1;
+        }
+    }
+    at
+}
+
+/// Length of a string in quotes.
+fn quoted(rest: &[char]) -> usize {
+    let mut at = 1;
+    while at < rest.len() && rest[at] != '"' {
+        at += if rest[at] == '\\' { 2 } else { 1 };
+    }
+    (at + 1).min(rest.len())
+}
+
+/// Length of a raw string, `r"…"` or `r#"…"#`, bytes too.
+fn raw(rest: &[char]) -> Option<usize> {
+    let start = rest
+        .iter()
+        .position(|&letter| letter == 'r')
+        .filter(|&at| at <= 1)?
+        + 1;
+    let hashes = rest[start..].iter().take_while(|&&letter| letter == '#').count();
+    if rest.get(start + hashes) != Some(&'"') {
+        return None;
+    }
+    let mut end = vec!['"'];
+    end.resize(hashes + 1, '#');
+    let text = &rest[start + hashes + 1..];
+    let length = text.windows(end.len()).position(|window| window == end)?;
+    Some(start + hashes + 1 + length + end.len())
+}
+
+/// Length of a character in quotes, or of the quote of a lifetime.
+fn quote(rest: &[char]) -> usize {
+    if rest.get(1) == Some(&'\\') {
+        let end = rest.iter().skip(3).position(|&letter| letter == '\'');
+        end.map_or(1, |end| end + 4)
+    } else if rest.get(2) == Some(&'\'') {
+        3
+    } else {
+        1
+    }
+}
+
+/// Drops what follows `#[cfg(test)]`: attributes, and an item to its `;` or closing brace.
+fn without_tests(words: &[String]) -> Vec<&str> {
+    const TEST: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
+    let mut kept = Vec::new();
+    let mut at = 0;
+    while at < words.len() {
+        let starts =
+            words.len() - at >= TEST.len() && words[at..].iter().zip(TEST).all(|(word, test)| word == test);
+        if starts {
+            at = end_of_item(words, at + TEST.len());
+        } else {
+            kept.push(words[at].as_str());
+            at += 1;
+        }
+    }
+    kept
+}
+
+fn end_of_item(words: &[String], mut at: usize) -> usize {
+    let mut depth = 0usize;
+    while at < words.len() {
+        match words[at].as_str() {
+            "{" | "(" | "[" => depth += 1,
+            ")" | "]" => depth = depth.saturating_sub(1),
+            "}" => {
+                depth = depth.saturating_sub(1);
+                if depth == 0 {
+                    return at + 1;
+                }
+            }
+            ";" if depth == 0 => return at + 1,
+            _ => {}
+        }
+        at += 1;
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SOURCE: &str = r##"
+        //! Words.
+        /// More /* words */.
+        fn a<'a>(x: &'a str) -> char { /* none /* at */ all */ let _ = "// kept \" {"; let _ = r#"/* kept "#; '{' }
+        #[cfg(test)]
+        mod tests {
+            use super::*; fn b() { '}' }
+        }
+        const C: u8 = b'\''; // the end
+    "##;
+
+    #[test]
+    fn words_and_tests_do_not_count_and_all_else_does() {
+        let found = tokens(SOURCE);
+        assert!(found.contains(r#""// kept \" {""#), "{found}");
+        assert!(found.contains(r##"r#"/* kept "#"##), "{found}");
+        assert!(found.ends_with(r"const C : u8 = b '\'' ;"), "{found}");
+        for gone in ["Words", "none", "all", "tests", "fn b", "the end"] {
+            assert!(!found.contains(gone), "{gone}: {found}");
+        }
+        let reworded = SOURCE
+            .replace("Words", "Other words")
+            .replace("fn b()", "fn other()")
+            .replace("{ /*", "{\n\n/*");
+        assert_eq!(tokens(&reworded), found);
+        assert_ne!(tokens(&SOURCE.replace("kept", "lost")), found);
+        assert_ne!(tokens(&SOURCE.replace("u8", "u16")), found);
+    }
+
+    #[test]
+    fn a_hash_sees_every_file_but_those_of_tests() {
+        let place = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = place.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        let now = || hash(place.path(), &["src", "data.toml"]).unwrap();
+        write("src/deep/a.rs", "fn a() {}");
+        write("data.toml", "a = 1");
+        let first = now();
+        write("src/deep/a.rs", "fn a() {} // words");
+        write("src/deep/tests.rs", "fn t() {}");
+        write("src/tests/t.rs", "fn t() {}");
+        assert_eq!(now(), first);
+        write("data.toml", "a = 2");
+        let second = now();
+        assert_ne!(second, first);
+        write("src/b.rs", "");
+        assert_ne!(now(), second);
+        assert!(hash(place.path(), &["gone"]).is_err());
+    }
+
+    #[test]
+    fn the_hash_is_fnv_1a() {
+        // The published value for "a"; `add` appends the length.
+        let mut hash = Fnv::default();
+        hash.0 = (hash.0 ^ u64::from(b'a')).wrapping_mul(0x0000_0100_0000_01b3);
+        assert_eq!(hash.text(), "af63dc4c8601ec8c");
+    }
+}
