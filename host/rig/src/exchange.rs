@@ -50,7 +50,7 @@ const BUSY_PAUSE: Duration = Duration::from_millis(5);
 const GREETING_PAUSE: Duration = Duration::from_millis(250);
 /// A board that has just refused something is there to say why it started.
 const WHY_WAIT: Duration = Duration::from_secs(1);
-/// Erasing and checking a slot of flash takes seconds on a real board.
+/// Erasing a slot of flash takes seconds on a real board; checking one takes less than an answer may.
 const FLASH_WAIT: Duration = Duration::from_secs(15);
 /// Wall time a lockstep tick may take: an emulated board under load on a slow machine.
 const TICK_WAIT: Duration = Duration::from_millis(20);
@@ -101,9 +101,7 @@ fn rearms(message: &ToDevice) -> bool {
 
 pub(crate) fn patience_for(message: &ToDevice, patience: &Patience) -> Duration {
     match message {
-        ToDevice::SceneBegin { .. } | ToDevice::SceneCommit | ToDevice::SetRig(_) => {
-            patience.answer.max(FLASH_WAIT)
-        }
+        ToDevice::SceneBegin { .. } | ToDevice::SetRig(_) => patience.answer.max(FLASH_WAIT),
         ToDevice::Run { ticks } => patience.answer + TICK_WAIT.saturating_mul(*ticks),
         _ => patience.answer,
     }

@@ -12,6 +12,7 @@ use mortise_protocol::message::{Refusal, ToDevice};
 
 use crate::client::Client;
 use crate::error::RigError;
+use crate::exchange::ATTEMPTS;
 use crate::link::Answer;
 use crate::words::Words;
 
@@ -93,8 +94,26 @@ impl Client {
             let _ = self.send(ToDevice::SceneAbort);
             return sent;
         }
-        self.request(ToDevice::SceneCommit)?;
+        self.commit(CRC.checksum(image))?;
         Ok(ControlFlow::Continue(()))
+    }
+
+    /// The board refuses a second commit of what it has taken, so when the answer to the first is lost, the scene it says it uses decides.
+    fn commit(&self, crc: u32) -> Result<(), RigError> {
+        let mut result = self.request(ToDevice::SceneCommit);
+        for _ in 1..ATTEMPTS {
+            if !matches!(result, Err(RigError::Timeout { .. })) {
+                break;
+            }
+            result = match self.request(ToDevice::SceneCommit) {
+                Err(RigError::Refused {
+                    reason: Refusal::NoUpload,
+                    ..
+                }) if self.refresh_capabilities()?.scene == Some(crc) => Ok(()),
+                again => again,
+            };
+        }
+        result
     }
 
     fn send_chunks(

@@ -2,9 +2,12 @@
 
 mod common;
 
-use std::time::Duration;
+use std::io::{Read, Write};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use common::{Faulty, Random, image};
+use mortise_protocol::frame::Decoder;
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_CHUNK;
 use mortise_protocol::message::{DeviceState, Refusal, ResetReason, ToDevice};
@@ -283,4 +286,82 @@ fn a_scene_arrives_over_a_bad_link() {
     assert!(client.link_counts().bad_frames > 0, "the link was not bad at all");
     drop(client);
     noise.join().expect("the noise ends with the link");
+}
+
+/// Loses what the board says from a commit on, for a while, or the commit itself.
+struct Losing<Inner> {
+    inner: Inner,
+    from: Arc<Mutex<Option<Instant>>>,
+    lost: bool,
+}
+
+/// Longer than a simulated board takes to answer, shorter than the client waits.
+const LOSS: Duration = Duration::from_millis(60);
+
+impl<Inner: Read> Read for Losing<Inner> {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        loop {
+            let count = self.inner.read(bytes)?;
+            let within = (*self.from.lock().unwrap()).is_some_and(|from| from.elapsed() < LOSS);
+            if count == 0 || !within {
+                return Ok(count);
+            }
+        }
+    }
+}
+
+impl<Inner: Write> Write for Losing<Inner> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let mut decoder = Decoder::new();
+        let commit = bytes.iter().any(|&byte| {
+            let frame = decoder.push::<ToDevice>(byte);
+            matches!(frame, Some(Ok((_, ToDevice::SceneCommit))))
+        });
+        let mut from = self.from.lock().unwrap();
+        if commit && from.is_none() {
+            *from = Some(Instant::now());
+            if self.lost {
+                return Ok(bytes.len());
+            }
+        }
+        self.inner.write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+/// The commit or its answer is lost: the scene is in use all the same, and an incomplete one is still refused.
+#[test]
+fn a_lost_commit_and_a_lost_answer_are_made_good() {
+    for lost in [true, false] {
+        let Transport { reader, writer, keep } = simulate(&Flash::default(), false).expect("a thread");
+        let from = Arc::new(Mutex::new(None));
+        let losing = |lost| (from.clone(), lost);
+        let ((from_reader, _), (from_writer, lost)) = (losing(false), losing(lost));
+        let transport = Transport {
+            reader: Box::new(Losing {
+                inner: reader,
+                from: from_reader,
+                lost: false,
+            }),
+            writer: Box::new(Losing {
+                inner: writer,
+                from: from_writer,
+                lost,
+            }),
+            keep,
+        };
+        let patience = Patience {
+            answer: Duration::from_millis(300),
+            ..Patience::long()
+        };
+        let client = Client::over(transport, "sim that loses one frame", patience, None).expect("the rig greets");
+        let scene = image(3 * MAX_CHUNK, 11);
+        client.upload(&scene, &mut |_| {}).expect("it arrives");
+        assert!(from.lock().unwrap().is_some(), "nothing was lost");
+        let found = client.refresh_capabilities().expect("an answer").scene;
+        assert_eq!(found, Some(CRC.checksum(&scene)), "commit lost: {lost}");
+    }
 }
