@@ -69,6 +69,8 @@ pub fn run(options: Options) -> anyhow::Result<()> {
         native,
         Box::new(move |creation| {
             theme::apply(&creation.egui_ctx);
+            #[cfg(target_os = "linux")]
+            super::appearance::follow(&creation.egui_ctx);
             fonts::install(&creation.egui_ctx);
             let ctx = creation.egui_ctx.clone();
             let mut window = Window::new(Session::new(Arc::new(move || ctx.request_repaint())));

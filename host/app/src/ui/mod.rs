@@ -1,6 +1,8 @@
 //! The window: draws a [`Session`] and hands it the operator's wishes. Works without a graphics device, so that tests can drive it.
 
 pub mod app;
+#[cfg(target_os = "linux")]
+mod appearance;
 mod arrange;
 mod cards;
 mod control;

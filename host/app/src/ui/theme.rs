@@ -104,7 +104,7 @@ pub fn of(ui: &Ui) -> &'static Palette {
     palette(Theme::from_dark_mode(ui.visuals().dark_mode))
 }
 
-/// Sets everything. The theme follows the system; where the window library is told none, as on Linux, it is dark.
+/// Sets everything. The theme follows the system; until that tells one it is dark.
 pub fn apply(ctx: &egui::Context) {
     ctx.options_mut(|options| {
         options.theme_preference = ThemePreference::System;
