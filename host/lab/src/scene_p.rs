@@ -211,9 +211,9 @@ impl Asked {
             .unwrap_or((f64::NAN, "none"))
     }
 
-    /// Median over the cases of each one's median time, ns.
+    /// Median over the cases of each one's least time, ns.
     pub fn median_ns(&self) -> f64 {
-        median(self.rows.iter().map(|(_, row)| row.median_ns as f64))
+        median(self.rows.iter().map(|(_, row)| row.least_ns as f64))
     }
 }
 
