@@ -99,7 +99,7 @@ pub const ARTEFACTS: &[Artefact] = &[
     },
     Artefact {
         name: "stability",
-        made: Made::Page { quick: false },
+        made: Made::Page { quick: true },
         sources: &[
             LAW,
             LOOP,

@@ -132,7 +132,7 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
     ))
 }
 
-/// Measures the shorter form of every table that README or another page quotes, and compares: bounds, claims, what pages quote, and the pages of
+/// Measures the shorter form of every table that README quotes, and compares: bounds, claims, what pages quote, and the pages of
 /// figures. Bounds of what the machine decides are told and not judged: another machine, or a busy one, breaks no promise.
 ///
 /// # Errors
@@ -140,8 +140,9 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
 pub fn check(root: &Path, program: &Path) -> Result<String> {
     let quoted = quoted::of_pages(root)?;
     let (mut said, mut wrong) = (Vec::new(), Vec::new());
-    for table in quoted::tables(&quoted) {
-        let measured = measure(root, program, &table, true, By::Kept)?;
+    let measured_tables = quoted::measured(&quoted);
+    for table in &measured_tables {
+        let measured = measure(root, program, table, true, By::Kept)?;
         let failing = |row: &&Row| row.fails() && !row.varies;
         let failing = measured.rows.iter().filter(failing);
         wrong.extend(failing.map(|row| format!("{table}: {}", row.line())));
@@ -152,12 +153,9 @@ pub fn check(root: &Path, program: &Path) -> Result<String> {
                 "{table}: the program says by its exit code that a bound does not hold"
             ));
         }
-        let file = format!("{}/{table}.md", artefacts::FOLDER);
-        let page = std::fs::read_to_string(root.join(&file))
-            .with_context(|| format!("reading {file}; `--renew` writes it"))?;
-        let page = quoted::page_rows(&page);
-        wrong.extend(quoted::differences(&table, &measured.rows, &page));
-        for quoted in quoted.iter().filter(|quoted| quoted.table == table) {
+        let page = page_of(root, table)?;
+        wrong.extend(quoted::differences(table, &measured.rows, &page));
+        for quoted in quoted.iter().filter(|quoted| quoted.table == *table) {
             wrong.extend(
                 quoted
                     .check(&measured.rows, &page)
@@ -167,6 +165,13 @@ pub fn check(root: &Path, program: &Path) -> Result<String> {
         }
         said.push(format!("{table}: {}", count(&measured.rows)));
     }
+    for quoted in quoted
+        .iter()
+        .filter(|quoted| !measured_tables.contains(&quoted.table))
+    {
+        let agrees = page_of(root, &quoted.table).and_then(|page| quoted.check_page(&page));
+        wrong.extend(agrees.err().map(|error| format!("{error:#}")));
+    }
     for wrong in &wrong {
         eprintln!("{wrong}");
     }
@@ -175,6 +180,14 @@ pub fn check(root: &Path, program: &Path) -> Result<String> {
     }
     said.push(format!("{} quoted figures agree", quoted.len()));
     Ok(said.join("; "))
+}
+
+/// The rows of a table's page.
+fn page_of(root: &Path, table: &str) -> Result<Vec<Row>> {
+    let file = format!("{}/{table}.md", artefacts::FOLDER);
+    let page = std::fs::read_to_string(root.join(&file))
+        .with_context(|| format!("reading {file}; `--renew` writes it"))?;
+    Ok(quoted::page_rows(&page))
 }
 
 /// Runs `mortise lab figures NAME --json` and prints each row as it comes.
