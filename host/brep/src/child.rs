@@ -124,21 +124,22 @@ fn respond<T: Serialize>(result: &Result<T, BrepError>) -> bool {
     })
 }
 
-/// Reads `path` in a child process.
-pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
-    run(path, options, None)
+/// Reads `path` in a child process, which ends when `cancel` is set.
+pub(crate) fn load(path: &Path, options: &LoadOptions, cancel: &AtomicBool) -> Result<CadModel, BrepError> {
+    run(path, options, None, cancel)
 }
 
 /// Asks about a shape of `path` in a child process.
 pub(crate) fn ask(path: &Path, options: &LoadOptions, question: &Question) -> Result<Answer, BrepError> {
     let question = postcard::to_allocvec(question).map_err(|e| process_error(path, &e.to_string()))?;
-    run(path, options, Some(question))
+    run(path, options, Some(question), &AtomicBool::new(false))
 }
 
 fn run<T: DeserializeOwned>(
     path: &Path,
     options: &LoadOptions,
     question: Option<Vec<u8>>,
+    cancel: &AtomicBool,
 ) -> Result<T, BrepError> {
     let child = spawn(path, options, question.is_some()).map_err(|e| process_error(path, &e.to_string()))?;
     let mut child = Reader(child);
@@ -169,8 +170,13 @@ fn run<T: DeserializeOwned>(
         path: path.display().to_string(),
         seconds: options.time_limit_s,
     };
-    let status = match wait(&mut child.0, limit, &flooded) {
+    let status = match wait(&mut child.0, limit, &[&flooded, cancel]) {
         Ok(Some(status)) => status,
+        Ok(None) if cancel.load(Ordering::Acquire) => {
+            return Err(BrepError::Cancelled {
+                path: path.display().to_string(),
+            });
+        }
         Ok(None) if flooded.load(Ordering::Acquire) => {
             return Err(BrepError::AnswerTooLong {
                 path: path.display().to_string(),
@@ -222,14 +228,14 @@ fn spawn(path: &Path, options: &LoadOptions, question: bool) -> std::io::Result<
         .spawn()
 }
 
-/// `None` when the child is still running after `limit`, or when it is `flooded`.
-fn wait(child: &mut Child, limit: Duration, flooded: &AtomicBool) -> std::io::Result<Option<ExitStatus>> {
+/// `None` when the child is still running after `limit`, or when one of `ends` is set.
+fn wait(child: &mut Child, limit: Duration, ends: &[&AtomicBool]) -> std::io::Result<Option<ExitStatus>> {
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(Some(status));
         }
-        if start.elapsed() >= limit || flooded.load(Ordering::Acquire) {
+        if start.elapsed() >= limit || ends.iter().any(|end| end.load(Ordering::Acquire)) {
             return Ok(None);
         }
         thread::sleep(POLL);

@@ -103,6 +103,12 @@ pub enum BrepError {
         /// The limit.
         seconds: u64,
     },
+    /// Whoever asked does not want it any more.
+    #[error("{path}: reading cancelled")]
+    Cancelled {
+        /// The path asked for.
+        path: String,
+    },
     /// The process that reads the file gave a longer answer than allowed.
     #[error(
         "{path}: gives more than {megabytes} MiB of parts and triangles; simplify it or read a part of it"

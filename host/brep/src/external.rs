@@ -286,8 +286,9 @@ fn parse(shown: &str, bytes: &[u8]) -> Result<(Exchange, Content), BrepError> {
     if bytes.is_empty() {
         return Err(BrepError::Empty { path: shown.into() });
     }
-    let file = part21::parse(bytes).map_err(|e| text_error(shown, e))?;
+    let mut file = part21::parse(bytes).map_err(|e| text_error(shown, e))?;
     let content = check::check(&file).map_err(|e| text_error(shown, e))?;
+    part21::from_identity(&mut file);
     Ok((file, content))
 }
 

@@ -139,10 +139,15 @@ class Walker {
       const TDF_Label label = roots.Value(i);
       const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(label);
       if (shape.IsNull() || (!XCAFDoc_ShapeTool::IsAssembly(label) && mapped.count(shape.TShape().get()) != 0)) continue;
+      // A root that is one placed thing and nothing else is a reference to it: its own shape has the placement in it.
+      TDF_Label product = label;
+      TopLoc_Location where;
+      if (XCAFDoc_ShapeTool::GetReferredShape(label, product)) where = XCAFDoc_ShapeTool::GetLocation(label);
       Path path{{std::string(), name_of(label)}};
+      if (product != label && name_of(product) != path.back().second) path.emplace_back(std::string(), name_of(product));
       Color color{};
-      const bool has = color_of(colors_, label, color);
-      walk(label, XCAFDoc_ShapeTool::GetLocation(label), path, has, color, 0);
+      const bool has = color_of(colors_, label, color) || color_of(colors_, product, color);
+      walk(product, where, path, has, color, 0);
     }
   }
 

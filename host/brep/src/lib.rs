@@ -39,6 +39,7 @@ pub use model::*;
 pub use options::{LoadOptions, set_time_limit_s};
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// Reads a STEP file (AP203, AP214, AP242) with the default [`LoadOptions`].
 ///
@@ -56,9 +57,22 @@ pub fn load_step(path: impl AsRef<Path>) -> Result<CadModel, BrepError> {
 /// # Errors
 /// One line that says what is wrong, where, and what to do; see [`BrepError`].
 pub fn load_step_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<CadModel, BrepError> {
+    load_step_until(path, options, &AtomicBool::new(false))
+}
+
+/// Reads a STEP file, and gives up within some milliseconds of `cancel` being set: the child process is gone when this returns. A reading in this
+/// process is not interrupted.
+///
+/// # Errors
+/// As [`load_step_with`], and [`BrepError::Cancelled`].
+pub fn load_step_until(
+    path: impl AsRef<Path>,
+    options: &LoadOptions,
+    cancel: &AtomicBool,
+) -> Result<CadModel, BrepError> {
     let path = path.as_ref();
     if child::is_ready() {
-        child::load(path, options)
+        child::load(path, options, cancel)
     } else {
         load_in_process(path, options)
     }

@@ -7,8 +7,9 @@ mod support;
 use glam::{DAffine3, DVec3};
 use libtest_mimic::{Arguments, Failed, Trial};
 use mortise_brep::oracle::{self, Side};
-use mortise_brep::{BrepError, LoadOptions, child, load_step, load_step_with};
+use mortise_brep::{BrepError, LoadOptions, child, load_step, load_step_until, load_step_with};
 use std::process::{Command, ExitCode, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use support::StepText;
 
@@ -22,7 +23,7 @@ fn main() -> ExitCode {
         println!("{read:?}");
         return ExitCode::SUCCESS;
     }
-    let tests: [(&str, fn()); 12] = [
+    let tests: [(&str, fn()); 13] = [
         (
             "a_child_reads_what_the_program_itself_would",
             a_child_reads_what_the_program_itself_would,
@@ -36,6 +37,10 @@ fn main() -> ExitCode {
         (
             "processor_time_is_limited_and_the_process_ends_with_its_parent",
             processor_time_is_limited_and_the_process_ends_with_its_parent,
+        ),
+        (
+            "a_reading_that_is_cancelled_leaves_no_process",
+            a_reading_that_is_cancelled_leaves_no_process,
         ),
         ("an_answer_is_limited", an_answer_is_limited),
         (
@@ -185,6 +190,45 @@ fn processor_time_is_limited_and_the_process_ends_with_its_parent() {
         );
         std::thread::sleep(Duration::from_millis(5));
     }
+}
+
+/// The test program's own children are told by the name of the file they read.
+fn a_reading_that_is_cancelled_leaves_no_process() {
+    let file = slow_file();
+    let cancel = AtomicBool::new(false);
+    let (result, took) = std::thread::scope(|scope| {
+        let reading = scope.spawn(|| load_step_until(&file, &LoadOptions::default(), &cancel));
+        if cfg!(target_os = "linux") {
+            let started = (0..1000).any(|_| {
+                std::thread::sleep(Duration::from_millis(2));
+                readers_of(&file) > 0
+            });
+            assert!(started, "no reading process");
+        } else {
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        let begun = Instant::now();
+        cancel.store(true, Ordering::Release);
+        (reading.join().unwrap(), begun.elapsed())
+    });
+    let error = result.map(|model| model.parts.len()).unwrap_err();
+    assert!(matches!(error, BrepError::Cancelled { .. }), "{error}");
+    assert!(took < Duration::from_secs(1), "{took:?}");
+    assert_eq!(readers_of(&file), 0, "it reads on");
+}
+
+/// Processes that were asked for this file; 0 where there is no /proc.
+fn readers_of(file: &std::path::Path) -> usize {
+    let wanted = format!("MORTISE_BREP_CHILD_PATH={}\0", file.display());
+    let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    processes
+        .filter_map(|process| std::fs::read(process.path().join("environ")).ok())
+        .filter(|environment| {
+            environment
+                .windows(wanted.len())
+                .any(|part| part == wanted.as_bytes())
+        })
+        .count()
 }
 
 fn an_answer_is_limited() {

@@ -147,6 +147,18 @@ fn a_set_of_thirteen_files_reads_as_the_flat_file() {
         ("millimetre", 1 + SUBS + PARTS)
     );
     assert_same(&set, &flat);
+    // ISO 10303-43: the motion that takes the placed product's axis onto the one it is given.
+    for (i, part) in flat.parts.iter().enumerate() {
+        let sub = i / 2;
+        let of_sub = motion(sub + 10) * axis(sub + 20).inverse();
+        let expected = of_sub * motion(i) * axis(i).inverse();
+        assert!(
+            part.placement.abs_diff_eq(expected, 1e-9),
+            "{}: {} is not {expected}",
+            part.name,
+            part.placement
+        );
+    }
 }
 
 #[test]

@@ -190,6 +190,126 @@ fn an_occurrence_may_be_placed_by_an_operator() {
     assert_near(placed_box(&model, 2).1, DVec3::new(11.0, 2.0, 3.0), 1e-9);
 }
 
+const MILLIMETRE: &str = "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))";
+const CENTIMETRE: &str = "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.))";
+
+/// An axis of a block and the axis of the assembly it lies on, in millimetres: a quarter turn about x, and one about z.
+fn quarter_turns(parent_mm: f64, child_mm: f64) -> [DAffine3; 2] {
+    [
+        DAffine3 {
+            matrix3: DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y),
+            translation: DVec3::new(5.0, -2.0, 3.0) / child_mm,
+        },
+        DAffine3 {
+            matrix3: DMat3::from_cols(DVec3::Y, -DVec3::X, DVec3::Z),
+            translation: DVec3::new(100.0, 20.0, 30.0) / parent_mm,
+        },
+    ]
+}
+
+/// ISO 10303-43 places p where item 2 · (item 1)⁻¹ takes it. By hand for [`quarter_turns`]: with d = p − (5, −2, 3) the block's axis sees
+/// (d.x, d.z, −d.y), and the assembly's axis puts (u, v, w) at (100 − v, 20 + u, 30 + w); together (103 − p.z, 15 + p.x, 28 − p.y).
+fn assert_on_its_axis(model: &CadModel, part: usize) {
+    assert_near(placed_box(model, part).0, DVec3::new(100.0, 15.0, 26.0), 1e-9);
+    assert_near(placed_box(model, part).1, DVec3::new(103.0, 16.0, 28.0), 1e-9);
+}
+
+#[test]
+fn a_component_lies_with_its_own_axis_on_the_one_it_is_given() {
+    for (parent, parent_mm) in [(MILLIMETRE, 1.0), (CENTIMETRE, 10.0)] {
+        for (child, child_mm) in [(MILLIMETRE, 1.0), (CENTIMETRE, 10.0)] {
+            let mut text = StepText::new(child);
+            let solid = text.solid_box("", DVec3::new(1.0, 2.0, 3.0) / child_mm, true);
+            let [from, to] = quarter_turns(parent_mm, child_mm);
+            let own = text.axis_of(from);
+            // As the standard wants it: each axis is an item of its representation.
+            let block = text.representation("ADVANCED_BREP_SHAPE_REPRESENTATION", &[solid, own]);
+            let block = text.product("block", block);
+            text.change_unit(parent);
+            let given = text.axis_of(to);
+            let root = text.representation("SHAPE_REPRESENTATION", &[given]);
+            let root = text.product("root", root);
+            text.component_by_entities("a", root, block, [own, given]);
+            text.component_by_entities("axes swapped", root, block, [given, own]);
+            text.component_reversed("ends swapped", root, block, [own, given]);
+            text.component_by_axes("axes of no representation", root, block, [from, to]);
+            let model = load(&text.finish()).unwrap();
+            assert_eq!(
+                (model.parts.len(), model.shapes.len()),
+                (4, 1),
+                "{:?}",
+                model.warnings
+            );
+            for part in 0..4 {
+                assert_on_its_axis(&model, part);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_mapped_item_lies_with_its_own_axis_on_the_one_it_is_given() {
+    for (operator, mm) in [(false, 1.0), (true, 1.0), (false, 10.0), (true, 10.0)] {
+        let mut text = StepText::new(if mm == 1.0 { MILLIMETRE } else { CENTIMETRE });
+        let solid = text.solid_box("", DVec3::new(1.0, 2.0, 3.0) / mm, true);
+        let block = text.part("block", &[solid]);
+        text.change_unit(MILLIMETRE);
+        let [from, to] = quarter_turns(1.0, mm);
+        let (own, given) = (text.axis_of(from), text.axis_of(to));
+        let mut items = vec![text.mapped_from(block, own, given)];
+        if operator {
+            // Twice as large about the axis: 2 (103 − p.z, 15 + p.x, 28 − p.y) − (100, 20, 30).
+            let axes = to.matrix3.to_cols_array_2d().map(DVec3::from);
+            let doubled = text.operator(axes, to.translation, 2.0);
+            items.push(text.mapped_from(block, own, doubled));
+        }
+        let whole = text.representation("SHAPE_REPRESENTATION", &items);
+        text.product("whole", whole);
+        let model = load(&text.finish()).unwrap();
+        assert_eq!(model.parts.len(), items.len(), "{:?}", model.warnings);
+        assert_eq!(names(&model)[0], "block");
+        assert_on_its_axis(&model, 0);
+        if operator {
+            assert_near(placed_box(&model, 1).0, DVec3::new(100.0, 10.0, 22.0), 1e-9);
+            assert_near(placed_box(&model, 1).1, DVec3::new(106.0, 12.0, 26.0), 1e-9);
+        }
+    }
+}
+
+/// ISO 10303-42 (function first_proj_axis): x is then the origin's, made square to z; along x itself it is the origin's y.
+#[test]
+fn an_axis_without_a_reference_direction_is_square_to_its_own() {
+    for (z, x) in [
+        (DVec3::Z, DVec3::X),
+        (-DVec3::Z, DVec3::X),
+        (DVec3::Y, DVec3::X),
+        (-DVec3::X, DVec3::Y),
+        (DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.8, 0.0, -0.6)),
+    ] {
+        let mut text = StepText::millimetres();
+        let solid = text.solid_box("", DVec3::new(1.0, 2.0, 3.0), true);
+        let block = text.part("block", &[solid]);
+        let root = text.assembly("root");
+        let (at, along) = (text.point(DVec3::ONE), text.direction(z));
+        let given = text.add(&format!("AXIS2_PLACEMENT_3D('',#{at},#{along},$)"));
+        let own = text.origin();
+        text.component_by_entities("a", root, block, [own, given]);
+        text.component_by_entities("b", root, block, [given, own]);
+        let model = load(&text.finish()).unwrap();
+        let expected = DAffine3 {
+            matrix3: DMat3::from_cols(x, z.cross(x), z),
+            translation: DVec3::ONE,
+        };
+        for (part, expected) in model.parts.iter().zip([expected, expected.inverse()]) {
+            assert!(
+                part.placement.abs_diff_eq(expected, 1e-12),
+                "{z}: {} is not {expected}",
+                part.placement
+            );
+        }
+    }
+}
+
 #[test]
 fn open_shells_alone_are_a_leaky_part() {
     let mut text = StepText::millimetres();

@@ -1,7 +1,7 @@
 //! Texts of several files joined into one: entities renumbered, and a product that another file describes replaced by it.
 
 use super::structure::{Structure, argument};
-use super::{Entity, Exchange, reference, references, units};
+use super::{Entity, Exchange, reference};
 use std::ops::Range;
 
 impl Exchange {
@@ -34,8 +34,8 @@ impl Exchange {
     }
 
     /// Puts the product `real`, a product definition and its representation, wherever the product definition `stub` is placed. `structure` is that of the
-    /// text that holds `stub`, whose entities are `text`. An axis of the stub that a placement starts from is in the stub's unit; it is given
-    /// anew in that of `real`.
+    /// text that holds `stub`, whose entities are `text`. Placements start from the identity ([`super::from_identity`]), which is the same in the unit of
+    /// `real`.
     pub fn substitute(
         &mut self,
         stub: usize,
@@ -66,7 +66,6 @@ impl Exchange {
             .collect();
         for relation in relations {
             for &of in &stubs {
-                self.rescale(relation, of, shape);
                 self.exchange(relation, of, shape);
             }
         }
@@ -79,7 +78,7 @@ impl Exchange {
     }
 
     /// Refers to `to` wherever `entity` refers to `from`.
-    fn exchange(&mut self, entity: usize, from: usize, to: usize) {
+    pub(super) fn exchange(&mut self, entity: usize, from: usize, to: usize) {
         let [from, to] = [from, to].map(|index| self.entities[index].id);
         let mut body = Vec::new();
         with_references(
@@ -94,77 +93,6 @@ impl Exchange {
                 *id = to;
             }
         }
-    }
-
-    /// Gives the axis by which `relation` places `stub` in the unit of `shape`.
-    fn rescale(&mut self, relation: usize, stub: usize, shape: usize) {
-        let factor = match (units::millimetres(self, stub), units::millimetres(self, shape)) {
-            (Some(from), Some(to)) if from != to => from / to,
-            _ => return,
-        };
-        let Some((old, axis)) = self.rescaled(relation, stub, factor) else {
-            return;
-        };
-        let axis = self.push(axis);
-        let axis = self.index[&axis] as usize;
-        // The transformation may serve other relations: this one gets its own.
-        let Some(transformation) = self.transformation(relation) else {
-            return;
-        };
-        let copy = String::from_utf8_lossy(self.body(transformation)).into_owned();
-        let copy = self.push(copy);
-        let copy = self.index[&copy] as usize;
-        self.exchange(copy, old, axis);
-        self.exchange(relation, transformation, copy);
-    }
-
-    fn transformation(&self, relation: usize) -> Option<usize> {
-        let with = self.arguments_as(relation, "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")?;
-        self.find(reference(with.last()?)?)
-    }
-
-    /// The stub's axis in a relation, and the body of the same axis with its origin `factor` times as far.
-    fn rescaled(&mut self, relation: usize, stub: usize, factor: f64) -> Option<(usize, String)> {
-        let transformation = self.transformation(relation)?;
-        let ends = self.arguments_as(relation, "REPRESENTATION_RELATIONSHIP")?;
-        let first = self.find(reference(ends.get(2)?)?)? == stub;
-        let items = self.arguments(stub);
-        let items: Vec<usize> = references(items.get(1)?)
-            .into_iter()
-            .filter_map(|id| self.find(id))
-            .collect();
-        let (one, two) = (
-            argument(self, transformation, 2)?,
-            argument(self, transformation, 3)?,
-        );
-        // Some writers list them the wrong way round; the representation's own item decides.
-        let old = match (items.contains(&one), items.contains(&two)) {
-            (true, false) => one,
-            (false, true) => two,
-            _ if first => one,
-            _ => two,
-        };
-        let point = argument(self, old, 1)?;
-        let point_arguments = self.arguments(point);
-        let inner = point_arguments.get(1)?.strip_prefix(b"(")?.strip_suffix(b")")?;
-        let scaled: Option<Vec<String>> = inner
-            .split(|&byte| byte == b',')
-            .map(|number| {
-                let value: f64 = std::str::from_utf8(number).ok()?.parse().ok()?;
-                Some(format!("{:?}", value * factor).to_uppercase())
-            })
-            .collect();
-        let origin = self.push(format!("CARTESIAN_POINT('',({}))", scaled?.join(",")));
-        let arguments: Vec<String> = self
-            .arguments(old)
-            .iter()
-            .enumerate()
-            .map(|(index, argument)| match index {
-                1 => format!("#{origin}"),
-                _ => String::from_utf8_lossy(argument).into_owned(),
-            })
-            .collect();
-        Some((old, format!("AXIS2_PLACEMENT_3D({})", arguments.join(","))))
     }
 }
 

@@ -11,6 +11,7 @@ pub mod documents;
 mod lexer;
 mod merge;
 pub mod operators;
+mod placements;
 pub mod render;
 pub mod schema;
 pub mod structure;
@@ -18,6 +19,7 @@ pub mod text;
 pub mod units;
 
 pub use lexer::parse;
+pub use placements::from_identity;
 
 use std::collections::HashMap;
 use std::ops::Range;

@@ -6,17 +6,17 @@
 //! travels in the occurrence's token ([`Exchange::scales`]). Mapped items beside such an operator become
 //! occurrences, since only those have names.
 
-use super::{Exchange, Part21Error, reference, references};
-use glam::DVec3;
+use super::{Exchange, Part21Error, reference, references, units};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// How far from 1 a scale may be without being one.
 const RIGID: f64 = 1e-9;
 
 /// x ↦ o + k·R·x.
 struct Operator {
-    origin: DVec3,
-    x: DVec3,
-    z: DVec3,
+    /// R and o.
+    motion: DAffine3,
+    /// k.
     scale: f64,
 }
 
@@ -56,16 +56,8 @@ fn relationships(file: &mut Exchange) -> Result<(), Part21Error> {
             continue;
         };
         let placement = parsed(file, operator)?;
-        let from = axis(
-            file,
-            &Operator {
-                origin: DVec3::ZERO,
-                x: DVec3::X,
-                z: DVec3::Z,
-                scale: 1.0,
-            },
-        );
-        let to = axis(file, &placement);
+        let from = file.write_axis(DAffine3::IDENTITY);
+        let to = file.write_axis(placement.motion);
         let motion = file.push(format!("ITEM_DEFINED_TRANSFORMATION('','',#{from},#{to})"));
         let old = format!("#{}", file.entities[operator].id);
         let body =
@@ -119,17 +111,25 @@ fn occurrence(
     target: Option<usize>,
 ) -> Option<Result<(), Part21Error>> {
     let map = argument(file, item, 1)?;
-    let from = file.entities[argument(file, map, 0)?].id;
-    let child = argument(file, map, 1)?;
+    let (from, child) = (argument(file, map, 0)?, argument(file, map, 1)?);
     let (parent_product, child_product) = (product(file, parent)?, product(file, child)?);
     let target = target?;
-    let (to, scale) = if is_operator(file, target) {
-        match parsed(file, target) {
-            Ok(placement) => (axis(file, &placement), placement.scale),
+    let (from, to, scale) = if is_operator(file, target) {
+        let Operator { motion, scale } = match parsed(file, target) {
+            Ok(placement) => placement,
             Err(error) => return Some(Err(error)),
-        }
+        };
+        // What is mapped starts from an axis A of its own: o + k·R·A⁻¹x, and with A⁻¹ = (Q, t) that is (R, o)·(Q, k·t) of k·x.
+        let mut own = file.read_axis(from)?.inverse();
+        let mm = [child, parent].map(|of| units::millimetres(file, of).unwrap_or(1.0));
+        own.translation *= scale * mm[0] / mm[1];
+        (
+            file.write_axis(DAffine3::IDENTITY),
+            file.write_axis(motion * own),
+            scale,
+        )
     } else {
-        (file.entities[target].id, 1.0)
+        (file.entities[from].id, file.entities[target].id, 1.0)
     };
     let (parent, child) = (file.entities[parent].id, file.entities[child].id);
     let use_of = file.push(format!(
@@ -202,7 +202,7 @@ fn parsed(file: &Exchange, entity: usize) -> Result<Operator, Part21Error> {
                 (all.split_off(all.len().checked_sub(4)?), vec![third])
             }
         };
-        let vector = |argument: &[u8]| vector(file, file.find(reference(argument)?)?);
+        let vector = |argument: &[u8]| file.vector(file.find(reference(argument)?)?);
         let given = |argument: Option<&&[u8]>| argument.filter(|a| **a != b"$").map(|a| vector(a));
         let z = given(third.last()).unwrap_or(Some(DVec3::Z))?.try_normalize()?;
         let x = given(common.first()).unwrap_or(Some(if z.x.abs() < 0.9 { DVec3::X } else { DVec3::Y }))?;
@@ -215,10 +215,12 @@ fn parsed(file: &Exchange, entity: usize) -> Result<Operator, Part21Error> {
         let origin = vector(common.get(2)?)?;
         // −M has the axes −x and −z, and its y is their cross product.
         let sign = if y.dot(z.cross(x)) < 0.0 { -1.0 } else { 1.0 };
+        let [x, z] = [x * sign, z * sign];
         Some(Operator {
-            origin,
-            x: x * sign,
-            z: z * sign,
+            motion: DAffine3 {
+                matrix3: DMat3::from_cols(x, z.cross(x), z),
+                translation: origin,
+            },
             scale: scale * sign,
         })
     };
@@ -226,24 +228,6 @@ fn parsed(file: &Exchange, entity: usize) -> Result<Operator, Part21Error> {
         line: file.entities[entity].line,
         what: format!("{} is no transformation", file.label(entity)),
     })
-}
-
-fn vector(file: &Exchange, entity: usize) -> Option<DVec3> {
-    let arguments = file.arguments(entity);
-    let list = std::str::from_utf8(arguments.get(1)?)
-        .ok()?
-        .strip_prefix('(')?
-        .strip_suffix(')')?;
-    let mut numbers = list.split(',').map(|n| n.parse::<f64>().ok());
-    Some(DVec3::new(numbers.next()??, numbers.next()??, numbers.next()??))
-}
-
-fn axis(file: &mut Exchange, placement: &Operator) -> u64 {
-    let triple = |v: DVec3| format!("({:?},{:?},{:?})", v.x, v.y, v.z).to_uppercase();
-    let origin = file.push(format!("CARTESIAN_POINT('',{})", triple(placement.origin)));
-    let z = file.push(format!("DIRECTION('',{})", triple(placement.z)));
-    let x = file.push(format!("DIRECTION('',{})", triple(placement.x)));
-    file.push(format!("AXIS2_PLACEMENT_3D('',#{origin},#{z},#{x})"))
 }
 
 fn of_kind(file: &Exchange, kind: &str) -> Vec<usize> {

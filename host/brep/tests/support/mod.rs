@@ -48,27 +48,31 @@ impl StepText {
             application: 0,
             context: 0,
         };
-        let metre = text.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.))");
+        text.context = text.context_in(unit);
+        text.application = text.add("APPLICATION_CONTEXT('automotive design')");
+        text
+    }
+
+    fn context_in(&mut self, unit: &str) -> u64 {
+        let metre = self.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.))");
         let unit = unit.replace("#SI", &format!("#{metre}"));
         let length = match unit.split_once(';') {
             // A conversion: the measure first, then the unit with #MEASURE for it.
             Some((measure, unit)) => {
-                let measure = text.add(measure);
-                text.add(&unit.replace("#MEASURE", &format!("#{measure}")))
+                let measure = self.add(measure);
+                self.add(&unit.replace("#MEASURE", &format!("#{measure}")))
             }
-            None => text.add(&unit),
+            None => self.add(&unit),
         };
-        let angle = text.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))");
-        let solid_angle = text.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())");
-        let uncertainty = text.add(&format!(
+        let angle = self.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))");
+        let solid_angle = self.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())");
+        let uncertainty = self.add(&format!(
             "UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),#{length},'accuracy','')"
         ));
-        text.context = text.add(&format!(
+        self.add(&format!(
             "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{uncertainty}))\
              GLOBAL_UNIT_ASSIGNED_CONTEXT((#{length},#{angle},#{solid_angle}))REPRESENTATION_CONTEXT('',''))"
-        ));
-        text.application = text.add("APPLICATION_CONTEXT('automotive design')");
-        text
+        ))
     }
 
     pub fn millimetres() -> Self {
@@ -249,22 +253,42 @@ impl StepText {
     }
 
     /// Puts `child` into `parent` so that the axis `from` of the child lies on `to` of the parent.
-    pub fn component_by_axes(
-        &mut self,
-        name: &str,
-        parent: Product,
-        child: Product,
-        [from, to]: [DAffine3; 2],
-    ) {
+    pub fn component_by_axes(&mut self, name: &str, parent: Product, child: Product, axes: [DAffine3; 2]) {
+        let axes = axes.map(|motion| self.axis_of(motion));
+        self.component_by_entities(name, parent, child, axes);
+    }
+
+    /// The axis that `motion` makes of the origin's.
+    pub fn axis_of(&mut self, motion: DAffine3) -> u64 {
+        self.axis(motion.translation, motion.matrix3.z_axis, motion.matrix3.x_axis)
+    }
+
+    /// The same by axes that are written already.
+    pub fn component_by_entities(&mut self, name: &str, parent: Product, child: Product, axes: [u64; 2]) {
         let occurrence = self.add(&format!(
             "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
             parent.definition, child.definition
         ));
         let shape = self.add(&format!("PRODUCT_DEFINITION_SHAPE('','',#{occurrence})"));
-        let [from, to] = [from, to]
-            .map(|motion| self.axis(motion.translation, motion.matrix3.z_axis, motion.matrix3.x_axis));
+        let [from, to] = axes;
         let transformation = self.add(&format!("ITEM_DEFINED_TRANSFORMATION('','',#{from},#{to})"));
         self.related(shape, parent, child, transformation);
+    }
+
+    /// Puts `child` into `parent` with the two representations, and their axes, listed the other way round.
+    pub fn component_reversed(&mut self, name: &str, parent: Product, child: Product, [from, to]: [u64; 2]) {
+        let occurrence = self.add(&format!(
+            "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
+            parent.definition, child.definition
+        ));
+        let shape = self.add(&format!("PRODUCT_DEFINITION_SHAPE('','',#{occurrence})"));
+        let transformation = self.add(&format!("ITEM_DEFINED_TRANSFORMATION('','',#{to},#{from})"));
+        self.related(shape, child, parent, transformation);
+    }
+
+    /// A length unit of its own for what is written from here on: the body of a length unit entity, in which `#SI` stands for the metre.
+    pub fn change_unit(&mut self, unit: &str) {
+        self.context = self.context_in(unit);
     }
 
     /// Says that the shape of `product` is in the file `name`, as CATIA writes it.
@@ -307,6 +331,11 @@ impl StepText {
     /// An item that maps `child` to `target` (an axis placement or a transformation operator).
     pub fn mapped(&mut self, child: Product, target: u64) -> u64 {
         let origin = self.origin();
+        self.mapped_from(child, origin, target)
+    }
+
+    /// The same, with the axis of `child` that comes to lie on `target`.
+    pub fn mapped_from(&mut self, child: Product, origin: u64, target: u64) -> u64 {
         let map = self.add(&format!(
             "REPRESENTATION_MAP(#{origin},#{})",
             child.representation
