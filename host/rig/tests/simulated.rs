@@ -357,7 +357,8 @@ fn a_lost_commit_and_a_lost_answer_are_made_good() {
             answer: Duration::from_millis(300),
             ..Patience::long()
         };
-        let client = Client::over(transport, "sim that loses one frame", patience, None).expect("the rig greets");
+        let client =
+            Client::over(transport, "sim that loses one frame", patience, None).expect("the rig greets");
         let scene = image(3 * MAX_CHUNK, 11);
         client.upload(&scene, &mut |_| {}).expect("it arrives");
         assert!(from.lock().unwrap().is_some(), "nothing was lost");
