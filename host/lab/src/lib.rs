@@ -23,6 +23,7 @@ pub mod hybrid;
 pub mod motion;
 pub mod pareto;
 pub mod peer;
+mod port;
 pub mod probe;
 pub mod rate;
 pub mod scenario;

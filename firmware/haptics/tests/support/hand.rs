@@ -1,5 +1,7 @@
 //! A handle in a hand, closed round the force law.
 
+use glam::{DQuat, DVec3};
+use mortise_haptics::observer::{Observer, Place};
 use mortise_haptics::{Flags, Input, Output, Pose, Quat, Settings, State, Twist, Vec3, tick};
 use mortise_protocol::image::SceneImage;
 
@@ -48,6 +50,14 @@ impl Hand {
         }
     }
 
+    /// As it truly is.
+    pub fn place(&self) -> Place {
+        Place {
+            position: DVec3::from_array(self.position),
+            orientation: DQuat::from_array(self.orientation.to_array().map(f64::from)).normalize(),
+        }
+    }
+
     pub fn pose(&self) -> Pose {
         Pose::new(vec3(self.position), self.orientation)
     }
@@ -88,8 +98,8 @@ pub struct Seen {
     pub unsettled: u32,
     pub solves_sum: u32,
     pub flags: Flags,
-    /// Largest work the device had given to the handle at any time, J.
-    pub work_given_j: f64,
+    /// Energy given to the handle over any interval beyond what was stored ([`mortise_haptics::observer`]), J, of a part grabbed just before the run.
+    pub made_j: f64,
 }
 
 impl Seen {
@@ -120,14 +130,27 @@ pub fn run(
 ) -> (Output, Seen) {
     let mut seen = Seen::default();
     let mut last: Option<Output> = None;
-    let mut given = 0.0;
+    let mut observer = Observer::new(scene, state, settings, &hand.place());
+    let mut from = hand.place();
     for t in 0..ticks {
         script(t, hand, last.as_ref());
+        if let Some(observer) = &mut observer {
+            // The wrench of the last tick is held up to here: the script may have turned the handle.
+            if let Some(last) = &last {
+                observer.tick(state, &from, &hand.place(), &last.handle);
+            }
+            observer.look(state);
+        }
+        from = hand.place();
         let out = tick(state, scene, settings, &hand.input());
-        given += hand.advance(out.handle.force, f64::from(settings.period_s));
-        seen.work_given_j = f64::max(seen.work_given_j, given);
+        hand.advance(out.handle.force, f64::from(settings.period_s));
         seen.add(&out);
         last = Some(out);
     }
-    (last.expect("at least one tick"), seen)
+    let last = last.expect("at least one tick");
+    if let Some(mut observer) = observer {
+        observer.tick(state, &from, &hand.place(), &last.handle);
+        seen.made_j = observer.given_j();
+    }
+    (last, seen)
 }

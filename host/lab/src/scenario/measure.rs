@@ -1,10 +1,12 @@
 //! Figures from telemetry: depth, press forces, impulses, energy at the handle.
 
 use glam::{DAffine3, DQuat, DVec3};
+use mortise_haptics::{Settings, Twist};
 use mortise_protocol::message::{Telemetry, WirePose, WireWrench};
 
 use super::scene::{Body, PreparedScene};
 use super::{Depth, Press};
+use crate::port::Port;
 
 /// A wire pose in millimetres.
 pub(crate) fn pose_mm(pose: &WirePose) -> DAffine3 {
@@ -104,7 +106,7 @@ pub(crate) fn impulse(samples: &[Telemetry]) -> Impulse {
     found
 }
 
-/// Most net work done on the object at any time, mJ.
+/// Most work done on the object over any interval, mJ. Nothing counts as stored: what the springs of contacts and targets give back counts as made.
 pub(crate) struct ObjectEnergy {
     /// By contacts.
     pub contact_mj: f64,
@@ -114,15 +116,8 @@ pub(crate) struct ObjectEnergy {
 
 /// See [`ObjectEnergy`]. The wrenches of a tick, taken at its end, moved the object to the pose told with them.
 pub(crate) fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> ObjectEnergy {
-    let mut most = ObjectEnergy {
-        contact_mj: 0.0,
-        constraint_mj: 0.0,
-    };
-    let Some(part) = scene.bodies().get(usize::from(scene.part)) else {
-        return most;
-    };
-    let center = part.surface.shape().center_of_mass;
-    let (mut contacts, mut targets) = (0.0f64, 0.0f64);
+    let (mut contacts, mut both) = (Port::default(), Port::default());
+    let center = center_of_mass(scene);
     for pair in samples.windows(2) {
         let (Some((_, from)), Some((_, to))) = (&pair[0].object, &pair[1].object) else {
             continue;
@@ -135,12 +130,20 @@ pub(crate) fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> Obj
             let of = |w: &WireWrench| 1e3 * (vector(w.force).dot(moved) + vector(w.torque).dot(turned));
             (1.0 - near) * of(get(&pair[0])) + near * of(get(&pair[1]))
         };
-        contacts += work(|sample| &sample.contact);
-        targets += work(|sample| &sample.guidance.wrench);
-        most.contact_mj = most.contact_mj.max(contacts);
-        most.constraint_mj = most.constraint_mj.max(contacts + targets);
+        let by_contacts = work(|sample| &sample.contact);
+        contacts.add(by_contacts);
+        both.add(by_contacts + work(|sample| &sample.guidance.wrench));
     }
-    most
+    ObjectEnergy {
+        contact_mj: contacts.made(),
+        constraint_mj: both.made(),
+    }
+}
+
+/// Of the part in hand, its frame, mm.
+fn center_of_mass(scene: &PreparedScene) -> DVec3 {
+    let part = scene.bodies().get(usize::from(scene.part));
+    part.map_or(DVec3::ZERO, |part| part.surface.shape().center_of_mass)
 }
 
 /// Rotation vector from one pose to another, world axes.
@@ -166,6 +169,8 @@ pub(crate) struct Felt {
     pub tick: u32,
     pub handle: WirePose,
     pub wrench: WireWrench,
+    /// The motion the law was told; `None` where it is not known.
+    pub twist: Option<Twist>,
 }
 
 impl Felt {
@@ -175,15 +180,25 @@ impl Felt {
             tick: sample.tick,
             handle: sample.handle,
             wrench: sample.wrench,
+            twist: None,
         }
     }
 }
 
-/// Work of the device on the handle, mJ: the largest net amount at any time, and all that passed either way. Exact between neighbouring ticks, whose
-/// wrench is held from the first to the second, as far as the poses are; else trapezoids: what happens between two samples is not seen.
-pub(crate) fn energy(felt: &[Felt]) -> (f64, f64) {
-    let (mut given, mut largest, mut passed) = (0.0f64, 0.0f64, 0.0f64);
-    for pair in felt.windows(2) {
+/// Work of the device on the handle, mJ: the most over any interval beyond what was stored at its start ([`crate::port`]), and all that passed either
+/// way. Exact between neighbouring ticks, whose wrench is held from the first to the second, as far as the poses are; else trapezoids: what happens
+/// between two samples is not seen. `felt` has an entry for each of `samples`.
+///
+/// What counts as stored: see [`Coupled::stored_mj`].
+pub(crate) fn energy(
+    scene: &PreparedScene,
+    settings: &Settings,
+    samples: &[Telemetry],
+    felt: &[Felt],
+) -> (f64, f64) {
+    let coupled = Coupled::new(scene, settings, samples);
+    let mut port = Port::default();
+    for (index, pair) in felt.windows(2).enumerate() {
         let (from, to) = (pose_mm(&pair[0].handle), pose_mm(&pair[1].handle));
         let moved = 1e-3 * (to.translation - from.translation);
         let turned = turn(&from, &to);
@@ -192,9 +207,93 @@ pub(crate) fn energy(felt: &[Felt]) -> (f64, f64) {
             first * vector(get(&pair[0].wrench)) + (1.0 - first) * vector(get(&pair[1].wrench))
         };
         let work = 1e3 * (mean(|w| w.force).dot(moved) + mean(|w| w.torque).dot(turned));
-        given += work;
-        largest = largest.max(given);
-        passed += work.abs();
+        let before = index.checked_sub(2).and_then(|start| samples.get(start..=index));
+        let stored = (coupled.as_ref().zip(before))
+            .and_then(|(coupled, before)| coupled.stored_mj(before, &pair[0]))
+            .unwrap_or(0.0);
+        port.add_beyond(stored, work);
     }
-    (largest, passed)
+    (port.made(), port.passed())
+}
+
+/// The part in the hand.
+struct Coupled<'a> {
+    settings: &'a Settings,
+    /// Centre of mass in the handle's frame as the part was grabbed, and in its own, m.
+    lever: DVec3,
+    center: DVec3,
+}
+
+impl<'a> Coupled<'a> {
+    /// `None` where no sample has a part in hand.
+    fn new(scene: &PreparedScene, settings: &'a Settings, samples: &[Telemetry]) -> Option<Self> {
+        let grabbed = samples.iter().find(|sample| sample.object.is_some())?;
+        let center = 1e-3 * center_of_mass(scene);
+        let (_, object) = grabbed.object.as_ref()?;
+        Some(Self {
+            settings,
+            lever: meters(&grabbed.handle)
+                .inverse()
+                .transform_point3(meters(object).transform_point3(center)),
+            center,
+        })
+    }
+
+    /// What is stored when the last of three neighbouring ticks, `felt`, begins, mJ; `None` where that is not known.
+    ///
+    /// S = ½·k·d² + ½·k_R·θ² + ½·m·v²: the coupling's springs and the motion of the object's centre of mass. Stretch and angle are found from the
+    /// wrench, because where the part has slipped to in the hand is not told. With F, τ the wrench on the object at its centre of mass, V, Ω the motion
+    /// of its place in the hand as the law was told it, and v', ω' that of the object at the tick's end (its poses' differences), the law has
+    ///
+    /// F = k·d + (b + h·k)·(V − v'), and τ likewise,
+    ///
+    /// d by the encoders' reading, to which is added what they rounded off. What is left out makes what is given too large: the energy of turning, and
+    /// what a wrench beyond the coupling's limits, or taken down after the coupling, does not show of the stretch.
+    fn stored_mj(&self, samples: &[Telemetry], felt: &Felt) -> Option<f64> {
+        let [a, b, c] = samples else {
+            return None;
+        };
+        if b.tick.wrapping_sub(a.tick) != 1 || c.tick.wrapping_sub(b.tick) != 1 {
+            return None;
+        }
+        let [before, at, after] = [&a.object, &b.object, &c.object].map(|object| object.as_ref());
+        let [before, at, after] = [before?, at?, after?].map(|(_, pose)| meters(pose));
+        let told = felt.twist?;
+        let s = &self.settings.coupling;
+        let [h, m, k, b, k_r, b_r] = [
+            self.settings.period_s,
+            self.settings.object.mass_kg,
+            s.k_t_n_per_m,
+            s.b_t,
+            s.k_r,
+            s.b_r,
+        ]
+        .map(f64::from);
+        let center = |object: &DAffine3| object.transform_point3(self.center);
+        // A spring of no stiffness stores nothing.
+        let inverse = |stiffness: f64| if stiffness > 0.0 { stiffness.recip() } else { 0.0 };
+        let read = meters(&c.handle);
+        let lever = read.transform_vector3(self.lever);
+        let truly = meters(&felt.handle);
+        let force = -vector(felt.wrench.force);
+        let torque = -vector(felt.wrench.torque) - lever.cross(force);
+        let turning = told.angular.as_dvec3();
+        let place = told.linear.as_dvec3() + turning.cross(lever);
+        let linear = place - (center(&after) - center(&at)) / h;
+        let angular = turning - turn(&at, &after) / h;
+        let d = (force - (b + h * k) * linear) * inverse(k) + truly.transform_point3(self.lever)
+            - read.transform_point3(self.lever);
+        let angle = (torque - (b_r + h * k_r) * angular) * inverse(k_r) + turn(&read, &truly);
+        let speed = (center(&at) - center(&before)) / h;
+        let stored =
+            0.5 * (k * d.length_squared() + k_r * angle.length_squared() + m * speed.length_squared());
+        Some(1e3 * stored)
+    }
+}
+
+/// A wire pose in metres.
+fn meters(pose: &WirePose) -> DAffine3 {
+    let mut pose = pose_mm(pose);
+    pose.translation *= 1e-3;
+    pose
 }

@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mortise_bake::{Method, PointshellKind};
+use mortise_firmware::parameters::Parameters;
+use mortise_haptics::Settings;
 use mortise_protocol::limits::MAX_KEYFRAMES;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::Faults;
@@ -225,6 +227,15 @@ pub struct Bounds {
 }
 
 impl Scenario {
+    /// What the force law is set to on a board that took the parameters; the defaults where it refuses one.
+    pub(crate) fn settings(&self) -> Settings {
+        let taken = (self.parameters.iter()).try_fold(Parameters::default(), |set, (name, &value)| {
+            set.with(parameter_named(name)?, value).ok()
+        });
+        let settings = taken.and_then(|set| set.settings().ok());
+        settings.map_or_else(Settings::default, |settings| settings.law)
+    }
+
     /// Reads a scenario file.
     ///
     /// # Errors

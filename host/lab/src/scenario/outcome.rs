@@ -51,14 +51,16 @@ pub struct Outcome {
     pub peak_contact_n: f64,
     /// Amount of the integral of the forces on the object by contacts and targets less that on the handle, N·s: what of it the hand did not feel.
     pub impulse_lost_ns: f64,
-    /// Most net work the device had done on the handle at any time, mJ: positive when it gave energy that nobody put in.
+    /// Most work of the device on the handle over any interval beyond what was stored at its start, mJ: energy that nobody put in. Stored are the
+    /// coupling's springs and the object's motion, as far as they are known: only where `energy_exact`, else nothing counts as stored.
     pub energy_given_mj: f64,
     /// Work that went through the handle either way, mJ.
     pub energy_passed_mj: f64,
     /// Whether both are of the handle's true motion, which takes every tick's sample of a simulated handle. Else they are of its encoders' readings,
     /// whose rounding (5 µm) makes them too large by some 10 µW on each axis that moves.
     pub energy_exact: bool,
-    /// Most net work contacts had done on the object at any time, mJ; exact where each tick is heard, else trapezoids between samples.
+    /// Most work of contacts on the object over any interval, mJ, nothing counted as stored; exact where each tick is heard, else trapezoids between
+    /// samples.
     pub contact_given_mj: f64,
     /// The same of contacts and targets together: what came through the port between the object and what constrains it.
     pub constraint_given_mj: f64,

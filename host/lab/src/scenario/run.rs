@@ -410,7 +410,7 @@ fn outcome(
         .press
         .as_ref()
         .and_then(|press| measure::press(press, settled));
-    let (energy_given_mj, energy_passed_mj) = measure::energy(felt);
+    let (energy_given_mj, energy_passed_mj) = measure::energy(scene, &scenario.settings(), samples, felt);
     let object = measure::object_energy(scene, samples);
     let impulse = measure::impulse(samples);
     let counted = capabilities.cost_unit == CostUnit::Instructions;

@@ -35,7 +35,8 @@ pub(super) fn replay(
     mechanism.set_hand(Some(script));
     let first = samples.first()?.tick;
     let felt = samples.iter().zip(0..).map(|(sample, age)| {
-        let reading = pose_to_wire(&mechanism.sense().handle);
+        let sensed = mechanism.sense();
+        let reading = pose_to_wire(&sensed.handle);
         let handle = pose_to_wire(&mechanism.true_pose());
         // Encoders are watched while a part is in hand.
         mechanism.watch_encoders(sample.object.is_some());
@@ -48,6 +49,7 @@ pub(super) fn replay(
             tick: sample.tick,
             handle,
             wrench: wrench_to_wire(&mechanism.motors()),
+            twist: Some(sensed.twist),
         })
     });
     felt.collect()
@@ -117,7 +119,7 @@ mod tests {
         let before = (&reach(&scenario.hand), REACH_TICKS + REST_TICKS);
         let script = script(&scenario.hand);
         let felt = replay(before, &script, samples).expect("every reading as recorded");
-        let (given, passed) = energy(&felt);
+        let (given, passed) = energy(&scene, &Settings::default(), samples, &felt);
         // Σ F·(e' − e), e the rounding, once the grip is firm.
         let error = |i: usize| {
             let position = |pose: &WirePose| DVec3::from_array(pose.position.map(f64::from));

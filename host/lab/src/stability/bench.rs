@@ -4,11 +4,17 @@
 //! integrated by Runge and Kutta's fourth order in `SUBSTEPS` steps a tick in double precision; where dry friction can hold the handle, it does. The
 //! encoder rounds, the speed comes from its differences, and the force is given out so many ticks late. The work of the device is exact, because its
 //! force is held.
+//!
+//! Energy made is the largest rise over any interval ([`crate::port`]). At the handle the coupling's springs and the object's motion count as stored,
+//! as [`mortise_haptics::observer`] has it; the springs of contacts do not, nor does anything at the object: what those give back counts as made.
 
-use mortise_haptics::{Input, Output, Passivity, Pose, Quat, Settings, State, Twist, Vec3, tick};
+use glam::DVec3;
+use mortise_haptics::observer::{Observer, Place};
+use mortise_haptics::{Input, Output, Passivity, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick};
 use mortise_protocol::image::SceneImage;
 
 use super::oracle::Plant;
+use crate::port::Port;
 
 /// Steps of integration a tick.
 const SUBSTEPS: u32 = 4;
@@ -112,30 +118,10 @@ pub struct Bench<'a> {
     last_read: f64,
     estimate: f64,
     under_way: Vec<f64>,
-    /// Work of the device on the handle, J.
-    pub energy: Energy,
+    /// Of the device's work on the handle; `None` only if nothing could be grabbed.
+    observer: Option<Observer>,
     /// Work of contacts on the object, J.
-    pub contact: Energy,
-}
-
-/// Work through a port, J.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Energy {
-    /// Net so far: positive is made by what is behind the port.
-    pub net: f64,
-    /// Largest net at any time.
-    pub made: f64,
-    /// All that went through, either way.
-    pub passed: f64,
-}
-
-impl Energy {
-    /// Takes one tick's work.
-    pub fn add(&mut self, work: f64) {
-        self.net += work;
-        self.made = self.made.max(self.net);
-        self.passed += work.abs();
-    }
+    contact: Port,
 }
 
 impl<'a> Bench<'a> {
@@ -148,6 +134,7 @@ impl<'a> Bench<'a> {
         state.load_scene(scene);
         let grabbed = state.grab(scene, part, &Pose::IDENTITY);
         debug_assert_eq!(grabbed, Ok(()));
+        let observer = Observer::new(scene, &state, &settings, &place(0.0, Quat::IDENTITY));
         Self {
             rig,
             settings,
@@ -159,9 +146,24 @@ impl<'a> Bench<'a> {
             last_read: 0.0,
             estimate: 0.0,
             under_way: vec![0.0; rig.delay_ticks],
-            energy: Energy::default(),
-            contact: Energy::default(),
+            observer,
+            contact: Port::default(),
         }
+    }
+
+    /// Energy given to the handle over any interval beyond what was stored at its start, J: made of nothing. `NaN` if nothing is in hand.
+    pub fn handle_made_j(&self) -> f64 {
+        self.observer.as_ref().map_or(f64::NAN, Observer::given_j)
+    }
+
+    /// All work that passed through the handle either way, J.
+    pub fn handle_passed_j(&self) -> f64 {
+        self.observer.as_ref().map_or(f64::NAN, Observer::passed_j)
+    }
+
+    /// Most work of contacts on the object over any interval, J.
+    pub fn contact_made_j(&self) -> f64 {
+        self.contact.made()
     }
 
     /// How passive the coupling is.
@@ -190,13 +192,25 @@ impl<'a> Bench<'a> {
             },
             enabled: true,
         };
+        if let Some(observer) = &mut self.observer {
+            observer.look(&self.state);
+        }
         let out = tick(&mut self.state, self.scene, &self.settings, &input);
         let object = out.object_twist;
         let pushed = out.contact.force.dot(object.linear) + out.contact.torque.dot(object.angular);
         self.contact.add(f64::from(pushed) * period);
         self.under_way.push(f64::from(out.handle.force.z));
         let force = self.under_way.remove(0);
+        let from = place(self.position, self.orientation);
         self.advance(force, wish, period);
+        if let Some(observer) = &mut self.observer {
+            // The handle moves along z alone: no other part of the wrench works.
+            let held = Wrench {
+                force: Vec3::new(0.0, 0.0, force as f32),
+                torque: Vec3::ZERO,
+            };
+            observer.tick(&self.state, &from, &place(self.position, self.orientation), &held);
+        }
         out
     }
 
@@ -209,7 +223,6 @@ impl<'a> Bench<'a> {
             ..
         } = self.rig;
         let h = period / f64::from(SUBSTEPS);
-        let start = self.position;
         for i in 0..SUBSTEPS {
             // The wish goes on within the tick, as a hand does.
             let wished = |t: f64| wish.position + wish.speed * (f64::from(i) * h + t);
@@ -235,6 +248,12 @@ impl<'a> Bench<'a> {
                 self.speed = 0.0;
             }
         }
-        self.energy.add(force * (self.position - start));
+    }
+}
+
+fn place(z: f64, orientation: Quat) -> Place {
+    Place {
+        position: DVec3::new(0.0, 0.0, z),
+        orientation: orientation.as_dquat().normalize(),
     }
 }

@@ -7,7 +7,7 @@
 use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
 
-use super::bench::{Bench, Energy, Rig, Sensor, Wish};
+use super::bench::{Bench, Rig, Sensor, Wish};
 use super::oracle::{Law, Search, Wall, limit};
 
 /// Pressed with this force, N.
@@ -68,8 +68,6 @@ pub struct Flick {
     /// Deviation of the flick in a linear loop without damping, v·√(m/K), m: trembling that has grown to what limits it may fall again, but not so
     /// far.
     pub linear_m: f64,
-    /// Work of the device on the handle since the flick.
-    pub energy: Energy,
 }
 
 impl Flick {
@@ -100,7 +98,6 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
         ..Wish::default()
     };
     bench.rig.plant.damping = rig.plant.damping;
-    bench.energy = Energy::default();
     let rest = bench.position;
     bench.speed += FLICK_M_PER_S;
     let watch = ticks(WATCH_S);
@@ -122,7 +119,6 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
         first_m,
         last_m,
         linear_m: FLICK_M_PER_S * (rig.plant.mass_kg / f64::from(settings.coupling.k_t_n_per_m)).sqrt(),
-        energy: bench.energy,
     }
 }
 

@@ -37,7 +37,7 @@ pub struct Blow {
     pub tunnelled: bool,
     /// Largest force on the handle, N.
     pub peak_force_n: f64,
-    /// Most net work of the device on the handle, mJ.
+    /// Most work of the device on the handle over any interval beyond what was stored, mJ.
     pub handle_made_mj: f64,
 }
 
@@ -145,7 +145,7 @@ pub fn strike(blow: &Strike<'_>) -> Blow {
         penetration_um: 1e3 * deepest,
         tunnelled: deepest > 0.5 * thick_mm,
         peak_force_n: peak,
-        handle_made_mj: 1e3 * bench.energy.made,
+        handle_made_mj: 1e3 * bench.handle_made_j(),
     }
 }
 

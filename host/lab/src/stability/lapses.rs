@@ -78,11 +78,12 @@ pub struct Held {
     pub step_n: f64,
     /// Of its torque, mN m.
     pub step_mnm: f64,
-    /// Most net work of the device on the handle at any time since the grab, mJ, and all that passed: the first time a target takes hold is in it.
+    /// Most work of the device on the handle over any interval since the grab beyond what was stored at its start, mJ, and all that passed: the first
+    /// time a target takes hold is in it.
     pub handle_made_mj: f64,
     /// See above.
     pub handle_passed_mj: f64,
-    /// Most net work of contacts and targets on the object likewise, mJ.
+    /// Most work of contacts and targets on the object over any interval, mJ, nothing counted as stored.
     pub object_made_mj: f64,
     /// From when the first target was in force until it was fully engaged, ms.
     pub engaged_ms: f64,
@@ -178,7 +179,8 @@ fn play(scenario: &Scenario, scene: &PreparedScene, case: &Case, lost: f64) -> R
     let held = recording.samples.get(held_from as usize..).unwrap_or(&[]);
     let in_force = held.iter().filter(|sample| sample.guidance.active > 0).count();
     let (step_n, step_nm) = largest_step(held);
-    let (handle_made_mj, handle_passed_mj) = energy(&recording.felt);
+    let (handle_made_mj, handle_passed_mj) =
+        energy(scene, &scenario.settings(), &recording.samples, &recording.felt);
     let first = |of: fn(&Telemetry) -> bool| recording.samples.iter().position(of);
     let engaged_ms = (first(|sample| sample.guidance.engagement == 1.0))
         .zip(first(|sample| sample.guidance.active > 0))

@@ -34,9 +34,9 @@ pub struct Press {
     pub penetration_um: f64,
     /// Force on the handle at the end, mean, N.
     pub force_n: f64,
-    /// Most net work of contacts on the object, mJ: made of nothing.
+    /// Most work of contacts on the object over any interval, mJ: made of nothing, or held by their springs.
     pub contact_made_mj: f64,
-    /// Most net work of the device on the handle, mJ.
+    /// Most work of the device on the handle over any interval beyond what was stored, mJ.
     pub handle_made_mj: f64,
 }
 
@@ -122,8 +122,8 @@ pub fn press(scene: &SceneImage<'_>, part: u16, settings: &Settings) -> Press {
         unrest_n: most - least,
         penetration_um: 1e6 * deepest,
         force_n: sum / f64::from(look),
-        contact_made_mj: 1e3 * bench.contact.made,
-        handle_made_mj: 1e3 * bench.energy.made,
+        contact_made_mj: 1e3 * bench.contact_made_j(),
+        handle_made_mj: 1e3 * bench.handle_made_j(),
     }
 }
 

@@ -43,7 +43,7 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         DEEPEST_UM,
     ));
     out(Row::at_most(
-        format!("{what}, implicit: energy that contacts made at the object"),
+        format!("{what}, implicit: energy that contacts made at the object over any interval"),
         implicit.contact_made_mj,
         "mJ",
         1.0,
@@ -61,7 +61,7 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         "µm",
     ));
     out(Row::told(
-        format!("{what}, explicit beside it: energy that contacts made at the object"),
+        format!("{what}, explicit beside it: energy that contacts made at the object over any interval"),
         explicit.contact_made_mj,
         "mJ",
     ));

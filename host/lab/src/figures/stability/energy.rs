@@ -11,7 +11,7 @@ use crate::fit::Fit;
 use crate::scenario::{Outcome, Scenario, run};
 use crate::stability::lapses;
 
-/// Most net energy at the handle, mJ, and of what passed, %.
+/// Most energy made at the handle over any interval, mJ, and of what passed, %.
 const MADE_MJ: f64 = 1.0;
 const MADE_PERCENT: f64 = 1.0;
 
@@ -54,7 +54,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         // Readings are not good enough: what their rounding makes is more than some scenarios may.
         let exact = if outcome.energy_exact { 1.0 } else { f64::NAN };
         out(Row::at_most(
-            format!("{what}: net energy made at the handle"),
+            format!("{what}: energy made at the handle over any interval"),
             exact * outcome.energy_given_mj,
             "mJ",
             MADE_MJ,
@@ -66,13 +66,13 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             MADE_PERCENT,
         ));
         out(Row::at_most(
-            format!("{what}: net energy that contacts made at the object"),
+            format!("{what}: energy that contacts made at the object over any interval"),
             outcome.contact_given_mj,
             "mJ",
             MADE_MJ,
         ));
         out(Row::at_most(
-            format!("{what}: net energy that contacts and targets together made at the object"),
+            format!("{what}: energy that contacts and targets together made at the object over any interval"),
             outcome.constraint_given_mj,
             "mJ",
             MADE_MJ,
@@ -85,7 +85,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             100.0 * held.lost
         );
         out(Row::at_most(
-            format!("{what}: net energy made at the handle since the grab"),
+            format!("{what}: energy made at the handle over any interval since the grab"),
             held.handle_made_mj,
             "mJ",
             MADE_MJ,
