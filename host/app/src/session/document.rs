@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::Context as _;
 use glam::DAffine3;
 use mortise_bake::Baked;
-use mortise_brep::CadModel;
+use mortise_brep::{CadModel, LoadOptions, load_step_until};
 
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
@@ -58,12 +59,12 @@ pub struct Document {
 }
 
 impl Document {
-    /// Reads a STEP file. Takes as long as the CAD kernel does: call it off the window's thread.
+    /// Reads a STEP file. Takes as long as the CAD kernel does, or until `cancel` is set: call it off the window's thread.
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn read(path: &Path, generation: u64) -> anyhow::Result<Self> {
-        let model = mortise_brep::load_step(path)?;
+    pub fn read(path: &Path, generation: u64, cancel: &AtomicBool) -> anyhow::Result<Self> {
+        let model = load_step_until(path, &LoadOptions::default(), cancel)?;
         let title = (path.file_name()).map_or_else(
             || path.display().to_string(),
             |n| n.to_string_lossy().into_owned(),
@@ -75,9 +76,9 @@ impl Document {
     ///
     /// # Errors
     /// When it cannot be written to the folder for temporary files, or not be read.
-    pub fn sample(generation: u64) -> anyhow::Result<Self> {
+    pub fn sample(generation: u64, cancel: &AtomicBool) -> anyhow::Result<Self> {
         let file = crate::sample::File::write().context("the sample could not be unpacked")?;
-        let model = mortise_brep::load_step(file.path())?;
+        let model = load_step_until(file.path(), &LoadOptions::default(), cancel)?;
         Ok(Self::of(model, None, crate::sample::NAME.to_owned(), generation))
     }
 

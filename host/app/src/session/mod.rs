@@ -252,8 +252,8 @@ impl Session {
             .as_ref()
             .and_then(|p| p.file_name())
             .map_or_else(|| "the sample".to_owned(), |n| n.to_string_lossy().into_owned());
-        self.start_job(format!("Reading {name}"), self.generation);
-        work::import(&self.outbox, path, self.generation);
+        let cancel = self.start_job(format!("Reading {name}"), self.generation);
+        work::import(&self.outbox, path, self.generation, cancel);
     }
 
     fn bake(&mut self) {

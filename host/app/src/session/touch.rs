@@ -73,13 +73,15 @@ fn is_corner(shape: &Shape, faces: [u32; 2], point: DVec3) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
+
     use super::*;
 
     /// All edges of the sample's parts, in the middle and at their ends: of the block's straight ones both ends are corners; a hole's or a peg's rim has
     /// none, though its seam begins there.
     #[test]
     fn corners_are_where_three_faces_meet() {
-        let document = Document::sample(0).expect("the sample opens");
+        let document = Document::sample(0, &AtomicBool::default()).expect("the sample opens");
         let (mut corners, mut rims) = (0, 0);
         for (part, pose) in document.poses.iter().enumerate() {
             let shape = &document.model.shapes[document.model.parts[part].shape];

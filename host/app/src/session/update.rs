@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use mortise_bake::Baked;
-use mortise_protocol::message::{DeviceState, ResetReason, Telemetry, ToDevice};
+use mortise_protocol::message::{DeviceState, ResetReason, Telemetry, ToDevice, TouchingPair};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
@@ -319,6 +319,11 @@ fn blocker(document: &Document, held: usize, telemetry: &Telemetry, walls: &[Wal
     else {
         return "nothing that is seen".to_owned();
     };
+    met(document, held, pair, part, walls)
+}
+
+/// What of `part` the part in hand meets by this pair, in words. Holes are numbered in the order of their faces, where there are several.
+fn met(document: &Document, held: usize, pair: &TouchingPair, part: usize, walls: &[Wall]) -> String {
     let faces = [pair.static_face, pair.static_edge_face];
     let touch = Touch::of(document, part, faces, pose::point_from_wire(pair.point));
     let bores: Vec<&Wall> = (walls.iter())
@@ -394,5 +399,107 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>
                 .notes
                 .add(Severity::Error, format!("The scene was not taken: {why}"));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DAffine3;
+    use mortise_brep::{CadModel, Face, Frame, Mesh, Part, Shape, Surface};
+    use mortise_protocol::image::NO_FACE;
+
+    use super::*;
+    use crate::session::insertion::local_walls;
+
+    /// A top face, then a wall for each of `holes`: the x of its axis and where the mesh of its wall begins and ends.
+    fn plate(holes: &[(f64, f64, f64)]) -> Shape {
+        let frame = |x: f64| Frame {
+            origin: DVec3::new(x, 0.0, 0.0),
+            x: DVec3::X,
+            y: DVec3::Y,
+            z: DVec3::Z,
+        };
+        let face = |surface, reversed| Face {
+            surface,
+            fit_mm: None,
+            reversed,
+            area_mm2: 1.0,
+            edges: vec![],
+            color: None,
+        };
+        let mut shape = Shape {
+            faces: vec![face(Surface::Plane { frame: frame(0.0) }, false)],
+            mesh: Mesh {
+                vertices: vec![],
+                triangles: vec![],
+                triangle_face: vec![],
+            },
+            ..Shape::default()
+        };
+        for &(x, low, high) in holes {
+            let (first, id) = (shape.mesh.vertices.len() as u32, shape.faces.len() as u32);
+            let surface = Surface::Cylinder {
+                frame: frame(x),
+                radius: 5.0,
+            };
+            shape.faces.push(face(surface, true));
+            let at = |y: f64, z: f64| DVec3::new(x, y, z);
+            shape
+                .mesh
+                .vertices
+                .extend([at(5.0, low), at(-5.0, low), at(5.0, high)]);
+            shape.mesh.triangles.push([first, first + 1, first + 2]);
+            shape.mesh.triangle_face.push(id);
+        }
+        shape
+    }
+
+    fn met_at(shape: Shape, faces: [u16; 2]) -> String {
+        let part = |name: &str| Part {
+            name: name.into(),
+            path: vec![],
+            shape: 0,
+            placement: DAffine3::IDENTITY,
+            color: None,
+        };
+        let model = CadModel {
+            shapes: vec![shape],
+            parts: vec![part("plate"), part("other plate")],
+            ..CadModel::default()
+        };
+        // The other plate, in hand, has holes of its own, which do not count.
+        let walls = local_walls(&model);
+        let document = Document::of(model, None, String::new(), 0);
+        let pair = TouchingPair {
+            moving_face: 0,
+            static_part: 0,
+            static_face: faces[0],
+            moving_edge_face: NO_FACE,
+            static_edge_face: faces[1],
+            count: 1,
+            depth: 1e-5,
+            point: [0.0; 3],
+            insertion: 0.0,
+        };
+        met(&document, 1, &pair, 0, &walls)
+    }
+
+    #[test]
+    fn holes_of_a_part_with_several_are_numbered() {
+        let two = || plate(&[(-20.0, 0.0, 8.0), (20.0, 0.0, 8.0)]);
+        assert_eq!(met_at(two(), [1, NO_FACE]), "wall of plate, hole 1");
+        assert_eq!(met_at(two(), [2, NO_FACE]), "wall of plate, hole 2");
+        assert_eq!(met_at(two(), [0, 2]), "rim of plate, hole 2");
+        assert_eq!(met_at(two(), [2, 0]), "rim of plate, hole 2");
+        assert_eq!(met_at(two(), [0, NO_FACE]), "face on face of plate");
+        // A wall in two halves is one hole; two on one axis with a gap between them are two.
+        let halves = plate(&[(-20.0, 0.0, 8.0), (-20.0, 0.0, 8.0), (20.0, 0.0, 8.0)]);
+        assert_eq!(met_at(halves.clone(), [2, NO_FACE]), "wall of plate, hole 1");
+        assert_eq!(met_at(halves, [3, NO_FACE]), "wall of plate, hole 2");
+        let above = plate(&[(0.0, 0.0, 8.0), (0.0, 20.0, 28.0)]);
+        assert_eq!(met_at(above, [2, NO_FACE]), "wall of plate, hole 2");
+        // The only one needs no number.
+        let one = plate(&[(0.0, 0.0, 8.0)]);
+        assert_eq!(met_at(one, [1, NO_FACE]), "wall of plate");
     }
 }

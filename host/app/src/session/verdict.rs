@@ -78,12 +78,24 @@ impl fmt::Display for Verdict {
                 peak_n,
             } => write!(
                 f,
-                "Goes in: {depth_mm:.1} mm, clearance {clearance_mm:.3} mm, peak {peak_n:.1} N"
+                "Goes in: {depth_mm:.1} mm, clearance {clearance_mm:.3} mm, peak {} N",
+                two_digits(*peak_n)
             ),
             Self::Stuck { depth_mm, on } => write!(f, "Stuck at {depth_mm:.1} mm: {on}"),
             Self::LetGo { depth_mm, full_mm } => write!(f, "Let go at {depth_mm:.1} of {full_mm:.1} mm"),
         }
     }
+}
+
+/// A force in two significant digits, the last no finer than 0.01: 12, 3.4, 0.84, 0.04.
+fn two_digits(newton: f64) -> String {
+    // What rounds up to the next power of ten has a digit less behind the point.
+    let digits = match newton.abs() {
+        n if n >= 9.95 => 0,
+        n if n >= 0.995 => 1,
+        _ => 2,
+    };
+    format!("{newton:.digits$}")
 }
 
 /// One sample of the part in hand.
@@ -342,7 +354,7 @@ mod tests {
         }
         said.extend(bench.hold(-40.0, 0.0, 2.0));
         let words: Vec<String> = said.iter().map(ToString::to_string).collect();
-        assert_eq!(words, ["Goes in: 40.0 mm, clearance 1.000 mm, peak 0.8 N"]);
+        assert_eq!(words, ["Goes in: 40.0 mm, clearance 1.000 mm, peak 0.84 N"]);
         // A spring's lag before the end is the end, once it rests there.
         let mut bench = Bench::new();
         bench.at(0.0, 0.0);
@@ -351,6 +363,27 @@ mod tests {
         // Out and in again is said again.
         assert_eq!(bench.hold(-20.0, 0.0, 0.2), []);
         assert_eq!(bench.hold(-40.0, 0.0, 0.2).len(), 1);
+    }
+
+    #[test]
+    fn a_small_force_is_told_in_two_digits() {
+        let told = [
+            (0.0, "0.00"),
+            (0.004, "0.00"),
+            (0.04, "0.04"),
+            (0.044, "0.04"),
+            (0.8449, "0.84"),
+            (0.9949, "0.99"),
+            (0.9951, "1.0"),
+            (1.04, "1.0"),
+            (3.449, "3.4"),
+            (9.949, "9.9"),
+            (9.951, "10"),
+            (12.4, "12"),
+        ];
+        for (newton, words) in told {
+            assert_eq!(two_digits(newton), words, "{newton}");
+        }
     }
 
     #[test]

@@ -116,20 +116,28 @@ impl Cancel {
         self.0.store(true, Ordering::Relaxed);
     }
 
+    /// For what looks at a flag by itself.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.0
+    }
+
     /// Whether it was asked.
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Reads a file (`None`: the sample).
-pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64) {
+/// Reads a file (`None`: the sample). When cancelled the reading process ends and nothing is said.
+pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64, cancel: Cancel) {
     let outbox = outbox.clone();
     spawn("mortise-import", move || {
         let read = match &path {
-            Some(path) => Document::read(path, generation),
-            None => Document::sample(generation),
+            Some(path) => Document::read(path, generation, cancel.flag()),
+            None => Document::sample(generation, cancel.flag()),
         };
+        if cancel.is_set() {
+            return;
+        }
         let result = read.map(Box::new).map_err(|error| format!("{error:#}"));
         outbox.send(Update::Imported { generation, result });
     });
