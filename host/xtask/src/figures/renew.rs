@@ -26,13 +26,10 @@ pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
             known.join(" ")
         );
     }
-    let mut manifest = Manifest::read(root)?.unwrap_or_default();
-    manifest
-        .0
-        .retain(|name, _| ARTEFACTS.iter().any(|artefact| artefact.name == *name));
     let (mut all_hold, mut said) = (true, Vec::new());
     for artefact in ARTEFACTS {
         let named = names.iter().any(|name| name == artefact.name);
+        let manifest = Manifest::read(root)?.unwrap_or_default();
         let Some(why) = stale(root, artefact, &manifest)?.filter(|_| named || names.is_empty()) else {
             continue;
         };
@@ -43,8 +40,7 @@ pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
         eprintln!("{} {why}", artefact.name);
         let start = Instant::now();
         all_hold &= make(root, program, artefact)?;
-        manifest.0.insert(artefact.name.to_owned(), artefact.state(root)?);
-        manifest.write(root)?;
+        record(root, artefact)?;
         said.push(format!(
             "{}: {:.0} s",
             artefact.name,
@@ -58,6 +54,14 @@ pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
         println!("nothing is stale");
     }
     Ok(all_hold)
+}
+
+/// Another run may have recorded what it made meanwhile: the manifest is read anew.
+fn record(root: &Path, artefact: &Artefact) -> Result<()> {
+    let mut manifest = Manifest::read(root)?.unwrap_or_default();
+    (manifest.0).retain(|name, _| ARTEFACTS.iter().any(|artefact| artefact.name == *name));
+    manifest.0.insert(artefact.name.to_owned(), artefact.state(root)?);
+    manifest.write(root)
 }
 
 fn make(root: &Path, program: &Path, artefact: &Artefact) -> Result<bool> {
