@@ -11,6 +11,9 @@ use mortise_brep::{BrepError, CadModel, load_step};
 use mortise_rig::RigSpec;
 use serde::Deserialize;
 
+pub(crate) mod written;
+
+use self::written::Written;
 use crate::LabError;
 use crate::scenario::{self, Bounds, Hand, Key, Run, Scenario, Scene, Shell};
 
@@ -36,16 +39,13 @@ pub struct Import {
 }
 
 impl Import {
-    /// Whether the file is broken on purpose, by its name.
-    pub fn is_broken(&self) -> bool {
-        is_broken(&self.file)
+    /// What its refusal must say, where it must be refused.
+    pub fn refusal(&self) -> Option<&'static str> {
+        match written::of(&self.file)? {
+            Written::Refused(why) => Some(why),
+            Written::Parts(_) => None,
+        }
     }
-}
-
-fn is_broken(file: &str) -> bool {
-    Path::new(file)
-        .file_name()
-        .is_some_and(|name| name.to_string_lossy().starts_with("broken_"))
 }
 
 /// What is written about a file beside it.
@@ -54,8 +54,8 @@ struct Expected {
     parts: Vec<String>,
 }
 
-/// Reads every STEP file below `cad` and holds it against `expected.json`: parts by name; a `broken_*` file must be refused in one line; a file
-/// nothing is written about must be read, or refused in one line.
+/// Reads every STEP file below `cad` and holds it against `expected.json`, parts by name, or against what is written here. A file on which nothing is
+/// written is wrong, and so is one that is written about and not there.
 ///
 /// # Errors
 /// `Unreadable` when the folder or `expected.json` cannot be read.
@@ -85,27 +85,46 @@ pub fn imports(cad: &Path) -> Result<Vec<Import>, LabError> {
         let wrong = judge(&file, expected.get(&file), load_step(&path));
         imports.push(Import { file, wrong });
     }
+    let listed = expected.keys().map(String::as_str);
+    for file in listed.chain(written::WRITTEN.iter().map(|(file, _)| *file)) {
+        if !cad.join(file).is_file() {
+            imports.push(Import {
+                file: file.to_owned(),
+                wrong: Some("is not there".into()),
+            });
+        }
+    }
     Ok(imports)
 }
 
 fn judge(file: &str, expected: Option<&Expected>, read: Result<CadModel, BrepError>) -> Option<String> {
-    match (read, expected) {
-        (Ok(_), _) if is_broken(file) => Some("was read although it is broken".into()),
-        (Ok(model), Some(expected)) => {
-            let names: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
-            let same = names.len() == expected.parts.len()
-                && names
-                    .iter()
-                    .zip(&expected.parts)
-                    .all(|(name, wanted)| is_named(name, wanted));
-            (!same).then(|| format!("has parts {names:?}, expected {:?}", expected.parts))
+    let refused = |error: &BrepError| Some(format!("was refused: {error}"));
+    if let Some(expected) = expected {
+        let model = match read {
+            Ok(model) => model,
+            Err(error) => return refused(&error),
+        };
+        let names: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
+        let same = names.len() == expected.parts.len()
+            && names
+                .iter()
+                .zip(&expected.parts)
+                .all(|(name, wanted)| is_named(name, wanted));
+        return (!same).then(|| format!("has parts {names:?}, expected {:?}", expected.parts));
+    }
+    match (written::of(file), read) {
+        (None, _) => Some("has nothing written about it".into()),
+        (Some(Written::Parts(wanted)), Ok(model)) => {
+            let found = model.parts.len();
+            (found != wanted).then(|| format!("has {found} parts, expected {wanted}"))
         }
-        (Ok(_), None) => None,
-        (Err(error), Some(_)) => Some(format!("was refused: {error}")),
-        (Err(error), None) => error
-            .to_string()
-            .contains('\n')
-            .then(|| format!("reason has several lines: {error}")),
+        (Some(Written::Parts(_)), Err(error)) => refused(&error),
+        (Some(Written::Refused(why)), Ok(_)) => Some(format!("was read, expected a refusal: {why}")),
+        (Some(Written::Refused(why)), Err(error)) => {
+            let words = error.to_string();
+            (!words.contains(why) || words.contains('\n'))
+                .then(|| format!("was refused by other words than \"{why}\": {words}"))
+        }
     }
 }
 

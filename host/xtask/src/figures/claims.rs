@@ -1,6 +1,10 @@
 //! `docs/figures/claims.json`: the figure that is stated for each row whose bound is not exact, by table.
 //!
 //! The program is compiled with it and judges by it. Measuring a table adds the claims of rows that had none; `--claim` takes all of them anew.
+//!
+//! A table is measured in full or in its shorter form, and its page is made from one of the two. Claims of that form's rows stand under the table's name;
+//! those of rows that only the other form has, under the name and [`OTHER_FORM`]. What the page's form does not measure any more goes over to the
+//! other form's, and what that does not measure either is dropped.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -12,6 +16,9 @@ use super::Row;
 
 /// Where claims are kept, from the root.
 pub const FILE: &str = "docs/figures/claims.json";
+
+/// Behind a table's name: rows that only the form has of which there is no page.
+const OTHER_FORM: &str = ", other form";
 
 /// Claims by table and row.
 #[derive(Debug, Default, PartialEq)]
@@ -47,13 +54,52 @@ impl Claims {
         rows.insert(key.to_owned(), claim);
     }
 
-    /// Adds the claims of measured rows.
-    pub fn take(&mut self, table: &str, rows: &[Row]) {
+    /// Takes the claims of all rows of one run over; `of_page` when it was of the form that the page has. Returns the claims that were dropped.
+    pub fn take(&mut self, table: &str, of_page: bool, rows: &[Row]) -> Vec<String> {
+        let other = format!("{table}{OTHER_FORM}");
         for row in rows {
-            if let Some(claim) = row.claim {
-                self.insert(table, &row.key(), claim);
+            let (Some(claim), key) = (row.claim, row.key()) else {
+                continue;
+            };
+            let known = self.0.get(table).is_some_and(|rows| rows.contains_key(&key));
+            if of_page || known {
+                self.insert(table, &key, claim);
+                if let Some(rows) = self.0.get_mut(&other) {
+                    rows.remove(&key);
+                }
+            } else {
+                self.insert(&other, &key, claim);
             }
         }
+        let left = self.without_row(table, of_page, rows);
+        let own = if of_page { table } else { &other };
+        for key in &left {
+            let claim = self.0.get_mut(own).and_then(|rows| rows.remove(key));
+            if let (true, Some(claim)) = (of_page, claim) {
+                self.insert(&other, key, claim);
+            }
+        }
+        self.0.retain(|_, rows| !rows.is_empty());
+        if of_page { Vec::new() } else { left }
+    }
+
+    /// Claims under this form's name of which a run of it has no row. A row that was skipped may stand for several whose names begin as its does.
+    pub fn without_row(&self, table: &str, of_page: bool, rows: &[Row]) -> Vec<String> {
+        let own = match of_page {
+            true => table.to_owned(),
+            false => format!("{table}{OTHER_FORM}"),
+        };
+        let measured = |key: &str| {
+            rows.iter().any(|row| {
+                let name = row.key();
+                name == key || (row.is_skipped() && key.starts_with(&name))
+            })
+        };
+        let claims = self.0.get(&own).into_iter().flatten();
+        claims
+            .map(|(key, _)| key.clone())
+            .filter(|key| !measured(key))
+            .collect()
     }
 
     /// Writes them, one a line, in order.
@@ -93,7 +139,7 @@ mod tests {
             claim: Some(1.505),
             ..Row::default()
         };
-        claims.take("contact", &[row, Row::default()]);
+        claims.take("contact", true, &[row, Row::default()]);
         let text = claims.text().unwrap();
         assert_eq!(
             text,
@@ -101,6 +147,62 @@ mod tests {
         );
         assert_eq!(Claims::parse(&text).unwrap(), claims);
         assert!(Claims::parse("{\"contact\": 1}").is_err());
+    }
+
+    #[test]
+    fn claims_of_rows_that_are_no_more_go() {
+        let rows = |names: &[&str]| -> Vec<Row> {
+            let row = |name: &&str| Row {
+                what: (*name).to_owned(),
+                claim: Some(name.len() as f64),
+                ..Row::default()
+            };
+            names.iter().map(row).collect()
+        };
+        let mut claims = Claims::default();
+        assert!(
+            claims
+                .take("contact", true, &rows(&["both", "page", "old"]))
+                .is_empty()
+        );
+        assert!(
+            claims
+                .take("contact", false, &rows(&["both", "short"]))
+                .is_empty()
+        );
+        let other = format!("contact{OTHER_FORM}");
+        let named = |claims: &Claims, table: &str| -> Vec<String> {
+            claims
+                .0
+                .get(table)
+                .into_iter()
+                .flatten()
+                .map(|(key, _)| key.clone())
+                .collect()
+        };
+        assert_eq!(named(&claims, "contact"), ["both", "old", "page"]);
+        assert_eq!(named(&claims, &other), ["short"]);
+        // What the page's form has no more may be the other's; what neither has is dropped.
+        let now = rows(&["both", "page"]);
+        assert_eq!(claims.without_row("contact", true, &now), ["old"]);
+        assert!(claims.take("contact", true, &now).is_empty());
+        assert_eq!(named(&claims, &other), ["old", "short"]);
+        let short = rows(&["both", "short"]);
+        assert_eq!(claims.without_row("contact", false, &short), ["old"]);
+        assert_eq!(claims.take("contact", false, &short), ["old"]);
+        assert_eq!(named(&claims, "contact"), ["both", "page"]);
+        assert_eq!(named(&claims, &other), ["short"]);
+        // Nothing is dropped for rows that cannot be measured here, nor in other tables.
+        let skipped = Row {
+            what: "pa".into(),
+            bound: "skipped".into(),
+            ..Row::default()
+        };
+        assert!(claims.without_row("contact", true, &[skipped.clone()]) == ["both"]);
+        claims.take("stability", true, &rows(&["other"]));
+        claims.take("contact", true, &[skipped]);
+        assert_eq!(named(&claims, "contact"), ["page"]);
+        assert_eq!(named(&claims, "stability"), ["other"]);
     }
 
     #[test]

@@ -97,15 +97,25 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     })
 }
 
+/// Whether the page of a table is made from the shorter form; `None` when there is no such table.
+fn page_is_quick(name: &str) -> Option<bool> {
+    let of = |artefact: &Artefact| match artefact.made {
+        Made::Page { quick } if artefact.name == name => Some(quick),
+        _ => None,
+    };
+    ARTEFACTS.iter().find_map(of)
+}
+
 /// Measures a table, keeps the claims of new rows and writes the page; true if every bound holds.
 fn write_page(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<bool> {
-    let known = |artefact: &&Artefact| artefact.name == name && matches!(artefact.made, Made::Page { .. });
-    if !ARTEFACTS.iter().any(|artefact| known(&artefact)) {
+    let Some(of_page) = page_is_quick(name).map(|page| page == quick) else {
         bail!("there is no table `{name}`; `mortise lab figures --help` names them");
-    }
+    };
     let measured = measure(root, program, name, quick, by)?;
     let mut claims = Claims::read(root)?;
-    claims.take(name, &measured.rows);
+    for key in claims.take(name, of_page, &measured.rows) {
+        eprintln!("{}: dropped, no row: {name}: {key}", claims::FILE);
+    }
     claims.write(root)?;
     let file = root.join(artefacts::FOLDER).join(format!("{name}.md"));
     std::fs::write(&file, page::text(name, quick, &measured.rows))
@@ -139,6 +149,7 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
 /// When a bound does not hold, or a number differs; what and where was printed.
 pub fn check(root: &Path, program: &Path) -> Result<String> {
     let quoted = quoted::of_pages(root)?;
+    let claims = Claims::read(root)?;
     let (mut said, mut wrong) = (Vec::new(), Vec::new());
     let measured_tables = quoted::measured(&quoted);
     for table in &measured_tables {
@@ -153,6 +164,12 @@ pub fn check(root: &Path, program: &Path) -> Result<String> {
                 "{table}: the program says by its exit code that a bound does not hold"
             ));
         }
+        let of_page = page_is_quick(table) == Some(true);
+        let gone = claims.without_row(table, of_page, &measured.rows);
+        wrong.extend(
+            gone.iter()
+                .map(|key| format!("{}: no row of {table}: {key}", claims::FILE)),
+        );
         let page = page_of(root, table)?;
         wrong.extend(quoted::differences(table, &measured.rows, &page));
         for quoted in quoted.iter().filter(|quoted| quoted.table == *table) {
