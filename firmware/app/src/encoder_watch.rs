@@ -14,7 +14,11 @@
 //!
 //! *Sign of life*: the counts since the last one span [`ALIVE_COUNTS`]. One count is none: an encoder with one of its two channels broken counts one up
 //! and one down as it turns. *Reason to have moved*: any axis of the mechanism went [`FAR_COUNTS`] since this one last answered a probe. A mechanism at
-//! rest that does not push is therefore left alone, once every axis has answered.
+//! rest that does not push is therefore left alone, once every axis has answered: one that was dead before the part was grabbed is found so.
+//!
+//! What a probe itself moves is no reason to move, or probes ask for probes without end: friction leaves a handle anywhere within f/k of its rest, and
+//! each probe may take it to the other side. How far a handle swings a rig says itself ([`EncoderWatch::swinging`]). While an axis may still swing, only
+//! more than that is a motion, and what is left of it afterwards is none.
 //!
 //! From the last sign of life to the verdict: [`STILL_TICKS`] + 2·[`RAMP_TICKS`] + [`LISTEN_TICKS`] = [`VERDICT_TICKS`] at the most, since an earlier probe
 //! is over by then: it returns twice as fast as it rose. Cost: some 20 integer operations an axis and tick. No allocation, total.
@@ -29,7 +33,7 @@ pub const LISTEN_TICKS: u16 = 20;
 pub const VERDICT_TICKS: u16 = STILL_TICKS + 2 * RAMP_TICKS + LISTEN_TICKS;
 /// Counts from one side to the other that are a sign of life.
 pub const ALIVE_COUNTS: i32 = 2;
-/// Counts any axis goes, after which every other has a reason to have moved: more than a probe itself moves.
+/// Counts any axis goes, after which every other has a reason to have moved.
 pub const FAR_COUNTS: i32 = 4;
 /// Share of what a motor can give from which on its axis is always watched.
 pub const LOADED: f32 = 0.05;
@@ -63,7 +67,11 @@ pub struct AxisTick {
 
 /// All encoders of a mechanism.
 #[derive(Clone, Copy, Debug)]
-pub struct EncoderWatch<const N: usize>([Axis; N]);
+pub struct EncoderWatch<const N: usize> {
+    axes: [Axis; N],
+    /// As [`FAR_COUNTS`], of an axis that may still swing from a probe.
+    swing_counts: i32,
+}
 
 #[derive(Clone, Copy, Debug)]
 struct Axis {
@@ -73,7 +81,7 @@ struct Axis {
     high: i32,
     /// Ticks since then.
     still: u16,
-    /// Counts since the axis last went far.
+    /// Counts since the axis last went far, without what a probe left behind.
     travel: i32,
     /// It had a reason to move since it last answered a probe.
     owes_answer: bool,
@@ -90,6 +98,8 @@ struct Probe {
     up: bool,
     /// Ticks since it was over.
     listened: u16,
+    /// Ticks for which the axis may still swing.
+    swings: u16,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,17 +125,25 @@ impl<const N: usize> Default for EncoderWatch<N> {
 impl<const N: usize> EncoderWatch<N> {
     /// Nothing seen yet; every encoder has to answer once.
     pub const fn new() -> Self {
-        Self([Axis::NEW; N])
+        Self::swinging(FAR_COUNTS)
+    }
+
+    /// Likewise, of axes that a probe may swing by less than `counts` with a hand at rest: less is then no reason to move.
+    pub const fn swinging(counts: i32) -> Self {
+        Self {
+            axes: [Axis::NEW; N],
+            swing_counts: counts,
+        }
     }
 
     /// One reading while a part is felt; the first axis that is dead. When no part is felt call [`Self::rest`] instead.
     pub fn update(&mut self, ticks: &[AxisTick; N]) -> Option<u8> {
         let mut far = false;
-        for (axis, tick) in self.0.iter_mut().zip(ticks) {
-            far |= axis.goes_far(tick.moved);
+        for (axis, tick) in self.axes.iter_mut().zip(ticks) {
+            far |= axis.goes_far(tick.moved, self.swing_counts);
         }
         let mut dead = None;
-        for (number, (axis, tick)) in self.0.iter_mut().zip(ticks).enumerate() {
+        for (number, (axis, tick)) in self.axes.iter_mut().zip(ticks).enumerate() {
             axis.owes_answer |= far;
             if axis.update(tick) && dead.is_none() {
                 dead = Some(number as u8);
@@ -136,12 +154,12 @@ impl<const N: usize> EncoderWatch<N> {
 
     /// No part is felt: no probes.
     pub fn rest(&mut self) {
-        *self = Self::new();
+        self.axes = [Axis::NEW; N];
     }
 
     /// Share of the probe's amplitude to add to an axis, −1 to 1; 0 for an axis that is not there.
     pub fn share(&self, axis: usize) -> f32 {
-        self.0.get(axis).map_or(0.0, |axis| axis.probe.share())
+        self.axes.get(axis).map_or(0.0, |axis| axis.probe.share())
     }
 }
 
@@ -158,12 +176,18 @@ impl Axis {
             level: 0,
             up: false,
             listened: 0,
+            swings: 0,
         },
     };
 
-    fn goes_far(&mut self, moved: i32) -> bool {
+    fn goes_far(&mut self, moved: i32, swing_counts: i32) -> bool {
         self.travel = self.travel.saturating_add(moved);
-        let far = self.travel.unsigned_abs() >= FAR_COUNTS as u32;
+        let most = if self.probe.swings > 0 {
+            swing_counts
+        } else {
+            FAR_COUNTS
+        };
+        let far = self.travel.unsigned_abs() >= most as u32;
         if far {
             self.travel = 0;
         }
@@ -197,7 +221,11 @@ impl Axis {
         if self.still >= STILL_TICKS && (self.owes_answer || pushes) {
             self.probe.begin(tick.effort);
         }
+        let swung = self.probe.swings > 0;
         self.probe.advance();
+        if swung && self.probe.swings == 0 && self.travel.unsigned_abs() >= FAR_COUNTS as u32 {
+            self.travel = 0;
+        }
         self.probe.listened >= LISTEN_TICKS
     }
 }
@@ -224,6 +252,11 @@ impl Probe {
     }
 
     fn advance(&mut self) {
+        self.swings = if self.phase == Phase::Rest {
+            self.swings.saturating_sub(1)
+        } else {
+            STILL_TICKS
+        };
         match self.phase {
             Phase::Rest => {}
             Phase::Rise => {

@@ -46,6 +46,11 @@ const PROBE_FORCE: f32 = amplitude(STIFFEST_HAND, RESOLUTION, COULOMB);
 /// Likewise about an axis, N·m: 0.006.
 const PROBE_TORQUE: f32 = amplitude(STIFFEST_WRIST, ANGULAR_RESOLUTION, ANGULAR_COULOMB);
 
+/// Counts that a probe swings the handle by in a hand at rest, at the most. Friction leaves the handle within [`COULOMB`]/k of where the hand wants it, so
+/// a probe may take it by 2·[`COULOMB`]/k from one side to the other: 50 µm or 10 counts in a hand of 400 N/m, 27 in one of 150 N/m; what it swings
+/// beyond its answer is about 4 counts at 400 N/m. Hands from 50 to 5,000 N/m are tried in `tests/encoder_watch.rs`.
+const SWING_COUNTS: i32 = 32;
+
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct Simulated {
@@ -107,7 +112,7 @@ impl Simulated {
             driven: Wrench::ZERO,
             motors: Wrench::ZERO,
             felt: false,
-            watch: EncoderWatch::new(),
+            watch: EncoderWatch::swinging(SWING_COUNTS),
         }
     }
 

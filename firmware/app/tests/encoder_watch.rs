@@ -7,6 +7,7 @@ use mortise_firmware::board::{Drive, Mechanism, Sensed};
 use mortise_firmware::described::Described;
 use mortise_firmware::encoder_watch::VERDICT_TICKS;
 use mortise_firmware::simulated::Simulated;
+use mortise_haptics::observer::Rise;
 use mortise_haptics::{Pose, Wrench};
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use proptest::prelude::*;
@@ -146,6 +147,47 @@ fn a_still_hand_that_presses_for_a_minute_is_no_dead_encoder() {
     assert!((high - low) < 25e-6, "{} m", high - low);
 }
 
+/// A free handle that is moved and then held at rest: what its probes give to the hand over any interval, and that they end.
+#[test]
+fn probes_give_a_resting_hand_less_than_ten_microjoules() {
+    for stiffness in [50.0, 100.0, 200.0, 400.0, 1_000.0, 5_000.0] {
+        for damping_s in [0.003, 0.01, 0.02] {
+            let grip = Grip {
+                stiffness,
+                damping_s,
+                ..STEADY
+            };
+            let mut rig = Simulated::new();
+            let place = |x: f32| Pose::new(Vec3::new(x, -0.7 * x, 0.4 * x), Quat::from_rotation_y(10.0 * x));
+            let frames = [(0, place(0.0), Vec3::ZERO), (500, place(0.01), Vec3::ZERO)];
+            rig.set_hand(Some(&hand(grip, &frames)));
+            let (mut rise, mut last, mut probed) = (Rise::default(), (rig.truth(), rig.motors()), 0);
+            for tick in 0..20_000 {
+                rig.sense();
+                let (from, held) = last;
+                let to = rig.truth();
+                let turned = (to.orientation * from.orientation.conjugate()).to_scaled_axis();
+                let work = held.force.dot(to.position - from.position) + held.torque.dot(turned);
+                rise.stored(0.0);
+                rise.gave(f64::from(work));
+                rig.watch_encoders(true);
+                rig.drive(Drive::Wrench(Wrench::ZERO));
+                last = (to, rig.motors());
+                if rig.motors() != Wrench::ZERO {
+                    probed = tick;
+                }
+            }
+            let given = rise.most();
+            println!(
+                "{stiffness} N/m, {damping_s} s: {:.2} µJ, last probe after {probed} ms",
+                1e6 * given
+            );
+            assert!(given > 0.0 && given < 10e-6, "{grip:?}: {given} J");
+            assert!(probed < 1_500, "{grip:?}: {probed} ms");
+        }
+    }
+}
+
 /// Amplitude of the line at `hz` over whole seconds.
 fn amplitude(way: &[f32], hz: u32) -> f64 {
     let (mut re, mut im) = (0.0, 0.0);
@@ -239,9 +281,14 @@ proptest! {
         prop_assert!(in_time, "{found:?}");
     }
 
-    /// Likewise the joints of an arm and a pantograph, away from stops and singular postures, where they are not judged. One joint's frozen encoder
-    /// bends the pose that both are driven by, so that in a pantograph the other joint may be named (kept cases); the motors are off in time all the
-    /// same.
+    /// Likewise the joints of an arm and a pantograph, away from stops and singular postures, where they are not judged.
+    ///
+    /// In a pantograph the other joint may be named, but only one that has itself been silent since before the freeze, so that its verdict comes sooner
+    /// than a frozen one's can (one of the kept cases, by 4 ms; none of 200 random ones). Both joints are then probed at once, and counts cannot tell
+    /// which silence is a defect: with J₀ and J₁ the ways the handle goes for a radian of each joint and c the cosine between them, a hand of
+    /// stiffness k answers torques τ by δq = (JᵀJ)⁻¹·τ/k. Two probes as strong as each other, with equal levers L, move a joint by τ/(k·L²·(1 + c)) where
+    /// they work against each other: by as little as half of what the amplitude is for, which a hand that moves on may cancel. The motors are off in
+    /// time all the same.
     #[test]
     fn a_joint_encoder_frozen_under_motion_is_found(
         grip in any_grip(), places in places(), axis in 0usize..3, at in 500u32..2_000, push in 0.0f32..4.0,
@@ -252,7 +299,8 @@ proptest! {
             let soft = Grip { stiffness: grip.stiffness.min(1_500.0), ..grip };
             let found = frozen(Described::new(&rig).unwrap(), soft, &near, axis, at, push);
             let in_time = found.is_some_and(|(dead, after)| {
-                let named = usize::from(dead) == axis || joints == 2;
+                let silent_before = joints == 2 && after < u32::from(VERDICT_TICKS) - 1;
+                let named = usize::from(dead) == axis || silent_before;
                 named && after <= u32::from(VERDICT_TICKS)
             });
             prop_assert!(in_time, "{}: {found:?}", rig.name);
