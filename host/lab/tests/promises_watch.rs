@@ -1,8 +1,8 @@
-//! The promises on still hands, dead encoders and rotation hold in their shorter form, and would not if nothing was measured.
+//! The promises on still hands, dead encoders, rotation, STOP behind a full line and external sets hold in their shorter form, and would not if nothing was measured.
 
 use std::path::Path;
 
-use mortise_lab::figures::promises::watch;
+use mortise_lab::figures::promises::{files, stop, watch};
 use mortise_lab::figures::{Plan, Row};
 
 fn main() {
@@ -23,8 +23,15 @@ fn main() {
         rows.push(row);
     };
     watch::measure(&plan, &mut keep).expect("measured");
+    stop::measure(&plan, &mut keep).expect("measured");
+    files::external_set(&plan, &mut keep).expect("measured");
     let broken: Vec<&Row> = rows.iter().filter(|row| row.fails()).collect();
     assert!(broken.is_empty(), "{broken:#?}");
-    assert_eq!(rows.len(), 5);
+    assert_eq!(rows.len(), 8);
+    // Without STOP the same motors are driven to the end.
+    assert_eq!(
+        stop::ticks_until_off(&plan, false).expect("measured"),
+        f64::INFINITY
+    );
     println!("test result: ok. 1 passed; 0 failed; 0 ignored; 0 measured; 0 filtered out");
 }

@@ -1,8 +1,12 @@
 //! Files and processes: what the program must not destroy, and what it refuses to read, by the program itself.
 
+use std::f64::consts::PI;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
+
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_brep::{CadModel, load_step};
 
 use super::{Plan, Row};
 use crate::LabError;
@@ -12,14 +16,7 @@ const REFUSAL_S: f64 = 5.0;
 
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    let place = tempfile::tempdir().map_err(|source| LabError::Unwritable {
-        path: std::env::temp_dir(),
-        source,
-    })?;
-    let text = std::fs::read_to_string(plan.pair).map_err(|source| LabError::Unreadable {
-        path: plan.pair.to_owned(),
-        source,
-    })?;
+    let (place, text) = (folder()?, pair(plan)?);
     let (kept, tried) = outputs(plan.program, place.path(), &text)?;
     out(Row::exactly(
         format!("outputs refused that would have destroyed something, of {tried}"),
@@ -39,7 +36,264 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             REFUSAL_S,
         ));
     }
+    external_set(plan, out)
+}
+
+fn folder() -> Result<tempfile::TempDir, LabError> {
+    tempfile::tempdir().map_err(|source| LabError::Unwritable {
+        path: std::env::temp_dir(),
+        source,
+    })
+}
+
+/// Text of the thesis pair.
+fn pair(plan: &Plan<'_>) -> Result<String, LabError> {
+    std::fs::read_to_string(plan.pair).map_err(|source| LabError::Unreadable {
+        path: plan.pair.to_owned(),
+        source,
+    })
+}
+
+/// Inches in a millimetre.
+const INCH: f64 = 1.0 / 25.4;
+/// Times the pair is placed.
+const PLACES: usize = 8;
+/// Points whose places are compared lie this far along the axes of a part, mm.
+const REACH_MM: f64 = 100.0;
+
+/// The pair placed several times in an assembly in inches, each time by a turned and moved axis of its own: in one file, and from a file beside it. Both
+/// must have all parts, each where item 2 · (item 1)⁻¹ of ISO 10303-43 puts it.
+///
+/// # Errors
+/// When the pair cannot be read, or what is made of it.
+pub fn external_set(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let (place, text) = (folder()?, pair(plan)?);
+    let (place, text) = (place.path(), text.as_str());
+    let write = |name: &str, text: &str| {
+        let path = place.join(name);
+        std::fs::write(&path, text)
+            .map(|()| path.clone())
+            .map_err(|source| LabError::Unwritable { path, source })
+    };
+    let alone = load_step(write("pair.step", text)?)?;
+    let mut models = Vec::new();
+    for (name, text) in [("flat.step", flat(text)), ("set.step", Some(set()))] {
+        models.push(match text {
+            Some(text) => load_step(write(name, &text)?)?,
+            None => CadModel::default(),
+        });
+    }
+    let wanted: Vec<(&str, DAffine3)> = (0..PLACES)
+        .flat_map(|i| {
+            let motion = given(i) * own(i).inverse();
+            alone
+                .parts
+                .iter()
+                .map(move |part| (part.name.as_str(), motion * part.placement))
+        })
+        .collect();
+    let right = |model: &CadModel| {
+        let shapes = |model: &CadModel| model.shapes.len();
+        model.parts.len() == wanted.len() && shapes(model) == shapes(&alone) && !alone.parts.is_empty()
+    };
+    let what =
+        format!("external set in another unit, placed {PLACES} times by axes of its own, and the flat file");
+    let sound = models.iter().all(right);
+    out(Row::exactly(
+        format!("{what}: parts of the set"),
+        if sound {
+            models[1].parts.len() as f64
+        } else {
+            f64::NAN
+        },
+        "parts",
+        wanted.len() as f64,
+    ));
+    let mut farthest = if sound { 0.0f64 } else { f64::NAN };
+    for model in &models {
+        let mut left: Vec<&(&str, DAffine3)> = wanted.iter().collect();
+        for part in &model.parts {
+            // Of those of this name, the one that is nearest to where it is: each is taken once.
+            let far = |wanted: &DAffine3| {
+                let points = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|point| REACH_MM * point);
+                let apart = |p: DVec3| {
+                    part.placement
+                        .transform_point3(p)
+                        .distance(wanted.transform_point3(p))
+                };
+                points.map(apart).into_iter().fold(0.0, f64::max)
+            };
+            let nearest = (0..left.len())
+                .filter(|&i| part.name.starts_with(left[i].0))
+                .min_by(|&a, &b| far(&left[a].1).total_cmp(&far(&left[b].1)));
+            farthest = match nearest {
+                Some(nearest) => farthest.max(far(&left.swap_remove(nearest).1)),
+                None => f64::NAN,
+            };
+            if farthest.is_nan() {
+                break;
+            }
+        }
+        if !left.is_empty() {
+            farthest = f64::NAN;
+        }
+    }
+    out(Row::at_most(
+        format!("{what}: farthest that a point of a part lies from where ISO 10303-43 puts it"),
+        farthest,
+        "mm",
+        1e-6,
+    ));
     Ok(())
+}
+
+/// Axis of the pair that is placed, mm.
+fn own(i: usize) -> DAffine3 {
+    let i = i as f64;
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4 * i - PI, 0.3 * i, 0.2 + 0.7 * i);
+    DAffine3::from_rotation_translation(turn, DVec3::new(7.0 - 3.0 * i, 11.0 * i, -5.0))
+}
+
+/// Axis of the assembly on which it lies, mm.
+fn given(i: usize) -> DAffine3 {
+    let i = i as f64;
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 1.1 * i, 0.5 - 0.2 * i, 0.9 * i);
+    DAffine3::from_rotation_translation(turn, DVec3::new(150.0 * i, 20.0, 30.0 - 40.0 * i))
+}
+
+/// An assembly in inches of the product definition `#child` with the representation `#shape`, in whose unit a millimetre is `scale`. Numbers from `first` on.
+fn assembly(first: u64, child: u64, shape: u64, scale: f64) -> String {
+    let mut data = String::new();
+    let mut next = first;
+    let mut add = |body: String| {
+        data += &format!("#{next}={body};\n");
+        next += 1;
+        next - 1
+    };
+    let context = inches(&mut add);
+    let axes: Vec<[u64; 2]> = (0..PLACES)
+        .map(|i| [(own(i), scale), (given(i), INCH)].map(|(motion, scale)| axis(&mut add, motion, scale)))
+        .collect();
+    let origin = axis(&mut add, DAffine3::IDENTITY, 1.0);
+    let (definition, root) = product(&mut add, "assembly", context, origin);
+    for (i, [own, given]) in axes.into_iter().enumerate() {
+        let occurrence = add(format!(
+            "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{i}','pair {i}','',#{definition},#{child},$)"
+        ));
+        let placed = add(format!("PRODUCT_DEFINITION_SHAPE('','',#{occurrence})"));
+        let motion = add(format!("ITEM_DEFINED_TRANSFORMATION('','',#{own},#{given})"));
+        let relation = add(format!(
+            "(REPRESENTATION_RELATIONSHIP('','',#{shape},#{root})REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{motion})\
+             SHAPE_REPRESENTATION_RELATIONSHIP())"
+        ));
+        add(format!(
+            "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{placed})"
+        ));
+    }
+    data
+}
+
+/// A context of representations in inches.
+fn inches(add: &mut impl FnMut(String) -> u64) -> u64 {
+    let metre = add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.))".into());
+    let measure = add(format!(
+        "LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.0254),#{metre})"
+    ));
+    let inch = add(format!(
+        "(CONVERSION_BASED_UNIT('INCH',#{measure})LENGTH_UNIT()NAMED_UNIT(#{metre}))"
+    ));
+    let angle = add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))".into());
+    let solid = add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())".into());
+    add(format!(
+        "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#{inch},#{angle},#{solid}))\
+         REPRESENTATION_CONTEXT('',''))"
+    ))
+}
+
+fn axis(add: &mut impl FnMut(String) -> u64, motion: DAffine3, scale: f64) -> u64 {
+    let triple = |v: DVec3| format!("({:?},{:?},{:?})", v.x, v.y, v.z).to_uppercase();
+    let origin = add(format!(
+        "CARTESIAN_POINT('',{})",
+        triple(scale * motion.translation)
+    ));
+    let z = add(format!("DIRECTION('',{})", triple(motion.matrix3.z_axis)));
+    let x = add(format!("DIRECTION('',{})", triple(motion.matrix3.x_axis)));
+    add(format!("AXIS2_PLACEMENT_3D('',#{origin},#{z},#{x})"))
+}
+
+/// A product without a shape of its own: its definition and its representation.
+fn product(add: &mut impl FnMut(String) -> u64, name: &str, context: u64, origin: u64) -> (u64, u64) {
+    let application = add("APPLICATION_CONTEXT('automotive design')".into());
+    let mechanical = add(format!("PRODUCT_CONTEXT('',#{application},'mechanical')"));
+    let product = add(format!("PRODUCT('{name}','{name}','',(#{mechanical}))"));
+    let formation = add(format!("PRODUCT_DEFINITION_FORMATION('','',#{product})"));
+    let design = add(format!(
+        "PRODUCT_DEFINITION_CONTEXT('part definition',#{application},'design')"
+    ));
+    let definition = add(format!("PRODUCT_DEFINITION('design','',#{formation},#{design})"));
+    let shape = add(format!("PRODUCT_DEFINITION_SHAPE('','',#{definition})"));
+    let representation = add(format!("SHAPE_REPRESENTATION('',(#{origin}),#{context})"));
+    add(format!(
+        "SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation})"
+    ));
+    (definition, representation)
+}
+
+/// The pair's text with the assembly in it.
+fn flat(text: &str) -> Option<String> {
+    let (child, shape) = (
+        number(text, "PRODUCT_DEFINITION(")?,
+        number(text, "SHAPE_REPRESENTATION(")?,
+    );
+    let end = text.rfind("ENDSEC;")?;
+    // The pair is in millimetres.
+    let assembly = assembly(1 + largest(text)?, child, shape, 1.0);
+    Some(format!("{}{assembly}{}", &text[..end], &text[end..]))
+}
+
+/// The assembly alone; what it places is in `pair.step`.
+fn set() -> String {
+    let mut data = String::new();
+    let mut next = 1;
+    let mut add = |body: String| {
+        data += &format!("#{next}={body};\n");
+        next += 1;
+        next - 1
+    };
+    let context = inches(&mut add);
+    let origin = axis(&mut add, DAffine3::IDENTITY, 1.0);
+    let (child, shape) = product(&mut add, "pair", context, origin);
+    let kind = add("DOCUMENT_TYPE('geometry')".into());
+    let document = add(format!("DOCUMENT_FILE('pair.step','','',#{kind},'',$)"));
+    let source = add("EXTERNAL_SOURCE(IDENTIFIER(''))".into());
+    let role = add("IDENTIFICATION_ROLE('external document id and location',$)".into());
+    add(format!(
+        "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT('pair.step',#{role},#{source},(#{document}))"
+    ));
+    let tie = add(format!("APPLIED_DOCUMENT_REFERENCE(#{document},'',(#{child}))"));
+    let assembly = assembly(tie + 1, child, shape, INCH);
+    format!(
+        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n\
+         FILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;\n{data}{assembly}ENDSEC;\nEND-ISO-10303-21;\n"
+    )
+}
+
+/// Number of the first entity of a type; `before` is how its body begins.
+fn number(text: &str, before: &str) -> Option<u64> {
+    let at = text
+        .find(&format!("= {before}"))
+        .or_else(|| text.find(&format!("={before}")))?;
+    let start = text[..at].rfind('#')?;
+    text[start + 1..at].trim().parse().ok()
+}
+
+/// Largest number of an entity.
+fn largest(text: &str) -> Option<u64> {
+    let numbers = text.lines().filter_map(|line| {
+        let number = line.strip_prefix('#')?.split(['=', ' ']).next()?;
+        number.parse().ok()
+    });
+    numbers.max()
 }
 
 /// How many of the dangerous outputs are refused with everything left as it was, and how many there are.
@@ -123,27 +377,8 @@ fn huge(text: &str) -> Option<String> {
 
 /// The text with its first product placed twice in an assembly, that twice in the next, 24 times over.
 fn bomb(text: &str) -> Option<String> {
-    let number = |before: &str| -> Option<u64> {
-        let at = text.find(before)?;
-        let start = text[..at].rfind('#')?;
-        text[start + 1..at]
-            .trim()
-            .trim_end_matches('=')
-            .trim()
-            .parse()
-            .ok()
-    };
-    let mut child = number("PRODUCT_DEFINITION(")?;
-    let mut next = 1 + text
-        .lines()
-        .filter_map(|line| {
-            line.strip_prefix('#')?
-                .split(['=', ' '])
-                .next()?
-                .parse::<u64>()
-                .ok()
-        })
-        .max()?;
+    let mut child = number(text, "PRODUCT_DEFINITION(")?;
+    let mut next = 1 + largest(text)?;
     let mut data = String::new();
     for _ in 0..24 {
         let parent = next;

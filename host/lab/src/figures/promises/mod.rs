@@ -1,8 +1,9 @@
 //! Promises: what the pages on safety, protocol and files say, tried by somebody who wants it to fail.
 
 mod energy;
-mod files;
+pub mod files;
 mod orders;
+pub mod stop;
 mod thesis;
 pub mod watch;
 mod window;
@@ -13,6 +14,7 @@ use crate::LabError;
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     orders::measure(plan, out)?;
+    stop::measure(plan, out)?;
     watch::measure(plan, out)?;
     energy::measure(plan, out)?;
     files::measure(plan, out)?;

@@ -1,0 +1,300 @@
+//! STOP behind everything else: the output full, the host not reading, and commands waiting before it.
+//!
+//! The in-process rig in lockstep through raw bytes, so that ticks are counted. The host reads nothing while telemetry all but fills the line; then one
+//! write releases more ticks, asks 200 things whose answers find no room, and ends in STOP. Only then it reads.
+
+use std::io::{self, Read as _, Write as _};
+use std::time::{Duration, Instant};
+
+use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
+use mortise_protocol::limits::MAX_FRAME;
+use mortise_protocol::message::{
+    FromDevice, HandScript, Keyframe, Statistics, Telemetry, ToDevice, Version, WirePose,
+};
+use mortise_rig::{Client, Flash, PIPE_CAPACITY, Patience, RigError, Transport, simulate};
+
+use crate::LabError;
+use crate::figures::{Plan, Row};
+use crate::scenario::{PreparedScene, Scenario};
+
+/// Commands before STOP.
+const COMMANDS: usize = 200;
+/// Ticks released before STOP and not yet run.
+const RELEASED: u32 = 50;
+/// Share of the line that telemetry fills before.
+const FILLED: f64 = 0.95;
+/// A bound for what takes milliseconds: only a hang reaches it.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Long enough for the board to run all ticks it may and to take in what was written.
+const PAUSE: Duration = Duration::from_millis(500);
+
+/// Measures the row.
+///
+/// # Errors
+/// Anything that keeps the scene from being baked or the board from answering.
+pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let ticks = ticks_until_off(plan, true)?;
+    out(Row::exactly(
+        format!(
+            "STOP to motors off, output full, host not reading, {COMMANDS} commands and {RELEASED} released ticks before it, in-process in lockstep (infinite: never)"
+        ),
+        ticks,
+        "ticks",
+        1.0,
+    ));
+    Ok(())
+}
+
+/// Ticks that run from the one in which the board has taken in STOP until the first without a wrench; without `stop`, the same with no STOP at the end.
+/// NaN when the output was not full, or the motors were not driven before.
+///
+/// # Errors
+/// As [`measure`].
+pub fn ticks_until_off(plan: &Plan<'_>, stop: bool) -> Result<f64, LabError> {
+    let scenario = Scenario::insertion(plan.pair)?;
+    let scene = PreparedScene::of(&scenario)?;
+    let flash = Flash::default();
+    let client = Client::over(simulate(&flash, false)?, "sim-fast", Patience::long(), None)?;
+    client.upload(&scene.image, &mut |_| {})?;
+    drop(client);
+    run(&flash, scene.part, stop).map_err(|error| {
+        LabError::Rig(RigError::LinkLost {
+            why: error.to_string(),
+        })
+    })
+}
+
+fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
+    let board = simulate(flash, false).map_err(io::Error::other)?;
+    let mut host = Host::greeted(board)?;
+    for message in [
+        ToDevice::Lockstep(true),
+        ToDevice::SetTelemetry { every_ticks: 1 },
+    ] {
+        host.done(&message)?;
+    }
+    let seen = host.ticks(1)?;
+    let Some(handle) = seen.telemetry.last().map(|sample| sample.handle) else {
+        return Ok(f64::NAN);
+    };
+    for message in [
+        ToDevice::Arm,
+        ToDevice::Grab { part },
+        ToDevice::SimulatedHand(trembling(handle)),
+    ] {
+        host.done(&message)?;
+    }
+    // Past the ramp that follows arming.
+    let seen = host.ticks(1_000)?;
+    let bytes_a_tick = seen.bytes as f64 / 1_000.0;
+    let filling = (FILLED * PIPE_CAPACITY as f64 / bytes_a_tick) as u32;
+    host.send(&ToDevice::Run { ticks: filling })?;
+    std::thread::sleep(PAUSE);
+
+    let mut burst = host.frame(&ToDevice::Run { ticks: RELEASED })?;
+    // Most of them with long answers, so that the output is full before the last.
+    let messages = [
+        ToDevice::Release,
+        ToDevice::GetCapabilities,
+        ToDevice::GetCapabilities,
+        ToDevice::Arm,
+        ToDevice::GetCapabilities,
+        ToDevice::GetCapabilities,
+        ToDevice::GetRig,
+        ToDevice::GetCapabilities,
+    ];
+    for index in 0..COMMANDS {
+        burst.extend(host.frame(&messages[index % messages.len()])?);
+    }
+    if stop {
+        burst.extend(host.frame(&ToDevice::Stop)?);
+    }
+    host.writer.write_all(&burst)?;
+    std::thread::sleep(PAUSE);
+
+    let seen = host.until(|seen| seen.ran.len() == 2)?;
+    let Statistics { unanswered, .. } = host.statistics()?;
+    let before = seen.ran[0];
+    let driven = |sample: &&Telemetry| {
+        let wrench = &sample.wrench;
+        wrench.force.iter().chain(&wrench.torque).any(|part| *part != 0.0)
+    };
+    let mut earlier = seen.telemetry.iter().filter(|sample| sample.tick <= before);
+    let facts = [
+        ("commands found the output full", unanswered > 0),
+        (
+            "motors were driven until then",
+            earlier.all(|sample| driven(&sample)),
+        ),
+        (
+            "every tick was told",
+            seen.telemetry.len() == (filling + RELEASED) as usize,
+        ),
+        ("the released ticks ran", seen.ran[1] == before + RELEASED),
+    ];
+    let missing: Vec<&str> = facts
+        .iter()
+        .filter(|(_, so)| !so)
+        .map(|(fact, _)| *fact)
+        .collect();
+    if !missing.is_empty() {
+        eprintln!("STOP behind a full line: not so: {}", missing.join(", "));
+    }
+    let sound = missing.is_empty();
+    let last_driven = seen
+        .telemetry
+        .iter()
+        .filter(driven)
+        .map(|sample| sample.tick)
+        .max();
+    Ok(match last_driven {
+        Some(last) if sound && last < before + RELEASED => f64::from(last - before + 1),
+        Some(_) if sound => f64::INFINITY,
+        _ => f64::NAN,
+    })
+}
+
+/// A hand that pushes and is never at rest, so that the motors are driven in every tick.
+fn trembling(pose: WirePose) -> HandScript {
+    HandScript {
+        stiffness: 400.0,
+        damping: 4.0,
+        angular_stiffness: 2.0,
+        angular_damping: 0.02,
+        tremor: 2e-4,
+        tremor_hz: 9.0,
+        keyframes: [Keyframe {
+            tick: 0,
+            pose,
+            push: [0.0, 0.0, -1.0],
+        }]
+        .into_iter()
+        .collect(),
+    }
+}
+
+/// A host of raw bytes.
+struct Host {
+    reader: Box<dyn io::Read + Send>,
+    writer: Box<dyn io::Write + Send>,
+    /// Dropped after both.
+    _keep: Option<Box<dyn Send + Sync>>,
+    decoder: Decoder,
+    sequence: u16,
+    session: Option<u32>,
+}
+
+/// What the board has said.
+#[derive(Default)]
+struct Seen {
+    bytes: usize,
+    telemetry: Vec<Telemetry>,
+    /// Ticks since start at the end of each run.
+    ran: Vec<u32>,
+    /// Everything else.
+    others: Vec<FromDevice>,
+}
+
+impl Host {
+    fn greeted(board: Transport) -> io::Result<Self> {
+        let Transport { reader, writer, keep } = board;
+        let mut host = Self {
+            reader,
+            writer,
+            _keep: keep,
+            decoder: Decoder::new(),
+            sequence: 0,
+            session: None,
+        };
+        host.send(&ToDevice::Hello(Version::own()))?;
+        host.send(&ToDevice::GetCapabilities)?;
+        let session = |seen: &Seen| {
+            seen.others.iter().find_map(|message| match message {
+                FromDevice::Capabilities(capabilities) => Some(capabilities.session),
+                _ => None,
+            })
+        };
+        host.session = session(&host.until(|seen| session(seen).is_some())?);
+        Ok(host)
+    }
+
+    fn frame(&mut self, message: &ToDevice) -> io::Result<Vec<u8>> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let stamp = self.session.map(|session| Stamp {
+            session,
+            count: u32::from(self.sequence),
+        });
+        let mut frame = [0; MAX_FRAME];
+        let bytes = encode_stamped(self.sequence, stamp, message, &mut frame);
+        Ok(bytes
+            .map_err(|_| io::Error::other("a message is too large"))?
+            .to_vec())
+    }
+
+    fn send(&mut self, message: &ToDevice) -> io::Result<()> {
+        let frame = self.frame(message)?;
+        self.writer.write_all(&frame)
+    }
+
+    /// Sends, and waits until it is done.
+    fn done(&mut self, message: &ToDevice) -> io::Result<()> {
+        self.send(message)?;
+        let asked = self.sequence;
+        let answer = |said: &FromDevice| match said {
+            FromDevice::Ack { seq } if *seq == asked => Some(Ok(())),
+            FromDevice::Refused { seq, reason } if *seq == asked => {
+                Some(Err(io::Error::other(format!("refused: {reason:?}"))))
+            }
+            _ => None,
+        };
+        let seen = self.until(|seen| seen.others.iter().any(|said| answer(said).is_some()))?;
+        seen.others.iter().find_map(answer).unwrap_or(Ok(()))
+    }
+
+    /// Lets so many ticks run, and reads all of them.
+    fn ticks(&mut self, ticks: u32) -> io::Result<Seen> {
+        self.send(&ToDevice::Run { ticks })?;
+        self.until(|seen| !seen.ran.is_empty())
+    }
+
+    fn statistics(&mut self) -> io::Result<Statistics> {
+        self.send(&ToDevice::GetStatistics { reset: false })?;
+        let told = |seen: &Seen| {
+            seen.others.iter().find_map(|message| match message {
+                FromDevice::Statistics(statistics) => Some(*statistics),
+                _ => None,
+            })
+        };
+        let seen = self.until(|seen| told(seen).is_some())?;
+        Ok(told(&seen).unwrap_or_default())
+    }
+
+    fn until(&mut self, done: impl Fn(&Seen) -> bool) -> io::Result<Seen> {
+        let begun = Instant::now();
+        let (mut seen, mut bytes) = (Seen::default(), [0; 4096]);
+        while !done(&seen) {
+            if begun.elapsed() > PATIENCE {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            let count = match self.reader.read(&mut bytes) {
+                Ok(0) => return Err(io::ErrorKind::BrokenPipe.into()),
+                Ok(count) => count,
+                Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => {
+                    0
+                }
+                Err(error) => return Err(error),
+            };
+            seen.bytes += count;
+            for &byte in &bytes[..count] {
+                match self.decoder.push::<FromDevice>(byte) {
+                    Some(Ok((_, FromDevice::Telemetry(sample)))) => seen.telemetry.push(sample),
+                    Some(Ok((_, FromDevice::Ran { tick, .. }))) => seen.ran.push(tick),
+                    Some(Ok((_, other))) => seen.others.push(other),
+                    Some(Err(_)) => return Err(io::ErrorKind::InvalidData.into()),
+                    None => {}
+                }
+            }
+        }
+        Ok(seen)
+    }
+}
