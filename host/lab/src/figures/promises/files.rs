@@ -29,12 +29,13 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         ("a coordinate of 1e308", huge(&text)),
     ] {
         let took = refusal(plan.program, place.path(), text)?;
-        out(Row::at_most(
+        let row = Row::at_most(
             format!("{what} refused in one line after (infinite: not refused)"),
             took,
             "s",
             REFUSAL_S,
-        ));
+        );
+        out(row.varies());
     }
     external_set(plan, out)
 }
