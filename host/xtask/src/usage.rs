@@ -59,6 +59,10 @@ const COMMANDS: &[Command] = &[
                 "Make anew what is stale in docs/figures, or NAMEs of it, and say how long each took",
             ),
             (
+                "--record",
+                "Take NAMEs in docs/figures, made by hand, for what is made now",
+            ),
+            (
                 "--claim",
                 "Claim what is measured; else claims are kept, and only those of new rows added",
             ),

@@ -199,7 +199,7 @@ impl Artefact {
                 self.experiment(),
                 option(quick)
             ),
-            Made::ByHand => format!("by hand, then cargo xtask figures --renew {}", self.name),
+            Made::ByHand => format!("by hand, then cargo xtask figures --record {}", self.name),
         }
     }
 

@@ -1,7 +1,8 @@
 //! `cargo xtask figures NAME`: measures and keeps the figures of one part of the product.
 //!
 //! The program prints one JSON object a row, `{"what","value","unit","bound","holds"}`; this writes
-//! them as a table to `docs/figures/NAME.md`. `--check` compares what pages say with what is measured; `--renew` makes anew what is stale.
+//! them as a table to `docs/figures/NAME.md`. `--check` compares what pages say with what is measured; `--renew` makes anew what is stale, `--record`
+//! takes what was made by hand.
 
 pub mod artefacts;
 mod claims;
@@ -52,7 +53,7 @@ impl By {
     }
 }
 
-/// `cargo xtask figures [NAME] [--quick] [--claim]`, `--check` or `--renew [NAME]...`.
+/// `cargo xtask figures [NAME] [--quick] [--claim]`, `--check`, `--renew [NAME]...` or `--record NAME...`.
 pub fn command(arguments: &[String]) -> Result<ExitCode> {
     let root = shell::root()?;
     let mut arguments = arguments.to_vec();
@@ -63,6 +64,10 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     let options: Vec<&str> = options.iter().map(String::as_str).collect();
     let name = match (options.as_slice(), names.as_slice()) {
         (["--check"], []) | (["--renew"], _) => None,
+        (["--record"], [_, ..]) => {
+            renew::record_all(&root, &names)?;
+            return Ok(ExitCode::SUCCESS);
+        }
         ([] | ["--quick"] | ["--claim"] | ["--quick", "--claim"] | ["--claim", "--quick"], [name]) => {
             Some(name)
         }

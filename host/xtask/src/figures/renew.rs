@@ -1,10 +1,10 @@
-//! `cargo xtask figures --renew`: makes anew what is stale in `docs/figures`, and says how long each took.
+//! `cargo xtask figures --renew`: makes anew what is stale in `docs/figures`, and says how long each took; `--record` takes what lies there as made now.
 
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 
 use super::artefacts::{ARTEFACTS, Artefact, FOLDER, Made, Manifest, stale};
 use super::{By, write_page};
@@ -16,24 +16,18 @@ use crate::shell;
 /// # Errors
 /// When a command fails, or a name is not known.
 pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
-    if let Some(unknown) = names
-        .iter()
-        .find(|name| !ARTEFACTS.iter().any(|artefact| artefact.name == **name))
-    {
-        let known: Vec<&str> = ARTEFACTS.iter().map(|artefact| artefact.name).collect();
-        bail!(
-            "no artefact is called `{unknown}`; there are: {}",
-            known.join(" ")
-        );
+    for name in names {
+        named(name)?;
     }
     let (mut all_hold, mut said) = (true, Vec::new());
     for artefact in ARTEFACTS {
-        let named = names.iter().any(|name| name == artefact.name);
         let manifest = Manifest::read(root)?.unwrap_or_default();
-        let Some(why) = stale(root, artefact, &manifest)?.filter(|_| named || names.is_empty()) else {
+        let Some(why) = stale(root, artefact, &manifest)?
+            .filter(|_| names.is_empty() || names.iter().any(|name| name == artefact.name))
+        else {
             continue;
         };
-        if artefact.made == Made::ByHand && !named {
+        if artefact.made == Made::ByHand {
             said.push(format!("{} {why}: made {}", artefact.name, artefact.command()));
             continue;
         }
@@ -54,6 +48,27 @@ pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
         println!("nothing is stale");
     }
     Ok(all_hold)
+}
+
+/// Takes the files of `names` for what their commands, run by hand, make of the sources there are now.
+///
+/// # Errors
+/// When a name is not known, or the manifest cannot be written.
+pub fn record_all(root: &Path, names: &[String]) -> Result<()> {
+    let artefacts: Result<Vec<_>> = names.iter().map(|name| named(name)).collect();
+    for artefact in artefacts? {
+        record(root, artefact)?;
+        println!("recorded: {}", artefact.name);
+    }
+    Ok(())
+}
+
+fn named(name: &str) -> Result<&'static Artefact> {
+    let found = ARTEFACTS.iter().find(|artefact| artefact.name == name);
+    found.with_context(|| {
+        let known: Vec<&str> = ARTEFACTS.iter().map(|artefact| artefact.name).collect();
+        format!("no artefact is called `{name}`; there are: {}", known.join(" "))
+    })
 }
 
 /// Another run may have recorded what it made meanwhile: the manifest is read anew.
@@ -77,7 +92,7 @@ fn make(root: &Path, program: &Path, artefact: &Artefact) -> Result<bool> {
                 .with_context(|| format!("`{}` made nothing", artefact.command()))?;
             Ok(true)
         }
-        // A person says that it shows what the program looks like now.
+        // Never asked for.
         Made::ByHand => Ok(true),
     }
 }
