@@ -287,3 +287,44 @@ pub(crate) fn step_files(folder: &Path) -> Result<Vec<PathBuf>, LabError> {
     files.sort();
     Ok(files)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_answer_is_told() {
+        let read = |parts: usize| {
+            let part = mortise_brep::Part {
+                name: "part".into(),
+                path: Vec::new(),
+                shape: 0,
+                placement: glam::DAffine3::IDENTITY,
+                color: None,
+            };
+            Ok(CadModel {
+                parts: vec![part; parts],
+                ..CadModel::default()
+            })
+        };
+        let empty = || Err(BrepError::Empty { path: "x".into() });
+        assert_eq!(judge("real/as1-oc-214.stp", None, read(18)), None);
+        assert_eq!(judge("08_hard/broken_empty.step", None, empty()), None);
+        let named = Expected {
+            parts: vec!["sub/part".into()],
+        };
+        assert_eq!(judge("any.step", Some(&named), read(1)), None);
+        for (file, expected, read) in [
+            ("real/as1-oc-214.stp", None, read(17)),
+            ("real/as1-oc-214.stp", None, empty()),
+            ("08_hard/broken_empty.step", None, read(1)),
+            ("08_hard/broken_missing_ref.step", None, empty()),
+            ("nobody.step", None, read(1)),
+            ("nobody.step", None, empty()),
+            ("any.step", Some(&named), read(2)),
+            ("any.step", Some(&named), empty()),
+        ] {
+            assert!(judge(file, expected, read).is_some(), "{file}");
+        }
+    }
+}

@@ -198,7 +198,7 @@ mod tests {
             bound: "skipped".into(),
             ..Row::default()
         };
-        assert!(claims.without_row("contact", true, &[skipped.clone()]) == ["both"]);
+        assert!(claims.without_row("contact", true, std::slice::from_ref(&skipped)) == ["both"]);
         claims.take("stability", true, &rows(&["other"]));
         claims.take("contact", true, &[skipped]);
         assert_eq!(named(&claims, "contact"), ["page"]);
