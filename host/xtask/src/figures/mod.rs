@@ -148,7 +148,8 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
 }
 
 /// Measures the shorter form of every table that README quotes, and compares: bounds, claims, what pages quote, and the pages of
-/// figures. Bounds of what the machine decides are told and not judged: another machine, or a busy one, breaks no promise.
+/// figures. Bounds of what the machine decides are told and not judged: another machine, or a busy one, breaks no promise. What the page of figures
+/// says does not hold is told, too.
 ///
 /// # Errors
 /// When a bound does not hold, or a number differs; what and where was printed.
@@ -159,11 +160,17 @@ pub fn check(root: &Path, program: &Path) -> Result<String> {
     let measured_tables = quoted::measured(&quoted);
     for table in &measured_tables {
         let measured = measure(root, program, table, true, By::Kept)?;
-        let failing = |row: &&Row| row.fails() && !row.varies;
-        let failing = measured.rows.iter().filter(failing);
-        wrong.extend(failing.map(|row| format!("{table}: {}", row.line())));
-        let slow = measured.rows.iter().filter(|row| row.fails() && row.varies);
-        said.extend(slow.map(|row| format!("not judged, as the machine decides it: {}", row.line())));
+        let page = page_of(root, table)?;
+        let told = |row: &Row| page.iter().any(|kept| kept.key() == row.key() && kept.fails());
+        for row in measured.rows.iter().filter(|row| row.fails()) {
+            if row.varies {
+                said.push(format!("not judged, as the machine decides it: {}", row.line()));
+            } else if told(row) {
+                said.push(format!("fails, as its page says: {}", row.line()));
+            } else {
+                wrong.push(format!("{table}: {}", row.line()));
+            }
+        }
         if !measured.success && !measured.rows.iter().any(Row::fails) {
             wrong.push(format!(
                 "{table}: the program says by its exit code that a bound does not hold"
@@ -175,7 +182,6 @@ pub fn check(root: &Path, program: &Path) -> Result<String> {
             gone.iter()
                 .map(|key| format!("{}: no row of {table}: {key}", claims::FILE)),
         );
-        let page = page_of(root, table)?;
         wrong.extend(quoted::differences(table, &measured.rows, &page));
         for quoted in quoted.iter().filter(|quoted| quoted.table == *table) {
             wrong.extend(

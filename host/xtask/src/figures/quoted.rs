@@ -218,6 +218,11 @@ pub fn page_rows(text: &str) -> Vec<Row> {
             what: cells[0].clone(),
             value: cells[1].clone(),
             unit: cells[2].clone(),
+            holds: match cells.get(5).map(String::as_str) {
+                Some(cell) if cell.starts_with("yes") => Some(true),
+                Some(cell) if cell.starts_with("**no**") => Some(false),
+                _ => None,
+            },
             ..Row::default()
         })
         .collect()
@@ -314,6 +319,8 @@ mod tests {
         let page = "| what | value | unit | claim | bound | holds |\n|---|---:|---|---:|---|---|\n| a\\|b (1) | 2 | mm | 2 | ≤ 2.2 | yes |\n";
         let rows = page_rows(page);
         assert_eq!(rows.last().map(|row| row.what.as_str()), Some("a|b (1)"));
+        assert_eq!(rows.last().map(|row| row.holds), Some(Some(true)));
+        assert!(page_rows(&page.replace("yes", "**no**"))[0].fails());
         let now = |value: f64| {
             [Row {
                 claim: Some(2.0),
