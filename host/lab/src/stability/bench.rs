@@ -5,7 +5,7 @@
 //! encoder rounds, the speed comes from its differences, and the force is given out so many ticks late. The work of the device is exact, because its
 //! force is held.
 //!
-//! Energy made is the largest rise over any interval ([`crate::port`]). At the handle the coupling's springs and the object's motion count as stored,
+//! Energy made is the largest rise over any interval (`port.rs`). At the handle the coupling's springs and the object's motion count as stored,
 //! as [`mortise_haptics::observer`] has it; the springs of contacts do not, nor does anything at the object: what those give back counts as made.
 
 use glam::DVec3;
