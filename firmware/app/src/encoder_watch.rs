@@ -17,8 +17,8 @@
 //! rest that does not push is therefore left alone, once every axis has answered: one that was dead before the part was grabbed is found so.
 //!
 //! What a probe itself moves is no reason to move, or probes ask for probes without end: friction leaves a handle anywhere within f/k of its rest, and
-//! each probe may take it to the other side. How far a handle swings a rig says itself ([`EncoderWatch::swinging`]). While an axis may still swing, only
-//! more than that is a motion, and what is left of it afterwards is none.
+//! each probe may take it to the other side. A rig states how far its handle swings ([`EncoderWatch::swinging`]). While an axis may still
+//! swing, only a larger displacement counts as motion, and what remains of the swing afterwards does not.
 //!
 //! From the last sign of life to the verdict: [`STILL_TICKS`] + 2·[`RAMP_TICKS`] + [`LISTEN_TICKS`] = [`VERDICT_TICKS`] at the most, since an earlier probe
 //! is over by then: it returns twice as fast as it rose. Cost: some 20 integer operations an axis and tick. No allocation, total.

@@ -55,11 +55,11 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
 /// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
 ///
-/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-22, thesis pair with 20 µm clearance baked at 0.5 mm cells
-/// with a pointshell of 25 µm: 72,540 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s, 18,480 in free motion; with a
-/// pointshell of 5 µm 112,320, points left out in 96 % of the ticks, and 19,100. A peg of 0.7 m
+/// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-23, thesis pair with 20 µm clearance baked at 0.5 mm cells
+/// with a pointshell of 25 µm: 72,900 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s, 19,400 in free motion; with a
+/// pointshell of 5 µm 114,280, points left out in 96 % of the ticks, and 20,020 (`mortise lab figures contact --quick`). A peg of 0.7 m
 /// with 0.2 mm clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below
-/// 120,000. Into a fit of 0.02 mm: 123,900 guided, 115,700 by collision alone; 121,580 with four different targets
+/// 120,000. Into a fit of 0.02 mm: 128,300 guided, 119,840 by collision alone (`mortise lab rate --quick`); 121,880 with four different targets
 /// (`mortise lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();

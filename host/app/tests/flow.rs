@@ -120,7 +120,7 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
         until(&mut harness, "the verdict", |s| s.verdict.is_some());
         let said = harness.state().session.verdict.as_ref().map(ToString::to_string);
         let said = said.expect("just seen");
-        // On the rim a tilted peg's wall may overlap the hole's by a little; whether the rim or the face beside it bears more is as it comes.
+        // On the rim a tilted peg's wall may overlap the hole's by a little; either the rim or the face beside it may bear more.
         let at_the_mouth = said.starts_with("Stuck at 0.0 mm: ") || said.starts_with("Stuck at 0.1 mm: ");
         assert!(at_the_mouth && said.ends_with(" of block"), "{said}");
     }
