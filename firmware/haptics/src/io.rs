@@ -4,8 +4,7 @@ use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::limits::MAX_PAIRS;
 
-use crate::guidance::GuidanceState;
-use crate::pose::{Pose, Twist, Wrench};
+use crate::math::pose::{Pose, Twist, Wrench};
 
 /// What the mechanism measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +34,19 @@ pub struct Output {
     pub guidance: GuidanceState,
     /// What the tick had to do.
     pub work: Work,
+}
+
+/// How targets stand, for telemetry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GuidanceState {
+    /// Targets in force (fading ones not counted).
+    pub active: u8,
+    /// Of those, whose mating faces have left the work.
+    pub joints: u8,
+    /// Largest engagement of any.
+    pub engagement: f32,
+    /// Their sum on the object at its centre of mass, world axes.
+    pub wrench: Wrench,
 }
 
 /// Bounded list of touching face pairs, deepest first.

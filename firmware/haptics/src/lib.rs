@@ -31,47 +31,27 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-mod above;
-mod analytic;
-mod body;
-mod coherence;
-mod constraint;
-mod contact;
-mod counted;
-mod coupling;
-mod explicit;
-mod facing;
-mod grip;
-mod guidance;
+mod baseline;
+mod collision;
+mod constraints;
+mod dynamics;
 mod io;
-mod job;
-mod joint;
-mod leaf;
-mod limits;
-mod linear;
-mod nearest;
+mod math;
 pub mod observer;
-mod occupancy;
-mod overload;
 mod passivity;
-mod pose;
 mod probe;
-mod proximity;
-mod pull;
-pub mod rotation;
 mod settings;
 mod state;
-mod step;
 mod tick;
-mod touching;
-mod walls;
 
+pub use constraints::targets::TargetError;
 pub use glam::{Quat, Vec3};
-pub use guidance::{GuidanceState, TargetError};
-pub use io::{FacePair, FacePairs, Flags, Input, Output, Work};
-pub use passivity::Passivity;
-pub use pose::{Pose, Twist, Wrench};
-pub use probe::{ContactPoint, Nearest, Probe, ProbeError, Prober};
+pub use io::{FacePair, FacePairs, Flags, GuidanceState, Input, Output, Work};
+pub use math::pose::{Pose, Twist, Wrench};
+pub use math::rotation;
+pub use passivity::tank::Passivity;
+pub use probe::nearest::Nearest;
+pub use probe::prober::{ContactPoint, Probe, ProbeError, Prober};
 pub use settings::{
     ContactSettings, CouplingSettings, GuidanceMethod, GuidanceSettings, Integrator, LimitSettings,
     ObjectSettings, PassivitySettings, Range, Settings, SettingsError, ranges,

@@ -31,7 +31,7 @@
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 use mortise_protocol::image::SceneImage;
 
-use crate::pose::{Pose, Wrench};
+use crate::math::pose::{Pose, Wrench};
 use crate::settings::Settings;
 use crate::state::State;
 

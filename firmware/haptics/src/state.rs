@@ -4,19 +4,23 @@ use core::fmt;
 
 use glam::Vec3;
 use heapless::Vec;
-use mortise_protocol::image::{PART_GRABBABLE, SceneImage, Shape};
+use mortise_protocol::image::{Field, PART_GRABBABLE, SceneImage, Shape};
 use mortise_protocol::limits::MAX_PARTS;
 use mortise_protocol::message::ConstraintTarget;
 
-use crate::body::{Body, Grabbed};
-use crate::coherence::Coherence;
-use crate::contact::Contacts;
-use crate::guidance::{Guidance, TargetError};
-use crate::overload::Overload;
-use crate::passivity::{Passivity, Tank};
-use crate::pose::{Pose, Twist, Wrench};
-use crate::proximity::Leaf;
-use crate::tick::usable_pose;
+use crate::collision::coherence::Coherence;
+use crate::collision::contact::Contacts;
+use crate::collision::decimation::Overload;
+use crate::collision::node_cursor::Leaf;
+use crate::collision::placement::Placed;
+use crate::constraints::targets::{Guidance, TargetError};
+use crate::dynamics::body::{Body, Grabbed};
+use crate::math::pose::{Pose, Twist, Wrench, usable_pose};
+use crate::passivity::tank::{Passivity, Tank};
+use crate::settings::Settings;
+
+/// Speed at which points come out again when shrinking falls, m/s.
+const COMES_OUT_M_PER_S: f32 = 0.01;
 
 /// Placements, the grabbed object, and what carries over. About 112 KiB; lives in a static on a board.
 #[derive(Clone, Debug)]
@@ -54,17 +58,6 @@ pub struct State {
     pub(crate) coherence: Coherence,
     /// Scratch of one tick; kept here because a board's stack is small.
     pub(crate) contacts: Contacts,
-}
-
-/// A part where it stands.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
-    pub pose: Pose,
-    /// Sphere about it, world.
-    pub center: Vec3,
-    pub radius: f32,
-    /// Sphere centre in the shape frame.
-    pub local_center: Vec3,
 }
 
 /// Why a part could not be grabbed.
@@ -285,6 +278,20 @@ impl State {
         self.guidance.forget();
         self.contacts.clear();
         self.coherence.forget();
+    }
+
+    /// How far points of the held part, of this field, are moved inward in this tick, m.
+    pub(crate) fn shrink(&mut self, settings: &Settings, field: &Field<'_>) -> f32 {
+        let wanted = settings.contact.shrunk_m(field);
+        let least = self.shrunk_m - COMES_OUT_M_PER_S * settings.period_s;
+        let now = if wanted > least { wanted } else { least };
+        let moved = now - self.shrunk_m;
+        if moved != 0.0 {
+            // What is known of distances counts on points staying where they are in their part. Each call is a round of its own.
+            self.coherence.travelled(if moved < 0.0 { -moved } else { moved });
+        }
+        self.shrunk_m = now;
+        now
     }
 
     /// Writes the held part's placement back to the list of parts.

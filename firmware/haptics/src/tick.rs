@@ -4,30 +4,27 @@ use glam::{Mat3, Vec3};
 use heapless::Vec;
 use mortise_protocol::image::SceneImage;
 
-use crate::body::Grabbed;
-use crate::contact::Phase;
-use crate::coupling::Coupling;
-use crate::explicit;
-use crate::grip::Hold;
-use crate::guidance::{At, GuidanceState};
-use crate::io::{FacePairs, Flags, Input, Output, Work};
-use crate::limits::limit;
-use crate::linear::inverse_sqrt;
-use crate::overload::Searched;
-use crate::pose::{Pose, Twist, Wrench, renormalize};
-use crate::proximity::{Leaf, Search};
-use crate::rotation;
+use crate::baseline::explicit;
+use crate::collision::contact::Phase;
+use crate::collision::cost::{PULL, solve_cost};
+use crate::collision::decimation::Searched;
+use crate::collision::face_pairs::{Scenery, touching_faces};
+use crate::collision::node_cursor::Leaf;
+use crate::collision::search::Search;
+use crate::constraints::targets::{At, TargetRules};
+use crate::dynamics::body::Grabbed;
+use crate::dynamics::coupling::Coupling;
+use crate::dynamics::limits::limit;
+use crate::dynamics::step::{MAX_SOLVES, Solution, Step, Stiffness};
+use crate::io::{FacePairs, Flags, GuidanceState, Input, Output, Work};
+use crate::math::pose::{Pose, Twist, Wrench, renormalize, usable_pose, usable_twist};
+use crate::math::rotation;
+use crate::math::scalar::{inverse_sqrt, larger, smaller};
+use crate::math::vector::cut;
+use crate::passivity::energy_bound::Hold;
 use crate::settings::{CouplingSettings, Integrator, Settings};
 use crate::state::State;
-use crate::step::{MAX_SOLVES, Solution, Step, Stiffness};
-use crate::touching::{Scenery, touching_faces};
 
-/// Positions beyond this are an encoder's fault, not a place, m.
-const FARTHEST_M: f32 = 100.0;
-/// Speeds beyond this likewise, m/s.
-const FASTEST_M_PER_S: f32 = 100.0;
-/// Angular speeds beyond this likewise, rad/s.
-const FASTEST_RAD_PER_S: f32 = 1000.0;
 /// How fast the number of points that share the total stiffness may fall, a tick: stiffness of points still touching then rises
 /// slowly, and little energy is made of it.
 const SHARING_DECAY: f32 = 0.95;
@@ -40,8 +37,6 @@ const FASTER: f32 = 2.0;
 
 /// So many solves with contacts every step may take, whatever the search took; most do with fewer.
 const LEAST_SOLVES: u8 = 4;
-/// To find what a target pulls with, and what follows from it, look-ups. What it takes in a solve: [`solve_cost`].
-const PULL: u32 = 6;
 /// The diagonal of a cell, cells.
 const DIAGONAL_CELLS: f32 = 1.733;
 
@@ -218,11 +213,6 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     out
 }
 
-/// A solve with so many pulls, in the look-ups of the budget.
-fn solve_cost(pulls: usize) -> u32 {
-    8 + 5 * pulls as u32 / 2
-}
-
 /// How many solves there may be with contacts, when so many look-ups are `left`: past the third, a solve takes three eighths of one for each
 /// candidate too.
 fn most_solves(left: u32, candidates: u16, pulls: usize) -> u8 {
@@ -256,6 +246,10 @@ impl State {
         let reserved = reserved.min(budget / 2);
         let held_shape = scene.shape_of_part(usize::from(grabbed.part));
         let shrunk_m = self.shrink(settings, &held_shape.field);
+        let rules = TargetRules {
+            targets: &self.guidance,
+            settings: &settings.guidance,
+        };
         let search = Search {
             scene,
             parts: &self.parts,
@@ -276,8 +270,7 @@ impl State {
             reserved,
             carried: if self.busy { u32::from(self.pushing) } else { 0 },
             braking_m,
-            guidance: &self.guidance,
-            guidance_settings: &settings.guidance,
+            rules: &rules,
         };
         let start = self.resume;
         let (stopped, used) = search.run(start, &mut self.coherence, &mut self.contacts, work);
@@ -439,7 +432,7 @@ impl Grabbed {
         self.twist = twist;
         self.center += twist.linear * period_s;
         let turn = twist.angular * period_s;
-        let turn = crate::limits::cut(turn, rotation::EXP_MAX).0;
+        let turn = cut(turn, rotation::EXP_MAX).0;
         self.orientation = renormalize(rotation::exp(turn) * self.orientation);
     }
 }
@@ -467,34 +460,4 @@ fn slow_down(twist: &mut Twist, reach: f32, most: f32) -> bool {
     } else {
         false
     }
-}
-
-/// The pose with its quaternion at unit length, unless it is not finite, too far off, or not a rotation.
-pub(crate) fn usable_pose(pose: &Pose) -> Option<Pose> {
-    let near = pose.position.abs().max_element() <= FARTHEST_M;
-    let norm2 = pose.orientation.length_squared();
-    let rotation = norm2 > 0.81 && norm2 < 1.21;
-    if !(pose.is_finite() && near && rotation) {
-        return None;
-    }
-    Some(Pose {
-        position: pose.position,
-        orientation: pose.orientation * (1.0 / libm::sqrtf(norm2)),
-    })
-}
-
-fn usable_twist(twist: &Twist) -> bool {
-    twist.is_finite()
-        && twist.linear.abs().max_element() <= FASTEST_M_PER_S
-        && twist.angular.abs().max_element() <= FASTEST_RAD_PER_S
-}
-
-/// The smaller of two numbers; unlike `f32::min` it does not depend on the platform's choice between zeros.
-fn smaller(a: f32, b: f32) -> f32 {
-    if b < a { b } else { a }
-}
-
-/// The larger of two numbers.
-fn larger(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
 }

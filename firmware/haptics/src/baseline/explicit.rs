@@ -1,0 +1,144 @@
+//! The textbook integrator: one explicit Newton–Euler step of the held object, eqs. 11–12 of Faas 2010.
+//!
+//! m·v̇ = F and I·ω̇ + ω × I·ω = τ, with coupling and contact forces taken at the tick's *start* and position moved with the new velocity
+//! (semi-implicit Euler). It needs no solver and is as cheap as it is fragile: a contact of stiffness k is stable while h²·k/m < 4 less what damping
+//! takes, all touching points together. Kept beside the implicit step to be compared with. Around it, as in the sources:
+//!
+//! * contact is a spring without damping, F = k·depth, and from ten touching points on the sum is divided by a tenth of their number (McNeely,
+//!   Puterbaugh & Troy 1999);
+//! * points that come nearer and do not touch yet are braked, F = −b·(v·n)·n (Faas eq. 6, McNeely et al. 1999). b takes from the object in one
+//!   tick, to first order, the kinetic energy of its motion along the braking force: with s the approach of each such point, F and τ the sum of s·n
+//!   and of its moments, b = Σs²/(2·h·(F²/m + τ·I⁻¹·τ)). The sources' rule, written for turns as well: half of the approach is left after a
+//!   tick, and the force can never add energy;
+//! * no point moves more than half a cell a tick (Faas eq. 5): see [`crate::tick()`].
+
+use glam::Vec3;
+
+use crate::collision::contact::{Contact, Phase};
+use crate::dynamics::coupling::Coupling;
+use crate::dynamics::step::{Solution, Step};
+use crate::math::pose::{Twist, Wrench};
+use crate::math::symmetric6::dot;
+use crate::settings::ContactSettings;
+
+/// Touching points that push with their full stiffness; more share it.
+const FULL_POINTS: f32 = 10.0;
+/// Approaches whose squares sum to less than this, (m/s)², are rest: not to be divided by.
+const LEAST_RESPONSE: f32 = 1e-20;
+
+/// Stiffness of each of `touching` points, N/m: as for the implicit step, and that of ten in all at the most.
+pub(crate) fn shared_stiffness(contact: &ContactSettings, touching: f32) -> f32 {
+    let k = contact.shared_stiffness(touching);
+    let share = contact.stiffness_n_per_m * (FULL_POINTS / touching);
+    if share < k { share } else { k }
+}
+
+/// The step without contacts.
+pub(crate) fn free(step: &Step<'_>) -> Solution {
+    Solution {
+        twist: accelerated(step, pulls(step)),
+        contact: Wrench::ZERO,
+        solves: 0,
+        settled: true,
+    }
+}
+
+/// The step with `contacts` of stiffness `k` (N/m); those with a gap up to `braking_m` only brake. On return their phases are those of the solution,
+/// and their rates those of its motion as far as `allowed` lets it.
+pub(crate) fn with_contacts(
+    step: &Step<'_>,
+    contacts: &mut [Contact],
+    k: f32,
+    braking_m: f32,
+    allowed: impl Fn(Twist) -> Twist,
+) -> Solution {
+    let before = step.scale(step.twist);
+    let brake = braking(step, contacts, braking_m, &before);
+    let mut contact = Wrench::ZERO;
+    for c in contacts.iter_mut() {
+        let force = if c.gap < 0.0 {
+            c.phase = Phase::Parting;
+            -k * c.gap
+        } else {
+            c.phase = Phase::Free;
+            -brake * approach(c, braking_m, &before)
+        };
+        let n = normal(c) * force;
+        contact.force += n;
+        contact.torque += c.arm.cross(n);
+    }
+    let twist = accelerated(step, pulls(step) + contact);
+    let after = step.scale(allowed(twist));
+    for c in contacts.iter_mut() {
+        c.rate = dot(&c.row, &after);
+    }
+    Solution {
+        twist,
+        contact,
+        solves: 0,
+        settled: true,
+    }
+}
+
+/// Wrench of the coupling at the tick's start, eqs. 1–2, as far as it does not slip, and of what targets pull with.
+fn pulls(step: &Step<'_>) -> Wrench {
+    // With no time ahead the pull is k·d − b·v.
+    let pull = step.coupling.pull(step.settings, 0.0, step.twist);
+    let slip = Coupling::slip(pull, step.settings);
+    let mut wrench = Wrench {
+        force: pull.force * slip.translation,
+        torque: pull.torque * slip.rotation,
+    };
+    let before = step.scale(step.twist);
+    for pull in step.pulls {
+        wrench = wrench + pull.wrench(&before, step.length);
+    }
+    wrench
+}
+
+/// Rate of a gap that closes and is to be braked, else 0, m/s.
+fn approach(c: &Contact, braking_m: f32, twist: &[f32; 6]) -> f32 {
+    if c.gap < 0.0 || c.gap > braking_m {
+        return 0.0;
+    }
+    let rate = dot(&c.row, twist);
+    if rate < 0.0 { rate } else { 0.0 }
+}
+
+/// b, N s/m.
+fn braking(step: &Step<'_>, contacts: &[Contact], braking_m: f32, twist: &[f32; 6]) -> f32 {
+    let mut squares = 0.0;
+    let mut sum = Wrench::ZERO;
+    for c in contacts {
+        let rate = approach(c, braking_m, twist);
+        if rate < 0.0 {
+            let n = normal(c) * rate;
+            squares += rate * rate;
+            sum.force += n;
+            sum.torque += c.arm.cross(n);
+        }
+    }
+    let turned = step.gyration2.inverse() * sum.torque;
+    let response = sum.force.length_squared() + sum.torque.dot(turned);
+    if response > LEAST_RESPONSE {
+        step.mass_kg * squares / (2.0 * step.period_s * response)
+    } else {
+        0.0
+    }
+}
+
+/// Twist at the tick's end under `wrench`, the gyroscopic torque with it.
+fn accelerated(step: &Step<'_>, wrench: Wrench) -> Twist {
+    let h = step.period_s;
+    let spin = step.twist.angular;
+    let gyroscopic = spin.cross(step.gyration2 * spin);
+    let angular = step.gyration2.inverse() * (wrench.torque * (1.0 / step.mass_kg) - gyroscopic);
+    Twist {
+        linear: step.twist.linear + wrench.force * (h / step.mass_kg),
+        angular: spin + angular * h,
+    }
+}
+
+fn normal(c: &Contact) -> Vec3 {
+    Vec3::new(c.row[0], c.row[1], c.row[2])
+}

@@ -1,0 +1,19 @@
+//! Where a search is in the trees of all pairs.
+
+/// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Leaf {
+    /// Twice the part's index, plus one for backward.
+    pub job: u16,
+    pub node: u32,
+}
+
+impl Leaf {
+    /// The beginning.
+    pub const FIRST: Self = Self { job: 0, node: 0 };
+
+    /// Index of the other part.
+    pub fn part(self) -> u16 {
+        self.job / 2
+    }
+}

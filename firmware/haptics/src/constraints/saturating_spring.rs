@@ -1,0 +1,158 @@
+//! One pull of a target within a step: stiff at first, never more than its cap, and damped while it lets go.
+//!
+//! A cap makes the step's equations nonlinear. Each solve takes the spring and the damper that pull as hard at the last solution (the secant) in its
+//! place; a few solves settle it.
+
+use glam::Vec3;
+use mortise_protocol::limits::MAX_TARGETS;
+
+use crate::constraints::alignment::Rows;
+use crate::math::pose::Wrench;
+use crate::math::scalar::inverse_sqrt;
+use crate::math::symmetric6::{Symmetric6, dot};
+
+/// Damping of what a target that ends lets go, N s/m.
+const LETTING_GO: f32 = 200.0;
+/// Its largest force, N.
+pub(crate) const LETTING_GO_N: f32 = 1.0;
+/// Two pulls for each target: offset and angle.
+pub(crate) const MAX_PULLS: usize = 2 * MAX_TARGETS;
+/// One saturating spring of a target, within a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Pull {
+    /// Place of its target among all.
+    pub slot: u8,
+    /// Of the angle, not the offset.
+    pub turns: bool,
+    /// What must vanish.
+    pub rows: Rows,
+    /// Σ JᵀJ.
+    product: Symmetric6,
+    /// Σ e·Jᵀ.
+    along: [f32; 6],
+    law: Law,
+    /// Largest force of the damper that lets go, N.
+    damper_n: f32,
+}
+
+/// The spring (N/m) and the damper (N s/m) that pull as hard as a saturating pull does at one solution.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Secant {
+    spring: f32,
+    damper: f32,
+    /// |u| and its rate there, m and m/s.
+    reach: f32,
+    speed: f32,
+}
+
+impl Secant {
+    /// Whether this, in place of another that is right, pulls wrongly by no more than `force_n`.
+    pub fn is_near(&self, other: &Self, force_n: f32) -> bool {
+        let spring = (self.spring - other.spring).abs() * other.reach;
+        let damper = (self.damper - other.damper).abs() * other.speed;
+        spring + damper <= force_n
+    }
+}
+
+/// How a pull grows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Law {
+    /// Stiff up to a cap: k (N/m), cap (N), h + τ (s).
+    Capped { stiffness: f32, cap: f32, ahead: f32 },
+    /// A plain spring: k (N/m), h (s).
+    Spring { stiffness: f32, ahead: f32 },
+}
+
+impl Pull {
+    /// Of which target, and whether of its angle; `damper_n`: largest force of the damper that lets go.
+    pub fn new((slot, turns): (u8, bool), rows: Rows, law: Law, damper_n: f32) -> Self {
+        let mut product = Symmetric6::ZERO;
+        let mut along = [0.0; 6];
+        for (row, error) in &rows.rows {
+            product.add_outer(1.0, row);
+            for (a, j) in along.iter_mut().zip(row) {
+                *a += error * j;
+            }
+        }
+        Self {
+            slot,
+            turns,
+            rows,
+            product,
+            along,
+            law,
+            damper_n,
+        }
+    }
+
+    /// At the step's end `x`.
+    pub fn secant(&self, x: &[f32; 6]) -> Secant {
+        let mut secant = Secant::default();
+        match self.law {
+            Law::Spring { stiffness, .. } => secant.spring = stiffness,
+            Law::Capped {
+                stiffness,
+                cap,
+                ahead,
+            } => {
+                let squared = self.rows.error2(x, ahead);
+                secant.reach = root(squared);
+                secant.spring = saturating(stiffness, cap, squared);
+            }
+        }
+        if self.damper_n > 0.0 {
+            secant.speed = self.rows.speed(x);
+            secant.damper = saturating(LETTING_GO, self.damper_n, secant.speed * secant.speed);
+        }
+        secant
+    }
+
+    /// Adds what the spring and the damper add to the step's matrix and right side.
+    pub fn add(&self, secant: Secant, period_s: f32, matrix: &mut Symmetric6, right: &mut [f32; 6]) {
+        let impulse = secant.spring * period_s;
+        matrix.add_scaled(impulse * self.ahead() + secant.damper * period_s, &self.product);
+        for (r, a) in right.iter_mut().zip(&self.along) {
+            *r -= impulse * a;
+        }
+    }
+
+    fn ahead(&self) -> f32 {
+        match self.law {
+            Law::Capped { ahead, .. } | Law::Spring { ahead, .. } => ahead,
+        }
+    }
+
+    /// On the object at its centre of mass.
+    pub fn wrench(&self, x: &[f32; 6], length: f32) -> Wrench {
+        let secant = self.secant(x);
+        let mut wrench = Wrench::ZERO;
+        for (row, error) in &self.rows.rows {
+            let rate = dot(row, x);
+            let f = -secant.spring * (error + self.ahead() * rate) - secant.damper * rate;
+            wrench.force += Vec3::new(row[0], row[1], row[2]) * f;
+            wrench.torque += Vec3::new(row[3], row[4], row[5]) * (f * length);
+        }
+        wrench
+    }
+}
+
+/// Force over u of a pull that is k·u at first and never more than `cap`: cap/√((cap/k)² + u²). Asked for in each solve by each pull.
+fn saturating(k: f32, cap: f32, u2: f32) -> f32 {
+    let slack = cap / k;
+    let squared = slack * slack + u2;
+    if is_ordinary(squared) {
+        cap * inverse_sqrt(squared)
+    } else {
+        0.0
+    }
+}
+
+/// √x.
+fn root(x: f32) -> f32 {
+    if is_ordinary(x) { x * inverse_sqrt(x) } else { 0.0 }
+}
+
+/// Whether [`inverse_sqrt`] is for such a number.
+fn is_ordinary(x: f32) -> bool {
+    x > f32::MIN_POSITIVE && x < f32::MAX
+}

@@ -1,0 +1,6 @@
+//! Motion of the held part: mass properties, coupling to the handle, the implicit step, limits on the handle's wrench.
+
+pub(crate) mod body;
+pub(crate) mod coupling;
+pub(crate) mod limits;
+pub(crate) mod step;

@@ -1,0 +1,61 @@
+//! The deepest point of one part against a voxmap of the other.
+
+use mortise_protocol::image::Voxel;
+
+use crate::baseline::occupancy::{TangentPlane, inward, shrunk};
+use crate::collision::directed_pair::Job;
+use crate::io::Flags;
+use crate::probe::nearest::{Nearest, SoFar};
+
+/// The deepest point of a job against a voxmap, as the method has it: depth to a tangent plane, else no more than a lower bound of the gap.
+///
+/// Looks at every point that is not known to be farther from all surface voxels than the nearest so far.
+pub(crate) fn nearest_voxel(job: &Job<'_>, shrunk_m: f32, so_far: &mut SoFar) {
+    let SoFar { best, work } = so_far;
+    let mut index = 0;
+    while let Some(node) = job.nodes.get(index) {
+        work.nodes += 1;
+        let center = job.to_field.apply(node.center);
+        if job.field.bound(center.to_array()) - (node.radius + shrunk_m) > best.distance_m {
+            index = node.skip as usize;
+            continue;
+        }
+        index += 1;
+        if node.skip as usize != index {
+            continue;
+        }
+        for point in node.points(job.points) {
+            work.points += 1;
+            let position = shrunk(point, shrunk_m);
+            let p = job.to_field.apply(position);
+            let sample = job.field.voxel(p.to_array());
+            let (distance_m, in_band) = match sample.voxel {
+                Voxel::Free => (sample.bound, false),
+                Voxel::Proximity => (0.0, false),
+                Voxel::Interior => {
+                    work.flags.insert(Flags::DEEP);
+                    (0.0, false)
+                }
+                Voxel::Surface => {
+                    let gap = TangentPlane::of(job, inward(point), p, &sample).gap;
+                    if gap < best.field_distance_m {
+                        best.field_distance_m = gap;
+                    }
+                    // Short of the plane the point need not be apart: the surface is somewhere in the voxel.
+                    if gap < 0.0 { (gap, true) } else { (0.0, false) }
+                }
+            };
+            if distance_m < best.distance_m {
+                *best = Nearest {
+                    distance_m,
+                    field_distance_m: best.field_distance_m,
+                    exact: false,
+                    in_band,
+                    arm: job.to_arm.apply(position),
+                    moving_face: point.face,
+                    fixed_face: sample.faces[0],
+                };
+            }
+        }
+    }
+}

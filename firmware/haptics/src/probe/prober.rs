@@ -1,0 +1,228 @@
+//! How near two parts are at one pose, and what contact would push with: what the tick sees, asked without a motion.
+//!
+//! For measuring, on a PC as on a board: it walks the trees and fields of the tick's own search, both ways, without its budget and without
+//! what earlier poses left. Forces are those of the contact law at rest, λ = k·depth, k shared as in the tick. A voxmap answers for itself: depth to
+//! its tangent planes, gaps only as bounds, nothing from the analytic faces.
+
+use core::fmt;
+
+use glam::Vec3;
+use mortise_protocol::image::SceneImage;
+
+use crate::collision::coherence::Coherence;
+use crate::collision::contact::{Contacts, Phase};
+use crate::collision::directed_pair::Job;
+use crate::collision::rules::NoRules;
+use crate::collision::search::Search;
+use crate::dynamics::body::Body;
+use crate::dynamics::step::{Stiffness, total_force};
+use crate::io::{Flags, Work};
+use crate::math::pose::{Pose, Wrench, usable_pose};
+use crate::probe::nearest::{Nearest, NearestSearch, SoFar};
+use crate::probe::nearest_voxel::nearest_voxel;
+use crate::settings::ContactSettings;
+
+/// What was found at one pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probe {
+    /// Where the gap is smallest or the depth largest.
+    pub nearest: Nearest,
+    /// Sum of all contact forces on the moving part, about its centre of mass, axes of the fixed part.
+    pub wrench: Wrench,
+    /// Points that push.
+    pub contacts: u16,
+    /// What was looked at, for gap and contacts together. [`Flags::DEEP`]: some point lies too deep to push;
+    /// [`Flags::CONTACTS_DROPPED`]: more touch than the store holds.
+    pub work: Work,
+}
+
+/// A point that pushes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPoint {
+    /// From the moving part's centre of mass, axes of the fixed part, m.
+    pub arm: Vec3,
+    /// Unit direction in which the moving part is pushed.
+    pub normal: Vec3,
+    /// As the field has it, m, positive.
+    pub depth_m: f32,
+    /// Face of the moving part.
+    pub moving_face: u16,
+    /// Face of the fixed part.
+    pub fixed_face: u16,
+}
+
+/// Why a pose could not be looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProbeError {
+    /// The scene has no part of this index.
+    NoSuchPart {
+        /// Asked for.
+        part: u16,
+    },
+    /// A part has no distance to itself.
+    SamePart,
+    /// The pose is not finite, farther than 100 m, or not a rotation.
+    BadPose,
+}
+
+impl fmt::Display for ProbeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoSuchPart { part } => write!(f, "the scene has no part {part}"),
+            Self::SamePart => f.write_str("a part has no distance to itself: choose two parts"),
+            Self::BadPose => {
+                f.write_str("the pose is not finite, farther than 100 m, or not a rotation: correct it")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ProbeError {}
+
+/// Room for one query. About 60 KiB; make it once.
+#[derive(Clone, Debug)]
+pub struct Prober {
+    contacts: Contacts,
+    coherence: Coherence,
+}
+
+impl Default for Prober {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Prober {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            contacts: Contacts::new(),
+            coherence: Coherence::new(),
+        }
+    }
+
+    /// Gap and contacts of part `moving`, placed at `pose` in the frame of part `fixed`.
+    ///
+    /// Cost: a look-up for every tree node and point that could be the nearest or overlaps, both ways; one projection a face, or two, for every point
+    /// next to an edge or beyond the band that could be. Unbounded by a budget: not for the tick.
+    ///
+    /// # Errors
+    /// [`ProbeError`].
+    pub fn probe(
+        &mut self,
+        scene: &SceneImage<'_>,
+        moving: u16,
+        fixed: u16,
+        pose: &Pose,
+        settings: &ContactSettings,
+    ) -> Result<Probe, ProbeError> {
+        for part in [moving, fixed] {
+            if usize::from(part) >= scene.parts().len() {
+                return Err(ProbeError::NoSuchPart { part });
+            }
+        }
+        if moving == fixed {
+            return Err(ProbeError::SamePart);
+        }
+        let pose = usable_pose(pose).ok_or(ProbeError::BadPose)?;
+        let held = scene.shape_of_part(usize::from(moving));
+        let other = scene.shape_of_part(usize::from(fixed));
+        let body = Body::of(&held);
+        let center = pose.transform_point(body.center_of_mass);
+        let jobs = [0, 1].map(|way| Job::new(way, (&held, pose), (&other, Pose::IDENTITY), center));
+
+        let mut so_far = SoFar {
+            best: Nearest {
+                distance_m: f32::INFINITY,
+                field_distance_m: f32::INFINITY,
+                exact: false,
+                in_band: false,
+                arm: Vec3::ZERO,
+                moving_face: mortise_protocol::image::NO_FACE,
+                fixed_face: mortise_protocol::image::NO_FACE,
+            },
+            work: Work::default(),
+        };
+        let mut touched = Work::default();
+        let shrunk_m = settings.shrunk_m(&held.field);
+        let search = Search {
+            scene,
+            parts: &[],
+            held: moving,
+            held_shape: scene.shape_of_part(usize::from(moving)),
+            shrunk_m,
+            pose,
+            center,
+            margin: 0.0,
+            way: 0.0,
+            slack: 0.0,
+            motions: [[0.0; 6]; 2],
+            swing: 0.0,
+            inverse_length: 1.0,
+            busy: false,
+            thinning: 0,
+            budget: u32::MAX,
+            reserved: 0,
+            carried: 0,
+            braking_m: 0.0,
+            rules: &NoRules,
+        };
+        let voxmaps = jobs.iter().any(|job| job.field.is_occupancy());
+        if voxmaps {
+            self.coherence.forget();
+        }
+        let mut touching = search.walk(false, &mut self.coherence, &mut self.contacts, &mut touched);
+        let mut searches = [0, 1].map(|way| NearestSearch::new(&jobs[way], [&other, &held][way]));
+        for (search, job) in searches.iter_mut().zip(&jobs) {
+            if !job.field.is_occupancy() {
+                search.walk(&mut so_far, &mut touching);
+            } else if !job.left_out() {
+                nearest_voxel(job, shrunk_m, &mut so_far);
+            }
+        }
+        for search in &mut searches {
+            search.rest(&mut so_far, &mut touching);
+        }
+        let SoFar {
+            best: nearest,
+            mut work,
+        } = so_far;
+        if voxmaps && (nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0) {
+            for job in jobs.iter().filter(|job| job.field.is_occupancy()) {
+                touching.all(job);
+            }
+        }
+        work.nodes += touched.nodes;
+        work.points += touched.points;
+        work.candidates = touched.candidates;
+        work.flags.insert(touched.flags);
+        work.flags
+            .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
+        let pushing = self.contacts.as_slice().len();
+        let k = settings.shared_stiffness(if pushing == 0 { 1.0 } else { pushing as f32 });
+        for contact in self.contacts.as_mut_slice() {
+            // At rest: no rate, so neither period nor damping counts.
+            contact.phase = Phase::Parting;
+        }
+        let k = Stiffness { point: k, guided: k };
+        let wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0, 1.0);
+        work.contacts = pushing as u16;
+        Ok(Probe {
+            nearest,
+            wrench,
+            contacts: work.contacts,
+            work,
+        })
+    }
+
+    /// The points that pushed in the last query, in no order that means anything.
+    pub fn contacts(&self) -> impl Iterator<Item = ContactPoint> {
+        self.contacts.as_slice().iter().map(|c| ContactPoint {
+            arm: c.arm,
+            normal: Vec3::new(c.row[0], c.row[1], c.row[2]),
+            depth_m: -c.gap,
+            moving_face: c.moving_face,
+            fixed_face: c.static_face,
+        })
+    }
+}
