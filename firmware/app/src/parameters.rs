@@ -99,7 +99,7 @@ impl Parameters {
         } else {
             GuidanceMethod::Thesis
         };
-        law.guidance.joints = self.get(P::Joints) >= 0.5;
+        law.guidance.exclusions = self.get(P::Joints) >= 0.5;
         law.validate().map_err(|_| Refusal::BadNumber)?;
         Ok(ControlSettings {
             law,

@@ -42,7 +42,7 @@ pub struct GuidanceState {
     /// Targets in force (fading ones not counted).
     pub active: u8,
     /// Of those, whose mating faces have left the work.
-    pub joints: u8,
+    pub exclusions: u8,
     /// Largest engagement of any.
     pub engagement: f32,
     /// Their sum on the object at its centre of mass, world axes.

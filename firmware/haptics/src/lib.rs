@@ -18,13 +18,13 @@
 //! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
 //! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
 //! | `guidance`, `constraint`, `pull` | constraint targets: in force, engaged; errors and their rows; how they pull in a step |
-//! | `joint` | what an engaged target keeps apart leaves the work |
+//! | `exclusion` | what an engaged target keeps apart leaves the work |
 //! | `counted` | work on a motion that is told in an encoder's counts |
 //! | `passivity` | observer of the energy the coupling makes, and the valve that stops it |
 //! | `grip` | energy account of the handle while targets pull: what they would give that the hand never brought slips or is not passed on |
 //! | `limits`, `touching` | force limits; touching face pairs |
 //! | `tick` | the order in which all this happens |
-//! | `observer` | energy that the hand was given and nobody brought, seen from outside: for measuring, not for the tick |
+//! | `observer` | energy that the hand was given and nobody credit_j, seen from outside: for measuring, not for the tick |
 //! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
 //!
 //! Symbols are those of `docs/notation.md`.

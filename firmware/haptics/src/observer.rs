@@ -1,7 +1,7 @@
 //! An observer outside of the law: energy that the device gives to the hand beyond what the hand brought, in double precision.
 //!
 //! For tests and experiments, not for the tick: nothing of the law reads it. Of the law's inside it knows one thing only, how far the part has slipped
-//! in the hand ([`State::given_way`]): a slip moves the coupling's spring, and the energy of a spring is told by its stretch.
+//! in the hand ([`State::slip`]): a slip moves the coupling's spring, and the energy of a spring is told by its stretch.
 //!
 //! # What is measured
 //!
@@ -184,7 +184,7 @@ impl Observer {
 
     /// S, J.
     fn stored(&self, state: &State, handle: &Place) -> f64 {
-        let slip = state.given_way();
+        let slip = state.slip();
         let place = handle.compose(&self.offset);
         let center = |at: &Place| at.orientation * self.center_of_mass + at.position;
         let stretch = center(&place) - center(&self.object) - handle.orientation * double(slip.linear);

@@ -112,7 +112,7 @@ pub struct GuidanceSettings {
     /// τ: time in which the way left falls to 1/e, s. Default 20 ms.
     pub time_s: f32,
     /// Whether mating faces that an engaged target keeps apart leave the work: nothing is felt of it. Default yes.
-    pub joints: bool,
+    pub exclusions: bool,
 }
 
 /// How a target pulls.
@@ -132,9 +132,9 @@ pub struct PassivitySettings {
     /// Most energy that the coupling may make and not have dissipated, J; from half of it on the wrench is turned down. 0 switches observer and valve
     /// off. Default 0.5 mJ: a tap of 0.1 kg at 0.1 m/s.
     pub tank_j: f32,
-    /// E₀: what targets may give the hand beyond what it has brought, J. Infinite: as much as they like, for comparison. Default 8 µJ: of the 10 µJ
+    /// E₀: what targets may give the hand beyond what it has credit_j, J. Infinite: as much as they like, for comparison. Default 8 µJ: of the 10 µJ
     /// that the hand is promised the rest is for what encoders and the coupling make.
-    pub endowment_j: f32,
+    pub initial_budget_j: f32,
     /// The handle's own viscous friction, N s/m, as far as it is certain: what it dissipates may be made. Default 0.
     pub damping: f32,
     /// The same in rotation, N m s/rad. Default 0.
@@ -192,11 +192,11 @@ impl Default for Settings {
                 method: GuidanceMethod::Capped,
                 allowance_m: 0.1e-3,
                 time_s: 20e-3,
-                joints: true,
+                exclusions: true,
             },
             passivity: PassivitySettings {
                 tank_j: 0.5e-3,
-                endowment_j: 8e-6,
+                initial_budget_j: 8e-6,
                 damping: 0.0,
                 angular_damping: 0.0,
                 delay_ticks: 0,

@@ -10,13 +10,13 @@ use mortise_protocol::message::ConstraintTarget;
 
 use crate::collision::coherence::Coherence;
 use crate::collision::contact::Contacts;
-use crate::collision::decimation::Overload;
-use crate::collision::node_cursor::Leaf;
+use crate::collision::decimation::Decimation;
+use crate::collision::node_cursor::NodeCursor;
 use crate::collision::placement::Placed;
-use crate::constraints::targets::{Guidance, TargetError};
+use crate::constraints::targets::{TargetError, TargetSet};
 use crate::dynamics::body::{Body, Grabbed};
 use crate::math::pose::{Pose, Twist, Wrench, usable_pose};
-use crate::passivity::tank::{Passivity, Tank};
+use crate::passivity::tank::{EnergyTank, Passivity};
 use crate::settings::Settings;
 
 /// Speed at which points come out again when shrinking falls, m/s.
@@ -35,15 +35,15 @@ pub struct State {
     /// Handle wrench of the last tick, for the slew limit.
     pub(crate) previous_wrench: Wrench,
     /// Energy account of the coupling.
-    pub(crate) tank: Tank,
+    pub(crate) tank: EnergyTank,
     /// Points touching, rising at once and falling by a twentieth a tick: divides the total contact stiffness.
     pub(crate) sharing: f32,
     /// Where to go on after a tick whose budget ran out, else the beginning.
-    pub(crate) resume: Leaf,
+    pub(crate) resume: NodeCursor,
     /// The last tick needed half the look-up budget or more.
     pub(crate) busy: bool,
     /// What is left out while there is too much to look at.
-    pub(crate) overload: Overload,
+    pub(crate) decimation: Decimation,
     /// Contacts that pushed in the last tick.
     pub(crate) pushing: u16,
     /// Smallest cell of any field in the scene, m; 0 without parts.
@@ -53,7 +53,7 @@ pub struct State {
     /// How far points of the held part are moved inward before voxmaps are asked, m.
     pub(crate) shrunk_m: f32,
     /// Constraint targets.
-    pub(crate) guidance: Guidance,
+    pub(crate) targets: TargetSet,
     /// Nodes that need not be looked at yet.
     pub(crate) coherence: Coherence,
     /// Scratch of one tick; kept here because a board's stack is small.
@@ -113,16 +113,16 @@ impl State {
             slipping: false,
             last_object: None,
             previous_wrench: Wrench::ZERO,
-            tank: Tank::new(),
+            tank: EnergyTank::new(),
             sharing: 0.0,
-            resume: Leaf::FIRST,
+            resume: NodeCursor::FIRST,
             busy: false,
-            overload: Overload::NEW,
+            decimation: Decimation::NEW,
             pushing: 0,
             finest_cell_m: 0.0,
             finest_voxel_m: 0.0,
             shrunk_m: 0.0,
-            guidance: Guidance::new(),
+            targets: TargetSet::new(),
             coherence: Coherence::new(),
             contacts: Contacts::new(),
         }
@@ -209,12 +209,12 @@ impl State {
     /// # Errors
     /// [`TargetError`]; nothing changed.
     pub fn set_target(&mut self, target: &ConstraintTarget) -> Result<(), TargetError> {
-        self.guidance.set(target, self.parts.len(), self.grabbed())
+        self.targets.set(target, self.parts.len(), self.grabbed())
     }
 
     /// Lets the target of this id fade; none of it is no error.
     pub fn clear_target(&mut self, id: u16) {
-        self.guidance.clear(id);
+        self.targets.clear(id);
     }
 
     /// Number of placed parts.
@@ -244,8 +244,8 @@ impl State {
 
     /// How far the part has slipped in the hand because guidance's pull was not paid for: stretch (m) and angle (rad) of the coupling, handle's axes.
     /// Zero without targets.
-    pub fn given_way(&self) -> Twist {
-        self.tank.given_way()
+    pub fn slip(&self) -> Twist {
+        self.tank.slip()
     }
 
     /// Whether the part slips in the hand for good where the coupling would have to pull harder than it may, instead of being pulled back with all it
@@ -264,20 +264,20 @@ impl State {
     }
 
     /// Has the next tick look at everything, as after a jump. Coherence changes the work, never the result; this is for showing so.
-    pub fn forget_coherence(&mut self) {
-        self.coherence.forget();
+    pub fn invalidate_coherence(&mut self) {
+        self.coherence.invalidate();
     }
 
     fn forget_contacts(&mut self) {
         self.sharing = 0.0;
-        self.resume = Leaf::FIRST;
+        self.resume = NodeCursor::FIRST;
         self.busy = false;
-        self.overload = Overload::NEW;
+        self.decimation = Decimation::NEW;
         self.pushing = 0;
         self.tank.forget();
-        self.guidance.forget();
+        self.targets.forget();
         self.contacts.clear();
-        self.coherence.forget();
+        self.coherence.invalidate();
     }
 
     /// How far points of the held part, of this field, are moved inward in this tick, m.

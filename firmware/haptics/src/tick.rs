@@ -9,9 +9,9 @@ use crate::collision::contact::Phase;
 use crate::collision::cost::{PULL, solve_cost};
 use crate::collision::decimation::Searched;
 use crate::collision::face_pairs::{Scenery, touching_faces};
-use crate::collision::node_cursor::Leaf;
+use crate::collision::node_cursor::NodeCursor;
 use crate::collision::search::Search;
-use crate::constraints::targets::{At, TargetRules};
+use crate::constraints::targets::{Situation, TargetRules};
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::coupling::Coupling;
 use crate::dynamics::limits::limit;
@@ -86,12 +86,12 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
             object_energy,
             settings,
         );
-        let hold = match (state.guidance.is_empty(), state.pushing) {
+        let hold = match (state.targets.is_empty(), state.pushing) {
             (false, _) => Hold::Targets,
             (true, 0) => Hold::Nothing,
             (true, _) => Hold::Contacts,
         };
-        (state.tank).give_way(&mut coupling, handle.orientation, hold, settings);
+        (state.tank).slip_to_bound(&mut coupling, handle.orientation, hold, settings);
         open
     } else {
         state.tank.forget();
@@ -101,8 +101,8 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     let (gyration2, scale) = grabbed
         .body
         .gyration2_in_world(grabbed.orientation, &settings.object);
-    state.guidance.step(&settings.guidance);
-    let at = At {
+    state.targets.step(&settings.guidance);
+    let at = Situation {
         scene,
         parts: &state.parts,
         held: grabbed.part,
@@ -113,11 +113,11 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         settings: &settings.guidance,
         coupling_stiffness: settings.coupling.k_t_n_per_m,
     };
-    let mut pulls = Vec::new();
-    state.guidance.add_pulls(&at, &mut pulls);
+    let mut springs = Vec::new();
+    state.targets.add_springs(&at, &mut springs);
     let turning = grabbed.turning_energy(settings.object.mass_kg, gyration2);
     state.tank.keep(object_energy + turning);
-    let guided_share = state.guidance.share(&at);
+    let guided_share = state.targets.share(&at);
     let step = Step {
         coupling: &coupling,
         settings: &settings.coupling,
@@ -126,7 +126,7 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         gyration2,
         length: scale,
         twist: grabbed.twist,
-        pulls: &pulls,
+        springs: &springs,
     };
     let mut free = match settings.integrator {
         Integrator::Implicit => step.free(),
@@ -141,8 +141,8 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
         + state.braking_margin(settings)
         + settings.period_s * smaller(likely, point_speed(free.twist, reach));
     let motions = [grabbed.twist, free.twist].map(|t| step.scale(t).map(|x| x * settings.period_s));
-    if (state.guidance).join(&at, &pulls, &motions, state.slack(settings)) {
-        state.coherence.end_joints();
+    if (state.targets).join(&at, &springs, &motions, state.slack(settings)) {
+        state.coherence.end_exclusions();
     }
     let solution = state.meet(
         scene,
@@ -182,8 +182,8 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
     let guided = (state.contacts.as_slice().iter())
         .filter(|c| c.guided && c.phase != Phase::Free)
         .map(|c| c.arm);
-    state.guidance.observe(guided, &state.parts);
-    let guidance = state.guidance.state(&pulls, &step.scale(twist), scale);
+    state.targets.observe(guided, &state.parts);
+    let guidance = state.targets.state(&springs, &step.scale(twist), scale);
     let scenery = Scenery {
         scene,
         parts: &state.parts,
@@ -215,8 +215,8 @@ pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, inpu
 
 /// How many solves there may be with contacts, when so many look-ups are `left`: past the third, a solve takes three eighths of one for each
 /// candidate too.
-fn most_solves(left: u32, candidates: u16, pulls: usize) -> u8 {
-    let more = left / (solve_cost(pulls) + 3 * u32::from(candidates) / 8);
+fn most_solves(left: u32, candidates: u16, springs: usize) -> u8 {
+    let more = left / (solve_cost(springs) + 3 * u32::from(candidates) / 8);
     u32::from(LEAST_SOLVES)
         .saturating_add(more)
         .min(u32::from(MAX_SOLVES)) as u8
@@ -239,15 +239,15 @@ impl State {
     ) -> Solution {
         let explicit = settings.integrator == Integrator::Explicit;
         let braking_m = if explicit { self.finest_cell_m } else { 0.0 };
-        let pulls = step.pulls.len();
+        let springs = step.springs.len();
         let budget = settings.contact.point_budget;
-        let reserved = solve_cost(pulls) * u32::from(free.solves + LEAST_SOLVES) + PULL * pulls as u32;
-        // Whatever pulls, contact is looked for.
+        let reserved = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + PULL * springs as u32;
+        // Whatever springs, contact is looked for.
         let reserved = reserved.min(budget / 2);
         let held_shape = scene.shape_of_part(usize::from(grabbed.part));
         let shrunk_m = self.shrink(settings, &held_shape.field);
         let rules = TargetRules {
-            targets: &self.guidance,
+            targets: &self.targets,
             settings: &settings.guidance,
         };
         let search = Search {
@@ -265,7 +265,7 @@ impl State {
             swing: margin / (grabbed.body.reach * grabbed.body.reach),
             inverse_length: 1.0 / step.length,
             busy: self.busy,
-            thinning: self.overload.thinning(),
+            decimation: self.decimation.decimation(),
             budget,
             reserved,
             carried: if self.busy { u32::from(self.pushing) } else { 0 },
@@ -274,11 +274,12 @@ impl State {
         };
         let start = self.resume;
         let (stopped, used) = search.run(start, &mut self.coherence, &mut self.contacts, work);
-        self.resume = stopped.unwrap_or(Leaf::FIRST);
+        self.resume = stopped.unwrap_or(NodeCursor::FIRST);
         self.busy = used.all > budget / 2;
-        work.flags.insert_if(search.thinning > 0, Flags::BUDGET_EXCEEDED);
+        work.flags
+            .insert_if(search.decimation > 0, Flags::BUDGET_EXCEEDED);
         let touching = self.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
-        self.overload.learn(&Searched {
+        self.decimation.update(&Searched {
             start,
             stopped,
             used,
@@ -307,7 +308,7 @@ impl State {
                 guided: k * guided_share,
             };
             let left = budget.saturating_sub(used.all);
-            let solves = most_solves(left, work.candidates, pulls);
+            let solves = most_solves(left, work.candidates, springs);
             step.with_contacts(free, contacts, &k, contact.damping_s, farthest, solves)
         };
         self.pushing = self.contacts.pushing() as u16;

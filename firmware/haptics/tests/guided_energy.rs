@@ -90,7 +90,7 @@ fn the_observer_sees_what_the_account_keeps_from_the_hand_and_nothing_without_ta
     let mut settings = Settings::default();
     let alone = sequences(0..60, &settings, false);
     assert!(worst(&alone).given_j < 0.1 * MOST_J, "{:?}", worst(&alone));
-    settings.passivity.endowment_j = f32::INFINITY;
+    settings.passivity.initial_budget_j = f32::INFINITY;
     let free = sequences(0..60, &settings, true);
     assert!(worst(&free).given_j > 100.0 * MOST_J, "{:?}", worst(&free));
 }
@@ -320,8 +320,8 @@ fn counts_do_not_wear_off_what_is_pressed() {
 #[test]
 fn a_hand_at_rest_is_given_next_to_nothing_and_the_part_is_guided_all_the_same() {
     let mut settings = Settings::default();
-    let mut played = |endowment_j: f32| {
-        settings.passivity.endowment_j = endowment_j;
+    let mut played = |initial_budget_j: f32| {
+        settings.passivity.initial_budget_j = initial_budget_j;
         let start = [0.0, 0.0, BLOCK_HALF + PEG_HALF - 10e-3];
         let mut rig = Rig::new(&HOLE, start, &settings);
         rig.hand.goal[0] = 0.4e-3;
@@ -337,7 +337,7 @@ fn a_hand_at_rest_is_given_next_to_nothing_and_the_part_is_guided_all_the_same()
         rig.given_uj()
     };
     let (paid, free) = (
-        played(Settings::default().passivity.endowment_j),
+        played(Settings::default().passivity.initial_budget_j),
         played(f32::INFINITY),
     );
     println!("{paid:.2} µJ, without the account {free:.2} µJ");

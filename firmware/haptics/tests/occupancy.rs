@@ -181,7 +181,7 @@ proptest! {
                     handle_twist: Twist { linear: step * 1e3, angular: Vec3::ZERO },
                     enabled: true,
                 };
-                eager.forget_coherence();
+                eager.invalidate_coherence();
                 let a = tick(&mut lazy, &scene, &settings, &input);
                 let b = tick(&mut eager, &scene, &settings, &input);
                 prop_assert_eq!(&a.handle, &b.handle);

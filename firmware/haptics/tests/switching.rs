@@ -1,7 +1,7 @@
 //! Targets that come late, twice, in the wrong order or not at all: no step in force, no energy made, and nothing left once they expire.
 //!
 //! Energy made is what [`mortise_haptics::observer`] finds: the largest rise over any interval, beyond what is stored. The account lends E₀ once
-//! ([`mortise_haptics::PassivitySettings::endowment_j`]) and what was lent is owed for good, so the number of targets and of switches does not enter.
+//! ([`mortise_haptics::PassivitySettings::initial_budget_j`]) and what was lent is owed for good, so the number of targets and of switches does not enter.
 //! To E₀ comes what readings in single precision hide of the motion. They round x, less than 2⁻⁴ m here, to 2⁻²⁹ m, so a sum over their
 //! differences misses Σ F·Δe = F·e − Σ e·ΔF by no more than
 //!
@@ -186,7 +186,7 @@ proptest! {
                 prop_assert!(out.guidance.wrench.force.length() == 0.0);
             }
         }
-        let lent = f64::from(settings.passivity.endowment_j);
+        let lent = f64::from(settings.passivity.initial_budget_j);
         let rounded = ROUNDED_M * (f64::from(settings.coupling.force_max_n) + changed_n);
         prop_assert!(observer.given_j() <= lent + rounded, "{} J, rounding {rounded} J", observer.given_j());
         // Where it was: the hand's spring and nothing else.

@@ -90,7 +90,7 @@ fn pulls(step: &Step<'_>) -> Wrench {
         torque: pull.torque * slip.rotation,
     };
     let before = step.scale(step.twist);
-    for pull in step.pulls {
+    for pull in step.springs {
         wrench = wrench + pull.wrench(&before, step.length);
     }
     wrench

@@ -20,10 +20,10 @@ use mortise_protocol::image::{Field, PointRecord, Voxel, VoxelSample, oct_decode
 
 use crate::collision::contact::Phase;
 use crate::collision::cost::MATING;
-use crate::collision::directed_pair::Job;
-use crate::collision::node_cursor::Leaf;
+use crate::collision::directed_pair::DirectedPair;
+use crate::collision::node_cursor::NodeCursor;
 use crate::collision::rules::Mating;
-use crate::collision::search::Walk;
+use crate::collision::search::Traversal;
 use crate::io::Flags;
 use crate::math::scalar::inverse_sqrt;
 use crate::settings::ContactSettings;
@@ -47,11 +47,11 @@ pub(crate) fn inward(point: &PointRecord) -> Vec3 {
 impl TangentPlane {
     /// Through the centre of the voxel that `p` (field frame) lies in.
     #[inline]
-    pub fn of(job: &Job<'_>, inward: Vec3, p: Vec3, voxel: &VoxelSample) -> Self {
-        let in_field = job.to_field.turn(inward);
+    pub fn of(pair: &DirectedPair<'_>, inward: Vec3, p: Vec3, voxel: &VoxelSample) -> Self {
+        let in_field = pair.to_field.turn(inward);
         Self {
             gap: (p - Vec3::from_array(voxel.center)).dot(in_field),
-            push: job.to_arm.turn(inward),
+            push: pair.to_arm.turn(inward),
         }
     }
 }
@@ -77,12 +77,12 @@ impl ContactSettings {
     }
 }
 
-impl Walk<'_, '_, '_> {
+impl Traversal<'_, '_, '_> {
     /// Looks one point up and offers it as a contact; how far it is from any surface voxel at least, m.
-    pub fn voxel(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
+    pub fn voxel(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         let position = shrunk(point, self.search.shrunk_m);
-        let p = job.to_field.apply(position);
-        let sample = job.field.voxel(p.to_array());
+        let p = pair.to_field.apply(position);
+        let sample = pair.field.voxel(p.to_array());
         let braking_m = self.search.braking_m;
         match sample.voxel {
             Voxel::Free => return sample.bound,
@@ -94,15 +94,15 @@ impl Walk<'_, '_, '_> {
             Voxel::Proximity | Voxel::Surface => {}
         }
         self.near += 1;
-        let plane = TangentPlane::of(job, inward(point), p, &sample);
-        let arm = job.to_arm.apply(position);
+        let plane = TangentPlane::of(pair, inward(point), p, &sample);
+        let arm = pair.to_arm.apply(position);
         let n = plane.push;
         let turn = arm.cross(n) * self.search.inverse_length;
         let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
         let approach = self.search.approach(&row);
-        let mating = self.mating_of_voxels(job, leaf, point, &sample);
+        let mating = self.mating_of_voxels(pair, leaf, point, &sample);
         let (gap, wanted) = if sample.voxel == Voxel::Surface {
-            let gap = plane.gap + mating.room;
+            let gap = plane.gap + mating.allowance_m;
             (gap, gap < self.search.slack + approach)
         } else {
             // As near as braking begins, for all the method knows; wanted while it comes nearer.
@@ -130,12 +130,12 @@ impl Walk<'_, '_, '_> {
     /// What guidance says of the faces that cross a point's voxel and this one.
     fn mating_of_voxels(
         &mut self,
-        job: &Job<'_>,
-        leaf: Leaf,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
         point: &PointRecord,
         sample: &VoxelSample,
     ) -> Mating {
-        if !job.guided {
+        if !pair.guided {
             return Mating::NONE;
         }
         self.spent += MATING;

@@ -2,20 +2,20 @@
 //!
 //! Cost: some 20 instructions for each node passed.
 
-use crate::collision::coherence::{Coherence, Due};
+use crate::collision::coherence::{Bound, Coherence};
 use crate::collision::node_key::Key;
 
 /// Deepest tree whose inner nodes all learn when they are due: 2¹⁶ leaves in two halves each time.
 const DEEPEST: usize = 16;
 
 /// The nodes above the one that is looked at, and when the first below each is due.
-pub(crate) struct Above {
-    nodes: heapless::Vec<(Key, u32, Due), DEEPEST>,
+pub(crate) struct Ancestors {
+    nodes: heapless::Vec<(Key, u32, Bound), DEEPEST>,
     /// Where the innermost ends.
     end: u32,
 }
 
-impl Above {
+impl Ancestors {
     pub const fn new() -> Self {
         Self {
             nodes: heapless::Vec::new(),
@@ -25,14 +25,14 @@ impl Above {
 
     /// What follows, up to node `end`, is below `key`. In a deeper tree the last above has it all.
     pub fn open(&mut self, key: Key, end: u32) {
-        if self.nodes.push((key, end, Due::NEVER)).is_ok() {
+        if self.nodes.push((key, end, Bound::NEVER)).is_ok() {
             self.end = end;
         }
     }
 
     /// Something below is due.
     #[inline]
-    pub fn hear(&mut self, due: Due) {
+    pub fn note(&mut self, due: Bound) {
         if let Some((_, _, first)) = self.nodes.last_mut()
             && due < *first
         {
@@ -51,11 +51,11 @@ impl Above {
         let Some((key, _, due)) = self.nodes.pop() else {
             return false;
         };
-        if due != Due::NOW {
-            coherence.set_due(key, due);
+        if due != Bound::NOW {
+            coherence.set_bound(key, due);
         }
         self.end = self.nodes.last().map_or(u32::MAX, |&(_, end, _)| end);
-        self.hear(due);
+        self.note(due);
         true
     }
 }

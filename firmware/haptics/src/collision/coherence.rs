@@ -3,10 +3,10 @@
 //! A node whose points are all at least D from the other part cannot hold a candidate until some point of the object has travelled
 //! D − margin. The travel is added up once a tick from a bound on the speed of any point, so the due times are conservative and the
 //! candidates found are the same with and without them. They are kept in a direct-mapped table: a collision costs a look-up, never a contact.
-//! A node that was near is taken to be near still, without asking the field, and asked again once in [`ASK_AGAIN`] ticks. Whole numbers of
+//! A node that was near is taken to be near still, without asking the field, and asked again once in [`QUERY_AGAIN`] ticks. Whole numbers of
 //! nanometres, rounded to the safe side, so that no travel is lost to rounding.
 //!
-//! A node that joints keep apart from all it could meet is far too, as long as every one of those joints lasts: what was noted so is told from the
+//! A node that exclusions keep apart from all it could meet is far too, as long as every one of those exclusions lasts: what was noted so is told from the
 //! rest by an epoch that ends with any of them.
 //!
 //! A node is due no sooner than the first of those below it, so what is far is passed over in large pieces. Of a leaf that is near it is noted which
@@ -14,46 +14,46 @@
 //!
 //! Cost: some 25 instructions for a node of which enough is known, against some 200 for asking the field.
 
-use crate::collision::face_cache::{Wall, Walls};
+use crate::collision::face_cache::{CachedFace, FaceCache};
 use crate::collision::node_key::{ALL, Key, Points, SLOTS};
 
 /// The travel is taken back to zero, and the table cleared, beyond this: 1.8 m.
 const LONGEST_NM: u32 = 1_800_000_000;
-// Dues stay clear of [`JOINED`].
-const _: () = assert!(LONGEST_NM + FARTHEST_NM < JOINED);
-/// Set in the due of a node that a joint keeps apart.
-const JOINED: u32 = 1 << 31;
+// Dues stay clear of [`EXCLUDED`].
+const _: () = assert!(LONGEST_NM + FARTHEST_NM < EXCLUDED);
+/// Set in the due of a node that a exclusion keeps apart.
+const EXCLUDED: u32 = 1 << 31;
 /// No due lies farther ahead: 268 mm.
 const FARTHEST_NM: u32 = 1 << 28;
 /// Ticks after which a node that was near is asked again, or all points of such a leaf are looked at; a power of two. Which tick depends on the
 /// node, so that the work is spread.
-const ASK_AGAIN: u32 = 16;
+const QUERY_AGAIN: u32 = 16;
 /// Set in the due of a leaf whose sphere did not tell that it is far, but its points did: when it is due, so are they.
 const BY_POINTS: u32 = 1;
 
-/// Due times of nodes.
+/// Bound times of nodes.
 // In this order: what is asked with every node lies at offsets that fit an instruction.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Coherence {
     travel_nm: u32,
     /// What was noted at up to this travel is void.
-    forgotten_nm: u32,
+    invalidated_nm: u32,
     /// Counts ticks.
     round: u32,
-    /// Of the joints.
+    /// Of the exclusions.
     epoch: u16,
     slots: [Slot; SLOTS],
-    walls: Walls,
+    face_cache: FaceCache,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     tag: u16,
-    /// Points that are near: none of a node that is far, or of an inner one. With [`JOINED`] the epoch instead.
+    /// Points that are near: none of a node that is far, or of an inner one. With [`EXCLUDED`] the epoch instead.
     near: Points,
     /// The travel at which the others, or all, are due.
-    due_nm: u32,
+    bound_nm: u32,
 }
 
 impl Slot {
@@ -61,28 +61,28 @@ impl Slot {
     const EMPTY: Self = Self {
         tag: 0,
         near: 0,
-        due_nm: 0,
+        bound_nm: 0,
     };
 }
 
 /// What is known of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Known {
-    /// None of its points can be a candidate before this [`Due`].
-    Far(Due),
+    /// None of its points can be a candidate before this [`Bound`].
+    Far(Bound),
     /// It was near not long ago: none but these of its points can be a candidate.
     Near(Points),
     /// A leaf all of whose points are due, and whose sphere told nothing when it was last asked.
-    Due,
+    Expired,
     /// Nothing, or nothing of late.
     Nothing,
 }
 
 /// When a node is to be looked at again: the travel, nm, as [`Coherence`] adds it up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Due(u32);
+pub(crate) struct Bound(u32);
 
-impl Due {
+impl Bound {
     /// At every tick.
     pub const NOW: Self = Self(0);
     /// Never, before others have had their say.
@@ -93,28 +93,28 @@ impl Coherence {
     pub const fn new() -> Self {
         Self {
             travel_nm: 0,
-            forgotten_nm: 0,
+            invalidated_nm: 0,
             round: 0,
             epoch: 0,
             slots: [Slot::EMPTY; SLOTS],
-            walls: Walls::new(),
+            face_cache: FaceCache::new(),
         }
     }
 
     /// Everything is due. For a jump of the object, or other parts.
-    pub fn forget(&mut self) {
-        // As if it had travelled past every due: clearing the table costs more than most ticks.
+    pub fn invalidate(&mut self) {
+        // As if it had travelled past every due: exclusion_work the table costs more than most ticks.
         self.add_travel(FARTHEST_NM);
-        self.forgotten_nm = self.travel_nm;
+        self.invalidated_nm = self.travel_nm;
     }
 
     fn add_travel(&mut self, nm: u32) {
         self.travel_nm = self.travel_nm.saturating_add(nm);
         if self.travel_nm > LONGEST_NM {
             // In place: made anew it would pass over the stack, which has not room for many such.
-            (self.travel_nm, self.forgotten_nm, self.epoch) = (0, 0, 0);
+            (self.travel_nm, self.invalidated_nm, self.epoch) = (0, 0, 0);
             self.slots.fill(Slot::EMPTY);
-            self.walls.clear();
+            self.face_cache.clear();
         }
     }
 
@@ -124,7 +124,7 @@ impl Coherence {
         self.add_travel(up_nm(distance));
     }
 
-    /// The travel that leaves `margin` m unseen: to be given to [`Self::ask`].
+    /// The travel that leaves `margin` m unseen: to be given to [`Self::query`].
     pub fn horizon(&self, margin: f32) -> u32 {
         self.travel_nm.saturating_add(up_nm(margin))
     }
@@ -132,99 +132,99 @@ impl Coherence {
     /// What is known of a node, for points that come within the `horizon`. More is known of what lies below an inner node than of the node: when it
     /// is due, it counts as near.
     #[inline]
-    pub fn ask(&self, key: Key, horizon: u32, leaf: bool) -> Known {
+    pub fn query(&self, key: Key, horizon: u32, leaf: bool) -> Known {
         let slot = &self.slots[key.slot()];
-        if slot.tag != key.tag() || slot.due_nm <= self.forgotten_nm {
+        if slot.tag != key.tag() || slot.bound_nm <= self.invalidated_nm {
             return Known::Nothing;
         }
-        if slot.due_nm >= JOINED {
-            // What is above cannot tell it from other dues, and must not outlast the joint.
-            return if slot.near == self.epoch && slot.due_nm & !JOINED > horizon {
-                Known::Far(Due::NOW)
+        if slot.bound_nm >= EXCLUDED {
+            // What is above cannot tell it from other dues, and must not outlast the exclusion.
+            return if slot.near == self.epoch && slot.bound_nm & !EXCLUDED > horizon {
+                Known::Far(Bound::NOW)
             } else {
                 Known::Nothing
             };
         }
-        let due = slot.due_nm <= horizon;
+        let due = slot.bound_nm <= horizon;
         if slot.near == 0 && !due {
-            return Known::Far(Due(slot.due_nm));
+            return Known::Far(Bound(slot.bound_nm));
         }
-        let again = self.round.wrapping_add(key.0).is_multiple_of(ASK_AGAIN);
+        let again = self.round.wrapping_add(key.0).is_multiple_of(QUERY_AGAIN);
         match (leaf, slot.near) {
             (false, _) if again => Known::Nothing,
             (false, _) => Known::Near(ALL),
             // Now and then it is seen whether the sphere tells by now.
-            (true, 0) if again || slot.due_nm & BY_POINTS == 0 => Known::Nothing,
-            (true, 0) => Known::Due,
-            (true, _) if again => Known::Due,
+            (true, 0) if again || slot.bound_nm & BY_POINTS == 0 => Known::Nothing,
+            (true, 0) => Known::Expired,
+            (true, _) if again => Known::Expired,
             (true, near) => Known::Near(if due { ALL } else { near }),
         }
     }
 
     /// No point of the node is nearer than `distance` m, as its sphere tells now.
     #[inline]
-    pub fn set_distance(&mut self, key: Key, distance: f32) -> Due {
-        let Due(due_nm) = self.ahead(key, distance);
-        self.set_due(key, Due(due_nm & !BY_POINTS))
+    pub fn set_distance(&mut self, key: Key, distance: f32) -> Bound {
+        let Bound(bound_nm) = self.ahead(key, distance);
+        self.set_bound(key, Bound(bound_nm & !BY_POINTS))
     }
 
     /// No point of the leaf is nearer than `distance` m, as each of them tells now.
     #[inline]
-    pub fn set_far(&mut self, key: Key, distance: f32) -> Due {
-        let Due(due_nm) = self.ahead(key, distance);
+    pub fn set_far(&mut self, key: Key, distance: f32) -> Bound {
+        let Bound(bound_nm) = self.ahead(key, distance);
         // No later than that.
-        self.set_due(key, Due(due_nm.saturating_sub(1) | BY_POINTS))
+        self.set_bound(key, Bound(bound_nm.saturating_sub(1) | BY_POINTS))
     }
 
     /// No node below this one is due before `due`.
     #[inline]
-    pub fn set_due(&mut self, key: Key, due: Due) -> Due {
-        let due_nm = smaller_of(due.0, self.travel_nm + FARTHEST_NM);
-        self.set(key, 0, due_nm);
-        Due(due_nm)
+    pub fn set_bound(&mut self, key: Key, due: Bound) -> Bound {
+        let bound_nm = smaller_of(due.0, self.travel_nm + FARTHEST_NM);
+        self.set(key, 0, bound_nm);
+        Bound(bound_nm)
     }
 
     /// The node is near.
     #[inline]
     pub fn set_near(&mut self, key: Key) {
-        // Due at once, but not forgotten.
+        // Bound at once, but not forgotten.
         self.set(key, ALL, self.travel_nm + 1);
     }
 
     /// Of the leaf's points these are near, the others no nearer than `distance` m.
     #[inline]
     pub fn set_points(&mut self, key: Key, near: Points, distance: f32) {
-        let Due(due_nm) = self.ahead(key, distance);
-        self.set(key, near, due_nm);
+        let Bound(bound_nm) = self.ahead(key, distance);
+        self.set(key, near, bound_nm);
     }
 
-    /// No point of the node can touch anything but what joints keep it from before it has travelled `distance` m.
-    pub fn set_joined(&mut self, key: Key, distance: f32) {
-        let Due(due_nm) = self.ahead(key, distance);
-        self.set(key, self.epoch, due_nm | JOINED);
+    /// No point of the node can touch anything but what exclusions keep it from before it has travelled `distance` m.
+    pub fn set_excluded(&mut self, key: Key, distance: f32) {
+        let Bound(bound_nm) = self.ahead(key, distance);
+        self.set(key, self.epoch, bound_nm | EXCLUDED);
     }
 
     /// What these points of a leaf have to do with.
     #[inline(always)]
-    pub fn wall(&self, leaf: Key, which: Points) -> Wall {
-        self.walls.get(leaf, which, self.travel_nm)
+    pub fn cached_face(&self, leaf: Key, which: Points) -> CachedFace {
+        self.face_cache.get(leaf, which, self.travel_nm)
     }
 
     /// All that these points of a leaf find within `distance` m of where they are has to do with this face, or with more than one.
-    pub fn set_wall(&mut self, leaf: Key, which: Points, wall: Option<u16>, distance: f32) {
+    pub fn cache_face(&mut self, leaf: Key, which: Points, face: Option<u16>, distance: f32) {
         if !leaf.is_none() {
             // Not all leaves in the same tick again.
-            let Due(until_nm) = self.ahead(leaf, distance);
-            self.walls.set(leaf, which, wall, until_nm);
+            let Bound(until_nm) = self.ahead(leaf, distance);
+            self.face_cache.set(leaf, which, face, until_nm);
         }
     }
 
-    /// Some joint is no more: what was noted for it is void.
-    pub fn end_joints(&mut self) {
+    /// Some exclusion is no more: what was noted for it is void.
+    pub fn end_exclusions(&mut self) {
         match self.epoch.checked_add(1) {
             Some(next) => self.epoch = next,
             None => {
-                self.forget();
+                self.invalidate();
                 self.epoch = 0;
             }
         }
@@ -232,17 +232,17 @@ impl Coherence {
 
     /// When the node's share of `distance` m will be used up.
     #[inline]
-    fn ahead(&self, key: Key, distance: f32) -> Due {
+    fn ahead(&self, key: Key, distance: f32) -> Bound {
         // A float that is negative or not a number becomes 0, a huge one the largest number.
         let ahead = (distance * (key.share() * 1e9)) as u32;
-        Due(self.travel_nm + smaller_of(ahead, FARTHEST_NM))
+        Bound(self.travel_nm + smaller_of(ahead, FARTHEST_NM))
     }
 
     #[inline]
-    fn set(&mut self, key: Key, near: Points, due_nm: u32) {
+    fn set(&mut self, key: Key, near: Points, bound_nm: u32) {
         if !key.is_none() {
             let tag = key.tag();
-            self.slots[key.slot()] = Slot { tag, near, due_nm };
+            self.slots[key.slot()] = Slot { tag, near, bound_nm };
         }
     }
 }
@@ -259,10 +259,10 @@ fn up_nm(distance: f32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collision::node_key::{JOBS, Keys, LONGEST_SHARE, NODES, SHORTEST_SHARE};
+    use crate::collision::node_key::{Keys, LONGEST_SHARE, NODES, PAIRS, SHORTEST_SHARE};
 
-    fn key_of(job: u16, node: u32) -> Key {
-        Keys::new(job, node as usize + 1).of(node)
+    fn key_of(pair: u16, node: u32) -> Key {
+        Keys::new(pair, node as usize + 1).of(node)
     }
 
     fn is_far(known: Known) -> bool {
@@ -273,19 +273,19 @@ mod tests {
     fn due_once_the_distance_is_used_up() {
         let mut c = Coherence::new();
         let key = key_of(3, 77);
-        assert_eq!(c.ask(key, c.horizon(0.0), true), Known::Nothing);
+        assert_eq!(c.query(key, c.horizon(0.0), true), Known::Nothing);
         c.set_distance(key, 1e-3);
-        assert!(is_far(c.ask(key, c.horizon(0.0), true)));
-        assert!(is_far(c.ask(key, c.horizon(0.44e-3), true)));
-        assert_eq!(c.ask(key, c.horizon(0.91e-3), true), Known::Nothing);
+        assert!(is_far(c.query(key, c.horizon(0.0), true)));
+        assert!(is_far(c.query(key, c.horizon(0.44e-3), true)));
+        assert_eq!(c.query(key, c.horizon(0.91e-3), true), Known::Nothing);
         for _ in 0..44 {
             c.travelled(1e-5);
-            assert!(is_far(c.ask(key, c.horizon(0.0), true)));
+            assert!(is_far(c.query(key, c.horizon(0.0), true)));
         }
         for _ in 0..47 {
             c.travelled(1e-5);
         }
-        assert_eq!(c.ask(key, c.horizon(0.0), true), Known::Nothing);
+        assert_eq!(c.query(key, c.horizon(0.0), true), Known::Nothing);
     }
 
     /// Over the whole range, and evenly: each of eight parts of it holds an eighth of a thousand nodes, four standard deviations of 10.5 allowed.
@@ -307,22 +307,22 @@ mod tests {
     #[test]
     fn what_joints_keep_apart_is_far_while_they_last() {
         let mut c = Coherence::new();
-        let key = key_of(JOBS - 1, NODES - 1);
+        let key = key_of(PAIRS - 1, NODES - 1);
         assert_eq!(key.tag(), u16::MAX, "the largest, and not that of an empty slot");
         for _ in 0..20 {
-            c.set_joined(key, 1e-3);
-            assert!(is_far(c.ask(key, c.horizon(0.4e-3), true)));
-            assert_eq!(c.ask(key, c.horizon(1e-3), true), Known::Nothing);
-            c.end_joints();
-            assert_eq!(c.ask(key, c.horizon(0.0), true), Known::Nothing);
+            c.set_excluded(key, 1e-3);
+            assert!(is_far(c.query(key, c.horizon(0.4e-3), true)));
+            assert_eq!(c.query(key, c.horizon(1e-3), true), Known::Nothing);
+            c.end_exclusions();
+            assert_eq!(c.query(key, c.horizon(0.0), true), Known::Nothing);
         }
         // Every epoch's keys are told apart, and from those without.
         let mut c = Coherence::new();
         c.set_distance(key, 1e-3);
         for _ in 0..3 {
-            c.end_joints();
+            c.end_exclusions();
         }
-        assert!(is_far(c.ask(key, c.horizon(0.0), true)));
+        assert!(is_far(c.query(key, c.horizon(0.0), true)));
     }
 
     #[test]
@@ -331,8 +331,8 @@ mod tests {
         let (a, b) = (key_of(0, 5), key_of(0, 5 + SLOTS as u32));
         c.set_distance(a, 1.0);
         c.set_distance(b, 1.0);
-        assert_eq!(c.ask(a, c.horizon(0.0), true), Known::Nothing);
-        assert!(is_far(c.ask(b, c.horizon(0.0), true)));
+        assert_eq!(c.query(a, c.horizon(0.0), true), Known::Nothing);
+        assert!(is_far(c.query(b, c.horizon(0.0), true)));
     }
 
     #[test]
@@ -341,9 +341,9 @@ mod tests {
         let key = key_of(0, 0);
         for start in 0..20 {
             c.set_distance(key, f32::INFINITY);
-            assert!(is_far(c.ask(key, c.horizon(0.2), true)), "{start}");
+            assert!(is_far(c.query(key, c.horizon(0.2), true)), "{start}");
             c.travelled(0.2);
-            assert_eq!(c.ask(key, c.horizon(0.1), true), Known::Nothing);
+            assert_eq!(c.query(key, c.horizon(0.1), true), Known::Nothing);
         }
     }
 
@@ -353,14 +353,14 @@ mod tests {
         for start in 0..20 {
             let key = |node| key_of(3, node);
             c.set_distance(key(0), f32::INFINITY);
-            c.set_due(key(1), Due::NEVER);
+            c.set_bound(key(1), Bound::NEVER);
             c.set_points(key(2), 5, f32::INFINITY);
-            c.set_joined(key(3), f32::INFINITY);
+            c.set_excluded(key(3), f32::INFINITY);
             c.set_near(key(4));
-            c.forget();
+            c.invalidate();
             for node in 0..5 {
                 for leaf in [false, true] {
-                    let known = c.ask(key(node), c.horizon(0.0), leaf);
+                    let known = c.query(key(node), c.horizon(0.0), leaf);
                     assert_eq!(known, Known::Nothing, "{start}: {node}");
                 }
             }
@@ -372,15 +372,18 @@ mod tests {
     fn what_is_noted_is_known() {
         let mut c = Coherence::new();
         for _ in 0..20 {
-            c.forget();
+            c.invalidate();
             c.set_near(key_of(3, 1));
             c.set_points(key_of(3, 2), 5, 1e-3);
             c.set_distance(key_of(3, 3), 1e-3);
-            let ask = |node| c.ask(key_of(3, node), c.horizon(0.0), true);
+            let ask = |node| c.query(key_of(3, node), c.horizon(0.0), true);
             // Each in one of 16 ticks is asked again.
             for (node, known) in [(1, Known::Near(ALL)), (2, Known::Near(5))] {
-                let again = c.round.wrapping_add(key_of(3, node).0).is_multiple_of(ASK_AGAIN);
-                assert_eq!(ask(node), if again { Known::Due } else { known });
+                let again = c
+                    .round
+                    .wrapping_add(key_of(3, node).0)
+                    .is_multiple_of(QUERY_AGAIN);
+                assert_eq!(ask(node), if again { Known::Expired } else { known });
             }
             assert!(is_far(ask(3)));
             c.travelled(0.0);
@@ -394,7 +397,7 @@ mod tests {
         for distance in [-1.0, 0.0, f32::NAN, f32::NEG_INFINITY] {
             c.set_distance(key_of(1, 1), distance);
             assert_eq!(
-                c.ask(key_of(1, 1), c.horizon(0.0), true),
+                c.query(key_of(1, 1), c.horizon(0.0), true),
                 Known::Nothing,
                 "{distance}"
             );
@@ -406,10 +409,10 @@ mod tests {
         let mut c = Coherence::new();
         let key = key_of(1, 9);
         let (mut asked, mut looked_at) = (0, 0);
-        for _ in 0..4 * ASK_AGAIN {
+        for _ in 0..4 * QUERY_AGAIN {
             c.set_near(key);
-            asked += u32::from(c.ask(key, c.horizon(1.0), false) == Known::Nothing);
-            looked_at += u32::from(c.ask(key, c.horizon(1.0), true) == Known::Due);
+            asked += u32::from(c.query(key, c.horizon(1.0), false) == Known::Nothing);
+            looked_at += u32::from(c.query(key, c.horizon(1.0), true) == Known::Expired);
             c.travelled(0.0);
         }
         assert_eq!((asked, looked_at), (4, 4));
@@ -421,11 +424,11 @@ mod tests {
         let mut c = Coherence::new();
         let key = key_of(1, 9);
         let mut asked = 0;
-        for _ in 0..4 * ASK_AGAIN {
+        for _ in 0..4 * QUERY_AGAIN {
             c.set_far(key, 1e-3);
-            assert!(is_far(c.ask(key, c.horizon(0.7e-3), true)));
-            match c.ask(key, c.horizon(0.9e-3), true) {
-                Known::Due => {}
+            assert!(is_far(c.query(key, c.horizon(0.7e-3), true)));
+            match c.query(key, c.horizon(0.9e-3), true) {
+                Known::Expired => {}
                 known => {
                     assert_eq!(known, Known::Nothing);
                     asked += 1;

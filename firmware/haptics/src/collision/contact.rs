@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::collision::node_cursor::Leaf;
+use crate::collision::node_cursor::NodeCursor;
 use crate::math::symmetric6::dot;
 
 /// Contacts one tick can carry.
@@ -34,7 +34,7 @@ pub(crate) struct Contact {
     /// The other part's, likewise.
     pub static_edge_face: u16,
     /// Where it was found; tells the other part.
-    pub leaf: Leaf,
+    pub leaf: NodeCursor,
 }
 
 impl Contact {
@@ -51,7 +51,7 @@ impl Contact {
         static_face: 0,
         moving_edge_face: 0,
         static_edge_face: 0,
-        leaf: Leaf::FIRST,
+        leaf: NodeCursor::FIRST,
     };
 }
 
@@ -197,7 +197,7 @@ impl Contacts {
 
     /// Takes what pushed in the last tick over into this one where its leaf was not looked at: the gap as the object's `motion` since (scaled as the
     /// rows) has changed it, the normal as it was.
-    pub fn carry(&mut self, motion: &[f32; 6], unseen: impl Fn(Leaf) -> bool) {
+    pub fn carry(&mut self, motion: &[f32; 6], unseen: impl Fn(NodeCursor) -> bool) {
         for i in 0..self.carried_len {
             let old = self.lists[1 - self.current][i];
             let gap = old.gap + dot(&old.row, motion);
@@ -372,7 +372,7 @@ mod tests {
         assert!(contacts.as_slice().is_empty());
         contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |_| false);
         assert!(contacts.as_slice().is_empty());
-        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |leaf| leaf == Leaf::FIRST);
+        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |leaf| leaf == NodeCursor::FIRST);
         assert_eq!(contacts.as_slice().len(), 10);
         for (i, c) in contacts.as_slice().iter().enumerate() {
             assert_eq!((usize::from(c.moving_face), c.phase), (i, Phase::Free));

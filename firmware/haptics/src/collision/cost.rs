@@ -1,6 +1,6 @@
 //! What work counts in the budget of a tick, in eighths of a field query ([`LOOKUP`]).
 
-/// A look-up, 190 instructions: what the budget is counted in, here in eighths of one. What joints take: [`crate::joint`].
+/// A look-up, 190 instructions: what the budget is counted in, here in eighths of one. What exclusions take: [`crate::exclusion`].
 pub(crate) const LOOKUP: u32 = 8;
 /// A point at an edge, besides.
 pub(crate) const EDGE: u32 = 6;
@@ -9,7 +9,7 @@ pub(crate) const NEAR: u32 = 6;
 /// Where targets guide, besides, to ask for the faces' mating,
 pub(crate) const MATING: u32 = 2;
 /// and at an edge for the room its faces have.
-pub(crate) const ROOM: u32 = 8;
+pub(crate) const ALLOWANCE: u32 = 8;
 /// A point that may touch, besides: half of them do, and in most ticks two solves are enough.
 pub(crate) const CANDIDATE: u32 = 11;
 /// To begin with a leaf.
@@ -19,15 +19,15 @@ pub(crate) const NODE: u32 = 12;
 /// To pass over a node of which enough is known.
 pub(crate) const PASSED_OVER: u32 = 5;
 /// A look-up of a point of which the face is known.
-pub(crate) const AT_WALL: u32 = 5;
+pub(crate) const CACHED_POINT: u32 = 5;
 /// To find out which it is.
-pub(crate) const FIND_WALL: u32 = 32;
+pub(crate) const FIND_FACE: u32 = 32;
 /// A look-up whose gap is noted, besides.
 pub(crate) const NOTED: u32 = 1;
 /// What asking about a leaf counts in the budget before anything is read.
-pub(crate) const CLEARING: u32 = 4 * LOOKUP;
+pub(crate) const EXCLUSION: u32 = 4 * LOOKUP;
 /// So many reads of the field's bricks and cells count in the budget as one [`LOOKUP`].
-pub(crate) const CLEARING_READS: u32 = 14;
+pub(crate) const EXCLUSION_READS: u32 = 14;
 /// To find what a target pulls with, and what follows from it, look-ups. What it takes in a solve: [`solve_cost`].
 pub(crate) const PULL: u32 = 6;
 

@@ -8,7 +8,7 @@
 
 use crate::collision::contact::MAX_CONTACTS;
 use crate::collision::cost::Used;
-use crate::collision::node_cursor::Leaf;
+use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Points};
 
 /// Ticks in a row whose budget may run out with the last leaf not reached: so whatever is near is looked at every second tick, or points are left
@@ -17,33 +17,33 @@ const OVERRUNS_BORNE: u8 = 1;
 /// Likewise after a grab, until all was looked at for the first time.
 const FIRST_LOOK: u8 = 64;
 /// Of the points that are near each 128th is looked at in any case.
-const MOST_THINNING: u8 = 7;
+const MAX_DECIMATION: u8 = 7;
 /// Ticks in a row whose budget must suffice before more points are looked at.
 const CALM_TICKS: u16 = 250;
 /// A budget or a store has room for twice the points when they are expected to fill less than eight ninths of it.
 const NINTHS: u32 = 8;
 
 /// Thinning up to which some point of every leaf is looked at: most leaves have 8 points or a few more.
-pub(crate) const LEAF_THINNING: u8 = 3;
-/// Which points of a leaf are looked at, by thinning.
-const THINNED: [Points; LEAF_THINNING as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
+pub(crate) const LEAF_DECIMATION: u8 = 3;
+/// Which points of a leaf are looked at, by decimation.
+const KEPT_POINTS: [Points; LEAF_DECIMATION as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
 
 /// Which points of a leaf are looked at. When one of each leaf is too many, whole leaves are left out, evenly too.
 #[inline]
-pub(crate) fn mask(thinning: u8, first_point: u32) -> Points {
-    let leaves = (1u32 << thinning.saturating_sub(LEAF_THINNING)) - 1;
-    if (first_point >> LEAF_THINNING) & leaves != 0 {
+pub(crate) fn mask(decimation: u8, first_point: u32) -> Points {
+    let leaves = (1u32 << decimation.saturating_sub(LEAF_DECIMATION)) - 1;
+    if (first_point >> LEAF_DECIMATION) & leaves != 0 {
         0
     } else {
-        THINNED[usize::from(thinning.min(LEAF_THINNING))]
+        KEPT_POINTS[usize::from(decimation.min(LEAF_DECIMATION))]
     }
 }
 
 /// How much is left out, and for how long it went well or ill.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Overload {
+pub(crate) struct Decimation {
     /// Of the points that are near only each 2ⁿth is looked at.
-    thinning: u8,
+    decimation: u8,
     /// Ticks whose budget may still run out before more points are left out.
     patience: u8,
     /// Ticks in a row whose budget was enough, or since more points were looked at again.
@@ -53,9 +53,9 @@ pub(crate) struct Overload {
 /// What one search came to.
 pub(crate) struct Searched {
     /// Where it began.
-    pub start: Leaf,
+    pub start: NodeCursor,
     /// Where the budget ran out.
-    pub stopped: Option<Leaf>,
+    pub stopped: Option<NodeCursor>,
     /// Look-ups.
     pub used: Used,
     /// Look-ups allowed.
@@ -66,29 +66,29 @@ pub(crate) struct Searched {
     pub lost: u32,
 }
 
-impl Overload {
+impl Decimation {
     /// After a grab: nothing was looked at yet.
     pub const NEW: Self = Self {
-        thinning: 0,
+        decimation: 0,
         patience: FIRST_LOOK,
         calm: 0,
     };
 
     /// Of the points that are near only each 2ⁿth is to be looked at.
-    pub fn thinning(&self) -> u8 {
-        self.thinning
+    pub fn decimation(&self) -> u8 {
+        self.decimation
     }
 
     /// Draws the conclusions of a search.
-    pub fn learn(&mut self, searched: &Searched) {
+    pub fn update(&mut self, searched: &Searched) {
         let overrun = self.bear(searched);
         let Searched { touching, lost, .. } = *searched;
         if lost > 0 {
-            self.thin_to_fit(touching + lost);
-        } else if overrun && self.thinning < MOST_THINNING && self.helps(searched) {
-            self.thinning += 1;
-        } else if self.thinning > 0 && self.calm >= CALM_TICKS && has_room(searched) {
-            self.thinning -= 1;
+            self.decimate_to_fit(touching + lost);
+        } else if overrun && self.decimation < MAX_DECIMATION && self.helps(searched) {
+            self.decimation += 1;
+        } else if self.decimation > 0 && self.calm >= CALM_TICKS && has_room(searched) {
+            self.decimation -= 1;
             self.calm = 0;
         }
     }
@@ -118,18 +118,18 @@ impl Overload {
     /// Whether half the points would make a difference, not only the way to them be too long; and where that leaves out whole leaves, whether there
     /// are so many that faces are not left out with them.
     fn helps(&self, searched: &Searched) -> bool {
-        let part = if self.thinning < LEAF_THINNING { 4 } else { 2 };
+        let part = if self.decimation < LEAF_DECIMATION { 4 } else { 2 };
         part * searched.used.on_points > searched.budget
     }
 
-    /// To where three quarters of a store are left of so many `touching` points seen at this thinning.
+    /// To where three quarters of a store are left of so many `touching` points seen at this decimation.
     ///
     /// More than the store holds must not touch: which are kept would follow the last tick's tilt and tilt the part the other way, and the
     /// stiffness that comes and goes with them makes energy. A flat face on more than 256 points rattled so from tick to tick, by as much as it was
     /// deep in.
-    fn thin_to_fit(&mut self, mut touching: u32) {
-        while self.thinning < MOST_THINNING && touching * 4 > MAX_CONTACTS as u32 * 3 {
-            self.thinning += 1;
+    fn decimate_to_fit(&mut self, mut touching: u32) {
+        while self.decimation < MAX_DECIMATION && touching * 4 > MAX_CONTACTS as u32 * 3 {
+            self.decimation += 1;
             touching /= 2;
         }
     }
@@ -147,8 +147,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn at(node: u32) -> Leaf {
-        Leaf { job: 0, node }
+    fn at(node: u32) -> NodeCursor {
+        NodeCursor { pair: 0, node }
     }
 
     fn stopped(start: u32, stop: u32) -> Searched {
@@ -161,7 +161,7 @@ mod tests {
 
     fn sufficed(all: u32) -> Searched {
         Searched {
-            start: Leaf::FIRST,
+            start: NodeCursor::FIRST,
             stopped: None,
             used: Used {
                 all,
@@ -175,72 +175,72 @@ mod tests {
 
     #[test]
     fn the_first_look_is_borne_once_round() {
-        let mut o = Overload::NEW;
+        let mut o = Decimation::NEW;
         for tick in 0..50 {
-            o.learn(&stopped(10 * tick, 10 * tick + 10));
-            assert_eq!(o.thinning(), 0, "{tick}");
+            o.update(&stopped(10 * tick, 10 * tick + 10));
+            assert_eq!(o.decimation(), 0, "{tick}");
         }
         // From the end to the beginning again.
-        o.learn(&stopped(500, 5));
+        o.update(&stopped(500, 5));
         for _ in 0..=OVERRUNS_BORNE {
-            o.learn(&stopped(5, 15));
+            o.update(&stopped(5, 15));
         }
-        assert_eq!(o.thinning(), 1);
+        assert_eq!(o.decimation(), 1);
     }
 
     /// A look that gets nowhere is not borne for ever.
     #[test]
     fn a_first_look_without_end_thins() {
-        let mut o = Overload::NEW;
+        let mut o = Decimation::NEW;
         for _ in 0..=FIRST_LOOK {
-            o.learn(&stopped(0, 1));
+            o.update(&stopped(0, 1));
         }
-        assert_eq!(o.thinning(), 1);
+        assert_eq!(o.decimation(), 1);
     }
 
     /// Points are left out for the work they make, whole leaves for more of it.
     #[test]
     fn a_way_too_long_leaves_nothing_out() {
-        let mut o = Overload::NEW;
+        let mut o = Decimation::NEW;
         let mut play = |on_points| {
             for _ in 0..1000 {
                 let used = Used { all: 500, on_points };
-                o.learn(&Searched {
+                o.update(&Searched {
                     used,
                     ..stopped(5, 40)
                 });
             }
-            o.thinning()
+            o.decimation()
         };
         assert_eq!(play(125), 0);
-        assert_eq!(play(126), LEAF_THINNING);
-        assert_eq!(play(250), LEAF_THINNING);
-        assert_eq!(play(251), MOST_THINNING);
+        assert_eq!(play(126), LEAF_DECIMATION);
+        assert_eq!(play(250), LEAF_DECIMATION);
+        assert_eq!(play(251), MAX_DECIMATION);
     }
 
     #[test]
     fn comes_back_step_by_step_and_only_after_calm() {
-        let mut o = Overload::NEW;
+        let mut o = Decimation::NEW;
         for _ in 0..1000 {
-            o.learn(&stopped(5, 40));
+            o.update(&stopped(5, 40));
         }
-        assert_eq!(o.thinning(), MOST_THINNING);
-        for ticks in 1..=u32::from(MOST_THINNING) * u32::from(CALM_TICKS) {
-            o.learn(&sufficed(100));
+        assert_eq!(o.decimation(), MAX_DECIMATION);
+        for ticks in 1..=u32::from(MAX_DECIMATION) * u32::from(CALM_TICKS) {
+            o.update(&sufficed(100));
             let steps = (ticks / u32::from(CALM_TICKS)) as u8;
-            assert_eq!(o.thinning(), MOST_THINNING - steps, "{ticks}");
+            assert_eq!(o.decimation(), MAX_DECIMATION - steps, "{ticks}");
         }
         // What would not fit stays out.
-        o.learn(&Searched {
+        o.update(&Searched {
             lost: 100,
             touching: 256,
             ..sufficed(100)
         });
-        assert_eq!(o.thinning(), 1);
+        assert_eq!(o.decimation(), 1);
         for _ in 0..2 * CALM_TICKS {
-            o.learn(&sufficed(400));
+            o.update(&sufficed(400));
         }
-        assert_eq!(o.thinning(), 1);
+        assert_eq!(o.decimation(), 1);
     }
 
     proptest! {
@@ -249,13 +249,13 @@ mod tests {
         fn stays_within_its_bounds(
             ticks in prop::collection::vec((0u32..100, prop::option::of(0u32..100), 0u32..2000, 0u32..257, 0u32..40_000), 1..300)
         ) {
-            let mut o = Overload::NEW;
+            let mut o = Decimation::NEW;
             for (start, stop, all, touching, lost) in ticks {
-                let before = o.thinning();
-                o.learn(&Searched { start: at(start), stopped: stop.map(at), touching, lost, ..sufficed(all) });
-                prop_assert!(o.thinning() <= MOST_THINNING);
-                let fits = 4 * ((touching + lost) >> (o.thinning() - before.min(o.thinning()))) <= 3 * MAX_CONTACTS as u32;
-                prop_assert!(lost == 0 || fits || o.thinning() == MOST_THINNING);
+                let before = o.decimation();
+                o.update(&Searched { start: at(start), stopped: stop.map(at), touching, lost, ..sufficed(all) });
+                prop_assert!(o.decimation() <= MAX_DECIMATION);
+                let fits = 4 * ((touching + lost) >> (o.decimation() - before.min(o.decimation()))) <= 3 * MAX_CONTACTS as u32;
+                prop_assert!(lost == 0 || fits || o.decimation() == MAX_DECIMATION);
             }
         }
     }

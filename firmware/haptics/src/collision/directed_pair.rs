@@ -5,20 +5,20 @@ use mortise_protocol::image::{FaceRecord, Field, NodeRecord, Place, PointRecord,
 
 use crate::collision::exact_surface::exact;
 use crate::collision::node_key::Keys;
-use crate::collision::rules::Joined;
+use crate::collision::rules::ExcludedPairs;
 use crate::math::pose::Pose;
 
 /// A position in a field is off by less than this times the lengths it is summed up from: eight roundings of 2⁻²⁴ at most.
 const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
-/// Trees and fields of one job, and the way between their frames.
-pub(crate) struct Job<'i> {
+/// Trees and fields of one pair, and the way between their frames.
+pub(crate) struct DirectedPair<'i> {
     pub index: u16,
     pub backward: bool,
     /// A target guides to this part.
     pub guided: bool,
-    /// Faces that joints keep apart.
-    pub joined: Joined,
+    /// Faces that exclusions keep apart.
+    pub excluded: ExcludedPairs,
     pub nodes: &'i [NodeRecord],
     /// What is known of them goes by these.
     pub keys: Keys,
@@ -53,7 +53,7 @@ impl Affine {
     }
 }
 
-impl<'i> Job<'i> {
+impl<'i> DirectedPair<'i> {
     /// Whether this way round is not part of the method: points of the other part against a voxmap of the held one.
     pub fn left_out(&self) -> bool {
         self.backward && self.field.is_occupancy()
@@ -67,7 +67,7 @@ impl<'i> Job<'i> {
 
     /// The face that every cell within `free_m` of any of these points of the tree names all over, if it is one; at a cost of `reads` at most, as of
     /// [`Field::all_at`].
-    pub fn wall<'p>(
+    pub fn only_face_near<'p>(
         &self,
         points: impl Iterator<Item = &'p PointRecord>,
         free_m: f32,
@@ -105,7 +105,7 @@ impl<'i> Job<'i> {
         }
     }
 
-    /// Job `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
+    /// DirectedPair `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
     /// the world.
     pub fn new(index: u16, held: (&Shape<'i>, Pose), other: (&Shape<'i>, Pose), center: Vec3) -> Self {
         let backward = !index.is_multiple_of(2);
@@ -121,7 +121,7 @@ impl<'i> Job<'i> {
             index,
             backward,
             guided: false,
-            joined: Joined::new(),
+            excluded: ExcludedPairs::new(),
             nodes: tree.nodes,
             keys: Keys::new(index, tree.nodes.len()),
             points: tree.points,

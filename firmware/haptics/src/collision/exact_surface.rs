@@ -190,13 +190,13 @@ pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Op
 /// What [`exact_on_face`] would have `found` were every face farther off by its `room`, which is nowhere more than `most`. About 60 instructions a
 /// face.
 #[inline(never)]
-pub(crate) fn with_room(
+pub(crate) fn with_allowance(
     found: OnFace,
     faces: &[FaceRecord],
     nearby: Nearby,
     p: Vec3,
     most: f32,
-    mut room: impl FnMut(u16) -> f32,
+    mut allowance_m: impl FnMut(u16) -> f32,
 ) -> OnFace {
     let (group, sign) = match nearby {
         Nearby::Convex(group) => (group, 1.0),
@@ -206,7 +206,7 @@ pub(crate) fn with_room(
     // Room makes a convex edge's other faces the nearer ones only when it is more than they are behind.
     let reach = if sign > 0.0 { most } else { 0.0 };
     let first = found.face;
-    let (mut chosen, mut gap) = (found, found.distance + room(first));
+    let (mut chosen, mut gap) = (found, found.distance + allowance_m(first));
     for face in group {
         if face == NO_FACE || face == first {
             continue;
@@ -215,7 +215,7 @@ pub(crate) fn with_room(
             continue;
         };
         if (other.distance - gap) * sign + reach > 0.0 {
-            let other_gap = other.distance + room(face);
+            let other_gap = other.distance + allowance_m(face);
             if (other_gap - gap) * sign > 0.0 {
                 (chosen, gap) = (other, other_gap);
             }

@@ -1,4 +1,4 @@
-//! Joints: what a target keeps apart needs no looking at.
+//! Exclusions: what a target keeps apart needs no looking at.
 //!
 //! A target that is fully engaged keeps the part on its axis, and its mating faces, which make room for each other there ([`crate::guidance`]),
 //! cannot touch: coaxial cylinders of radii R and r are R − r apart, less what the part is off the axis. As long as
@@ -6,9 +6,9 @@
 //! e + θ·l + 2·Δ + slack ≤ (R − r) + room
 //!
 //! (e, θ: offset and angle left; l: lever from the axis' point to the part's farthest; Δ: what the motion so far, or that without contacts, adds in a
-//! tick) no point of one face can become a contact with the other. Then the target is a *joint*, and leaves of the sphere tree whose points meet
+//! tick) no point of one face can become a contact with the other. Then the target is a *exclusion*, and leaves of the sphere tree whose points meet
 //! nothing but the other face are passed over until the object has travelled to where that may end. What is felt is the same to the bit
-//! with and without: a joint forms and ends without a step because it changes the work and nothing else.
+//! with and without: a exclusion forms and ends without a step because it changes the work and nothing else.
 //!
 //! Whether a leaf's points meet nothing else is asked of the field, as seldom as the field is asked about nodes: of all of them at once by what the
 //! bricks about them have to do with, or of each by the cells next to it. What is read is counted in the budget for what it takes, and a tick begins
@@ -21,10 +21,10 @@ use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::image::{EDGE_ERROR_CELLS, PointRecord};
 
-use crate::collision::cost::{CLEARING, CLEARING_READS, LOOKUP};
-use crate::collision::directed_pair::Job;
-use crate::collision::rules::{MAX_JOINED, holds};
-use crate::collision::search::Walk;
+use crate::collision::cost::{EXCLUSION, EXCLUSION_READS, LOOKUP};
+use crate::collision::directed_pair::DirectedPair;
+use crate::collision::rules::{MAX_EXCLUDED, holds};
+use crate::collision::search::Traversal;
 
 /// Around a leaf's points, cells that must hold the mating face and no other: half a brick, or else the next.
 const FAR_CELLS: f32 = 4.0;
@@ -35,40 +35,40 @@ const LEAST_CLEAR_CELLS: f32 = 0.5;
 const MOST_READS: u32 = 1000;
 
 /// A tick asks about no further leaf once asking has counted one part in so many of its budget of look-ups, each [`LOOKUP`].
-const CLEARING_SHARE: u32 = 12;
+const EXCLUSION_SHARE: u32 = 12;
 
-impl Walk<'_, '_, '_> {
-    /// How far the object may travel before a point of the leaf at `points` could touch anything but what joints keep it from, m; none when that is
+impl Traversal<'_, '_, '_> {
+    /// How far the object may travel before a point of the leaf at `points` could touch anything but what exclusions keep it from, m; none when that is
     /// not known, or hardly any way, or enough leaves were asked about in this tick.
-    pub(crate) fn joined(&mut self, job: &Job<'_>, points: &[PointRecord]) -> Option<f32> {
-        let common = mates(job, points)?;
-        if !self.may_clear() {
+    pub(crate) fn excluded(&mut self, pair: &DirectedPair<'_>, points: &[PointRecord]) -> Option<f32> {
+        let common = mates(pair, points)?;
+        if !self.may_query_exclusion() {
             return None;
         }
-        let cell = job.field.record().cell;
+        let cell = pair.field.record().cell;
         let mut left = MOST_READS;
         let mut only = |[low, high]: [Vec3; 2], reach: f32, mates: &[u16]| {
             let (low, high) = ((low - reach).to_array(), (high + reach).to_array());
-            (job.field).only(low, high, &mut left, |face| mates.contains(&face))
+            (pair.field).only(low, high, &mut left, |face| mates.contains(&face))
         };
         // All of them at once by what bricks say, or else each by the cells about it.
-        if !common.is_empty() && only(bounds(job, points)?, FAR_CELLS, &common) {
-            self.count_clearing(0, MOST_READS - left, 0);
+        if !common.is_empty() && only(bounds(pair, points)?, FAR_CELLS, &common) {
+            self.count_exclusion(0, MOST_READS - left, 0);
             return Some(FAR_CELLS * cell);
         }
         let (mut clear, mut looked_up) = (NEXT_CELLS, 0);
         let (mut mates, mut last) = (common, None);
         for point in points {
             if last.replace(own(point)) != Some(own(point)) {
-                mates = mates_of(job, point);
+                mates = mates_of(pair, point);
             }
-            let at = Vec3::from_array(job.in_cells(point));
+            let at = Vec3::from_array(pair.in_cells(point));
             if !mates.is_empty() && only([at; 2], NEXT_CELLS, &mates) {
                 continue;
             }
             // Not a mating face's, or near another: as far as it is from everything.
             looked_up += 1;
-            let far = job.distance(point.position) / cell - EDGE_ERROR_CELLS;
+            let far = pair.distance(point.position) / cell - EDGE_ERROR_CELLS;
             if far < clear {
                 clear = far;
             }
@@ -76,20 +76,20 @@ impl Walk<'_, '_, '_> {
                 break;
             }
         }
-        self.count_clearing(points.len() as u32, MOST_READS - left, looked_up);
+        self.count_exclusion(points.len() as u32, MOST_READS - left, looked_up);
         (clear >= LEAST_CLEAR_CELLS).then_some(clear * cell)
     }
 
-    /// Whether this tick may still ask what joints keep apart. A leaf not asked about is looked at, which is felt the same, and asked about again
+    /// Whether this tick may still ask what exclusions keep apart. A leaf not asked about is looked at, which is felt the same, and asked about again
     /// before long.
-    fn may_clear(&self) -> bool {
-        self.clearing < LOOKUP * self.search.budget / CLEARING_SHARE
+    fn may_query_exclusion(&self) -> bool {
+        self.exclusion_work < LOOKUP * self.search.budget / EXCLUSION_SHARE
     }
 
     /// The surroundings of a leaf were looked at: so many points by themselves, so much read, and so many points looked up, at two look-ups each.
-    fn count_clearing(&mut self, one_by_one: u32, reads: u32, looked_up: u32) {
-        let spent = CLEARING + LOOKUP * (one_by_one + 2 * looked_up) + LOOKUP * reads / CLEARING_READS;
-        self.clearing += spent;
+    fn count_exclusion(&mut self, one_by_one: u32, reads: u32, looked_up: u32) {
+        let spent = EXCLUSION + LOOKUP * (one_by_one + 2 * looked_up) + LOOKUP * reads / EXCLUSION_READS;
+        self.exclusion_work += spent;
         self.spent += spent;
     }
 }
@@ -99,24 +99,24 @@ fn own(point: &PointRecord) -> [u16; 2] {
     [point.face, point.edge_face]
 }
 
-/// Faces of the field's shape that joints keep the point from.
-fn mates_of(job: &Job<'_>, point: &PointRecord) -> Vec<u16, MAX_JOINED> {
-    (job.joined.iter())
+/// Faces of the field's shape that exclusions keep the point from.
+fn mates_of(pair: &DirectedPair<'_>, point: &PointRecord) -> Vec<u16, MAX_EXCLUDED> {
+    (pair.excluded.iter())
         .filter(|[tree, _]| holds(own(point), *tree))
         .map(|&[_, field]| field)
         .collect()
 }
 
-/// Those that joints keep every one of the points from; `None` where they keep none of them from any.
-fn mates(job: &Job<'_>, points: &[PointRecord]) -> Option<Vec<u16, MAX_JOINED>> {
-    let (mut common, mut any) = (None::<Vec<u16, MAX_JOINED>>, false);
+/// Those that exclusions keep every one of the points from; `None` where they keep none of them from any.
+fn mates(pair: &DirectedPair<'_>, points: &[PointRecord]) -> Option<Vec<u16, MAX_EXCLUDED>> {
+    let (mut common, mut any) = (None::<Vec<u16, MAX_EXCLUDED>>, false);
     let mut last = None;
     for point in points {
         // Points that follow each other mostly have the same faces.
         if last.replace(own(point)) == Some(own(point)) {
             continue;
         }
-        let mates = mates_of(job, point);
+        let mates = mates_of(pair, point);
         any |= !mates.is_empty();
         match &mut common {
             Some(common) => common.retain(|face| mates.contains(face)),
@@ -127,8 +127,8 @@ fn mates(job: &Job<'_>, points: &[PointRecord]) -> Option<Vec<u16, MAX_JOINED>> 
 }
 
 /// Least and largest of the points' coordinates, in cells of the field.
-fn bounds(job: &Job<'_>, points: &[PointRecord]) -> Option<[Vec3; 2]> {
-    let mut all = points.iter().map(|point| Vec3::from_array(job.in_cells(point)));
+fn bounds(pair: &DirectedPair<'_>, points: &[PointRecord]) -> Option<[Vec3; 2]> {
+    let mut all = points.iter().map(|point| Vec3::from_array(pair.in_cells(point)));
     let first = all.next()?;
     Some(all.fold([first; 2], |[low, high], at| [low.min(at), high.max(at)]))
 }

@@ -14,7 +14,7 @@ const SLOT_BITS: u32 = 9;
 
 /// Faces of leaves.
 #[derive(Clone, Debug)]
-pub(crate) struct Walls {
+pub(crate) struct FaceCache {
     slots: [Slot; SLOTS],
 }
 
@@ -26,7 +26,7 @@ struct Slot {
     /// Of which points.
     which: Points,
     /// None where they have to do with more than one, or it is not known.
-    wall: Option<u16>,
+    face: Option<u16>,
 }
 
 impl Slot {
@@ -35,13 +35,13 @@ impl Slot {
         leaf: Key::NONE,
         until_nm: 0,
         which: 0,
-        wall: None,
+        face: None,
     };
 }
 
 /// What is known of points of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wall {
+pub(crate) enum CachedFace {
     /// All their cells name this face.
     Face(u16),
     /// They do not, or did not when last asked.
@@ -50,7 +50,7 @@ pub(crate) enum Wall {
     Unknown,
 }
 
-impl Walls {
+impl FaceCache {
     pub const fn new() -> Self {
         Self {
             slots: [Slot::EMPTY; SLOTS],
@@ -63,26 +63,26 @@ impl Walls {
 
     /// Of these points of a leaf, when the object has travelled so far.
     #[inline(always)]
-    pub fn get(&self, leaf: Key, which: Points, travel_nm: u32) -> Wall {
+    pub fn get(&self, leaf: Key, which: Points, travel_nm: u32) -> CachedFace {
         let slot = &self.slots[Self::place(leaf)];
         if travel_nm >= slot.until_nm {
-            Wall::Unknown
+            CachedFace::Unknown
         } else if slot.leaf != leaf {
-            Wall::Several
+            CachedFace::Several
         } else if which & !slot.which != 0 {
-            Wall::Unknown
+            CachedFace::Unknown
         } else {
-            slot.wall.map_or(Wall::Several, Wall::Face)
+            slot.face.map_or(CachedFace::Several, CachedFace::Face)
         }
     }
 
     /// Of these points of a leaf, before the object has travelled so far.
-    pub fn set(&mut self, leaf: Key, which: Points, wall: Option<u16>, until_nm: u32) {
+    pub fn set(&mut self, leaf: Key, which: Points, face: Option<u16>, until_nm: u32) {
         self.slots[Self::place(leaf)] = Slot {
             leaf,
             until_nm,
             which,
-            wall,
+            face,
         };
     }
 
@@ -100,31 +100,31 @@ mod tests {
     #[test]
     fn known_of_these_points_and_so_far_only() {
         let keys = Keys::new(3, 1000);
-        let mut walls = Walls::new();
-        assert_eq!(walls.get(keys.of(7), 0b11, 0), Wall::Unknown);
-        walls.set(keys.of(7), 0b0110, Some(5), 100);
-        assert_eq!(walls.get(keys.of(7), 0b0110, 99), Wall::Face(5));
-        assert_eq!(walls.get(keys.of(7), 0b0010, 0), Wall::Face(5));
-        assert_eq!(walls.get(keys.of(7), 0b1010, 0), Wall::Unknown);
-        assert_eq!(walls.get(keys.of(7), 0b0110, 100), Wall::Unknown);
-        walls.set(keys.of(7), 0b0110, None, 100);
-        assert_eq!(walls.get(keys.of(7), 0b0110, 0), Wall::Several);
-        walls.clear();
-        assert_eq!(walls.get(keys.of(7), 0b0110, 0), Wall::Unknown);
+        let mut face_cache = FaceCache::new();
+        assert_eq!(face_cache.get(keys.of(7), 0b11, 0), CachedFace::Unknown);
+        face_cache.set(keys.of(7), 0b0110, Some(5), 100);
+        assert_eq!(face_cache.get(keys.of(7), 0b0110, 99), CachedFace::Face(5));
+        assert_eq!(face_cache.get(keys.of(7), 0b0010, 0), CachedFace::Face(5));
+        assert_eq!(face_cache.get(keys.of(7), 0b1010, 0), CachedFace::Unknown);
+        assert_eq!(face_cache.get(keys.of(7), 0b0110, 100), CachedFace::Unknown);
+        face_cache.set(keys.of(7), 0b0110, None, 100);
+        assert_eq!(face_cache.get(keys.of(7), 0b0110, 0), CachedFace::Several);
+        face_cache.clear();
+        assert_eq!(face_cache.get(keys.of(7), 0b0110, 0), CachedFace::Unknown);
     }
 
     /// Who finds his place taken is neither told another's wall, nor takes it from him while it holds.
     #[test]
     fn a_place_is_one_leafs() {
         let keys = Keys::new(0, 100_000);
-        let mut walls = Walls::new();
+        let mut face_cache = FaceCache::new();
         let first = keys.of(0);
         let other = (1..100_000)
             .map(|node| keys.of(node))
-            .find(|&key| Walls::place(key) == Walls::place(first))
+            .find(|&key| FaceCache::place(key) == FaceCache::place(first))
             .expect("more leaves than places");
-        walls.set(first, 1, Some(5), 100);
-        assert_eq!(walls.get(other, 1, 99), Wall::Several);
-        assert_eq!(walls.get(other, 1, 100), Wall::Unknown);
+        face_cache.set(first, 1, Some(5), 100);
+        assert_eq!(face_cache.get(other, 1, 99), CachedFace::Several);
+        assert_eq!(face_cache.get(other, 1, 100), CachedFace::Unknown);
     }
 }

@@ -13,7 +13,7 @@
 use glam::Vec3;
 use mortise_protocol::image::{NO_FACE, Nearby, PointRecord, oct_decode};
 
-use crate::collision::directed_pair::Job;
+use crate::collision::directed_pair::DirectedPair;
 
 /// Largest m·n of a sample along an edge that counts as touching: a blade, whose cone is nearly a half-space, must not be lost to rounding.
 const EDGE_COSINE: f32 = 0.1;
@@ -22,11 +22,11 @@ const FACE_COSINE: f32 = -0.1;
 
 /// Whether the sample's surface cannot touch a face of outward normal `normal` (field frame) at a convex edge.
 #[inline]
-pub(crate) fn faces_away(job: &Job<'_>, nearby: Nearby, point: &PointRecord, normal: Vec3) -> bool {
+pub(crate) fn faces_away(pair: &DirectedPair<'_>, nearby: Nearby, point: &PointRecord, normal: Vec3) -> bool {
     if !matches!(nearby, Nearby::Convex(_)) {
         return false;
     }
-    let own = job.to_field.turn(Vec3::from_array(oct_decode(point.normal)));
+    let own = pair.to_field.turn(Vec3::from_array(oct_decode(point.normal)));
     let most = if point.edge_face == NO_FACE {
         FACE_COSINE
     } else {

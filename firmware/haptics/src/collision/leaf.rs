@@ -2,16 +2,16 @@
 
 use mortise_protocol::image::PointRecord;
 
-use crate::collision::coherence::Due;
-use crate::collision::cost::{AT_WALL, FIND_WALL, LOOKUP, NOTED};
-use crate::collision::directed_pair::Job;
+use crate::collision::coherence::Bound;
+use crate::collision::cost::{CACHED_POINT, FIND_FACE, LOOKUP, NOTED};
+use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::on_face;
-use crate::collision::face_cache::Wall;
-use crate::collision::node_cursor::Leaf;
+use crate::collision::face_cache::CachedFace;
+use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Key, Points};
-use crate::collision::search::Walk;
+use crate::collision::search::Traversal;
 
-/// Leaves of which it is found out in one tick how far the points are that thinning leaves out.
+/// Leaves of which it is found out in one tick how far the points are that decimation leaves out.
 const LEFT_OUT_LEAVES: u32 = 8;
 /// It is asked for as far as the points go in so many ticks like the last one,
 const FREE_TICKS: f32 = 64.0;
@@ -22,49 +22,58 @@ const FREE_CELLS: f32 = 0.5;
 /// and not at all where so few ticks would use that up.
 const LEAST_TICKS: f32 = 8.0;
 /// In one tick it is asked of so many leaves at most.
-const WALLS: u32 = 2;
-/// See [`Job::wall`].
+const MAX_FINDS: u32 = 2;
+/// See [`DirectedPair::wall`].
 const FREE_READS: u32 = 200;
 
-impl Walk<'_, '_, '_> {
+impl Traversal<'_, '_, '_> {
     /// All points of a leaf, as far as the budget goes, and when it is due again.
-    pub fn points(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord]) -> Due {
+    pub fn points(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, points: &[PointRecord]) -> Bound {
         let most = (self.left() as usize).min(points.len());
         let mut seen = Seen::new(self.search.near());
-        match self.coherence.wall(job.keys.of(leaf.node), all_of(points)) {
-            Wall::Face(face) if most == points.len() && most <= Points::BITS as usize => {
-                seen.price = AT_WALL;
+        match self
+            .coherence
+            .cached_face(pair.keys.of(leaf.node), all_of(points))
+        {
+            CachedFace::Face(face) if most == points.len() && most <= Points::BITS as usize => {
+                seen.price = CACHED_POINT;
                 for point in points {
-                    seen.add(self.at_wall(job, leaf, point, face));
+                    seen.add(self.on_cached_face(pair, leaf, point, face));
                 }
             }
             _ => {
                 for point in points.iter().take(most) {
-                    seen.add(self.point(job, leaf, point));
+                    seen.add(self.point(pair, leaf, point));
                 }
             }
         }
-        self.seen(job, leaf, points, seen)
+        self.seen(pair, leaf, points, seen)
     }
 
     /// The same when points are left out: only those of the `mask` are offered as contacts.
     ///
     /// The others are looked at in some leaves a tick, so that more and more of what is left out is known to be far.
     #[inline(never)]
-    pub fn thinned(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], mask: Points) -> Due {
-        if self.left_out == LEFT_OUT_LEAVES || job.field.is_occupancy() {
-            self.some(job, leaf, points, mask & all_of(points));
-            return Due::NOW;
+    pub fn decimated(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        points: &[PointRecord],
+        mask: Points,
+    ) -> Bound {
+        if self.left_out == LEFT_OUT_LEAVES || pair.field.is_occupancy() {
+            self.some(pair, leaf, points, mask & all_of(points));
+            return Bound::NOW;
         }
         self.left_out += 1;
         let most = (self.left() as usize).min(points.len());
         let mut seen = Seen::new(self.search.near());
         for point in points.iter().take(most) {
-            seen.add(job.distance(point.position));
+            seen.add(pair.distance(point.position));
         }
-        self.some(job, leaf, points, seen.near & mask);
+        self.some(pair, leaf, points, seen.near & mask);
         let before = self.spent;
-        let due = self.seen(job, leaf, points, seen);
+        let due = self.seen(pair, leaf, points, seen);
         // Not what there would be twice as much of with twice the points.
         self.aside += self.spent - before;
         due
@@ -72,75 +81,87 @@ impl Walk<'_, '_, '_> {
 
     /// Notes what was `seen` of a leaf, and tells when it is due again.
     #[inline(always)]
-    fn seen(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], seen: Seen) -> Due {
+    fn seen(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        points: &[PointRecord],
+        seen: Seen,
+    ) -> Bound {
         self.work.points += seen.points;
         self.spent += (seen.price + NOTED) * seen.points;
         // What was not looked at could be anywhere.
         if (seen.points as usize) < points.len() {
-            return Due::NOW;
+            return Bound::NOW;
         }
-        let key = job.keys.of(leaf.node);
+        let key = pair.keys.of(leaf.node);
         if seen.near == 0 {
             return self.coherence.set_far(key, seen.beyond);
         }
         if seen.points <= Points::BITS {
             self.coherence.set_points(key, seen.near, seen.beyond);
         }
-        Due::NOW
+        Bound::NOW
     }
 
     /// Those points of a leaf, which were near before.
     #[inline(always)]
-    pub fn some(&mut self, job: &Job<'_>, leaf: Leaf, points: &[PointRecord], which: Points) {
+    pub fn some(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, points: &[PointRecord], which: Points) {
         let looked_at = which.count_ones();
         self.work.points += looked_at;
-        let key = job.keys.of(leaf.node);
-        match self.coherence.wall(key, which) {
-            Wall::Face(face) => {
-                self.spent += AT_WALL * looked_at;
+        let key = pair.keys.of(leaf.node);
+        match self.coherence.cached_face(key, which) {
+            CachedFace::Face(face) => {
+                self.spent += CACHED_POINT * looked_at;
                 for point in these(points, which) {
-                    let _ = self.at_wall(job, leaf, point, face);
+                    let _ = self.on_cached_face(pair, leaf, point, face);
                 }
                 return;
             }
-            Wall::Several => {}
-            Wall::Unknown => self.find_wall(job, key, points, which),
+            CachedFace::Several => {}
+            CachedFace::Unknown => self.find_face(pair, key, points, which),
         }
         self.spent += LOOKUP * looked_at;
         for point in these(points, which) {
-            let _ = self.point(job, leaf, point);
+            let _ = self.point(pair, leaf, point);
         }
     }
 
-    /// As [`Walk::point`] for one that has to do with this face alone.
+    /// As [`Traversal::point`] for one that has to do with this face alone.
     #[inline(always)]
-    fn at_wall(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, face: u16) -> f32 {
-        let in_field = job.to_field.apply(point.position);
-        match on_face(job.faces, face, in_field) {
+    fn on_cached_face(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        face: u16,
+    ) -> f32 {
+        let in_field = pair.to_field.apply(point.position);
+        match on_face(pair.faces, face, in_field) {
             Some(found) => {
                 if found.distance < self.search.margin {
-                    self.near(job, leaf, point, &found);
+                    self.near(pair, leaf, point, &found);
                 }
                 found.distance
             }
-            None => self.point(job, leaf, point),
+            None => self.point(pair, leaf, point),
         }
     }
 
     /// Notes what those points of a leaf have to do with.
     #[inline(never)]
-    fn find_wall(&mut self, job: &Job<'_>, key: Key, points: &[PointRecord], which: Points) {
-        let most = FREE_CELLS * job.field.record().cell;
+    fn find_face(&mut self, pair: &DirectedPair<'_>, key: Key, points: &[PointRecord], which: Points) {
+        let most = FREE_CELLS * pair.field.record().cell;
         let way = self.search.way;
-        if self.asked_walls == WALLS || job.field.is_occupancy() || most < LEAST_TICKS * way {
+        if self.faces_sought == MAX_FINDS || pair.field.is_occupancy() || most < LEAST_TICKS * way {
             return;
         }
-        self.asked_walls += 1;
-        self.spent += FIND_WALL;
+        self.faces_sought += 1;
+        self.spent += FIND_FACE;
         let ahead = FREE_TICKS * way + FREE_M;
         let free = if ahead < most { ahead } else { most };
-        let wall = job.wall(these(points, which), free, FREE_READS);
-        self.coherence.set_wall(key, which, wall, free);
+        let face = pair.only_face_near(these(points, which), free, FREE_READS);
+        self.coherence.cache_face(key, which, face, free);
     }
 }
 

@@ -2,18 +2,18 @@
 
 /// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Leaf {
+pub(crate) struct NodeCursor {
     /// Twice the part's index, plus one for backward.
-    pub job: u16,
+    pub pair: u16,
     pub node: u32,
 }
 
-impl Leaf {
+impl NodeCursor {
     /// The beginning.
-    pub const FIRST: Self = Self { job: 0, node: 0 };
+    pub const FIRST: Self = Self { pair: 0, node: 0 };
 
     /// Index of the other part.
     pub fn part(self) -> u16 {
-        self.job / 2
+        self.pair / 2
     }
 }

@@ -2,12 +2,12 @@
 
 /// Entries in the table of [`super::coherence`]. A power of two.
 pub(super) const SLOTS: usize = 8192;
-/// A job of more nodes is looked at whole every tick. So every tag fits 16 bits.
-pub(super) const NODES: u32 = (1 << JOB_SHIFT) - SLOTS as u32 - 1;
-/// Keys of jobs lie so many bits apart.
-const JOB_SHIFT: u32 = 20;
+/// A pair of more nodes is looked at whole every tick. So every tag fits 16 bits.
+pub(super) const NODES: u32 = (1 << PAIR_SHIFT) - SLOTS as u32 - 1;
+/// Keys of pairs lie so many bits apart.
+const PAIR_SHIFT: u32 = 20;
 /// Jobs that can be told apart; further ones likewise.
-pub(super) const JOBS: u16 = 512;
+pub(super) const PAIRS: u16 = 512;
 /// How much of its distance a node is left alone for, at most: interpolated distances may change a little faster than the object travels where
 /// a brick holds a sharp edge.
 pub(super) const LONGEST_SHARE: f32 = 0.9;
@@ -19,7 +19,7 @@ pub(crate) type Points = u16;
 /// See [`Points`].
 pub(crate) const ALL: Points = Points::MAX;
 
-/// The nodes of one job.
+/// The nodes of one pair.
 #[derive(Clone, Copy)]
 pub(crate) struct Keys {
     first: u32,
@@ -28,11 +28,11 @@ pub(crate) struct Keys {
 }
 
 impl Keys {
-    /// Of a job with so many nodes.
-    pub fn new(job: u16, nodes: usize) -> Self {
-        if nodes <= NODES as usize && job < JOBS {
+    /// Of a pair with so many nodes.
+    pub fn new(pair: u16, nodes: usize) -> Self {
+        if nodes <= NODES as usize && pair < PAIRS {
             Self {
-                first: (u32::from(job) << JOB_SHIFT) + 1,
+                first: (u32::from(pair) << PAIR_SHIFT) + 1,
                 mask: u32::MAX,
             }
         } else {
@@ -50,7 +50,7 @@ impl Keys {
     }
 }
 
-/// Which node of which job.
+/// Which node of which pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Key(pub(super) u32);
 
@@ -63,9 +63,9 @@ impl Key {
     }
 
     pub fn slot(self) -> usize {
-        // Neighbouring nodes fall into neighbouring slots; jobs are spread over the table.
-        let job = self.0 >> JOB_SHIFT;
-        (self.0 + 619 * job) as usize % SLOTS
+        // Neighbouring nodes fall into neighbouring slots; pairs are spread over the table.
+        let pair = self.0 >> PAIR_SHIFT;
+        (self.0 + 619 * pair) as usize % SLOTS
     }
 
     /// Tells it from the others that fall into its slot; never that of an empty slot.

@@ -4,11 +4,11 @@ use heapless::Vec;
 use mortise_protocol::image::NO_FACE;
 use mortise_protocol::limits::MAX_TARGETS;
 
-/// Pairs of joints to one part; of more, the rest stay in the work.
-pub(crate) const MAX_JOINED: usize = 2 * MAX_TARGETS;
+/// Pairs of exclusions to one part; of more, the rest stay in the work.
+pub(crate) const MAX_EXCLUDED: usize = 2 * MAX_TARGETS;
 
-/// Face pairs that joints to one part keep apart: of the tree's shape, of the field's.
-pub(crate) type Joined = Vec<[u16; 2], MAX_JOINED>;
+/// Face pairs that exclusions to one part keep apart: of the tree's shape, of the field's.
+pub(crate) type ExcludedPairs = Vec<[u16; 2], MAX_EXCLUDED>;
 
 /// What contact between two faces has to know of guidance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,14 +16,14 @@ pub(crate) struct Mating {
     /// Whether a target owns the pair.
     pub guided: bool,
     /// Gaps count for larger by this, m.
-    pub room: f32,
+    pub allowance_m: f32,
 }
 
 impl Mating {
     /// No target.
     pub const NONE: Self = Self {
         guided: false,
-        room: 0.0,
+        allowance_m: 0.0,
     };
 }
 
@@ -72,13 +72,13 @@ pub(crate) trait FacePairRules {
     fn concerns(&self, part: u16) -> bool;
 
     /// Pairs of faces of the held part and this one that cannot touch: those of the tree's shape first, which is the held one unless `backward`.
-    fn joined(&self, part: u16, backward: bool) -> Joined;
+    fn excluded(&self, part: u16, backward: bool) -> ExcludedPairs;
 
     /// Contact between these faces: `moving` and `fixed` name the face, and the other one where the point lies on an edge.
     fn mating(&self, part: u16, moving: [u16; 2], fixed: [u16; 2]) -> Mating;
 
     /// No [`Mating::room`] is larger, m.
-    fn most_room(&self) -> f32;
+    fn max_allowance_m(&self) -> f32;
 }
 
 /// No constraints.
@@ -89,15 +89,15 @@ impl FacePairRules for NoRules {
         false
     }
 
-    fn joined(&self, _: u16, _: bool) -> Joined {
-        Joined::new()
+    fn excluded(&self, _: u16, _: bool) -> ExcludedPairs {
+        ExcludedPairs::new()
     }
 
     fn mating(&self, _: u16, _: [u16; 2], _: [u16; 2]) -> Mating {
         Mating::NONE
     }
 
-    fn most_room(&self) -> f32 {
+    fn max_allowance_m(&self) -> f32 {
         0.0
     }
 }

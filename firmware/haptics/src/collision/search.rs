@@ -16,15 +16,17 @@
 use glam::Vec3;
 use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage, Shape};
 
-use crate::collision::ancestors::Above;
-use crate::collision::coherence::{Coherence, Due, Known};
+use crate::collision::ancestors::Ancestors;
+use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contacts, Phase};
-use crate::collision::cost::{CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, ROOM, Used};
+use crate::collision::cost::{
+    ALLOWANCE, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, Used,
+};
 use crate::collision::decimation::mask;
-use crate::collision::directed_pair::Job;
-use crate::collision::exact_surface::{OnFace, exact_on_face, on_face, with_room};
+use crate::collision::directed_pair::DirectedPair;
+use crate::collision::exact_surface::{OnFace, exact_on_face, on_face, with_allowance};
 use crate::collision::facing::faces_away;
-use crate::collision::node_cursor::Leaf;
+use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mated, Mating};
@@ -69,7 +71,7 @@ pub(crate) struct Search<'s, 'i> {
     /// The last tick came near the budget.
     pub busy: bool,
     /// Of the points of a leaf that is near only each 2ⁿth is looked at.
-    pub thinning: u8,
+    pub decimation: u8,
     /// Work allowed, look-ups.
     pub budget: u32,
     /// What of it is the step's.
@@ -78,7 +80,7 @@ pub(crate) struct Search<'s, 'i> {
     pub carried: u32,
     /// Points that come this near are braked, m; 0 for no braking. Then points in proximity voxels are wanted too.
     pub braking_m: f32,
-    /// Where guided faces meet, contact makes room.
+    /// Where guided faces meet, contact makes allowance_m.
     pub rules: &'s dyn FacePairRules,
 }
 
@@ -105,19 +107,19 @@ impl<'i> Search<'_, 'i> {
     /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out, and what it took.
     pub fn run(
         &self,
-        start: Leaf,
+        start: NodeCursor,
         coherence: &mut Coherence,
         contacts: &mut Contacts,
         work: &mut Work,
-    ) -> (Option<Leaf>, Used) {
-        let mut walk = self.walk(self.busy, coherence, contacts, work);
-        let stop = walk
-            .jobs(start, None)
-            .or_else(|| walk.jobs(Leaf::FIRST, Some(start)));
-        walk.spent -= CANDIDATE * walk.expected;
+    ) -> (Option<NodeCursor>, Used) {
+        let mut traversal = self.traverse(self.busy, coherence, contacts, work);
+        let stop = traversal
+            .pairs(start, None)
+            .or_else(|| traversal.pairs(NodeCursor::FIRST, Some(start)));
+        traversal.spent -= CANDIDATE * traversal.expected;
         let used = Used {
-            all: walk.used(),
-            on_points: walk.on_points / LOOKUP,
+            all: traversal.used(),
+            on_points: traversal.on_points / LOOKUP,
         };
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET_EXCEEDED);
@@ -133,8 +135,8 @@ impl<'i> Search<'_, 'i> {
         (stop, used)
     }
 
-    /// Trees and fields of job `index`, or none when the two parts' spheres are apart.
-    fn job(&self, index: u16) -> Option<Job<'i>> {
+    /// Trees and fields of pair `index`, or none when the two parts' spheres are apart.
+    fn pair(&self, index: u16) -> Option<DirectedPair<'i>> {
         let part = index / 2;
         let other = self.parts.get(usize::from(part))?;
         let held = self.parts.get(usize::from(self.held))?;
@@ -148,29 +150,29 @@ impl<'i> Search<'_, 'i> {
             return None;
         }
         let other_shape = self.scene.shape_of_part(usize::from(part));
-        let mut job = Job::new(
+        let mut pair = DirectedPair::new(
             index,
             (&self.held_shape, self.pose),
             (&other_shape, other.pose),
             self.center,
         );
-        job.guided = self.rules.concerns(part);
-        if job.guided && !job.field.is_occupancy() {
-            job.joined = self.rules.joined(part, job.backward);
+        pair.guided = self.rules.concerns(part);
+        if pair.guided && !pair.field.is_occupancy() {
+            pair.excluded = self.rules.excluded(part, pair.backward);
         }
-        Some(job)
+        Some(pair)
     }
 
     /// A walk that has not begun, into an empty store; with `put_aside` what that held can be carried over.
-    pub fn walk<'w>(
+    pub fn traverse<'w>(
         &'w self,
         put_aside: bool,
         coherence: &'w mut Coherence,
         contacts: &'w mut Contacts,
         work: &'w mut Work,
-    ) -> Walk<'w, 'w, 'i> {
+    ) -> Traversal<'w, 'w, 'i> {
         contacts.begin(put_aside);
-        Walk {
+        Traversal {
             search: self,
             horizon: coherence.horizon(self.margin),
             coherence,
@@ -180,9 +182,9 @@ impl<'i> Search<'_, 'i> {
             expected: self.carried,
             on_points: 0,
             aside: 0,
-            clearing: 0,
+            exclusion_work: 0,
             left_out: 0,
-            asked_walls: 0,
+            faces_sought: 0,
             mated: Mated::NONE,
             near: 0,
         }
@@ -190,7 +192,7 @@ impl<'i> Search<'_, 'i> {
 }
 
 /// A search under way.
-pub(crate) struct Walk<'w, 's, 'i> {
+pub(crate) struct Traversal<'w, 's, 'i> {
     pub search: &'w Search<'s, 'i>,
     pub coherence: &'w mut Coherence,
     /// Travel at which what lies within the margin is due.
@@ -201,54 +203,57 @@ pub(crate) struct Walk<'w, 's, 'i> {
     pub spent: u32,
     /// Of that, on points rather than the way to them.
     on_points: u32,
-    /// Of that, for what thinning leaves out of the leaf that is looked at.
+    /// Of that, for what decimation leaves out of the leaf that is looked at.
     pub aside: u32,
-    /// Of that, for what joints keep apart.
-    pub clearing: u32,
+    /// Of that, for what exclusions keep apart.
+    pub exclusion_work: u32,
     /// Candidates paid for and not yet found.
     expected: u32,
-    /// Leaves looked at for what thinning leaves out of them.
+    /// Leaves looked at for what decimation leaves out of them.
     pub left_out: u32,
-    /// Leaves whose walls were asked for.
-    pub asked_walls: u32,
+    /// Leaves whose face_cache were asked for.
+    pub faces_sought: u32,
     /// What guidance said of the last point's faces.
     mated: Mated,
     /// Points within the margin.
     pub near: u32,
 }
 
-impl Walk<'_, '_, '_> {
-    /// All of a job.
-    pub fn all(&mut self, job: &Job<'_>) {
-        let _ = self.nodes(job, 0, u32::MAX);
+impl Traversal<'_, '_, '_> {
+    /// All of a pair.
+    pub fn all(&mut self, pair: &DirectedPair<'_>) {
+        let _ = self.nodes(pair, 0, u32::MAX);
     }
 
     /// One point of the leaf `node`: as `found`, or looked up.
     #[inline(never)]
-    pub fn one(&mut self, job: &Job<'_>, node: u32, point: &PointRecord, found: Option<OnFace>) {
-        let leaf = Leaf { job: job.index, node };
+    pub fn one(&mut self, pair: &DirectedPair<'_>, node: u32, point: &PointRecord, found: Option<OnFace>) {
+        let leaf = NodeCursor {
+            pair: pair.index,
+            node,
+        };
         match found {
-            Some(found) => self.near(job, leaf, point, &found),
+            Some(found) => self.near(pair, leaf, point, &found),
             None => {
-                let _ = self.point(job, leaf, point);
+                let _ = self.point(pair, leaf, point);
             }
         }
     }
 
     /// Everything from `start` to before `end` (or the last); where it stopped when the budget ran out.
-    fn jobs(&mut self, start: Leaf, end: Option<Leaf>) -> Option<Leaf> {
-        let jobs = 2 * self.search.parts.len() as u16;
-        let last = end.map_or(jobs, |e| (e.job + 1).min(jobs));
-        for index in start.job..last {
-            let Some(job) = self.search.job(index) else {
+    fn pairs(&mut self, start: NodeCursor, end: Option<NodeCursor>) -> Option<NodeCursor> {
+        let pairs = 2 * self.search.parts.len() as u16;
+        let last = end.map_or(pairs, |e| (e.pair + 1).min(pairs));
+        for index in start.pair..last {
+            let Some(pair) = self.search.pair(index) else {
                 continue;
             };
-            let from = if index == start.job { start.node } else { 0 };
+            let from = if index == start.pair { start.node } else { 0 };
             let to = match end {
-                Some(end) if end.job == index => end.node,
+                Some(end) if end.pair == index => end.node,
                 _ => u32::MAX,
             };
-            let stopped = self.nodes(&job, from, to);
+            let stopped = self.nodes(&pair, from, to);
             if stopped.is_some() {
                 return stopped;
             }
@@ -256,40 +261,40 @@ impl Walk<'_, '_, '_> {
         None
     }
 
-    /// Nodes `from..to` of a job in preorder, skipping what is too far; where it stopped when the budget ran out.
+    /// Nodes `from..to` of a pair in preorder, skipping what is too far; where it stopped when the budget ran out.
     ///
     /// Ends because every record's `skip` points forward (checked when the image was opened).
-    fn nodes(&mut self, job: &Job<'_>, from: u32, to: u32) -> Option<Leaf> {
-        if job.left_out() {
+    fn nodes(&mut self, pair: &DirectedPair<'_>, from: u32, to: u32) -> Option<NodeCursor> {
+        if pair.left_out() {
             return None;
         }
-        let mut edge_error = EDGE_ERROR_CELLS * job.field.record().cell;
-        if job.field.is_occupancy() {
+        let mut edge_error = EDGE_ERROR_CELLS * pair.field.record().cell;
+        if pair.field.is_occupancy() {
             edge_error += self.search.shrunk_m;
         }
         let limit = LOOKUP.saturating_mul(self.search.budget);
-        let keys = job.keys;
-        let mut above = Above::new();
+        let keys = pair.keys;
+        let mut ancestors = Ancestors::new();
         let mut index = from;
         while index < to {
-            let Some(node) = job.nodes.get(index as usize) else {
+            let Some(node) = pair.nodes.get(index as usize) else {
                 break;
             };
-            let here = Leaf {
-                job: job.index,
+            let here = NodeCursor {
+                pair: pair.index,
                 node: index,
             };
             if self.spent >= limit {
                 return Some(here);
             }
-            above.close(index, self.coherence);
+            ancestors.close(index, self.coherence);
             let key = keys.of(index);
             let mut asked = false;
             let mut near = ALL;
-            match self.coherence.ask(key, self.horizon, node.skip == index + 1) {
+            match self.coherence.query(key, self.horizon, node.skip == index + 1) {
                 Known::Far(due) => {
                     self.spent += PASSED_OVER;
-                    above.hear(due);
+                    ancestors.note(due);
                     index = node.skip;
                     continue;
                 }
@@ -297,16 +302,16 @@ impl Walk<'_, '_, '_> {
                     self.spent += PASSED_OVER;
                     near = points;
                 }
-                Known::Due => {
+                Known::Expired => {
                     self.spent += PASSED_OVER;
                     asked = true;
                 }
                 Known::Nothing => {
                     self.spent += NODE;
                     self.work.nodes += 1;
-                    let distance = job.distance(node.center) - (node.radius + edge_error);
+                    let distance = pair.distance(node.center) - (node.radius + edge_error);
                     if distance > self.search.margin {
-                        above.hear(self.coherence.set_distance(key, distance));
+                        ancestors.note(self.coherence.set_distance(key, distance));
                         index = node.skip;
                         continue;
                     }
@@ -316,18 +321,18 @@ impl Walk<'_, '_, '_> {
             }
             index += 1;
             if node.skip != index {
-                above.open(key, node.skip);
+                ancestors.open(key, node.skip);
                 continue;
             }
-            let mask = mask(self.search.thinning, node.first_point);
-            let points = node.points(job.points);
+            let mask = mask(self.search.decimation, node.first_point);
+            let points = node.points(pair.points);
             // Asked as seldom as the field is.
             if asked
-                && !job.joined.is_empty()
-                && let Some(clear) = self.joined(job, points)
+                && !pair.excluded.is_empty()
+                && let Some(clear) = self.excluded(pair, points)
             {
-                self.coherence.set_joined(key, clear);
-                above.hear(Due::NOW);
+                self.coherence.set_excluded(key, clear);
+                ancestors.note(Bound::NOW);
                 continue;
             }
             // A leaf is looked at as a whole, unless even the whole budget would not do.
@@ -336,39 +341,39 @@ impl Walk<'_, '_, '_> {
             }
             self.spent += LEAF;
             let before = self.spent;
-            above.hear(if near != ALL {
-                self.some(job, here, points, near & mask);
-                Due::NOW
+            ancestors.note(if near != ALL {
+                self.some(pair, here, points, near & mask);
+                Bound::NOW
             } else {
                 match mask {
-                    ALL => self.points(job, here, points),
-                    mask => self.thinned(job, here, points, mask),
+                    ALL => self.points(pair, here, points),
+                    mask => self.decimated(pair, here, points, mask),
                 }
             });
             self.on_points += self.spent - before - self.aside;
             self.aside = 0;
         }
-        above.close(index, self.coherence);
+        ancestors.close(index, self.coherence);
         None
     }
 
     /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
     #[inline(always)]
-    pub fn point(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord) -> f32 {
-        if job.field.is_occupancy() {
-            return self.voxel(job, leaf, point);
+    pub fn point(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
+        if pair.field.is_occupancy() {
+            return self.voxel(pair, leaf, point);
         }
-        let in_field = job.to_field.apply(point.position);
-        match job.field.place(in_field.to_array()) {
+        let in_field = pair.to_field.apply(point.position);
+        match pair.field.place(in_field.to_array()) {
             Place::Cell(cell) => {
-                let found = cell.face().and_then(|face| on_face(job.faces, face, in_field));
+                let found = cell.face().and_then(|face| on_face(pair.faces, face, in_field));
                 if let Some(found) = found {
                     if found.distance < self.search.margin {
-                        self.near(job, leaf, point, &found);
+                        self.near(pair, leaf, point, &found);
                     }
                     return found.distance;
                 }
-                self.at_edge(job, leaf, point, &cell, in_field)
+                self.at_edge(pair, leaf, point, &cell, in_field)
             }
             Place::Far { inside: false, bound } => bound,
             Place::Far { inside: true, .. } => {
@@ -380,34 +385,41 @@ impl Walk<'_, '_, '_> {
 
     /// A point where more than one face is near, or none has a closed form.
     #[inline(never)]
-    fn at_edge(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, cell: &Cell<'_>, p: Vec3) -> f32 {
+    fn at_edge(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        cell: &Cell<'_>,
+        p: Vec3,
+    ) -> f32 {
         self.spent += EDGE;
-        let nearby = job.field.nearby(cell);
-        if let Some(mut found) = exact_on_face(job.faces, nearby, p) {
+        let nearby = pair.field.nearby(cell);
+        if let Some(mut found) = exact_on_face(pair.faces, nearby, p) {
             let distance = found.distance;
             if distance < self.search.margin {
-                if job.guided {
-                    self.spent += ROOM;
+                if pair.guided {
+                    self.spent += ALLOWANCE;
                     // At the rim of a guided face the other face gives way with it: the part would stand on it else.
-                    let most = self.search.rules.most_room();
-                    let room = |face| self.mating(job, leaf, point, face).room;
-                    found = with_room(found, job.faces, nearby, p, most, room);
+                    let most = self.search.rules.max_allowance_m();
+                    let allowance_m = |face| self.mating(pair, leaf, point, face).allowance_m;
+                    found = with_allowance(found, pair.faces, nearby, p, most, allowance_m);
                 }
-                if !faces_away(job, nearby, point, found.normal) {
-                    self.near(job, leaf, point, &found);
+                if !faces_away(pair, nearby, point, found.normal) {
+                    self.near(pair, leaf, point, &found);
                 }
             }
             return distance;
         }
-        let distance = job.field.distance(cell);
+        let distance = pair.field.distance(cell);
         if distance >= self.search.margin {
             return distance;
         }
-        let sample = job.field.sample(cell);
+        let sample = pair.field.sample(cell);
         let gradient = Vec3::from_array(sample.gradient);
         let squared = gradient.length_squared();
         if squared < LEAST_GRADIENT2 {
-            let deep = distance < -job.field.record().cell;
+            let deep = distance < -pair.field.record().cell;
             self.work.flags.insert_if(deep, Flags::DEEP);
         } else {
             let found = OnFace {
@@ -416,26 +428,26 @@ impl Walk<'_, '_, '_> {
                 face: sample.face,
                 edge_face: NO_FACE,
             };
-            self.near(job, leaf, point, &found);
+            self.near(pair, leaf, point, &found);
         }
         distance
     }
 
     /// Offers a point within the margin as a contact.
     #[inline(always)]
-    pub fn near(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, found: &OnFace) {
+    pub fn near(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord, found: &OnFace) {
         self.near += 1;
         self.spent += NEAR;
-        let n = job.to_push * found.normal;
-        let (moving, fixed) = sides(job, point, found.face);
-        let mating = if job.guided {
+        let n = pair.to_push * found.normal;
+        let (moving, fixed) = sides(pair, point, found.face);
+        let mating = if pair.guided {
             self.spent += MATING;
-            self.mating(job, leaf, point, found.face)
+            self.mating(pair, leaf, point, found.face)
         } else {
             Mating::NONE
         };
-        let gap = found.distance + mating.room;
-        let arm = job.to_arm.apply(point.position);
+        let gap = found.distance + mating.allowance_m;
+        let arm = pair.to_arm.apply(point.position);
         let turn = arm.cross(n) * self.search.inverse_length;
         let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
         let slack = self.search.slack;
@@ -454,7 +466,7 @@ impl Walk<'_, '_, '_> {
         contact.phase = Phase::Free;
         contact.guided = mating.guided;
         (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
-        (contact.moving_edge_face, contact.static_edge_face) = if job.backward {
+        (contact.moving_edge_face, contact.static_edge_face) = if pair.backward {
             (found.edge_face, point.edge_face)
         } else {
             (point.edge_face, found.edge_face)
@@ -463,14 +475,20 @@ impl Walk<'_, '_, '_> {
     }
 
     /// What guidance says of a point and a face.
-    fn mating(&mut self, job: &Job<'_>, leaf: Leaf, point: &PointRecord, face: u16) -> Mating {
-        let (moving, fixed) = sides(job, point, face);
+    fn mating(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        face: u16,
+    ) -> Mating {
+        let (moving, fixed) = sides(pair, point, face);
         self.mating_of(leaf, moving, fixed)
     }
 
     /// What guidance says of these faces of the held part and of the other one.
     #[inline]
-    pub fn mating_of(&mut self, leaf: Leaf, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
+    pub fn mating_of(&mut self, leaf: NodeCursor, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
         (self.mated).look_up(self.search.rules, leaf.part(), moving, fixed)
     }
 
@@ -498,7 +516,7 @@ impl Walk<'_, '_, '_> {
 
 /// Faces of the held part and of the other one, where a point meets a face.
 #[inline(always)]
-fn sides(job: &Job<'_>, point: &PointRecord, face: u16) -> ([u16; 2], [u16; 2]) {
+fn sides(pair: &DirectedPair<'_>, point: &PointRecord, face: u16) -> ([u16; 2], [u16; 2]) {
     let (own, other) = ([point.face, point.edge_face], [face, NO_FACE]);
-    if job.backward { (other, own) } else { (own, other) }
+    if pair.backward { (other, own) } else { (own, other) }
 }

@@ -36,8 +36,9 @@ impl Fit {
             if !mate(target.kind, m, s) {
                 continue;
             }
-            let misfit = misfit(m, &target.moving, own) + misfit(s, &target.fixed, other);
-            let gap = -(m.sense * m.radius + s.sense * s.radius) - misfit;
+            let alignment_error =
+                alignment_error(m, &target.moving, own) + alignment_error(s, &target.fixed, other);
+            let gap = -(m.sense * m.radius + s.sense * s.radius) - alignment_error;
             fit.pairs |= 1 << i;
             if gap < fit.gap_m {
                 fit.gap_m = gap;
@@ -62,7 +63,7 @@ fn mate(kind: ConstraintKind, moving: &FaceRecord, fixed: &FaceRecord) -> bool {
 }
 
 /// How far a surface is from where the feature has it, within `lever` of the feature's point, m.
-fn misfit(face: &FaceRecord, feature: &Feature, lever: f32) -> f32 {
+fn alignment_error(face: &FaceRecord, feature: &Feature, lever: f32) -> f32 {
     let from = Vec3::from_array(face.origin) - Vec3::from_array(feature.point);
     if face.kind == surface_kind::SPHERE {
         return length(from);
@@ -104,10 +105,13 @@ mod tests {
     fn misfit_is_how_far_the_surface_is_off() {
         let feature = |point, direction| Feature { point, direction };
         let shaft = cylinder(1.0, 0.01);
-        assert_eq!(misfit(&shaft, &feature([0.0; 3], [0.0, 0.0, 1.0]), 0.1), 0.0);
-        let aside = misfit(&shaft, &feature([3e-5, 0.0, 0.05], [0.0, 0.0, 1.0]), 0.1);
+        assert_eq!(
+            alignment_error(&shaft, &feature([0.0; 3], [0.0, 0.0, 1.0]), 0.1),
+            0.0
+        );
+        let aside = alignment_error(&shaft, &feature([3e-5, 0.0, 0.05], [0.0, 0.0, 1.0]), 0.1);
         assert!((aside - 3e-5).abs() < 1e-9);
-        let tilted = misfit(&shaft, &feature([0.0; 3], [1e-3, 0.0, 1.0]), 0.1);
+        let tilted = alignment_error(&shaft, &feature([0.0; 3], [1e-3, 0.0, 1.0]), 0.1);
         assert!((tilted - 1e-4).abs() < 1e-6, "{tilted}");
     }
 }

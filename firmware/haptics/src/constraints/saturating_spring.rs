@@ -12,14 +12,14 @@ use crate::math::scalar::inverse_sqrt;
 use crate::math::symmetric6::{Symmetric6, dot};
 
 /// Damping of what a target that ends lets go, N s/m.
-const LETTING_GO: f32 = 200.0;
+const RELEASE_DAMPING: f32 = 200.0;
 /// Its largest force, N.
-pub(crate) const LETTING_GO_N: f32 = 1.0;
+pub(crate) const RELEASE_N: f32 = 1.0;
 /// Two pulls for each target: offset and angle.
-pub(crate) const MAX_PULLS: usize = 2 * MAX_TARGETS;
+pub(crate) const MAX_SPRINGS: usize = 2 * MAX_TARGETS;
 /// One saturating spring of a target, within a step.
 #[derive(Clone, Debug)]
-pub(crate) struct Pull {
+pub(crate) struct SaturatingSpring {
     /// Place of its target among all.
     pub slot: u8,
     /// Of the angle, not the offset.
@@ -63,7 +63,7 @@ pub(crate) enum Law {
     Spring { stiffness: f32, ahead: f32 },
 }
 
-impl Pull {
+impl SaturatingSpring {
     /// Of which target, and whether of its angle; `damper_n`: largest force of the damper that lets go.
     pub fn new((slot, turns): (u8, bool), rows: Rows, law: Law, damper_n: f32) -> Self {
         let mut product = Symmetric6::ZERO;
@@ -102,7 +102,7 @@ impl Pull {
         }
         if self.damper_n > 0.0 {
             secant.speed = self.rows.speed(x);
-            secant.damper = saturating(LETTING_GO, self.damper_n, secant.speed * secant.speed);
+            secant.damper = saturating(RELEASE_DAMPING, self.damper_n, secant.speed * secant.speed);
         }
         secant
     }

@@ -16,7 +16,7 @@
 //!
 //! A target's pull is free; what the hand is given of it is not: see the source of `grip`.
 //!
-//! Where the target's faces meet, contact makes room: gaps between them count for larger by a·[`GuidanceSettings::allowance_m`]. The axis holds
+//! Where the target's faces meet, contact makes allowance_m: gaps between them count for larger by a·[`GuidanceSettings::allowance_m`]. The axis holds
 //! what the wall held before, an exact fit goes in, and a part pulled off its axis against the cap finds the wall again. All other contacts
 //! stay as they are, and so do planes and cones: they stop a part, and a push above the cap must not go 0.1 mm into a stop.
 //!
@@ -31,11 +31,11 @@ use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget};
 
 use crate::collision::placement::Placed;
-use crate::collision::rules::{FacePairRules, Joined, Mating, holds};
+use crate::collision::rules::{ExcludedPairs, FacePairRules, Mating, holds};
 use crate::collision::search::APPROACH;
 use crate::constraints::alignment::Alignment;
 use crate::constraints::fit::Fit;
-use crate::constraints::saturating_spring::{LETTING_GO_N, Law, MAX_PULLS, Pull};
+use crate::constraints::saturating_spring::{Law, MAX_SPRINGS, RELEASE_N, SaturatingSpring};
 use crate::io::GuidanceState;
 use crate::math::pose::Pose;
 use crate::settings::{GuidanceMethod, GuidanceSettings};
@@ -47,7 +47,7 @@ const FORCE_STEP_N: f32 = 0.015;
 /// The cap on the torque likewise, N m.
 const TORQUE_STEP_NM: f32 = 1.8e-3;
 /// Fading of what lets go, a tick.
-const LETTING_GO_STEP: f32 = 1.0 / 1024.0;
+const RELEASE_STEP: f32 = 1.0 / 1024.0;
 /// Share of the stiffness that is there at least, so that a target without any pull has a number for its slack.
 const LEAST_STIFF: f32 = 1e-6;
 /// Stiffness of the thesis' constraint spring over the coupling's.
@@ -60,7 +60,7 @@ pub enum TargetError {
     BadNumber,
     /// Its part is not in the scene, or is the one in hand.
     NoSuchPart,
-    /// No room: as many targets as there may be are in force or fading.
+    /// No allowance_m: as many targets as there may be are in force or fading.
     Full,
 }
 
@@ -73,16 +73,16 @@ struct Slot {
     /// Ticks until it expires; 0: fading.
     left: u16,
     /// How much of the damper is there that lets the part go slowly, 0 to 1.
-    letting_go: f32,
+    releasing: f32,
     /// How its faces fit; none until it is first fully engaged.
     fit: Option<Fit>,
     /// Whether it keeps them apart now.
-    joined: bool,
+    excluded: bool,
 }
 
 /// All targets.
 #[derive(Clone, Debug)]
-pub(crate) struct Guidance {
+pub(crate) struct TargetSet {
     slots: Vec<Slot, MAX_TARGETS>,
     /// How they pull: as set, once all that pulled otherwise has faded.
     method: GuidanceMethod,
@@ -90,7 +90,7 @@ pub(crate) struct Guidance {
     insertion_m: f32,
 }
 
-impl Guidance {
+impl TargetSet {
     pub const fn new() -> Self {
         Self {
             slots: Vec::new(),
@@ -137,9 +137,9 @@ impl Guidance {
             target: target.clone(),
             engagement: 0.0,
             left: target.expiry_ticks,
-            letting_go: 0.0,
+            releasing: 0.0,
             fit: None,
-            joined: false,
+            excluded: false,
         });
         Ok(())
     }
@@ -174,20 +174,20 @@ impl Guidance {
             let step = slot.step() * share;
             if slot.wanted(on) > 0.0 {
                 slot.engagement = (slot.engagement + step).min(1.0);
-                slot.letting_go = (slot.letting_go - LETTING_GO_STEP).max(0.0);
+                slot.releasing = (slot.releasing - RELEASE_STEP).max(0.0);
             } else if slot.engagement > 0.0 {
                 slot.engagement = (slot.engagement - step).max(0.0);
-                slot.letting_go = (slot.letting_go + step).min(1.0);
+                slot.releasing = (slot.releasing + step).min(1.0);
             } else {
-                slot.letting_go = (slot.letting_go - LETTING_GO_STEP).max(0.0);
+                slot.releasing = (slot.releasing - RELEASE_STEP).max(0.0);
             }
         }
         self.slots
-            .retain(|slot| slot.left > 0 || slot.engagement > 0.0 || slot.letting_go > 0.0);
+            .retain(|slot| slot.left > 0 || slot.engagement > 0.0 || slot.releasing > 0.0);
     }
 
     /// What the targets pull with in this tick, appended to `pulls`: too large to be handed about by value.
-    pub fn add_pulls(&self, at: &At<'_, '_>, pulls: &mut Vec<Pull, MAX_PULLS>) {
+    pub fn add_springs(&self, at: &Situation<'_, '_>, springs: &mut Vec<SaturatingSpring, MAX_SPRINGS>) {
         for (i, slot) in self.slots.iter().enumerate() {
             let Some(alignment) = slot.alignment(at) else {
                 continue;
@@ -217,43 +217,49 @@ impl Guidance {
             };
             for (turns, rows, law) in [(false, alignment.offset, offset), (true, alignment.angle, angle)] {
                 if !rows.rows.is_empty() {
-                    // Two a target: there is room.
-                    let _ = pulls.push(Pull::new(
+                    // Two a target: there is allowance_m.
+                    let _ = springs.push(SaturatingSpring::new(
                         (i as u8, turns),
                         rows,
                         law,
-                        LETTING_GO_N * slot.letting_go,
+                        RELEASE_N * slot.releasing,
                     ));
                 }
             }
         }
     }
 
-    /// Forms and ends joints, given what the targets pull with and how far the object may move in this tick: `motions` of one period, scaled as the
+    /// Forms and ends exclusions, given what the targets pull with and how far the object may move in this tick: `motions` of one period, scaled as the
     /// step's unknowns, and the `slack` within which points are wanted. Whether any ended.
-    pub fn join(&mut self, at: &At<'_, '_>, pulls: &[Pull], motions: &[[f32; 6]; 2], slack: f32) -> bool {
+    pub fn join(
+        &mut self,
+        at: &Situation<'_, '_>,
+        springs: &[SaturatingSpring],
+        motions: &[[f32; 6]; 2],
+        slack: f32,
+    ) -> bool {
         let mut ended = false;
         for (i, slot) in self.slots.iter_mut().enumerate() {
-            let was = slot.joined;
-            slot.joined = slot.left > 0
+            let was = slot.excluded;
+            slot.excluded = slot.left > 0
                 && slot.engagement == 1.0
-                && at.settings.joints
+                && at.settings.exclusions
                 && self.method == GuidanceMethod::Capped
                 && slot.keeps_apart(
                     at,
-                    pulls.iter().filter(|p| usize::from(p.slot) == i),
+                    springs.iter().filter(|p| usize::from(p.slot) == i),
                     motions,
                     slack,
                 );
-            ended |= was && !slot.joined;
+            ended |= was && !slot.excluded;
         }
         ended
     }
 
-    /// Pairs of faces that joints to this part keep apart: those of the tree's shape first, which is the moving one unless `backward`.
-    pub fn joined(&self, part: u16, backward: bool) -> Joined {
-        let mut all = Joined::new();
-        for slot in (self.slots.iter()).filter(|slot| slot.joined && slot.target.static_part == part) {
+    /// Pairs of faces that exclusions to this part keep apart: those of the tree's shape first, which is the moving one unless `backward`.
+    pub fn excluded(&self, part: u16, backward: bool) -> ExcludedPairs {
+        let mut all = ExcludedPairs::new();
+        for slot in (self.slots.iter()).filter(|slot| slot.excluded && slot.target.static_part == part) {
             let Some(fit) = &slot.fit else { continue };
             for (i, &(m, s)) in slot.target.faces.iter().enumerate() {
                 if fit.pairs >> i & 1 != 0 {
@@ -277,16 +283,19 @@ impl Guidance {
                 continue;
             }
             mating.guided = true;
-            let room = slot.ahead() * settings.allowance_m;
-            if self.method != GuidanceMethod::Thesis && makes_room(target.kind) && room > mating.room {
-                mating.room = room;
+            let allowance_m = slot.ahead() * settings.allowance_m;
+            if self.method != GuidanceMethod::Thesis
+                && makes_allowance(target.kind)
+                && allowance_m > mating.allowance_m
+            {
+                mating.allowance_m = allowance_m;
             }
         }
         mating
     }
 
     /// What is left of the stiffness of contacts between guided faces: all of it, except in the thesis' blend.
-    pub fn share(&self, at: &At<'_, '_>) -> f32 {
+    pub fn share(&self, at: &Situation<'_, '_>) -> f32 {
         if self.method != GuidanceMethod::Thesis {
             return 1.0;
         }
@@ -321,7 +330,7 @@ impl Guidance {
     }
 
     /// x of the thesis, times engagement: ½e^(−θ/θ₀) + ½e^(−d/d₀), d₀ the cell of the fixed part's field, θ₀ that over the insertion depth.
-    fn weight(&self, slot: &Slot, alignment: &Alignment, at: &At<'_, '_>) -> f32 {
+    fn weight(&self, slot: &Slot, alignment: &Alignment, at: &Situation<'_, '_>) -> f32 {
         let still = [0.0; 6];
         let d = alignment.offset.error(&still, 0.0);
         let theta = alignment.angle.error(&still, 0.0) / at.length;
@@ -348,16 +357,16 @@ impl Guidance {
     }
 
     /// How the targets stand, with the pulls of the tick at its end `x`.
-    pub fn state(&self, pulls: &[Pull], x: &[f32; 6], length: f32) -> GuidanceState {
+    pub fn state(&self, springs: &[SaturatingSpring], x: &[f32; 6], length: f32) -> GuidanceState {
         let mut state = GuidanceState::default();
         for slot in &self.slots {
             state.active += u8::from(slot.left > 0);
-            state.joints += u8::from(slot.joined);
+            state.exclusions += u8::from(slot.excluded);
             if slot.engagement > state.engagement {
                 state.engagement = slot.engagement;
             }
         }
-        for pull in pulls {
+        for pull in springs {
             state.wrench = state.wrench + pull.wrench(x, length);
         }
         state
@@ -366,7 +375,7 @@ impl Guidance {
 
 /// The targets in force, as the search asks for them.
 pub(crate) struct TargetRules<'a> {
-    pub targets: &'a Guidance,
+    pub targets: &'a TargetSet,
     pub settings: &'a GuidanceSettings,
 }
 
@@ -375,21 +384,21 @@ impl FacePairRules for TargetRules<'_> {
         self.targets.concerns(part)
     }
 
-    fn joined(&self, part: u16, backward: bool) -> Joined {
-        self.targets.joined(part, backward)
+    fn excluded(&self, part: u16, backward: bool) -> ExcludedPairs {
+        self.targets.excluded(part, backward)
     }
 
     fn mating(&self, part: u16, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
         self.targets.mating(part, moving, fixed, self.settings)
     }
 
-    fn most_room(&self) -> f32 {
+    fn max_allowance_m(&self) -> f32 {
         self.settings.allowance_m
     }
 }
 
 /// Where things stand when pulls are made.
-pub(crate) struct At<'a, 'i> {
+pub(crate) struct Situation<'a, 'i> {
     pub scene: &'a SceneImage<'i>,
     pub parts: &'a [Placed],
     /// Index of the part in hand.
@@ -419,7 +428,7 @@ impl Slot {
         STEP.min(TORQUE_STEP_NM / self.target.torque_cap.max(TORQUE_STEP_NM))
     }
 
-    /// Engagement of the torque and of the room, which need not grow as slowly as the force: a part that comes upright first goes in, one that
+    /// Engagement of the torque and of the allowance_m, which need not grow as slowly as the force: a part that comes upright first goes in, one that
     /// comes to the axis first stands on the rim.
     fn ahead(&self) -> f32 {
         (self.engagement * self.torque_step() / self.step()).min(1.0)
@@ -428,8 +437,8 @@ impl Slot {
     /// Whether the part is so near to where the target wants it, and will be after this tick, that the mating faces cannot touch.
     fn keeps_apart<'p>(
         &mut self,
-        at: &At<'_, '_>,
-        pulls: impl Iterator<Item = &'p Pull>,
+        at: &Situation<'_, '_>,
+        springs: impl Iterator<Item = &'p SaturatingSpring>,
         motions: &[[f32; 6]; 2],
         slack: f32,
     ) -> bool {
@@ -448,10 +457,10 @@ impl Slot {
             return false;
         }
         // Forms with half the room to spare, so that it does not come and go.
-        let share = if self.joined { 1.0 } else { 0.5 };
+        let share = if self.excluded { 1.0 } else { 0.5 };
         let most = share * (at.settings.allowance_m + fit.gap_m);
         let mut off = slack;
-        for pull in pulls {
+        for pull in springs {
             // Seen at the part's farthest point, not at L.
             let lever = if pull.turns { fit.lever_m / at.length } else { 1.0 };
             off += lever * pull.rows.error(&[0.0; 6], 0.0);
@@ -464,17 +473,17 @@ impl Slot {
     }
 
     /// How far the target is from being met, if it pulls at all.
-    fn alignment(&self, at: &At<'_, '_>) -> Option<Alignment> {
+    fn alignment(&self, at: &Situation<'_, '_>) -> Option<Alignment> {
         let part = usize::from(self.target.static_part);
         let fixed = at.parts.get(part).filter(|_| part < at.scene.parts().len())?;
-        (self.engagement > 0.0 || self.letting_go > 0.0)
+        (self.engagement > 0.0 || self.releasing > 0.0)
             .then(|| Alignment::of(&self.target, &at.object, at.center, &fixed.pose, at.length))
     }
 }
 
-/// Whether contact between a target's faces makes room. Planes and cones stop a part, with more force than the target's cap: they stay where they
+/// Whether contact between a target's faces makes allowance_m. Planes and cones stop a part, with more force than the target's cap: they stay where they
 /// are.
-fn makes_room(kind: ConstraintKind) -> bool {
+fn makes_allowance(kind: ConstraintKind) -> bool {
     !matches!(kind, ConstraintKind::Coplanar | ConstraintKind::Conical)
 }
 

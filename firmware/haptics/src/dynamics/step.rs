@@ -21,7 +21,7 @@ use glam::{Mat3, Vec3};
 use heapless::Vec;
 
 use crate::collision::contact::{Contact, Phase};
-use crate::constraints::saturating_spring::{MAX_PULLS, Pull, Secant};
+use crate::constraints::saturating_spring::{MAX_SPRINGS, SaturatingSpring, Secant};
 use crate::dynamics::coupling::{Coupling, Slip};
 use crate::math::pose::{Twist, Wrench};
 use crate::math::symmetric6::{Symmetric6, add_scaled, dot};
@@ -64,21 +64,21 @@ pub(crate) struct Step<'a> {
     /// V.
     pub twist: Twist,
     /// What constraint targets pull with.
-    pub pulls: &'a [Pull],
+    pub springs: &'a [SaturatingSpring],
 }
 
 /// Everything in the step that saturates, as the springs that pull as hard at one solution.
 #[derive(Clone, Debug)]
 struct Secants {
     slip: Slip,
-    pulls: Vec<Secant, MAX_PULLS>,
+    springs: Vec<Secant, MAX_SPRINGS>,
 }
 
 impl Secants {
     const fn new() -> Self {
         Self {
             slip: Slip::NONE,
-            pulls: Vec::new(),
+            springs: Vec::new(),
         }
     }
 }
@@ -280,10 +280,10 @@ impl Step<'_> {
     fn find_secants(&self, x: &[f32; 6], found: &mut Secants) {
         let pull = self.coupling.pull(self.settings, self.period_s, self.unscale(x));
         found.slip = Coupling::slip(pull, self.settings);
-        found.pulls.clear();
-        for pull in self.pulls {
-            // No more than there is room for pulls.
-            let _ = found.pulls.push(pull.secant(x));
+        found.springs.clear();
+        for pull in self.springs {
+            // No more than there is room for springs.
+            let _ = found.springs.push(pull.secant(x));
         }
     }
 
@@ -314,7 +314,7 @@ impl Step<'_> {
         let angular = (self.gyration2 * self.twist.angular) * (m * inverse_length)
             + (c.angle * s.k_r + c.target.angular * b_r) * (h * slip.rotation * inverse_length);
         let mut right = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
-        for (pull, secant) in self.pulls.iter().zip(&secants.pulls) {
+        for (pull, secant) in self.springs.iter().zip(&secants.springs) {
             pull.add(*secant, h, &mut matrix, &mut right);
         }
         (matrix, right)
@@ -405,9 +405,9 @@ fn settled(a: &Secants, b: &Secants) -> bool {
     let (s, t) = (a.slip, b.slip);
     (s.translation - t.translation).abs() < SLIP_BAND
         && (s.rotation - t.rotation).abs() < SLIP_BAND
-        && a.pulls
+        && a.springs
             .iter()
-            .zip(&b.pulls)
+            .zip(&b.springs)
             .all(|(p, q)| p.is_near(q, PULL_BAND_N))
 }
 
@@ -458,7 +458,7 @@ mod tests {
                 gyration2: Mat3::IDENTITY * 0.04,
                 length: 0.2,
                 twist: Twist { linear: Vec3::from_array(speed), angular: Vec3::from_array(turning) },
-                pulls: &[],
+                springs: &[],
             };
             let mut contacts = Contacts::new();
             for &(along, side, gap) in &points {

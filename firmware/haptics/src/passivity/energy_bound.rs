@@ -5,9 +5,9 @@
 //!
 //! B ← min(B − W, U + ½·m·v² + ½·ω·I·ω),   W = F·Δp + τ·Δφ of the wrench that acted,
 //!
-//! with U as in `passivity`: what the hand brought, as far as it is still stored in the coupling or in the object's motion. What is stored there no
+//! with U as in `passivity`: what the hand credit_j, as far as it is still stored in the coupling or in the object's motion. What is stored there no
 //! more is dissipated, and is not there to be spent by a target; what a target stores was brought by nobody and does not count. −B never exceeds E₀
-//! ([`crate::PassivitySettings::endowment_j`]), because of two measures that act while there are targets:
+//! ([`crate::PassivitySettings::initial_budget_j`]), because of two measures that act while there are targets:
 //!
 //! * **Slip.** The coupling stores no more than E₀ + B. Where a pull would have it store more, the part gives way in the hand by as much: d and θ count
 //!   from where it has slipped to, as if the hand had taken hold of it there. What gave way comes back with a time of 0.25 s as far as E₀ + B allows.
@@ -65,50 +65,50 @@ pub(crate) enum Hold {
     Targets,
 }
 
-/// What the hand brought, and how far the part gave way in it.
+/// What the hand credit_j, and how far the part gave way in it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Grip {
+pub(crate) struct EnergyBound {
     /// B, J.
-    brought: f32,
+    credit_j: f32,
     /// As stretch and angle of the coupling, handle's axes.
-    given_way: Twist,
+    slip: Twist,
     /// What acted on the handle last.
     acted: Wrench,
     /// There are targets, or the part has not come back from where they had it slip.
-    acts: bool,
+    active: bool,
 }
 
-impl Grip {
+impl EnergyBound {
     /// Zero bits, as [`crate::State::new`] asks.
     pub const fn new() -> Self {
         Self {
-            brought: 0.0,
-            given_way: Twist::ZERO,
+            credit_j: 0.0,
+            slip: Twist::ZERO,
             acted: Wrench::ZERO,
-            acts: false,
+            active: false,
         }
     }
 
     /// Nothing is in hand any more; what was lent is owed.
     pub fn forget(&mut self) {
-        let brought = if self.brought < 0.0 { self.brought } else { 0.0 };
+        let credit_j = if self.credit_j < 0.0 { self.credit_j } else { 0.0 };
         *self = Self {
-            brought,
+            credit_j,
             ..Self::new()
         };
     }
 
     /// How far the part gave way.
-    pub fn given_way(&self) -> Twist {
-        self.given_way
+    pub fn slip(&self) -> Twist {
+        self.slip
     }
 
     /// The wrench `acted` while the reading moved by `moved` and `turned`.
-    pub fn gave(&mut self, acted: Wrench, moved: Vec3, turned: Vec3, told: &PassivitySettings) {
-        self.brought -= acted.force.dot(moved) + acted.torque.dot(turned);
-        if self.acts {
+    pub fn account(&mut self, acted: Wrench, moved: Vec3, turned: Vec3, told: &PassivitySettings) {
+        self.credit_j -= acted.force.dot(moved) + acted.torque.dot(turned);
+        if self.active {
             let changed = acted + -self.acted;
-            self.brought -= 0.5
+            self.credit_j -= 0.5
                 * (told.position_count_m * sum(changed.force.abs())
                     + told.angle_count_rad * sum(changed.torque.abs()));
         }
@@ -117,14 +117,14 @@ impl Grip {
 
     /// `coupling` from where the part has slipped to.
     pub fn measure(&self, coupling: &mut Coupling, handle: Quat) {
-        if self.given_way != Twist::ZERO {
-            coupling.stretch -= handle * self.given_way.linear;
-            coupling.angle -= handle * self.given_way.angular;
+        if self.slip != Twist::ZERO {
+            coupling.stretch -= handle * self.slip.linear;
+            coupling.angle -= handle * self.slip.angular;
         }
     }
 
     /// Gives way in `coupling`, which stores `stored` (J), or comes back, `open` being what the valve lets through.
-    pub fn give_way(
+    pub fn slip_to_bound(
         &mut self,
         coupling: &mut Coupling,
         stored: &mut f32,
@@ -133,22 +133,26 @@ impl Grip {
         open: f32,
         settings: &Settings,
     ) {
-        let lent = settings.passivity.endowment_j;
-        let firm = self.given_way == Twist::ZERO;
-        self.acts = hold == Hold::Targets || !firm;
-        if !self.acts {
+        let lent = settings.passivity.initial_budget_j;
+        let firm = self.slip == Twist::ZERO;
+        self.active = hold == Hold::Targets || !firm;
+        if !self.active {
             // What the coupling makes by itself is the valve's to mind.
-            self.brought = if self.brought > -lent { self.brought } else { -lent };
+            self.credit_j = if self.credit_j > -lent {
+                self.credit_j
+            } else {
+                -lent
+            };
             return;
         }
-        let paid = lent + self.brought;
+        let paid = lent + self.credit_j;
         let before = *coupling;
         if hold == Hold::Nothing {
-            come_back(coupling, handle, &self.given_way, settings.period_s);
+            come_back(coupling, handle, &self.slip, settings.period_s);
         } else if open * *stored > paid {
             shorten(coupling, paid / open, &settings.coupling);
         } else if !firm {
-            come_back(coupling, handle, &self.given_way, settings.period_s);
+            come_back(coupling, handle, &self.slip, settings.period_s);
             if open * potential(coupling, &settings.coupling) > paid {
                 *coupling = before;
             }
@@ -160,7 +164,7 @@ impl Grip {
         if slipped != Twist::ZERO {
             *stored = potential(coupling, &settings.coupling);
             let handle = handle.conjugate();
-            let given = &mut self.given_way;
+            let given = &mut self.slip;
             given.linear += handle * slipped.linear;
             given.angular += handle * slipped.angular;
             if given.linear.abs().cmple(NOTHING.linear).all()
@@ -173,8 +177,8 @@ impl Grip {
 
     /// What the hand brought and is `stored` no more (J) is dissipated.
     pub fn keep(&mut self, stored: f32) {
-        self.brought = if self.brought < stored {
-            self.brought
+        self.credit_j = if self.credit_j < stored {
+            self.credit_j
         } else {
             stored
         };
@@ -183,7 +187,7 @@ impl Grip {
     /// `wrench`, or as much of it as is paid for whatever the hand does until the next tick, `motion` being the handle's as it is told; late motors give
     /// the wrenches `pending` before it.
     pub fn bound(&self, wrench: Wrench, pending: &[Wrench], motion: Twist, settings: &Settings) -> Wrench {
-        if !self.acts {
+        if !self.active {
             return wrench;
         }
         let told = &settings.passivity;
@@ -207,7 +211,7 @@ impl Grip {
         let squared = |w: &Wrench| {
             h * late * (w.force.length_squared() / LIGHTEST + w.torque.length_squared() / LIGHTEST_TURNING)
         };
-        let mut paid = told.endowment_j + self.brought;
+        let mut paid = told.initial_budget_j + self.credit_j;
         for w in pending {
             let worst = straight(w) + squared(w);
             paid -= if worst > 0.0 { worst } else { 0.0 };
@@ -244,10 +248,10 @@ fn sum(v: Vec3) -> f32 {
 }
 
 /// Some of what gave way comes back.
-fn come_back(coupling: &mut Coupling, handle: Quat, given_way: &Twist, period_s: f32) {
+fn come_back(coupling: &mut Coupling, handle: Quat, slip: &Twist, period_s: f32) {
     let back = period_s / COMING_BACK_S;
-    coupling.stretch += handle * (given_way.linear * back);
-    coupling.angle += handle * (given_way.angular * back);
+    coupling.stretch += handle * (slip.linear * back);
+    coupling.angle += handle * (slip.angular * back);
 }
 
 /// Has `coupling` store no more than `most`, J.

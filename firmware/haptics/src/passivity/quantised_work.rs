@@ -19,7 +19,7 @@ const SLIGHT: f32 = 0.01;
 
 /// Three axes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Counted([Axis; 3]);
+pub(crate) struct QuantisedWork([Axis; 3]);
 
 #[derive(Clone, Copy, Debug)]
 struct Axis {
@@ -30,7 +30,7 @@ struct Axis {
     ticks: f32,
 }
 
-impl Counted {
+impl QuantisedWork {
     /// Zero bits.
     pub const fn new() -> Self {
         Self(
@@ -93,14 +93,14 @@ impl Axis {
 mod tests {
     use super::*;
 
-    /// Work as `Counted` has it, force times difference of readings, and the true one, of a force on x along a path given in 100 steps a tick.
+    /// Work as `QuantisedWork` has it, force times difference of readings, and the true one, of a force on x along a path given in 100 steps a tick.
     fn along(
         count: f32,
         ticks: usize,
         x: impl Fn(f64) -> f64,
         mut force: impl FnMut(f32) -> f32,
     ) -> (f64, f64, f64) {
-        let mut counted = Counted::new();
+        let mut counted = QuantisedWork::new();
         let told = |k: usize| (libm::round(x(k as f64) / f64::from(count)) * f64::from(count)) as f32;
         let (mut seen, mut plain, mut truth) = (0.0, 0.0, 0.0);
         for k in 0..ticks {
@@ -154,7 +154,7 @@ mod tests {
         let spring = |told: f32| -1000.0 * told;
         let (seen, plain, _) = along(5e-6, 1000, fast, spring);
         assert!((seen / plain - 1.0).abs() < 0.02, "{seen} {plain}");
-        let mut exact = Counted::new();
+        let mut exact = QuantisedWork::new();
         for k in 0..100 {
             let (f, moved) = (k as f32, if k % 3 == 0 { 0.0 } else { 1e-9 * k as f32 });
             let seen = exact.work(Vec3::new(f, 0.0, 0.0), Vec3::new(moved, 0.0, 0.0), 0.0);

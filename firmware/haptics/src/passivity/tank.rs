@@ -33,8 +33,8 @@ use glam::{Quat, Vec3};
 
 use crate::dynamics::coupling::{Coupling, potential};
 use crate::math::pose::{Pose, Twist, Wrench};
-use crate::passivity::energy_bound::{Grip, Hold};
-use crate::passivity::quantised_work::Counted;
+use crate::passivity::energy_bound::{EnergyBound, Hold};
+use crate::passivity::quantised_work::QuantisedWork;
 use crate::settings::{MAX_DELAY_TICKS, Settings};
 
 /// The most the valve closes in a tick, once the tank is empty.
@@ -62,24 +62,24 @@ pub struct Passivity {
 
 /// The observer's memory.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tank {
+pub(crate) struct EnergyTank {
     pub seen: Passivity,
     /// Whether the last tick was observed, so that what follows is known.
     known: bool,
     handle: Pose,
     /// What the wrench did on the handle, which is told in counts.
-    linear: Counted,
-    angular: Counted,
+    linear: QuantisedWork,
+    angular: QuantisedWork,
     /// U, J.
     stored: f32,
-    grip: Grip,
+    energy_bound: EnergyBound,
     /// Work on the object since, J.
     to_object: f32,
     /// Wrenches of the last ticks, newest first, where the motors are late.
     given: [Wrench; MAX_DELAY_TICKS + 1],
 }
 
-impl Tank {
+impl EnergyTank {
     /// Full, open, nothing known. Zero bits, as [`crate::State::new`] asks.
     pub const fn new() -> Self {
         Self {
@@ -93,10 +93,10 @@ impl Tank {
                 position: Vec3::ZERO,
                 orientation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
             },
-            linear: Counted::new(),
-            angular: Counted::new(),
+            linear: QuantisedWork::new(),
+            angular: QuantisedWork::new(),
             stored: 0.0,
-            grip: Grip::new(),
+            energy_bound: EnergyBound::new(),
             to_object: 0.0,
             given: [Wrench::ZERO; MAX_DELAY_TICKS + 1],
         }
@@ -122,7 +122,7 @@ impl Tank {
             let told = &settings.passivity;
             let to_handle = self.linear.work(acting.force, moved, told.position_count_m)
                 + (self.angular).work(acting.torque, turned, told.angle_count_rad);
-            self.grip.gave(acting, moved, turned, told);
+            self.energy_bound.account(acting, moved, turned, told);
             let made = to_handle + open * (self.to_object + stored - self.stored);
             let rubbed = settings.passivity.damping * handle_twist.linear.dot(moved)
                 + settings.passivity.angular_damping * handle_twist.angular.dot(turned);
@@ -148,31 +148,33 @@ impl Tank {
         self.given[delay_ticks.min(MAX_DELAY_TICKS)]
     }
 
-    /// See [`crate::State::given_way`].
-    pub fn given_way(&self) -> Twist {
-        self.grip.given_way()
+    /// See [`crate::State::slip`].
+    pub fn slip(&self) -> Twist {
+        self.energy_bound.slip()
     }
 
-    /// See [`Grip::measure`]; before [`Self::balance`].
+    /// See [`EnergyBound::measure`]; before [`Self::balance`].
     pub fn measure(&self, coupling: &mut Coupling, handle: Quat) {
-        self.grip.measure(coupling, handle);
+        self.energy_bound.measure(coupling, handle);
     }
 
-    /// See [`Grip::give_way`]; after [`Self::balance`].
-    pub fn give_way(&mut self, coupling: &mut Coupling, handle: Quat, hold: Hold, settings: &Settings) {
+    /// See [`EnergyBound::slip_to_bound`]; after [`Self::balance`].
+    pub fn slip_to_bound(&mut self, coupling: &mut Coupling, handle: Quat, hold: Hold, settings: &Settings) {
         let open = 1.0 - self.seen.softened;
-        (self.grip).give_way(coupling, &mut self.stored, handle, hold, open, settings);
+        (self.energy_bound).slip_to_bound(coupling, &mut self.stored, handle, hold, open, settings);
     }
 
-    /// See [`Grip::keep`]; `moving`: energy of the object's motion, J.
+    /// See [`EnergyBound::keep`]; `moving`: energy of the object's motion, J.
     pub fn keep(&mut self, moving: f32) {
-        self.grip.keep((1.0 - self.seen.softened) * self.stored + moving);
+        self.energy_bound
+            .keep((1.0 - self.seen.softened) * self.stored + moving);
     }
 
-    /// See [`Grip::bound`].
+    /// See [`EnergyBound::bound`].
     pub fn bound(&self, wrench: Wrench, motion: Twist, settings: &Settings) -> Wrench {
         let pending = (settings.passivity.delay_ticks as usize).min(MAX_DELAY_TICKS);
-        self.grip.bound(wrench, &self.given[..pending], motion, settings)
+        self.energy_bound
+            .bound(wrench, &self.given[..pending], motion, settings)
     }
 
     /// After the step: the object moved with `twist` under `pull`.
@@ -182,9 +184,12 @@ impl Tank {
 
     /// Nothing acts on the handle, or something else did: the account begins anew.
     pub fn forget(&mut self) {
-        let mut grip = self.grip;
-        grip.forget();
-        *self = Self { grip, ..Self::new() };
+        let mut energy_bound = self.energy_bound;
+        energy_bound.forget();
+        *self = Self {
+            energy_bound,
+            ..Self::new()
+        };
     }
 
     fn account(&mut self, drawn: f32, stored: f32, object_energy: f32, period_s: f32, size: f32) {

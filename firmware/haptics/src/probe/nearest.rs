@@ -10,9 +10,9 @@ use mortise_protocol::image::{
     Cell, EDGE_ERROR_CELLS, NO_FACE, Nearby, NodeRecord, Place, PointRecord, Shape,
 };
 
-use crate::collision::directed_pair::Job;
+use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, closed_form, exact, on_face, unsigned_distance};
-use crate::collision::search::Walk;
+use crate::collision::search::Traversal;
 use crate::io::Work;
 
 /// The diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
@@ -62,7 +62,7 @@ impl SoFar {
 
 /// One way of a search.
 pub(crate) struct NearestSearch<'s, 'i> {
-    job: &'s Job<'i>,
+    pair: &'s DirectedPair<'i>,
     /// The shape whose field it looks up.
     shape: &'s Shape<'i>,
     /// Distances are stored up to here, m.
@@ -82,7 +82,7 @@ pub(crate) struct NearestSearch<'s, 'i> {
 }
 
 /// A leaf that is to be looked at.
-struct Leaf<'i> {
+struct PendingLeaf<'i> {
     node: u32,
     points: &'i [PointRecord],
     /// No point of it is nearer, m.
@@ -128,10 +128,10 @@ impl Seen {
 
 impl<'s, 'i> NearestSearch<'s, 'i> {
     /// About to begin.
-    pub fn new(job: &'s Job<'i>, shape: &'s Shape<'i>) -> Self {
+    pub fn new(pair: &'s DirectedPair<'i>, shape: &'s Shape<'i>) -> Self {
         let record = shape.field.record();
         Self {
-            job,
+            pair,
             shape,
             band: record.band,
             resolved: record.band - DIAGONAL_CELLS * record.cell,
@@ -145,7 +145,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
 
     /// All leaves that could hold the nearest point or one that overlaps, as far as a look-up settles their points. What overlaps goes to
     /// `contacts`. Leaves beyond the band wait as long as nothing in the band was found.
-    pub fn walk(&mut self, so_far: &mut SoFar, contacts: &mut Walk<'_, '_, '_>) {
+    pub fn walk(&mut self, so_far: &mut SoFar, contacts: &mut Traversal<'_, '_, '_>) {
         self.leaves(so_far, u32::MAX, |search, so_far, leaf| {
             if so_far.best.distance_m > search.band {
                 search.waiting = leaf.node + 1;
@@ -157,7 +157,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             for point in leaf.points {
                 let seen = search.see(point);
                 if seen.overlaps {
-                    contacts.one(search.job, leaf.node, point, search.found(&seen, point));
+                    contacts.one(search.pair, leaf.node, point, search.found(&seen, point));
                 }
                 if !search.settle(&seen, point, so_far) {
                     search.left_over = search.left_over.min(seen.least);
@@ -168,7 +168,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     }
 
     /// What [`Self::walk`] left over: leaves that waited, and points to be measured.
-    pub fn rest(&mut self, so_far: &mut SoFar, contacts: &mut Walk<'_, '_, '_>) {
+    pub fn rest(&mut self, so_far: &mut SoFar, contacts: &mut Traversal<'_, '_, '_>) {
         let needed = |least: f32, limit: f32| least < f32::INFINITY && least <= limit;
         if needed(self.waits_beyond, so_far.limit()) && so_far.best.distance_m > self.band {
             self.first(so_far);
@@ -187,7 +187,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             for point in leaf.points {
                 let seen = search.see(point);
                 if waited && seen.overlaps {
-                    contacts.one(search.job, leaf.node, point, search.found(&seen, point));
+                    contacts.one(search.pair, leaf.node, point, search.found(&seen, point));
                 }
                 if waited || !seen.settled {
                     search.measure(&seen, point, so_far);
@@ -199,13 +199,13 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
 
     /// Down by the nearer child, to one leaf; measures the point of it that seems nearest. Every step goes forward, so it ends.
     fn first(&mut self, so_far: &mut SoFar) {
-        let nodes = self.job.nodes;
+        let nodes = self.pair.nodes;
         let mut index = 0;
         while let Some(node) = nodes.get(index) {
             let end = node.skip as usize;
             if end == index + 1 {
                 let mut nearest = None;
-                for point in node.points(self.job.points) {
+                for point in node.points(self.pair.points) {
                     so_far.work.points += 1;
                     let seen = self.see(point);
                     if (nearest.as_ref()).is_none_or(|(other, _): &(Seen, _)| seen.distance < other.distance)
@@ -239,9 +239,9 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         &mut self,
         so_far: &mut SoFar,
         end: u32,
-        mut look: impl FnMut(&mut Self, &mut SoFar, Leaf<'i>),
+        mut look: impl FnMut(&mut Self, &mut SoFar, PendingLeaf<'i>),
     ) {
-        let nodes = self.job.nodes.get(..end as usize).unwrap_or(self.job.nodes);
+        let nodes = self.pair.nodes.get(..end as usize).unwrap_or(self.pair.nodes);
         let mut index = 0;
         while let Some(node) = nodes.get(index) {
             let (bound, beyond) = self.bound(node, so_far);
@@ -250,11 +250,11 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                 continue;
             }
             if node.skip as usize == index + 1 {
-                let points = node.points(self.job.points);
+                let points = node.points(self.pair.points);
                 look(
                     self,
                     so_far,
-                    Leaf {
+                    PendingLeaf {
                         node: index as u32,
                         points,
                         bound,
@@ -270,8 +270,8 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     #[inline(always)]
     fn bound(&self, node: &NodeRecord, so_far: &mut SoFar) -> (f32, bool) {
         so_far.work.nodes += 1;
-        let center = self.job.to_field.apply(node.center);
-        let distance = self.job.field.bound(center.to_array());
+        let center = self.pair.to_field.apply(node.center);
+        let distance = self.pair.field.bound(center.to_array());
         // Inside, a clamped distance and a bound beyond the band say how deep at least, not at most.
         if distance < -self.resolved {
             return (f32::NEG_INFINITY, false);
@@ -284,16 +284,16 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
 
     #[inline(always)]
     fn in_field(&self, point: &PointRecord) -> Vec3 {
-        self.job.to_field.apply(point.position)
+        self.pair.to_field.apply(point.position)
     }
 
     /// Looks a point up.
     #[inline(always)]
     fn see(&self, point: &PointRecord) -> Seen {
         let p = self.in_field(point);
-        match self.job.field.place(p.to_array()) {
+        match self.pair.field.place(p.to_array()) {
             Place::Cell(cell) => {
-                let nearby = self.job.field.nearby(&cell);
+                let nearby = self.pair.field.nearby(&cell);
                 let exact = exact(self.shape.faces, nearby, p);
                 if let Some((distance, face)) = exact
                     && distance.abs() <= self.resolved
@@ -332,7 +332,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
 
     /// Looks up what its cell's faces do not settle; `exact` is what they give.
     fn interpolated(&self, cell: &Cell<'_>, nearby: Nearby, exact: Option<(f32, u16)>) -> Seen {
-        let interpolated = self.job.field.distance(cell);
+        let interpolated = self.pair.field.distance(cell);
         let mut seen = Seen {
             distance: interpolated,
             least: interpolated - self.edge_error,
@@ -403,7 +403,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     fn take(&self, seen: &Seen, exact: Option<f32>, point: &PointRecord, so_far: &mut SoFar) {
         let distance_m = exact.unwrap_or(seen.distance);
         if distance_m < so_far.best.distance_m {
-            let (moving_face, fixed_face) = if self.job.backward {
+            let (moving_face, fixed_face) = if self.pair.backward {
                 (seen.face, point.face)
             } else {
                 (point.face, seen.face)
@@ -413,7 +413,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                 field_distance_m: so_far.best.field_distance_m,
                 exact: exact.is_some(),
                 in_band: seen.in_band,
-                arm: self.job.to_arm.apply(point.position),
+                arm: self.pair.to_arm.apply(point.position),
                 moving_face,
                 fixed_face,
             };

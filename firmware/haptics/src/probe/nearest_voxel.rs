@@ -3,20 +3,20 @@
 use mortise_protocol::image::Voxel;
 
 use crate::baseline::occupancy::{TangentPlane, inward, shrunk};
-use crate::collision::directed_pair::Job;
+use crate::collision::directed_pair::DirectedPair;
 use crate::io::Flags;
 use crate::probe::nearest::{Nearest, SoFar};
 
-/// The deepest point of a job against a voxmap, as the method has it: depth to a tangent plane, else no more than a lower bound of the gap.
+/// The deepest point of a pair against a voxmap, as the method has it: depth to a tangent plane, else no more than a lower bound of the gap.
 ///
 /// Looks at every point that is not known to be farther from all surface voxels than the nearest so far.
-pub(crate) fn nearest_voxel(job: &Job<'_>, shrunk_m: f32, so_far: &mut SoFar) {
+pub(crate) fn nearest_voxel(pair: &DirectedPair<'_>, shrunk_m: f32, so_far: &mut SoFar) {
     let SoFar { best, work } = so_far;
     let mut index = 0;
-    while let Some(node) = job.nodes.get(index) {
+    while let Some(node) = pair.nodes.get(index) {
         work.nodes += 1;
-        let center = job.to_field.apply(node.center);
-        if job.field.bound(center.to_array()) - (node.radius + shrunk_m) > best.distance_m {
+        let center = pair.to_field.apply(node.center);
+        if pair.field.bound(center.to_array()) - (node.radius + shrunk_m) > best.distance_m {
             index = node.skip as usize;
             continue;
         }
@@ -24,11 +24,11 @@ pub(crate) fn nearest_voxel(job: &Job<'_>, shrunk_m: f32, so_far: &mut SoFar) {
         if node.skip as usize != index {
             continue;
         }
-        for point in node.points(job.points) {
+        for point in node.points(pair.points) {
             work.points += 1;
             let position = shrunk(point, shrunk_m);
-            let p = job.to_field.apply(position);
-            let sample = job.field.voxel(p.to_array());
+            let p = pair.to_field.apply(position);
+            let sample = pair.field.voxel(p.to_array());
             let (distance_m, in_band) = match sample.voxel {
                 Voxel::Free => (sample.bound, false),
                 Voxel::Proximity => (0.0, false),
@@ -37,7 +37,7 @@ pub(crate) fn nearest_voxel(job: &Job<'_>, shrunk_m: f32, so_far: &mut SoFar) {
                     (0.0, false)
                 }
                 Voxel::Surface => {
-                    let gap = TangentPlane::of(job, inward(point), p, &sample).gap;
+                    let gap = TangentPlane::of(pair, inward(point), p, &sample).gap;
                     if gap < best.field_distance_m {
                         best.field_distance_m = gap;
                     }
@@ -51,7 +51,7 @@ pub(crate) fn nearest_voxel(job: &Job<'_>, shrunk_m: f32, so_far: &mut SoFar) {
                     field_distance_m: best.field_distance_m,
                     exact: false,
                     in_band,
-                    arm: job.to_arm.apply(position),
+                    arm: pair.to_arm.apply(position),
                     moving_face: point.face,
                     fixed_face: sample.faces[0],
                 };

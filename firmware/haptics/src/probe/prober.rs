@@ -11,7 +11,7 @@ use mortise_protocol::image::SceneImage;
 
 use crate::collision::coherence::Coherence;
 use crate::collision::contact::{Contacts, Phase};
-use crate::collision::directed_pair::Job;
+use crate::collision::directed_pair::DirectedPair;
 use crate::collision::rules::NoRules;
 use crate::collision::search::Search;
 use crate::dynamics::body::Body;
@@ -129,7 +129,7 @@ impl Prober {
         let other = scene.shape_of_part(usize::from(fixed));
         let body = Body::of(&held);
         let center = pose.transform_point(body.center_of_mass);
-        let jobs = [0, 1].map(|way| Job::new(way, (&held, pose), (&other, Pose::IDENTITY), center));
+        let pairs = [0, 1].map(|way| DirectedPair::new(way, (&held, pose), (&other, Pose::IDENTITY), center));
 
         let mut so_far = SoFar {
             best: Nearest {
@@ -160,24 +160,24 @@ impl Prober {
             swing: 0.0,
             inverse_length: 1.0,
             busy: false,
-            thinning: 0,
+            decimation: 0,
             budget: u32::MAX,
             reserved: 0,
             carried: 0,
             braking_m: 0.0,
             rules: &NoRules,
         };
-        let voxmaps = jobs.iter().any(|job| job.field.is_occupancy());
+        let voxmaps = pairs.iter().any(|pair| pair.field.is_occupancy());
         if voxmaps {
-            self.coherence.forget();
+            self.coherence.invalidate();
         }
-        let mut touching = search.walk(false, &mut self.coherence, &mut self.contacts, &mut touched);
-        let mut searches = [0, 1].map(|way| NearestSearch::new(&jobs[way], [&other, &held][way]));
-        for (search, job) in searches.iter_mut().zip(&jobs) {
-            if !job.field.is_occupancy() {
+        let mut touching = search.traverse(false, &mut self.coherence, &mut self.contacts, &mut touched);
+        let mut searches = [0, 1].map(|way| NearestSearch::new(&pairs[way], [&other, &held][way]));
+        for (search, pair) in searches.iter_mut().zip(&pairs) {
+            if !pair.field.is_occupancy() {
                 search.walk(&mut so_far, &mut touching);
-            } else if !job.left_out() {
-                nearest_voxel(job, shrunk_m, &mut so_far);
+            } else if !pair.left_out() {
+                nearest_voxel(pair, shrunk_m, &mut so_far);
             }
         }
         for search in &mut searches {
@@ -188,8 +188,8 @@ impl Prober {
             mut work,
         } = so_far;
         if voxmaps && (nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0) {
-            for job in jobs.iter().filter(|job| job.field.is_occupancy()) {
-                touching.all(job);
+            for pair in pairs.iter().filter(|pair| pair.field.is_occupancy()) {
+                touching.all(pair);
             }
         }
         work.nodes += touched.nodes;

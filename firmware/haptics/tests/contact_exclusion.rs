@@ -28,7 +28,7 @@ fn play(clearance: f64, ticks: u32, budget: u32, joints: bool, mut way: impl FnM
     let mut state = State::new();
     state.load_scene(&scene);
     let mut settings = Settings::default();
-    settings.guidance.joints = joints;
+    settings.guidance.exclusions = joints;
     settings.contact.point_budget = budget;
     let mut hand = Hand::at([0.0, 0.0, BLOCK_HALF + PEG_HALF - 10e-3]);
     state.grab(&scene, 1, &hand.pose()).unwrap();
@@ -45,7 +45,7 @@ fn play(clearance: f64, ticks: u32, budget: u32, joints: bool, mut way: impl FnM
         let (out, _) = run(&mut state, &scene, &settings, &mut hand, 1, |_, hand, _| {
             way(t, hand)
         });
-        played.joined += usize::from(out.guidance.joints > 0);
+        played.joined += usize::from(out.guidance.exclusions > 0);
         played.outputs.push(out);
     }
     played
@@ -58,7 +58,7 @@ fn same(with: &Run, without: &Run) {
         let plain = |out: &Output| {
             let mut out = out.clone();
             out.work = Default::default();
-            out.guidance.joints = 0;
+            out.guidance.exclusions = 0;
             out
         };
         assert_eq!(plain(a), plain(b), "tick {t}");
@@ -230,7 +230,8 @@ fn bolted(play: f64, parallel: bool) -> ([f64; 2], u32) {
             off[0] = off[0].max((f64::from(pose.position.z) - landed).abs());
             off[1] = off[1].max(f64::from(pose.position.truncate().length()));
             let on_top = out.pairs.iter().any(|p| (p.moving_face, p.static_face) == (2, 0));
-            felt += u32::from(on_top && out.guidance.joints == 1 && (out.handle.force.z - 5.0).abs() < 0.1);
+            felt +=
+                u32::from(on_top && out.guidance.exclusions == 1 && (out.handle.force.z - 5.0).abs() < 0.1);
         }
     }
     println!(
