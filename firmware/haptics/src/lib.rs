@@ -34,9 +34,12 @@
 mod baseline;
 mod collision;
 mod constraints;
+mod contact_step;
 mod dynamics;
+mod hand;
 mod io;
 mod math;
+mod motion;
 pub mod observer;
 mod passivity;
 mod probe;

@@ -15,8 +15,7 @@
 use glam::Vec3;
 
 use crate::collision::contact::{Contact, Phase};
-use crate::dynamics::coupling::Coupling;
-use crate::dynamics::step::{Solution, Step};
+use crate::dynamics::step::{Solution, Step, Terms};
 use crate::math::pose::{Twist, Wrench};
 use crate::math::symmetric6::dot;
 use crate::settings::ContactSettings;
@@ -34,9 +33,9 @@ pub(crate) fn shared_stiffness(contact: &ContactSettings, touching: f32) -> f32 
 }
 
 /// The step without contacts.
-pub(crate) fn free(step: &Step<'_>) -> Solution {
+pub(crate) fn free(step: &Step, terms: Terms<'_, '_>) -> Solution {
     Solution {
-        twist: accelerated(step, pulls(step)),
+        twist: accelerated(step, at_start(step, terms)),
         contact: Wrench::ZERO,
         solves: 0,
         settled: true,
@@ -46,7 +45,8 @@ pub(crate) fn free(step: &Step<'_>) -> Solution {
 /// The step with `contacts` of stiffness `k` (N/m); those with a gap up to `braking_m` only brake. On return their phases are those of the solution,
 /// and their rates those of its motion as far as `allowed` lets it.
 pub(crate) fn with_contacts(
-    step: &Step<'_>,
+    step: &Step,
+    terms: Terms<'_, '_>,
     contacts: &mut [Contact],
     k: f32,
     braking_m: f32,
@@ -67,7 +67,7 @@ pub(crate) fn with_contacts(
         contact.force += n;
         contact.torque += c.arm.cross(n);
     }
-    let twist = accelerated(step, pulls(step) + contact);
+    let twist = accelerated(step, at_start(step, terms) + contact);
     let after = step.scale(allowed(twist));
     for c in contacts.iter_mut() {
         c.rate = dot(&c.row, &after);
@@ -80,18 +80,12 @@ pub(crate) fn with_contacts(
     }
 }
 
-/// Wrench of the coupling at the tick's start, eqs. 1–2, as far as it does not slip, and of what targets pull with.
-fn pulls(step: &Step<'_>) -> Wrench {
-    // With no time ahead the pull is k·d − b·v.
-    let pull = step.coupling.pull(step.settings, 0.0, step.twist);
-    let slip = Coupling::slip(pull, step.settings);
-    let mut wrench = Wrench {
-        force: pull.force * slip.translation,
-        torque: pull.torque * slip.rotation,
-    };
+/// Wrench of all terms at the tick's start.
+fn at_start(step: &Step, terms: Terms<'_, '_>) -> Wrench {
     let before = step.scale(step.twist);
-    for pull in step.springs {
-        wrench = wrench + pull.wrench(&before, step.length);
+    let mut wrench = Wrench::ZERO;
+    for term in terms.iter() {
+        term.add_wrench(&before, 0.0, &mut wrench);
     }
     wrench
 }
@@ -106,7 +100,7 @@ fn approach(c: &Contact, braking_m: f32, twist: &[f32; 6]) -> f32 {
 }
 
 /// b, N s/m.
-fn braking(step: &Step<'_>, contacts: &[Contact], braking_m: f32, twist: &[f32; 6]) -> f32 {
+fn braking(step: &Step, contacts: &[Contact], braking_m: f32, twist: &[f32; 6]) -> f32 {
     let mut squares = 0.0;
     let mut sum = Wrench::ZERO;
     for c in contacts {
@@ -128,7 +122,7 @@ fn braking(step: &Step<'_>, contacts: &[Contact], braking_m: f32, twist: &[f32; 
 }
 
 /// Twist at the tick's end under `wrench`, the gyroscopic torque with it.
-fn accelerated(step: &Step<'_>, wrench: Wrench) -> Twist {
+fn accelerated(step: &Step, wrench: Wrench) -> Twist {
     let h = step.period_s;
     let spin = step.twist.angular;
     let gyroscopic = spin.cross(step.gyration2 * spin);

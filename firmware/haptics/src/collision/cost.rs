@@ -29,11 +29,11 @@ pub(crate) const EXCLUSION: u32 = 4 * LOOKUP;
 /// So many reads of the field's bricks and cells count in the budget as one [`LOOKUP`].
 pub(crate) const EXCLUSION_READS: u32 = 14;
 /// To find what a target pulls with, and what follows from it, look-ups. What it takes in a solve: [`solve_cost`].
-pub(crate) const PULL: u32 = 6;
+pub(crate) const SPRING: u32 = 6;
 
 /// A solve with so many pulls, in the look-ups of the budget.
-pub(crate) fn solve_cost(pulls: usize) -> u32 {
-    8 + 5 * pulls as u32 / 2
+pub(crate) fn solve_cost(springs: usize) -> u32 {
+    8 + 5 * springs as u32 / 2
 }
 
 /// What a search took, look-ups.

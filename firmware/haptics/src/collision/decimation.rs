@@ -43,7 +43,7 @@ pub(crate) fn mask(decimation: u8, first_point: u32) -> Points {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decimation {
     /// Of the points that are near only each 2ⁿth is looked at.
-    decimation: u8,
+    level: u8,
     /// Ticks whose budget may still run out before more points are left out.
     patience: u8,
     /// Ticks in a row whose budget was enough, or since more points were looked at again.
@@ -69,14 +69,14 @@ pub(crate) struct Searched {
 impl Decimation {
     /// After a grab: nothing was looked at yet.
     pub const NEW: Self = Self {
-        decimation: 0,
+        level: 0,
         patience: FIRST_LOOK,
         calm: 0,
     };
 
     /// Of the points that are near only each 2ⁿth is to be looked at.
-    pub fn decimation(&self) -> u8 {
-        self.decimation
+    pub fn level(&self) -> u8 {
+        self.level
     }
 
     /// Draws the conclusions of a search.
@@ -85,10 +85,10 @@ impl Decimation {
         let Searched { touching, lost, .. } = *searched;
         if lost > 0 {
             self.decimate_to_fit(touching + lost);
-        } else if overrun && self.decimation < MAX_DECIMATION && self.helps(searched) {
-            self.decimation += 1;
-        } else if self.decimation > 0 && self.calm >= CALM_TICKS && has_room(searched) {
-            self.decimation -= 1;
+        } else if overrun && self.level < MAX_DECIMATION && self.helps(searched) {
+            self.level += 1;
+        } else if self.level > 0 && self.calm >= CALM_TICKS && has_room(searched) {
+            self.level -= 1;
             self.calm = 0;
         }
     }
@@ -118,7 +118,7 @@ impl Decimation {
     /// Whether half the points would make a difference, not only the way to them be too long; and where that leaves out whole leaves, whether there
     /// are so many that faces are not left out with them.
     fn helps(&self, searched: &Searched) -> bool {
-        let part = if self.decimation < LEAF_DECIMATION { 4 } else { 2 };
+        let part = if self.level < LEAF_DECIMATION { 4 } else { 2 };
         part * searched.used.on_points > searched.budget
     }
 
@@ -128,8 +128,8 @@ impl Decimation {
     /// stiffness that comes and goes with them makes energy. A flat face on more than 256 points rattled so from tick to tick, by as much as it was
     /// deep in.
     fn decimate_to_fit(&mut self, mut touching: u32) {
-        while self.decimation < MAX_DECIMATION && touching * 4 > MAX_CONTACTS as u32 * 3 {
-            self.decimation += 1;
+        while self.level < MAX_DECIMATION && touching * 4 > MAX_CONTACTS as u32 * 3 {
+            self.level += 1;
             touching /= 2;
         }
     }
@@ -178,14 +178,14 @@ mod tests {
         let mut o = Decimation::NEW;
         for tick in 0..50 {
             o.update(&stopped(10 * tick, 10 * tick + 10));
-            assert_eq!(o.decimation(), 0, "{tick}");
+            assert_eq!(o.level(), 0, "{tick}");
         }
         // From the end to the beginning again.
         o.update(&stopped(500, 5));
         for _ in 0..=OVERRUNS_BORNE {
             o.update(&stopped(5, 15));
         }
-        assert_eq!(o.decimation(), 1);
+        assert_eq!(o.level(), 1);
     }
 
     /// A look that gets nowhere is not borne for ever.
@@ -195,7 +195,7 @@ mod tests {
         for _ in 0..=FIRST_LOOK {
             o.update(&stopped(0, 1));
         }
-        assert_eq!(o.decimation(), 1);
+        assert_eq!(o.level(), 1);
     }
 
     /// Points are left out for the work they make, whole leaves for more of it.
@@ -210,7 +210,7 @@ mod tests {
                     ..stopped(5, 40)
                 });
             }
-            o.decimation()
+            o.level()
         };
         assert_eq!(play(125), 0);
         assert_eq!(play(126), LEAF_DECIMATION);
@@ -224,11 +224,11 @@ mod tests {
         for _ in 0..1000 {
             o.update(&stopped(5, 40));
         }
-        assert_eq!(o.decimation(), MAX_DECIMATION);
+        assert_eq!(o.level(), MAX_DECIMATION);
         for ticks in 1..=u32::from(MAX_DECIMATION) * u32::from(CALM_TICKS) {
             o.update(&sufficed(100));
             let steps = (ticks / u32::from(CALM_TICKS)) as u8;
-            assert_eq!(o.decimation(), MAX_DECIMATION - steps, "{ticks}");
+            assert_eq!(o.level(), MAX_DECIMATION - steps, "{ticks}");
         }
         // What would not fit stays out.
         o.update(&Searched {
@@ -236,11 +236,11 @@ mod tests {
             touching: 256,
             ..sufficed(100)
         });
-        assert_eq!(o.decimation(), 1);
+        assert_eq!(o.level(), 1);
         for _ in 0..2 * CALM_TICKS {
             o.update(&sufficed(400));
         }
-        assert_eq!(o.decimation(), 1);
+        assert_eq!(o.level(), 1);
     }
 
     proptest! {
@@ -251,11 +251,11 @@ mod tests {
         ) {
             let mut o = Decimation::NEW;
             for (start, stop, all, touching, lost) in ticks {
-                let before = o.decimation();
+                let before = o.level();
                 o.update(&Searched { start: at(start), stopped: stop.map(at), touching, lost, ..sufficed(all) });
-                prop_assert!(o.decimation() <= MAX_DECIMATION);
-                let fits = 4 * ((touching + lost) >> (o.decimation() - before.min(o.decimation()))) <= 3 * MAX_CONTACTS as u32;
-                prop_assert!(lost == 0 || fits || o.decimation() == MAX_DECIMATION);
+                prop_assert!(o.level() <= MAX_DECIMATION);
+                let fits = 4 * ((touching + lost) >> (o.level() - before.min(o.level()))) <= 3 * MAX_CONTACTS as u32;
+                prop_assert!(lost == 0 || fits || o.level() == MAX_DECIMATION);
             }
         }
     }

@@ -3,10 +3,14 @@
 //! A cap makes the step's equations nonlinear. Each solve takes the spring and the damper that pull as hard at the last solution (the secant) in its
 //! place; a few solves settle it.
 
+use core::mem;
+
 use glam::Vec3;
+use heapless::Vec;
 use mortise_protocol::limits::MAX_TARGETS;
 
 use crate::constraints::alignment::Rows;
+use crate::dynamics::force::{ForceTerm, Iterate, System};
 use crate::math::pose::Wrench;
 use crate::math::scalar::inverse_sqrt;
 use crate::math::symmetric6::{Symmetric6, dot};
@@ -37,7 +41,7 @@ pub(crate) struct SaturatingSpring {
 
 /// The spring (N/m) and the damper (N s/m) that pull as hard as a saturating pull does at one solution.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Secant {
+struct Secant {
     spring: f32,
     damper: f32,
     /// |u| and its rate there, m and m/s.
@@ -47,7 +51,7 @@ pub(crate) struct Secant {
 
 impl Secant {
     /// Whether this, in place of another that is right, pulls wrongly by no more than `force_n`.
-    pub fn is_near(&self, other: &Self, force_n: f32) -> bool {
+    fn is_near(&self, other: &Self, force_n: f32) -> bool {
         let spring = (self.spring - other.spring).abs() * other.reach;
         let damper = (self.damper - other.damper).abs() * other.speed;
         spring + damper <= force_n
@@ -86,7 +90,7 @@ impl SaturatingSpring {
     }
 
     /// At the step's end `x`.
-    pub fn secant(&self, x: &[f32; 6]) -> Secant {
+    fn secant(&self, x: &[f32; 6]) -> Secant {
         let mut secant = Secant::default();
         match self.law {
             Law::Spring { stiffness, .. } => secant.spring = stiffness,
@@ -108,10 +112,10 @@ impl SaturatingSpring {
     }
 
     /// Adds what the spring and the damper add to the step's matrix and right side.
-    pub fn add(&self, secant: Secant, period_s: f32, matrix: &mut Symmetric6, right: &mut [f32; 6]) {
+    fn add(&self, secant: Secant, period_s: f32, system: &mut System) {
         let impulse = secant.spring * period_s;
-        matrix.add_scaled(impulse * self.ahead() + secant.damper * period_s, &self.product);
-        for (r, a) in right.iter_mut().zip(&self.along) {
+        (system.matrix).add_scaled(impulse * self.ahead() + secant.damper * period_s, &self.product);
+        for (r, a) in system.right.iter_mut().zip(&self.along) {
             *r -= impulse * a;
         }
     }
@@ -133,6 +137,73 @@ impl SaturatingSpring {
             wrench.torque += Vec3::new(row[3], row[4], row[5]) * (f * length);
         }
         wrench
+    }
+
+    /// Its potential at the step's end, J, with the look-ahead of its own law: c·(√((c/k)² + u²) − c/k), or ½·k·u².
+    #[cfg(test)]
+    fn energy_j(&self, x: &[f32; 6]) -> f32 {
+        let squared = self.rows.error2(x, self.ahead());
+        match self.law {
+            Law::Spring { stiffness, .. } => 0.5 * stiffness * squared,
+            Law::Capped { stiffness, cap, .. } => {
+                let slack = cap / stiffness;
+                cap * (libm::sqrtf(slack * slack + squared) - slack)
+            }
+        }
+    }
+}
+
+/// A spring that pulls wrongly by less than this is settled, N: less than half of what may change in a tick.
+const SPRING_BAND_N: f32 = 0.02;
+
+/// The springs of all targets as one force term.
+pub(crate) struct TargetForce<'a> {
+    springs: &'a [SaturatingSpring],
+    secants: Vec<Secant, MAX_SPRINGS>,
+    period_s: f32,
+    /// L, m.
+    length: f32,
+}
+
+impl<'a> TargetForce<'a> {
+    pub fn new(springs: &'a [SaturatingSpring], period_s: f32, length: f32) -> Self {
+        let mut secants = Vec::new();
+        // No more springs than there is capacity for.
+        let _ = secants.resize(springs.len(), Secant::default());
+        Self {
+            springs,
+            secants,
+            period_s,
+            length,
+        }
+    }
+}
+
+impl ForceTerm for TargetForce<'_> {
+    fn linearise(&mut self, at: &Iterate<'_>) -> bool {
+        let mut settled = true;
+        for (spring, secant) in self.springs.iter().zip(&mut self.secants) {
+            let last = mem::replace(secant, spring.secant(at.x));
+            settled &= last.is_near(secant, SPRING_BAND_N);
+        }
+        settled
+    }
+
+    fn add_to(&self, system: &mut System) {
+        for (spring, secant) in self.springs.iter().zip(&self.secants) {
+            spring.add(*secant, self.period_s, system);
+        }
+    }
+
+    fn add_wrench(&self, x: &[f32; 6], _: f32, to: &mut Wrench) {
+        for spring in self.springs {
+            *to = *to + spring.wrench(x, self.length);
+        }
+    }
+
+    #[cfg(test)]
+    fn energy_j(&self, x: &[f32; 6]) -> f32 {
+        self.springs.iter().map(|spring| spring.energy_j(x)).sum()
     }
 }
 

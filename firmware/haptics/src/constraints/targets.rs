@@ -231,7 +231,7 @@ impl TargetSet {
 
     /// Forms and ends exclusions, given what the targets pull with and how far the object may move in this tick: `motions` of one period, scaled as the
     /// step's unknowns, and the `slack` within which points are wanted. Whether any ended.
-    pub fn join(
+    pub fn exclude(
         &mut self,
         at: &Situation<'_, '_>,
         springs: &[SaturatingSpring],

@@ -3,7 +3,9 @@
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::Shape;
 
-use crate::math::pose::{Pose, Twist};
+use crate::math::pose::{Pose, Twist, renormalize};
+use crate::math::rotation;
+use crate::math::vector::cut;
 use crate::settings::ObjectSettings;
 
 /// Added to every reach: a part that is a mere point must not be divided by.
@@ -117,5 +119,24 @@ impl Grabbed {
             position: self.center - self.orientation * self.body.center_of_mass,
             orientation: self.orientation,
         }
+    }
+
+    /// Energy of its motion, J, without that of its turning.
+    pub fn moving_energy(&self, mass_kg: f32) -> f32 {
+        0.5 * mass_kg * self.twist.linear.length_squared()
+    }
+
+    /// Energy of its turning, J.
+    pub fn turning_energy(&self, mass_kg: f32, gyration2: Mat3) -> f32 {
+        0.5 * mass_kg * self.twist.angular.dot(gyration2 * self.twist.angular)
+    }
+
+    /// Moves with `twist` for `period_s`.
+    pub fn advance(&mut self, twist: Twist, period_s: f32) {
+        self.twist = twist;
+        self.center += twist.linear * period_s;
+        let turn = twist.angular * period_s;
+        let turn = cut(turn, rotation::EXP_MAX).0;
+        self.orientation = renormalize(rotation::exp(turn) * self.orientation);
     }
 }

@@ -7,9 +7,13 @@
 //! Beyond its largest force or torque the coupling slips: its stiffness and damping are scaled down together, which keeps the implicit step's matrix
 //! positive definite and the force's direction.
 
+use core::mem;
+
 use glam::Vec3;
 
 use crate::dynamics::body::Grabbed;
+use crate::dynamics::force::{ForceTerm, Iterate, System};
+use crate::io::Flags;
 use crate::math::pose::{Pose, Twist, Wrench};
 use crate::math::rotation::{self, log_continuous};
 use crate::math::vector::{cut, length};
@@ -106,6 +110,125 @@ impl Coupling {
     /// What the handle feels at its origin when the object is pulled with `wrench`: the reaction, applied where the hand holds the part.
     pub fn reaction(&self, wrench: Wrench) -> Wrench {
         (-wrench).moved_by(-self.lever)
+    }
+}
+
+/// The coupling at the tick's start, slipping in the hand where it is stretched beyond `limits`. A firm grip that closes on a part at once
+/// gives it the hand's motion, or the damper would be felt; one that slips takes it along from rest, since ½·m·v² is the hand's to give.
+pub(crate) fn take_hold(
+    mut grabbed: Grabbed,
+    handle: Pose,
+    handle_twist: Twist,
+    limits: Option<&CouplingSettings>,
+) -> (Grabbed, Coupling) {
+    let mut coupling = Coupling::measure(handle, handle_twist, &grabbed);
+    if let Some(limits) = limits
+        && let Some(offset) = coupling.slipped(handle, &grabbed, limits)
+    {
+        grabbed.offset = offset;
+        coupling = Coupling::measure(handle, handle_twist, &grabbed);
+    }
+    grabbed.angle = coupling.angle;
+    if grabbed.age == 0 && limits.is_none() {
+        grabbed.twist = coupling.target;
+    }
+    grabbed.age = grabbed.age.saturating_add(1);
+    (grabbed, coupling)
+}
+
+/// `pull` cut to what the coupling can transmit.
+pub(crate) fn slipping(pull: Wrench, settings: &CouplingSettings, flags: &mut Flags) -> Wrench {
+    let slip = Coupling::slip(pull, settings);
+    flags.insert_if(slip.translation < 1.0, Flags::SATURATED_FORCE);
+    flags.insert_if(slip.rotation < 1.0, Flags::SATURATED_TORQUE);
+    Wrench {
+        force: pull.force * slip.translation,
+        torque: pull.torque * slip.rotation,
+    }
+}
+
+/// A slip that changes by less than this is settled.
+const SLIP_BAND: f32 = 1e-3;
+
+/// The coupling as a force term: K = B + h·K_spring and w = K_spring·d + (B + h·K_spring)·V_hand, both scaled by the slip.
+pub(crate) struct CouplingForce<'a> {
+    pub coupling: &'a Coupling,
+    pub settings: &'a CouplingSettings,
+    pub period_s: f32,
+    /// L, m.
+    pub length: f32,
+    slip: Slip,
+}
+
+impl<'a> CouplingForce<'a> {
+    pub fn new(coupling: &'a Coupling, settings: &'a CouplingSettings, period_s: f32, length: f32) -> Self {
+        Self {
+            coupling,
+            settings,
+            period_s,
+            length,
+            slip: Slip::NONE,
+        }
+    }
+
+    fn twist(&self, x: &[f32; 6]) -> Twist {
+        Twist {
+            linear: Vec3::new(x[0], x[1], x[2]),
+            angular: Vec3::new(x[3], x[4], x[5]) * (1.0 / self.length),
+        }
+    }
+}
+
+impl ForceTerm for CouplingForce<'_> {
+    /// Without slip: most ticks need no other.
+    fn begin(&mut self, _: &[f32; 6]) {
+        self.slip = Slip::NONE;
+    }
+
+    fn linearise(&mut self, at: &Iterate<'_>) -> bool {
+        let pull = self.coupling.pull(self.settings, self.period_s, self.twist(at.x));
+        let slip = Coupling::slip(pull, self.settings);
+        let last = mem::replace(&mut self.slip, slip);
+        (last.translation - slip.translation).abs() < SLIP_BAND
+            && (last.rotation - slip.rotation).abs() < SLIP_BAND
+    }
+
+    fn add_to(&self, system: &mut System) {
+        let (c, s, slip) = (self.coupling, self.settings, self.slip);
+        let h = self.period_s;
+        let inverse_length = 1.0 / self.length;
+        let b_t = s.b_t + h * s.k_t_n_per_m;
+        let b_r = s.b_r + h * s.k_r;
+        let translation = h * b_t * slip.translation;
+        let rotation = h * b_r * slip.rotation * inverse_length * inverse_length;
+        for i in 0..3 {
+            system.matrix.add(i, i, translation);
+            system.matrix.add(3 + i, 3 + i, rotation);
+        }
+        let linear = (c.stretch * s.k_t_n_per_m + c.target.linear * b_t) * (h * slip.translation);
+        let angular = (c.angle * s.k_r + c.target.angular * b_r) * (h * slip.rotation * inverse_length);
+        let right = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
+        for (r, w) in system.right.iter_mut().zip(right) {
+            *r += w;
+        }
+    }
+
+    fn add_wrench(&self, x: &[f32; 6], period_s: f32, to: &mut Wrench) {
+        let pull = self.coupling.pull(self.settings, period_s, self.twist(x));
+        let slip = Coupling::slip(pull, self.settings);
+        to.force += pull.force * slip.translation;
+        to.torque += pull.torque * slip.rotation;
+    }
+
+    #[cfg(test)]
+    fn energy_j(&self, x: &[f32; 6]) -> f32 {
+        let moved = self.twist(x);
+        let at_end = Coupling {
+            stretch: self.coupling.stretch - moved.linear * self.period_s,
+            angle: self.coupling.angle - moved.angular * self.period_s,
+            ..*self.coupling
+        };
+        potential(&at_end, self.settings)
     }
 }
 

@@ -15,46 +15,21 @@
 //! Cost on a Cortex-M7 (counted as in [`crate::tick()`]): 150 instructions to set a system up, 150 to solve it, and about 300 for a contact in all
 //! passes over it together.
 
-use core::{array, mem};
-
 use glam::{Mat3, Vec3};
-use heapless::Vec;
 
-use crate::collision::contact::{Contact, Phase};
-use crate::constraints::saturating_spring::{MAX_SPRINGS, SaturatingSpring, Secant};
-use crate::dynamics::coupling::{Coupling, Slip};
+use crate::collision::contact::Contact;
+use crate::dynamics::contact_force::ContactForce;
+use crate::dynamics::force::{ForceTerm, Iterate, System};
 use crate::math::pose::{Twist, Wrench};
-use crate::math::symmetric6::{Symmetric6, add_scaled, dot};
-use crate::settings::CouplingSettings;
+use crate::math::symmetric6::Symmetric6;
 
-/// Solves allowed with contacts.
+/// Largest number of solves with contacts.
 pub(crate) const MAX_SOLVES: u8 = 8;
-/// Solves allowed without contacts: one, and two more while the coupling slips.
+/// Largest number of solves without contacts: one, and two more while a term saturates.
 const MAX_FREE_SOLVES: u8 = 3;
-/// A point that the last solution lets push or pull by less than this where it should not, N, does not ask for another solve: at 200 kN/m
-/// it is 2.5 nm, the rounding of a position of 40 mm.
-const FORCE_BAND_N: f32 = 0.5e-3;
-/// Rates within this of zero do not change between parting and closing, m/s: k·τ times this is 0.1 mN at 200 kN/m and 0.5 ms.
-const RATE_BAND_M_PER_S: f32 = 1e-6;
-/// Nor do rates that the rounding of the object's pose makes: a quaternion tells no turn finer than this, rad, which at the end of an arm a is a
-/// gap's change by a·2⁻²³ from one tick to the next. Of a peg that slides along a wall every second point would change in every tick else, and ask
-/// for two more solves.
-const TURN_ROUNDING: f32 = 1.0 / (1 << 23) as f32;
-/// Where nothing touches yet, those points are first taken to touch that would go so far as this share of what would go deepest: that stops the
-/// object before the others do.
-const LANDING_SHARE: f32 = 0.8;
-/// What has not settled so after this many solves need not ever: from then on only [`RATE_BAND_M_PER_S`] counts.
-const ROUGH_SOLVES: u8 = MAX_SOLVES / 2;
-/// A slip that changes by less than this is settled.
-const SLIP_BAND: f32 = 1e-3;
 
-/// A pull that is wrong by less than this is settled, N: less than half of what may change in a tick.
-const PULL_BAND_N: f32 = 0.02;
-
-/// The object and its coupling at the tick's start.
-pub(crate) struct Step<'a> {
-    pub coupling: &'a Coupling,
-    pub settings: &'a CouplingSettings,
+/// The held object at the tick's start, without the forces on it.
+pub(crate) struct Step {
     pub period_s: f32,
     pub mass_kg: f32,
     /// Inertia over mass in the world, m².
@@ -63,40 +38,6 @@ pub(crate) struct Step<'a> {
     pub length: f32,
     /// V.
     pub twist: Twist,
-    /// What constraint targets pull with.
-    pub springs: &'a [SaturatingSpring],
-}
-
-/// Everything in the step that saturates, as the springs that pull as hard at one solution.
-#[derive(Clone, Debug)]
-struct Secants {
-    slip: Slip,
-    springs: Vec<Secant, MAX_SPRINGS>,
-}
-
-impl Secants {
-    const fn new() -> Self {
-        Self {
-            slip: Slip::NONE,
-            springs: Vec::new(),
-        }
-    }
-}
-
-/// Stiffness of contacts, N/m.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Stiffness {
-    /// Of a point.
-    pub point: f32,
-    /// Of a point between guided faces.
-    pub guided: f32,
-}
-
-impl Stiffness {
-    #[inline]
-    fn of(&self, c: &Contact) -> f32 {
-        if c.guided { self.guided } else { self.point }
-    }
 }
 
 /// A solution of the step.
@@ -112,20 +53,21 @@ pub(crate) struct Solution {
     pub settled: bool,
 }
 
-impl Step<'_> {
+/// The force terms of a step, contact apart, in the order in which they enter the sums.
+pub(crate) type Terms<'a, 't> = &'a mut [&'t mut dyn ForceTerm];
+
+impl Step {
     /// The step without contacts.
-    pub fn free(&self) -> Solution {
-        let (secants, next) = &mut (Secants::new(), Secants::new());
-        let (mut secants, mut next) = (secants, next);
-        self.find_secants(&self.scale(self.twist), secants);
-        secants.slip = Slip::NONE;
+    pub fn free(&self, terms: Terms<'_, '_>) -> Solution {
+        let start = self.scale(self.twist);
+        for term in terms.iter_mut() {
+            term.begin(&start);
+        }
         let mut solves = 0;
         loop {
-            let (matrix, right) = self.without_contact(secants);
-            let x = matrix.solve(&right);
+            let x = self.system(terms).solve();
             solves += 1;
-            self.find_secants(&x, next);
-            if settled(secants, next) || solves == MAX_FREE_SOLVES {
+            if linearise(terms, &x, &[]) || solves == MAX_FREE_SOLVES {
                 return Solution {
                     twist: self.unscale(&x),
                     contact: Wrench::ZERO,
@@ -133,191 +75,80 @@ impl Step<'_> {
                     settled: true,
                 };
             }
-            mem::swap(&mut secants, &mut next);
         }
     }
 
-    /// The step with `contacts` of stiffness `k` and approach damping `damping_s` (τ), starting from the motion so far, or from the
-    /// `free` solution when that touches nothing. No contact's arm is longer than `farthest` (m). What has not settled after `most_solves` is taken
-    /// as it is.
+    /// The step with contacts, starting from the motion so far, or from the `free` solution when that touches nothing. What has not settled after
+    /// `max_solves` is taken as it is.
     ///
     /// On return each contact's rate and phase are those of the solution.
     pub fn with_contacts(
         &self,
         free: &Solution,
-        contacts: &mut [Contact],
-        k: &Stiffness,
-        damping_s: f32,
-        farthest: f32,
-        most_solves: u8,
+        terms: Terms<'_, '_>,
+        contact: &mut ContactForce<'_>,
+        max_solves: u8,
     ) -> Solution {
-        if contacts.is_empty() {
-            // What the loop below comes to then, to the bit.
+        if contact.contacts().is_empty() {
+            // The bits that the loop below would give.
             return Solution {
                 twist: self.unscale(&self.scale(free.twist)),
                 ..*free
             };
         }
-        let h = self.period_s;
-        let lever = farthest / self.length;
-        // No rate changes by more than the unknowns' change times this: the length of a row, n and (r × n)/L.
-        let row_length = above_root(1.0 + lever * lever);
-        let reach = |phase| match phase {
-            Phase::Free => 0.0,
-            Phase::Parting => h,
-            Phase::Closing => h + damping_s,
-        };
-        let band = FORCE_BAND_N / k.point;
-        // A ten-thousandth more than the force law's own, so that rounding (some 10⁻⁷ of the gap) cannot decide otherwise than it does.
-        let closing_s = 1.0001 * (h + damping_s);
-        // Two, taken in turn: they are too large to be handed about.
-        let (secants, next) = &mut (Secants::new(), Secants::new());
-        let (mut secants, mut next) = (secants, next);
-        self.find_secants(&self.scale(free.twist), secants);
-        // Where the object rests or slides, its motion up to now already tells which points touch.
+        // Where the object rests or slides, its motion up to now already gives the points that touch.
         let mut x = self.scale(self.twist);
-        let mut changed = false;
-        let (mut landing, mut deepest) = (true, 0.0);
-        for c in contacts.iter_mut() {
-            c.rate = dot(&c.row, &x);
-            // Most points are free and stay so: a gap that closing in full would leave open needs no closer look.
-            let end = c.gap + closing_s * c.rate;
-            if c.gap >= 0.0 && end >= 0.0 {
-                continue;
-            }
-            c.phase = next_phase(c, h, damping_s, band, RATE_BAND_M_PER_S);
-            changed |= c.phase != Phase::Free;
-            landing &= c.gap >= 0.0;
-            if end < deepest {
-                deepest = end;
-            }
+        let touching = contact.begin(&x);
+        if !touching {
+            x = self.scale(free.twist);
         }
-        if landing && changed {
-            // What goes deepest stops the object before the others touch.
-            for c in contacts.iter_mut() {
-                if c.gap + closing_s * c.rate > LANDING_SHARE * deepest {
-                    c.phase = Phase::Free;
-                }
-            }
-        }
-        let touching = || contacts.iter().filter(|c| c.phase != Phase::Free);
-        let mut stiffness =
-            Symmetric6::sum_of_outer(touching().map(|c| (h * k.of(c) * reach(c.phase), &c.row)));
-        let mut push = [0.0f32; 6];
-        for c in touching() {
-            add_scaled(&mut push, -h * k.of(c) * c.gap, &c.row);
-        }
-        let rough_rate_band = RATE_BAND_M_PER_S + farthest * TURN_ROUNDING / h;
+        linearise(terms, &x, contact.contacts());
         let mut solves = 0;
-        // Whether `x` solves the step with some set of touching points.
-        let mut solved = false;
-        // How far any rate can have changed since all were looked at, m/s.
-        let mut way = 0.0;
-        let is_settled = loop {
-            let last = x;
-            if !solved && !changed {
-                x = self.scale(free.twist);
-            } else {
-                self.find_secants(&x, next);
-                if solved && !changed && settled(secants, next) {
-                    break true;
-                }
-                if solves >= most_solves {
-                    break false;
-                }
-                mem::swap(&mut secants, &mut next);
-                let (mut matrix, mut right) = self.without_contact(secants);
-                matrix.add_matrix(&stiffness);
-                for (r, p) in right.iter_mut().zip(&push) {
-                    *r += p;
-                }
-                x = matrix.solve(&right);
-                solves += 1;
-            }
-            solved = true;
-            // What of a free point's gap is left at the step's end by the rate last looked at, m, can have been closed since when it is less than
-            // this.
-            let moved: [f32; 6] = array::from_fn(|i| x[i] - last[i]);
-            way += row_length * above_root(dot(&moved, &moved));
-            let out_of_reach = closing_s * way;
-            changed = false;
-            let rate_band = if solves <= ROUGH_SOLVES {
-                rough_rate_band
-            } else {
-                RATE_BAND_M_PER_S
-            };
-            for c in contacts.iter_mut() {
-                if c.phase == Phase::Free && c.gap + closing_s * c.rate >= out_of_reach {
-                    continue;
-                }
-                c.rate = dot(&c.row, &x);
-                if c.phase == Phase::Free && c.gap >= 0.0 && c.gap + closing_s * c.rate >= 0.0 {
-                    continue;
-                }
-                if stays(c, h, damping_s, band, rate_band) {
-                    continue;
-                }
-                let phase = next_phase(c, h, damping_s, band, rate_band);
-                if phase != c.phase {
-                    changed = true;
-                    let k = k.of(c);
-                    stiffness.add_outer(h * k * (reach(phase) - reach(c.phase)), &c.row);
-                    let sign = f32::from(phase != Phase::Free) - f32::from(c.phase != Phase::Free);
-                    add_scaled(&mut push, -h * k * c.gap * sign, &c.row);
-                    c.phase = phase;
-                }
-            }
-        };
-        let contact = total_force(contacts, k, h, damping_s, self.length);
+        let mut settled = !touching && contact.linearise(&x, solves);
+        while !settled && solves < max_solves {
+            let mut system = self.system(terms);
+            contact.add_to(&mut system);
+            x = system.solve();
+            solves += 1;
+            let same_contacts = contact.linearise(&x, solves);
+            settled = linearise(terms, &x, contact.contacts()) && same_contacts;
+        }
         Solution {
             twist: self.unscale(&x),
-            contact,
+            contact: contact.wrench(),
             solves: free.solves + solves,
-            settled: is_settled,
+            settled,
         }
     }
 
-    fn find_secants(&self, x: &[f32; 6], found: &mut Secants) {
-        let pull = self.coupling.pull(self.settings, self.period_s, self.unscale(x));
-        found.slip = Coupling::slip(pull, self.settings);
-        found.springs.clear();
-        for pull in self.springs {
-            // No more than there is room for springs.
-            let _ = found.springs.push(pull.secant(x));
+    /// Inertia and all terms but contact: (M + Σ h·Kᵢ)·V' = M·V + Σ h·wᵢ.
+    fn system(&self, terms: Terms<'_, '_>) -> System {
+        let mut system = self.inertia();
+        for term in terms.iter() {
+            term.add_to(&mut system);
         }
+        system
     }
 
-    /// Matrix and right side of mass and coupling, scaled: (M + h·B + h²·K)·V' = M·V + h·(K·d + (B + h·K)·V_hand).
-    fn without_contact(&self, secants: &Secants) -> (Symmetric6, [f32; 6]) {
-        let slip = secants.slip;
-        let h = self.period_s;
+    /// M and M·V, scaled.
+    fn inertia(&self) -> System {
         let m = self.mass_kg;
-        let s = self.settings;
-        let c = self.coupling;
         let inverse_length = 1.0 / self.length;
-        let b_t = s.b_t + h * s.k_t_n_per_m;
-        let b_r = s.b_r + h * s.k_r;
-        let translation = m + h * b_t * slip.translation;
-        let rotation = h * b_r * slip.rotation * inverse_length * inverse_length;
         let inertia = self.gyration2 * (m * inverse_length * inverse_length);
         let mut matrix = Symmetric6::ZERO;
         let columns = [inertia.x_axis, inertia.y_axis, inertia.z_axis];
         for i in 0..3 {
-            matrix.add(i, i, translation);
+            matrix.add(i, i, m);
             for (j, column) in columns.iter().enumerate().take(i + 1) {
                 matrix.add(3 + i, 3 + j, column[i]);
             }
-            matrix.add(3 + i, 3 + i, rotation);
         }
-        let linear = self.twist.linear * m
-            + (c.stretch * s.k_t_n_per_m + c.target.linear * b_t) * (h * slip.translation);
-        let angular = (self.gyration2 * self.twist.angular) * (m * inverse_length)
-            + (c.angle * s.k_r + c.target.angular * b_r) * (h * slip.rotation * inverse_length);
-        let mut right = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
-        for (pull, secant) in self.springs.iter().zip(&secants.springs) {
-            pull.add(*secant, h, &mut matrix, &mut right);
+        let linear = self.twist.linear * m;
+        let angular = (self.gyration2 * self.twist.angular) * (m * inverse_length);
+        System {
+            matrix,
+            right: [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z],
         }
-        (matrix, right)
     }
 
     /// The step's unknowns for a twist: (v, ω·L).
@@ -334,110 +165,25 @@ impl Step<'_> {
     }
 }
 
-/// Sum of the forces of `contacts` on the object, at its centre of mass. Their rows are those of a step of this `length`, L.
-pub(crate) fn total_force(
-    contacts: &[Contact],
-    k: &Stiffness,
-    period_s: f32,
-    damping_s: f32,
-    length: f32,
-) -> Wrench {
-    let mut total = [0.0; 6];
-    for c in contacts {
-        let force = force(c, k.of(c), period_s, damping_s);
-        if force > 0.0 {
-            add_scaled(&mut total, force, &c.row);
-        }
-    }
-    let [x, y, z, a, b, c] = total;
-    Wrench {
-        force: Vec3::new(x, y, z),
-        torque: Vec3::new(a, b, c) * length,
-    }
-}
-
-/// Force of a contact (N) at its rate, never negative.
-pub(crate) fn force(c: &Contact, k: f32, period_s: f32, damping_s: f32) -> f32 {
-    let reach = match c.phase {
-        Phase::Free => return 0.0,
-        Phase::Parting => period_s,
-        Phase::Closing => period_s + damping_s,
-    };
-    let force = -k * (c.gap + reach * c.rate);
-    if force > 0.0 { force } else { 0.0 }
-}
-
-/// Whether a contact that pushes goes on to, on its branch: what [`next_phase`] says too, sooner.
-#[inline(always)]
-fn stays(c: &Contact, h: f32, damping_s: f32, band: f32, rate_band: f32) -> bool {
-    let end = c.gap + h * c.rate;
-    match c.phase {
-        Phase::Free => false,
-        Phase::Parting => c.rate >= -rate_band && end < band,
-        Phase::Closing => c.rate < rate_band && end + damping_s * c.rate < band,
-    }
-}
-
-#[inline]
-fn next_phase(c: &Contact, h: f32, damping_s: f32, band: f32, rate_band: f32) -> Phase {
-    let closing = match c.phase {
-        Phase::Closing => c.rate < rate_band,
-        Phase::Parting => c.rate < -rate_band,
-        Phase::Free => c.rate < 0.0,
-    };
-    let end = c.gap + h * c.rate + if closing { damping_s * c.rate } else { 0.0 };
-    let most = if c.phase == Phase::Free { -band } else { band };
-    if end >= most {
-        Phase::Free
-    } else if closing {
-        Phase::Closing
-    } else {
-        Phase::Parting
-    }
-}
-
-/// At least √`squared`.
-fn above_root(squared: f32) -> f32 {
-    1.000_01 * libm::sqrtf(squared)
-}
-
-fn settled(a: &Secants, b: &Secants) -> bool {
-    let (s, t) = (a.slip, b.slip);
-    (s.translation - t.translation).abs() < SLIP_BAND
-        && (s.rotation - t.rotation).abs() < SLIP_BAND
-        && a.springs
-            .iter()
-            .zip(&b.springs)
-            .all(|(p, q)| p.is_near(q, PULL_BAND_N))
+/// Linearises every term at `x`; whether all of them had settled.
+fn linearise(terms: Terms<'_, '_>, x: &[f32; 6], contacts: &[Contact]) -> bool {
+    let at = Iterate { x, contacts };
+    terms
+        .iter_mut()
+        .fold(true, |settled, term| term.linearise(&at) && settled)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collision::contact::Contacts;
+    use crate::collision::contact::{Contacts, Phase};
+    use crate::dynamics::contact_force::{FORCE_BAND_N, RATE_BAND_M_PER_S, Stiffness, TURN_ROUNDING};
+    use crate::dynamics::coupling::{Coupling, CouplingForce};
+    use crate::math::symmetric6::{add_scaled, dot};
+    use glam::Vec3;
     use proptest::prelude::*;
 
     proptest! {
-        /// The short cut is no other rule: it holds exactly where the branch of a contact that pushes does not change.
-        #[test]
-        fn stays_where_the_phase_does(
-            gap in -20e-6f32..20e-6,
-            rate in prop_oneof![-0.02f32..0.02, -3e-6f32..3e-6, Just(0.0)],
-            closing in any::<bool>(),
-            damping_s in 0.0f32..2e-3,
-            band in 0.0f32..1e-6,
-            rate_band in 1e-6f32..1e-4,
-        ) {
-            let mut contacts = Contacts::new();
-            let c = contacts.offer(gap, gap, 0.0).expect("room");
-            (c.gap, c.rate) = (gap, rate);
-            for phase in [Phase::Free, if closing { Phase::Closing } else { Phase::Parting }] {
-                c.phase = phase;
-                let goes_on = phase != Phase::Free && next_phase(c, 1e-3, damping_s, band, rate_band) == phase;
-                prop_assert_eq!(stays(c, 1e-3, damping_s, band, rate_band), goes_on, "{:?}", c);
-            }
-        }
-
         /// What has settled solves the step by the force law itself, but for what each contact may be off by: the bands of rate and force. Long pegs
         /// that lie on a wall and hardly move.
         #[test]
@@ -451,14 +197,11 @@ mod tests {
             let settings = crate::Settings::default();
             let coupling = Coupling::stretched(Vec3::new(0.0, push, 0.0), Vec3::new(lean, 0.0, 0.0));
             let step = Step {
-                coupling: &coupling,
-                settings: &settings.coupling,
                 period_s: settings.period_s,
                 mass_kg: settings.object.mass_kg,
                 gyration2: Mat3::IDENTITY * 0.04,
                 length: 0.2,
                 twist: Twist { linear: Vec3::from_array(speed), angular: Vec3::from_array(turning) },
-                springs: &[],
             };
             let mut contacts = Contacts::new();
             for &(along, side, gap) in &points {
@@ -474,12 +217,15 @@ mod tests {
             let (h, damping) = (settings.period_s, settings.contact.damping_s);
             let stiffness = settings.contact.stiffness_n_per_m;
             let k = Stiffness { point: stiffness, guided: stiffness };
-            let solution = step.with_contacts(&step.free(), contacts.as_mut_slice(), &k, damping, farthest, MAX_SOLVES);
+            let mut coupling_force = CouplingForce::new(&coupling, &settings.coupling, h, step.length);
+            let terms: Terms<'_, '_> = &mut [&mut coupling_force];
+            let free = step.free(terms);
+            let mut force = ContactForce::new(contacts.as_mut_slice(), k, h, damping, (farthest, step.length));
+            let solution = step.with_contacts(&free, terms, &mut force, MAX_SOLVES);
             prop_assert!(solution.settled);
             let x = step.scale(solution.twist);
-            let mut secants = Secants::new();
-            step.find_secants(&x, &mut secants);
-            let (matrix, right) = step.without_contact(&secants);
+            linearise(terms, &x, &[]);
+            let System { matrix, right } = step.system(terms);
             let mut left = matrix.times(&x);
             let (mut allowed, mut size) = (0.0, 0.0);
             let most = 1.0 + farthest / step.length;

@@ -15,7 +15,7 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::rules::NoRules;
 use crate::collision::search::Search;
 use crate::dynamics::body::Body;
-use crate::dynamics::step::{Stiffness, total_force};
+use crate::dynamics::contact_force::{Stiffness, total_force};
 use crate::io::{Flags, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose};
 use crate::probe::nearest::{Nearest, NearestSearch, SoFar};
