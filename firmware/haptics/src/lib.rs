@@ -56,8 +56,8 @@ pub use passivity::tank::Passivity;
 pub use probe::nearest::Nearest;
 pub use probe::prober::{ContactPoint, Probe, ProbeError, Prober};
 pub use settings::{
-    ContactSettings, CouplingSettings, GuidanceMethod, GuidanceSettings, Integrator, LimitSettings,
-    ObjectSettings, PassivitySettings, Range, Settings, SettingsError, ranges,
+    ContactSettings, CouplingSettings, FrictionSettings, GuidanceMethod, GuidanceSettings, Integrator,
+    LimitSettings, ObjectSettings, PassivitySettings, Range, Settings, SettingsError, ranges,
 };
 pub use state::{GrabError, State};
 pub use tick::tick;

@@ -12,6 +12,8 @@ pub struct Settings {
     pub coupling: CouplingSettings,
     /// Between object and the other parts.
     pub contact: ContactSettings,
+    /// At contacts.
+    pub friction: FrictionSettings,
     /// The simulated object.
     pub object: ObjectSettings,
     /// How constraint targets guide.
@@ -85,6 +87,26 @@ impl ContactSettings {
         } else {
             self.stiffness_n_per_m
         }
+    }
+}
+
+/// Dry friction at contacts; see `dynamics::friction` in the sources. Off by default: the force law of a fit is smooth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionSettings {
+    /// μ_k, kinetic coefficient. Default 0.
+    pub kinetic: f32,
+    /// μ_s, static coefficient, at least the kinetic one. Default 0.
+    pub fixed: f32,
+    /// s_S, speed over which the coefficient falls from static to kinetic, m/s: well above the creep speed. Default 10 mm/s.
+    pub stribeck_m_per_s: f32,
+    /// ε, speed below which friction is viscous, m/s. Smaller holds better and takes more solves. Default 0.1 mm/s.
+    pub creep_m_per_s: f32,
+}
+
+impl FrictionSettings {
+    /// Whether contacts have no friction.
+    pub fn is_off(&self) -> bool {
+        self.kinetic == 0.0 && self.fixed == 0.0
     }
 }
 
@@ -182,6 +204,12 @@ impl Default for Settings {
                 point_budget: 520,
                 shrinking: 0.0,
             },
+            friction: FrictionSettings {
+                kinetic: 0.0,
+                fixed: 0.0,
+                stribeck_m_per_s: 10e-3,
+                creep_m_per_s: 1e-4,
+            },
             object: ObjectSettings {
                 mass_kg: 0.1,
                 gyration_min_m: 3e-3,
@@ -264,6 +292,12 @@ pub mod ranges {
     };
     /// [`super::ContactSettings::shrinking`]: beyond a voxel points lie outside of their own voxels, on the wrong side.
     pub const SHRINKING: Range = Range { min: 0.0, max: 1.0 };
+    /// [`super::FrictionSettings::kinetic`] and [`super::FrictionSettings::fixed`]; the first must not exceed the second.
+    pub const FRICTION: Range = Range { min: 0.0, max: 2.0 };
+    /// [`super::FrictionSettings::stribeck_m_per_s`].
+    pub const STRIBECK_M_PER_S: Range = Range { min: 1e-4, max: 1.0 };
+    /// [`super::FrictionSettings::creep_m_per_s`].
+    pub const CREEP_M_PER_S: Range = Range { min: 1e-5, max: 0.01 };
     /// [`super::ObjectSettings::mass_kg`].
     pub const MASS_KG: Range = Range { min: 0.01, max: 10.0 };
     /// [`super::ObjectSettings::gyration_min_m`] and [`super::ObjectSettings::gyration_max_m`]; the first must not exceed the second.
@@ -330,6 +364,7 @@ impl Settings {
         let Self {
             coupling,
             contact,
+            friction,
             object,
             guidance,
             passivity,
@@ -340,6 +375,10 @@ impl Settings {
         let gyration_max = Range {
             min: object.gyration_min_m,
             ..ranges::GYRATION_M
+        };
+        let fixed = Range {
+            min: friction.kinetic,
+            ..ranges::FRICTION
         };
         let checks = [
             ("coupling.k_t_n_per_m", coupling.k_t_n_per_m, ranges::K_T_N_PER_M),
@@ -374,6 +413,18 @@ impl Settings {
                 ranges::POINT_BUDGET,
             ),
             ("contact.shrinking", contact.shrinking, ranges::SHRINKING),
+            ("friction.kinetic", friction.kinetic, ranges::FRICTION),
+            ("friction.fixed", friction.fixed, fixed),
+            (
+                "friction.stribeck_m_per_s",
+                friction.stribeck_m_per_s,
+                ranges::STRIBECK_M_PER_S,
+            ),
+            (
+                "friction.creep_m_per_s",
+                friction.creep_m_per_s,
+                ranges::CREEP_M_PER_S,
+            ),
             ("object.mass_kg", object.mass_kg, ranges::MASS_KG),
             ("object.gyration_min_m", object.gyration_min_m, ranges::GYRATION_M),
             ("object.gyration_max_m", object.gyration_max_m, gyration_max),

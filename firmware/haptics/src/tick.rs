@@ -11,6 +11,7 @@ use crate::constraints::targets::{Situation, TargetRules};
 use crate::contact_step::{Constraints, Given, Reach, contact_step};
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::coupling::{Coupling, CouplingForce, slipping, take_hold};
+use crate::dynamics::friction::Friction;
 use crate::dynamics::step::{Solution, Step, Terms};
 use crate::hand::Hand;
 use crate::io::{Flags, GuidanceState, Input, Output, Work};
@@ -140,7 +141,8 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     hand.tank.keep(coupled.moving_j + turning_j);
     let mut coupling_force = CouplingForce::new(coupling, &settings.coupling, period_s, length);
     let mut target_force = TargetForce::new(&springs, period_s, length);
-    let terms: Terms<'_, '_> = &mut [&mut coupling_force, &mut target_force];
+    let mut friction = Friction::new(&settings.friction, period_s, length);
+    let terms: Terms<'_, '_> = &mut [&mut coupling_force, &mut target_force, &mut friction];
 
     let (free, reach) = free_motion(given, &grabbed, &step, terms);
     if (hand.targets).exclude(&situation, &springs, &reach.motions, given.slack()) {

@@ -10,7 +10,8 @@ use heapless::Vec;
 use mortise_protocol::limits::MAX_TARGETS;
 
 use crate::constraints::alignment::Rows;
-use crate::dynamics::force::{ForceTerm, Iterate, System};
+use crate::dynamics::force::{ForceTerm, Iterate};
+use crate::dynamics::system::System;
 use crate::math::pose::Wrench;
 use crate::math::scalar::inverse_sqrt;
 use crate::math::symmetric6::{Symmetric6, dot};
@@ -226,4 +227,37 @@ fn root(x: f32) -> f32 {
 /// Whether [`inverse_sqrt`] is for such a number.
 fn is_ordinary(x: f32) -> bool {
     x > f32::MIN_POSITIVE && x < f32::MAX
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::force::contract;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Far below its cap, about it, and far beyond.
+        #[test]
+        fn targets_are_a_force_term(
+            errors in prop::array::uniform2(-2e-3f32..2e-3),
+            turn in prop::array::uniform3(-1.0f32..1.0),
+            stiffness in 1e2f32..1e4,
+            cap in 0.5f32..5.0,
+            x in contract::twists(),
+            v in contract::twists(),
+            along in 0usize..6,
+        ) {
+            let mut rows = Rows::default();
+            let [a, b, c] = turn;
+            let _ = rows.rows.push(([1.0, 0.0, 0.0, a, b, c], errors[0]));
+            let _ = rows.rows.push(([0.0, 1.0, 0.0, c, a, b], errors[1]));
+            let ahead = 0.021;
+            let law = Law::Capped { stiffness, cap, ahead };
+            let springs = [SaturatingSpring::new((0, false), rows, law, 0.0)];
+            let (h, length) = (1e-3, 0.02);
+            let mut force = TargetForce::new(&springs, h, length);
+            contract::majorises(&mut force, &Iterate { x: &x, contact: None }, &v, h, length)?;
+            contract::conserves(&mut force, &x, (along, 1e-3), ahead, h, length)?;
+        }
+    }
 }

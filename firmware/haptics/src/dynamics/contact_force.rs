@@ -14,7 +14,7 @@ use core::array;
 use glam::Vec3;
 
 use crate::collision::contact::{Contact, Phase};
-use crate::dynamics::force::System;
+use crate::dynamics::system::System;
 use crate::math::pose::Wrench;
 use crate::math::symmetric6::{Symmetric6, add_scaled, dot};
 
@@ -180,6 +180,13 @@ impl<'a> ContactForce<'a> {
             }
         }
         !changed
+    }
+
+    /// Contacts that push at the last iterate, each with its normal force, N.
+    pub fn pushing(&self) -> impl Iterator<Item = (&Contact, f32)> {
+        (self.contacts.iter())
+            .filter(|c| c.phase != Phase::Free)
+            .map(|c| (c, force(c, self.k.of(c), self.period_s, self.damping_s)))
     }
 
     /// Adds the majorisers of all contacts.

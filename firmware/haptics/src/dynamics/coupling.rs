@@ -12,7 +12,8 @@ use core::mem;
 use glam::Vec3;
 
 use crate::dynamics::body::Grabbed;
-use crate::dynamics::force::{ForceTerm, Iterate, System};
+use crate::dynamics::force::{ForceTerm, Iterate};
+use crate::dynamics::system::System;
 use crate::io::Flags;
 use crate::math::pose::{Pose, Twist, Wrench};
 use crate::math::rotation::{self, log_continuous};
@@ -253,5 +254,34 @@ fn fraction(v: Vec3, most: f32) -> f32 {
         most / length(v)
     } else {
         1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::force::contract;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Sticking and slipping.
+        #[test]
+        fn the_coupling_is_a_force_term(
+            stretch in prop::array::uniform3(-0.02f32..0.02),
+            angle in prop::array::uniform3(-0.8f32..0.8),
+            x in contract::twists(),
+            v in contract::twists(),
+            along in 0usize..6,
+        ) {
+            let mut settings = crate::Settings::default().coupling;
+            let coupling = Coupling::stretched(Vec3::from_array(stretch), Vec3::from_array(angle));
+            let (h, length) = (1e-3, 0.02);
+            let mut force = CouplingForce::new(&coupling, &settings, h, length);
+            contract::majorises(&mut force, &Iterate { x: &x, contact: None }, &v, h, length)?;
+            // Without dampers all of it is conservative.
+            (settings.b_t, settings.b_r) = (0.0, 0.0);
+            let mut force = CouplingForce::new(&coupling, &settings, h, length);
+            contract::conserves(&mut force, &x, (along, 2e-2), h, h, length)?;
+        }
     }
 }

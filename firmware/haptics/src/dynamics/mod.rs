@@ -4,5 +4,7 @@ pub(crate) mod body;
 pub(crate) mod contact_force;
 pub(crate) mod coupling;
 pub(crate) mod force;
+pub(crate) mod friction;
 pub(crate) mod limits;
 pub(crate) mod step;
+pub(crate) mod system;

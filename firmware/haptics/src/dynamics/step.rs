@@ -17,9 +17,9 @@
 
 use glam::{Mat3, Vec3};
 
-use crate::collision::contact::Contact;
 use crate::dynamics::contact_force::ContactForce;
-use crate::dynamics::force::{ForceTerm, Iterate, System};
+use crate::dynamics::force::{ForceTerm, Iterate};
+use crate::dynamics::system::System;
 use crate::math::pose::{Twist, Wrench};
 use crate::math::symmetric6::Symmetric6;
 
@@ -67,7 +67,7 @@ impl Step {
         loop {
             let x = self.system(terms).solve();
             solves += 1;
-            if linearise(terms, &x, &[]) || solves == MAX_FREE_SOLVES {
+            if linearise(terms, &x, None) || solves == MAX_FREE_SOLVES {
                 return Solution {
                     twist: self.unscale(&x),
                     contact: Wrench::ZERO,
@@ -102,7 +102,7 @@ impl Step {
         if !touching {
             x = self.scale(free.twist);
         }
-        linearise(terms, &x, contact.contacts());
+        linearise(terms, &x, Some(contact));
         let mut solves = 0;
         let mut settled = !touching && contact.linearise(&x, solves);
         while !settled && solves < max_solves {
@@ -111,7 +111,7 @@ impl Step {
             x = system.solve();
             solves += 1;
             let same_contacts = contact.linearise(&x, solves);
-            settled = linearise(terms, &x, contact.contacts()) && same_contacts;
+            settled = linearise(terms, &x, Some(contact)) && same_contacts;
         }
         Solution {
             twist: self.unscale(&x),
@@ -166,8 +166,8 @@ impl Step {
 }
 
 /// Linearises every term at `x`; whether all of them had settled.
-fn linearise(terms: Terms<'_, '_>, x: &[f32; 6], contacts: &[Contact]) -> bool {
-    let at = Iterate { x, contacts };
+fn linearise(terms: Terms<'_, '_>, x: &[f32; 6], contact: Option<&ContactForce<'_>>) -> bool {
+    let at = Iterate { x, contact };
     terms
         .iter_mut()
         .fold(true, |settled, term| term.linearise(&at) && settled)
@@ -224,7 +224,7 @@ mod tests {
             let solution = step.with_contacts(&free, terms, &mut force, MAX_SOLVES);
             prop_assert!(solution.settled);
             let x = step.scale(solution.twist);
-            linearise(terms, &x, &[]);
+            linearise(terms, &x, None);
             let System { matrix, right } = step.system(terms);
             let mut left = matrix.times(&x);
             let (mut allowed, mut size) = (0.0, 0.0);

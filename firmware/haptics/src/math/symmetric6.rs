@@ -62,7 +62,6 @@ impl Symmetric6 {
     }
 
     /// `self · x`.
-    #[cfg(test)]
     pub fn times(&self, x: &[f32; 6]) -> [f32; 6] {
         let mut y = [0.0; 6];
         for i in 0..6 {
