@@ -1,6 +1,6 @@
 //! Sampling the exact distance into sparse bricks.
 //!
-//! Only bricks with a point within the band of the surface are stored. Trilinear interpolation of exact samples errs by about cell²/(8R) on
+//! Only bricks with a point within the band of the surface are stored. Trilinear interpolation of exact samples has an error of about cell²/(8R) on
 //! a cylinder of radius R and is exact on planes; samples are rounded to `scale`, which adds at most scale/2. Cost: one exact query for
 //! each of 729 samples of a stored brick, in parallel; a few queries for each empty one.
 

@@ -41,7 +41,7 @@ const MODEL_MM: f64 = 1e-3;
 const KERNEL_MM: f64 = 1e-7;
 /// Points of a ball by which a doubtful answer of the kernel is checked; a majority of more than three quarters decides.
 const BALL: usize = 16;
-/// Points of one batch: each reads the file anew.
+/// Points of one batch: each batch reads the file again.
 const BATCH: usize = 1000;
 /// Most points checked in this way: the kernel's rays fail at one in ten thousand, so a larger number is not the kernel's fault.
 const MOST_DOUBTED: usize = 200;

@@ -1,4 +1,4 @@
-//! Written images open; damaged ones are rejected or harmless, whatever the damage, even with a valid checksum.
+//! Written images open; damaged ones are rejected or harmless, for any damage, even with a valid checksum.
 
 mod common;
 
