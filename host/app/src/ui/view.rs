@@ -94,7 +94,7 @@ fn empty(ui: &mut Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
                     .color(theme::of(ui).text_strong),
             );
             ui.label(
-                RichText::new("Feel whether the parts fit together before they are made")
+                RichText::new("Feel whether its parts go together, before anything is made")
                     .color(theme::of(ui).text_weak),
             );
             ui.add_space(if roomy { 16.0 } else { 2.0 });
