@@ -123,12 +123,14 @@ fn a_lost_link_is_told_once_with_its_reason_and_reconnect_mends_it() {
     let session = &harness.state().session;
     let reported = errors(session);
     assert_eq!(reported.len(), 1, "{reported:#?}");
-    assert!(reported[0].contains("nothing was heard for"), "{reported:?}");
+    assert!(reported[0].contains("nothing was received for"), "{reported:?}");
     assert_eq!(session.device(), None);
     harness.get_by_label("Link lost");
     // Once in the card and once among the messages.
     assert_eq!(
-        harness.get_all_by_label_contains("nothing was heard for").count(),
+        harness
+            .get_all_by_label_contains("nothing was received for")
+            .count(),
         2
     );
 
@@ -158,7 +160,7 @@ fn a_board_that_starts_anew_is_told_once_and_reached_again() {
     harness.run_steps(20);
     let reported = errors(&harness.state().session);
     assert!(
-        reported.len() == 1 && reported[0].contains("started anew"),
+        reported.len() == 1 && reported[0].contains("the board has restarted"),
         "{reported:#?}"
     );
     click(&mut harness, "Reconnect");
