@@ -48,7 +48,7 @@ pub struct Client {
     patience: Patience,
     capabilities: Capabilities,
     lockstep: Arc<AtomicBool>,
-    /// At most one message whose answer carries no number may be under way per kind.
+    /// Serialises messages whose answers carry no sequence number: at most one may be under way.
     asking: Mutex<()>,
     heartbeat: Option<Heartbeat>,
     reader: Option<Reader>,
@@ -260,7 +260,7 @@ impl Client {
         }
     }
 
-    /// Reads the board's capabilities again: the scene in use and the state change.
+    /// Reads the board's capabilities again, which include the scene in use and the state.
     ///
     /// # Errors
     /// As [`Client::request`].

@@ -121,7 +121,7 @@ fn power_on(
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
         ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
-        // Distinguishes this board from those of other processes, which frames meant for this one must not reach.
+        // A count suffices: frames for this board cannot reach boards of other processes.
         entropy: STARTS.fetch_add(1, Ordering::Relaxed),
     };
     let (mut link, mut control) = device::start(

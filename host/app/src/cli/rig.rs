@@ -47,7 +47,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Check { file, json } => {
             let rig = load_rig(file)?;
-            // `abilities` builds the same model as reading the description, so it fails only on the home pose.
+            // Does not fail after a successful reading, which builds the same model.
             let Ok(found) = abilities(&rig) else {
                 anyhow::bail!("{}: cannot work in its home pose", file.display());
             };

@@ -36,7 +36,7 @@ pub struct Faults {
     pub seed: u64,
     /// Share of frames lost.
     pub drop: f64,
-    /// Share of frames with one to three bits flipped.
+    /// Share of frames in which up to three bits are flipped.
     pub corrupt: f64,
     /// Share of frames delivered twice.
     pub repeat: f64,
