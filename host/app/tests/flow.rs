@@ -37,7 +37,7 @@ fn from_an_empty_window_to_a_felt_insertion_and_stop() {
 
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
 
     click(&mut harness, "Play insertion");
     // 60 mm of travel; the peg's lower end is 20 mm above the hole.
@@ -102,7 +102,7 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
         harness.state_mut().session.act(off);
         arm(&mut harness);
         harness.state_mut().session.act(Intent::Grab(1));
-        until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+        until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
         let handle = harness.state().session.handle().expect("reported");
         // 20 mm down to the block, and 4 mm further: 1.6 N at the hand's 400 N/m.
         let shifted = |down_mm: f64| {
@@ -211,7 +211,7 @@ fn the_part_in_hand_follows_the_pointer() {
     arm(&mut harness);
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
 
     let view = harness.get_by_label("3D view").rect();
     let camera = harness.state().view.camera;

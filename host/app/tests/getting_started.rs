@@ -101,7 +101,7 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
     harness.get_by_label(all[3][1]);
     assert!(harness.query_by_label(all[3][2]).is_none(), "nothing to press");
     harness.state_mut().session.act(Intent::Bake);
-    until(&mut harness, "baked anew", |s| {
+    until(&mut harness, "baked again", |s| {
         !s.scene_is_on_board() && !s.is_busy()
     });
     harness.state_mut().session.act(Intent::CancelUpload);
@@ -120,7 +120,7 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
     // 6: a click on the part's line, then the buttons; later a double click.
     click(&mut harness, "peg");
     click(&mut harness, all[5][0]);
-    until(&mut harness, "in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "held", |s| s.grabbed() == Some(1));
     harness.run_steps(2);
     click(&mut harness, all[5][1]);
     until(&mut harness, "released", is(DeviceState::Armed));
@@ -136,7 +136,7 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
         });
     }
     harness.step();
-    until(&mut harness, "in hand by a double click", |s| {
+    until(&mut harness, "grabbed by a double click", |s| {
         s.grabbed() == Some(1)
     });
     // 7.

@@ -153,7 +153,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     arm(&mut harness);
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
     let session = &mut harness.state_mut().session;
     assert!(obstacle(session, &Intent::SwitchTargetOff(unknown, true)).is_some());
 
@@ -185,11 +185,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     session.telemetry = Some(telemetry);
     let document = session.document.as_ref().expect("the sample");
     let items = compose(session, document, Camera::default(), false, Ground::Dark, 1.0).items;
-    assert_eq!(
-        items[1].lit_edges,
-        [[0, 2]],
-        "the edge of the part in hand that touches"
-    );
+    assert_eq!(items[1].lit_edges, [[0, 2]], "the touching edge of the held part");
     assert_eq!(items[0].lit_edges, [[3, 5]], "and that of the other");
     let mut odd = List {
         held: Some(1),

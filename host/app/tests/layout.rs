@@ -113,14 +113,14 @@ fn stop_and_the_state_are_on_screen_at_every_size_and_scale() {
         let document = harness.state_mut().session.document.as_mut().expect("open");
         document.title = "left-bearing-housing-with-extra-long-name-revision-12.step".repeat(3);
         let model = std::sync::Arc::make_mut(&mut document.model);
-        model.parts[1].name = "peg of a name that no bar of any window has room for ".repeat(4);
+        model.parts[1].name = "peg of a name that no bar of any window has space for ".repeat(4);
     }
     connect(&mut harness);
     check(&mut harness, "Idle", "connected");
     arm(&mut harness);
     harness.state_mut().session.act(mortise::session::Intent::Grab(1));
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
-    check(&mut harness, "Holding", "in hand");
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
+    check(&mut harness, "Holding", "a part is held");
     // The path dialog lies over everything else.
     harness.state_mut().session.wants_path = true;
     harness.run_steps(2);

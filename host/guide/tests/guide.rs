@@ -240,7 +240,7 @@ fn another_cap_goes_to_the_board_at_once_and_its_refusal_is_told() {
     });
     let sent = guide.hear(&sample(16, 0.5, -10.0, true));
     let [target] = targets(&sent)[..] else {
-        panic!("sent anew: {sent:?}")
+        panic!("sent again: {sent:?}")
     };
     assert_eq!(target.force_cap, 1.0);
     guide.answered(target.id, Err("busy".into()));

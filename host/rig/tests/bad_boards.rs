@@ -144,7 +144,7 @@ fn a_board_that_started_anew_is_told_with_the_reason() {
         client.request(ToDevice::Disarm).expect("answered");
         let reason = "the board has restarted: the board restarted after a panic in line 4242";
         if asks {
-            let failed = client.request(ToDevice::Arm).expect_err("forgotten");
+            let failed = client.request(ToDevice::Arm).expect_err("the greeting is lost");
             assert!(
                 failed.is_link_lost() && failed.to_string().contains(reason),
                 "{failed}"
