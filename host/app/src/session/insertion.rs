@@ -13,7 +13,7 @@ use super::pose::{moved, to_wire};
 const LEAN: f64 = 0.02;
 /// Walls closer than this, mm and rad, are the same wall.
 const SAME: f64 = 1e-6;
-/// Largest excess of the hole's radius over the peg's, as a fraction.
+/// Largest difference of the radii of hole and peg, as a fraction of the hole's radius.
 const SLACK: f64 = 0.2;
 
 /// A peg in front of a hole.

@@ -25,7 +25,7 @@ const PUSH_N: f64 = 0.3;
 const BEGUN_MM: f64 = 1.0;
 /// Largest angle between the axes of an insertion, rad.
 const LEAN: f64 = 0.2;
-/// Largest excess of the bore's radius, as a fraction of its radius.
+/// Largest difference of the radii of bore and shaft, as a fraction of the bore's radius.
 const SLACK: f64 = 0.4;
 /// Largest number of pairs examined; an assembly with more shafts of one size is watched only in part.
 const MAX_PAIRS: usize = 4096;
