@@ -1,4 +1,4 @@
-//! From a target in millimetres of the model to the board's message.
+//! Conversion of a target in millimetres of the model to the board's message.
 
 use glam::DVec3;
 use heapless::Vec as BoundedVec;
@@ -7,7 +7,7 @@ use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 
 use crate::GuideSettings;
 
-/// The board's word for a target's kind; `None` for what is left to contact.
+/// The board's constraint kind for a target; `None` for kinds left to contact.
 pub fn kind(target: &Target) -> Option<ConstraintKind> {
     match target.kind {
         TargetKind::Concentric => Some(ConstraintKind::Concentric),
@@ -19,7 +19,7 @@ pub fn kind(target: &Target) -> Option<ConstraintKind> {
     }
 }
 
-/// The message about a target. `parts` names the model part of each part of the image.
+/// The message for a target. `parts` maps each part of the image to a part of the model.
 pub fn message(
     target: &Target,
     parts: &[usize],
@@ -36,7 +36,7 @@ pub fn message(
     for &moving in &target.moving_faces {
         for &fixed in &target.fixed_faces {
             if let (Ok(moving), Ok(fixed)) = (u16::try_from(moving), u16::try_from(fixed)) {
-                // The first few are the surface's largest share; the rest is felt as contact.
+                // The first few faces are the largest of the surface; contact with the others stays enabled.
                 let _ = faces.push((moving, fixed));
             }
         }

@@ -115,7 +115,7 @@ pub(crate) mod contract {
         let work = [f.x, f.y, f.z, t.x, t.y, t.z][along] * 2.0 * step * ahead_s;
         let size = term.energy_j(x);
         prop_assert!(
-            (fall - work).abs() <= 0.02 * work.abs() + 1e-6 * size + 1e-9,
+            (fall - work).abs() <= 0.02 * work.abs() + 1e-6 * size + 1e-8,
             "{fall} {work}"
         );
         Ok(())

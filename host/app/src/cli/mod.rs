@@ -1,7 +1,7 @@
-//! Commands: the same work as in the window, without one. Each has `--json`.
+//! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: a figure did not hold, or the insertion did not come to its end; 2: not possible, with one line on
-//! standard error that says why.
+//! Exit code 0: done; 1: a figure did not hold, or the insertion was not completed; 2: not possible, with one line on standard error that
+//! gives the reason.
 
 mod bake;
 mod contacts;
@@ -43,11 +43,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Say what a STEP file holds: parts, faces, volumes, and what was lost
+    /// List the contents of a STEP file: parts, faces, volumes, and import losses
     Inspect(inspect::Args),
-    /// Find which faces of which parts touch, and how
+    /// Find which faces of which parts touch, and the kinds of contact
     Contacts(contacts::Args),
-    /// Turn a STEP file into a scene image for the board
+    /// Convert a STEP file to a scene image (collision model) for the board
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
     Demo(demo::Args),
@@ -63,7 +63,7 @@ enum Command {
     Open(Open),
 }
 
-/// What the window starts with.
+/// Contents of the window at the start.
 #[derive(Debug, Args)]
 struct Open {
     /// STEP file to open
@@ -74,16 +74,16 @@ struct Open {
     picture: Picture,
 }
 
-/// For automation.
+/// Options for automation.
 #[derive(Debug, Default, Args)]
 struct Picture {
-    /// Write a PNG of the window, then end
+    /// Write a PNG of the window, then exit
     #[arg(long, hide = true, value_name = "PNG")]
     screenshot: Option<PathBuf>,
-    /// Replace the PNG where it is there already
+    /// Replace an existing PNG
     #[arg(long, hide = true, requires = "screenshot")]
     force: bool,
-    /// Seconds from the start to the picture
+    /// Seconds from the start to the screenshot
     #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
     after: f64,
     /// Draw fixed parts as glass
@@ -150,7 +150,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// An error with its causes in one line; a cause that the message before it already tells is not told again.
+/// An error with its causes in one line; a cause that the message before it already contains is omitted.
 fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {
@@ -171,7 +171,7 @@ fn window(open: Open) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Reads a rig from the command line.
+/// Parses a rig from the command line.
 fn rig(text: &str) -> Result<RigSpec, String> {
     text.parse()
         .map_err(|error: mortise_rig::SpecError| error.to_string())
@@ -184,8 +184,8 @@ mod tests {
     #[test]
     fn an_error_is_one_line_that_tells_each_cause_once() {
         let cause = anyhow::anyhow!("no room\non the disk");
-        let told = cause.context("cannot write x: no room on the disk");
-        assert_eq!(one_line(&told), "cannot write x: no room on the disk");
+        let error = cause.context("cannot write x: no room on the disk");
+        assert_eq!(one_line(&error), "cannot write x: no room on the disk");
         assert_eq!(
             one_line(&told.context("baking")),
             "baking: cannot write x: no room on the disk"

@@ -1,4 +1,4 @@
-//! Writing results, to a pipe that may be closed before all is written.
+//! Writing of results to a pipe that may be closed early.
 
 use std::io::{ErrorKind, Write as _};
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 /// One line of JSON on standard output.
 ///
 /// # Errors
-/// When it cannot be written.
+/// The line cannot be written.
 pub fn json(value: &impl Serialize) -> anyhow::Result<()> {
     line(&serde_json::to_string(value)?)
 }
@@ -15,7 +15,7 @@ pub fn json(value: &impl Serialize) -> anyhow::Result<()> {
 /// Indented JSON on standard output.
 ///
 /// # Errors
-/// When it cannot be written.
+/// The text cannot be written.
 pub fn json_pretty(value: &impl Serialize) -> anyhow::Result<()> {
     line(&serde_json::to_string_pretty(value)?)
 }
@@ -23,7 +23,7 @@ pub fn json_pretty(value: &impl Serialize) -> anyhow::Result<()> {
 /// One line of text on standard output.
 ///
 /// # Errors
-/// When it cannot be written.
+/// The line cannot be written.
 pub fn line(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{text}")?;
@@ -31,7 +31,7 @@ pub fn line(text: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The reader went away (`mortise … | head`): nothing to complain about.
+/// Whether the reader closed the pipe (`mortise … | head`), which is no error.
 pub fn is_closed(error: &anyhow::Error) -> bool {
     error
         .downcast_ref::<std::io::Error>()

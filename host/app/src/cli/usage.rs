@@ -1,13 +1,13 @@
-//! Command lines that cannot be understood: one line on standard error.
+//! Report of invalid command lines: one line on standard error.
 
 use std::process::ExitCode;
 
 use clap::CommandFactory as _;
 
-/// Prints help where it is asked for; otherwise what is wrong, where, and what to do, in one line.
+/// Prints help when requested; otherwise the error, its place and its remedy, in one line.
 pub fn tell(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
-        // The reader may be gone, as with `mortise --help | head`.
+        // The reader may have closed the pipe, as with `mortise --help | head`.
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
@@ -19,7 +19,7 @@ pub fn tell(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// `message`, of several lines, in one: the usage, which help repeats, is left out.
+/// Joins `message`, of several lines, to one line without the usage, which help repeats.
 fn line(message: &str, command: &str) -> String {
     let message = message.strip_prefix("error: ").unwrap_or(message);
     let end = ["\n\nUsage:", "\n\nFor more information"]
@@ -32,7 +32,7 @@ fn line(message: &str, command: &str) -> String {
     format!("mortise: {}; see `{command} --help`", words.join(" "))
 }
 
-/// The command that `arguments` name, with its subcommands.
+/// The command and subcommands in `arguments`.
 fn command(arguments: &[String]) -> String {
     let (mut name, mut at) = ("mortise".to_owned(), super::Cli::command());
     for argument in arguments {
