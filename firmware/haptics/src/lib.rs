@@ -57,7 +57,7 @@ pub use probe::nearest::Nearest;
 pub use probe::prober::{ContactPoint, Probe, ProbeError, Prober};
 pub use settings::{
     ContactSettings, CouplingSettings, FrictionSettings, GuidanceMethod, GuidanceSettings, Integrator,
-    LimitSettings, ObjectSettings, PassivitySettings, Range, Settings, SettingsError, ranges,
+    LimitSettings, ObjectSettings, PassivitySettings, Range, Settings, SettingsError,
 };
 pub use state::{GrabError, State};
 pub use tick::tick;

@@ -168,9 +168,11 @@ impl Step {
 /// Linearises every term at `x`; whether all of them had settled.
 fn linearise(terms: Terms<'_, '_>, x: &[f32; 6], contact: Option<&ContactForce<'_>>) -> bool {
     let at = Iterate { x, contact };
-    terms
-        .iter_mut()
-        .fold(true, |settled, term| term.linearise(&at) && settled)
+    let mut settled = true;
+    for term in terms.iter_mut() {
+        settled &= term.linearise(&at);
+    }
+    settled
 }
 
 #[cfg(test)]
