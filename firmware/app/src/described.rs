@@ -14,16 +14,16 @@
 
 use glam::{Mat3, Vec3};
 use mortise_haptics::{Pose, Wrench, rotation};
+use mortise_mechanism::encoder_watch::{EncoderWatch, probed};
+use mortise_mechanism::joints::{ENCODERS, Joints, Reading};
+use mortise_mechanism::kinematics::Posture;
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::{Rig, RigFault};
 
 use crate::board::{Drive, Mechanism, Sensed, TICK_S};
-use crate::encoder_watch::{EncoderWatch, probed};
 use crate::hand::{Grip, Hand, Wish};
 use crate::input_faults::{AXES, InputScript, Wiring};
-use crate::joints::{ENCODERS, Joints, Reading};
-use crate::kinematics::Posture;
 use crate::simulated::SUBSTEPS;
 
 /// Inertia of the handle about a wrist axis, kg·m², and its bearings' friction, N·m·s/rad.
@@ -77,7 +77,7 @@ impl Described {
     /// In its home pose, at rest, nobody holding it, motors off.
     ///
     /// # Errors
-    /// See [`crate::kinematics::Model::new`].
+    /// See [`mortise_mechanism::kinematics::Model::new`].
     pub fn new(rig: &Rig) -> Result<Self, RigFault> {
         let joints = Joints::new(rig)?;
         let of = |number: usize, value: fn(&mortise_protocol::rig::Joint) -> f32, else_: f32| {

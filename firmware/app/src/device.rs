@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use mortise_firmware::board::{Clock, Identity, Outbound};
-//! use mortise_firmware::ceilings::Ceilings;
+//! use mortise_mechanism::ceilings::Ceilings;
 //! use mortise_firmware::channel::Channels;
 //! use mortise_firmware::control::Ticked;
 //! use mortise_firmware::device::start;

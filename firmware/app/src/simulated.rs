@@ -7,11 +7,13 @@
 
 use glam::{Quat, Vec3};
 use mortise_haptics::{Pose, Twist, Wrench, rotation};
+use mortise_mechanism::encoder::{Counter, Velocity};
+use mortise_mechanism::encoder_watch::{
+    AxisTick, EncoderWatch, STIFFEST_HAND, STIFFEST_WRIST, amplitude, probed,
+};
 use mortise_protocol::message::{HandScript, InputFault};
 
 use crate::board::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
-use crate::encoder::{Counter, Velocity};
-use crate::encoder_watch::{AxisTick, EncoderWatch, STIFFEST_HAND, STIFFEST_WRIST, amplitude, probed};
 use crate::hand::{Grip, Hand, Wish, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
 

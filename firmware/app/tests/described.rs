@@ -113,7 +113,7 @@ proptest! {
             mechanism.drive(push(force));
             mechanism.sense();
         }
-        let model = mortise_firmware::kinematics::Model::new(&rig).unwrap();
+        let model = mortise_mechanism::kinematics::Model::new(&rig).unwrap();
         let mut angles = [0.0; 3];
         for (angle, joint) in angles.iter_mut().zip(&rig.joints) { *angle = joint.home; }
         let posture = model.posture(angles, [0.0; 3]).unwrap();

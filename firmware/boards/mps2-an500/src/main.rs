@@ -43,11 +43,11 @@ mod app {
 
     use heapless::spsc::{Consumer, Producer, Queue};
     use mortise_firmware::board::Identity;
-    use mortise_firmware::ceilings::Ceilings;
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::Ticked;
     use mortise_firmware::device::start;
     use mortise_firmware::store;
+    use mortise_mechanism::ceilings::Ceilings;
     use mortise_protocol::message::CostUnit;
 
     use crate::device::Interrupt;

@@ -1,8 +1,8 @@
 //! The arm as the application sees it: handle pose and velocity in, force on the handle out.
 
 use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, TICK_S};
-use mortise_firmware::encoder_watch::{AxisTick, EncoderWatch, LOADED, probed};
 use mortise_haptics::{Pose, Quat, Twist, Vec3};
+use mortise_mechanism::encoder_watch::{AxisTick, EncoderWatch, LOADED, probed};
 use nucleo_h743zi::drive::{AXES, currents};
 use nucleo_h743zi::kinematics::Posture;
 use nucleo_h743zi::rig::RIG;

@@ -62,9 +62,9 @@ mod tests {
     use super::super::{PreparedScene, Scenario, connect, record};
     use super::*;
     use glam::DVec3;
-    use mortise_firmware::encoder::VELOCITY_FILTER_S;
     use mortise_firmware::simulated::RESOLUTION;
     use mortise_haptics::Settings;
+    use mortise_mechanism::encoder::VELOCITY_FILTER_S;
     use mortise_protocol::message::WirePose;
     use mortise_rig::RigSpec;
 

@@ -1,6 +1,6 @@
 //! What a described rig can do at its home pose: how finely it senses, how hard it pushes.
 
-use mortise_firmware::kinematics::Model;
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::rig::{Rig, RigFault};
 use serde::Serialize;

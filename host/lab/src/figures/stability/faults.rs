@@ -11,12 +11,12 @@ use glam::Vec3;
 use mortise_firmware::board::{
     Clock, Drive, DriverFault, DriverFaultKind, Identity, Mechanism, Outbound, SLOTS, Sensed,
 };
-use mortise_firmware::ceilings::Ceilings;
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
 use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};

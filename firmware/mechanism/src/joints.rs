@@ -5,9 +5,9 @@ use mortise_haptics::{Pose, Twist};
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::rig::{Rig, RigFault};
 
-use crate::board::TICK_S;
 use crate::encoder::{Counter, Velocity};
 use crate::encoder_watch::{AxisTick, amplitude};
+use crate::interface::TICK_S;
 use crate::kinematics::{Model, Posture};
 
 /// Encoders of a description: joints, then wrist axes. Those that are not there count nothing.

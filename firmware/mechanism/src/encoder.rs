@@ -1,6 +1,6 @@
 //! What every board does with encoder counts: tell motion from a jump, and estimate speed.
 
-use crate::board::{TICK_HZ, TICK_S};
+use crate::interface::{TICK_HZ, TICK_S};
 
 /// Counts from one reading to the next, of a counter that wraps at 32 bits.
 #[derive(Clone, Copy, Debug)]
