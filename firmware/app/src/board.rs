@@ -31,6 +31,14 @@ pub const RIG_SLOTS: [usize; 2] = [SLOTS, SLOTS + 1];
 /// Smallest piece that can be written, bytes: one flash word of an STM32H7. A piece is written at most once between two erasures.
 pub const WRITE_SIZE: usize = 32;
 
+/// One flash word, aligned as scenes need it.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub struct FlashWord(pub [u8; WRITE_SIZE]);
+
+/// An erased word.
+pub const ERASED: FlashWord = FlashWord([0xff; WRITE_SIZE]);
+
 /// Two slots of memory-mapped flash for scenes, read in place, and two small ones for the rig's description ([`RIG_SLOTS`]).
 ///
 /// Erased bytes read as `0xff`. Used from the link plane only; calls may block for as long as the flash needs (1–2 s for a 128 KiB

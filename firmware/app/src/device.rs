@@ -6,8 +6,9 @@
 //! use mortise_firmware::channel::Channels;
 //! use mortise_firmware::control::Ticked;
 //! use mortise_firmware::device::start;
-//! use mortise_firmware::ram_flash::{ERASED, RamFlash};
-//! use mortise_firmware::simulated::Simulated;
+//! use mortise_firmware::board::ERASED;
+//! use mortise_simulation::ram_flash::RamFlash;
+//! use mortise_simulation::simulated::Simulated;
 //! use mortise_protocol::message::{CostUnit, ResetReason};
 //!
 //! struct NoClock;

@@ -11,9 +11,8 @@
 //! | [`channel`] | queues and words between the planes |
 //! | [`control`], [`safety`], [`statistics`] | the tick; its state machine; counters and state hash |
 //! | [`link`], [`parameters`], [`wire`] | messages; values and settings; conversions |
-//! | [`store`], [`ram_flash`] | A/B scene slots, the rig's description; flash in RAM |
-//! | [`simulated`], [`hand`], [`input_faults`] | simulated mechanism and hand, what goes wrong at its inputs |
-//! | [`described`], [`simulated_rig`] | simulated mechanism of a described rig; whichever a simulated board has |
+//! | [`store`] | A/B scene slots, the rig's description |
+//! | [`scripts`] | which scripts a simulated mechanism can follow |
 #![no_std]
 
 #[cfg(test)]
@@ -22,16 +21,11 @@ extern crate std;
 pub mod board;
 pub mod channel;
 pub mod control;
-pub mod described;
 pub mod device;
-pub mod hand;
-pub mod input_faults;
 pub mod link;
 pub mod parameters;
-pub mod ram_flash;
 pub mod safety;
-pub mod simulated;
-pub mod simulated_rig;
+pub mod scripts;
 pub mod statistics;
 pub mod store;
 pub mod wire;

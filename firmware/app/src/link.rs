@@ -22,9 +22,8 @@ use mortise_protocol::message::{
 
 use crate::board::{Flash, Identity, Outbound, TICK_HZ};
 use crate::channel::{Command, CommandKind, EVENTS, Epoch, Event, LinkEnds, Reply, SAMPLES};
-use crate::hand::check_script;
-use crate::input_faults::check_input_faults;
 use crate::parameters::Parameters;
+use crate::scripts::{check_input_faults, check_script};
 use crate::store::Store;
 use crate::store::rig::Kept;
 

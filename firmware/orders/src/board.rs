@@ -3,9 +3,9 @@
 use std::cell::{Cell, UnsafeCell};
 
 use mortise_firmware::board::{
-    Clock, Drive, Flash, FlashError, Identity, Mechanism, Outbound, SLOTS, Sensed, WRITE_SIZE,
+    Clock, Drive, ERASED, Flash, FlashError, FlashWord, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    WRITE_SIZE,
 };
-use mortise_firmware::ram_flash::{ERASED, FlashWord};
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
 use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::image::CRC;

@@ -23,7 +23,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt as _;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::link::LinkPlane;
-use mortise_firmware::ram_flash::RamFlash;
+use mortise_simulation::ram_flash::RamFlash;
 
 /// The control plane of this board.
 type Control = ControlPlane<'static, 'static, motors::Motors, timer::TickClock>;

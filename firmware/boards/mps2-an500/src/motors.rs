@@ -1,10 +1,10 @@
 //! The simulated mechanism behind an enable output that can be seen: LED 0 is on while motors are enabled.
 
 use mortise_firmware::board::{Drive, Mechanism, Sensed};
-use mortise_firmware::simulated_rig::SimulatedRig;
 use mortise_haptics::{Pose, Wrench};
 use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::Rig;
+use mortise_simulation::simulated_rig::SimulatedRig;
 
 use crate::device::Registers;
 

@@ -5,13 +5,13 @@ use std::cell::UnsafeCell as Plain;
 use loom::cell::UnsafeCell;
 use loom::sync::Arc;
 use mortise_firmware::board::{
-    Clock, Drive, Flash, FlashError, Identity, Mechanism, Outbound, SLOTS, Sensed, WRITE_SIZE,
+    Clock, Drive, ERASED, Flash, FlashError, FlashWord, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    WRITE_SIZE,
 };
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_firmware::ram_flash::{ERASED, FlashWord};
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
 use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::frame::{Stamp, encode_stamped};

@@ -46,6 +46,7 @@ const LOOP: &[&str] = &[
     "protocol/src",
     "firmware/mechanism/src",
     "firmware/app/src",
+    "firmware/simulation/src",
     "firmware/boards/mps2-an500/src",
     "host/rig/src",
     "host/mating/src",

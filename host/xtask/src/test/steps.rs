@@ -15,11 +15,12 @@ const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// What property tests draw their cases from, unless the environment says otherwise: a commit passes or fails here as it does everywhere. Plain
 /// `cargo test` draws anew each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
-const BOARD_SIDE: [&str; 4] = [
+const BOARD_SIDE: [&str; 5] = [
     "mortise-protocol",
     "mortise-haptics",
     "mortise-mechanism",
     "mortise-firmware",
+    "mortise-simulation",
 ];
 
 pub fn format(bench: &mut Bench) -> Result<String> {

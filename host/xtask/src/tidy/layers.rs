@@ -33,13 +33,29 @@ const LAYERS: &[(&str, &[&str])] = &[
         &[
             "mortise-firmware",
             "mortise-mechanism",
+            "mortise-simulation",
             "mortise-haptics",
             "mortise-protocol",
         ],
     ),
     (
         "firmware/app",
-        &["mortise-mechanism", "mortise-haptics", "mortise-protocol"],
+        &[
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+            // By its tests alone: the simulation depends on the application.
+            "mortise-simulation",
+        ],
+    ),
+    (
+        "firmware/simulation",
+        &[
+            "mortise-firmware",
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+        ],
     ),
     (
         "firmware/orders",

@@ -9,13 +9,13 @@ use std::rc::Rc;
 
 use glam::Vec3;
 use mortise_firmware::board::{
-    Clock, Drive, DriverFault, DriverFaultKind, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    Clock, Drive, DriverFault, DriverFaultKind, ERASED, FlashWord, Identity, Mechanism, Outbound, SLOTS,
+    Sensed,
 };
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
 use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
@@ -23,6 +23,7 @@ use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::{CostUnit, DeviceState, Fault, FromDevice, ResetReason, ToDevice, Version};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::describe;
+use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};

@@ -21,10 +21,10 @@ use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::{Rig, RigFault};
 
-use crate::board::{Drive, Mechanism, Sensed, TICK_S};
 use crate::hand::{Grip, Hand, Wish};
 use crate::input_faults::{AXES, InputScript, Wiring};
 use crate::simulated::SUBSTEPS;
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, TICK_S};
 
 /// Inertia of the handle about a wrist axis, kg·m², and its bearings' friction, N·m·s/rad.
 const WRIST_INERTIA: f32 = 1e-5;

@@ -1,15 +1,16 @@
 //! Described mechanisms with a simulated hand: they sense what is there, stay finite and passive, stop at their ranges, and push as they should.
 
-mod support;
+#[path = "../../app/tests/support/rigs.rs"]
+mod rigs;
 
 use glam::Vec3;
 use mortise_firmware::board::{Drive, Mechanism, TICK_S};
-use mortise_firmware::described::Described;
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_protocol::rig::Rig;
+use mortise_simulation::described::Described;
 use proptest::prelude::*;
-use support::rigs::{arm, paddle, pantograph};
+use rigs::{arm, paddle, pantograph};
 
 fn any_rig() -> impl Strategy<Value = Rig> {
     prop_oneof![Just(arm()), Just(pantograph()), Just(paddle())]

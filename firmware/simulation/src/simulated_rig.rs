@@ -4,9 +4,9 @@ use mortise_haptics::{Pose, Wrench};
 use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::Rig;
 
-use crate::board::{Drive, Mechanism, Sensed};
 use crate::described::Described;
 use crate::simulated::Simulated;
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed};
 
 /// See the module.
 #[derive(Clone, Debug)]

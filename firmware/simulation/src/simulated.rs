@@ -13,9 +13,9 @@ use mortise_mechanism::encoder_watch::{
 };
 use mortise_protocol::message::{HandScript, InputFault};
 
-use crate::board::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
 use crate::hand::{Grip, Hand, Wish, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
 
 /// Steps in a tick.
 pub const SUBSTEPS: u32 = 4;

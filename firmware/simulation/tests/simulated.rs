@@ -2,9 +2,9 @@
 
 use glam::{Quat, Vec3};
 use mortise_firmware::board::{Drive, Mechanism};
-use mortise_firmware::simulated::*;
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
+use mortise_simulation::simulated::*;
 use proptest::prelude::*;
 
 fn script(position: Vec3, orientation: Quat, push: Vec3) -> HandScript {
