@@ -5,7 +5,7 @@
 
 use mortise_mechanism::ceilings::Ceilings;
 pub use mortise_mechanism::interface::{
-    Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, TICK_HZ, TICK_S,
+    Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, Simulation, TICK_HZ, TICK_S,
 };
 use mortise_protocol::message::{CostUnit, ResetReason};
 

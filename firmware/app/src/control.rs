@@ -409,7 +409,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     fn start_anew(&mut self) {
         self.ends.law.restart_slew();
-        if let Some(handle) = self.mechanism.reset() {
+        if let Some(handle) = self
+            .mechanism
+            .simulation()
+            .and_then(|simulation| simulation.reset())
+        {
             self.sensed.handle = handle;
             self.sensed.twist = Twist::ZERO;
         }

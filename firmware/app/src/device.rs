@@ -45,11 +45,12 @@ use crate::parameters::ControlSettings;
 pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
     channels: &'c mut Channels<'s>,
     flash: F,
-    mechanism: M,
+    mut mechanism: M,
     clock: C,
     identity: Identity,
 ) -> (LinkPlane<'c, 's, F>, ControlPlane<'c, 's, M, C>) {
     let (link_ends, control_ends) = channels.split();
+    let simulated = mechanism.simulation().is_some();
     let control = ControlPlane::new(
         control_ends,
         mechanism,
@@ -57,6 +58,6 @@ pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
         &identity,
         ControlSettings::at_start(identity.ceilings),
     );
-    let link = LinkPlane::new(link_ends, flash, identity, M::SIMULATED, M::DESCRIBED);
+    let link = LinkPlane::new(link_ends, flash, identity, simulated, M::DESCRIBED);
     (link, control)
 }

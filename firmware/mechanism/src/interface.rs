@@ -82,8 +82,6 @@ pub enum Drive {
 /// Both calls are part of the 1 ms tick: bounded time, no blocking, no panics. After [`Drive::Off`] the enable output must be inactive
 /// when `drive` returns. A board that cannot produce every component of a wrench (its identity says which) drops the others.
 pub trait Mechanism {
-    /// Mechanism and hand are simulated: time may then wait for the host (lockstep).
-    const SIMULATED: bool;
     /// It is what the description kept in flash says; else it is compiled in, and no description is taken.
     const DESCRIBED: bool = false;
 
@@ -102,22 +100,30 @@ pub trait Mechanism {
         [0.0; 2]
     }
 
-    /// Wrench (world, at the handle's origin) of the simulated hand in the last tick; `None` where a person holds the handle.
+    /// The handle stands in its reference pose: counting encoders start from here. Called with the motors off only.
+    fn home(&mut self) {}
+
+    /// The controls of a simulated mechanism; `None` for a real one.
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        None
+    }
+}
+
+/// Controls that only a simulated mechanism has. Its time may wait for the host (lockstep). What a simulation does not model does nothing.
+pub trait Simulation {
+    /// Wrench (world, at the handle's origin) of the simulated hand in the last tick; `None` without such a hand.
     fn hand(&self) -> Option<Wrench> {
         None
     }
 
-    /// Gives the simulated hand a script whose time starts now; `None` lets go. A real mechanism has no such hand and does nothing.
+    /// Gives the simulated hand a script whose time starts now; `None` lets go.
     fn set_hand(&mut self, _script: Option<&HandScript>) {}
 
-    /// The handle stands in its reference pose: counting encoders start from here. Called with the motors off only.
-    fn home(&mut self) {}
-
-    /// Lets the inputs of a simulated mechanism fail as told, from the next reading on. A real mechanism does nothing.
+    /// Lets the inputs fail as the script says, from the next reading on.
     fn set_input_faults(&mut self, _faults: &[InputFault]) {}
 
-    /// Puts a simulated mechanism where it was at start, at rest, without a hand, so that a scenario starts from known bits; returns the handle's
-    /// pose there. A real one stays where it is.
+    /// Puts the mechanism where it was at start, at rest, without a hand, so that a scenario starts from known bits; returns the handle's pose
+    /// there, or `None` where the mechanism stays as it is.
     fn reset(&mut self) -> Option<Pose> {
         None
     }

@@ -163,8 +163,6 @@ impl Rig {
 pub(crate) struct Puppet<'s>(pub &'s Rig);
 
 impl Mechanism for Puppet<'_> {
-    const SIMULATED: bool = false;
-
     fn sense(&mut self) -> Sensed {
         self.0.sensed.get()
     }

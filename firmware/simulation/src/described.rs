@@ -24,7 +24,7 @@ use mortise_protocol::rig::{Rig, RigFault};
 use crate::hand::{Grip, Hand, Wish};
 use crate::input_faults::{AXES, InputScript, Wiring};
 use crate::simulated::SUBSTEPS;
-use mortise_mechanism::interface::{Drive, Mechanism, Sensed, TICK_S};
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_S};
 
 /// Inertia of the handle about a wrist axis, kg·m², and its bearings' friction, N·m·s/rad.
 const WRIST_INERTIA: f32 = 1e-5;
@@ -313,8 +313,6 @@ fn solve(system: Mat3, momentum: Vec3) -> Vec3 {
 }
 
 impl Mechanism for Described {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         self.advance();
         let wiring = self.script.advance(self.wiring);
@@ -355,14 +353,6 @@ impl Mechanism for Described {
         self.joints.count_at_handle()
     }
 
-    fn hand(&self) -> Option<Wrench> {
-        Some(self.hand_wrench)
-    }
-
-    fn set_hand(&mut self, script: Option<&HandScript>) {
-        self.hand = script.and_then(Hand::new);
-    }
-
     /// The simulated operator knows exactly where the joints are.
     fn home(&mut self) {
         self.offsets = [0; ENCODERS];
@@ -372,6 +362,20 @@ impl Mechanism for Described {
         }
         self.joints.start_at(&self.counts);
         self.referenced = true;
+    }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
+}
+
+impl Simulation for Described {
+    fn hand(&self) -> Option<Wrench> {
+        Some(self.hand_wrench)
+    }
+
+    fn set_hand(&mut self, script: Option<&HandScript>) {
+        self.hand = script.and_then(Hand::new);
     }
 
     fn set_input_faults(&mut self, faults: &[InputFault]) {

@@ -15,7 +15,7 @@ use mortise_protocol::message::{HandScript, InputFault};
 
 use crate::hand::{Grip, Hand, Wish, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
-use mortise_mechanism::interface::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_HZ, TICK_S};
 
 /// Steps in a tick.
 pub const SUBSTEPS: u32 = 4;
@@ -325,8 +325,6 @@ fn rounded(x: f32) -> f32 {
 }
 
 impl Mechanism for Simulated {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         self.advance();
         let wiring = self.script.advance(self.wiring);
@@ -371,20 +369,26 @@ impl Mechanism for Simulated {
         [RESOLUTION, ANGULAR_RESOLUTION]
     }
 
-    fn hand(&self) -> Option<Wrench> {
-        Some(self.hand_wrench)
-    }
-
-    fn set_hand(&mut self, script: Option<&HandScript>) {
-        self.hand = script.and_then(Hand::new);
-    }
-
     /// The simulated operator knows exactly where the handle is.
     fn home(&mut self) {
         self.encoders = Encoders {
             orientation: self.body.pose.orientation,
             ..Encoders::new()
         };
+    }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
+}
+
+impl Simulation for Simulated {
+    fn hand(&self) -> Option<Wrench> {
+        Some(self.hand_wrench)
+    }
+
+    fn set_hand(&mut self, script: Option<&HandScript>) {
+        self.hand = script.and_then(Hand::new);
     }
 
     fn set_input_faults(&mut self, faults: &[InputFault]) {

@@ -4,7 +4,7 @@
 mod rigs;
 
 use glam::Vec3;
-use mortise_firmware::board::{Drive, Mechanism, TICK_S};
+use mortise_firmware::board::{Drive, Mechanism, Simulation, TICK_S};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_protocol::rig::Rig;

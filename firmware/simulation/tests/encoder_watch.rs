@@ -4,7 +4,7 @@
 mod rigs;
 
 use glam::{Quat, Vec3};
-use mortise_firmware::board::{Drive, Mechanism, Sensed};
+use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 use mortise_haptics::observer::Rise;
 use mortise_haptics::{Pose, Wrench};
 use mortise_mechanism::encoder_watch::VERDICT_TICKS;
@@ -15,7 +15,7 @@ use proptest::prelude::*;
 use rigs::{arm, paddle, pantograph};
 
 /// A mechanism of either kind whose encoders can be stopped.
-trait Rig: Mechanism {
+trait Rig: Mechanism + Simulation {
     fn freeze(&mut self, axis: usize);
     fn truth(&self) -> Pose;
 }

@@ -56,8 +56,6 @@ fn posture(counts: [i32; AXES]) -> Posture {
 }
 
 impl Mechanism for HapticArm {
-    const SIMULATED: bool = false;
-
     fn sense(&mut self) -> Sensed {
         let readings = self.encoders.read();
         self.posture = posture(readings.map(|reading| reading.count));

@@ -6,7 +6,7 @@ use loom::cell::UnsafeCell;
 use loom::sync::Arc;
 use mortise_firmware::board::{
     Clock, Drive, ERASED, Flash, FlashError, FlashWord, Identity, Mechanism, Outbound, SLOTS, Sensed,
-    WRITE_SIZE,
+    Simulation, WRITE_SIZE,
 };
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
@@ -110,8 +110,6 @@ unsafe impl Flash<'static> for ModelFlash {
 struct Motors(Arc<Exclusive>);
 
 impl Mechanism for Motors {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         Sensed::AT_REST
     }
@@ -121,7 +119,13 @@ impl Mechanism for Motors {
             self.0.touch();
         }
     }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
 }
+
+impl Simulation for Motors {}
 
 struct NoClock;
 

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use glam::Vec3;
 use mortise_firmware::board::{
     Clock, Drive, DriverFault, DriverFaultKind, ERASED, FlashWord, Identity, Mechanism, Outbound, SLOTS,
-    Sensed,
+    Sensed, Simulation,
 };
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
@@ -230,8 +230,6 @@ struct Strings {
 struct Puppet(Rc<Strings>);
 
 impl Mechanism for Puppet {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         *self.0.sensed.borrow()
     }
@@ -239,7 +237,13 @@ impl Mechanism for Puppet {
     fn drive(&mut self, drive: Drive) {
         self.0.drive.set(drive);
     }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
 }
+
+impl Simulation for Puppet {}
 
 struct Late(Rc<Strings>);
 
