@@ -5,10 +5,11 @@ use mortise_haptics::{Pose, Twist};
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::rig::{Rig, RigFault};
 
-use crate::encoder::{Counter, Velocity};
+use crate::encoder::Counter;
 use crate::encoder_watch::{AxisTick, amplitude};
 use crate::interface::TICK_S;
 use crate::kinematics::{Model, Posture};
+use crate::velocity::low_pass::Velocity;
 
 /// Encoders of a description: joints, then wrist axes. Those that are not there count nothing.
 pub const ENCODERS: usize = MAX_JOINTS + 3;

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`interface`] | what the control plane reads of a mechanism and sets on it, once in each tick |
 //! | [`kinematics`], [`joints`] | of a described rig: angles to pose and force to torques; counts to angles and torques to currents |
-//! | [`encoder`], [`encoder_watch`] | encoder counts to motion and speed; dead encoders |
+//! | [`encoder`], [`velocity`], [`encoder_watch`] | encoder counts to motion; motion to speed; dead encoders |
 //! | [`ceilings`] | the rig's limits, and what they leave of a wrench |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -18,3 +18,4 @@ pub mod encoder_watch;
 pub mod interface;
 pub mod joints;
 pub mod kinematics;
+pub mod velocity;

@@ -7,7 +7,7 @@
 
 use glam::{Quat, Vec3};
 use mortise_haptics::{Pose, Twist, Wrench, rotation};
-use mortise_mechanism::encoder::{Counter, Velocity};
+use mortise_mechanism::encoder::Counter;
 use mortise_mechanism::encoder_watch::{
     AxisTick, EncoderWatch, STIFFEST_HAND, STIFFEST_WRIST, amplitude, probed,
 };
@@ -16,6 +16,7 @@ use mortise_protocol::message::{HandScript, InputFault};
 use crate::hand::{Grip, Hand, Wish, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
 use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_HZ, TICK_S};
+use mortise_mechanism::velocity::low_pass::Velocity;
 
 /// Steps in a tick.
 pub const SUBSTEPS: u32 = 4;

@@ -3,10 +3,10 @@
 use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, TICK_S};
 use mortise_haptics::{Pose, Quat, Twist, Vec3};
 use mortise_mechanism::encoder_watch::{AxisTick, EncoderWatch, LOADED, probed};
+use mortise_mechanism::velocity::adaptive_window::Estimator;
 use nucleo_h743zi::drive::{AXES, currents};
 use nucleo_h743zi::kinematics::Posture;
 use nucleo_h743zi::rig::RIG;
-use nucleo_h743zi::velocity::Estimator;
 
 use crate::encoders::Encoders;
 use crate::motors::{self, Motors};

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
     use glam::DVec3;
     use mortise_haptics::Settings;
-    use mortise_mechanism::encoder::VELOCITY_FILTER_S;
+    use mortise_mechanism::velocity::low_pass::VELOCITY_FILTER_S;
     use mortise_protocol::message::WirePose;
     use mortise_rig::RigSpec;
     use mortise_simulation::simulated::RESOLUTION;
