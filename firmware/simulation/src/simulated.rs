@@ -16,7 +16,7 @@ use mortise_protocol::message::{HandScript, InputFault};
 use crate::hand::{Grip, Hand, Wish, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
 use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_HZ, TICK_S};
-use mortise_mechanism::velocity::low_pass::Velocity;
+use mortise_mechanism::velocity::{Estimator, InUse};
 
 /// Steps in a tick.
 pub const SUBSTEPS: u32 = 4;
@@ -87,8 +87,8 @@ struct Encoders {
     offset: [i32; 3],
     /// Nothing jumped since the counters were set.
     referenced: bool,
-    linear: [Velocity; 3],
-    angular: [Velocity; 3],
+    linear: [InUse; 3],
+    angular: [InUse; 3],
     /// Orientation as counted: follows the true one in whole counts about its own axes.
     orientation: Quat,
 }
@@ -243,8 +243,8 @@ impl Encoders {
             counts: [0; 3],
             offset: [0; 3],
             referenced: true,
-            linear: [Velocity::new(); 3],
-            angular: [Velocity::new(); 3],
+            linear: [InUse::AT_REST; 3],
+            angular: [InUse::AT_REST; 3],
             orientation: Quat::IDENTITY,
         }
     }
@@ -269,7 +269,7 @@ impl Encoders {
             }
             steps[axis] = step.counts;
             position[axis] = count as f32 * RESOLUTION;
-            linear[axis] = self.linear[axis].update(step.counts as f32 * RESOLUTION);
+            linear[axis] = self.linear[axis].update(step.counts, RESOLUTION);
         }
         let counted = Pose {
             position: Vec3::ZERO,
@@ -287,7 +287,7 @@ impl Encoders {
             if moved[axis].abs() > JUMP_ANGULAR_SPEED * TICK_S && jump.is_none() {
                 jump = Some(3 + axis as u8);
             }
-            angular[axis] = self.angular[axis].update(moved[axis]);
+            angular[axis] = self.angular[axis].update(steps[3 + axis], ANGULAR_RESOLUTION);
         }
         self.orientation = unit(rotation::exp(Vec3::from_array(moved)) * self.orientation);
         let seen = Pose {

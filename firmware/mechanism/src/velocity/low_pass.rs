@@ -1,5 +1,6 @@
 //! Velocity from encoder counts: first-order low-pass of the difference quotient.
 
+use super::Estimator;
 use crate::interface::{TICK_HZ, TICK_S};
 
 /// Time constant of the speed estimate, s.
@@ -9,21 +10,18 @@ use crate::interface::{TICK_HZ, TICK_S};
 pub const VELOCITY_FILTER_S: f32 = 0.003;
 
 /// First-order low-pass of the difference quotient, one axis.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Velocity {
+#[derive(Clone, Copy, Debug)]
+pub struct LowPass {
+    /// m/s or rad/s.
     estimate: f32,
 }
 
-impl Velocity {
-    /// At rest.
-    pub const fn new() -> Self {
-        Self { estimate: 0.0 }
-    }
+impl Estimator for LowPass {
+    const AT_REST: Self = Self { estimate: 0.0 };
 
-    /// Takes the motion of one tick (any unit), gives the speed (that unit per second).
-    pub fn update(&mut self, moved: f32) -> f32 {
+    fn update(&mut self, moved: i32, per_count: f32) -> f32 {
         const GAIN: f32 = TICK_S / (VELOCITY_FILTER_S + TICK_S);
-        self.estimate += GAIN * (moved * TICK_HZ as f32 - self.estimate);
+        self.estimate += GAIN * (moved as f32 * per_count * TICK_HZ as f32 - self.estimate);
         self.estimate
     }
 }
@@ -34,10 +32,10 @@ mod tests {
 
     #[test]
     fn speed_settles_on_the_true_one() {
-        let mut velocity = Velocity::default();
+        let mut velocity = LowPass::AT_REST;
         let mut estimate = 0.0;
         for _ in 0..60 {
-            estimate = velocity.update(5e-6);
+            estimate = velocity.update(1, 5e-6);
         }
         // 60 ticks at gain 1/4 leave 0.75⁶⁰ = 3·10⁻⁸ of the step.
         assert!((estimate - 5e-3).abs() < 1e-9, "{estimate}");
