@@ -12,6 +12,7 @@ mod fingerprint;
 mod freshness;
 
 use heapless::String;
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::frame::{Decoder, FrameError, Received, encode};
 use mortise_protocol::image::LAYOUT_VERSION;
 use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS};
@@ -21,10 +22,8 @@ use mortise_protocol::message::{
 
 use crate::board::{Flash, Identity, Outbound, TICK_HZ};
 use crate::channel::{Command, CommandKind, EVENTS, Epoch, Event, LinkEnds, Reply, SAMPLES};
-use crate::hand::check_script;
-use crate::input_faults::check_input_faults;
-use crate::kinematics::Model;
 use crate::parameters::Parameters;
+use crate::scripts::{check_input_faults, check_script};
 use crate::store::Store;
 use crate::store::rig::Kept;
 

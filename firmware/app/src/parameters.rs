@@ -1,11 +1,11 @@
 //! The parameters' values, and the settings the tick uses, made from them at low priority.
 
 use mortise_haptics::{GuidanceMethod, Integrator, Settings};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::message::Refusal;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
 use crate::board::{TICK_HZ, TICK_S};
-use crate::ceilings::Ceilings;
 
 /// What the control plane needs, finished: swapped in between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]

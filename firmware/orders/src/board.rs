@@ -3,11 +3,11 @@
 use std::cell::{Cell, UnsafeCell};
 
 use mortise_firmware::board::{
-    Clock, Drive, Flash, FlashError, Identity, Mechanism, Outbound, SLOTS, Sensed, WRITE_SIZE,
+    Clock, Drive, ERASED, Flash, FlashError, FlashWord, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    WRITE_SIZE,
 };
-use mortise_firmware::ceilings::Ceilings;
-use mortise_firmware::ram_flash::{ERASED, FlashWord};
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{CostUnit, ResetReason};
@@ -163,8 +163,6 @@ impl Rig {
 pub(crate) struct Puppet<'s>(pub &'s Rig);
 
 impl Mechanism for Puppet<'_> {
-    const SIMULATED: bool = false;
-
     fn sense(&mut self) -> Sensed {
         self.0.sensed.get()
     }

@@ -7,8 +7,8 @@
 
 use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
-use mortise_firmware::joints::{ENCODERS, Joints};
-use mortise_firmware::kinematics::Model;
+use mortise_mechanism::joints::{ENCODERS, Joints};
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::limits::MAX_MESSAGE;
 use mortise_protocol::rig::Rig;
 use mortise_rig::{abilities, parse_rig, write_rig};

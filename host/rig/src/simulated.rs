@@ -9,16 +9,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use mortise_firmware::board::{Clock, Identity, Outbound, SLOTS, TICK_HZ};
-use mortise_firmware::ceilings::Ceilings;
+use mortise_firmware::board::{Clock, ERASED, FlashWord, Identity, Outbound, SLOTS, TICK_HZ};
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::Ticked;
 use mortise_firmware::device;
 use mortise_firmware::link::OUTBOUND_MIN;
-use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
-use mortise_firmware::simulated_rig::SimulatedRig;
 use mortise_firmware::store;
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::message::{CostUnit, ResetReason};
+use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
+use mortise_simulation::simulated_rig::SimulatedRig;
 
 use crate::error::RigError;
 use crate::pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use mortise_firmware::board::{Drive, Mechanism, Sensed};
+use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 
 /// Shared between the test and the mechanism.
 #[derive(Clone)]
@@ -46,7 +46,6 @@ impl<const SIMULATED: bool> Puppet<SIMULATED> {
 }
 
 impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
-    const SIMULATED: bool = SIMULATED;
     const DESCRIBED: bool = SIMULATED;
 
     fn sense(&mut self) -> Sensed {
@@ -62,4 +61,10 @@ impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
     fn drive(&mut self, drive: Drive) {
         self.0.0.borrow_mut().drives.push(drive);
     }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        SIMULATED.then_some(self)
+    }
 }
+
+impl<const SIMULATED: bool> Simulation for Puppet<SIMULATED> {}

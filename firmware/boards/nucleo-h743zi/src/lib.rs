@@ -1,4 +1,4 @@
-//! What of the board needs no chip: kinematics, velocity estimate, current commands, flash map, reset cause.
+//! What of the board needs no chip: kinematics, current commands, flash map, reset cause.
 //!
 //! Tested on the PC with `cargo test -p nucleo-h743zi --lib --target x86_64-unknown-linux-gnu`. The program that wires it to the chip is
 //! `main.rs` and the modules beside it; they are compiled for the chip only.
@@ -11,4 +11,3 @@ pub mod encoder;
 pub mod flash_map;
 pub mod kinematics;
 pub mod rig;
-pub mod velocity;

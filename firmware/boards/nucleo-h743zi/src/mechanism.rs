@@ -1,12 +1,12 @@
 //! The arm as the application sees it: handle pose and velocity in, force on the handle out.
 
-use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, TICK_S};
-use mortise_firmware::encoder_watch::{AxisTick, EncoderWatch, LOADED, probed};
+use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Mechanism, Sensed};
 use mortise_haptics::{Pose, Quat, Twist, Vec3};
+use mortise_mechanism::encoder_watch::{AxisTick, EncoderWatch, LOADED, probed};
+use mortise_mechanism::velocity::{AdaptiveWindow, Estimator};
 use nucleo_h743zi::drive::{AXES, currents};
 use nucleo_h743zi::kinematics::Posture;
 use nucleo_h743zi::rig::RIG;
-use nucleo_h743zi::velocity::Estimator;
 
 use crate::encoders::Encoders;
 use crate::motors::{self, Motors};
@@ -19,7 +19,7 @@ const PROBE_SHARE: f32 = 0.3;
 pub struct HapticArm {
     encoders: Encoders,
     motors: Motors,
-    estimators: [Estimator; AXES],
+    estimators: [AdaptiveWindow; AXES],
     /// Of the last `sense`: torques belong to it.
     posture: Posture,
     /// A part is felt.
@@ -39,7 +39,7 @@ impl HapticArm {
         Self {
             encoders,
             motors,
-            estimators: counts.map(Estimator::new),
+            estimators: [AdaptiveWindow::AT_REST; AXES],
             posture: posture(counts),
             felt: false,
             watch: EncoderWatch::new(),
@@ -56,8 +56,6 @@ fn posture(counts: [i32; AXES]) -> Posture {
 }
 
 impl Mechanism for HapticArm {
-    const SIMULATED: bool = false;
-
     fn sense(&mut self) -> Sensed {
         let readings = self.encoders.read();
         self.posture = posture(readings.map(|reading| reading.count));
@@ -80,7 +78,7 @@ impl Mechanism for HapticArm {
                 jump = Some(axis as u8);
             }
             self.counts[axis] = reading.count;
-            rates[axis] = self.estimators[axis].update(reading.count) * RIG.radians_per_count(axis) / TICK_S;
+            rates[axis] = self.estimators[axis].update(ticks[axis].moved, RIG.radians_per_count(axis));
         }
         let encoder_stuck = if self.felt {
             self.watch.update(&ticks)
@@ -123,7 +121,7 @@ impl Mechanism for HapticArm {
 
     fn home(&mut self) {
         self.encoders.home();
-        self.estimators = RIG.home_counts.map(Estimator::new);
+        self.estimators = [AdaptiveWindow::AT_REST; AXES];
         self.counts = RIG.home_counts;
         self.referenced = true;
     }

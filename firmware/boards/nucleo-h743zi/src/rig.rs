@@ -4,7 +4,7 @@
 //! (`haptikfabrikenapi.h`, read 2025-11). Another arm of the same kind needs another [`RIG`] and nothing else.
 
 use glam::Vec3;
-use mortise_firmware::ceilings::Ceilings;
+use mortise_mechanism::ceilings::Ceilings;
 
 use crate::drive::{AXES, Driver};
 use crate::kinematics::Arm;

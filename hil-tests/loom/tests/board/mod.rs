@@ -5,15 +5,15 @@ use std::cell::UnsafeCell as Plain;
 use loom::cell::UnsafeCell;
 use loom::sync::Arc;
 use mortise_firmware::board::{
-    Clock, Drive, Flash, FlashError, Identity, Mechanism, Outbound, SLOTS, Sensed, WRITE_SIZE,
+    Clock, Drive, ERASED, Flash, FlashError, FlashWord, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    Simulation, WRITE_SIZE,
 };
-use mortise_firmware::ceilings::Ceilings;
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_firmware::ram_flash::{ERASED, FlashWord};
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::frame::{Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::MAX_FRAME;
@@ -110,8 +110,6 @@ unsafe impl Flash<'static> for ModelFlash {
 struct Motors(Arc<Exclusive>);
 
 impl Mechanism for Motors {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         Sensed::AT_REST
     }
@@ -121,7 +119,13 @@ impl Mechanism for Motors {
             self.0.touch();
         }
     }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
 }
+
+impl Simulation for Motors {}
 
 struct NoClock;
 

@@ -1,6 +1,6 @@
 //! Capabilities of a described rig at its home pose: resolution of its sensors, and force.
 
-use mortise_firmware::kinematics::Model;
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::rig::{Rig, RigFault};
 use serde::Serialize;

@@ -8,7 +8,7 @@ mod file;
 
 use std::path::{Path, PathBuf};
 
-use mortise_firmware::kinematics::Model;
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::rig::{Rig, RigFault, RigKey};
 
 use crate::words::Words;

@@ -30,13 +30,43 @@ const KERNEL_MARKS: &[&str] = &[concat!(".hx", "x"), concat!("cx", "x::")];
 const LAYERS: &[(&str, &[&str])] = &[
     (
         "firmware/boards",
-        &["mortise-firmware", "mortise-haptics", "mortise-protocol"],
+        &[
+            "mortise-firmware",
+            "mortise-mechanism",
+            "mortise-simulation",
+            "mortise-haptics",
+            "mortise-protocol",
+        ],
     ),
-    ("firmware/app", &["mortise-haptics", "mortise-protocol"]),
+    (
+        "firmware/app",
+        &[
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+            // By its tests alone: the simulation depends on the application.
+            "mortise-simulation",
+        ],
+    ),
+    (
+        "firmware/simulation",
+        &[
+            "mortise-firmware",
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+        ],
+    ),
     (
         "firmware/orders",
-        &["mortise-firmware", "mortise-haptics", "mortise-protocol"],
+        &[
+            "mortise-firmware",
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+        ],
     ),
+    ("firmware/mechanism", &["mortise-haptics", "mortise-protocol"]),
     ("firmware/haptics", &["mortise-protocol"]),
     ("firmware", &["mortise-haptics", "mortise-protocol"]),
     ("protocol", &[]),

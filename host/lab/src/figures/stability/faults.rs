@@ -9,20 +9,21 @@ use std::rc::Rc;
 
 use glam::Vec3;
 use mortise_firmware::board::{
-    Clock, Drive, DriverFault, DriverFaultKind, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    Clock, Drive, DriverFault, DriverFaultKind, ERASED, FlashWord, Identity, Mechanism, Outbound, SLOTS,
+    Sensed, Simulation,
 };
-use mortise_firmware::ceilings::Ceilings;
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::{CostUnit, DeviceState, Fault, FromDevice, ResetReason, ToDevice, Version};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::describe;
+use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
@@ -229,8 +230,6 @@ struct Strings {
 struct Puppet(Rc<Strings>);
 
 impl Mechanism for Puppet {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         *self.0.sensed.borrow()
     }
@@ -238,7 +237,13 @@ impl Mechanism for Puppet {
     fn drive(&mut self, drive: Drive) {
         self.0.drive.set(drive);
     }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
 }
+
+impl Simulation for Puppet {}
 
 struct Late(Rc<Strings>);
 

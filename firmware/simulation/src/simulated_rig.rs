@@ -1,12 +1,10 @@
 //! The mechanism a simulated board has: the one its kept description tells of, or a free handle with six motors.
 
-use mortise_haptics::{Pose, Wrench};
-use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::Rig;
 
-use crate::board::{Drive, Mechanism, Sensed};
 use crate::described::Described;
 use crate::simulated::Simulated;
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation};
 
 /// See the module.
 #[derive(Clone, Debug)]
@@ -41,7 +39,6 @@ macro_rules! each {
 }
 
 impl Mechanism for SimulatedRig {
-    const SIMULATED: bool = true;
     const DESCRIBED: bool = true;
 
     fn sense(&mut self) -> Sensed {
@@ -60,23 +57,11 @@ impl Mechanism for SimulatedRig {
         each!(self, mechanism => mechanism.count())
     }
 
-    fn hand(&self) -> Option<Wrench> {
-        each!(self, mechanism => mechanism.hand())
-    }
-
-    fn set_hand(&mut self, script: Option<&HandScript>) {
-        each!(self, mechanism => mechanism.set_hand(script));
-    }
-
     fn home(&mut self) {
         each!(self, mechanism => mechanism.home());
     }
 
-    fn set_input_faults(&mut self, faults: &[InputFault]) {
-        each!(self, mechanism => mechanism.set_input_faults(faults));
-    }
-
-    fn reset(&mut self) -> Option<Pose> {
-        each!(self, mechanism => mechanism.reset())
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        each!(self, mechanism => mechanism.simulation())
     }
 }

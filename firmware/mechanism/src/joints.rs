@@ -5,10 +5,11 @@ use mortise_haptics::{Pose, Twist};
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::rig::{Rig, RigFault};
 
-use crate::board::TICK_S;
-use crate::encoder::{Counter, Velocity};
+use crate::encoder::Counter;
 use crate::encoder_watch::{AxisTick, amplitude};
+use crate::interface::TICK_S;
 use crate::kinematics::{Model, Posture};
+use crate::velocity::{Estimator, InUse};
 
 /// Encoders of a description: joints, then wrist axes. Those that are not there count nothing.
 pub const ENCODERS: usize = MAX_JOINTS + 3;
@@ -32,7 +33,7 @@ pub struct Joints {
     home: [f32; ENCODERS],
     farthest: [u32; ENCODERS],
     counters: [Counter; ENCODERS],
-    velocities: [Velocity; ENCODERS],
+    velocities: [InUse; ENCODERS],
     torque_per_ampere: [f32; MAX_JOINTS],
     current_limit: [f32; MAX_JOINTS],
     coulomb: [f32; MAX_JOINTS],
@@ -97,7 +98,7 @@ impl Joints {
             home,
             farthest,
             counters: farthest.map(Counter::new),
-            velocities: [Velocity::new(); ENCODERS],
+            velocities: [InUse::AT_REST; ENCODERS],
             torque_per_ampere,
             current_limit,
             coulomb,
@@ -118,7 +119,7 @@ impl Joints {
     /// The mechanism rests where these counts say: the next reading is compared with them. Where it cannot be, the last posture stays.
     pub fn start_at(&mut self, counts: &[i32; ENCODERS]) {
         self.counters = self.farthest.map(Counter::new);
-        self.velocities = [Velocity::new(); ENCODERS];
+        self.velocities = [InUse::AT_REST; ENCODERS];
         let mut angles = [0.0; ENCODERS];
         for encoder in 0..ENCODERS {
             self.counters[encoder].update(counts[encoder]);
@@ -177,8 +178,7 @@ impl Joints {
                 jump = Some(encoder as u8);
             }
             moved[encoder] = step.counts;
-            rates[encoder] =
-                self.velocities[encoder].update(step.counts as f32 * self.radians_per_count[encoder]);
+            rates[encoder] = self.velocities[encoder].update(step.counts, self.radians_per_count[encoder]);
             angles[encoder] = self.angle(encoder, counts[encoder]);
         }
         let found = posture(&self.model, &angles);

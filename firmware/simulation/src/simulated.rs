@@ -7,13 +7,16 @@
 
 use glam::{Quat, Vec3};
 use mortise_haptics::{Pose, Twist, Wrench, rotation};
+use mortise_mechanism::encoder::Counter;
+use mortise_mechanism::encoder_watch::{
+    AxisTick, EncoderWatch, STIFFEST_HAND, STIFFEST_WRIST, amplitude, probed,
+};
 use mortise_protocol::message::{HandScript, InputFault};
 
-use crate::board::{Drive, Mechanism, Sensed, TICK_HZ, TICK_S};
-use crate::encoder::{Counter, Velocity};
-use crate::encoder_watch::{AxisTick, EncoderWatch, STIFFEST_HAND, STIFFEST_WRIST, amplitude, probed};
 use crate::hand::{Grip, Hand, Wish, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_HZ, TICK_S};
+use mortise_mechanism::velocity::{Estimator, InUse};
 
 /// Steps in a tick.
 pub const SUBSTEPS: u32 = 4;
@@ -84,8 +87,8 @@ struct Encoders {
     offset: [i32; 3],
     /// Nothing jumped since the counters were set.
     referenced: bool,
-    linear: [Velocity; 3],
-    angular: [Velocity; 3],
+    linear: [InUse; 3],
+    angular: [InUse; 3],
     /// Orientation as counted: follows the true one in whole counts about its own axes.
     orientation: Quat,
 }
@@ -240,8 +243,8 @@ impl Encoders {
             counts: [0; 3],
             offset: [0; 3],
             referenced: true,
-            linear: [Velocity::new(); 3],
-            angular: [Velocity::new(); 3],
+            linear: [InUse::AT_REST; 3],
+            angular: [InUse::AT_REST; 3],
             orientation: Quat::IDENTITY,
         }
     }
@@ -266,7 +269,7 @@ impl Encoders {
             }
             steps[axis] = step.counts;
             position[axis] = count as f32 * RESOLUTION;
-            linear[axis] = self.linear[axis].update(step.counts as f32 * RESOLUTION);
+            linear[axis] = self.linear[axis].update(step.counts, RESOLUTION);
         }
         let counted = Pose {
             position: Vec3::ZERO,
@@ -284,7 +287,7 @@ impl Encoders {
             if moved[axis].abs() > JUMP_ANGULAR_SPEED * TICK_S && jump.is_none() {
                 jump = Some(3 + axis as u8);
             }
-            angular[axis] = self.angular[axis].update(moved[axis]);
+            angular[axis] = self.angular[axis].update(steps[3 + axis], ANGULAR_RESOLUTION);
         }
         self.orientation = unit(rotation::exp(Vec3::from_array(moved)) * self.orientation);
         let seen = Pose {
@@ -323,8 +326,6 @@ fn rounded(x: f32) -> f32 {
 }
 
 impl Mechanism for Simulated {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         self.advance();
         let wiring = self.script.advance(self.wiring);
@@ -369,20 +370,26 @@ impl Mechanism for Simulated {
         [RESOLUTION, ANGULAR_RESOLUTION]
     }
 
-    fn hand(&self) -> Option<Wrench> {
-        Some(self.hand_wrench)
-    }
-
-    fn set_hand(&mut self, script: Option<&HandScript>) {
-        self.hand = script.and_then(Hand::new);
-    }
-
     /// The simulated operator knows exactly where the handle is.
     fn home(&mut self) {
         self.encoders = Encoders {
             orientation: self.body.pose.orientation,
             ..Encoders::new()
         };
+    }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
+}
+
+impl Simulation for Simulated {
+    fn hand(&self) -> Option<Wrench> {
+        Some(self.hand_wrench)
+    }
+
+    fn set_hand(&mut self, script: Option<&HandScript>) {
+        self.hand = script.and_then(Hand::new);
     }
 
     fn set_input_faults(&mut self, faults: &[InputFault]) {

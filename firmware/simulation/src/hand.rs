@@ -6,42 +6,12 @@
 
 use glam::Vec3;
 use heapless::Vec;
+use mortise_firmware::scripts::check_script;
+use mortise_firmware::wire::pose_from_wire;
 use mortise_haptics::{Pose, Twist, rotation};
+use mortise_mechanism::interface::{TICK_HZ, TICK_S};
 use mortise_protocol::limits::MAX_KEYFRAMES;
-use mortise_protocol::message::{HandScript, Refusal};
-
-use crate::board::{TICK_HZ, TICK_S};
-use crate::wire::pose_from_wire;
-
-/// Stiffest hand accepted, N/m and N·m/rad: beyond it an f32 no longer resolves the spring's work.
-pub const STIFFNESS_MAX: f32 = 1e6;
-/// Hardest push accepted, N.
-pub const PUSH_MAX: f32 = 1e3;
-/// Largest tremor accepted, m.
-pub const TREMOR_MAX: f32 = 0.1;
-
-/// Whether a script can be followed: numbers finite and possible, at least one keyframe, times ascending.
-pub fn check_script(script: &HandScript) -> Result<(), Refusal> {
-    let in_range = |value: f32, max: f32| (0.0..=max).contains(&value);
-    let springs = [
-        script.stiffness,
-        script.damping,
-        script.angular_stiffness,
-        script.angular_damping,
-    ];
-    let numbers = springs.iter().all(|&v| in_range(v, STIFFNESS_MAX))
-        && in_range(script.tremor, TREMOR_MAX)
-        && in_range(script.tremor_hz, 0.5 * f32::from(TICK_HZ));
-    let frames = script.keyframes.iter().all(|frame| {
-        pose_from_wire(&frame.pose).is_some() && frame.push.iter().all(|&p| in_range(p.abs(), PUSH_MAX))
-    });
-    let ascending = script.keyframes.windows(2).all(|w| w[0].tick < w[1].tick);
-    if numbers && frames && ascending && !script.keyframes.is_empty() {
-        Ok(())
-    } else {
-        Err(Refusal::BadNumber)
-    }
-}
+use mortise_protocol::message::HandScript;
 
 /// What the hand wants in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -218,7 +188,7 @@ fn sine_of_turn(phase: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mortise_protocol::message::{Keyframe, WirePose};
+    use mortise_protocol::message::{Keyframe, Refusal, WirePose};
 
     fn frame(tick: u32, x: f32, angle: f32) -> Keyframe {
         Keyframe {

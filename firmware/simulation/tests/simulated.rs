@@ -1,10 +1,10 @@
 //! The simulated mechanism against closed forms, and against anything a script may ask.
 
 use glam::{Quat, Vec3};
-use mortise_firmware::board::{Drive, Mechanism};
-use mortise_firmware::simulated::*;
+use mortise_firmware::board::{Drive, Mechanism, Simulation};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
+use mortise_simulation::simulated::*;
 use proptest::prelude::*;
 
 fn script(position: Vec3, orientation: Quat, push: Vec3) -> HandScript {

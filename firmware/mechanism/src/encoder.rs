@@ -1,6 +1,4 @@
-//! What every board does with encoder counts: tell motion from a jump, and estimate speed.
-
-use crate::board::{TICK_HZ, TICK_S};
+//! What every board does with encoder counts: tell motion from a jump.
 
 /// Counts from one reading to the next, of a counter that wraps at 32 bits.
 #[derive(Clone, Copy, Debug)]
@@ -36,32 +34,6 @@ impl Counter {
     }
 }
 
-/// Time constant of the speed estimate, s.
-///
-/// The difference of two readings of resolution Δ is quantised to Δ/h; the filter leaves h/(τ+h) of it: with 5 µm and 3 ms 1.25 mm/s. It delays the
-/// coupling's damping by τ, which Colgate–Schenkel's bound with filtered velocity takes into account.
-pub const VELOCITY_FILTER_S: f32 = 0.003;
-
-/// First-order low-pass of the difference quotient, one axis.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Velocity {
-    estimate: f32,
-}
-
-impl Velocity {
-    /// At rest.
-    pub const fn new() -> Self {
-        Self { estimate: 0.0 }
-    }
-
-    /// Takes the motion of one tick (any unit), gives the speed (that unit per second).
-    pub fn update(&mut self, moved: f32) -> f32 {
-        const GAIN: f32 = TICK_S / (VELOCITY_FILTER_S + TICK_S);
-        self.estimate += GAIN * (moved * TICK_HZ as f32 - self.estimate);
-        self.estimate
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,16 +48,5 @@ mod tests {
         assert_eq!(counter.update(i32::MIN + 8), step(0, true));
         assert_eq!(counter.update(i32::MIN + 7), step(-1, false));
         assert_eq!(counter.update(0), step(0, true));
-    }
-
-    #[test]
-    fn speed_settles_on_the_true_one() {
-        let mut velocity = Velocity::default();
-        let mut estimate = 0.0;
-        for _ in 0..60 {
-            estimate = velocity.update(5e-6);
-        }
-        // 60 ticks at gain 1/4 leave 0.75⁶⁰ = 3·10⁻⁸ of the step.
-        assert!((estimate - 5e-3).abs() < 1e-9, "{estimate}");
     }
 }

@@ -10,21 +10,21 @@
 //! viscous friction implicit and J frozen over the step. Dry friction is then, of all impulses within ±h·f_c at the joints, the one that leaves the
 //! least energy (the principle of maximum dissipation), so that a joint stands exactly where no more than its own friction is asked of it. Joints end
 //! at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's orientation through the same equation.
-//! Sensing and currents are [`Joints`], the code of a real rig.
+//! Sensing and currents are [`DescribedMechanism`], the code of a real rig.
 
 use glam::{Mat3, Vec3};
 use mortise_haptics::{Pose, Wrench, rotation};
+use mortise_mechanism::joints::{ENCODERS, Joints};
+use mortise_mechanism::kinematics::Posture;
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::{Rig, RigFault};
 
-use crate::board::{Drive, Mechanism, Sensed, TICK_S};
-use crate::encoder_watch::{EncoderWatch, probed};
 use crate::hand::{Grip, Hand, Wish};
 use crate::input_faults::{AXES, InputScript, Wiring};
-use crate::joints::{ENCODERS, Joints, Reading};
-use crate::kinematics::Posture;
 use crate::simulated::SUBSTEPS;
+use mortise_mechanism::described::DescribedMechanism;
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_S};
 
 /// Inertia of the handle about a wrist axis, kg·m², and its bearings' friction, N·m·s/rad.
 const WRIST_INERTIA: f32 = 1e-5;
@@ -43,18 +43,13 @@ pub struct Described {
     pub wiring: Wiring,
     script: InputScript,
     links: Links,
-    joints: Joints,
+    mechanism: DescribedMechanism,
     counts: [i32; ENCODERS],
     offsets: [i32; ENCODERS],
-    referenced: bool,
     hand: Option<Hand>,
     hand_wrench: Wrench,
-    /// What the motors were driven with, and what they do with the probes in it.
-    driven: [f32; MAX_JOINTS],
+    /// What the motors are given, with the encoders' probes.
     currents: [f32; MAX_JOINTS],
-    /// A part is felt.
-    felt: bool,
-    watch: EncoderWatch<ENCODERS>,
 }
 
 /// The true mechanism.
@@ -77,9 +72,9 @@ impl Described {
     /// In its home pose, at rest, nobody holding it, motors off.
     ///
     /// # Errors
-    /// See [`crate::kinematics::Model::new`].
+    /// See [`mortise_mechanism::kinematics::Model::new`].
     pub fn new(rig: &Rig) -> Result<Self, RigFault> {
-        let joints = Joints::new(rig)?;
+        let mechanism = DescribedMechanism::new(rig, true)?;
         let of = |number: usize, value: fn(&mortise_protocol::rig::Joint) -> f32, else_: f32| {
             rig.joints.get(number).map_or(else_, value)
         };
@@ -95,7 +90,7 @@ impl Described {
         }
         let wrist = rig.wrist.map_or([0.0; 3], |wrist| wrist.home);
         start[MAX_JOINTS..].copy_from_slice(&wrist);
-        let posture = *joints.posture();
+        let posture = *mechanism.joints().posture();
         Ok(Self {
             wiring: Wiring::SOUND,
             script: InputScript::new(),
@@ -112,16 +107,12 @@ impl Described {
                 wrist_rates: Vec3::ZERO,
                 posture,
             },
-            joints,
+            mechanism,
             counts: [0; ENCODERS],
             offsets: [0; ENCODERS],
-            referenced: true,
             hand: None,
             hand_wrench: Wrench::ZERO,
-            driven: [0.0; MAX_JOINTS],
             currents: [0.0; MAX_JOINTS],
-            felt: false,
-            watch: EncoderWatch::new(),
         })
     }
 
@@ -142,10 +133,11 @@ impl Described {
 
     fn advance(&mut self) {
         let held = self.hand.as_mut().map(|hand| (hand.grip, hand.advance()));
-        let motors = self.joints.torques(&self.currents);
+        let joints = self.mechanism.joints();
+        let motors = joints.torques(&self.currents);
         let mut sum = Wrench::ZERO;
         for _ in 0..SUBSTEPS {
-            let hand = self.links.step(motors, held.as_ref(), &self.joints);
+            let hand = self.links.step(motors, held.as_ref(), joints);
             sum = sum + hand;
         }
         let share = 1.0 / SUBSTEPS as f32;
@@ -155,29 +147,18 @@ impl Described {
         };
     }
 
-    /// What the encoders say, and the first that does not follow its motor.
-    fn read(&mut self, wiring: &Wiring) -> (Reading, Option<u8>) {
+    /// The encoders' counts through `wiring`.
+    fn count(&mut self, wiring: &Wiring) {
         for encoder in 0..ENCODERS {
             // As many encoders as the free handle has axes.
             self.offsets[encoder] = self.offsets[encoder].saturating_add(wiring.glitch[encoder]);
             if !wiring.stuck[encoder] {
                 let angle = self.links.angle(encoder);
-                self.counts[encoder] = self
-                    .joints
+                self.counts[encoder] = (self.mechanism.joints())
                     .count(encoder, angle)
                     .saturating_add(self.offsets[encoder]);
             }
         }
-        let reading = self.joints.read(&self.counts);
-        let dead = if self.felt {
-            self.watch
-                .update(&self.joints.axis_ticks(&reading.moved, &self.driven))
-        } else {
-            self.watch.rest();
-            None
-        };
-        self.referenced &= reading.jump.is_none() && !reading.impossible;
-        (reading, dead)
     }
 }
 
@@ -313,65 +294,47 @@ fn solve(system: Mat3, momentum: Vec3) -> Vec3 {
 }
 
 impl Mechanism for Described {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         self.advance();
         let wiring = self.script.advance(self.wiring);
         self.wiring.glitch = [0; AXES];
-        let (reading, stuck) = self.read(&wiring);
-        wiring.through(Sensed {
-            handle: reading.handle,
-            twist: reading.twist,
-            encoder_jump: reading.jump,
-            impossible_posture: reading.impossible,
-            encoder_stuck: stuck,
-            referenced: self.referenced,
-            ..Sensed::AT_REST
-        })
+        self.count(&wiring);
+        wiring.through(self.mechanism.read(&self.counts))
     }
 
     fn drive(&mut self, drive: Drive) {
-        self.driven = match drive {
-            Drive::Off => [0.0; MAX_JOINTS],
-            Drive::Wrench(wrench) => self.joints.currents(wrench.force),
-        };
-        self.currents = self.driven;
-        if drive == Drive::Off || !self.felt {
-            return;
-        }
-        for (joint, current) in self.currents.iter_mut().enumerate() {
-            if let Some(amplitude) = self.joints.probe(joint) {
-                *current = probed(*current, amplitude, self.watch.share(joint));
-            }
-        }
+        self.currents = self.mechanism.currents(drive);
     }
 
     fn watch_encoders(&mut self, felt: bool) {
-        self.felt = felt;
+        self.mechanism.watch_encoders(felt);
     }
 
     fn count(&self) -> [f32; 2] {
-        self.joints.count_at_handle()
+        self.mechanism.joints().count_at_handle()
     }
 
+    /// The simulated operator knows exactly where the joints are.
+    fn home(&mut self) {
+        self.offsets = [0; ENCODERS];
+        for encoder in 0..ENCODERS {
+            self.counts[encoder] = self.mechanism.joints().count(encoder, self.links.angle(encoder));
+        }
+        self.mechanism.reference(&self.counts);
+    }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
+}
+
+impl Simulation for Described {
     fn hand(&self) -> Option<Wrench> {
         Some(self.hand_wrench)
     }
 
     fn set_hand(&mut self, script: Option<&HandScript>) {
         self.hand = script.and_then(Hand::new);
-    }
-
-    /// The simulated operator knows exactly where the joints are.
-    fn home(&mut self) {
-        self.offsets = [0; ENCODERS];
-        self.watch.rest();
-        for encoder in 0..ENCODERS {
-            self.counts[encoder] = self.joints.count(encoder, self.links.angle(encoder));
-        }
-        self.joints.start_at(&self.counts);
-        self.referenced = true;
     }
 
     fn set_input_faults(&mut self, faults: &[InputFault]) {
@@ -384,17 +347,13 @@ impl Mechanism for Described {
         self.links.wrist = [start[3], start[4], start[5]];
         self.links.rates = Vec3::ZERO;
         self.links.wrist_rates = Vec3::ZERO;
-        self.joints.start();
-        self.links.posture = *self.joints.posture();
+        self.mechanism.reset();
+        self.links.posture = *self.mechanism.joints().posture();
         self.script = InputScript::new();
         self.counts = [0; ENCODERS];
         self.offsets = [0; ENCODERS];
-        self.watch.rest();
-        self.felt = false;
-        self.referenced = true;
         self.hand = None;
         self.hand_wrench = Wrench::ZERO;
-        self.driven = [0.0; MAX_JOINTS];
         self.currents = [0.0; MAX_JOINTS];
         Some(self.links.pose())
     }

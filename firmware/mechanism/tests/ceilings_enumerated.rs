@@ -2,8 +2,8 @@
 //! ones, infinite, none. All 18.9 million combinations of force, speed, torque, angular speed and place; bounds are checked in double precision.
 
 use glam::Vec3;
-use mortise_firmware::ceilings::{Ceilings, restrain};
 use mortise_haptics::{Twist, Wrench};
+use mortise_mechanism::ceilings::{Ceilings, restrain};
 
 const FORCE: f32 = 8.0;
 const TORQUE: f32 = 0.3;

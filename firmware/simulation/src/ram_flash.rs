@@ -5,18 +5,10 @@
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 
-use crate::board::{Flash, FlashError, RIG_SLOTS, SLOTS, WRITE_SIZE};
+use mortise_firmware::board::{ERASED, Flash, FlashError, FlashWord, RIG_SLOTS, SLOTS, WRITE_SIZE};
 
 /// Bytes erased at once, as on an STM32H743.
 pub const ERASE_SIZE: usize = 128 * 1024;
-
-/// One flash word, aligned as scenes need it.
-#[repr(C, align(32))]
-#[derive(Clone, Copy, Debug)]
-pub struct FlashWord(pub [u8; WRITE_SIZE]);
-
-/// An erased word.
-pub const ERASED: FlashWord = FlashWord([0xff; WRITE_SIZE]);
 
 /// Two scene slots in RAM, and behind them two sectors for the rig's description.
 #[derive(Debug)]

@@ -4,13 +4,10 @@
 //! alike.
 
 use heapless::Vec;
+pub use mortise_firmware::scripts::AXES;
+use mortise_mechanism::interface::{DriverFault, DriverFaultKind, Sensed};
 use mortise_protocol::limits::MAX_INPUT_FAULTS;
-use mortise_protocol::message::{InputFault, InputFaultKind, Refusal};
-
-use crate::board::{DriverFault, DriverFaultKind, Sensed};
-
-/// Encoder axes: position x, y, z, rotation about x, y, z.
-pub const AXES: usize = 6;
+use mortise_protocol::message::{InputFault, InputFaultKind};
 
 /// State of the simulated wiring in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -80,23 +77,6 @@ impl Wiring {
     }
 }
 
-/// Whether a list of faults can be carried out: axes are of this mechanism.
-pub fn check_input_faults(faults: &[InputFault]) -> Result<(), Refusal> {
-    let possible = |fault: &InputFault| match fault.kind {
-        InputFaultKind::EncoderGlitch { axis, .. }
-        | InputFaultKind::EncoderStuck { axis }
-        | InputFaultKind::Driver { axis }
-        | InputFaultKind::OverCurrent { axis }
-        | InputFaultKind::OverTemperature { axis } => usize::from(axis) < AXES,
-        InputFaultKind::NotANumber | InputFaultKind::StopOpen | InputFaultKind::SupplyLow => true,
-    };
-    if faults.iter().all(possible) {
-        Ok(())
-    } else {
-        Err(Refusal::BadNumber)
-    }
-}
-
 /// A script of faults whose time goes on with each reading.
 #[derive(Clone, Debug, Default)]
 pub struct InputScript {
@@ -156,16 +136,5 @@ mod tests {
             assert_eq!(wiring.stop_open, (2..5).contains(&tick), "{tick}");
             assert_eq!(wiring.glitch[4], if tick == 3 { -7 } else { 0 }, "{tick}");
         }
-    }
-
-    #[test]
-    fn an_axis_that_is_none_is_refused() {
-        let fault = |axis| InputFault {
-            tick: 0,
-            ticks: 1,
-            kind: InputFaultKind::EncoderStuck { axis },
-        };
-        assert_eq!(check_input_faults(&[fault(5)]), Ok(()));
-        assert_eq!(check_input_faults(&[fault(5), fault(6)]), Err(Refusal::BadNumber));
     }
 }

@@ -1,20 +1,21 @@
 //! Dead encoders against still hands, in closed loop: a wall of springs on what the encoders say, the simulated mechanisms, random hands.
 
-mod support;
+#[path = "../../app/tests/support/rigs.rs"]
+mod rigs;
 
 use glam::{Quat, Vec3};
-use mortise_firmware::board::{Drive, Mechanism, Sensed};
-use mortise_firmware::described::Described;
-use mortise_firmware::encoder_watch::VERDICT_TICKS;
-use mortise_firmware::simulated::Simulated;
+use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 use mortise_haptics::observer::Rise;
 use mortise_haptics::{Pose, Wrench};
+use mortise_mechanism::encoder_watch::VERDICT_TICKS;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
+use mortise_simulation::described::Described;
+use mortise_simulation::simulated::Simulated;
 use proptest::prelude::*;
-use support::rigs::{arm, paddle, pantograph};
+use rigs::{arm, paddle, pantograph};
 
 /// A mechanism of either kind whose encoders can be stopped.
-trait Rig: Mechanism {
+trait Rig: Mechanism + Simulation {
     fn freeze(&mut self, axis: usize);
     fn truth(&self) -> Pose;
 }

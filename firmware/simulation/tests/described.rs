@@ -1,15 +1,16 @@
 //! Described mechanisms with a simulated hand: they sense what is there, stay finite and passive, stop at their ranges, and push as they should.
 
-mod support;
+#[path = "../../app/tests/support/rigs.rs"]
+mod rigs;
 
 use glam::Vec3;
-use mortise_firmware::board::{Drive, Mechanism, TICK_S};
-use mortise_firmware::described::Described;
+use mortise_firmware::board::{Drive, Mechanism, Simulation, TICK_S};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_protocol::rig::Rig;
+use mortise_simulation::described::Described;
 use proptest::prelude::*;
-use support::rigs::{arm, paddle, pantograph};
+use rigs::{arm, paddle, pantograph};
 
 fn any_rig() -> impl Strategy<Value = Rig> {
     prop_oneof![Just(arm()), Just(pantograph()), Just(paddle())]
@@ -113,7 +114,7 @@ proptest! {
             mechanism.drive(push(force));
             mechanism.sense();
         }
-        let model = mortise_firmware::kinematics::Model::new(&rig).unwrap();
+        let model = mortise_mechanism::kinematics::Model::new(&rig).unwrap();
         let mut angles = [0.0; 3];
         for (angle, joint) in angles.iter_mut().zip(&rig.joints) { *angle = joint.home; }
         let posture = model.posture(angles, [0.0; 3]).unwrap();
