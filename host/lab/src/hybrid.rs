@@ -18,13 +18,15 @@ use mortise_guide::GuideSettings;
 use mortise_protocol::image::{BRICK_CELLS, Field, NO_FACE, SceneImage, Voxel};
 use mortise_protocol::message::{Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_scenario::measure::depth;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{Depth, PreparedScene, Scenario, ScenarioError};
 use serde::Serialize;
 
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::fit::Fit;
 use crate::guided::{SIM, inserted, key, play_to};
-use crate::scenario::{Depth, PreparedScene, Scenario, depth, pose_mm};
 use crate::study::faas::{FIG_35_HZ, TABLE_6};
 use crate::table::rounded;
 use crate::variant::Variant;
@@ -204,7 +206,7 @@ pub fn counts() -> Result<Vec<Count>, LabError> {
         let file = fit(peg, CASES[0].engaged_mm).file()?;
         let model = load_step(file.path())?;
         let options = Variant::textbook(VOXEL_MM).options(Grabbable::Named(vec!["peg".into()]));
-        let named = |source| LabError::Bake {
+        let named = |source| ScenarioError::Bake {
             step: "the pair of table 6".into(),
             source,
         };

@@ -9,6 +9,7 @@ use std::fmt;
 use mortise_bake::SampleFormat;
 use mortise_protocol::message::Refusal;
 use mortise_rig::{EmulatedMode, RigError, RigSpec};
+use mortise_scenario::ScenarioError;
 use serde::Serialize;
 
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
@@ -127,12 +128,12 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
     let instructions = match play(variant, &Fit::thesis(COUNTED_MM), pressed, None, &board) {
         Ok((outcome, _)) => outcome.instructions_per_tick_max,
         // A model too coarse for the fit pushes until the board gives up: it has no cost then.
-        Err(LabError::Fault { .. }) => None,
+        Err(LabError::Scenario(ScenarioError::Fault { .. })) => None,
         // One too large for the board is never looked at there.
-        Err(LabError::Rig(RigError::Refused {
+        Err(LabError::Scenario(ScenarioError::Rig(RigError::Refused {
             reason: Refusal::SceneTooLarge { .. },
             ..
-        })) => None,
+        }))) => None,
         Err(error) => return Err(error),
     };
     let smallest = if looked_for {

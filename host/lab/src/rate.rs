@@ -11,13 +11,15 @@ use mortise_bake::Grabbable;
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_scenario::measure::depth;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{PreparedScene, Recording, Scenario};
 use serde::Serialize;
 
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::fit::Fit;
 use crate::guided::{emulated, inserted, key, known_target, play_to, refreshed};
-use crate::scenario::{PreparedScene, Recording, Scenario, depth, pose_mm};
 use crate::table::rounded;
 use crate::variant::Variant;
 

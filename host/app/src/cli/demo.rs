@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use mortise_lab::scenario::{self, Outcome, Scenario};
 use mortise_rig::{EmulatedMode, RigSpec};
+use mortise_scenario::{Outcome, Scenario};
 
 use super::{Picture, Reading, output};
 use crate::session::Intent;
@@ -54,7 +54,7 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     // The sample's file is removed when this is dropped, after the run.
     let sample = match &args.file {
         Some(_) => None,
-        None => Some(crate::sample::File::write()?),
+        None => Some(mortise_scenario::sample::File::write()?),
     };
     let step = match (&args.file, &sample) {
         (Some(file), _) => file.as_path(),
@@ -62,8 +62,8 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
         (None, None) => anyhow::bail!("there is no file to open"),
     };
     let scenario = Scenario::insertion(step)?;
-    let outcome = scenario::run(&scenario, &rig)?;
-    let verdicts = outcome.verdicts(&scenario);
+    let outcome = mortise_scenario::run(&scenario, &rig)?;
+    let verdicts = outcome.verdicts(&scenario.holds);
     if args.json {
         output::json(&outcome)?;
     } else {

@@ -13,7 +13,7 @@ use mortise_output::{Existing, Folder};
 use mortise_rig::RigSpec;
 
 use super::output;
-use crate::sample;
+use mortise_scenario::sample;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]

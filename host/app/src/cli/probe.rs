@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use mortise_bake::{Method, PointshellKind};
-use mortise_lab::probe::{self, Model, ProbeScene};
+use mortise_scenario::probe::{self, Model, ProbeScene};
 
 use super::{Reading, output};
 
