@@ -60,7 +60,7 @@ const DIAGONAL_CELLS: f32 = 1.733;
 /// pointshell of 5 µm 112,320, points left out in 96 % of the ticks, and 19,100. A peg of 0.7 m
 /// with 0.2 mm clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below
 /// 120,000. Into a fit of 0.02 mm: 123,900 guided, 115,700 by collision alone; 121,580 with four different targets
-/// (`mortise lab figures constraints --quick`).
+/// (`mortise-lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let Some(handle) = usable_pose(&input.handle).filter(|_| usable_twist(&input.handle_twist)) else {

@@ -15,6 +15,7 @@ use serde::Serialize;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::exact_fit::made_from;
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::variant::Variant;
 
@@ -203,6 +204,44 @@ impl fmt::Display for Trial {
         } else {
             write!(f, " ({})", self.why)
         }
+    }
+}
+
+/// The experiment `clearance`.
+pub struct Clearance;
+
+impl Experiment for Clearance {
+    fn name(&self) -> &'static str {
+        "clearance"
+    }
+
+    fn about(&self) -> &'static str {
+        "Find the smallest clearance that assembles, by method and cell"
+    }
+
+    fn quick(&self) -> &'static str {
+        "one cell of each kind"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["clearance"].map(String::from).into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        ["clearance"].map(String::from).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let mut trials = Vec::new();
+        for variant in variants(form.quick) {
+            smallest(&variant, &CLEARANCES_MM, &mut |trial| {
+                report(&trial);
+                trials.push(trial);
+            })?;
+        }
+        Ok(Findings::default()
+            .rows("clearance", &trials)?
+            .chart("clearance", chart(&trials)))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Experiments: the figures the product is measured by, sweeps and studies. Scenarios and probes come from `mortise-scenario`.
 //!
-//! [`figures::figures`] measures every row of a named table.
+//! [`figures::figures`] measures every row of a named table. An [`experiment`] has a name, runs in a whole and a quick form and finds rows and
+//! charts; [`experiments::ALL`] lists them.
 //! [`clearance`] finds the smallest clearance that assembles, [`pareto`] holds accuracy against cost; [`chart`] and [`table`] write what sweeps find.
 //! [`rate`] and [`blend`] show an insertion tick by tick, the thesis' figures or method beside ours; [`study`] repeats its chapter 7.
 //! [`stability`] closes loops on one axis and finds where they become unstable.
@@ -14,6 +15,8 @@ pub mod corpus;
 pub mod endurance;
 mod error;
 mod exact_fit;
+pub mod experiment;
+pub mod experiments;
 pub mod figures;
 pub mod fit;
 mod guided;

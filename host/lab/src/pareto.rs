@@ -15,6 +15,7 @@ use serde::Serialize;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::clearance::{CELLS_MM, CLEARANCES_MM, smallest};
 use crate::error::LabError;
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::motion::{Motion, play};
 use crate::peer;
@@ -272,6 +273,39 @@ impl fmt::Display for Entry {
             write!(f, "; assembles down to {smallest} µm")?;
         }
         Ok(())
+    }
+}
+
+/// The experiment `pareto`.
+pub struct Pareto;
+
+impl Experiment for Pareto {
+    fn name(&self) -> &'static str {
+        "pareto"
+    }
+
+    fn about(&self) -> &'static str {
+        "Hold accuracy against cost: error, smallest clearance, instructions, nanoseconds, bytes"
+    }
+
+    fn quick(&self) -> &'static str {
+        "fewer models"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["pareto"].map(String::from).into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        ["pareto-ticks", "pareto-time"].map(String::from).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let entries = sweep(form.quick, &mut |entry| report(entry))?;
+        Ok(Findings::default()
+            .rows("pareto", &entries)?
+            .chart("pareto-ticks", ticks_chart(&entries))
+            .chart("pareto-time", time_chart(&entries)))
     }
 }
 

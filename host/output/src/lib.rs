@@ -1,4 +1,4 @@
-//! Files written where a user says.
+//! What programs write: files where a user says, results in [`lines`], and how a [`program`] ends.
 //!
 //! An [`Output`] is checked before the work begins and again before it is written. It is never a file that the command reads (the
 //! same file by device and inode, whatever link leads to it), never anything but a regular file (a symbolic link is not followed), and replaces
@@ -10,6 +10,8 @@
 
 mod error;
 mod folder;
+pub mod lines;
+pub mod program;
 mod same;
 
 pub use error::OutputError;

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use mortise_output::lines;
 use mortise_rig::{EmulatedMode, RigSpec};
 use mortise_scenario::{Outcome, Scenario};
 
-use super::{Picture, Reading, output};
+use super::{Picture, Reading};
 use crate::session::Intent;
 use crate::ui::app;
 
@@ -65,11 +66,11 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     let outcome = mortise_scenario::run(&scenario, &rig)?;
     let verdicts = outcome.verdicts(&scenario.holds);
     if args.json {
-        output::json(&outcome)?;
+        lines::json(&outcome)?;
     } else {
         table(&outcome)?;
         for verdict in &verdicts {
-            output::line(&format!("  {verdict}"))?;
+            lines::text(&format!("  {verdict}"))?;
         }
     }
     let holds = verdicts.iter().all(|verdict| verdict.holds);
@@ -85,9 +86,9 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-fn table(outcome: &Outcome) -> anyhow::Result<()> {
+fn table(outcome: &Outcome) -> std::io::Result<()> {
     let millimetres = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |v| format!("{v:.2}"));
-    output::line(&format!(
+    lines::text(&format!(
         "{} on {} ({}): inserted {} of {} mm in {} ticks, {} missed, at most {:.2} N",
         outcome.scenario,
         outcome.rig,
@@ -99,9 +100,9 @@ fn table(outcome: &Outcome) -> anyhow::Result<()> {
         outcome.peak_force_n,
     ))?;
     if let Some(instructions) = outcome.instructions_per_tick_max {
-        output::line(&format!("  dearest tick: {instructions} instructions"))?;
+        lines::text(&format!("  dearest tick: {instructions} instructions"))?;
     }
-    output::line(&format!("  state hash: {}", outcome.state_hash))
+    lines::text(&format!("  state hash: {}", outcome.state_hash))
 }
 
 /// The emulated board when it is there, else in-process, with a word about it.

@@ -28,7 +28,7 @@ pub struct Artefact {
 pub enum Made {
     /// A page: `cargo xtask figures NAME`.
     Page { quick: bool },
-    /// A sweep: `mortise lab NAME --out docs/figures`.
+    /// A sweep: `mortise-lab NAME --out docs/figures`.
     Sweep { quick: bool },
     /// By a person at the window.
     ByHand,
@@ -210,7 +210,7 @@ pub const ARTEFACTS: &[Artefact] = &[
 const WRITTEN: &[&str] = &["sweeps.md", "claims.json", "manifest.json"];
 
 impl Artefact {
-    /// The experiment of `mortise lab`, and the start of its files' names.
+    /// The experiment of `mortise-lab`, and the start of its files' names.
     pub fn experiment(&self) -> &'static str {
         self.name.strip_suffix("-maps").unwrap_or(self.name)
     }
@@ -221,7 +221,7 @@ impl Artefact {
         match self.made {
             Made::Page { quick } => format!("cargo xtask figures {}{}", self.name, option(quick)),
             Made::Sweep { quick } => format!(
-                "mortise lab {}{} --out {FOLDER} --force",
+                "mortise-lab {}{} --out {FOLDER} --force",
                 self.experiment(),
                 option(quick)
             ),
