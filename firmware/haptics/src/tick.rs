@@ -42,8 +42,8 @@ const FASTER: f32 = 2.0;
 /// with a pointshell of 25 µm: 72,900 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s, 19,400 in free motion; with a
 /// pointshell of 5 µm 114,280, points left out in 96 % of the ticks, and 20,020 (`mortise lab figures contact --quick`). A peg of 0.7 m
 /// with 0.2 mm clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below
-/// 120,000. Into a fit of 0.02 mm: 128,300 guided, 119,840 by collision alone (`mortise lab rate --quick`); 121,880 with four different targets
-/// (`mortise lab figures constraints --quick`).
+/// 120,000. Into a fit of 0.02 mm: 128,300 guided, 119,840 by collision alone (`mortise-lab rate --quick`); 121,880 with four different targets
+/// (`mortise-lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();
     let hand = &mut state.hand;

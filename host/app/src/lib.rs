@@ -4,7 +4,6 @@
 //! same without a window.
 
 pub mod cli;
-pub mod sample;
 pub mod session;
 pub mod ui;
 pub mod viewport;

@@ -96,26 +96,6 @@ fn a_killed_bake_leaves_no_half_of_a_file() {
 }
 
 #[test]
-fn tables_and_charts_are_replaced_on_request_only() {
-    let place = tempfile::tempdir().expect("temporary folder");
-    let table = place.path().join("stability-impact.svg");
-    std::fs::write(&table, "mine").expect("written");
-    let sweep = [
-        "lab",
-        "stability",
-        "--quick",
-        "--map",
-        "stability-impact",
-        "--out",
-        ".",
-    ];
-    let output = mortise(place.path(), &sweep);
-    refused(&output, "--force");
-    assert!(output.stdout.is_empty(), "refused before the first trial");
-    assert_eq!(std::fs::read(&table).expect("there"), b"mine");
-}
-
-#[test]
 fn a_picture_is_refused_before_the_window_opens() {
     let place = tempfile::tempdir().expect("temporary folder");
     std::fs::write(place.path().join("x.png"), "mine").expect("written");
@@ -156,11 +136,7 @@ fn every_bad_option_value_is_one_line() {
         (&["bake", SAMPLE, "-o", "q", "--method", "x"], "distance-field"),
         (&["demo", "--rig", "emulated:q"], "emulated:lockstep"),
         (&["demo", "--json"], "--headless"),
-        (&["lab", "figures", "no-such"], "end-to-end"),
-        (&["lab", "stability", "--map", "x"], "stability-jam"),
-        (&["lab", "shrink", "--force"], "--out"),
-        (&["lab", "endurance", "--hours", "-1"], "100 h"),
-        (&["lab", "endurance", "--hours", "nan"], "100 h"),
+        (&["lab", "rate", "--quick"], "`mortise-lab rate --quick`"),
         (&["probe", SAMPLE], "--moving"),
         (&["rig", "show", "--rig", "emulated:q"], "emulated:lockstep"),
         (&["ports", "--jsn"], "--json"),

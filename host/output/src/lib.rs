@@ -1,4 +1,4 @@
-//! Safe output to files that a user names.
+//! What programs write: files where a user says, results in [`lines`], and how a [`program`] ends.
 //!
 //! An [`Output`] is checked before the work begins and again before it is written. It is never a file that the command reads (identified by
 //! device and inode, through any link), never anything but a regular file (a symbolic link is not followed), and replaces an existing file
@@ -10,6 +10,8 @@
 
 mod error;
 mod folder;
+pub mod lines;
+pub mod program;
 mod same;
 
 pub use error::OutputError;

@@ -7,9 +7,9 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use mortise_bake::{BakeOptions, BakeReport, Grabbable, Method, Planned, PointshellKind, Progress, Request};
-use mortise_output::{Existing, Output};
+use mortise_output::{Existing, Output, lines};
 
-use super::{Reading, output, units};
+use super::{Reading, units};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -126,13 +126,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let baked = result.with_context(in_file)?;
     target.write(&baked.image)?;
     if args.json {
-        output::json(&baked.report)?;
+        lines::json(&baked.report)?;
         return Ok(ExitCode::SUCCESS);
     }
     let report = &baked.report;
     print_image(args, report)?;
     for shape in &report.shapes {
-        output::line(&format!(
+        lines::text(&format!(
             "  {}: cells of {:.3} mm, {} bricks, {} points, {} bytes",
             shape.name,
             shape.cell_mm,
@@ -151,8 +151,8 @@ fn clear(terminal: bool) {
     }
 }
 
-fn print_image(args: &Args, report: &BakeReport) -> anyhow::Result<()> {
-    output::line(&format!(
+fn print_image(args: &Args, report: &BakeReport) -> std::io::Result<()> {
+    lines::text(&format!(
         "{}: {} bytes, {} parts, {} shapes",
         args.output.display(),
         report.image_bytes,
@@ -163,7 +163,7 @@ fn print_image(args: &Args, report: &BakeReport) -> anyhow::Result<()> {
 
 fn print_warnings(model: &[String], report: &BakeReport) -> anyhow::Result<()> {
     for warning in model.iter().chain(&report.warnings) {
-        output::line(&format!("  warning: {warning}"))?;
+        lines::text(&format!("  warning: {warning}"))?;
     }
     Ok(())
 }
@@ -186,7 +186,7 @@ fn print_plan(
         ExitCode::FAILURE
     };
     if args.json {
-        output::json(&serde_json::json!({
+        lines::json(&serde_json::json!({
             "met": planned.met,
             "fits": planned.fits,
             "request": request,
@@ -212,14 +212,14 @@ fn print_plan(
                 plan.ticks.first().map_or(0, |tick| tick.cost.instructions)
             )
         };
-        output::line(&format!(
+        lines::text(&format!(
             "{}: {:.3} µm cannot be met; {verdict}. Nothing was written.",
             args.file.display(),
             um(request.accuracy_mm)
         ))?;
     }
     for (shape, made) in plan.shapes.iter().zip(&plan.report.shapes) {
-        output::line(&format!(
+        lines::text(&format!(
             "  {}: cells of {:.3} mm, {:?}, limited by {}; error {:.2} µm in fits ({:.2} field, {:.2} shell), {:.1} µm elsewhere",
             shape.name,
             shape.cell_mm,
@@ -230,7 +230,7 @@ fn print_plan(
             um(shape.shell_error_in_fits_mm),
             um(shape.error_elsewhere_mm),
         ))?;
-        output::line(&format!(
+        lines::text(&format!(
             "    {} points, {} bricks, {} bytes{}{}",
             made.points.iter().sum::<usize>(),
             made.bricks,
@@ -241,7 +241,7 @@ fn print_plan(
     }
     for tick in plan.ticks.iter().take(3) {
         let cost = tick.cost;
-        output::line(&format!(
+        lines::text(&format!(
             "  holding {}: about {} instructions at worst, {} points near, {} touching",
             tick.name, cost.instructions, cost.points, cost.contacts
         ))?;

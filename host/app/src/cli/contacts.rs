@@ -6,9 +6,10 @@ use std::process::ExitCode;
 
 use mortise_brep::{CadModel, LoadOptions};
 use mortise_mating::{Axis, Contact, Tolerances, identify};
+use mortise_output::lines;
 use serde::Serialize;
 
-use super::{Reading, output};
+use super::Reading;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -103,7 +104,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         warnings: &model.warnings,
     };
     if args.json {
-        output::json(&report)?
+        lines::json(&report)?
     } else {
         table(&report)?
     }
@@ -179,7 +180,7 @@ fn axis(axis: &Axis) -> AxisReport {
 fn table(report: &Report<'_>) -> anyhow::Result<()> {
     let plural = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
     let (parts, pairs) = (report.parts.len(), report.contacts.len());
-    output::line(&format!(
+    lines::text(&format!(
         "{}, {}",
         plural(parts, "part"),
         plural(pairs, "pair of surfaces in contact")
@@ -205,13 +206,13 @@ fn table(report: &Report<'_>) -> anyhow::Result<()> {
             um if um < 1e-3 => ", in splines".to_owned(),
             um => format!(", in splines to {um:.3} µm"),
         };
-        output::line(&format!(
+        lines::text(&format!(
             "  {}{times}: {} – {}{diameter}, {size}{fit}",
             pair.kind, pair.a, pair.b
         ))?;
     }
     for warning in report.warnings {
-        output::line(&format!("  warning: {warning}"))?;
+        lines::text(&format!("  warning: {warning}"))?;
     }
     Ok(())
 }

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use mortise_lab::scenario::{self, Outcome, Scenario};
+use mortise_output::lines;
 use mortise_rig::{EmulatedMode, RigSpec};
+use mortise_scenario::{Outcome, Scenario};
 
-use super::{Picture, Reading, output};
+use super::{Picture, Reading};
 use crate::session::Intent;
 use crate::ui::app;
 
@@ -54,7 +55,7 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     // The sample's file is removed when this is dropped, after the run.
     let sample = match &args.file {
         Some(_) => None,
-        None => Some(crate::sample::File::write()?),
+        None => Some(mortise_scenario::sample::File::write()?),
     };
     let step = match (&args.file, &sample) {
         (Some(file), _) => file.as_path(),
@@ -62,14 +63,14 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
         (None, None) => anyhow::bail!("there is no file to open"),
     };
     let scenario = Scenario::insertion(step)?;
-    let outcome = scenario::run(&scenario, &rig)?;
-    let verdicts = outcome.verdicts(&scenario);
+    let outcome = mortise_scenario::run(&scenario, &rig)?;
+    let verdicts = outcome.verdicts(&scenario.holds);
     if args.json {
-        output::json(&outcome)?;
+        lines::json(&outcome)?;
     } else {
         table(&outcome)?;
         for verdict in &verdicts {
-            output::line(&format!("  {verdict}"))?;
+            lines::text(&format!("  {verdict}"))?;
         }
     }
     let holds = verdicts.iter().all(|verdict| verdict.holds);
@@ -85,9 +86,9 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-fn table(outcome: &Outcome) -> anyhow::Result<()> {
+fn table(outcome: &Outcome) -> std::io::Result<()> {
     let millimetres = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |v| format!("{v:.2}"));
-    output::line(&format!(
+    lines::text(&format!(
         "{} on {} ({}): inserted {} of {} mm in {} ticks, {} missed, at most {:.2} N",
         outcome.scenario,
         outcome.rig,
@@ -99,9 +100,9 @@ fn table(outcome: &Outcome) -> anyhow::Result<()> {
         outcome.peak_force_n,
     ))?;
     if let Some(instructions) = outcome.instructions_per_tick_max {
-        output::line(&format!("  dearest tick: {instructions} instructions"))?;
+        lines::text(&format!("  dearest tick: {instructions} instructions"))?;
     }
-    output::line(&format!("  state hash: {}", outcome.state_hash))
+    lines::text(&format!("  state hash: {}", outcome.state_hash))
 }
 
 /// The emulated board when it is there, else in-process, with a word about it.

@@ -1,6 +1,6 @@
 //! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: a figure did not hold, or the insertion was not completed; 2: not possible, with one line on standard error that
+//! Exit code 0: done; 1: the insertion was not completed; 2: not possible, with one line on standard error that
 //! gives the reason.
 
 mod bake;
@@ -9,31 +9,32 @@ mod demo;
 mod inspect;
 mod lab;
 mod mistyped;
-mod output;
 mod ports;
 mod probe;
 mod reading;
 mod rig;
 mod units;
-mod usage;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
-use mortise_output::{Existing, Output};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
+use mortise_output::{Existing, Output, program};
 use mortise_rig::RigSpec;
 
 use crate::session::Intent;
 use crate::ui::app::{self, Options, Screenshot};
 use reading::Reading;
 
+/// Name of the program.
+const NAME: &str = "mortise";
+
 /// Feel whether CAD parts go together, before anything is made.
 ///
 /// Without a command the window opens.
 #[derive(Debug, Parser)]
-#[command(name = "mortise", version, args_conflicts_with_subcommands = true)]
+#[command(name = NAME, version, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -51,7 +52,8 @@ enum Command {
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
     Demo(demo::Args),
-    /// Run experiments and measure figures
+    /// Experiments and figures: the program `mortise-lab`
+    #[command(hide = true)]
     Lab(lab::Args),
     /// Measure gap, depth and contact forces at given poses of one part
     Probe(probe::Args),
@@ -115,7 +117,7 @@ impl Picture {
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return usage::tell(&error),
+        Err(error) => return program::usage(NAME, &error, Cli::command()),
     };
     let result = match cli {
         Cli { command: None, open } => {
@@ -140,28 +142,7 @@ pub fn main() -> ExitCode {
             Command::Rig(args) => rig::run(&args),
         },
     };
-    match result {
-        Ok(code) => code,
-        Err(error) if output::is_closed(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("mortise: {}", one_line(&error));
-            ExitCode::from(2)
-        }
-    }
-}
-
-/// An error with its causes in one line; a cause that the message before it already contains is omitted.
-fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain() {
-        let text = cause.to_string().replace('\n', " ");
-        if line.is_empty() {
-            line = text;
-        } else if !line.contains(&text) {
-            line = format!("{line}: {text}");
-        }
-    }
-    line
+    program::end(NAME, result)
 }
 
 fn window(open: Open) -> anyhow::Result<ExitCode> {
@@ -175,20 +156,4 @@ fn window(open: Open) -> anyhow::Result<ExitCode> {
 fn rig(text: &str) -> Result<RigSpec, String> {
     text.parse()
         .map_err(|error: mortise_rig::SpecError| error.to_string())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_error_is_one_line_that_tells_each_cause_once() {
-        let cause = anyhow::anyhow!("no room\non the disk");
-        let error = cause.context("cannot write x: no room on the disk");
-        assert_eq!(one_line(&error), "cannot write x: no room on the disk");
-        assert_eq!(
-            one_line(&told.context("baking")),
-            "baking: cannot write x: no room on the disk"
-        );
-    }
 }

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use mortise_bake::{Method, PointshellKind};
-use mortise_lab::probe::{self, Model, ProbeScene};
+use mortise_output::lines;
+use mortise_scenario::probe::{self, Model, ProbeScene};
 
-use super::{Reading, output};
+use super::Reading;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -67,9 +68,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     for pose in &poses {
         let row = scene.probe(pair, pose)?;
         if args.json {
-            output::json(&row)?;
+            lines::json(&row)?;
         } else {
-            output::line(&row.to_string())?;
+            lines::text(&row.to_string())?;
         }
     }
     Ok(ExitCode::SUCCESS)

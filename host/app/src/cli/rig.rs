@@ -4,10 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Subcommand;
+use mortise_output::lines;
 use mortise_protocol::message::{DeviceState, ToDevice};
 use mortise_rig::{Abilities, Client, RigSpec, abilities, load_rig, write_rig};
-
-use super::output;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -52,7 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 anyhow::bail!("{}: cannot work in its home pose", file.display());
             };
             if *json {
-                output::json(&found)?;
+                lines::json(&found)?;
             } else {
                 print(&found)?;
             }
@@ -67,7 +66,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let client = client.restart()?;
             match client.rig()? {
                 (Some(kept), true) if kept == rig => {
-                    output::line(&sent(spec, &client, &rig.name))?;
+                    lines::text(&sent(spec, &client, &rig.name))?;
                 }
                 _ => anyhow::bail!("the board does not use the description that was sent: send it again"),
             }
@@ -75,7 +74,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Action::Show { rig: spec } => {
             let client = Client::connect(spec)?;
             match client.rig()? {
-                (Some(rig), _) => output::line(write_rig(&rig).trim_end())?,
+                (Some(rig), _) => lines::text(write_rig(&rig).trim_end())?,
                 (None, _) if is_volatile(spec) => anyhow::bail!(
                     "{} keeps no description: it runs inside this program and ends with it, so a description from `mortise rig send` is lost; a rig on a serial port keeps its own",
                     client.name()
@@ -130,7 +129,7 @@ fn print(found: &Abilities) -> anyhow::Result<()> {
         format!("  friction: at most {:.2} N at the handle", found.friction_n),
         format!("  fastest encoder: {:.0} counts in a tick", found.counts_per_tick),
     ] {
-        output::line(&line)?;
+        lines::text(&line)?;
     }
     Ok(())
 }

@@ -77,9 +77,14 @@ impl Document {
     /// # Errors
     /// The sample cannot be written to the folder for temporary files, or not be read.
     pub fn sample(generation: u64, cancel: &AtomicBool) -> anyhow::Result<Self> {
-        let file = crate::sample::File::write().context("the sample could not be unpacked")?;
+        let file = mortise_scenario::sample::File::write().context("the sample could not be unpacked")?;
         let model = load_step_until(file.path(), &LoadOptions::default(), cancel)?;
-        Ok(Self::of(model, None, crate::sample::NAME.to_owned(), generation))
+        Ok(Self::of(
+            model,
+            None,
+            mortise_scenario::sample::NAME.to_owned(),
+            generation,
+        ))
     }
 
     /// The document of a model.

@@ -75,6 +75,41 @@ const LAYERS: &[(&str, &[&str])] = &[
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],
     ),
+    (
+        "host/scenario",
+        &[
+            "mortise-bake",
+            "mortise-brep",
+            "mortise-firmware",
+            "mortise-guide",
+            "mortise-haptics",
+            "mortise-protocol",
+            "mortise-rig",
+        ],
+    ),
+    // Experiments are a program of their own.
+    (
+        "host/app",
+        &[
+            "mortise-bake",
+            "mortise-brep",
+            "mortise-guide",
+            "mortise-mating",
+            "mortise-output",
+            "mortise-protocol",
+            "mortise-rig",
+            "mortise-scenario",
+        ],
+    ),
+    (
+        "hil-tests",
+        &[
+            "mortise-brep",
+            "mortise-protocol",
+            "mortise-rig",
+            "mortise-scenario",
+        ],
+    ),
 ];
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -23,11 +23,11 @@ use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::{CostUnit, DeviceState, Fault, FromDevice, ResetReason, ToDevice, Version};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::describe;
+use mortise_scenario::{PreparedScene, Scenario};
 use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
-use crate::scenario::{PreparedScene, Scenario};
 
 /// Ticks within which motors must be off or fading, the one that sees the fault counted.
 const WITHIN_TICKS: u32 = 2;

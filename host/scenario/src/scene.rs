@@ -10,10 +10,8 @@ use mortise_bake::{
 use mortise_brep::{CadModel, load_step};
 use mortise_guide::{Guide, GuideSettings};
 
-use super::Scenario;
-use crate::error::LabError;
-use crate::exact_fit::ExactFit;
-use crate::fit::Fit;
+use crate::error::ScenarioError;
+use crate::scenario::Scenario;
 
 /// Chord error of the points that penetration is measured at, as a share of the part's radius: 5 µm on a part of 100 mm, a tenth of the 0.05 mm that
 /// matter there.
@@ -32,19 +30,25 @@ pub struct PreparedScene {
     /// Index of the part to grab, in the image.
     pub part: u16,
     bodies: Vec<Body>,
-    /// Its two parts in closed form, where they are a peg and a block.
-    closed_form: Option<ExactFit>,
+    /// Its penetration in closed form, where that is known.
+    closed_form: Option<ClosedForm>,
 }
 
+/// Deepest point of either of two solids inside the other, mm, with the moving part's shape at a pose (mm, world); 0 when nowhere inside.
+pub type ClosedForm = Box<dyn Fn(&DAffine3) -> f64 + Send + Sync>;
+
 /// A part as measuring sees it.
-pub(crate) struct Body {
-    pub(crate) surface: ExactSurface,
+pub struct Body {
+    /// Its exact surface, shape frame, mm.
+    pub surface: ExactSurface,
     /// Points on its surface, shape frame, mm.
-    pub(crate) points: Vec<DVec3>,
-    /// Sphere about it, shape frame, mm.
-    pub(crate) center: DVec3,
-    pub(crate) radius: f64,
-    pub(crate) placement: DAffine3,
+    pub points: Vec<DVec3>,
+    /// Centre of a sphere about it, shape frame, mm.
+    pub center: DVec3,
+    /// The sphere's radius, mm.
+    pub radius: f64,
+    /// Shape to world where the file places it, mm.
+    pub placement: DAffine3,
 }
 
 impl PreparedScene {
@@ -52,7 +56,7 @@ impl PreparedScene {
     ///
     /// # Errors
     /// `Brep`, `Bake`, `NoSuchPart`.
-    pub fn of(scenario: &Scenario) -> Result<Self, LabError> {
+    pub fn of(scenario: &Scenario) -> Result<Self, ScenarioError> {
         let options = BakeOptions {
             method: scenario.scene.method,
             shell: scenario.scene.pointshell(),
@@ -67,26 +71,26 @@ impl PreparedScene {
     ///
     /// # Errors
     /// As [`Self::of`].
-    pub fn with(scenario: &Scenario, options: &BakeOptions) -> Result<Self, LabError> {
+    pub fn with(scenario: &Scenario, options: &BakeOptions) -> Result<Self, ScenarioError> {
         let model = load_step(&scenario.scene.step)?;
         Self::bake(&scenario.scene.step, model, &scenario.scene.part, options)
     }
 
-    fn bake(step: &Path, model: CadModel, part: &str, options: &BakeOptions) -> Result<Self, LabError> {
+    fn bake(step: &Path, model: CadModel, part: &str, options: &BakeOptions) -> Result<Self, ScenarioError> {
         let name = || step.display().to_string();
         if !model.parts.iter().any(|known| known.name == part) {
             let known: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
-            return Err(LabError::NoSuchPart {
+            return Err(ScenarioError::NoSuchPart {
                 step: name(),
                 part: part.to_owned(),
                 known: known.join(", "),
             });
         }
         let baked = bake(&model, options, &|_| ControlFlow::Continue(()))
-            .map_err(|source| LabError::Bake { step: name(), source })?;
+            .map_err(|source| ScenarioError::Bake { step: name(), source })?;
         let index = baked.report.parts.iter().position(|baked| baked.name == part);
         let Some(index) = index.and_then(|index| u16::try_from(index).ok()) else {
-            return Err(LabError::NoSuchPart {
+            return Err(ScenarioError::NoSuchPart {
                 step: name(),
                 part: part.to_owned(),
                 known: "parts, but this one has no surface".into(),
@@ -105,24 +109,23 @@ impl PreparedScene {
         })
     }
 
-    /// The same, known to be made from `fit`: penetration is then measured in closed form.
-    pub(crate) fn made_from(self, fit: Fit) -> Self {
-        let exact = self.exact_fit(fit);
+    /// The same with its penetration in closed form, which is then what runs measure.
+    pub fn with_closed_form(self, closed_form: ClosedForm) -> Self {
         Self {
-            closed_form: Some(exact),
+            closed_form: Some(closed_form),
             ..self
         }
     }
 
-    /// The peg and the hole of `fit`, from which this scene was made, in closed form.
-    pub(crate) fn exact_fit(&self, fit: Fit) -> ExactFit {
-        let placed = self.bodies.get(usize::from(self.part)).map(|part| part.placement);
-        ExactFit::new(fit, placed.unwrap_or_default())
+    /// See [`Self::with_closed_form`].
+    pub(crate) fn closed_form(&self) -> Option<&ClosedForm> {
+        self.closed_form.as_ref()
     }
 
-    /// See [`Self::made_from`].
-    pub(crate) fn closed_form(&self) -> Option<&ExactFit> {
-        self.closed_form.as_ref()
+    /// Where the file places the moving part: its shape to world, mm.
+    pub fn placement(&self) -> DAffine3 {
+        let part = self.bodies.get(usize::from(self.part));
+        part.map(|part| part.placement).unwrap_or_default()
     }
 
     /// What recognises and sends constraints in this scene.
@@ -131,12 +134,13 @@ impl PreparedScene {
         Guide::new(&self.model, parts, settings)
     }
 
-    pub(crate) fn bodies(&self) -> &[Body] {
+    /// Its parts, in the image's order.
+    pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
 
     /// Index in the image of the part named so.
-    pub(crate) fn part_named(&self, name: &str) -> Option<usize> {
+    pub fn part_named(&self, name: &str) -> Option<usize> {
         self.report.parts.iter().position(|part| part.name == name)
     }
 }

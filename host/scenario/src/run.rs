@@ -1,25 +1,20 @@
 //! Playing a scenario on a rig.
 
-use glam::{DQuat, DVec3};
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{
-    Capabilities, CostUnit, DeviceState, Fault, FromDevice, HandScript, Keyframe, Statistics, Telemetry,
-    ToDevice, WirePose, flag,
+    Capabilities, CostUnit, DeviceState, Fault, FromDevice, Statistics, Telemetry, ToDevice, flag,
 };
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe};
 
-use super::measure::Felt;
-use super::outcome::Outcome;
-use super::scene::PreparedScene;
-use super::{Hand, Key, Scenario, measure, overlap, parameter_named, truth};
-use crate::error::LabError;
+use crate::error::ScenarioError;
+use crate::hand::{REACH_TICKS, REST_TICKS, TICK_HZ, reach, script};
+use crate::measure::Felt;
+use crate::outcome::Outcome;
+use crate::scenario::{Scenario, parameter_named};
+use crate::scene::PreparedScene;
+use crate::{measure, overlap, truth, wire};
 
-/// Ticks in a second of every simulated rig.
-const TICK_HZ: f64 = 1000.0;
-/// Ticks in which the hand brings the handle to the grip, and in which it comes to rest there.
-pub(super) const REACH_TICKS: u32 = 300;
-pub(super) const REST_TICKS: u32 = 200;
 /// Ticks asked for at once: bounds the telemetry that waits, and the time until a fault is seen.
 const BATCH_TICKS: u32 = 500;
 /// Ticks after disarming in which the wrench fades out.
@@ -28,8 +23,8 @@ const FADE_TICKS: u32 = 150;
 /// Reads, bakes and plays `scenario` on the rig `spec`, in lockstep, and measures.
 ///
 /// # Errors
-/// Everything [`LabError`] lists but `NoSuchFigures`. A bound that does not hold is not an error: see [`Outcome::verdicts`].
-pub fn run(scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
+/// Everything [`ScenarioError`] lists but `NoSuchFigures`. A bound that does not hold is not an error: see [`Outcome::verdicts`].
+pub fn run(scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError> {
     let scene = PreparedScene::of(scenario)?;
     let client = connect(scenario, spec)?;
     run_on(&client, scenario, &scene)
@@ -39,7 +34,7 @@ pub fn run(scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
 ///
 /// # Errors
 /// `Rig`.
-pub fn connect(scenario: &Scenario, spec: &RigSpec) -> Result<Client, LabError> {
+pub fn connect(scenario: &Scenario, spec: &RigSpec) -> Result<Client, ScenarioError> {
     let spec = spec.lockstep();
     Ok(match scenario.faults {
         Some(_) => Client::connect_with_faults(&spec)?,
@@ -51,7 +46,7 @@ pub fn connect(scenario: &Scenario, spec: &RigSpec) -> Result<Client, LabError> 
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_on(client: &Client, scenario: &Scenario, scene: &PreparedScene) -> Result<Outcome, LabError> {
+pub fn run_on(client: &Client, scenario: &Scenario, scene: &PreparedScene) -> Result<Outcome, ScenarioError> {
     if !scenario.run.guidance {
         return Ok(record(client, scenario, scene, None)?.outcome);
     }
@@ -71,7 +66,7 @@ pub struct Recording {
     /// Every sample the board sent from the hand's start on, also those a faulty link lost.
     pub samples: Vec<Telemetry>,
     /// The same handle and wrench for each: of its true motion where [`Outcome::energy_exact`], else as the board tells it.
-    pub(crate) felt: Vec<Felt>,
+    pub felt: Vec<Felt>,
     /// What the link did to the frames.
     pub faults: FaultCounts,
 }
@@ -85,10 +80,10 @@ pub fn record(
     scenario: &Scenario,
     scene: &PreparedScene,
     listener: Option<&mut Listener<'_>>,
-) -> Result<Recording, LabError> {
+) -> Result<Recording, ScenarioError> {
     let capabilities = client.capabilities();
     if !capabilities.simulated {
-        return Err(LabError::NeedsSimulatedHand {
+        return Err(ScenarioError::NeedsSimulatedHand {
             rig: client.name().to_owned(),
             scenario: scenario.name.clone(),
         });
@@ -138,9 +133,9 @@ pub fn record(
 }
 
 /// The line the scenario's faults are for.
-fn line_of<'c>(client: &'c Client, scenario: &Scenario) -> Result<Option<&'c FaultLine>, LabError> {
+fn line_of<'c>(client: &'c Client, scenario: &Scenario) -> Result<Option<&'c FaultLine>, ScenarioError> {
     match (&scenario.faults, client.fault_line()) {
-        (Some(_), None) => Err(LabError::Scenario {
+        (Some(_), None) => Err(ScenarioError::Scenario {
             name: scenario.name.clone(),
             what: "it has [faults], but the connection is one without: connect with faults".into(),
         }),
@@ -163,7 +158,7 @@ struct Play<'c> {
 
 impl Play<'_> {
     /// Takes the samples the board sent, whatever became of them, and faults it told of.
-    fn overheard(&mut self, line: &FaultLine) -> Result<(), LabError> {
+    fn overheard(&mut self, line: &FaultLine) -> Result<(), ScenarioError> {
         self.samples.clear();
         for told in line.overheard() {
             match told {
@@ -176,17 +171,17 @@ impl Play<'_> {
     }
 
     /// A fault is an error unless the scenario makes it.
-    fn faulted(&mut self, tick: u32, fault: Fault) -> Result<(), LabError> {
+    fn faulted(&mut self, tick: u32, fault: Fault) -> Result<(), ScenarioError> {
         if !self.expected {
             let what = describe(fault);
-            return Err(LabError::Fault { tick, what });
+            return Err(ScenarioError::Fault { tick, what });
         }
         self.fault.get_or_insert((tick, fault));
         Ok(())
     }
 
     /// Scene on the board, parameters set, handle at the grip, part in hand.
-    fn prepare(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<(), LabError> {
+    fn prepare(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<(), ScenarioError> {
         let client = self.client;
         // An earlier run may have left it stopped.
         if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
@@ -215,7 +210,7 @@ impl Play<'_> {
         scenario: &Scenario,
         line: Option<&FaultLine>,
         listener: Option<&mut Listener<'_>>,
-    ) -> Result<Ran, LabError> {
+    ) -> Result<Ran, ScenarioError> {
         let client = self.client;
         client.statistics(true)?;
         let every_ticks = scenario.run.telemetry_every_ticks;
@@ -225,7 +220,7 @@ impl Play<'_> {
         if let (Some(line), Some(faults)) = (line, &scenario.faults) {
             if self.expected {
                 self.begun = client.run(0)?.tick;
-                let inputs = faults.input_message().map_err(|what| LabError::Scenario {
+                let inputs = faults.input_message().map_err(|what| ScenarioError::Scenario {
                     name: scenario.name.clone(),
                     what: format!("faults.{what}"),
                 })?;
@@ -245,7 +240,7 @@ impl Play<'_> {
     }
 
     /// Sends a parameter each `every` ticks.
-    fn loaded(&mut self, scenario: &Scenario, ticks: u32, every: u32) -> Result<Ran, LabError> {
+    fn loaded(&mut self, scenario: &Scenario, ticks: u32, every: u32) -> Result<Ran, ScenarioError> {
         let client = self.client;
         // The limit goes to and fro well above the forces that occur, so that each message changes a setting and none the outcome.
         let id = ParameterId::ForceLimit;
@@ -269,7 +264,7 @@ impl Play<'_> {
         // All of them arrived when the last did: they are taken in order.
         let found = client.parameter(id)?;
         if found != value {
-            return Err(LabError::Scenario {
+            return Err(ScenarioError::Scenario {
                 name: scenario.name.clone(),
                 what: format!(
                     "ForceLimit is {found} after {} messages, the last said {value}",
@@ -287,7 +282,7 @@ impl Play<'_> {
         ticks: u32,
         every: u32,
         faulty: bool,
-    ) -> Result<Ran, LabError> {
+    ) -> Result<Ran, ScenarioError> {
         let mut left = ticks;
         loop {
             let batch = left.min(every);
@@ -314,7 +309,7 @@ impl Play<'_> {
     }
 
     /// Lets ticks run, in batches, and takes what the board says meanwhile.
-    fn run(&mut self, ticks: u32) -> Result<Ran, LabError> {
+    fn run(&mut self, ticks: u32) -> Result<Ran, ScenarioError> {
         let mut left = ticks;
         loop {
             let batch = left.min(BATCH_TICKS);
@@ -327,7 +322,7 @@ impl Play<'_> {
         }
     }
 
-    fn listen(&mut self) -> Result<(), LabError> {
+    fn listen(&mut self) -> Result<(), ScenarioError> {
         let client = self.client;
         for event in client.events().try_iter() {
             match event {
@@ -338,55 +333,6 @@ impl Play<'_> {
         }
         Ok(())
     }
-}
-
-fn wire_pose(position_mm: DVec3, orientation: DQuat) -> WirePose {
-    WirePose {
-        position: (1e-3 * position_mm).as_vec3().to_array(),
-        orientation: orientation.as_quat().to_array(),
-    }
-}
-
-fn with_keyframes(hand: &Hand, keyframes: impl Iterator<Item = Keyframe>) -> HandScript {
-    HandScript {
-        stiffness: hand.stiffness_n_per_m,
-        damping: hand.damping_n_s_per_m,
-        angular_stiffness: hand.angular_stiffness_n_m_per_rad,
-        angular_damping: hand.angular_damping_n_m_s_per_rad,
-        tremor: (1e-3 * hand.tremor_mm) as f32,
-        tremor_hz: hand.tremor_hz,
-        keyframes: keyframes.collect(),
-    }
-}
-
-/// From where a simulated handle starts (the world's origin) to the grip, without tremor.
-pub(super) fn reach(hand: &Hand) -> HandScript {
-    let keyframe = |tick, position_mm| Keyframe {
-        tick,
-        pose: wire_pose(position_mm, DQuat::IDENTITY),
-        push: [0.0; 3],
-    };
-    let way = [
-        keyframe(0, DVec3::ZERO),
-        keyframe(REACH_TICKS, DVec3::from_array(hand.grip_mm)),
-    ];
-    HandScript {
-        tremor: 0.0,
-        ..with_keyframes(hand, way.into_iter())
-    }
-}
-
-pub(super) fn script(hand: &Hand) -> HandScript {
-    let grip = DVec3::from_array(hand.grip_mm);
-    let keyframe = |key: &Key| Keyframe {
-        tick: (key.t_s * TICK_HZ).round() as u32,
-        pose: wire_pose(
-            grip + DVec3::from_array(key.offset_mm),
-            DQuat::from_scaled_axis(DVec3::from_array(key.turn_deg.map(f64::to_radians))),
-        ),
-        push: key.push_n,
-    };
-    with_keyframes(hand, hand.keyframes.iter().map(keyframe))
 }
 
 fn outcome(
@@ -405,7 +351,7 @@ fn outcome(
     let settled = &samples[samples.len().saturating_sub(settled_count as usize)..];
     let last = samples.iter().rev().find_map(|sample| sample.object.as_ref());
     let depth = (scenario.depth.as_ref().zip(last))
-        .and_then(|(depth, (_, pose))| measure::depth(scene, depth, &measure::pose_mm(pose)));
+        .and_then(|(depth, (_, pose))| measure::depth(scene, depth, &wire::pose_mm(pose)));
     let press = scenario
         .press
         .as_ref()
@@ -433,7 +379,7 @@ fn outcome(
         press_handle_n: press.map(|(handle, _)| handle),
         press_hand_n: press.map(|(_, hand)| hand),
         press_error_percent: press.map(|(handle, hand)| 100.0 * (handle - hand).abs() / hand.abs().max(1e-9)),
-        penetration_mm: overlap::deepest(scene, samples),
+        penetration_mm: overlap::penetration_mm(scene, samples),
         board_penetration_mm: measure::board_deepest(samples),
         contact_impulse_ns: impulse.contact_ns,
         peak_contact_n: impulse.contact_peak_n,

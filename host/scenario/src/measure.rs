@@ -4,27 +4,14 @@ use glam::{DAffine3, DQuat, DVec3};
 use mortise_haptics::{Settings, Twist};
 use mortise_protocol::message::{Telemetry, WirePose, WireWrench};
 
-use super::scene::{Body, PreparedScene};
-use super::{Depth, Press};
 use crate::port::Port;
-
-/// A wire pose in millimetres.
-pub(crate) fn pose_mm(pose: &WirePose) -> DAffine3 {
-    let [x, y, z] = pose.position.map(f64::from);
-    let [i, j, k, w] = pose.orientation.map(f64::from);
-    DAffine3::from_rotation_translation(
-        DQuat::from_xyzw(i, j, k, w).normalize(),
-        1e3 * DVec3::new(x, y, z),
-    )
-}
-
-pub(super) fn vector(v: [f32; 3]) -> DVec3 {
-    DVec3::from_array(v.map(f64::from))
-}
+use crate::scenario::{Depth, Press};
+use crate::scene::{Body, PreparedScene};
+use crate::wire::{pose_mm, vector};
 
 /// Largest force commanded from the second tick after the one in which a fault was seen, N. A sample carries the ticks that are done: its own is one
 /// less.
-pub(crate) fn force_after(samples: &[Telemetry], fault_tick: u32) -> f64 {
+pub fn force_after(samples: &[Telemetry], fault_tick: u32) -> f64 {
     (samples.iter())
         .filter(|sample| sample.tick > fault_tick + 2)
         .map(|sample| vector(sample.wrench.force).length())
@@ -32,7 +19,7 @@ pub(crate) fn force_after(samples: &[Telemetry], fault_tick: u32) -> f64 {
 }
 
 /// How far the moving part is in, mm, the hole's depth, and how far off the axis its centre of mass is.
-pub(crate) fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<(f64, f64, f64)> {
+pub fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<(f64, f64, f64)> {
     let axis = DVec3::from_array(depth.axis).try_normalize()?;
     let fixed = scene.bodies().get(scene.part_named(&depth.fixed)?)?;
     let part = scene.bodies().get(usize::from(scene.part))?;
@@ -51,13 +38,13 @@ pub(crate) fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> 
 }
 
 /// Deepest penetration as the board told it, mm.
-pub(crate) fn board_deepest(samples: &[Telemetry]) -> f64 {
+pub fn board_deepest(samples: &[Telemetry]) -> f64 {
     let depths = samples.iter().filter_map(|sample| sample.pairs.first());
     depths.map(|pair| 1e3 * f64::from(pair.depth)).fold(0.0, f64::max)
 }
 
 /// Means over the settled samples of the handle's reaction and of the hand's force along the press direction, N.
-pub(crate) fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> {
+pub fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> {
     let direction = DVec3::from_array(press.direction).try_normalize()?;
     let forces: Vec<(f64, f64)> = settled
         .iter()
@@ -81,7 +68,7 @@ pub(crate) fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> 
 
 /// What contacts did to the object and the handle to the hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Impulse {
+pub struct Impulse {
     /// ∫|contact force| dt, N s.
     pub contact_ns: f64,
     /// Largest contact force, N.
@@ -92,7 +79,7 @@ pub(crate) struct Impulse {
 }
 
 /// Impulses over samples, each of which stands for the time since the one before.
-pub(crate) fn impulse(samples: &[Telemetry]) -> Impulse {
+pub fn impulse(samples: &[Telemetry]) -> Impulse {
     let mut found = Impulse::default();
     let mut lost = DVec3::ZERO;
     for pair in samples.windows(2) {
@@ -107,7 +94,7 @@ pub(crate) fn impulse(samples: &[Telemetry]) -> Impulse {
 }
 
 /// Most work done on the object over any interval, mJ. Nothing counts as stored: what the springs of contacts and targets give back counts as made.
-pub(crate) struct ObjectEnergy {
+pub struct ObjectEnergy {
     /// By contacts.
     pub contact_mj: f64,
     /// By contacts and targets together: through the whole port between the object and what constrains it.
@@ -115,7 +102,7 @@ pub(crate) struct ObjectEnergy {
 }
 
 /// See [`ObjectEnergy`]. The wrenches of a tick, taken at its end, moved the object to the pose told with them.
-pub(crate) fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> ObjectEnergy {
+pub fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> ObjectEnergy {
     let (mut contacts, mut both) = (Port::default(), Port::default());
     let center = center_of_mass(scene);
     for pair in samples.windows(2) {
@@ -147,7 +134,7 @@ fn center_of_mass(scene: &PreparedScene) -> DVec3 {
 }
 
 /// Rotation vector from one pose to another, world axes.
-fn turn(from: &DAffine3, to: &DAffine3) -> DVec3 {
+pub(crate) fn turn(from: &DAffine3, to: &DAffine3) -> DVec3 {
     let rotation = |pose: &DAffine3| DQuat::from_mat3(&pose.matrix3);
     (rotation(to) * rotation(from).inverse())
         .normalize()
@@ -165,9 +152,12 @@ fn share_of_first(from_tick: u32, to_tick: u32) -> f64 {
 
 /// The handle at the start of a tick, and the wrench held from there on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Felt {
+pub struct Felt {
+    /// The tick.
     pub tick: u32,
+    /// Pose of the handle, world.
     pub handle: WirePose,
+    /// On the handle.
     pub wrench: WireWrench,
     /// The motion the law was told; `None` where it is not known.
     pub twist: Option<Twist>,
@@ -190,7 +180,7 @@ impl Felt {
 /// between two samples is not seen. `felt` has an entry for each of `samples`.
 ///
 /// What counts as stored: see [`Coupled::stored_mj`].
-pub(crate) fn energy(
+pub fn energy(
     scene: &PreparedScene,
     settings: &Settings,
     samples: &[Telemetry],
@@ -217,16 +207,16 @@ pub(crate) fn energy(
 }
 
 /// The part in the hand.
-struct Coupled<'a> {
+pub(crate) struct Coupled<'a> {
     settings: &'a Settings,
     /// Centre of mass in the handle's frame as the part was grabbed, and in its own, m.
     lever: DVec3,
-    center: DVec3,
+    pub(crate) center: DVec3,
 }
 
 impl<'a> Coupled<'a> {
     /// `None` where no sample has a part in hand.
-    fn new(scene: &PreparedScene, settings: &'a Settings, samples: &[Telemetry]) -> Option<Self> {
+    pub(crate) fn new(scene: &PreparedScene, settings: &'a Settings, samples: &[Telemetry]) -> Option<Self> {
         let grabbed = samples.iter().find(|sample| sample.object.is_some())?;
         let center = 1e-3 * center_of_mass(scene);
         let (_, object) = grabbed.object.as_ref()?;
@@ -250,7 +240,7 @@ impl<'a> Coupled<'a> {
     ///
     /// d by the encoders' reading, to which is added what they rounded off. What is left out makes what is given too large: the energy of turning, and
     /// what a wrench beyond the coupling's limits, or taken down after the coupling, does not show of the stretch.
-    fn stored_mj(&self, samples: &[Telemetry], felt: &Felt) -> Option<f64> {
+    pub(crate) fn stored_mj(&self, samples: &[Telemetry], felt: &Felt) -> Option<f64> {
         let [a, b, c] = samples else {
             return None;
         };
@@ -293,58 +283,8 @@ impl<'a> Coupled<'a> {
 }
 
 /// A wire pose in metres.
-fn meters(pose: &WirePose) -> DAffine3 {
+pub(crate) fn meters(pose: &WirePose) -> DAffine3 {
     let mut pose = pose_mm(pose);
     pose.translation *= 1e-3;
     pose
-}
-
-#[cfg(test)]
-mod tests {
-    use mortise_rig::RigSpec;
-
-    use super::super::{Scenario, connect, record};
-    use super::*;
-
-    /// In a hand in which nothing slips the stretch is known from the poses as well, however the hand moves: from the handle's true pose and the
-    /// object's at the tick's start.
-    #[test]
-    fn what_is_stored_is_what_the_poses_say_where_nothing_slips() {
-        let text = include_str!("../../../../hil-tests/scenarios/press_flat_5n.toml");
-        let mut scenario = Scenario::parse(text, "press").expect("a scenario");
-        let pair = concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../app/samples/pair_d18.75_clear1.00.step"
-        );
-        scenario.scene.step = pair.into();
-        scenario.run.telemetry_every_ticks = 1;
-        let scene = PreparedScene::of(&scenario).expect("baked");
-        let client = connect(&scenario, &RigSpec::Simulated { realtime: false }).expect("connected");
-        let recording = record(&client, &scenario, &scene, None).expect("played");
-        let (samples, felt) = (&recording.samples, &recording.felt);
-        let settings = scenario.settings();
-        let coupled = Coupled::new(&scene, &settings, samples).expect("in hand");
-        let [k, k_r] = [settings.coupling.k_t_n_per_m, settings.coupling.k_r].map(f64::from);
-        let grabbed = |sample: &Telemetry| meters(&sample.object.as_ref().expect("in hand").1);
-        let offset = meters(&samples[0].handle).inverse() * grabbed(&samples[0]);
-        let (mut most, mut worst) = (0.0f64, 0.0f64);
-        // Behind the ramp after the grab, in which a part slips.
-        for (three, felt) in samples.windows(3).zip(&felt[2..]).skip(200) {
-            let place = meters(&felt.handle) * offset;
-            let [before, at] = [grabbed(&three[0]), grabbed(&three[1])];
-            let center = |pose: &DAffine3| pose.transform_point3(coupled.center);
-            let speed = 1e3 * (center(&at) - center(&before));
-            let exact = 0.5
-                * (k * (center(&place) - center(&at)).length_squared()
-                    + k_r * turn(&at, &place).length_squared()
-                    + f64::from(settings.object.mass_kg) * speed.length_squared());
-            let found = coupled.stored_mj(three, felt).expect("neighbours");
-            most = most.max(1e3 * exact);
-            worst = worst.max((found - 1e3 * exact).abs());
-        }
-        println!("up to {most} mJ stored, found to {worst} mJ");
-        // 5 N on 1 N/mm store 12.5 mJ. How the hand holds the part is taken from the readings of the first sample, to a count: 5 µm by 5 N.
-        assert!(most > 12.0, "{most} mJ");
-        assert!(worst < 25e-3, "{worst} mJ of {most} mJ");
-    }
 }

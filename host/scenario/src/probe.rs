@@ -17,7 +17,7 @@ use mortise_haptics::{Flags, Pose, Prober, Quat, Settings, Vec3};
 use mortise_protocol::image::{MAGIC, NO_FACE, SceneImage};
 use serde::Serialize;
 
-use crate::error::LabError;
+use crate::error::ScenarioError;
 
 /// Columns a file of poses must have, in any order.
 pub const COLUMNS: [&str; 8] = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"];
@@ -48,12 +48,12 @@ pub struct NamedPose {
 ///
 /// # Errors
 /// `Unreadable`; `Input` with the line and what is wrong in it.
-pub fn read_poses(path: &Path) -> Result<Vec<NamedPose>, LabError> {
-    let text = std::fs::read_to_string(path).map_err(|source| LabError::Unreadable {
+pub fn read_poses(path: &Path) -> Result<Vec<NamedPose>, ScenarioError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Unreadable {
         path: path.to_owned(),
         source,
     })?;
-    parse_poses(&text).map_err(|(line, what)| LabError::Input {
+    parse_poses(&text).map_err(|(line, what)| ScenarioError::Input {
         name: format!("{}:{line}", path.display()),
         what,
     })
@@ -172,7 +172,7 @@ impl ProbeScene {
     ///
     /// # Errors
     /// `Unreadable`, `Brep`, `Bake`; `Input` for a damaged image, or one given a cell size.
-    pub fn load(path: &Path, cell_mm: Option<f64>) -> Result<Self, LabError> {
+    pub fn load(path: &Path, cell_mm: Option<f64>) -> Result<Self, ScenarioError> {
         let model = Model {
             cell_mm,
             ..Model::default()
@@ -184,10 +184,10 @@ impl ProbeScene {
     ///
     /// # Errors
     /// As [`Self::load`]; `Input` for an image of another method.
-    pub fn load_by(path: &Path, model: &Model) -> Result<Self, LabError> {
+    pub fn load_by(path: &Path, model: &Model) -> Result<Self, ScenarioError> {
         let cell_mm = model.cell_mm;
         let name = path.display().to_string();
-        let unreadable = |source| LabError::Unreadable {
+        let unreadable = |source| ScenarioError::Unreadable {
             path: path.to_owned(),
             source,
         };
@@ -212,7 +212,7 @@ impl ProbeScene {
                 },
             );
         }
-        let bad = |what: String| LabError::Input {
+        let bad = |what: String| ScenarioError::Input {
             name: name.clone(),
             what,
         };
@@ -241,11 +241,11 @@ impl ProbeScene {
     ///
     /// # Errors
     /// `Unreadable`, `Brep`, `Bake`.
-    pub fn bake(path: &Path, options: &BakeOptions) -> Result<Self, LabError> {
+    pub fn bake(path: &Path, options: &BakeOptions) -> Result<Self, ScenarioError> {
         let name = path.display().to_string();
         let model = load_step(path)?;
         let baked =
-            bake(&model, options, &|_| ControlFlow::Continue(())).map_err(|source| LabError::Bake {
+            bake(&model, options, &|_| ControlFlow::Continue(())).map_err(|source| ScenarioError::Bake {
                 step: name.clone(),
                 source,
             })?;
@@ -266,9 +266,9 @@ impl ProbeScene {
     ///
     /// # Errors
     /// `NoSuchPart`; `Input` when `fixed` is left out and there is a choice, or both are one part.
-    pub fn pair(&self, moving: &str, fixed: Option<&str>) -> Result<Pair, LabError> {
+    pub fn pair(&self, moving: &str, fixed: Option<&str>) -> Result<Pair, ScenarioError> {
         let moving = self.part(moving)?;
-        let bad = |what: String| LabError::Input {
+        let bad = |what: String| ScenarioError::Input {
             name: self.name.clone(),
             what,
         };
@@ -289,10 +289,10 @@ impl ProbeScene {
         Ok(Pair { moving, fixed })
     }
 
-    fn part(&self, name: &str) -> Result<u16, LabError> {
+    fn part(&self, name: &str) -> Result<u16, ScenarioError> {
         (self.parts.iter().position(|part| part == name))
             .and_then(|index| u16::try_from(index).ok())
-            .ok_or_else(|| LabError::NoSuchPart {
+            .ok_or_else(|| ScenarioError::NoSuchPart {
                 step: self.name.clone(),
                 part: name.to_owned(),
                 known: self.parts.join(", "),
@@ -303,8 +303,8 @@ impl ProbeScene {
     ///
     /// # Errors
     /// `Input` when the force law refuses the pose.
-    pub fn probe(&self, pair: Pair, named: &NamedPose) -> Result<ProbeRow, LabError> {
-        let bad = |what: String| LabError::Input {
+    pub fn probe(&self, pair: Pair, named: &NamedPose) -> Result<ProbeRow, ScenarioError> {
+        let bad = |what: String| ScenarioError::Input {
             name: format!("{}, pose `{}`", self.name, named.name),
             what,
         };

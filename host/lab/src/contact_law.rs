@@ -13,8 +13,9 @@ use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::Telemetry;
 
-use super::measure::{pose_mm, vector};
-use super::scene::{Body, PreparedScene};
+use mortise_scenario::wire::{pose_mm, vector};
+use mortise_scenario::{Body, PreparedScene};
+
 use crate::error::LabError;
 
 /// Farther off than this, mm, a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.

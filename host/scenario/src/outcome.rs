@@ -1,8 +1,20 @@
 //! What a run of a scenario measured, and whether its bounds hold.
 
-use serde::Serialize;
+use std::collections::BTreeMap;
 
-use super::Scenario;
+use serde::{Deserialize, Serialize};
+
+/// Two-sided bounds: a figure that is too good is as suspicious as one that is too bad.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bounds {
+    /// Smallest that holds.
+    pub min: f64,
+    /// Largest that holds.
+    pub max: f64,
+    /// Only on rigs whose written form starts so (`emulated`), because others do not measure it.
+    pub only_on: Option<String>,
+}
 
 /// What a run measured. Serialised as it is for `mortise demo --headless --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -175,10 +187,9 @@ impl Outcome {
         Self::QUANTITIES.contains(&quantity)
     }
 
-    /// Every bound of `scenario` that concerns this rig. A quantity that was not measured does not hold.
-    pub fn verdicts(&self, scenario: &Scenario) -> Vec<Verdict> {
-        scenario
-            .holds
+    /// Every bound of a scenario's `[holds]` that concerns this rig. A quantity that was not measured does not hold.
+    pub fn verdicts(&self, holds: &BTreeMap<String, Bounds>) -> Vec<Verdict> {
+        holds
             .iter()
             .filter(|(_, bounds)| {
                 bounds

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// File name of the sample.
 pub const NAME: &str = "pair_d18.75_clear1.00.step";
 /// Contents of the sample.
-pub const STEP: &[u8] = include_bytes!("../samples/pair_d18.75_clear1.00.step");
+pub const STEP: &[u8] = include_bytes!("../../app/samples/pair_d18.75_clear1.00.step");
 
 /// The sample as a file, removed when dropped: the CAD kernel reads files only.
 #[derive(Debug)]

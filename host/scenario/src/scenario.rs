@@ -3,14 +3,6 @@
 //! Lengths in a scenario file are millimetres, angles degrees, forces newtons, times seconds; the names say so. The hand takes hold of the
 //! part at `grip_mm` and moves relative to that point.
 
-mod law;
-mod measure;
-mod outcome;
-mod overlap;
-mod run;
-mod scene;
-mod truth;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -22,13 +14,8 @@ use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::Faults;
 use serde::Deserialize;
 
-use crate::error::LabError;
-
-pub(crate) use law::pushed;
-pub(crate) use measure::{depth, energy, object_energy, pose_mm};
-pub use outcome::{Outcome, Verdict};
-pub use run::{Listener, Recording, connect, record, run, run_on};
-pub use scene::PreparedScene;
+use crate::error::ScenarioError;
+use crate::outcome::{Bounds, Outcome};
 
 /// A scenario.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -214,21 +201,9 @@ pub struct Press {
     pub direction: [f64; 3],
 }
 
-/// Two-sided bounds: a figure that is too good is as suspicious as one that is too bad.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Bounds {
-    /// Smallest that holds.
-    pub min: f64,
-    /// Largest that holds.
-    pub max: f64,
-    /// Only on rigs whose written form starts so (`emulated`), because others do not measure it.
-    pub only_on: Option<String>,
-}
-
 impl Scenario {
     /// What the force law is set to on a board that took the parameters; the defaults where it refuses one.
-    pub(crate) fn settings(&self) -> Settings {
+    pub fn settings(&self) -> Settings {
         let taken = (self.parameters.iter()).try_fold(Parameters::default(), |set, (name, &value)| {
             set.with(parameter_named(name)?, value).ok()
         });
@@ -240,8 +215,8 @@ impl Scenario {
     ///
     /// # Errors
     /// `Unreadable`, `Scenario`.
-    pub fn load(path: &Path) -> Result<Self, LabError> {
-        let text = std::fs::read_to_string(path).map_err(|source| LabError::Unreadable {
+    pub fn load(path: &Path) -> Result<Self, ScenarioError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Unreadable {
             path: path.to_owned(),
             source,
         })?;
@@ -256,8 +231,8 @@ impl Scenario {
     ///
     /// # Errors
     /// `Scenario`.
-    pub fn parse(text: &str, name: &str) -> Result<Self, LabError> {
-        let scenario: Self = toml::from_str(text).map_err(|error| LabError::Scenario {
+    pub fn parse(text: &str, name: &str) -> Result<Self, ScenarioError> {
+        let scenario: Self = toml::from_str(text).map_err(|error| ScenarioError::Scenario {
             name: name.to_owned(),
             what: error.to_string(),
         })?;
@@ -269,16 +244,16 @@ impl Scenario {
     ///
     /// # Errors
     /// `Scenario`, never with the text that comes with the program (tested).
-    pub fn insertion(step: &Path) -> Result<Self, LabError> {
-        let text = include_str!("../../../../hil-tests/scenarios/insertion.toml");
+    pub fn insertion(step: &Path) -> Result<Self, ScenarioError> {
+        let text = include_str!("../../../hil-tests/scenarios/insertion.toml");
         let mut scenario = Self::parse(text, "insertion")?;
         scenario.scene.step = step.to_owned();
         Ok(scenario)
     }
 
-    fn check(&self, name: &str) -> Result<(), LabError> {
+    fn check(&self, name: &str) -> Result<(), ScenarioError> {
         let wrong = |what: String| {
-            Err(LabError::Scenario {
+            Err(ScenarioError::Scenario {
                 name: name.to_owned(),
                 what,
             })
@@ -365,7 +340,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_said_with_its_place() {
-        let good = include_str!("../../../../hil-tests/scenarios/insertion.toml");
+        let good = include_str!("../../../hil-tests/scenarios/insertion.toml");
         let said = |from: &str, to: &str| {
             assert!(good.contains(from), "{from}");
             Scenario::parse(&good.replacen(from, to, 1), "test")
