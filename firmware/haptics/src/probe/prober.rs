@@ -176,7 +176,7 @@ impl Prober {
         for (search, pair) in searches.iter_mut().zip(&pairs) {
             if !pair.field.is_occupancy() {
                 search.walk(&mut so_far, &mut touching);
-            } else if !pair.left_out() {
+            } else if !pair.unused() {
                 nearest_voxel(pair, shrunk_m, &mut so_far);
             }
         }
