@@ -206,7 +206,7 @@ impl State {
 
     /// How passive the coupling is.
     pub fn passivity(&self) -> Passivity {
-        self.hand.tank.seen
+        self.hand.tank.status
     }
 
     /// How far the part has slipped in the hand because guidance's pull was not paid for: stretch (m) and angle (rad) of the coupling, handle's axes.
