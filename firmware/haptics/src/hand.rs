@@ -72,7 +72,7 @@ impl Hand {
     /// Drops everything that belongs to the part held so far.
     pub fn invalidate(&mut self) {
         self.tank.forget();
-        self.targets.forget();
+        self.targets.clear_all();
         self.contact.invalidate();
     }
 
