@@ -84,7 +84,7 @@ pub(crate) struct EnergyBound {
 }
 
 impl EnergyBound {
-    /// Zero bits, as [`crate::State::new`] asks.
+    /// No credit, no slip. All bits zero, as [`crate::State::new`] requires.
     pub const fn new() -> Self {
         Self {
             credit_j: 0.0,
