@@ -1,4 +1,4 @@
-//! One hand: the part it holds, and what carries over from tick to tick because it holds it.
+//! State of one hand: the part it holds, and what carries over from tick to tick while it holds it.
 
 use mortise_protocol::image::Field;
 
@@ -14,14 +14,14 @@ use crate::math::pose::{Pose, Twist, Wrench};
 use crate::passivity::tank::EnergyTank;
 use crate::settings::Settings;
 
-/// Speed at which points come out again when shrinking falls, m/s.
-const COMES_OUT_M_PER_S: f32 = 0.01;
+/// Speed at which shrunk points return outward when shrinking falls, m/s.
+const EXPANSION_M_PER_S: f32 = 0.01;
 
 /// State of one hand.
 #[derive(Clone, Debug)]
 pub(crate) struct Hand {
     pub grabbed: Option<Grabbed>,
-    /// The part slips in the hand for good where the coupling saturates.
+    /// Whether the coupling slips permanently where it saturates ([`crate::State::set_slipping`]).
     pub slipping: bool,
     /// Placement of the part last held.
     pub last_object: Option<Pose>,
@@ -34,18 +34,18 @@ pub(crate) struct Hand {
     pub contact: ContactMemory,
 }
 
-/// What the search for contacts and the step keep for the next tick.
+/// Memory of the contact search and the step for the next tick.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactMemory {
-    /// Number of points touching, rising at once and falling by a twentieth a tick: divides the total contact stiffness.
+    /// Number of touching points, which divides the total contact stiffness; rises at once and falls by a twentieth a tick.
     pub sharing: f32,
-    /// Where to go on after a tick whose budget ran out, else the beginning.
+    /// Where the search resumes after a tick whose budget ran out, else the beginning.
     pub resume: NodeCursor,
     /// The last tick needed half of the work budget or more.
     pub busy: bool,
-    /// What is left out while there is too much to evaluate.
+    /// Decimation of points while the work exceeds the budget.
     pub decimation: Decimation,
-    /// Contacts that pushed in the last tick.
+    /// Number of contacts that pushed in the last tick.
     pub pushing: u16,
     /// How far points of the held part are moved inward before voxmaps are queried, m.
     pub shrunk_m: f32,
@@ -56,7 +56,7 @@ pub(crate) struct ContactMemory {
 }
 
 impl Hand {
-    /// Empty.
+    /// Holds nothing.
     pub const fn new() -> Self {
         Self {
             grabbed: None,
@@ -69,14 +69,14 @@ impl Hand {
         }
     }
 
-    /// Drops everything that belongs to the part held so far.
+    /// Resets everything that belongs to the part held so far.
     pub fn invalidate(&mut self) {
         self.tank.forget();
-        self.targets.forget();
+        self.targets.clear_all();
         self.contact.invalidate();
     }
 
-    /// `wanted` as the mechanism may have it, within all limits; remembered for the slew limit.
+    /// `wanted` within all limits; stored for the slew limit.
     pub fn limited(
         &mut self,
         wanted: Wrench,
@@ -100,7 +100,7 @@ impl Hand {
         out
     }
 
-    /// Output of a tick in which nothing moves and nothing pushes.
+    /// Output of a tick without motion and forces.
     pub fn at_rest(&mut self, work: Work) -> Output {
         if work.flags != Flags::empty() {
             self.previous_wrench = Wrench::ZERO;
@@ -116,7 +116,7 @@ impl Hand {
         }
     }
 
-    /// The same when a tick cannot be computed, for the reason in `flag`: the object stops where it is.
+    /// As [`Self::at_rest`], for a tick that cannot be computed for the reason in `flag`: the object stops where it is.
     pub fn stopped(&mut self, mut work: Work, flag: Flags) -> Output {
         work.flags.insert(flag);
         if let Some(g) = &mut self.grabbed {
@@ -150,11 +150,11 @@ impl ContactMemory {
         self.coherence.invalidate();
     }
 
-    /// How far points of the held part, of this field, are moved inward in this tick, m.
+    /// Distance by which points of the held part, of this field, are moved inward in this tick, m.
     pub fn shrink(&mut self, settings: &Settings, field: &Field<'_>) -> f32 {
         let wanted = settings.contact.shrunk_m(field);
-        let least = self.shrunk_m - COMES_OUT_M_PER_S * settings.period_s;
-        let now = if wanted > least { wanted } else { least };
+        let lowest = self.shrunk_m - EXPANSION_M_PER_S * settings.period_s;
+        let now = if wanted > lowest { wanted } else { lowest };
         let moved = now - self.shrunk_m;
         if moved != 0.0 {
             // Advancement bounds assume points at rest in their part. Each call counts as a round.

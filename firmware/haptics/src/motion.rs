@@ -7,7 +7,7 @@ use crate::math::scalar::inverse_sqrt;
 
 /// Upper bound of the speed of any point within `reach` of the centre of mass, m/s.
 pub(crate) fn point_speed(twist: Twist, reach: f32) -> f32 {
-    // No less than the lengths, by more than rounding can make the roots too small.
+    // Rounded up by more than the error of the inverse roots.
     let length = |v: Vec3| {
         let squared = v.length_squared();
         1.000_001 * squared * inverse_sqrt(squared)
@@ -15,13 +15,13 @@ pub(crate) fn point_speed(twist: Twist, reach: f32) -> f32 {
     length(twist.linear) + length(twist.angular) * reach
 }
 
-/// Scales `twist` so that no point within `reach` is faster than `most`; whether it had to.
+/// Scales `twist` so that no point within `reach` is faster than `limit` (m/s). Returns whether it was scaled.
 ///
-/// A scaled motion keeps every linearised gap that the full one keeps: it stops part of the way.
-pub(crate) fn slow_down(twist: &mut Twist, reach: f32, most: f32) -> bool {
+/// A scaled motion keeps every linearised gap that the full one keeps, because it ends on the same path.
+pub(crate) fn slow_down(twist: &mut Twist, reach: f32, limit: f32) -> bool {
     let speed = point_speed(*twist, reach);
-    if speed > most {
-        let scale = most / speed;
+    if speed > limit {
+        let scale = limit / speed;
         twist.linear *= scale;
         twist.angular *= scale;
         true

@@ -1,4 +1,4 @@
-//! What the force law remembers from tick to tick.
+//! State of the force law, kept from tick to tick.
 
 use core::fmt;
 
@@ -15,7 +15,7 @@ use crate::hand::Hand;
 use crate::math::pose::{Pose, Twist, Wrench, usable_pose};
 use crate::passivity::tank::Passivity;
 
-/// Placements, the grabbed object, and what carries over. About 112 KiB; lives in a static on a board.
+/// Placements, the grabbed object, and everything that carries over. About 112 KiB; lives in a static on a board.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Every part's placement.
@@ -24,7 +24,7 @@ pub struct State {
     pub(crate) hand: Hand,
 }
 
-/// The finest cells in a scene: the textbook's methods move no farther in a tick than half of one.
+/// Finest cells in a scene: the textbook's methods move at most half a cell in a tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Resolution {
     /// Smallest cell of any field, m; 0 without parts.
@@ -45,19 +45,19 @@ impl Resolution {
 pub enum GrabError {
     /// The scene has no part of this index.
     NoSuchPart {
-        /// Asked for.
+        /// The part requested.
         part: u16,
-        /// Parts there are.
+        /// Number of parts in the scene.
         parts: u16,
     },
     /// The part is fixed.
     Fixed {
-        /// Asked for.
+        /// The part requested.
         part: u16,
     },
-    /// Another part is in hand: release it first.
+    /// Another part is held: release it first.
     Busy {
-        /// The one in hand.
+        /// The held part.
         part: u16,
     },
     /// The handle's pose is not usable.
@@ -84,8 +84,8 @@ impl Default for State {
 }
 
 impl State {
-    /// No scene, nothing grabbed. Every bit of it is zero, so that a static lies in `.bss` and takes no flash; make it there, it is too large for
-    /// a board's stack.
+    /// No scene, nothing grabbed. All bits zero, so that a static lies in `.bss` and takes no flash. Construct it in place: it is too large for a
+    /// board's stack.
     pub const fn new() -> Self {
         Self {
             parts: Vec::new(),
@@ -94,7 +94,7 @@ impl State {
         }
     }
 
-    /// Takes over a scene's placements; whatever was grabbed is let go. Parts beyond [`MAX_PARTS`] are left out.
+    /// Loads a scene's placements; a grabbed part is released. Parts beyond [`MAX_PARTS`] are ignored.
     ///
     /// Cost grows with the number of parts; not for the tick.
     pub fn load_scene(&mut self, scene: &SceneImage<'_>) {
@@ -124,7 +124,7 @@ impl State {
         }
     }
 
-    /// Takes part `part` in hand where it stands: the offset between handle and part is kept, so no force arises.
+    /// Grabs part `part` at its placement: the offset between handle and part is kept, so no force arises.
     pub fn grab(&mut self, scene: &SceneImage<'_>, part: u16, handle: &Pose) -> Result<(), GrabError> {
         if let Some(grabbed) = &self.hand.grabbed {
             return Err(GrabError::Busy { part: grabbed.part });
@@ -159,19 +159,19 @@ impl State {
         Ok(())
     }
 
-    /// Lets go: the part stays where it is. The handle's force falls to zero within the slew limit.
+    /// Releases the part, which stays at its placement. The handle's force falls to zero within the slew limit.
     pub fn release(&mut self) {
         self.hand.grabbed = None;
         self.hand.invalidate();
     }
 
-    /// Index of the part in hand.
+    /// Index of the held part.
     pub fn grabbed(&self) -> Option<u16> {
         self.hand.grabbed.as_ref().map(|g| g.part)
     }
 
-    /// Guides the part in hand towards `target` from the next tick on; a target of the same id is refreshed or replaced, one older than that does
-    /// nothing. Grabbing and releasing end all guidance.
+    /// Guides the held part towards `target` from the next tick on. A target with the same id is refreshed or replaced; an older one is ignored.
+    /// Grabbing and releasing end all guidance.
     ///
     /// # Errors
     /// [`TargetError`]; nothing changed.
@@ -179,7 +179,7 @@ impl State {
         self.hand.targets.set(target, self.parts.len(), self.grabbed())
     }
 
-    /// Lets the target of this id fade; none of it is no error.
+    /// Lets the target with this id fade. Unknown ids are ignored.
     pub fn clear_target(&mut self, id: u16) {
         self.hand.targets.clear(id);
     }
@@ -189,12 +189,12 @@ impl State {
         self.parts.len()
     }
 
-    /// Where part `part` stands (shape frame in the world).
+    /// Placement of part `part` (shape frame in the world).
     pub fn placement(&self, part: u16) -> Option<Pose> {
         self.parts.get(usize::from(part)).map(|p| p.pose)
     }
 
-    /// The part in hand: placement, and twist at its centre of mass.
+    /// The held part: placement, and twist at its centre of mass.
     pub fn object(&self) -> Option<(Pose, Twist)> {
         self.hand.grabbed.as_ref().map(|g| (g.pose(), g.twist))
     }
@@ -204,33 +204,33 @@ impl State {
         self.hand.grabbed.as_ref().map(|g| g.center)
     }
 
-    /// How passive the coupling is.
+    /// Energy state of the coupling.
     pub fn passivity(&self) -> Passivity {
-        self.hand.tank.seen
+        self.hand.tank.status
     }
 
-    /// How far the part has slipped in the hand because guidance's pull was not paid for: stretch (m) and angle (rad) of the coupling, handle's axes.
-    /// Zero without targets.
+    /// Slip of the coupling, by which guidance is kept from delivering net energy to the operator: stretch (m) and angle (rad) of the coupling,
+    /// handle's axes. Zero without targets.
     pub fn slip(&self) -> Twist {
         self.hand.tank.slip()
     }
 
-    /// Whether the part slips in the hand for good where the coupling would have to pull harder than it may, instead of being pulled back with all it
-    /// may.
+    /// Sets whether the coupling slips permanently where it saturates, instead of pulling the part back with its largest force.
     ///
-    /// For as long as a grip is still being made firm ([`crate::CouplingSettings::force_max_n`] raised from tick to tick): a coupling that is
-    /// stretched farther than it can hold would gain d·ΔF with each step of its limit, energy that nobody put in; one that has slipped stores no more
-    /// than it can give back.
+    /// For the time after a grab in which the coupling's limit rises from tick to tick ([`crate::CouplingSettings::force_max_n`]): a coupling
+    /// stretched farther than it can hold would gain d·ΔF with each step of its limit, energy unaccounted for; one that has slipped stores no more
+    /// than it can return.
     pub fn set_slipping(&mut self, slipping: bool) {
         self.hand.slipping = slipping;
     }
 
-    /// Forgets the last handle wrench, so that the next one builds up from zero under the slew limit.
+    /// Resets the last handle wrench, so that the next one builds up from zero under the slew limit.
     pub fn restart_slew(&mut self) {
         self.hand.previous_wrench = Wrench::ZERO;
     }
 
-    /// Has the next tick look at everything, as after a jump. Coherence changes the work, never the result; this is for showing so.
+    /// Voids all advancement bounds, so that the next tick queries everything, as after a jump. Coherence changes the work, never the result; tests
+    /// use this to show it.
     pub fn invalidate_coherence(&mut self) {
         self.hand.contact.coherence.invalidate();
     }
@@ -248,7 +248,7 @@ impl State {
     }
 }
 
-/// The smaller of a size found so far (0: none) and another.
+/// The smaller of the size found so far (0: none) and another.
 fn finer(known: f32, cell: f32) -> f32 {
     if known > 0.0 && known < cell { known } else { cell }
 }

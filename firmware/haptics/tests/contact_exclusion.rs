@@ -1,4 +1,4 @@
-//! Joints: mating faces that an engaged target keeps apart leave the work, and nothing is felt of it.
+//! Contact exclusions: mating faces that an engaged target keeps apart are not searched, and the result is the same to the bit.
 
 mod support;
 
@@ -10,31 +10,37 @@ use support::hand::{Hand, run};
 use support::solids::{Block, Bolt};
 use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
 
-/// What a run with targets did, tick by tick.
+/// Result of a run with targets, tick by tick.
 struct Run {
     outputs: Vec<Output>,
-    joined: usize,
+    excluded_ticks: usize,
 }
 
-/// Room for all points: what is thinned out depends on the work. In a tick as many leaves are asked about as there are.
+/// Budget for all points, as decimation depends on the work; in a tick all leaves get an exclusion query.
 const AMPLE: u32 = 20_000;
-/// Room for all points still, but of all leaves only some are asked about in a tick.
+/// Budget for all points still, but only some leaves get an exclusion query in a tick.
 const SCANT: u32 = 8_000;
 
-/// A hand that goes where `way` says, 1 mm and 2° off or not, with a target set, refreshed and left to expire; with joints or without.
-fn play(clearance: f64, ticks: u32, budget: u32, joints: bool, mut way: impl FnMut(u32, &mut Hand)) -> Run {
+/// Runs a hand steered by `script`, with a target set, refreshed and left to expire; with contact exclusions or without.
+fn play(
+    clearance: f64,
+    ticks: u32,
+    budget: u32,
+    exclusions: bool,
+    mut script: impl FnMut(u32, &mut Hand),
+) -> Run {
     let image = support::exact_hole_and_peg(clearance, 10e-3);
     let scene = image.open();
     let mut state = State::new();
     state.load_scene(&scene);
     let mut settings = Settings::default();
-    settings.guidance.exclusions = joints;
+    settings.guidance.exclusions = exclusions;
     settings.contact.point_budget = budget;
     let mut hand = Hand::at([0.0, 0.0, BLOCK_HALF + PEG_HALF - 10e-3]);
     state.grab(&scene, 1, &hand.pose()).unwrap();
     let mut played = Run {
         outputs: Vec::new(),
-        joined: 0,
+        excluded_ticks: 0,
     };
     for t in 0..ticks {
         if t.is_multiple_of(100) && t < ticks / 2 {
@@ -43,17 +49,17 @@ fn play(clearance: f64, ticks: u32, budget: u32, joints: bool, mut way: impl FnM
                 .unwrap();
         }
         let (out, _) = run(&mut state, &scene, &settings, &mut hand, 1, |_, hand, _| {
-            way(t, hand)
+            script(t, hand)
         });
-        played.joined += usize::from(out.guidance.exclusions > 0);
+        played.excluded_ticks += usize::from(out.guidance.exclusions > 0);
         played.outputs.push(out);
     }
     played
 }
 
-/// The same to the bit, work apart.
+/// Asserts equality to the bit, work apart.
 fn same(with: &Run, without: &Run) {
-    assert_eq!(without.joined, 0);
+    assert_eq!(without.excluded_ticks, 0);
     for (t, (a, b)) in with.outputs.iter().zip(&without.outputs).enumerate() {
         let plain = |out: &Output| {
             let mut out = out.clone();
@@ -65,21 +71,21 @@ fn same(with: &Run, without: &Run) {
     }
 }
 
-/// Into the hole and to and fro in it, tilting and turning; the target expires half-way.
-fn script(t: u32, hand: &mut Hand, aside: f64, tilt: f32, faster: f64) {
+/// Moves into the hole and to and fro in it, tilting and rotating; the target expires half-way.
+fn script(t: u32, hand: &mut Hand, offset: f64, tilt: f32, faster: f64) {
     let time = f64::from(t) * 1e-3;
     let tremor = 0.2e-3 * (core::f64::consts::TAU * 10.0 * time).sin();
     let axis = Vec3::new(0.6, 0.8, 0.3);
     hand.orientation = Quat::from_axis_angle(axis.normalize(), tilt * (time / 0.3).min(1.0) as f32);
     hand.goal = [
-        aside * (time / 0.3).min(1.0) + tremor,
+        offset * (time / 0.3).min(1.0) + tremor,
         0.3 * tremor,
         BLOCK_HALF + PEG_HALF - 10e-3 - 8e-3 * (faster * time).sin(),
     ];
 }
 
 #[test]
-fn nothing_is_felt_of_a_joint() {
+fn an_exclusion_changes_no_bit() {
     for (clearance, budget) in [
         (1e-3, AMPLE),
         (20e-6, AMPLE),
@@ -93,8 +99,8 @@ fn nothing_is_felt_of_a_joint() {
             play(clearance, 2400, budget, false, way),
         );
         same(&with, &without);
-        assert!(with.joined > 800, "{}", with.joined);
-        // From when it has formed until the first refresh fails.
+        assert!(with.excluded_ticks > 800, "{}", with.excluded_ticks);
+        // From its formation until the first missing refresh.
         let points = |run: &Run| {
             run.outputs[400..1200]
                 .iter()
@@ -103,10 +109,10 @@ fn nothing_is_felt_of_a_joint() {
         };
         let (few, all) = (points(&with), points(&without));
         println!(
-            "{clearance}, {budget}: joined in {} ticks, {few} points against {all}",
-            with.joined
+            "{clearance}, {budget}: excluded in {} ticks, {few} points against {all}",
+            with.excluded_ticks
         );
-        // With 1 mm to spare leaves are seldom looked at in any case; in a close fit in every tick.
+        // With 1 mm of clearance leaves are seldom searched in any case; in a close fit in every tick.
         let share = if clearance > 0.1e-3 { 0.5 } else { 0.3 };
         assert!(f64::from(few) < share * f64::from(all), "{few} {all}");
     }
@@ -115,16 +121,16 @@ fn nothing_is_felt_of_a_joint() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Whatever the hand does: pulled off against the cap, torn out, pushed through.
+    /// For any motion of the hand: pulled off against the cap, torn out, pushed through.
     #[test]
-    fn nothing_is_felt_of_a_joint_whatever_the_hand_does(
+    fn an_exclusion_changes_no_bit_for_any_motion_of_the_hand(
         clearance in prop_oneof![Just(0.0), 0.0..200e-6],
         budget in prop_oneof![Just(AMPLE), Just(SCANT)],
-        aside in -12e-3..12e-3f64,
+        offset in -12e-3..12e-3f64,
         tilt in -0.2f32..0.2,
         faster in 1.0..30.0f64,
     ) {
-        let way = |t: u32, hand: &mut Hand| script(t, hand, aside, tilt, faster);
+        let way = |t: u32, hand: &mut Hand| script(t, hand, offset, tilt, faster);
         same(&play(clearance, 900, budget, true, way), &play(clearance, 900, budget, false, way));
     }
 }
@@ -132,7 +138,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// A region said to hold nothing but the hole's face: every look-up in it finds that, or nothing; and no more is read than allowed.
+    /// A region reported to hold only the hole's face: every field query in it finds that face or none, and the report reads no more than allowed.
     #[test]
     fn a_region_of_one_face_has_no_other(
         low in prop::array::uniform3(-4.0f32..80.0),
@@ -147,7 +153,7 @@ proptest! {
         let mut left = most;
         let only = field.only(low, high, &mut left, |face| face == 3);
         prop_assert!(left <= most);
-        // What may be read decides whether there is an answer, not which.
+        // The limit on reads decides whether there is an answer, not which.
         let of_all = field.only(low, high, &mut u32::MAX.clone(), |face| face == 3);
         prop_assert!(of_all || !only);
         let mut left = most;
@@ -167,7 +173,7 @@ proptest! {
 }
 
 /// A bolt with a 5 mm head and a shaft of 25 mm, pushed into its hole with 5 N by a hand 1 mm and 2° off; with the planes' angle guided too, or not.
-/// How far it is off its stop and its axis at most once there, m, and in how many of 500 ticks the head touches while the shaft is a joint.
+/// Returns its largest distances from its stop and its axis once there, m, and in how many of 500 ticks the head touches while the shaft is excluded.
 fn bolted(play: f64, parallel: bool) -> ([f64; 2], u32) {
     let mut w = support::image::Writer::exact(0.5e-3);
     let block = w.shape(&Block {
@@ -218,7 +224,7 @@ fn bolted(play: f64, parallel: bool) -> ([f64; 2], u32) {
             1,
             |_, hand, _| {
                 hand.orientation = Quat::from_rotation_y(0.035);
-                // So far below the stop that hand and coupling push with 5 N.
+                // Goal so far below the stop that hand and coupling push with 5 N.
                 let coupling = f64::from(Settings::default().coupling.k_t_n_per_m);
                 let below = landed - 5.0 / hand.spring_n_per_m - 5.0 / coupling;
                 let down = ((f64::from(t) - 200.0) / 2500.0).clamp(0.0, 1.0);
@@ -245,11 +251,12 @@ fn bolted(play: f64, parallel: bool) -> ([f64; 2], u32) {
 #[test]
 fn a_bolts_head_lands_on_its_stop_and_stays_there() {
     for parallel in [false, true] {
-        // With room in the hole the head alone touches: 64 points of 200 kN/m and more under 5 N.
+        // With clearance in the hole the head alone touches: 64 points of 200 kN/m and more under 5 N.
         let (off, felt) = bolted(3e-3, parallel);
         assert!(off[0] < 1e-6 && off[1] < 5e-6, "{off:?}");
         assert_eq!(felt, 500, "ticks with the head on its stop");
-        // In a close fit the rim meets the corner under the head, which interpolation at 0.5 mm rounds (the baker has it exact), and is pushed aside.
+        // In a close fit the rim meets the corner under the head, which interpolation at 0.5 mm rounds (the baker has it exact), and is pushed
+        // sideways.
         let (off, _) = bolted(20e-6, parallel);
         assert!(off[0] < 50e-6 && off[1] < 50e-6, "{off:?}");
     }
@@ -258,7 +265,7 @@ fn a_bolts_head_lands_on_its_stop_and_stays_there() {
 static IMAGE: std::sync::LazyLock<support::image::Image> =
     std::sync::LazyLock::new(|| support::exact_hole_and_peg(20e-6, 10e-3));
 
-/// Not by refusing everything: in the hole's middle, at its wall, the region is the hole's.
+/// Queries are not rejected everywhere: in the hole's middle, at its wall, the region holds the hole's face only.
 #[test]
 fn the_holes_wall_is_a_region_of_its_own() {
     let scene = IMAGE.open();
@@ -276,9 +283,9 @@ fn the_holes_wall_is_a_region_of_its_own() {
         let (low, high) = (at.map(|x| x - reach), at.map(|x| x + reach));
         field.all_at(low, high, &mut 10_000, 3)
     };
-    // Of the grid, and beyond it.
+    // In the grid, and beyond it.
     assert!(all(1.0) && !all(1e3));
-    // Two cells below the rim cells tell where bricks do not.
+    // Two cells below the rim the cells decide where the bricks do not.
     let below = |cells: f64| [support::HOLE, 0.0, BLOCK_HALF - cells * 0.5e-3];
     assert!(!only(below(0.0), 1.0, 3));
     assert!(only(below(4.0), 1.0, 3));

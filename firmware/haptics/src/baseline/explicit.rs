@@ -1,14 +1,14 @@
-//! The textbook integrator: one explicit Newton–Euler step of the held object, eqs. 11–12 of Faas 2010.
+//! Textbook integrator: one explicit Newton–Euler step of the held object, eqs. 11–12 of Faas 2010.
 //!
 //! m·v̇ = F and I·ω̇ + ω × I·ω = τ, with coupling and contact forces taken at the tick's *start* and position moved with the new velocity
-//! (semi-implicit Euler). It needs no solver and is as cheap as it is fragile: a contact of stiffness k is stable while h²·k/m < 4 less what damping
-//! takes, all touching points together. Kept beside the implicit step to be compared with. Around it, as in the sources:
+//! (semi-implicit Euler). It needs no solver, but is only conditionally stable: a contact of stiffness k is stable while h²·k/m < 4 less the effect
+//! of damping, all touching points together. Kept for comparison with the implicit step. As in the sources:
 //!
 //! * contact is a spring without damping, F = k·depth, and from ten touching points on the sum is divided by a tenth of their number (McNeely,
 //!   Puterbaugh & Troy 1999);
-//! * points that come nearer and do not touch yet are braked, F = −b·(v·n)·n (Faas eq. 6, McNeely et al. 1999). b takes from the object in one
-//!   tick, to first order, the kinetic energy of its motion along the braking force: with s the approach of each such point, F and τ the sum of s·n
-//!   and of its moments, b = Σs²/(2·h·(F²/m + τ·I⁻¹·τ)). The sources' rule, written for turns as well: half of the approach is left after a
+//! * points that approach and do not touch yet are braked, F = −b·(v·n)·n (Faas eq. 6, McNeely et al. 1999). In one tick b removes from the object,
+//!   to first order, the kinetic energy of its motion along the braking force: with s the approach of each such point, F and τ the sum of s·n and of
+//!   its moments, b = Σs²/(2·h·(F²/m + τ·I⁻¹·τ)). This is the sources' rule, written for rotations as well: half of the approach is left after a
 //!   tick, and the force can never add energy;
 //! * no point moves more than half a cell a tick (Faas eq. 5): see [`crate::tick()`].
 
@@ -20,12 +20,12 @@ use crate::math::pose::{Twist, Wrench};
 use crate::math::symmetric6::dot;
 use crate::settings::ContactSettings;
 
-/// Touching points that push with their full stiffness; more share it.
+/// Number of touching points up to which each pushes with its full stiffness; more share that of this number.
 const FULL_POINTS: f32 = 10.0;
-/// Approaches whose squares sum to less than this, (m/s)², are rest: not to be divided by.
+/// Squared response below which the approach counts as rest, (m/s)²: avoids a division by zero.
 const LEAST_RESPONSE: f32 = 1e-20;
 
-/// Stiffness of each of `touching` points, N/m: as for the implicit step, and that of ten in all at the most.
+/// Stiffness of each of `touching` points, N/m: as for the implicit step, and at most that of ten points in all.
 pub(crate) fn shared_stiffness(contact: &ContactSettings, touching: f32) -> f32 {
     let k = contact.shared_stiffness(touching);
     let share = contact.stiffness_n_per_m * (FULL_POINTS / touching);
@@ -43,7 +43,7 @@ pub(crate) fn free(step: &Step, terms: Terms<'_, '_>) -> Solution {
 }
 
 /// The step with `contacts` of stiffness `k` (N/m); those with a gap up to `braking_m` only brake. On return their phases are those of the solution,
-/// and their rates those of its motion as far as `allowed` lets it.
+/// and their rates those of its motion as limited by `allowed`.
 pub(crate) fn with_contacts(
     step: &Step,
     terms: Terms<'_, '_>,
@@ -90,7 +90,7 @@ fn at_start(step: &Step, terms: Terms<'_, '_>) -> Wrench {
     wrench
 }
 
-/// Rate of a gap that closes and is to be braked, else 0, m/s.
+/// Rate of a gap that closes within the braking distance, else 0, m/s.
 fn approach(c: &Contact, braking_m: f32, twist: &[f32; 6]) -> f32 {
     if c.gap < 0.0 || c.gap > braking_m {
         return 0.0;
@@ -121,7 +121,7 @@ fn braking(step: &Step, contacts: &[Contact], braking_m: f32, twist: &[f32; 6]) 
     }
 }
 
-/// Twist at the tick's end under `wrench`, the gyroscopic torque with it.
+/// Twist at the tick's end under `wrench` and the gyroscopic torque.
 fn accelerated(step: &Step, wrench: Wrench) -> Twist {
     let h = step.period_s;
     let spin = step.twist.angular;

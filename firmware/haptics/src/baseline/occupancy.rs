@@ -1,19 +1,20 @@
-//! Contact of a pointshell with a voxmap: tangent planes.
+//! Contact of a pointshell with a voxmap, by tangent planes.
 //!
-//! The textbook method (McNeely, Puterbaugh & Troy 1999, tangent-plane force model), kept beside the distance field to be compared with. A point of
-//! the held part in a *surface* voxel meets a plane through the voxel's centre with the point's own normal; with n the point's inward normal, p the
-//! point and c the centre, the gap is φ = (p − c)·n, and it is pushed along n. So a contact carries the same numbers as one from a distance field,
-//! and both integrators take both. The depth is wrong by up to half a voxel's diagonal, and jumps where a point goes from voxel to voxel.
+//! The textbook method (McNeely, Puterbaugh & Troy 1999, tangent-plane force model), kept for comparison with the distance field. A point of the held
+//! part in a *surface* voxel meets a plane through the voxel's centre with the point's own normal. With n the point's inward normal, p the point and
+//! c the centre, the gap is φ = (p − c)·n, and the force acts along n. So a contact has the same quantities as one from a distance field, and both
+//! integrators accept both. The depth is wrong by up to half a voxel's diagonal, and jumps where a point moves from voxel to voxel.
 //!
-//! As in the paper: points of the held part only, none of the other's; *interior* voxels push nothing, they are flagged [`Flags::DEEP`]; *proximity*
-//! voxels only brake, and only with [`crate::Integrator::Explicit`]. Unlike it, the force layer is where the surface is, not two voxels outside.
+//! As in the paper: only points of the held part are used, none of the other's; *interior* voxels exert no force, they are flagged [`Flags::DEEP`];
+//! *proximity* voxels only brake, and only with [`crate::Integrator::Explicit`]. Unlike the paper, the force layer is at the surface, not two voxels
+//! outside.
 //!
 //! *Shrinking* (McNeely et al.; Faas 2010, section 4.1.1) moves the points inward along their normals, by up to a voxel of the held part. It is a
-//! setting of the running law ([`crate::ContactSettings::shrinking`]): it grows at once, which only lets contacts go, and falls so slowly that points
-//! coming out push no faster than a hand would.
+//! setting of the running law ([`crate::ContactSettings::shrinking`]). It rises at once, which only releases contacts, and falls so slowly that
+//! points moving outward push no faster than a hand would.
 //!
-//! A point and a voxel name the faces that cross them, two each: the contact of a point and a voxel of guided faces is guided, as in the hybrid method
-//! of Faas 2010, section 5.4.
+//! A point and a voxel name the faces that cross them, two each: the contact of a point and a voxel of guided faces is guided, as in the hybrid
+//! method of Faas 2010, section 5.4.
 
 use glam::Vec3;
 use mortise_protocol::image::{Field, PointRecord, Voxel, VoxelSample, oct_decode};
@@ -28,11 +29,11 @@ use crate::io::Flags;
 use crate::math::scalar::inverse_sqrt;
 use crate::settings::ContactSettings;
 
-/// The plane a point meets.
+/// Tangent plane that a point meets.
 pub(crate) struct TangentPlane {
-    /// Of the point, m: negative when it is through.
+    /// Gap of the point, m: negative beyond the plane.
     pub gap: f32,
-    /// Inward normal of the point: where it is pushed to, world.
+    /// Inward normal of the point, the direction of the force, world.
     push: Vec3,
 }
 
@@ -40,12 +41,12 @@ pub(crate) struct TangentPlane {
 #[inline]
 pub(crate) fn inward(point: &PointRecord) -> Vec3 {
     let code = Vec3::from_array(oct_decode(point.normal));
-    // The code is no shorter than 1/√3 (the octahedron's faces).
+    // The decoded normal is no shorter than 1/√3 (the octahedron's faces).
     code * -inverse_sqrt(code.length_squared())
 }
 
 impl TangentPlane {
-    /// Through the centre of the voxel that `p` (field frame) lies in.
+    /// Plane through the centre of the voxel that `p` (field frame) lies in.
     #[inline]
     pub fn of(pair: &DirectedPair<'_>, inward: Vec3, p: Vec3, voxel: &VoxelSample) -> Self {
         let in_field = pair.to_field.turn(inward);
@@ -56,7 +57,7 @@ impl TangentPlane {
     }
 }
 
-/// Where a point is that was moved inward by so much, tree frame.
+/// Position of a point moved inward by `by_m`, tree frame, m.
 #[inline]
 pub(crate) fn shrunk(point: &PointRecord, by_m: f32) -> [f32; 3] {
     if by_m > 0.0 {
@@ -67,7 +68,7 @@ pub(crate) fn shrunk(point: &PointRecord, by_m: f32) -> [f32; 3] {
 }
 
 impl ContactSettings {
-    /// How far points of the part with this field are moved inward, m.
+    /// Distance by which points of the part with this field are moved inward, m.
     pub(crate) fn shrunk_m(&self, field: &Field<'_>) -> f32 {
         if field.is_occupancy() {
             self.shrinking * field.record().cell
@@ -78,7 +79,7 @@ impl ContactSettings {
 }
 
 impl Traversal<'_, '_, '_> {
-    /// Looks one point up and offers it as a contact; how far it is from any surface voxel at least, m.
+    /// Queries one point and offers it as a contact. Returns a lower bound of its distance from any surface voxel, m.
     pub fn voxel(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         let position = shrunk(point, self.search.shrunk_m);
         let p = pair.to_field.apply(position);
@@ -105,7 +106,7 @@ impl Traversal<'_, '_, '_> {
             let gap = plane.gap + mating.allowance_m;
             (gap, gap < self.search.slack + approach)
         } else {
-            // As near as braking begins, for all the method knows; wanted while it comes nearer.
+            // The method knows only that the point is within the braking distance; it is a candidate while it approaches.
             (braking_m, approach > 0.0)
         };
         if !wanted {
@@ -127,7 +128,7 @@ impl Traversal<'_, '_, '_> {
         0.0
     }
 
-    /// What guidance says of the faces that cross a point's voxel and this one.
+    /// Mating of the faces at a point and of those that cross its voxel.
     fn mating_of_voxels(
         &mut self,
         pair: &DirectedPair<'_>,

@@ -1,17 +1,17 @@
-//! The nodes above the one that is looked at: none of them is due before the first of those below it.
+//! Ancestor stack of the node under evaluation: it passes the smallest advancement bound of the nodes below up to each ancestor.
 //!
 //! Cost: some 20 instructions for each node passed.
 
 use crate::collision::coherence::{Bound, Coherence};
 use crate::collision::node_key::Key;
 
-/// Deepest tree whose inner nodes all learn when they are due: 2¹⁶ leaves in two halves each time.
+/// Depth of the deepest tree whose inner nodes all get bounds: 2¹⁶ leaves with two children per node.
 const DEEPEST: usize = 16;
 
-/// The nodes above the one that is looked at, and when the first below each is due.
+/// Ancestors of the node under evaluation, each with the smallest bound found below it so far.
 pub(crate) struct Ancestors {
     nodes: heapless::Vec<(Key, u32, Bound), DEEPEST>,
-    /// Where the innermost ends.
+    /// End of the innermost ancestor's subtree.
     end: u32,
 }
 
@@ -23,24 +23,25 @@ impl Ancestors {
         }
     }
 
-    /// What follows, up to node `end`, is below `key`. In a deeper tree the last above has it all.
+    /// Enters the subtree of `key`, which ends before node `end`. In a deeper tree the last ancestor on the stack stands for the ones that do not
+    /// fit.
     pub fn open(&mut self, key: Key, end: u32) {
         if self.nodes.push((key, end, Bound::NEVER)).is_ok() {
             self.end = end;
         }
     }
 
-    /// Something below is due.
+    /// Records the bound of a node below.
     #[inline]
-    pub fn note(&mut self, due: Bound) {
-        if let Some((_, _, first)) = self.nodes.last_mut()
-            && due < *first
+    pub fn note(&mut self, bound: Bound) {
+        if let Some((_, _, earliest)) = self.nodes.last_mut()
+            && bound < *earliest
         {
-            *first = due;
+            *earliest = bound;
         }
     }
 
-    /// All nodes before `index` were looked at or passed over.
+    /// Leaves the subtrees that end at or before `index`, and stores their bounds.
     #[inline(always)]
     pub fn close(&mut self, index: u32, coherence: &mut Coherence) {
         while index >= self.end && self.close_last(coherence) {}
@@ -48,14 +49,14 @@ impl Ancestors {
 
     #[inline(always)]
     fn close_last(&mut self, coherence: &mut Coherence) -> bool {
-        let Some((key, _, due)) = self.nodes.pop() else {
+        let Some((key, _, bound)) = self.nodes.pop() else {
             return false;
         };
-        if due != Bound::NOW {
-            coherence.set_bound(key, due);
+        if bound != Bound::NOW {
+            coherence.set_bound(key, bound);
         }
         self.end = self.nodes.last().map_or(u32::MAX, |&(_, end, _)| end);
-        self.note(due);
+        self.note(bound);
         true
     }
 }

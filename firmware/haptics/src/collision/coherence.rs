@@ -1,47 +1,46 @@
-//! What need not be looked at yet: how far the object must travel before a node's points can touch.
+//! Temporal coherence: how far the object must travel before a node's points can touch (its *advancement bound*).
 //!
-//! A node whose points are all at least D from the other part cannot hold a candidate until some point of the object has travelled
-//! D − margin. The travel is added up once a tick from a bound on the speed of any point, so the due times are conservative and the
-//! candidates found are the same with and without them. They are kept in a direct-mapped table: a collision costs a look-up, never a contact.
-//! A node that was near is taken to be near still, without asking the field, and asked again once in [`QUERY_AGAIN`] ticks. Whole numbers of
-//! nanometres, rounded to the safe side, so that no travel is lost to rounding.
+//! A node whose points are all at least D from the other part cannot hold a candidate until some point of the object has travelled D − margin. The
+//! travel is summed once a tick from a bound on the speed of any point, so the bounds are conservative and the candidates are the same with and
+//! without them. Bounds are kept in a direct-mapped table: a collision costs a field query, never a contact. A node that was near is assumed to be
+//! near still, without a field query, and is queried again once in [`QUERY_AGAIN`] ticks. Travel is counted in whole nanometres, rounded to the safe
+//! side, so that none is lost to rounding.
 //!
-//! A node that exclusions keep apart from all it could meet is far too, as long as every one of those exclusions lasts: what was noted so is told from the
-//! rest by an epoch that ends with any of them.
+//! A node that contact exclusions keep apart from everything within reach also counts as far, as long as each of those exclusions holds. Such entries
+//! carry an epoch, which ends with any exclusion.
 //!
-//! A node is due no sooner than the first of those below it, so what is far is passed over in large pieces. Of a leaf that is near it is noted which
-//! of its points are, and how long the others can be left alone.
+//! A node's bound is at most the smallest bound of the nodes below it, so far regions are skipped in large pieces. For a near leaf the table stores
+//! which of its points are near, and the bound of the others.
 //!
-//! Cost: some 25 instructions for a node of which enough is known, against some 200 for asking the field.
+//! Cost: some 25 instructions for a node with a valid entry, against some 200 for a field query.
 
 use crate::collision::face_cache::{CachedFace, FaceCache};
 use crate::collision::node_key::{ALL, Key, Points, SLOTS};
 
-/// The travel is taken back to zero, and the table cleared, beyond this: 1.8 m.
+/// Travel beyond which it is reset to zero and the table is cleared: 1.8 m.
 const LONGEST_NM: u32 = 1_800_000_000;
-// Dues stay clear of [`EXCLUDED`].
+// Bounds stay clear of the flag [`EXCLUDED`].
 const _: () = assert!(LONGEST_NM + FARTHEST_NM < EXCLUDED);
-/// Set in the due of a node that a exclusion keeps apart.
+/// Flag in the bound of a node that a contact exclusion keeps apart.
 const EXCLUDED: u32 = 1 << 31;
-/// No due lies farther ahead: 268 mm.
+/// Largest bound ahead of the travel: 268 mm.
 const FARTHEST_NM: u32 = 1 << 28;
-/// Ticks after which a node that was near is asked again, or all points of such a leaf are looked at; a power of two. Which tick depends on the
-/// node, so that the work is spread.
+/// Period, in ticks, after which a near node is queried again and all points of a near leaf are evaluated; a power of two. The phase depends on the
+/// node, so that the work is spread over ticks.
 const QUERY_AGAIN: u32 = 16;
-/// Set in the due of a leaf whose sphere did not tell that it is far, but its points did: when it is due, so are they.
+/// Flag in the bound of a leaf that is far by its points although its sphere is not: when the bound expires, the points are evaluated directly.
 const BY_POINTS: u32 = 1;
 
-/// Bound times of nodes.
-// In this order: what is asked with every node lies at offsets that fit an instruction.
+/// Advancement bounds of nodes, and cached faces.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Coherence {
     travel_nm: u32,
-    /// What was noted at up to this travel is void.
+    /// Entries with bounds up to this travel are void.
     invalidated_nm: u32,
-    /// Counts ticks.
+    /// Tick counter.
     round: u32,
-    /// Of the exclusions.
+    /// Epoch of the contact exclusions.
     epoch: u16,
     slots: [Slot; SLOTS],
     face_cache: FaceCache,
@@ -50,14 +49,14 @@ pub(crate) struct Coherence {
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     tag: u16,
-    /// Points that are near: none of a node that is far, or of an inner one. With [`EXCLUDED`] the epoch instead.
+    /// Near points; none for a far node, all for a near inner node. With [`EXCLUDED`] the epoch instead.
     near: Points,
-    /// The travel at which the others, or all, are due.
+    /// Travel at which the bound of the other points, or of all, expires.
     bound_nm: u32,
 }
 
 impl Slot {
-    /// All zero, so that a fresh table lies in memory that is cleared rather than copied from flash.
+    /// All zero, so that a fresh table lies in zeroed memory rather than being copied from flash.
     const EMPTY: Self = Self {
         tag: 0,
         near: 0,
@@ -65,27 +64,27 @@ impl Slot {
     };
 }
 
-/// What is known of a node.
+/// Stored knowledge of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Known {
     /// None of its points can be a candidate before this [`Bound`].
     Far(Bound),
-    /// It was near not long ago: none but these of its points can be a candidate.
+    /// The node was near not long ago: only these of its points can be candidates.
     Near(Points),
-    /// A leaf all of whose points are due, and whose sphere told nothing when it was last asked.
+    /// The bounds of all points of this leaf have expired, and its sphere did not show it to be far when last queried.
     Expired,
-    /// Nothing, or nothing of late.
+    /// No entry, or the node is to be queried again.
     Nothing,
 }
 
-/// When a node is to be looked at again: the travel, nm, as [`Coherence`] adds it up.
+/// Advancement bound: the travel (as [`Coherence`] sums it, nm) at which a node must be evaluated again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Bound(u32);
 
 impl Bound {
-    /// At every tick.
+    /// Expires at every tick.
     pub const NOW: Self = Self(0);
-    /// Never, before others have had their say.
+    /// Never expires: the neutral element when bounds are combined.
     pub const NEVER: Self = Self(u32::MAX);
 }
 
@@ -101,9 +100,9 @@ impl Coherence {
         }
     }
 
-    /// Everything is due. For a jump of the object, or other parts.
+    /// Voids all entries. For a jump of the object, or other parts.
     pub fn invalidate(&mut self) {
-        // As if it had travelled past every due: exclusion_work the table costs more than most ticks.
+        // Equivalent to travelling past every bound: clearing the table costs more than most ticks.
         self.add_travel(FARTHEST_NM);
         self.invalidated_nm = self.travel_nm;
     }
@@ -111,26 +110,26 @@ impl Coherence {
     fn add_travel(&mut self, nm: u32) {
         self.travel_nm = self.travel_nm.saturating_add(nm);
         if self.travel_nm > LONGEST_NM {
-            // In place: made anew it would pass over the stack, which has not room for many such.
+            // In place: a new table would be built on the stack, which has no space for many of them.
             (self.travel_nm, self.invalidated_nm, self.epoch) = (0, 0, 0);
             self.slots.fill(Slot::EMPTY);
             self.face_cache.clear();
         }
     }
 
-    /// The object moved, no point of it by more than `distance` m.
+    /// Adds the object's motion: no point moved by more than `distance` m.
     pub fn travelled(&mut self, distance: f32) {
         self.round = self.round.wrapping_add(1);
         self.add_travel(up_nm(distance));
     }
 
-    /// The travel that leaves `margin` m unseen: to be given to [`Self::query`].
+    /// Travel up to which bounds count as expired, for points within `margin` m; input of [`Self::query`].
     pub fn horizon(&self, margin: f32) -> u32 {
         self.travel_nm.saturating_add(up_nm(margin))
     }
 
-    /// What is known of a node, for points that come within the `horizon`. More is known of what lies below an inner node than of the node: when it
-    /// is due, it counts as near.
+    /// Stored knowledge of a node, for points that come within the `horizon`. The nodes below an inner node have more precise entries than the node
+    /// itself: when its bound has expired, it counts as near.
     #[inline]
     pub fn query(&self, key: Key, horizon: u32, leaf: bool) -> Known {
         let slot = &self.slots[key.slot()];
@@ -138,88 +137,88 @@ impl Coherence {
             return Known::Nothing;
         }
         if slot.bound_nm >= EXCLUDED {
-            // What is above cannot tell it from other dues, and must not outlast the exclusion.
+            // Ancestors cannot distinguish exclusion entries, so their bound must not outlive the exclusion.
             return if slot.near == self.epoch && slot.bound_nm & !EXCLUDED > horizon {
                 Known::Far(Bound::NOW)
             } else {
                 Known::Nothing
             };
         }
-        let due = slot.bound_nm <= horizon;
-        if slot.near == 0 && !due {
+        let reached = slot.bound_nm <= horizon;
+        if slot.near == 0 && !reached {
             return Known::Far(Bound(slot.bound_nm));
         }
-        let again = self.round.wrapping_add(key.0).is_multiple_of(QUERY_AGAIN);
+        let requery = self.round.wrapping_add(key.0).is_multiple_of(QUERY_AGAIN);
         match (leaf, slot.near) {
-            (false, _) if again => Known::Nothing,
+            (false, _) if requery => Known::Nothing,
             (false, _) => Known::Near(ALL),
-            // Now and then it is seen whether the sphere tells by now.
-            (true, 0) if again || slot.bound_nm & BY_POINTS == 0 => Known::Nothing,
+            // Once in [`QUERY_AGAIN`] ticks the sphere is queried: it may show by now that the leaf is far.
+            (true, 0) if requery || slot.bound_nm & BY_POINTS == 0 => Known::Nothing,
             (true, 0) => Known::Expired,
-            (true, _) if again => Known::Expired,
-            (true, near) => Known::Near(if due { ALL } else { near }),
+            (true, _) if requery => Known::Expired,
+            (true, near) => Known::Near(if reached { ALL } else { near }),
         }
     }
 
-    /// No point of the node is nearer than `distance` m, as its sphere tells now.
+    /// Stores that no point of the node is nearer than `distance` m, by its sphere.
     #[inline]
     pub fn set_distance(&mut self, key: Key, distance: f32) -> Bound {
-        let Bound(bound_nm) = self.ahead(key, distance);
+        let Bound(bound_nm) = self.bound_after(key, distance);
         self.set_bound(key, Bound(bound_nm & !BY_POINTS))
     }
 
-    /// No point of the leaf is nearer than `distance` m, as each of them tells now.
+    /// Stores that no point of the leaf is nearer than `distance` m, by each of its points.
     #[inline]
     pub fn set_far(&mut self, key: Key, distance: f32) -> Bound {
-        let Bound(bound_nm) = self.ahead(key, distance);
-        // No later than that.
+        let Bound(bound_nm) = self.bound_after(key, distance);
+        // The flag must not round the bound up.
         self.set_bound(key, Bound(bound_nm.saturating_sub(1) | BY_POINTS))
     }
 
-    /// No node below this one is due before `due`.
+    /// Stores that no node below this one has a bound smaller than `bound`.
     #[inline]
-    pub fn set_bound(&mut self, key: Key, due: Bound) -> Bound {
-        let bound_nm = smaller_of(due.0, self.travel_nm + FARTHEST_NM);
+    pub fn set_bound(&mut self, key: Key, bound: Bound) -> Bound {
+        let bound_nm = smaller_of(bound.0, self.travel_nm + FARTHEST_NM);
         self.set(key, 0, bound_nm);
         Bound(bound_nm)
     }
 
-    /// The node is near.
+    /// Stores that the node is near.
     #[inline]
     pub fn set_near(&mut self, key: Key) {
-        // Bound at once, but not forgotten.
+        // Expires at once, but is a valid entry.
         self.set(key, ALL, self.travel_nm + 1);
     }
 
-    /// Of the leaf's points these are near, the others no nearer than `distance` m.
+    /// Stores which of the leaf's points are near, and that the others are no nearer than `distance` m.
     #[inline]
     pub fn set_points(&mut self, key: Key, near: Points, distance: f32) {
-        let Bound(bound_nm) = self.ahead(key, distance);
+        let Bound(bound_nm) = self.bound_after(key, distance);
         self.set(key, near, bound_nm);
     }
 
-    /// No point of the node can touch anything but what exclusions keep it from before it has travelled `distance` m.
+    /// Stores that no point of the node can touch anything but the faces that exclusions keep it from, before it has travelled `distance` m.
     pub fn set_excluded(&mut self, key: Key, distance: f32) {
-        let Bound(bound_nm) = self.ahead(key, distance);
+        let Bound(bound_nm) = self.bound_after(key, distance);
         self.set(key, self.epoch, bound_nm | EXCLUDED);
     }
 
-    /// What these points of a leaf have to do with.
+    /// Face near the selected points of a leaf, if cached.
     #[inline(always)]
     pub fn cached_face(&self, leaf: Key, which: Points) -> CachedFace {
         self.face_cache.get(leaf, which, self.travel_nm)
     }
 
-    /// All that these points of a leaf find within `distance` m of where they are has to do with this face, or with more than one.
+    /// Caches the one face within `distance` m of the selected points of a leaf, or `None` where there is more than one.
     pub fn cache_face(&mut self, leaf: Key, which: Points, face: Option<u16>, distance: f32) {
         if !leaf.is_none() {
-            // Not all leaves in the same tick again.
-            let Bound(until_nm) = self.ahead(leaf, distance);
+            // The node's share of the distance: not all leaves expire in the same tick.
+            let Bound(until_nm) = self.bound_after(leaf, distance);
             self.face_cache.set(leaf, which, face, until_nm);
         }
     }
 
-    /// Some exclusion is no more: what was noted for it is void.
+    /// Voids all exclusion entries; for when any exclusion has ended.
     pub fn end_exclusions(&mut self) {
         match self.epoch.checked_add(1) {
             Some(next) => self.epoch = next,
@@ -230,9 +229,9 @@ impl Coherence {
         }
     }
 
-    /// When the node's share of `distance` m will be used up.
+    /// Travel at which the node's share of `distance` m is used up.
     #[inline]
-    fn ahead(&self, key: Key, distance: f32) -> Bound {
+    fn bound_after(&self, key: Key, distance: f32) -> Bound {
         // A float that is negative or not a number becomes 0, a huge one the largest number.
         let ahead = (distance * (key.share() * 1e9)) as u32;
         Bound(self.travel_nm + smaller_of(ahead, FARTHEST_NM))
@@ -270,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn due_once_the_distance_is_used_up() {
+    fn query_needed_once_the_distance_is_travelled() {
         let mut c = Coherence::new();
         let key = key_of(3, 77);
         assert_eq!(c.query(key, c.horizon(0.0), true), Known::Nothing);
@@ -288,7 +287,8 @@ mod tests {
         assert_eq!(c.query(key, c.horizon(0.0), true), Known::Nothing);
     }
 
-    /// Over the whole range, and evenly: each of eight parts of it holds an eighth of a thousand nodes, four standard deviations of 10.5 allowed.
+    /// The shares cover the whole range evenly: each of eight parts of it holds an eighth of a thousand nodes, four standard deviations of 10.5
+    /// allowed.
     #[test]
     fn shares_lie_between_their_bounds_and_differ() {
         let mut seen = [0u32; 8];
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn what_joints_keep_apart_is_far_while_they_last() {
+    fn excluded_nodes_are_far_until_an_exclusion_ends() {
         let mut c = Coherence::new();
         let key = key_of(PAIRS - 1, NODES - 1);
         assert_eq!(key.tag(), u16::MAX, "the largest, and not that of an empty slot");
@@ -316,7 +316,7 @@ mod tests {
             c.end_exclusions();
             assert_eq!(c.query(key, c.horizon(0.0), true), Known::Nothing);
         }
-        // Every epoch's keys are told apart, and from those without.
+        // Entries of different epochs are distinct, and distinct from entries without one.
         let mut c = Coherence::new();
         c.set_distance(key, 1e-3);
         for _ in 0..3 {
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn a_collision_forgets() {
+    fn a_collision_evicts() {
         let mut c = Coherence::new();
         let (a, b) = (key_of(0, 5), key_of(0, 5 + SLOTS as u32));
         c.set_distance(a, 1.0);
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn no_due_outlasts_long_travel() {
+    fn no_bound_outlasts_long_travel() {
         let mut c = Coherence::new();
         let key = key_of(0, 0);
         for start in 0..20 {
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_known_once_forgotten() {
+    fn nothing_is_known_once_invalidated() {
         let mut c = Coherence::new();
         for start in 0..20 {
             let key = |node| key_of(3, node);
@@ -367,31 +367,31 @@ mod tests {
         }
     }
 
-    /// Whatever was noted, right after everything was forgotten too.
+    /// Every kind of entry is found, right after an invalidation too.
     #[test]
-    fn what_is_noted_is_known() {
+    fn entries_are_found_after_invalidation() {
         let mut c = Coherence::new();
         for _ in 0..20 {
             c.invalidate();
             c.set_near(key_of(3, 1));
             c.set_points(key_of(3, 2), 5, 1e-3);
             c.set_distance(key_of(3, 3), 1e-3);
-            let ask = |node| c.query(key_of(3, node), c.horizon(0.0), true);
-            // Each in one of 16 ticks is asked again.
+            let query = |node| c.query(key_of(3, node), c.horizon(0.0), true);
+            // Each is queried again in one of 16 ticks.
             for (node, known) in [(1, Known::Near(ALL)), (2, Known::Near(5))] {
-                let again = c
+                let requery = c
                     .round
                     .wrapping_add(key_of(3, node).0)
                     .is_multiple_of(QUERY_AGAIN);
-                assert_eq!(ask(node), if again { Known::Expired } else { known });
+                assert_eq!(query(node), if requery { Known::Expired } else { known });
             }
-            assert!(is_far(ask(3)));
+            assert!(is_far(query(3)));
             c.travelled(0.0);
         }
     }
 
     #[test]
-    fn nothing_nearer_than_nothing() {
+    fn no_bound_from_a_meaningless_distance() {
         let mut c = Coherence::new();
         c.travelled(1e-3);
         for distance in [-1.0, 0.0, f32::NAN, f32::NEG_INFINITY] {
@@ -405,25 +405,25 @@ mod tests {
     }
 
     #[test]
-    fn near_is_asked_again() {
+    fn near_nodes_are_queried_again() {
         let mut c = Coherence::new();
         let key = key_of(1, 9);
-        let (mut asked, mut looked_at) = (0, 0);
+        let (mut queried, mut expired) = (0, 0);
         for _ in 0..4 * QUERY_AGAIN {
             c.set_near(key);
-            asked += u32::from(c.query(key, c.horizon(1.0), false) == Known::Nothing);
-            looked_at += u32::from(c.query(key, c.horizon(1.0), true) == Known::Expired);
+            queried += u32::from(c.query(key, c.horizon(1.0), false) == Known::Nothing);
+            expired += u32::from(c.query(key, c.horizon(1.0), true) == Known::Expired);
             c.travelled(0.0);
         }
-        assert_eq!((asked, looked_at), (4, 4));
+        assert_eq!((queried, expired), (4, 4));
     }
 
-    /// A leaf that only its points told to be far is looked at when due, and now and then asked.
+    /// A leaf that is far by its points only is evaluated when its bound expires, and its sphere is queried once in [`QUERY_AGAIN`] ticks.
     #[test]
-    fn far_by_points_is_due_without_asking() {
+    fn far_by_points_expires_without_a_node_query() {
         let mut c = Coherence::new();
         let key = key_of(1, 9);
-        let mut asked = 0;
+        let mut queried = 0;
         for _ in 0..4 * QUERY_AGAIN {
             c.set_far(key, 1e-3);
             assert!(is_far(c.query(key, c.horizon(0.7e-3), true)));
@@ -431,11 +431,11 @@ mod tests {
                 Known::Expired => {}
                 known => {
                     assert_eq!(known, Known::Nothing);
-                    asked += 1;
+                    queried += 1;
                 }
             }
             c.travelled(0.0);
         }
-        assert_eq!(asked, 4);
+        assert_eq!(queried, 4);
     }
 }

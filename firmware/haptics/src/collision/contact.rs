@@ -1,44 +1,44 @@
-//! Contacts of one tick: a bounded store that keeps the deepest and the widest apart.
+//! Contacts of one tick: a bounded store that keeps the deepest contacts and the ones with the longest lever arms.
 
 use glam::Vec3;
 
 use crate::collision::node_cursor::NodeCursor;
 use crate::math::symmetric6::dot;
 
-/// Contacts one tick can carry.
+/// Capacity for contacts per tick.
 pub(crate) const MAX_CONTACTS: usize = 256;
 
-/// A point near or in the other part, linearised about the tick's start.
+/// A point near the other part or inside it, linearised about the tick's start.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Contact {
-    /// How the gap's rate follows from the scaled twist (v, ω·L): (n, (r × n)/L), n the world normal that pushes the object away.
+    /// Jacobian row of the gap's rate for the scaled twist (v, ω·L): (n, (r × n)/L), n the world normal that pushes the object away.
     pub row: [f32; 6],
-    /// From the object's centre of mass to the point, world axes, m.
+    /// Lever arm from the object's centre of mass to the point, world axes, m.
     pub arm: Vec3,
     /// Signed distance at the tick's start, m.
     pub gap: f32,
-    /// How soon a turn of the object could bring it to touch, m: the gap less what its lever makes up for. Small is soon.
+    /// Gap less the part of it that a rotation of the object closes at this lever arm, m: the smaller, the sooner a rotation makes the point touch.
     pub reach_gap: f32,
-    /// Rate of the gap in the last solution, m/s; not kept up while the contact is free.
+    /// Rate of the gap in the last solution, m/s; not updated while the contact is free.
     pub rate: f32,
-    /// Part of the force law the last solution assumed.
+    /// Branch of the force law that the last solution assumed.
     pub phase: Phase,
-    /// Between faces that a target guides.
+    /// Whether a target guides its faces.
     pub guided: bool,
     /// Face of the held part.
     pub moving_face: u16,
     /// Face of the other part.
     pub static_face: u16,
-    /// The held part's other face where the point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
+    /// The held part's second face where the point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
     pub moving_edge_face: u16,
-    /// The other part's, likewise.
+    /// The other part's second face, likewise.
     pub static_edge_face: u16,
-    /// Where it was found; tells the other part.
+    /// Leaf in which it was found; identifies the other part.
     pub leaf: NodeCursor,
 }
 
 impl Contact {
-    /// Nothing. All zero, so that a fresh store lies in memory that is cleared rather than copied from flash.
+    /// Empty contact. All zero, so that a fresh store lies in zeroed memory rather than being copied from flash.
     const NONE: Self = Self {
         row: [0.0; 6],
         arm: Vec3::ZERO,
@@ -60,42 +60,43 @@ impl Contact {
 pub(crate) enum Phase {
     /// No force.
     Free,
-    /// Force falls off as the gap opens: λ = −k·(gap + h·rate).
+    /// Without damping: λ = −k·(gap + h·rate).
     Parting,
     /// With damping: λ = −k·(gap + (h + τ)·rate).
     Closing,
 }
 
-/// Contacts kept for their depth; as many are kept for their lever.
+/// Contacts kept for their depth; as many are kept for their lever arm.
 const HALF: usize = MAX_CONTACTS / 2;
 
-/// At most [`MAX_CONTACTS`] contacts: of all offered, half are the deepest, half are those of the rest that a turn would bring to touch first.
+/// Store of at most [`MAX_CONTACTS`] contacts. Of all offered, half are the deepest; the other half are those of the rest that a rotation would bring
+/// to touch first.
 ///
-/// The deepest alone would all lie on the side a part leans to; with nothing left on the other side it would rock. Among equals the first
-/// offered stay. A contact is filled in place: it is too large to be handed about by value in the innermost loop.
+/// The deepest alone would all lie on the side to which a part leans; with no contacts on the other side it would rock. Among equals the first
+/// offered stay. A contact is filled in place: it is too large to pass by value in the innermost loop.
 #[derive(Clone, Debug)]
 pub(crate) struct Contacts {
-    /// This tick's and the last one's, in turn, filled up to their lengths. One that overflowed has the deepest in its first half.
+    /// Contacts of this tick and the last one, alternating, filled up to their lengths. After an overflow the first half holds the deepest.
     lists: [[Contact; MAX_CONTACTS]; 2],
-    /// Which is this tick's: 0 or 1.
+    /// Index of this tick's list: 0 or 1.
     current: usize,
-    /// Length of this tick's.
+    /// Length of this tick's list.
     len: usize,
-    /// Once it overflowed, of the first half: the least deep on top.
+    /// Heap over the first half after an overflow: the least deep on top.
     by_gap: Heap,
-    /// Likewise, of the second half: the one that would touch last on top.
+    /// Heap over the second half after an overflow: the largest reach gap on top.
     by_reach: Heap,
-    /// It overflowed.
+    /// Whether the list overflowed.
     dropped: bool,
-    /// How many of those left out touch.
+    /// Number of dropped contacts that touch.
     lost: u32,
     /// Square of the longest arm, m².
     farthest2: f32,
-    /// How many of the last tick's can be carried over.
+    /// Number of the last tick's contacts that can be carried over.
     carried_len: usize,
 }
 
-/// Places in half a list, the one with the largest key on top. Keys lie side by side, not a contact's size apart in the list.
+/// Heap of the indices of half a list, the largest key on top. Keys are stored side by side, not a contact's size apart.
 #[derive(Clone, Debug)]
 struct Heap {
     keys: [f32; HALF],
@@ -113,7 +114,7 @@ impl Heap {
         }
     }
 
-    /// Over the `keys` of all of a half, in its order.
+    /// Builds the heap over the `keys` of one half, in the list's order.
     #[cold]
     fn build(&mut self, keys: impl Iterator<Item = f32>) {
         for (i, key) in keys.enumerate().take(HALF) {
@@ -129,7 +130,7 @@ impl Heap {
         self.keys[0]
     }
 
-    /// Gives the place on top a new key, not larger than the old; that place.
+    /// Replaces the key on top with one that is not larger. Returns the index of its contact.
     fn replace_largest(&mut self, key: f32) -> usize {
         let place = self.places[0];
         self.keys[0] = key;
@@ -137,7 +138,7 @@ impl Heap {
         usize::from(place)
     }
 
-    /// Moves the entry at `i` below all with larger keys: at most 7 steps.
+    /// Moves the entry at `i` below all entries with larger keys: at most 7 steps.
     fn sift_down(&mut self, mut i: usize) {
         let (key, place) = (self.keys[i], self.places[i]);
         loop {
@@ -185,9 +186,9 @@ impl Contacts {
         self.carried_len = 0;
     }
 
-    /// Empties the store for the next tick. With `put_aside` what it held can be had back by [`Self::carry`].
-    pub fn begin(&mut self, put_aside: bool) {
-        self.carried_len = if put_aside { self.len } else { 0 };
+    /// Empties the store for the next tick. With `keep_previous` the contacts it held can be restored by [`Self::carry`].
+    pub fn begin(&mut self, keep_previous: bool) {
+        self.carried_len = if keep_previous { self.len } else { 0 };
         self.current = 1 - self.current;
         self.len = 0;
         self.dropped = false;
@@ -195,14 +196,14 @@ impl Contacts {
         self.farthest2 = 0.0;
     }
 
-    /// Takes what pushed in the last tick over into this one where its leaf was not looked at: the gap as the object's `motion` since (scaled as the
-    /// rows) has changed it, the normal as it was.
-    pub fn carry(&mut self, motion: &[f32; 6], unseen: impl Fn(NodeCursor) -> bool) {
+    /// Carries over contacts that pushed in the last tick and whose leaf was not visited: the object's `motion` since (scaled as the rows) updates
+    /// the gap, the normal stays.
+    pub fn carry(&mut self, motion: &[f32; 6], unvisited: impl Fn(NodeCursor) -> bool) {
         for i in 0..self.carried_len {
             let old = self.lists[1 - self.current][i];
             let gap = old.gap + dot(&old.row, motion);
             if old.phase != Phase::Free
-                && unseen(old.leaf)
+                && unvisited(old.leaf)
                 && let Some(new) = self.offer(gap, old.reach_gap, old.arm.length_squared())
             {
                 *new = Contact {
@@ -232,23 +233,23 @@ impl Contacts {
         self.as_slice().iter().filter(|c| c.phase != Phase::Free).count()
     }
 
-    /// Whether any was left out since [`Self::clear`].
+    /// Whether any contact was dropped since [`Self::clear`].
     pub fn dropped(&self) -> bool {
         self.dropped
     }
 
-    /// How many contacts that touch were left out since [`Self::clear`].
+    /// Number of contacts that touch and were dropped since [`Self::clear`].
     pub fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// The longest arm of all that were taken in, m.
+    /// The longest lever arm of all contacts accepted, m.
     pub fn farthest(&self) -> f32 {
         libm::sqrtf(self.farthest2)
     }
 
-    /// A place for a contact with an arm of √`arm2`, the rest of which the caller fills in, unless it is not to be kept. Once all is full it is two
-    /// comparisons, and at most twice 7 steps of a heap when it displaces others.
+    /// Slot for a contact with a lever arm of √`arm2`, which the caller fills in; `None` if the contact is not kept. Once the list is full the cost
+    /// is two comparisons, and at most twice 7 heap steps when the contact displaces others.
     #[inline]
     pub fn offer(&mut self, gap: f32, reach_gap: f32, arm2: f32) -> Option<&mut Contact> {
         let place = if self.len < MAX_CONTACTS {
@@ -266,7 +267,7 @@ impl Contacts {
         Some(contact)
     }
 
-    /// A place once all is full. Out of line: the loop over points is faster for it.
+    /// Index for a new contact once the list is full. Out of line: the loop over points is faster for it.
     #[inline(never)]
     fn displace(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
         let list = &mut self.lists[self.current];
@@ -287,7 +288,7 @@ impl Contacts {
         Some(place)
     }
 
-    /// A place in the second half, unless all there would touch sooner. Whichever is left out for it is counted.
+    /// Index in the second half, unless all contacts there would touch sooner. Counts the dropped contact if it touches.
     fn displace_in_second_half(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
         let sooner = reach_gap < self.by_reach.largest();
         let place = sooner.then(|| HALF + self.by_reach.replace_largest(reach_gap));
@@ -302,7 +303,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keeps_the_deepest_and_of_the_rest_the_soonest() {
+    fn keeps_the_deepest_and_then_the_soonest_in_reach() {
         // A full-period generator modulo 2048 offers each gap once, in a scrambled order; reach gaps fall as gaps rise.
         let mut contacts = Contacts::new();
         let mut x = 1u32;
@@ -331,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn drops_nothing_while_there_is_room() {
+    fn drops_nothing_up_to_capacity() {
         let mut contacts = Contacts::new();
         for i in 0..MAX_CONTACTS {
             // The deeper half comes last, so every one of it displaces another.
@@ -343,13 +344,13 @@ mod tests {
     }
 
     #[test]
-    fn counts_those_that_touch_and_are_left_out() {
+    fn counts_dropped_contacts_that_touch() {
         let mut contacts = Contacts::new();
         let mut x = 1u32;
         let touching = 700;
         for _ in 0..2048 {
             x = (x * 1021 + 7) % 2048;
-            // The deepest have the least levers.
+            // The deepest have the shortest lever arms.
             let gap = x as f32 - touching as f32;
             let _ = contacts.offer(gap, 0.5 * gap, 0.0);
         }
@@ -360,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn carries_what_was_not_seen() {
+    fn carries_contacts_of_unvisited_leaves() {
         let mut contacts = Contacts::new();
         for i in 0..10 {
             let c = contacts.offer(-1e-6, 0.0, 0.0).unwrap();

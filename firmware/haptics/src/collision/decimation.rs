@@ -1,34 +1,35 @@
-//! What is left out while there is more to look at than the budget allows, and when it is looked at again.
+//! Decimation of near points while the work exceeds the budget.
 //!
-//! A tick whose budget runs out carries over what pushed in leaves not reached, and the next goes on where it stopped: that does where two ticks get
-//! round, and for the first look at everything after a grab. Where they do not, every second of the points that are near is left out, then every
-//! second of the rest, until they do. Where an eighth of them is not the most of the work, no leaf is left out as a whole: a face may have no more
-//! than one. The ticks then go on getting round as they can. Points come back, twice as many at a time, once the budget would allow it and nothing
-//! was carried over for a quarter of a second: contacts that come and go are felt more than fewer of them.
+//! When the budget runs out, contacts that pushed in leaves not reached are carried over, and the next tick resumes where this one stopped. That
+//! suffices where two ticks complete a round, and for the first pass over everything after a grab. Where they do not, every second near point is
+//! decimated, then every second of the rest, until two ticks suffice. Whole leaves are decimated only where points are most of the work even at an
+//! eighth of them: a face may have no more than one leaf. Otherwise the ticks continue to complete rounds as they can. The level falls again,
+//! doubling the points each time, once the budget would allow it and nothing was carried over for a quarter of a second: contacts that come and go
+//! are felt more than fewer of them.
 
 use crate::collision::contact::MAX_CONTACTS;
 use crate::collision::cost::Used;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Points};
 
-/// Ticks in a row whose budget may run out with the last leaf not reached: so whatever is near is looked at every second tick, or points are left
-/// out.
-const OVERRUNS_BORNE: u8 = 1;
-/// Likewise after a grab, until all was looked at for the first time.
-const FIRST_LOOK: u8 = 64;
-/// Of the points that are near each 128th is looked at in any case.
+/// Consecutive ticks whose budget may run out before the last leaf is reached: beyond them, that is, where near points are not queried every second
+/// tick, points are decimated.
+const MAX_OVERRUNS: u8 = 1;
+/// The same limit after a grab, until everything was searched for the first time.
+const MAX_FIRST_OVERRUNS: u8 = 64;
+/// Highest level: each 128th near point is always queried.
 const MAX_DECIMATION: u8 = 7;
-/// Ticks in a row whose budget must suffice before more points are looked at.
+/// Consecutive ticks whose budget must suffice before the level falls.
 const CALM_TICKS: u16 = 250;
-/// A budget or a store has room for twice the points when they are expected to fill less than eight ninths of it.
+/// Twice the points fit a budget or store when they are expected to fill less than eight ninths of it.
 const NINTHS: u32 = 8;
 
-/// Thinning up to which some point of every leaf is looked at: most leaves have 8 points or a few more.
+/// Highest level at which some point of every leaf is queried: most leaves have 8 points or a few more.
 pub(crate) const LEAF_DECIMATION: u8 = 3;
-/// Which points of a leaf are looked at, by decimation.
+/// Points of a leaf that are queried, by level.
 const KEPT_POINTS: [Points; LEAF_DECIMATION as usize + 1] = [ALL, 0x5555, 0x1111, 0x0101];
 
-/// Which points of a leaf are looked at. When one of each leaf is too many, whole leaves are left out, evenly too.
+/// Points of a leaf that are queried. Above [`LEAF_DECIMATION`] whole leaves are decimated, evenly too.
 #[inline]
 pub(crate) fn mask(decimation: u8, first_point: u32) -> Points {
     let leaves = (1u32 << decimation.saturating_sub(LEAF_DECIMATION)) - 1;
@@ -39,94 +40,90 @@ pub(crate) fn mask(decimation: u8, first_point: u32) -> Points {
     }
 }
 
-/// How much is left out, and for how long it went well or ill.
+/// Decimation level and the history that decides its changes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decimation {
-    /// Of the points that are near only each 2ⁿth is looked at.
+    /// Only each 2ⁿth near point is queried.
     level: u8,
-    /// Ticks whose budget may still run out before more points are left out.
+    /// Ticks whose budget may still run out before the level rises.
     patience: u8,
-    /// Ticks in a row whose budget was enough, or since more points were looked at again.
+    /// Consecutive ticks whose budget sufficed, counted anew from each fall of the level.
     calm: u16,
 }
 
-/// What one search came to.
+/// Outcome of one search.
 pub(crate) struct Searched {
-    /// Where it began.
+    /// Where the search started.
     pub start: NodeCursor,
-    /// Where the budget ran out.
+    /// Where the budget ran out, if it did.
     pub stopped: Option<NodeCursor>,
-    /// Look-ups.
+    /// Cost, field queries.
     pub used: Used,
-    /// Look-ups allowed.
+    /// Budget, field queries.
     pub budget: u32,
     /// Contacts that overlap.
     pub touching: u32,
-    /// How many more did, for which there was no room.
+    /// Further overlapping contacts that the store could not hold.
     pub lost: u32,
 }
 
 impl Decimation {
-    /// After a grab: nothing was looked at yet.
+    /// State after a grab: nothing was searched yet.
     pub const NEW: Self = Self {
         level: 0,
-        patience: FIRST_LOOK,
+        patience: MAX_FIRST_OVERRUNS,
         calm: 0,
     };
 
-    /// Of the points that are near only each 2ⁿth is to be looked at.
+    /// Decimation level: only each 2ⁿth near point is to be queried.
     pub fn level(&self) -> u8 {
         self.level
     }
 
-    /// Draws the conclusions of a search.
+    /// Adapts the level to the outcome of a search.
     pub fn update(&mut self, searched: &Searched) {
-        let overrun = self.bear(searched);
+        let overrun = self.count_overrun(searched);
         let Searched { touching, lost, .. } = *searched;
         if lost > 0 {
             self.decimate_to_fit(touching + lost);
         } else if overrun && self.level < MAX_DECIMATION && self.helps(searched) {
             self.level += 1;
-        } else if self.level > 0 && self.calm >= CALM_TICKS && has_room(searched) {
+        } else if self.level > 0 && self.calm >= CALM_TICKS && has_capacity(searched) {
             self.level -= 1;
             self.calm = 0;
         }
     }
 
-    /// Whether the budget ran out once too often without getting round.
-    fn bear(&mut self, searched: &Searched) -> bool {
+    /// Counts a budget overrun without a completed round. Returns whether there was one too many.
+    fn count_overrun(&mut self, searched: &Searched) -> bool {
         let Some(stop) = searched.stopped else {
-            self.patience = OVERRUNS_BORNE;
+            self.patience = MAX_OVERRUNS;
             self.calm = self.calm.saturating_add(1);
             return false;
         };
         self.calm = 0;
         if stop < searched.start {
-            // Past the last leaf and on from the first: the first look is over, too.
-            self.patience = OVERRUNS_BORNE;
+            // Past the last leaf and on from the first: the first pass is complete, too.
+            self.patience = MAX_OVERRUNS;
             return false;
         }
         let overrun = self.patience == 0;
-        self.patience = if overrun {
-            OVERRUNS_BORNE
-        } else {
-            self.patience - 1
-        };
+        self.patience = if overrun { MAX_OVERRUNS } else { self.patience - 1 };
         overrun
     }
 
-    /// Whether half the points would make a difference, not only the way to them be too long; and where that leaves out whole leaves, whether there
-    /// are so many that faces are not left out with them.
+    /// Whether half the points would reduce the work noticeably, because points rather than the traversal dominate it. Where whole leaves would be
+    /// decimated, points must dominate so far that there are enough leaves for every face to keep some.
     fn helps(&self, searched: &Searched) -> bool {
         let part = if self.level < LEAF_DECIMATION { 4 } else { 2 };
-        part * searched.used.on_points > searched.budget
+        part * searched.used.point_work > searched.budget
     }
 
-    /// To where three quarters of a store are left of so many `touching` points seen at this decimation.
+    /// Raises the level until `touching` points, counted at the present level, fill at most three quarters of the store.
     ///
-    /// More than the store holds must not touch: which are kept would follow the last tick's tilt and tilt the part the other way, and the
-    /// stiffness that comes and goes with them makes energy. A flat face on more than 256 points rattled so from tick to tick, by as much as it was
-    /// deep in.
+    /// More points than the store holds must not touch: the selection of kept contacts would follow the last tick's tilt and tilt the part the other
+    /// way, and the stiffness that comes and goes with them generates energy. A flat face on more than 256 points rattled so from tick to tick, by as
+    /// much as its depth.
     fn decimate_to_fit(&mut self, mut touching: u32) {
         while self.level < MAX_DECIMATION && touching * 4 > MAX_CONTACTS as u32 * 3 {
             self.level += 1;
@@ -135,11 +132,11 @@ impl Decimation {
     }
 }
 
-/// Whether twice the points would do. What leads to them costs the same as before.
-fn has_room(searched: &Searched) -> bool {
-    let has_room = |filled: u32, of: u32| 9 * filled < NINTHS * of;
-    let twice = searched.used.all + searched.used.on_points;
-    has_room(twice, searched.budget) && has_room(2 * searched.touching, MAX_CONTACTS as u32)
+/// Whether twice the points would fit. The traversal to them costs the same as before.
+fn has_capacity(searched: &Searched) -> bool {
+    let has_capacity = |filled: u32, of: u32| 9 * filled < NINTHS * of;
+    let twice = searched.used.all + searched.used.point_work;
+    has_capacity(twice, searched.budget) && has_capacity(2 * searched.touching, MAX_CONTACTS as u32)
 }
 
 #[cfg(test)]
@@ -165,7 +162,7 @@ mod tests {
             stopped: None,
             used: Used {
                 all,
-                on_points: 3 * all / 4,
+                point_work: 3 * all / 4,
             },
             budget: 500,
             touching: 10,
@@ -174,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_look_is_borne_once_round() {
+    fn the_first_pass_may_overrun_until_it_is_complete() {
         let mut o = Decimation::NEW;
         for tick in 0..50 {
             o.update(&stopped(10 * tick, 10 * tick + 10));
@@ -182,29 +179,29 @@ mod tests {
         }
         // From the end to the beginning again.
         o.update(&stopped(500, 5));
-        for _ in 0..=OVERRUNS_BORNE {
+        for _ in 0..=MAX_OVERRUNS {
             o.update(&stopped(5, 15));
         }
         assert_eq!(o.level(), 1);
     }
 
-    /// A look that gets nowhere is not borne for ever.
+    /// A pass without progress does not postpone decimation for ever.
     #[test]
-    fn a_first_look_without_end_thins() {
+    fn a_first_pass_that_never_completes_decimates() {
         let mut o = Decimation::NEW;
-        for _ in 0..=FIRST_LOOK {
+        for _ in 0..=MAX_FIRST_OVERRUNS {
             o.update(&stopped(0, 1));
         }
         assert_eq!(o.level(), 1);
     }
 
-    /// Points are left out for the work they make, whole leaves for more of it.
+    /// Points are decimated when they make up the work, whole leaves when they make up more of it.
     #[test]
-    fn a_way_too_long_leaves_nothing_out() {
+    fn traversal_cost_alone_does_not_decimate() {
         let mut o = Decimation::NEW;
-        let mut play = |on_points| {
+        let mut play = |point_work| {
             for _ in 0..1000 {
-                let used = Used { all: 500, on_points };
+                let used = Used { all: 500, point_work };
                 o.update(&Searched {
                     used,
                     ..stopped(5, 40)
@@ -230,7 +227,7 @@ mod tests {
             let steps = (ticks / u32::from(CALM_TICKS)) as u8;
             assert_eq!(o.level(), MAX_DECIMATION - steps, "{ticks}");
         }
-        // What would not fit stays out.
+        // Points that would not fit stay decimated.
         o.update(&Searched {
             lost: 100,
             touching: 256,
@@ -244,7 +241,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever comes, at most each 128th is looked at, and of what touches no more stays than there is room for.
+        /// For any sequence of searches at least each 128th point is queried, and touching points are decimated until they fit the store.
         #[test]
         fn stays_within_its_bounds(
             ticks in prop::collection::vec((0u32..100, prop::option::of(0u32..100), 0u32..2000, 0u32..257, 0u32..40_000), 1..300)

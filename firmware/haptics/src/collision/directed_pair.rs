@@ -1,4 +1,4 @@
-//! One way round of one pair of parts: the tree of one, the field of the other, and the way between their frames.
+//! Directed pair: the tree of one part against the field of the other, with the transforms between their frames.
 
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{FaceRecord, Field, NodeRecord, Place, PointRecord, Shape};
@@ -8,19 +8,19 @@ use crate::collision::node_key::Keys;
 use crate::collision::rules::ExcludedPairs;
 use crate::math::pose::Pose;
 
-/// A position in a field is off by less than this times the lengths it is summed up from: eight roundings of 2⁻²⁴ at most.
+/// Rounding error of a position in a field, relative to the lengths summed: eight roundings of 2⁻²⁴ at most.
 const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
-/// Trees and fields of one pair, and the way between their frames.
+/// Tree of one part, field of the other, and the transforms between their frames.
 pub(crate) struct DirectedPair<'i> {
     pub index: u16,
     pub backward: bool,
-    /// A target guides to this part.
+    /// Whether a target guides the held part towards this part.
     pub guided: bool,
-    /// Faces that exclusions keep apart.
+    /// Face pairs that contact exclusions keep apart.
     pub excluded: ExcludedPairs,
     pub nodes: &'i [NodeRecord],
-    /// What is known of them goes by these.
+    /// Keys of the nodes in the coherence tables.
     pub keys: Keys,
     pub points: &'i [PointRecord],
     pub field: Field<'i>,
@@ -28,7 +28,7 @@ pub(crate) struct DirectedPair<'i> {
     pub faces: &'i [FaceRecord],
     /// Tree frame to field frame.
     pub to_field: Affine,
-    /// Tree frame to arm (from the held part's centre of mass, world axes).
+    /// Tree frame to lever arm (from the held part's centre of mass, world axes).
     pub to_arm: Affine,
     /// Field gradient to the direction, in the world, that pushes the held part away.
     pub to_push: Mat3,
@@ -46,7 +46,7 @@ impl Affine {
         self.linear * Vec3::from_array(p) + self.offset
     }
 
-    /// A direction.
+    /// Rotates a direction.
     #[inline]
     pub fn turn(&self, direction: Vec3) -> Vec3 {
         self.linear * direction
@@ -54,23 +54,23 @@ impl Affine {
 }
 
 impl<'i> DirectedPair<'i> {
-    /// Whether this way round is not part of the method: points of the other part against a voxmap of the held one.
-    pub fn left_out(&self) -> bool {
+    /// Whether the method does not use this direction: points of the other part against a voxmap of the held part.
+    pub fn unused(&self) -> bool {
         self.backward && self.field.is_occupancy()
     }
 
-    /// A point of the tree in cells from the corner of the field's grid.
+    /// Position of a point of the tree in cells from the corner of the field's grid.
     pub fn in_cells(&self, point: &PointRecord) -> [f32; 3] {
         let in_field = self.to_field.apply(point.position);
         self.field.in_cells(in_field.to_array())
     }
 
-    /// The face that every cell within `free_m` of any of these points of the tree names all over, if it is one; at a cost of `reads` at most, as of
-    /// [`Field::all_at`].
+    /// The one face named by every cell within `clearance_m` of any of these points of the tree, if there is only one; at most `reads` reads, counted
+    /// as in [`Field::all_at`].
     pub fn only_face_near<'p>(
         &self,
         points: impl Iterator<Item = &'p PointRecord>,
-        free_m: f32,
+        clearance_m: f32,
         mut reads: u32,
     ) -> Option<u16> {
         let mut face = None;
@@ -86,12 +86,12 @@ impl<'i> DirectedPair<'i> {
             (low, high) = (low.min(in_field), high.max(in_field));
         }
         let extent = self.field.extent_m() + self.to_field.offset.abs().element_sum();
-        let free = Vec3::splat(free_m + ROUNDING * extent);
-        let [low, high] = [low - free, high + free].map(|p| self.field.in_cells(p.to_array()));
+        let clearance = Vec3::splat(clearance_m + ROUNDING * extent);
+        let [low, high] = [low - clearance, high + clearance].map(|p| self.field.in_cells(p.to_array()));
         face.filter(|face| self.field.all_at(low, high, &mut reads, *face))
     }
 
-    /// Signed distance of the field's shape from `p` (tree frame), or a bound: by exact surfaces where they are known.
+    /// Signed distance from `p` (tree frame, m) to the field's shape, or a bound; from exact surfaces where they are known.
     #[inline(always)]
     pub fn distance(&self, p: [f32; 3]) -> f32 {
         let in_field = self.to_field.apply(p);
@@ -105,7 +105,7 @@ impl<'i> DirectedPair<'i> {
         }
     }
 
-    /// DirectedPair `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
+    /// Directed pair `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
     /// the world.
     pub fn new(index: u16, held: (&Shape<'i>, Pose), other: (&Shape<'i>, Pose), center: Vec3) -> Self {
         let backward = !index.is_multiple_of(2);

@@ -1,12 +1,12 @@
 //! Distance from a point to a baked shape by its analytic faces: exact where the field interpolates or has ended.
 //!
-//! A face record is an unbounded surface; which piece of it belongs to the shape the field tells: a foot of the perpendicular counts when the
-//! field has the shape's surface there. Near an edge the field is not sharp enough to tell, so there the other face decides: at a convex edge
-//! a foot that lies outside the other face's surface is beyond the edge, at a re-entrant edge one that lies inside it. The nearest point of
-//! an edge is that of the two surfaces' intersection, by Newton steps.
+//! A face record is an unbounded surface; the field determines which piece of it belongs to the shape: a foot of the perpendicular counts when the
+//! field has the shape's surface there. Near an edge the field is not sharp enough, so there the other face decides: at a convex edge a foot outside
+//! the other face's surface is beyond the edge, at a re-entrant edge one inside it. The nearest point of an edge is that of the two surfaces'
+//! intersection, by Newton steps.
 //!
-//! Metres, shape frame. Every loop is bounded by the number of faces (squared, for edges). Cost: one projection a face, and a look-up for each
-//! that could be the nearest.
+//! Metres, shape frame. Every loop is bounded by the number of faces (squared, for edges). Cost: one projection per face, and a field query for each
+//! face that could be nearest.
 
 use glam::Vec3;
 use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Nearby, Shape, surface_kind};
@@ -14,13 +14,13 @@ use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Nearby, Shape, surfac
 use crate::math::scalar::inverse_sqrt;
 use crate::math::vector::length;
 
-/// A foot counts when the field's distance there is below this many cells: interpolation errs by 0.2 next to a right angle.
+/// A foot counts when the field's distance there is below this many cells: interpolation errs by 0.2 cells next to a right angle.
 const ON_SURFACE_CELLS: f32 = 0.3;
 /// Within this many cells of an edge the other face decides whether a foot is beyond it.
 const NEAR_EDGE_CELLS: f32 = 2.0;
-/// Sine of the least angle between faces that makes an edge: below it one face goes on in the other.
+/// Sine of the smallest angle between faces that form an edge: below it one face continues the other.
 const LEAST_EDGE_SINE: f32 = 0.05;
-/// A point that touches as near as this to an edge touches the edge, m: some times the depth of a touch.
+/// A touching point within this distance of an edge touches the edge, m: several times the depth of a contact.
 const AT_EDGE_M: f32 = 10e-6;
 /// Newton steps to an edge: each squares the error, which starts below the radius of curvature.
 const EDGE_STEPS: usize = 6;
@@ -47,7 +47,7 @@ fn foot(face: &FaceRecord, p: Vec3) -> Option<Foot> {
     })
 }
 
-/// Signed distance, outside positive, and outward unit normal, likewise.
+/// Signed distance, outside positive, and outward unit normal; `None` as in [`foot`].
 #[inline(always)]
 fn signed(face: &FaceRecord, p: Vec3) -> Option<(f32, Vec3)> {
     let axis = Vec3::from_array(face.axis);
@@ -76,7 +76,7 @@ fn signed(face: &FaceRecord, p: Vec3) -> Option<(f32, Vec3)> {
     Some((natural * face.sense, normal * face.sense))
 }
 
-/// Length and direction of `v`, unless that is nothing.
+/// Length and direction of `v`, unless it is zero.
 #[inline]
 fn polar(v: Vec3) -> Option<(f32, Vec3)> {
     let squared = v.length_squared();
@@ -86,7 +86,7 @@ fn polar(v: Vec3) -> Option<(f32, Vec3)> {
     })
 }
 
-/// `v` over its length, unless that is nothing.
+/// `v` over its length, unless that is zero.
 fn unit(v: Vec3, length: f32) -> Option<Vec3> {
     (length > 1e-9).then(|| v * (1.0 / length))
 }
@@ -106,16 +106,16 @@ fn curvature(face: &FaceRecord, p: Vec3) -> f32 {
     1.0 / if radius > 1e-9 { radius } else { 1e-9 }
 }
 
-/// What a face's exact surface says at a point.
+/// Distance, normal and faces of the exact surface nearest to a point.
 #[derive(Clone, Copy)]
 pub(crate) struct OnFace {
     /// Signed distance, outside positive, m.
     pub distance: f32,
     /// Outward unit normal there.
     pub normal: Vec3,
-    /// Whose surface it is.
+    /// Face of that surface.
     pub face: u16,
-    /// The other face where it is at an edge, else [`NO_FACE`].
+    /// The second face where the point is at an edge, else [`NO_FACE`].
     pub edge_face: u16,
 }
 
@@ -131,8 +131,8 @@ pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace
     })
 }
 
-/// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and whose it is; none where the interpolated distance is to
-/// be taken. Outside an edge or corner it is no more than the distance. About 50 instructions a face on a Cortex-M7.
+/// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and the face it belongs to; `None` where the interpolated
+/// distance is to be used. Outside an edge or corner it is a lower bound of the distance. About 50 instructions per face on a Cortex-M7.
 #[inline]
 pub(crate) fn exact(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
     match nearby {
@@ -143,7 +143,7 @@ pub(crate) fn exact(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f3
     }
 }
 
-/// Of the faces of a group the one with the largest distance times `sign`.
+/// The face of a group with the largest distance times `sign`.
 #[inline]
 fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<(f32, u16)> {
     let mut found = (distance(faces, group[0], p)?, group[0]);
@@ -159,8 +159,8 @@ fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<
     Some(found)
 }
 
-/// As [`exact`], with the normal of the face whose distance it is, and the other face that is as far off to within [`AT_EDGE_M`]. About 80
-/// instructions a face on a Cortex-M7.
+/// As [`exact`], with the normal of the face found, and the second face if its distance is equal to within [`AT_EDGE_M`]. About 80 instructions per
+/// face on a Cortex-M7.
 #[inline]
 pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<OnFace> {
     let (group, sign) = match nearby {
@@ -187,15 +187,15 @@ pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Op
     Some(found)
 }
 
-/// What [`exact_on_face`] would have `found` were every face farther off by its `room`, which is nowhere more than `most`. About 60 instructions a
-/// face.
+/// The result that [`exact_on_face`] would give if every face were farther off by its `allowance_m`, which nowhere exceeds `max_allowance_m`; `found`
+/// is the result without allowances. About 60 instructions per face.
 #[inline(never)]
 pub(crate) fn with_allowance(
     found: OnFace,
     faces: &[FaceRecord],
     nearby: Nearby,
     p: Vec3,
-    most: f32,
+    max_allowance_m: f32,
     mut allowance_m: impl FnMut(u16) -> f32,
 ) -> OnFace {
     let (group, sign) = match nearby {
@@ -203,8 +203,8 @@ pub(crate) fn with_allowance(
         Nearby::Reentrant(group) => (group, -1.0),
         _ => return found,
     };
-    // Room makes a convex edge's other faces the nearer ones only when it is more than they are behind.
-    let reach = if sign > 0.0 { most } else { 0.0 };
+    // At a convex edge an allowance makes another face decisive only where it exceeds the difference of their distances.
+    let reach = if sign > 0.0 { max_allowance_m } else { 0.0 };
     let first = found.face;
     let (mut chosen, mut gap) = (found, found.distance + allowance_m(first));
     for face in group {
@@ -233,15 +233,15 @@ fn distance(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<f32> {
         surface_kind::PLANE => Some(along * face.sense),
         surface_kind::CYLINDER => {
             let squared = from.length_squared() - along * along;
-            // On the axis, or within rounding of it, the direction is lost and so is the foot.
+            // On the axis, or within rounding of it, the direction is undefined and so is the foot.
             (squared > 1e-12).then(|| (squared * inverse_sqrt(squared) - face.radius) * face.sense)
         }
         _ => foot(face, p).map(|foot| foot.distance),
     }
 }
 
-/// Distance to the surface of `face` when it agrees with the field's `distance` at `p` as well as interpolation lets it: twice
-/// cell²·κ/8 in each of two directions, and two steps of a sample. Then no edge comes between.
+/// Distance to the surface of `face` when it agrees with the field's `distance` at `p` within the error of interpolation: twice cell²·κ/8 in each of
+/// two directions, and two steps of a sample. Then no edge lies between.
 pub(crate) fn agreeing(shape: &Shape<'_>, face: u16, p: Vec3, distance: f32) -> Option<f32> {
     let face = shape.faces.get(usize::from(face))?;
     let exact = foot(face, p)?.distance;
@@ -250,20 +250,20 @@ pub(crate) fn agreeing(shape: &Shape<'_>, face: u16, p: Vec3, distance: f32) -> 
     ((exact - distance).abs() <= tolerance).then_some(exact)
 }
 
-/// Whether every face has a closed form, so that [`unsigned_distance`] can be had at all.
+/// Whether every face has a closed form, the condition for [`unsigned_distance`].
 pub(crate) fn closed_form(shape: &Shape<'_>) -> bool {
     shape.faces.iter().all(|face| face.kind != surface_kind::OTHER)
 }
 
-/// Distance from `p` to a shape's faces and edges, all of [`closed_form`], never negative; none when nothing was found. Where an edge has ended short
-/// of its foot, where there is no foot at all, or with `corners`, to samples of edges and corners too: one corner against another is found in no
-/// other way.
+/// Distance from `p` to a shape's faces and edges, never negative; `None` when nothing was found. All faces must have a [`closed_form`]. Samples of
+/// edges and corners are included where an edge ends before its foot, where there is no foot at all, or with `corners`: one corner against another is
+/// found in no other way.
 ///
-/// Where it is no less than `enough`, it is given as `enough`.
+/// Distances of `enough` or more are returned as `enough`.
 pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, mut corners: bool, enough: f32) -> Option<f32> {
     let near_edge = NEAR_EDGE_CELLS * shape.field.record().cell;
     let mut best = enough;
-    // Faces that are near; one whose foot is not unique may be.
+    // Faces that may be near, including those whose foot is not unique.
     let mut near = 0;
     for (a, face) in shape.faces.iter().enumerate() {
         let Some(foot_a) = foot(face, p) else {
@@ -279,7 +279,7 @@ pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, mut corners: bool, e
             best = distance;
         }
     }
-    // An edge or corner lies on two faces at least, and is no nearer than they.
+    // An edge or corner lies on at least two faces, and is no nearer than they are.
     if near < 2 {
         return best.is_finite().then_some(best);
     }
@@ -295,7 +295,7 @@ pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, mut corners: bool, e
             {
                 let distance = length(p - edge);
                 if distance < best {
-                    // Past a corner the two surfaces still cross, but the edge has ended.
+                    // Past a corner the two surfaces still intersect, but the edge has ended.
                     if [[a, b], [b, a]]
                         .iter()
                         .any(|&of| beyond(shape, of, edge, near_edge))
@@ -314,7 +314,7 @@ pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, mut corners: bool, e
     best.is_finite().then_some(best)
 }
 
-/// Distance from `p` to the nearest sample of an edge or corner, never less than that to the surface, or `enough` when all are farther.
+/// Distance from `p` to the nearest sample of an edge or corner, an upper bound of the distance to the surface; `enough` when all are farther.
 fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
     let mut best = enough;
     let mut index = 0;
@@ -339,7 +339,7 @@ fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
     best
 }
 
-/// Whether the field has the surface at `p`, as well as it can tell.
+/// Whether the field has the surface at `p`, within its resolution.
 fn on_surface(shape: &Shape<'_>, p: Vec3) -> bool {
     match shape.field.lookup(p.to_array()) {
         Lookup::Near(sample) => sample.distance.abs() <= ON_SURFACE_CELLS * shape.field.record().cell,
@@ -347,7 +347,7 @@ fn on_surface(shape: &Shape<'_>, p: Vec3) -> bool {
     }
 }
 
-/// Whether `p` on the surface of face `of[0]` lies beyond its edge with another face that is near, `of[1]` left aside.
+/// Whether `p` on the surface of face `of[0]` lies beyond its edge with another near face; `of[1]` is ignored.
 fn beyond(shape: &Shape<'_>, of: [usize; 2], p: Vec3, near_edge: f32) -> bool {
     let Some(face) = shape.faces.get(of[0]) else {
         return false;
@@ -359,7 +359,7 @@ fn beyond(shape: &Shape<'_>, of: [usize; 2], p: Vec3, near_edge: f32) -> bool {
     })
 }
 
-/// Whether `p` on the surface of `face` lies beyond its edge with `other`, when there is one within `near_edge`.
+/// Whether `p` on the surface of `face` lies beyond its edge with `other`, if there is one within `near_edge`.
 fn beyond_edge(shape: &Shape<'_>, face: &FaceRecord, other: &FaceRecord, p: Vec3, near_edge: f32) -> bool {
     let Some(edge) = edge_foot(face, other, p) else {
         return false;
@@ -380,14 +380,14 @@ fn beyond_edge(shape: &Shape<'_>, face: &FaceRecord, other: &FaceRecord, p: Vec3
     if convex { side > 0.0 } else { side < 0.0 }
 }
 
-/// The point nearest to `p` on the intersection of two surfaces: Newton steps, each the point nearest to `p` on the line in which the
-/// tangent planes meet. None where the surfaces do not cross, or hardly.
+/// The point nearest to `p` on the intersection of two surfaces: Newton steps, each the point nearest to `p` on the line in which the tangent planes
+/// meet. `None` where the surfaces do not intersect, or hardly.
 fn edge_foot(a: &FaceRecord, b: &FaceRecord, p: Vec3) -> Option<Vec3> {
     let mut x = p;
-    let mut left = f32::INFINITY;
+    let mut residual = f32::INFINITY;
     for _ in 0..EDGE_STEPS {
         let (fa, fb) = (foot(a, x)?, foot(b, x)?);
-        left = fa.distance.abs() + fb.distance.abs();
+        residual = fa.distance.abs() + fb.distance.abs();
         let cosine = fa.normal.dot(fb.normal);
         let sine2 = 1.0 - cosine * cosine;
         if sine2 < LEAST_EDGE_SINE * LEAST_EDGE_SINE {
@@ -400,7 +400,7 @@ fn edge_foot(a: &FaceRecord, b: &FaceRecord, p: Vec3) -> Option<Vec3> {
         x = p + fa.normal * along_a + fb.normal * along_b;
     }
     // A hundredth of a micrometre in a tenth of a metre: single precision.
-    (left <= 1e-7 * (1.0 + 10.0 * length(x))).then_some(x)
+    (residual <= 1e-7 * (1.0 + 10.0 * length(x))).then_some(x)
 }
 
 #[cfg(test)]

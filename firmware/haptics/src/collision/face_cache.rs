@@ -1,10 +1,10 @@
-//! The one face that points of a leaf have to do with, for as long as they cannot come to a cell that names another.
+//! Face cache: the only face near the selected points of a leaf, valid until the points can reach a cell that names another face.
 //!
-//! Of what it takes to look a point up at a wall the way to its cell is a good third: grid, brick, palette. Where all cells about the near points of
-//! a leaf name one face it is spared, until the points may have gone as far as was looked about them. The table is direct-mapped, like that of
-//! [`crate::coherence`], which keeps it: whoever finds his place taken goes to the cells.
+//! A good third of the cost of a point query at a wall is the path to its cell: grid, brick, palette. Where all cells around the near points of a
+//! leaf name one face, that cost is saved until the points may have travelled as far as the cells were examined. The table is direct-mapped, like
+//! that of [`super::coherence`], which owns it: a leaf whose slot is taken is queried through the cells.
 //!
-//! Cost: some 20 instructions a leaf where it is known, against 80 a point; several hundred to find out.
+//! Cost: some 20 instructions per leaf with a valid entry, against 80 per point; several hundred to create an entry.
 
 use crate::collision::node_key::{Key, Points};
 
@@ -12,7 +12,7 @@ use crate::collision::node_key::{Key, Points};
 const SLOTS: usize = 1 << SLOT_BITS;
 const SLOT_BITS: u32 = 9;
 
-/// Faces of leaves.
+/// Cached faces of leaves.
 #[derive(Clone, Debug)]
 pub(crate) struct FaceCache {
     slots: [Slot; SLOTS],
@@ -21,16 +21,16 @@ pub(crate) struct FaceCache {
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     leaf: Key,
-    /// Travel before which it holds, nm.
+    /// Travel at which the entry expires, nm.
     until_nm: u32,
-    /// Of which points.
+    /// Points it covers.
     which: Points,
-    /// None where they have to do with more than one, or it is not known.
+    /// The face; `None` where more than one face is near, or it could not be determined.
     face: Option<u16>,
 }
 
 impl Slot {
-    /// All zero, so that a fresh table lies in memory that is cleared rather than copied from flash.
+    /// All zero, so that a fresh table lies in zeroed memory rather than being copied from flash.
     const EMPTY: Self = Self {
         leaf: Key::NONE,
         until_nm: 0,
@@ -39,14 +39,14 @@ impl Slot {
     };
 }
 
-/// What is known of points of a leaf.
+/// Cached knowledge about points of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CachedFace {
-    /// All their cells name this face.
+    /// All cells near them name this face.
     Face(u16),
-    /// They do not, or did not when last asked.
+    /// More than one face is near, or the slot holds another leaf's valid entry: query the cells.
     Several,
-    /// Not asked.
+    /// No valid entry: a face search is worthwhile.
     Unknown,
 }
 
@@ -61,7 +61,7 @@ impl FaceCache {
         self.slots.fill(Slot::EMPTY);
     }
 
-    /// Of these points of a leaf, when the object has travelled so far.
+    /// Cached face of the selected points of a leaf at the given travel.
     #[inline(always)]
     pub fn get(&self, leaf: Key, which: Points, travel_nm: u32) -> CachedFace {
         let slot = &self.slots[Self::place(leaf)];
@@ -76,7 +76,7 @@ impl FaceCache {
         }
     }
 
-    /// Of these points of a leaf, before the object has travelled so far.
+    /// Stores the face of the selected points of a leaf, valid until the given travel.
     pub fn set(&mut self, leaf: Key, which: Points, face: Option<u16>, until_nm: u32) {
         self.slots[Self::place(leaf)] = Slot {
             leaf,
@@ -86,7 +86,7 @@ impl FaceCache {
         };
     }
 
-    /// Leaves that are near lie at regular distances in a tree: they are spread.
+    /// Slot of a leaf, hashed: near leaves lie at regular distances in a tree.
     fn place(leaf: Key) -> usize {
         (leaf.hash() >> (u32::BITS - SLOT_BITS)) as usize
     }
@@ -98,7 +98,7 @@ mod tests {
     use crate::collision::node_key::Keys;
 
     #[test]
-    fn known_of_these_points_and_so_far_only() {
+    fn an_entry_holds_for_its_points_and_travel_only() {
         let keys = Keys::new(3, 1000);
         let mut face_cache = FaceCache::new();
         assert_eq!(face_cache.get(keys.of(7), 0b11, 0), CachedFace::Unknown);
@@ -113,9 +113,9 @@ mod tests {
         assert_eq!(face_cache.get(keys.of(7), 0b0110, 0), CachedFace::Unknown);
     }
 
-    /// Who finds his place taken is neither told another's wall, nor takes it from him while it holds.
+    /// On collision a live entry is neither returned nor evicted: [`CachedFace::Several`] starts no face search.
     #[test]
-    fn a_place_is_one_leafs() {
+    fn a_slot_holds_one_leaf() {
         let keys = Keys::new(0, 100_000);
         let mut face_cache = FaceCache::new();
         let first = keys.of(0);

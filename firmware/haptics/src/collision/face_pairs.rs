@@ -1,7 +1,7 @@
-//! Which faces touch: contacts gathered by face pair.
+//! Touching face pairs: the contacts of a tick gathered by face pair.
 //!
-//! A point on an edge belongs to two faces. Of these the one that touches is the one that faces the other part's surface: the hole's wall where its
-//! rim meets a peg's side, the block's top where it meets the peg's end. It is chosen for the deepest point of those that share their faces.
+//! A point on an edge belongs to two faces. The one that touches is the one that faces the other part's surface: the wall of a hole where its rim
+//! meets a peg's side, the top of a block where it meets the peg's end. It is chosen at the deepest point of those that share their faces.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -14,37 +14,37 @@ use crate::collision::placement::Placed;
 use crate::io::{FacePair, FacePairs};
 use crate::math::pose::Pose;
 
-/// Pairs told apart before the deepest [`MAX_PAIRS`] are reported; contacts of further pairs are not counted.
+/// Pairs gathered before the deepest [`MAX_PAIRS`] are reported; contacts of further pairs are not counted.
 const MAX_GATHERED: usize = 2 * MAX_PAIRS;
 
-/// Where things stood when the contacts were found.
+/// Placements at which the contacts were found.
 pub(crate) struct Scenery<'a, 'i> {
     pub scene: &'a SceneImage<'i>,
     pub parts: &'a [Placed],
-    /// Index of the held part, and where it is.
+    /// Index and placement of the held part.
     pub held: u16,
     pub object: Pose,
-    /// Its centre of mass.
+    /// Its centre of mass, world, m.
     pub center: Vec3,
     pub period_s: f32,
 }
 
-/// Contacts of the same faces, and how far they reach along an axis.
+/// Contacts between the same faces, and their extent along an axis.
 #[derive(Clone, Debug)]
 struct Gathered {
     pair: FacePair,
-    /// What pushes the held part away at the deepest point, world.
+    /// Direction that pushes the held part away at the deepest point, world.
     push: Vec3,
-    /// World; nothing where no face is round.
+    /// Axis of the round face, world; zero where neither face is round.
     axis: Vec3,
     from: f32,
     to: f32,
 }
 
-/// Adds the face pairs of all contacts that push to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes
+/// Adds the face pairs of all pushing contacts to the empty `pairs`, deepest first (by depth at the step's end); among equals the first found comes
 /// first.
 ///
-/// Contacts come in order of the tree, so the pair last seen is tried first. Cost: 30 instructions a contact, and 500 a pair that has an edge.
+/// Contacts come in tree order, so the last pair is tried first. Cost: 30 instructions per contact, and 500 per pair that has an edge.
 pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: &mut FacePairs) {
     let mut gathered: Vec<Gathered, MAX_GATHERED> = Vec::new();
     let mut last = 0;
@@ -72,7 +72,7 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
         let g = g.facing(at);
         match merged.iter_mut().find(|m| m.is_like(&g)) {
             Some(m) => m.merge(&g),
-            // No more than there were.
+            // Never exceeds the number gathered.
             None => drop(merged.push(g)),
         }
     }
@@ -96,7 +96,7 @@ pub(crate) fn touching_faces(contacts: &[Contact], at: &Scenery<'_, '_>, pairs: 
 }
 
 impl Gathered {
-    /// Of the faces of a contact, which is not yet added.
+    /// Pair of the faces of a contact, which is not added yet.
     fn new(c: &Contact, at: &Scenery<'_, '_>) -> Self {
         let (moving, fixed) = (
             [c.moving_face, c.moving_edge_face],
@@ -138,7 +138,7 @@ impl Gathered {
         }
     }
 
-    /// With the faces first that face each other.
+    /// Copy in which, of two faces at an edge, the one that faces the other part comes first.
     fn facing(&self, at: &Scenery<'_, '_>) -> Self {
         let mut facing = self.clone();
         let p = &mut facing.pair;
@@ -152,7 +152,7 @@ impl Gathered {
         );
         [p.static_face, p.static_edge_face] = turned;
         if at.axis(p.static_part, &[p.static_face], &[p.moving_face]) == Vec3::ZERO {
-            // The axis was that of a face beyond the edge.
+            // The axis belonged to the face beyond the edge.
             (facing.from, facing.to) = (0.0, 0.0);
         }
         facing
@@ -163,14 +163,14 @@ impl Gathered {
         faces(&self.pair) == faces(&other.pair)
     }
 
-    /// Takes over the contacts of one that is like this.
+    /// Adds the contacts of another entry for the same faces.
     fn merge(&mut self, other: &Self) {
         let count = self.pair.count.saturating_add(other.pair.count);
         if other.pair.depth_m > self.pair.depth_m {
             self.pair = other.pair;
         }
         self.pair.count = count;
-        // The axes are those of the same face, or of others about the same axis, either way round.
+        // The axes belong to the same face, or to faces about the same axis, in either sense.
         let (from, to) = if self.axis.dot(other.axis) < 0.0 {
             (-other.to, -other.from)
         } else {
@@ -186,7 +186,7 @@ impl Gathered {
 }
 
 impl Scenery<'_, '_> {
-    /// Exact surfaces of a part, and where it stands.
+    /// Exact surfaces and placement of a part.
     fn surfaces(&self, part: u16) -> Option<(&[FaceRecord], Pose)> {
         let index = usize::from(part);
         let pose = if part == self.held {
@@ -197,7 +197,7 @@ impl Scenery<'_, '_> {
         (index < self.scene.parts().len()).then(|| (self.scene.shape_of_part(index).faces, pose))
     }
 
-    /// Axis (world) of the first of these static faces that is a cylinder or cone, else of these moving ones, else nothing.
+    /// Axis (world) of the first of these static faces that is a cylinder or cone, else of the first such moving face, else zero.
     fn axis(&self, static_part: u16, fixed: &[u16], moving: &[u16]) -> Vec3 {
         let of = |part: u16, face: u16| {
             let (faces, pose) = self.surfaces(part)?;
@@ -210,7 +210,7 @@ impl Scenery<'_, '_> {
             .unwrap_or(Vec3::ZERO)
     }
 
-    /// Of two faces at an edge, both with a closed form, the one first whose outward normal at `point` (world) points more along `direction`.
+    /// Orders the two faces at an edge: first the one whose outward normal at `point` (world) points more along `direction`. Both need a closed form.
     fn faces_along(&self, part: u16, [a, b]: [u16; 2], point: Vec3, direction: Vec3) -> [u16; 2] {
         let along = |face: u16| {
             let (faces, pose) = self.surfaces(part)?;

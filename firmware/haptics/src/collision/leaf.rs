@@ -1,4 +1,4 @@
-//! The points of one leaf: which are looked at, and what is noted of them.
+//! Evaluation of one leaf: the choice of points to query, and the advancement bound stored for the rest.
 
 use mortise_protocol::image::PointRecord;
 
@@ -11,48 +11,49 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Key, Points};
 use crate::collision::search::Traversal;
 
-/// Leaves of which it is found out in one tick how far the points are that decimation leaves out.
-const LEFT_OUT_LEAVES: u32 = 8;
-/// It is asked for as far as the points go in so many ticks like the last one,
-const FREE_TICKS: f32 = 64.0;
-/// and this far, m,
-const FREE_M: f32 = 50e-6;
-/// but no farther than this many cells: the band in which cells name faces is not much wider.
-const FREE_CELLS: f32 = 0.5;
-/// and not at all where so few ticks would use that up.
-const LEAST_TICKS: f32 = 8.0;
-/// In one tick it is asked of so many leaves at most.
-const MAX_FINDS: u32 = 2;
-/// See [`DirectedPair::wall`].
-const FREE_READS: u32 = 200;
+/// Leaves per tick whose decimated points are queried for their distance.
+const MAX_DECIMATED_QUERIES: u32 = 8;
+/// A cached face must hold for the motion of this many ticks like the last one,
+const CLEARANCE_TICKS: f32 = 64.0;
+/// plus this distance, m,
+const CLEARANCE_M: f32 = 50e-6;
+/// but for no more than this many cells: the band in which cells name faces is not much wider.
+const MAX_CLEARANCE_CELLS: f32 = 0.5;
+/// A face is not searched for where fewer ticks than this would use up that clearance.
+const MIN_CLEARANCE_TICKS: f32 = 8.0;
+/// Face searches per tick.
+const MAX_FACE_SEARCHES: u32 = 2;
+/// Limit on reads of the field per face search; see [`DirectedPair::only_face_near`].
+const FACE_SEARCH_READS: u32 = 200;
 
 impl Traversal<'_, '_, '_> {
-    /// All points of a leaf, as far as the budget goes, and when it is due again.
+    /// Queries all points of a leaf as far as the budget allows. Returns the leaf's advancement bound.
     pub fn points(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, points: &[PointRecord]) -> Bound {
-        let most = (self.left() as usize).min(points.len());
-        let mut seen = Seen::new(self.search.near());
+        let count = (self.left() as usize).min(points.len());
+        let mut scan = LeafScan::new(self.search.near());
         match self
             .coherence
             .cached_face(pair.keys.of(leaf.node), all_of(points))
         {
-            CachedFace::Face(face) if most == points.len() && most <= Points::BITS as usize => {
-                seen.price = CACHED_POINT;
+            CachedFace::Face(face) if count == points.len() && count <= Points::BITS as usize => {
+                scan.price = CACHED_POINT;
                 for point in points {
-                    seen.add(self.on_cached_face(pair, leaf, point, face));
+                    scan.add(self.on_cached_face(pair, leaf, point, face));
                 }
             }
             _ => {
-                for point in points.iter().take(most) {
-                    seen.add(self.point(pair, leaf, point));
+                for point in points.iter().take(count) {
+                    scan.add(self.point(pair, leaf, point));
                 }
             }
         }
-        self.seen(pair, leaf, points, seen)
+        self.record_scan(pair, leaf, points, scan)
     }
 
-    /// The same when points are left out: only those of the `mask` are offered as contacts.
+    /// As [`Self::points`] under decimation: only points in the `mask` are offered as contacts.
     ///
-    /// The others are looked at in some leaves a tick, so that more and more of what is left out is known to be far.
+    /// In up to [`MAX_DECIMATED_QUERIES`] leaves per tick the distances of all points are measured, so that more and more decimated points are known
+    /// to be far.
     #[inline(never)]
     pub fn decimated(
         &mut self,
@@ -61,73 +62,79 @@ impl Traversal<'_, '_, '_> {
         points: &[PointRecord],
         mask: Points,
     ) -> Bound {
-        if self.left_out == LEFT_OUT_LEAVES || pair.field.is_occupancy() {
-            self.some(pair, leaf, points, mask & all_of(points));
+        if self.decimated_queries == MAX_DECIMATED_QUERIES || pair.field.is_occupancy() {
+            self.selected_points(pair, leaf, points, mask & all_of(points));
             return Bound::NOW;
         }
-        self.left_out += 1;
-        let most = (self.left() as usize).min(points.len());
-        let mut seen = Seen::new(self.search.near());
-        for point in points.iter().take(most) {
-            seen.add(pair.distance(point.position));
+        self.decimated_queries += 1;
+        let count = (self.left() as usize).min(points.len());
+        let mut scan = LeafScan::new(self.search.near());
+        for point in points.iter().take(count) {
+            scan.add(pair.distance(point.position));
         }
-        self.some(pair, leaf, points, seen.near & mask);
+        self.selected_points(pair, leaf, points, scan.near & mask);
         let before = self.spent;
-        let due = self.seen(pair, leaf, points, seen);
-        // Not what there would be twice as much of with twice the points.
-        self.aside += self.spent - before;
-        due
+        let bound = self.record_scan(pair, leaf, points, scan);
+        // This work would not double with twice the points.
+        self.decimation_work += self.spent - before;
+        bound
     }
 
-    /// Notes what was `seen` of a leaf, and tells when it is due again.
+    /// Stores what the `scan` of a leaf found, and returns the leaf's advancement bound.
     #[inline(always)]
-    fn seen(
+    fn record_scan(
         &mut self,
         pair: &DirectedPair<'_>,
         leaf: NodeCursor,
         points: &[PointRecord],
-        seen: Seen,
+        scan: LeafScan,
     ) -> Bound {
-        self.work.points += seen.points;
-        self.spent += (seen.price + NOTED) * seen.points;
-        // What was not looked at could be anywhere.
-        if (seen.points as usize) < points.len() {
+        self.work.points += scan.points;
+        self.spent += (scan.price + NOTED) * scan.points;
+        // Points that were not queried have no bound.
+        if (scan.points as usize) < points.len() {
             return Bound::NOW;
         }
         let key = pair.keys.of(leaf.node);
-        if seen.near == 0 {
-            return self.coherence.set_far(key, seen.beyond);
+        if scan.near == 0 {
+            return self.coherence.set_far(key, scan.beyond);
         }
-        if seen.points <= Points::BITS {
-            self.coherence.set_points(key, seen.near, seen.beyond);
+        if scan.points <= Points::BITS {
+            self.coherence.set_points(key, scan.near, scan.beyond);
         }
         Bound::NOW
     }
 
-    /// Those points of a leaf, which were near before.
+    /// Queries the selected points of a leaf: those that were near before.
     #[inline(always)]
-    pub fn some(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, points: &[PointRecord], which: Points) {
-        let looked_at = which.count_ones();
-        self.work.points += looked_at;
+    pub fn selected_points(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        points: &[PointRecord],
+        selection: Points,
+    ) {
+        let count = selection.count_ones();
+        self.work.points += count;
         let key = pair.keys.of(leaf.node);
-        match self.coherence.cached_face(key, which) {
+        match self.coherence.cached_face(key, selection) {
             CachedFace::Face(face) => {
-                self.spent += CACHED_POINT * looked_at;
-                for point in these(points, which) {
+                self.spent += CACHED_POINT * count;
+                for point in selected(points, selection) {
                     let _ = self.on_cached_face(pair, leaf, point, face);
                 }
                 return;
             }
             CachedFace::Several => {}
-            CachedFace::Unknown => self.find_face(pair, key, points, which),
+            CachedFace::Unknown => self.find_face(pair, key, points, selection),
         }
-        self.spent += LOOKUP * looked_at;
-        for point in these(points, which) {
+        self.spent += LOOKUP * count;
+        for point in selected(points, selection) {
             let _ = self.point(pair, leaf, point);
         }
     }
 
-    /// As [`Traversal::point`] for one that has to do with this face alone.
+    /// As [`Traversal::point`], for a point near which this face is the only one.
     #[inline(always)]
     fn on_cached_face(
         &mut self,
@@ -148,55 +155,62 @@ impl Traversal<'_, '_, '_> {
         }
     }
 
-    /// Notes what those points of a leaf have to do with.
+    /// Searches for the one face near the selected points of a leaf, and caches the result.
     #[inline(never)]
-    fn find_face(&mut self, pair: &DirectedPair<'_>, key: Key, points: &[PointRecord], which: Points) {
-        let most = FREE_CELLS * pair.field.record().cell;
-        let way = self.search.way;
-        if self.faces_sought == MAX_FINDS || pair.field.is_occupancy() || most < LEAST_TICKS * way {
+    fn find_face(&mut self, pair: &DirectedPair<'_>, key: Key, points: &[PointRecord], selection: Points) {
+        let max_clearance = MAX_CLEARANCE_CELLS * pair.field.record().cell;
+        let travel = self.search.way;
+        if self.face_searches == MAX_FACE_SEARCHES
+            || pair.field.is_occupancy()
+            || max_clearance < MIN_CLEARANCE_TICKS * travel
+        {
             return;
         }
-        self.faces_sought += 1;
+        self.face_searches += 1;
         self.spent += FIND_FACE;
-        let ahead = FREE_TICKS * way + FREE_M;
-        let free = if ahead < most { ahead } else { most };
-        let face = pair.only_face_near(these(points, which), free, FREE_READS);
-        self.coherence.cache_face(key, which, face, free);
+        let wanted = CLEARANCE_TICKS * travel + CLEARANCE_M;
+        let clearance = if wanted < max_clearance {
+            wanted
+        } else {
+            max_clearance
+        };
+        let face = pair.only_face_near(selected(points, selection), clearance, FACE_SEARCH_READS);
+        self.coherence.cache_face(key, selection, face, clearance);
     }
 }
 
-/// All of a leaf's points that can be told apart.
+/// Selection of all points of a leaf, up to the number of bits.
 #[inline(always)]
 fn all_of(points: &[PointRecord]) -> Points {
     ALL.checked_shr(Points::BITS.saturating_sub(points.len() as u32))
         .unwrap_or(0)
 }
 
-/// Those of a leaf's points.
+/// The selected points of a leaf.
 #[inline(always)]
-fn these(points: &[PointRecord], mut which: Points) -> impl Iterator<Item = &PointRecord> {
+fn selected(points: &[PointRecord], mut selection: Points) -> impl Iterator<Item = &PointRecord> {
     core::iter::from_fn(move || {
-        let point = points.get(which.trailing_zeros() as usize);
-        which &= which.wrapping_sub(1);
+        let point = points.get(selection.trailing_zeros() as usize);
+        selection &= selection.wrapping_sub(1);
         point
     })
 }
 
-/// What points of a leaf told.
-struct Seen {
-    /// How many.
+/// Distances found for the points of a leaf.
+struct LeafScan {
+    /// Number of points queried.
     points: u32,
-    /// What counts as near, m.
+    /// Largest gap that counts as near, m.
     limit: f32,
-    /// Eighths of a look-up that each took.
+    /// Cost of each query, eighths of a field query.
     price: u32,
-    /// Those that are near.
+    /// Selection of near points.
     near: Points,
-    /// Smallest gap of the others, m.
+    /// Smallest gap of the other points, m.
     beyond: f32,
 }
 
-impl Seen {
+impl LeafScan {
     fn new(limit: f32) -> Self {
         Self {
             points: 0,
@@ -207,7 +221,7 @@ impl Seen {
         }
     }
 
-    /// The next point has this gap.
+    /// Adds the gap of the next point, m.
     #[inline(always)]
     fn add(&mut self, gap: f32) {
         if gap > self.limit {

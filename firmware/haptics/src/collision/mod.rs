@@ -1,15 +1,15 @@
-//! Where the held part is near others: sphere tree of one part against the distance field of the other, both ways.
+//! Contact search: the sphere tree of one part against the distance field of another, in both directions.
 //!
 //! | file | what |
 //! |---|---|
 //! | `search`, `leaf` | traversal of all trees within a work budget; the points of one leaf |
-//! | `directed_pair` | one part's tree against the other's field, and the transforms between them |
-//! | `exact_surface`, `facing` | distance by exact surfaces; normals that rule a contact out |
-//! | `coherence`, `node_key`, `ancestors`, `face_cache` | what earlier ticks proved, so that it is not computed again |
-//! | `rules`, `exclusion` | what constraints say about pairs of faces; leaves they keep from touching |
-//! | `cost`, `decimation` | what work counts; what is left out when there is too much of it |
-//! | `contact`, `face_pairs` | bounded store of contacts; touching faces |
-//! | `placement`, `node_cursor` | where parts stand; where a search stopped |
+//! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
+//! | `exact_surface`, `facing` | distance to exact surfaces; normals that rule out a contact |
+//! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
+//! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
+//! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
+//! | `contact`, `face_pairs` | bounded store of contacts; touching face pairs |
+//! | `placement`, `node_cursor` | placement of a part; position of the search in all trees |
 
 pub(crate) mod ancestors;
 pub(crate) mod coherence;

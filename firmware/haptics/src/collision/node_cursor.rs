@@ -1,6 +1,6 @@
-//! Where a search is in the trees of all pairs.
+//! Position of the search in the trees of all directed pairs.
 
-/// Place in the order in which everything is looked at: part by part, forward before backward, node by node.
+/// Position in the search order: part by part, forward before backward, node by node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct NodeCursor {
     /// Twice the part's index, plus one for backward.
@@ -9,7 +9,7 @@ pub(crate) struct NodeCursor {
 }
 
 impl NodeCursor {
-    /// The beginning.
+    /// Start of the order.
     pub const FIRST: Self = Self { pair: 0, node: 0 };
 
     /// Index of the other part.

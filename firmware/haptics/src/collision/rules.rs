@@ -1,21 +1,21 @@
-//! What constraints say about contact between two faces.
+//! Interface through which constraints affect contact between two faces.
 
 use heapless::Vec;
 use mortise_protocol::image::NO_FACE;
 use mortise_protocol::limits::MAX_TARGETS;
 
-/// Pairs of exclusions to one part; of more, the rest stay in the work.
+/// Capacity for excluded face pairs towards one part; pairs beyond it are searched as usual.
 pub(crate) const MAX_EXCLUDED: usize = 2 * MAX_TARGETS;
 
-/// Face pairs that exclusions to one part keep apart: of the tree's shape, of the field's.
+/// Face pairs that contact exclusions towards one part keep apart: face of the tree's shape, face of the field's shape.
 pub(crate) type ExcludedPairs = Vec<[u16; 2], MAX_EXCLUDED>;
 
-/// What contact between two faces has to know of guidance.
+/// Effect of guidance on the contact between two faces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mating {
-    /// Whether a target owns the pair.
+    /// Whether a target guides this face pair.
     pub guided: bool,
-    /// Gaps count for larger by this, m.
+    /// Allowance added to every gap of the pair, m.
     pub allowance_m: f32,
 }
 
@@ -27,16 +27,16 @@ impl Mating {
     };
 }
 
-/// Faces at a point, and what guidance says of them: points that follow each other mostly have the same.
+/// Cache of the last faces and their [`Mating`]: consecutive points mostly lie on the same faces.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mated {
+pub(crate) struct MatingCache {
     part: u16,
     moving: [u16; 2],
     fixed: [u16; 2],
     mating: Mating,
 }
 
-impl Mated {
+impl MatingCache {
     /// No faces.
     pub const NONE: Self = Self {
         part: u16::MAX,
@@ -45,15 +45,9 @@ impl Mated {
         mating: Mating::NONE,
     };
 
-    /// What `rules` say of these faces: asked only when they differ from the last.
+    /// [`Mating`] of these faces; queries `rules` only when the faces differ from the last ones.
     #[inline]
-    pub fn look_up(
-        &mut self,
-        rules: &dyn FacePairRules,
-        part: u16,
-        moving: [u16; 2],
-        fixed: [u16; 2],
-    ) -> Mating {
+    pub fn get(&mut self, rules: &dyn FacePairRules, part: u16, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
         if (self.part, self.moving, self.fixed) != (part, moving, fixed) {
             *self = Self {
                 part,
@@ -66,18 +60,18 @@ impl Mated {
     }
 }
 
-/// What the constraints in force say about contact between faces: asked by the search, answered by a layer above it.
+/// Rules of the constraints in force for contact between faces. The search queries them; the constraint layer implements them.
 pub(crate) trait FacePairRules {
-    /// Whether any rule is about this part.
+    /// Whether any rule concerns this part.
     fn concerns(&self, part: u16) -> bool;
 
-    /// Pairs of faces of the held part and this one that cannot touch: those of the tree's shape first, which is the held one unless `backward`.
+    /// Face pairs of the held part and this part that cannot touch. The face of the tree's shape comes first: the held part's, unless `backward`.
     fn excluded(&self, part: u16, backward: bool) -> ExcludedPairs;
 
-    /// Contact between these faces: `moving` and `fixed` name the face, and the other one where the point lies on an edge.
+    /// Effect of guidance on contact between these faces. `moving` and `fixed` hold the face, and the second face where the point lies on an edge.
     fn mating(&self, part: u16, moving: [u16; 2], fixed: [u16; 2]) -> Mating;
 
-    /// No [`Mating::room`] is larger, m.
+    /// Upper bound of [`Mating::allowance_m`], m.
     fn max_allowance_m(&self) -> f32;
 }
 
@@ -102,7 +96,7 @@ impl FacePairRules for NoRules {
     }
 }
 
-/// Whether a point that lies on these faces lies on this one.
+/// Whether a point on these faces lies on `face`.
 pub(crate) fn holds(faces: [u16; 2], face: u16) -> bool {
     face != NO_FACE && (faces[0] == face || faces[1] == face)
 }

@@ -1,17 +1,18 @@
-//! Where the held part is near another: points of one in the signed-distance field of the other, both ways.
+//! Contact search: points of one part in the signed-distance field of the other, in both directions.
 //!
-//! Forward, every point of the held part is looked up in the other part's field; backward, every point of the other part in the held part's,
-//! or a sharp fixed rim would slip between the points of a tilted part. Both walk a preorder sphere tree and skip every sphere that the
-//! field's distance at its centre puts farther off than the margin.
+//! Forward, every point of the held part is queried in the other part's field; backward, every point of the other part in the held part's field.
+//! Without the backward direction a sharp fixed rim would slip between the points of a tilted part. Both directions traverse a preorder sphere tree
+//! and skip every sphere whose distance, by the field at its centre, exceeds the margin.
 //!
-//! When the budget runs out, work is left undone in this order. The step has no more solves than the budget has room for, four at least. What pushed
-//! in leaves not reached is carried over with the gaps the last motion left them, and the next tick goes on where this one stopped, round and round.
-//! When two ticks do not get round, but for those after a grab, points are left out evenly where they are the work: each second, fourth, eighth of
-//! those that are near is looked at where points take a quarter of the budget, and where they still take half of it whole leaves are left out, to
-//! each 128th point; always the same ones, until there is room again ([`crate::overload`]). The error bound of the pointshell grows by four at each
-//! step, all else stays as it was. Carrying is prepared for once a tick needed half the budget.
+//! When the budget runs out, work is dropped in this order. First, the step gets only as many solves as the budget has left, four at least. Second,
+//! contacts that pushed in leaves not reached are carried over, their gaps advanced by the last motion, and the next tick resumes where this one
+//! stopped, round and round. Third, when two ticks do not complete a round (the ticks after a grab excepted), points are decimated evenly where
+//! points are the bulk of the work: each second, fourth or eighth near point is queried where points take a quarter of the budget; where they still
+//! take half of it, whole leaves are decimated, down to each 128th point. The selection stays the same until the budget suffices again
+//! ([`super::decimation`]). The error bound of the pointshell grows by a factor of four at each step; all else stays as it was. Carrying over is
+//! prepared once a tick has needed half of the budget.
 //!
-//! Cost: see [`crate::tick()`]; the look-ups in the field are two thirds of it.
+//! Cost: see [`crate::tick()`]; field queries are two thirds of it.
 
 use glam::Vec3;
 use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage, Shape};
@@ -29,82 +30,83 @@ use crate::collision::facing::faces_away;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
-use crate::collision::rules::{FacePairRules, Mated, Mating};
+use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::io::{Flags, Work};
 use crate::math::pose::Pose;
 use crate::math::scalar::inverse_sqrt;
 use crate::math::symmetric6::dot;
 
-/// A gradient shorter than this (squared) tells no direction: the field is clamped there, or between two surfaces. Within a cell of a sharp edge
-/// it shrinks to about 0.3 while its direction is still good.
+/// Squared gradient length below which the gradient gives no direction: the field is clamped there, or lies between two surfaces. Within a cell of a
+/// sharp edge the length shrinks to about 0.3 while the direction is still good.
 const LEAST_GRADIENT2: f32 = 0.01;
-/// The motion a tick ends with lies between that so far and that without contacts, or is turned by the contacts: the end of a rod struck at
-/// the other end moves half as fast again. So the approach by either is taken this many times.
+/// Safety factor on the approach predicted by either motion. The motion at the tick's end lies between the last motion and the one without contacts,
+/// or is turned by the contacts: the end of a rod struck at the other end moves half as fast again.
 pub(crate) const APPROACH: f32 = 2.0;
-/// What would be due within so many more ticks like the last one counts as near, and is looked at every tick: finding out whether it is, with all of
-/// a leaf, costs as much.
+/// Points whose bound would expire within this many more ticks like the last one count as near and are queried every tick: evaluating the whole leaf
+/// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
-/// One search.
+/// Inputs of one search.
 pub(crate) struct Search<'s, 'i> {
     pub scene: &'s SceneImage<'i>,
     pub parts: &'s [Placed],
     /// Index of the held part.
     pub held: u16,
     pub held_shape: Shape<'i>,
-    /// Its points are this far inward of where they are stored, to voxmaps, m.
+    /// Distance by which points of the held part are moved inward before voxmaps are queried, m.
     pub shrunk_m: f32,
     pub pose: Pose,
     /// World position of its centre of mass, m.
     pub center: Vec3,
-    /// No point can travel farther in this tick: points with larger gaps are not looked at closely, m.
+    /// Upper bound of any point's travel in this tick: points with larger gaps are not evaluated further, m.
     pub margin: f32,
-    /// How far any point went in the last tick at most, m.
+    /// Upper bound of any point's travel in the last tick, m.
     pub way: f32,
-    /// Points that come as near as this by the motion so far, or by that without contacts, are candidates, m.
+    /// Points whose gap falls to this by the last motion, or by the motion without contacts, are candidates, m.
     pub slack: f32,
-    /// The last tick's motion and that without contacts, of one period, scaled as the step's unknowns, m.
+    /// The last tick's motion and the motion without contacts, each of one period, scaled as the step's unknowns, m.
     pub motions: [[f32; 6]; 2],
-    /// How much gap a lever makes up for when contacts are chosen: margin/reach², so that at the object's farthest point it is the margin, 1/m.
+    /// Weight of the squared lever arm against the gap when contacts are chosen: margin/reach², so that it equals the margin at the object's farthest
+    /// point, 1/m.
     pub swing: f32,
     /// 1/L of the step's scaling, 1/m.
     pub inverse_length: f32,
-    /// The last tick came near the budget.
+    /// The last tick needed half of the budget or more.
     pub busy: bool,
-    /// Of the points of a leaf that is near only each 2ⁿth is looked at.
+    /// Only each 2ⁿth near point of a leaf is queried.
     pub decimation: u8,
-    /// Work allowed, look-ups.
+    /// Work budget of the tick, field queries.
     pub budget: u32,
-    /// What of it is the step's.
+    /// Part of the budget reserved for the step.
     pub reserved: u32,
-    /// Contacts that will be in it though none is found, for they are carried over.
+    /// Contacts carried over, which enter the step even if the search finds none.
     pub carried: u32,
-    /// Points that come this near are braked, m; 0 for no braking. Then points in proximity voxels are wanted too.
+    /// Gap below which points are braked, m; 0 for no braking. With braking, points in proximity voxels are candidates too.
     pub braking_m: f32,
-    /// Where guided faces meet, contact makes allowance_m.
+    /// Rules of the constraints in force for guided faces.
     pub rules: &'s dyn FacePairRules,
 }
 
 impl<'i> Search<'_, 'i> {
-    /// Points that come as near as this are looked at every tick, m.
+    /// Gap below which points are queried every tick, m.
     #[inline]
     pub fn near(&self) -> f32 {
         (self.margin + NEAR_TICKS * self.way) * (1.0 / SHORTEST_SHARE)
     }
 
-    /// How far a contact's gap may close in this tick, m, at least 0.
+    /// Upper bound of how far a contact's gap may close in this tick, m, at least 0.
     #[inline]
     pub fn approach(&self, row: &[f32; 6]) -> f32 {
-        let mut most = 0.0f32;
+        let mut fastest = 0.0f32;
         for motion in &self.motions {
             let closing = -dot(row, motion);
-            if closing > most {
-                most = closing;
+            if closing > fastest {
+                fastest = closing;
             }
         }
-        APPROACH * most
+        APPROACH * fastest
     }
 
-    /// Fills `contacts`, from `start` on and round; returns where to go on when the budget ran out, and what it took.
+    /// Fills `contacts`, starting at `start` and wrapping round. Returns where to resume if the budget ran out, and the cost.
     pub fn run(
         &self,
         start: NodeCursor,
@@ -119,23 +121,23 @@ impl<'i> Search<'_, 'i> {
         traversal.spent -= CANDIDATE * traversal.expected;
         let used = Used {
             all: traversal.used(),
-            on_points: traversal.on_points / LOOKUP,
+            point_work: traversal.point_work / LOOKUP,
         };
         if let Some(stop) = stop {
             work.flags.insert(Flags::BUDGET_EXCEEDED);
             contacts.carry(&self.motions[0], |leaf| {
-                let seen = if start < stop {
+                let visited = if start < stop {
                     start <= leaf && leaf < stop
                 } else {
                     start <= leaf || leaf < stop
                 };
-                !seen
+                !visited
             });
         }
         (stop, used)
     }
 
-    /// Trees and fields of pair `index`, or none when the two parts' spheres are apart.
+    /// Directed pair `index`, or `None` when the bounding spheres of the two parts are apart.
     fn pair(&self, index: u16) -> Option<DirectedPair<'i>> {
         let part = index / 2;
         let other = self.parts.get(usize::from(part))?;
@@ -163,15 +165,15 @@ impl<'i> Search<'_, 'i> {
         Some(pair)
     }
 
-    /// A walk that has not begun, into an empty store; with `put_aside` what that held can be carried over.
+    /// A traversal that has not begun, with an empty contact store; with `keep_previous` the previous contacts can be carried over.
     pub fn traverse<'w>(
         &'w self,
-        put_aside: bool,
+        keep_previous: bool,
         coherence: &'w mut Coherence,
         contacts: &'w mut Contacts,
         work: &'w mut Work,
     ) -> Traversal<'w, 'w, 'i> {
-        contacts.begin(put_aside);
+        contacts.begin(keep_previous);
         Traversal {
             search: self,
             horizon: coherence.horizon(self.margin),
@@ -180,52 +182,52 @@ impl<'i> Search<'_, 'i> {
             work,
             spent: LOOKUP * self.reserved + CANDIDATE * self.carried,
             expected: self.carried,
-            on_points: 0,
-            aside: 0,
+            point_work: 0,
+            decimation_work: 0,
             exclusion_work: 0,
-            left_out: 0,
-            faces_sought: 0,
-            mated: Mated::NONE,
+            decimated_queries: 0,
+            face_searches: 0,
+            mating_cache: MatingCache::NONE,
             near: 0,
         }
     }
 }
 
-/// A search under way.
+/// A search in progress.
 pub(crate) struct Traversal<'w, 's, 'i> {
     pub search: &'w Search<'s, 'i>,
     pub coherence: &'w mut Coherence,
-    /// Travel at which what lies within the margin is due.
+    /// Travel at which bounds of points within the margin expire, nm.
     horizon: u32,
     pub contacts: &'w mut Contacts,
     pub work: &'w mut Work,
-    /// Of the budget, eighths of a look-up.
+    /// Budget spent, eighths of a field query.
     pub spent: u32,
-    /// Of that, on points rather than the way to them.
-    on_points: u32,
-    /// Of that, for what decimation leaves out of the leaf that is looked at.
-    pub aside: u32,
-    /// Of that, for what exclusions keep apart.
+    /// Of that, on points rather than on the traversal.
+    point_work: u32,
+    /// Of that, on decimated points of the current leaf.
+    pub decimation_work: u32,
+    /// Of that, on exclusion queries.
     pub exclusion_work: u32,
-    /// Candidates paid for and not yet found.
+    /// Candidates already paid for and not yet found.
     expected: u32,
-    /// Leaves looked at for what decimation leaves out of them.
-    pub left_out: u32,
-    /// Leaves whose face_cache were asked for.
-    pub faces_sought: u32,
-    /// What guidance said of the last point's faces.
-    mated: Mated,
-    /// Points within the margin.
+    /// Leaves whose decimated points were queried.
+    pub decimated_queries: u32,
+    /// Leaves whose face was searched for.
+    pub face_searches: u32,
+    /// Mating of the last point's faces.
+    mating_cache: MatingCache,
+    /// Number of points within the margin.
     pub near: u32,
 }
 
 impl Traversal<'_, '_, '_> {
-    /// All of a pair.
+    /// Searches a whole pair.
     pub fn all(&mut self, pair: &DirectedPair<'_>) {
         let _ = self.nodes(pair, 0, u32::MAX);
     }
 
-    /// One point of the leaf `node`: as `found`, or looked up.
+    /// Offers one point of the leaf `node`, at the surface `found` or after a query.
     #[inline(never)]
     pub fn one(&mut self, pair: &DirectedPair<'_>, node: u32, point: &PointRecord, found: Option<OnFace>) {
         let leaf = NodeCursor {
@@ -240,7 +242,7 @@ impl Traversal<'_, '_, '_> {
         }
     }
 
-    /// Everything from `start` to before `end` (or the last); where it stopped when the budget ran out.
+    /// Searches everything from `start` to before `end` (or to the last node). Returns where it stopped when the budget ran out.
     fn pairs(&mut self, start: NodeCursor, end: Option<NodeCursor>) -> Option<NodeCursor> {
         let pairs = 2 * self.search.parts.len() as u16;
         let last = end.map_or(pairs, |e| (e.pair + 1).min(pairs));
@@ -261,11 +263,11 @@ impl Traversal<'_, '_, '_> {
         None
     }
 
-    /// Nodes `from..to` of a pair in preorder, skipping what is too far; where it stopped when the budget ran out.
+    /// Searches nodes `from..to` of a pair in preorder and skips subtrees beyond the margin. Returns where it stopped when the budget ran out.
     ///
-    /// Ends because every record's `skip` points forward (checked when the image was opened).
+    /// Terminates because every record's `skip` points forward (checked when the image was opened).
     fn nodes(&mut self, pair: &DirectedPair<'_>, from: u32, to: u32) -> Option<NodeCursor> {
-        if pair.left_out() {
+        if pair.unused() {
             return None;
         }
         let mut edge_error = EDGE_ERROR_CELLS * pair.field.record().cell;
@@ -289,12 +291,12 @@ impl Traversal<'_, '_, '_> {
             }
             ancestors.close(index, self.coherence);
             let key = keys.of(index);
-            let mut asked = false;
+            let mut queried = false;
             let mut near = ALL;
             match self.coherence.query(key, self.horizon, node.skip == index + 1) {
-                Known::Far(due) => {
+                Known::Far(bound) => {
                     self.spent += PASSED_OVER;
-                    ancestors.note(due);
+                    ancestors.note(bound);
                     index = node.skip;
                     continue;
                 }
@@ -304,7 +306,7 @@ impl Traversal<'_, '_, '_> {
                 }
                 Known::Expired => {
                     self.spent += PASSED_OVER;
-                    asked = true;
+                    queried = true;
                 }
                 Known::Nothing => {
                     self.spent += NODE;
@@ -316,7 +318,7 @@ impl Traversal<'_, '_, '_> {
                         continue;
                     }
                     self.coherence.set_near(key);
-                    asked = true;
+                    queried = true;
                 }
             }
             index += 1;
@@ -326,8 +328,8 @@ impl Traversal<'_, '_, '_> {
             }
             let mask = mask(self.search.decimation, node.first_point);
             let points = node.points(pair.points);
-            // Asked as seldom as the field is.
-            if asked
+            // Queried as seldom as the field is.
+            if queried
                 && !pair.excluded.is_empty()
                 && let Some(clear) = self.excluded(pair, points)
             {
@@ -335,14 +337,14 @@ impl Traversal<'_, '_, '_> {
                 ancestors.note(Bound::NOW);
                 continue;
             }
-            // A leaf is looked at as a whole, unless even the whole budget would not do.
+            // A leaf is evaluated as a whole, unless it exceeds even the whole budget.
             if (self.left() as usize) < points.len() && self.work.points > 0 {
                 return Some(here);
             }
             self.spent += LEAF;
             let before = self.spent;
             ancestors.note(if near != ALL {
-                self.some(pair, here, points, near & mask);
+                self.selected_points(pair, here, points, near & mask);
                 Bound::NOW
             } else {
                 match mask {
@@ -350,14 +352,14 @@ impl Traversal<'_, '_, '_> {
                     mask => self.decimated(pair, here, points, mask),
                 }
             });
-            self.on_points += self.spent - before - self.aside;
-            self.aside = 0;
+            self.point_work += self.spent - before - self.decimation_work;
+            self.decimation_work = 0;
         }
         ancestors.close(index, self.coherence);
         None
     }
 
-    /// Looks one point up and offers it as a contact if it is within the margin; its gap, or a lower bound of it.
+    /// Queries one point and offers it as a contact if it lies within the margin. Returns its gap or a lower bound of it, m.
     #[inline(always)]
     pub fn point(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         if pair.field.is_occupancy() {
@@ -383,7 +385,7 @@ impl Traversal<'_, '_, '_> {
         }
     }
 
-    /// A point where more than one face is near, or none has a closed form.
+    /// Queries a point near more than one face, or near a face without a closed form.
     #[inline(never)]
     fn at_edge(
         &mut self,
@@ -400,10 +402,10 @@ impl Traversal<'_, '_, '_> {
             if distance < self.search.margin {
                 if pair.guided {
                     self.spent += ALLOWANCE;
-                    // At the rim of a guided face the other face gives way with it: the part would stand on it else.
-                    let most = self.search.rules.max_allowance_m();
+                    // At the rim of a guided face the adjacent face gets the allowance too; otherwise the part would rest on it.
+                    let max_allowance_m = self.search.rules.max_allowance_m();
                     let allowance_m = |face| self.mating(pair, leaf, point, face).allowance_m;
-                    found = with_allowance(found, pair.faces, nearby, p, most, allowance_m);
+                    found = with_allowance(found, pair.faces, nearby, p, max_allowance_m, allowance_m);
                 }
                 if !faces_away(pair, nearby, point, found.normal) {
                     self.near(pair, leaf, point, &found);
@@ -474,7 +476,7 @@ impl Traversal<'_, '_, '_> {
         contact.leaf = leaf;
     }
 
-    /// What guidance says of a point and a face.
+    /// Mating of a point and a face.
     fn mating(
         &mut self,
         pair: &DirectedPair<'_>,
@@ -486,13 +488,13 @@ impl Traversal<'_, '_, '_> {
         self.mating_of(leaf, moving, fixed)
     }
 
-    /// What guidance says of these faces of the held part and of the other one.
+    /// Mating of these faces of the held part and of the other part.
     #[inline]
     pub fn mating_of(&mut self, leaf: NodeCursor, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
-        (self.mated).look_up(self.search.rules, leaf.part(), moving, fixed)
+        (self.mating_cache).get(self.search.rules, leaf.part(), moving, fixed)
     }
 
-    /// A point may touch.
+    /// Counts a candidate, a point that may touch, and charges it to the budget.
     #[inline(always)]
     pub fn count_candidate(&mut self) {
         if self.expected > 0 {
@@ -503,18 +505,18 @@ impl Traversal<'_, '_, '_> {
         self.work.candidates = self.work.candidates.saturating_add(1);
     }
 
-    /// What was done so far, in look-ups.
+    /// Budget spent so far, field queries.
     fn used(&self) -> u32 {
         self.spent / LOOKUP
     }
 
-    /// Look-ups left.
+    /// Budget left, field queries.
     pub fn left(&self) -> u32 {
         self.search.budget.saturating_sub(self.used())
     }
 }
 
-/// Faces of the held part and of the other one, where a point meets a face.
+/// Faces of the held part and of the other part, where a point meets a face.
 #[inline(always)]
 fn sides(pair: &DirectedPair<'_>, point: &PointRecord, face: u16) -> ([u16; 2], [u16; 2]) {
     let (own, other) = ([point.face, point.edge_face], [face, NO_FACE]);

@@ -1,7 +1,7 @@
-//! How far a constraint target is from being met, linearised for the step.
+//! Alignment error of a constraint target, linearised for the step.
 //!
-//! A feature is a point and a direction: an axis, a plane, an apex, a centre. Of the offset between the points some components must vanish,
-//! and for some kinds the directions must be parallel (in either sense: a peg goes in from both sides):
+//! A feature is a point and a direction: an axis, a plane, an apex, a centre. Some components of the offset between the two points must vanish, and
+//! for some kinds the directions must be parallel (in either sense: a peg may enter from both sides):
 //!
 //! | kind | components of the offset | directions |
 //! |---|---|---|
@@ -12,7 +12,7 @@
 //! | annular | across the fixed axis | free |
 //! | annular, bore moving | across the moving axis | free |
 //!
-//! Of planes only the angle is guided: contact keeps the distance and pulls no part, and a plane that pulled could hold one up in the air.
+//! For planes only the angle is guided: contact keeps the distance and attracts no part, and an attracting plane could hold a part up in the air.
 //!
 //! Each component is a row J of the step's scaled twist (v, ω·L) and an error e: e' = e + h·J·V'. The offset is taken between the moving point and
 //! the fixed feature, the angle as the sine of that between the directions.
@@ -24,13 +24,13 @@ use mortise_protocol::message::{ConstraintKind, ConstraintTarget};
 use crate::math::pose::Pose;
 use crate::math::symmetric6::dot;
 
-/// Components that must vanish: rows and errors (m; for directions rad·L).
+/// Components of the alignment error that must vanish: Jacobian rows and errors (m; for directions rad·L).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
     pub rows: Vec<([f32; 6], f32), 3>,
 }
 
-/// What a target asks for, at one moment.
+/// Alignment error of a target at one placement.
 #[derive(Clone, Debug)]
 pub(crate) struct Alignment {
     /// Offset between the points.
@@ -40,7 +40,7 @@ pub(crate) struct Alignment {
 }
 
 impl Alignment {
-    /// Of `target`, the object standing at `object` with its centre of mass at `center`, the other part at `fixed`; `length` is L.
+    /// Error of `target` with the object at `object`, its centre of mass at `center`, and the other part at `fixed`; `length` is L.
     pub fn of(target: &ConstraintTarget, object: &Pose, center: Vec3, fixed: &Pose, length: f32) -> Self {
         let point = object.transform_point(Vec3::from_array(target.moving.point));
         let direction = object.transform_vector(Vec3::from_array(target.moving.direction));
@@ -49,7 +49,7 @@ impl Alignment {
         let arm = point - center;
         let (u, v) = across(axis);
         let mut offset = Rows::default();
-        // Fixed to the moving part, they turn with it.
+        // Directions fixed to the moving part rotate with it.
         let turning = across(Vec3::from_array(target.moving.direction));
         let turning = [turning.0, turning.1].map(|n| object.transform_vector(n));
         let (directions, arm): (&[Vec3], Vec3) = match target.kind {
@@ -81,7 +81,7 @@ impl Alignment {
 
 impl Rows {
     fn add(&mut self, row: [f32; 6], error: f32) {
-        // Three at most, as there is room for.
+        // Three at most, the capacity.
         let _ = self.rows.push((row, error));
     }
 
@@ -150,7 +150,7 @@ mod tests {
         }
     }
 
-    /// The rows are the errors' derivatives: moved a little along each unknown, the errors change as the rows say.
+    /// The rows are the errors' derivatives: a small motion along each unknown changes the errors as the rows predict.
     #[test]
     fn rows_are_derivatives() {
         let length = 0.02;

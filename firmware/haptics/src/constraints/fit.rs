@@ -1,4 +1,4 @@
-//! How the faces of a target fit when it is met: the gap between them, by the scene's own exact surfaces.
+//! Fit of a target's faces when it is met: the gap between them, by the scene's own exact surfaces.
 
 use glam::Vec3;
 use mortise_protocol::image::{FaceRecord, Shape, surface_kind};
@@ -6,19 +6,19 @@ use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 
 use crate::math::vector::length;
 
-/// How mating faces fit when their target is met.
+/// Fit of mating faces when their target is met.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fit {
-    /// Which of the target's pairs are kept apart, by bit.
+    /// Bit mask of the target's face pairs that are kept apart.
     pub pairs: u8,
-    /// The smallest gap between those, m; negative for a press fit.
+    /// The smallest gap of those pairs, m; negative for a press fit.
     pub gap_m: f32,
-    /// No point of the moving part is farther from its feature, m.
+    /// Lever arm from the moving part's feature to its farthest point, upper bound, m.
     pub lever_m: f32,
 }
 
 impl Fit {
-    /// Of a target's pairs, by the exact surfaces of both shapes. About 150 instructions a pair; once a target.
+    /// Fit of a target's face pairs, by the exact surfaces of both shapes. About 150 instructions a pair, computed once per target.
     pub fn of(target: &ConstraintTarget, moving: &Shape<'_>, fixed: &Shape<'_>) -> Self {
         let lever = |shape: &Shape<'_>, feature: &Feature| {
             let center = Vec3::from_array(shape.record.center);
@@ -48,7 +48,7 @@ impl Fit {
     }
 }
 
-/// Whether these surfaces are kept apart by a target of this kind: one round, the other round about it.
+/// Whether a target of this kind keeps these surfaces apart: a convex round surface inside a concave one.
 fn mate(kind: ConstraintKind, moving: &FaceRecord, fixed: &FaceRecord) -> bool {
     use surface_kind::{CYLINDER, SPHERE};
     let kinds = (moving.kind, fixed.kind);
@@ -62,7 +62,7 @@ fn mate(kind: ConstraintKind, moving: &FaceRecord, fixed: &FaceRecord) -> bool {
     round && moving.sense * fixed.sense < 0.0
 }
 
-/// How far a surface is from where the feature has it, within `lever` of the feature's point, m.
+/// Distance of a surface from its nominal place by the feature, within `lever` of the feature's point, m.
 fn alignment_error(face: &FaceRecord, feature: &Feature, lever: f32) -> f32 {
     let from = Vec3::from_array(face.origin) - Vec3::from_array(feature.point);
     if face.kind == surface_kind::SPHERE {
@@ -102,15 +102,15 @@ mod tests {
     }
 
     #[test]
-    fn misfit_is_how_far_the_surface_is_off() {
+    fn alignment_error_is_the_offset_of_the_surface() {
         let feature = |point, direction| Feature { point, direction };
         let shaft = cylinder(1.0, 0.01);
         assert_eq!(
             alignment_error(&shaft, &feature([0.0; 3], [0.0, 0.0, 1.0]), 0.1),
             0.0
         );
-        let aside = alignment_error(&shaft, &feature([3e-5, 0.0, 0.05], [0.0, 0.0, 1.0]), 0.1);
-        assert!((aside - 3e-5).abs() < 1e-9);
+        let offset = alignment_error(&shaft, &feature([3e-5, 0.0, 0.05], [0.0, 0.0, 1.0]), 0.1);
+        assert!((offset - 3e-5).abs() < 1e-9);
         let tilted = alignment_error(&shaft, &feature([0.0; 3], [1e-3, 0.0, 1.0]), 0.1);
         assert!((tilted - 1e-4).abs() < 1e-6, "{tilted}");
     }

@@ -1,7 +1,7 @@
-//! One pull of a target within a step: stiff at first, never more than its cap, and damped while it lets go.
+//! Saturating spring of a target within a step: stiff at small errors, limited to its cap, and damped on release.
 //!
-//! A cap makes the step's equations nonlinear. Each solve takes the spring and the damper that pull as hard at the last solution (the secant) in its
-//! place; a few solves settle it.
+//! The cap makes the step's equations nonlinear. Each solve replaces the spring by the secant: the linear spring and damper with the same force at
+//! the last solution. A few solves converge.
 
 use core::mem;
 
@@ -16,42 +16,42 @@ use crate::math::pose::Wrench;
 use crate::math::scalar::inverse_sqrt;
 use crate::math::symmetric6::{Symmetric6, dot};
 
-/// Damping of what a target that ends lets go, N s/m.
+/// Damping on release of a target that ends, N s/m.
 const RELEASE_DAMPING: f32 = 200.0;
-/// Its largest force, N.
+/// Largest force of that damper, N.
 pub(crate) const RELEASE_N: f32 = 1.0;
-/// Two pulls for each target: offset and angle.
+/// Two springs for each target: offset and angle.
 pub(crate) const MAX_SPRINGS: usize = 2 * MAX_TARGETS;
-/// One saturating spring of a target, within a step.
+/// Linear: k (N/m), h (s).
 #[derive(Clone, Debug)]
 pub(crate) struct SaturatingSpring {
-    /// Place of its target among all.
+    /// Index of its target.
     pub slot: u8,
-    /// Of the angle, not the offset.
+    /// Whether it acts on the angle rather than the offset.
     pub turns: bool,
-    /// What must vanish.
+    /// Error components it acts on.
     pub rows: Rows,
     /// Σ JᵀJ.
     product: Symmetric6,
     /// Σ e·Jᵀ.
     along: [f32; 6],
     law: Law,
-    /// Largest force of the damper that lets go, N.
+    /// Largest force of the release damper, N.
     damper_n: f32,
 }
 
-/// The spring (N/m) and the damper (N s/m) that pull as hard as a saturating pull does at one solution.
+/// Linear spring (N/m) and damper (N s/m) with the same force as the saturating spring at one solution.
 #[derive(Clone, Copy, Debug, Default)]
 struct Secant {
     spring: f32,
     damper: f32,
-    /// |u| and its rate there, m and m/s.
+    /// |u| and its rate at that solution, m and m/s.
     reach: f32,
     speed: f32,
 }
 
 impl Secant {
-    /// Whether this, in place of another that is right, pulls wrongly by no more than `force_n`.
+    /// Whether the force of this secant differs from that of the correct one, `other`, by no more than `force_n`.
     fn is_near(&self, other: &Self, force_n: f32) -> bool {
         let spring = (self.spring - other.spring).abs() * other.reach;
         let damper = (self.damper - other.damper).abs() * other.speed;
@@ -59,17 +59,17 @@ impl Secant {
     }
 }
 
-/// How a pull grows.
+/// Force law of the spring.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Law {
-    /// Stiff up to a cap: k (N/m), cap (N), h + τ (s).
+    /// Saturating: k (N/m), cap (N), h + τ (s).
     Capped { stiffness: f32, cap: f32, ahead: f32 },
     /// A plain spring: k (N/m), h (s).
     Spring { stiffness: f32, ahead: f32 },
 }
 
 impl SaturatingSpring {
-    /// Of which target, and whether of its angle; `damper_n`: largest force of the damper that lets go.
+    /// Spring of the target `slot`, on its angle or its offset; `damper_n` is the largest force of the release damper.
     pub fn new((slot, turns): (u8, bool), rows: Rows, law: Law, damper_n: f32) -> Self {
         let mut product = Symmetric6::ZERO;
         let mut along = [0.0; 6];
@@ -90,7 +90,7 @@ impl SaturatingSpring {
         }
     }
 
-    /// At the step's end `x`.
+    /// Secant at the step's end `x`.
     fn secant(&self, x: &[f32; 6]) -> Secant {
         let mut secant = Secant::default();
         match self.law {
@@ -112,7 +112,7 @@ impl SaturatingSpring {
         secant
     }
 
-    /// Adds what the spring and the damper add to the step's matrix and right side.
+    /// Adds spring and damper to the step's matrix and right side.
     fn add(&self, secant: Secant, period_s: f32, system: &mut System) {
         let impulse = secant.spring * period_s;
         (system.matrix).add_scaled(impulse * self.ahead() + secant.damper * period_s, &self.product);
@@ -127,7 +127,7 @@ impl SaturatingSpring {
         }
     }
 
-    /// On the object at its centre of mass.
+    /// Wrench on the object at its centre of mass.
     pub fn wrench(&self, x: &[f32; 6], length: f32) -> Wrench {
         let secant = self.secant(x);
         let mut wrench = Wrench::ZERO;
@@ -154,7 +154,7 @@ impl SaturatingSpring {
     }
 }
 
-/// A spring that pulls wrongly by less than this is settled, N: less than half of what may change in a tick.
+/// Force error below which a spring has converged, N: less than half of the force change allowed in a tick.
 const SPRING_BAND_N: f32 = 0.02;
 
 /// The springs of all targets as one force term.
@@ -169,7 +169,7 @@ pub(crate) struct TargetForce<'a> {
 impl<'a> TargetForce<'a> {
     pub fn new(springs: &'a [SaturatingSpring], period_s: f32, length: f32) -> Self {
         let mut secants = Vec::new();
-        // No more springs than there is capacity for.
+        // The number of springs is within the capacity.
         let _ = secants.resize(springs.len(), Secant::default());
         Self {
             springs,
@@ -208,7 +208,7 @@ impl ForceTerm for TargetForce<'_> {
     }
 }
 
-/// Force over u of a pull that is k·u at first and never more than `cap`: cap/√((cap/k)² + u²). Asked for in each solve by each pull.
+/// Secant stiffness of a spring that is k·u at first and never exceeds `cap`: cap/√((cap/k)² + u²). Evaluated in each solve for each spring.
 fn saturating(k: f32, cap: f32, u2: f32) -> f32 {
     let slack = cap / k;
     let squared = slack * slack + u2;
@@ -224,7 +224,7 @@ fn root(x: f32) -> f32 {
     if is_ordinary(x) { x * inverse_sqrt(x) } else { 0.0 }
 }
 
-/// Whether [`inverse_sqrt`] is for such a number.
+/// Whether [`inverse_sqrt`] is valid for `x`.
 fn is_ordinary(x: f32) -> bool {
     x > f32::MIN_POSITIVE && x < f32::MAX
 }

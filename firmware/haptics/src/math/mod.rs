@@ -1,4 +1,4 @@
-//! Rigid motions, small linear algebra, and single numbers. Imports nothing of the crate.
+//! Mathematics: rigid motions, small linear algebra, and scalars. Imports nothing of the crate.
 
 pub(crate) mod pose;
 pub mod rotation;

@@ -1,7 +1,7 @@
-//! Poses, twists and wrenches: what moves, how fast, and what pushes.
+//! Poses, twists and wrenches of rigid bodies.
 //!
-//! SI and radians. Unless a name says otherwise everything is in the world frame; a twist or a wrench belongs to a reference point
-//! that its owner names (the handle's origin, or the object's centre of mass).
+//! SI and radians. Unless a name says otherwise everything is in the world frame; a twist or a wrench belongs to a reference point that its owner
+//! names (the handle's origin, or the object's centre of mass).
 
 use glam::{Mat3, Quat, Vec3};
 
@@ -15,13 +15,13 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// No displacement.
+    /// Identity.
     pub const IDENTITY: Self = Self {
         position: Vec3::ZERO,
         orientation: Quat::IDENTITY,
     };
 
-    /// From its parts; `orientation` must be of unit length.
+    /// Pose from its components; `orientation` must be of unit length.
     pub const fn new(position: Vec3, orientation: Quat) -> Self {
         Self {
             position,
@@ -29,7 +29,7 @@ impl Pose {
         }
     }
 
-    /// From the arrays a scene image stores (m; unit quaternion x, y, z, w, brought to unit length).
+    /// Pose from the arrays of a scene image (m; unit quaternion x, y, z, w, normalised).
     pub fn from_arrays(position: [f32; 3], orientation: [f32; 4]) -> Self {
         Self {
             position: Vec3::from_array(position),
@@ -47,7 +47,7 @@ impl Pose {
         }
     }
 
-    /// Parent in child: `p.inverse().compose(p)` is the identity up to rounding.
+    /// Pose of the parent in the child: `p.inverse().compose(p)` is the identity up to rounding.
     #[inline]
     #[must_use]
     pub fn inverse(self) -> Self {
@@ -58,21 +58,21 @@ impl Pose {
         }
     }
 
-    /// A point of the child frame in the parent frame, m.
+    /// Transforms a point from the child frame to the parent frame, m.
     #[inline]
     #[must_use]
     pub fn transform_point(self, point: Vec3) -> Vec3 {
         self.orientation * point + self.position
     }
 
-    /// A direction of the child frame in the parent frame.
+    /// Transforms a direction from the child frame to the parent frame.
     #[inline]
     #[must_use]
     pub fn transform_vector(self, vector: Vec3) -> Vec3 {
         self.orientation * vector
     }
 
-    /// The rotation as a matrix: cheaper where many points are transformed.
+    /// The rotation as a matrix: cheaper for many points.
     #[inline]
     #[must_use]
     pub fn rotation(self) -> Mat3 {
@@ -133,14 +133,14 @@ impl Twist {
 /// Force and torque on a rigid body at a reference point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
-    /// N.
+    /// Force, N.
     pub force: Vec3,
-    /// About the reference point, N m.
+    /// Torque about the reference point, N m.
     pub torque: Vec3,
 }
 
 impl Wrench {
-    /// Nothing pushes.
+    /// Zero wrench.
     pub const ZERO: Self = Self {
         force: Vec3::ZERO,
         torque: Vec3::ZERO,
@@ -199,21 +199,21 @@ impl core::ops::Neg for Wrench {
     }
 }
 
-/// Brings a nearly unit quaternion back to unit length with one Newton step of 1/√x at 1: a length error of e leaves 1.5·e².
-/// No square root, so the cost is the same ten instructions everywhere.
+/// Normalises a nearly unit quaternion with one Newton step of 1/√x at 1: a length error of e leaves 1.5·e². No square root, so the cost is the same
+/// ten instructions everywhere.
 #[inline]
 pub(crate) fn renormalize(q: Quat) -> Quat {
     q * (1.5 - 0.5 * q.length_squared())
 }
 
-/// Positions beyond this are an encoder's fault, not a place, m.
+/// Largest plausible coordinate, m: positions beyond it are an encoder fault.
 const FARTHEST_M: f32 = 100.0;
-/// Speeds beyond this likewise, m/s.
+/// Largest plausible speed, m/s.
 const FASTEST_M_PER_S: f32 = 100.0;
-/// Angular speeds beyond this likewise, rad/s.
+/// Largest plausible angular speed, rad/s.
 const FASTEST_RAD_PER_S: f32 = 1000.0;
 
-/// The pose with its quaternion at unit length, unless it is not finite, too far off, or not a rotation.
+/// The pose with its quaternion normalised; `None` if it is not finite, too far off, or not a rotation.
 pub(crate) fn usable_pose(pose: &Pose) -> Option<Pose> {
     let near = pose.position.abs().max_element() <= FARTHEST_M;
     let norm2 = pose.orientation.length_squared();
@@ -227,7 +227,7 @@ pub(crate) fn usable_pose(pose: &Pose) -> Option<Pose> {
     })
 }
 
-/// Whether a twist is finite and of a speed that a handle can have.
+/// Whether a twist is finite and plausible for a handle.
 pub(crate) fn usable_twist(twist: &Twist) -> bool {
     twist.is_finite()
         && twist.linear.abs().max_element() <= FASTEST_M_PER_S

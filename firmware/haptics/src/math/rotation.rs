@@ -1,21 +1,21 @@
-//! Between rotation vectors (axis · angle, rad) and unit quaternions, for the range each side needs.
+//! Conversion between rotation vectors (axis · angle, rad) and unit quaternions, for the range each side needs.
 //!
-//! Series in the squared angle instead of library sines: they need neither a square root nor double precision, which a Cortex-M7
-//! built for single precision would do in software.
+//! Series in the squared angle instead of library sines: they need neither a square root nor double precision, which a Cortex-M7 built for single
+//! precision would do in software.
 
 use glam::{Quat, Vec3};
 
 use crate::math::pose::renormalize;
 
-/// Longest rotation vector [`exp`] is made for, rad.
+/// Longest rotation vector within the accuracy of [`exp`], rad.
 pub const EXP_MAX: f32 = core::f32::consts::PI;
 
-/// How far past half a turn [`log_continuous`] keeps the branch it was on, rad.
+/// Angle past half a turn up to which [`log_continuous`] keeps its branch, rad.
 pub const BRANCH_HYSTERESIS: f32 = 0.3;
 
 /// Unit quaternion of rotation vector `phi` (rad), `|phi| ≤ EXP_MAX`.
 ///
-/// With x = |φ|/2 ≤ π/2 the first term left out of sin(x)/x is x¹²/13! < 4·10⁻⁸, of cos(x) x¹⁴/14! < 7·10⁻⁹.
+/// With x = |φ|/2 ≤ π/2 the first omitted term of sin(x)/x is x¹²/13! < 4·10⁻⁸, of cos(x) x¹⁴/14! < 7·10⁻⁹.
 #[inline]
 pub fn exp(phi: Vec3) -> Quat {
     let x2 = 0.25 * phi.length_squared();
@@ -39,15 +39,15 @@ pub fn exp(phi: Vec3) -> Quat {
 
 /// Rotation vector (rad) of unit quaternion `q`, on the branch that continues `previous`.
 ///
-/// The shorter of the two ways round is taken, except within [`BRANCH_HYSTERESIS`] past half a turn from `previous`: there the
-/// vector keeps its direction, so that noise about half a turn cannot flip the torque back and forth. Relative error < 10⁻⁶.
+/// The shorter rotation is taken, except within [`BRANCH_HYSTERESIS`] past half a turn from `previous`: there the vector keeps its direction, so that
+/// noise about half a turn cannot flip the torque back and forth. Relative error < 10⁻⁶.
 #[inline]
 pub fn log_continuous(q: Quat, previous: Vec3) -> Vec3 {
     let q = if q.w < 0.0 { -q } else { q };
     let v = Vec3::new(q.x, q.y, q.z);
     let n2 = v.length_squared();
     if n2 < 0.01 {
-        // 2·asin(n)/n in n²; the first term left out is 2·(105/3456)·n⁸ < 10⁻⁹.
+        // 2·asin(n)/n in n²; the first omitted term is 2·(105/3456)·n⁸ < 10⁻⁹.
         return v * (2.0 * (1.0 + n2 * (1.0 / 6.0 + n2 * (3.0 / 40.0 + n2 * (15.0 / 336.0)))));
     }
     let n = libm::sqrtf(n2);
@@ -100,7 +100,7 @@ mod tests {
             previous = log_continuous(quat(axis, angle), previous);
             assert!((previous.z - angle).abs() < 1e-5, "{angle}: {previous}");
         }
-        // Beyond the hysteresis (π + 0.3) the short way wins.
+        // Beyond the hysteresis (π + 0.3) the shorter rotation is taken.
         let far = log_continuous(quat(axis, 3.6), previous);
         assert!(far.z < 0.0);
     }

@@ -1,4 +1,4 @@
-//! Single numbers: what a platform could round or choose differently is written out.
+//! Scalar functions, written out where a platform could round or choose differently.
 
 /// The smaller of two numbers; unlike `f32::min` it does not depend on the platform's choice between zeros.
 #[inline]
@@ -12,7 +12,7 @@ pub(crate) fn larger(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }
 
-/// 1/√x for ordinary positive x: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).
+/// 1/√x for normal positive x: first guess from the bits (within 3.5 %), three Newton steps (1.9·10⁻³, 5·10⁻⁶, below rounding).
 #[inline]
 pub(crate) fn inverse_sqrt(x: f32) -> f32 {
     let mut y = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));

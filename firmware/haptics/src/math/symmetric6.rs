@@ -1,4 +1,4 @@
-//! A symmetric 6×6 system, solved by LDLᵀ, and vectors of six numbers.
+//! Symmetric 6×6 matrix with an LDLᵀ solver, and vectors of six numbers.
 #![expect(
     clippy::needless_range_loop,
     reason = "two indices at once, as the formulas have them"
@@ -7,7 +7,7 @@
 /// Lower triangle of a symmetric 6×6 matrix.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Symmetric6 {
-    /// Row by row; above the diagonal unused.
+    /// Row by row; unused above the diagonal.
     rows: [[f32; 6]; 6],
 }
 

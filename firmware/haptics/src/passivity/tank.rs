@@ -1,28 +1,29 @@
-//! Passivity of the coupling: an observer of the energy it makes, and a valve that turns the handle's wrench down before that can be felt.
+//! Energy tank: a passivity observer of the coupling, and a valve that scales the handle's wrench down before generated energy can be felt.
 //!
-//! The handle is sampled and its wrench held from tick to tick, so a virtual spring can give back more than was put in; speed that is told late makes
-//! of a damper a motor. Neither can happen unseen, because the work of a held wrench is known exactly once the next pose is: W = F·Δp + τ·Δφ. The
-//! coupling is a two-port between handle and object; what it makes in a tick is what left by both ports and what is stored more than before,
+//! The handle is sampled and its wrench held from tick to tick, so a virtual spring can return more energy than it received; with delayed velocity a
+//! damper can generate energy. Both are observable, because the work of a held wrench is known exactly once the next pose is: W = F·Δp + τ·Δφ. The
+//! coupling is a two-port between handle and object; the energy it generates in a tick is what left by both ports plus the increase of what it
+//! stores,
 //!
 //! G = W_handle + s·(W_object + ΔU), U = the potential of a spring that slips at F_max.
 //!
-//! An energy tank pays for G and is filled by what coupling and handle ([`crate::PassivitySettings::damping`]) dissipate, to
-//! [`crate::PassivitySettings::tank_j`] and no further: energy that an hour of friction took out is not there to be spent by an instability (the late
-//! action of a plain passivity observer), and since U is part of the account a spring that was pressed may give back all of it. Below half of the
-//! tank the valve s falls, by up to a quarter a tick. It scales the wrench as a whole: no speed is divided by or fed back, so nothing buzzes at rest,
-//! and it works where an added damper would not because speed itself is late. Turning it down frees s·U, which goes to the tank; turning it up again
-//! costs as much, is paid by the tank, and takes 20 s in contact and half a second out of it.
+//! The energy tank pays for G. It is filled by the dissipation of coupling and handle ([`crate::PassivitySettings::damping`]) up to
+//! [`crate::PassivitySettings::tank_j`] and no further: energy that friction dissipated over an hour must not be available to an instability (the
+//! late action of a plain passivity observer). Since U is part of the account, a compressed spring may return all of its energy. Below half of the
+//! tank the valve s closes, by up to a quarter a tick. It scales the wrench as a whole: it neither divides by a speed nor feeds one back, so it
+//! causes no buzz at rest, and it works where an added damper would fail because speed itself is delayed. Closing it frees s·U, which goes to the
+//! tank; opening it again costs as much, is paid by the tank, and takes 20 s in contact and half a second out of contact.
 //!
-//! What is behind the coupling is the object's port: targets that take hold there make energy of nothing, and `grip` keeps it from the hand, with an
-//! account of its own.
+//! Behind the coupling is the object's port: targets that engage there introduce energy unaccounted for, and [`super::energy_bound`] keeps it from
+//! the operator, with an account of its own.
 //!
-//! A wrench that reaches the motors late works on another motion than it was made for: rigs whose drivers take ticks to answer say so in
-//! [`crate::PassivitySettings::delay_ticks`]. So do those whose encoders count ([`crate::PassivitySettings::position_count_m`]): a sum over
-//! differences of counts takes for made what is dissipated between them, and shut the valve on a hand that leaned and trembled for half a minute (see
-//! the source of `counted`). What is not seen: energy below one count, and a wrench that the application takes down (a ceiling, the fade of a soft
-//! stop), which is taken for whole. Both make W too small or too large by no more than one count, or one fade, of force. A ramp from nothing
-//! therefore raises the coupling's own limits, with a part that slips in the hand meanwhile ([`crate::State::set_slipping`]): scaling the wrench
-//! behind the coupling makes up to the object's kinetic energy.
+//! A wrench that reaches the motors late works on another motion than the one it was computed for: rigs whose drivers take ticks to respond state so
+//! in [`crate::PassivitySettings::delay_ticks`]. Rigs with counting encoders state the count ([`crate::PassivitySettings::position_count_m`]): a sum
+//! over differences of counts mistakes dissipation within a count for generated energy, and closed the valve on a hand that leaned with tremor for
+//! half a minute (see `quantised_work`). Not observed are energy below one count, and a reduction of the wrench by the application (a
+//! hardware limit, the fade of a soft stop), which is assumed to act whole. Both make W too small or too large by no more than one count, or one
+//! fade, of force. A ramp from zero therefore raises the coupling's own limits, with a part that slips in the hand meanwhile
+//! ([`crate::State::set_slipping`]): scaling the wrench behind the coupling generates up to the object's kinetic energy.
 //!
 //! After the energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli, *Bilateral telemanipulation with time delays: a two-layer approach
 //! combining passivity and transparency*, IEEE T-RO 27(4), 2011, with the reference energy of Ryu, Preusche, Hannaford and Hirzinger, *Time domain
@@ -37,58 +38,58 @@ use crate::passivity::energy_bound::{EnergyBound, Hold};
 use crate::passivity::quantised_work::QuantisedWork;
 use crate::settings::{MAX_DELAY_TICKS, Settings};
 
-/// The most the valve closes in a tick, once the tank is empty.
+/// Largest change of the valve in a tick when closing, at an empty tank.
 const CLOSING: f32 = 0.25;
-/// Time in which it would open from shut: in contact, and where nothing is stored, s.
+/// Time in which the valve opens fully, in contact and out of it, s.
 const OPENING_S: f32 = 20.0;
 const OPENING_FREE_S: f32 = 0.5;
-/// Time in which the tank fills where nothing is stored, s.
+/// Time in which the tank fills out of contact, s.
 const FILLING_FREE_S: f32 = 1.0;
-/// A spring that stores less than this share of the tank is not in contact.
-const FREE: f32 = 0.02;
-/// The tank's debt is not counted beyond this multiple of it: the valve is shut by then.
-const MOST_DRAWN: f32 = 1.5;
+/// A spring that stores less than this share of the tank counts as out of contact.
+const FREE_SHARE: f32 = 0.02;
+/// Limit on the energy drawn, as a multiple of the tank: the valve is shut by then.
+const MAX_DEBT: f32 = 1.5;
 
-/// What is observed and how far the valve is shut; all zero when nothing was drawn.
+/// Observed energy and valve state; all zero when nothing was drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Passivity {
-    /// Drawn from the tank and not yet paid back, J.
+    /// Energy drawn from the tank and not yet returned, J.
     pub drawn_j: f32,
     /// 1 − s: 0 open, 1 shut.
     pub softened: f32,
-    /// Made by the coupling so far, net of what it dissipated, J: negative when it is passive.
+    /// Energy generated by the coupling so far, net of its dissipation, J: negative when it is passive.
     pub made_j: f32,
 }
 
-/// The observer's memory.
+/// State of the observer and the tank.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EnergyTank {
-    pub seen: Passivity,
-    /// Whether the last tick was observed, so that what follows is known.
-    known: bool,
+    pub status: Passivity,
+    /// Whether the last tick was observed, so that its work is known.
+    has_previous: bool,
     handle: Pose,
-    /// What the wrench did on the handle, which is told in counts.
+    /// Work of the wrench on the handle, whose motion is measured in counts.
     linear: QuantisedWork,
     angular: QuantisedWork,
     /// U, J.
     stored: f32,
     energy_bound: EnergyBound,
-    /// Work on the object since, J.
+    /// Work on the object in the last period, J.
     to_object: f32,
-    /// Wrenches of the last ticks, newest first, where the motors are late.
-    given: [Wrench; MAX_DELAY_TICKS + 1],
+    /// Wrenches of the last ticks, newest first, for delayed motors.
+    wrenches: [Wrench; MAX_DELAY_TICKS + 1],
 }
 
 impl EnergyTank {
-    /// Full, open, nothing known. Zero bits, as [`crate::State::new`] asks.
+    /// Full tank, open valve, no observation yet. All bits zero, as [`crate::State::new`] requires.
     pub const fn new() -> Self {
         Self {
-            seen: Passivity {
+            status: Passivity {
                 drawn_j: 0.0,
                 softened: 0.0,
                 made_j: 0.0,
             },
-            known: false,
+            has_previous: false,
             handle: Pose {
                 position: Vec3::ZERO,
                 orientation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
@@ -98,54 +99,54 @@ impl EnergyTank {
             stored: 0.0,
             energy_bound: EnergyBound::new(),
             to_object: 0.0,
-            given: [Wrench::ZERO; MAX_DELAY_TICKS + 1],
+            wrenches: [Wrench::ZERO; MAX_DELAY_TICKS + 1],
         }
     }
 
-    /// At the tick's start: takes the account of the last period, behind the tick that gave `given`; what the wrench is to be multiplied by.
+    /// Balances the energy of the last period, at the tick's start; `last` is the wrench of the tick before. Returns the factor for the wrench.
     pub fn balance(
         &mut self,
         handle: Pose,
         handle_twist: Twist,
         coupling: &Coupling,
-        given: Wrench,
+        last: Wrench,
         object_energy: f32,
         settings: &Settings,
     ) -> f32 {
-        let acting = self.acting(given, settings.passivity.delay_ticks as usize);
+        let acting = self.acting(last, settings.passivity.delay_ticks as usize);
         let stored = potential(coupling, &settings.coupling);
-        let open = 1.0 - self.seen.softened;
+        let open = 1.0 - self.status.softened;
         let size = settings.passivity.tank_j;
-        if self.known {
+        if self.has_previous {
             let moved = handle.position - self.handle.position;
             let turned = small_turn(self.handle.orientation, handle.orientation);
-            let told = &settings.passivity;
-            let to_handle = self.linear.work(acting.force, moved, told.position_count_m)
-                + (self.angular).work(acting.torque, turned, told.angle_count_rad);
-            self.energy_bound.account(acting, moved, turned, told);
+            let passivity = &settings.passivity;
+            let to_handle = self.linear.work(acting.force, moved, passivity.position_count_m)
+                + (self.angular).work(acting.torque, turned, passivity.angle_count_rad);
+            self.energy_bound.account(acting, moved, turned, passivity);
             let made = to_handle + open * (self.to_object + stored - self.stored);
-            let rubbed = settings.passivity.damping * handle_twist.linear.dot(moved)
+            let dissipated = settings.passivity.damping * handle_twist.linear.dot(moved)
                 + settings.passivity.angular_damping * handle_twist.angular.dot(turned);
             if size > 0.0 {
-                self.seen.made_j += made;
-                let drawn = made - if rubbed > 0.0 { rubbed } else { 0.0 };
-                self.account(drawn, stored, object_energy, settings.period_s, size);
+                self.status.made_j += made;
+                let drawn = made - if dissipated > 0.0 { dissipated } else { 0.0 };
+                self.update_valve(drawn, stored, object_energy, settings.period_s, size);
             }
         }
-        self.known = true;
+        self.has_previous = true;
         self.handle = handle;
         self.stored = stored;
-        1.0 - self.seen.softened
+        1.0 - self.status.softened
     }
 
-    /// Takes in the last tick's wrench; the one that acted since.
-    fn acting(&mut self, given: Wrench, delay_ticks: usize) -> Wrench {
+    /// Records the last tick's wrench, and returns the one that acted since.
+    fn acting(&mut self, last: Wrench, delay_ticks: usize) -> Wrench {
         if delay_ticks == 0 {
-            return given;
+            return last;
         }
-        self.given.rotate_right(1);
-        self.given[0] = given;
-        self.given[delay_ticks.min(MAX_DELAY_TICKS)]
+        self.wrenches.rotate_right(1);
+        self.wrenches[0] = last;
+        self.wrenches[delay_ticks.min(MAX_DELAY_TICKS)]
     }
 
     /// See [`crate::State::slip`].
@@ -160,42 +161,43 @@ impl EnergyTank {
 
     /// See [`EnergyBound::slip_to_bound`]; after [`Self::balance`].
     pub fn slip_to_bound(&mut self, coupling: &mut Coupling, handle: Quat, hold: Hold, settings: &Settings) {
-        let open = 1.0 - self.seen.softened;
+        let open = 1.0 - self.status.softened;
         (self.energy_bound).slip_to_bound(coupling, &mut self.stored, handle, hold, open, settings);
     }
 
-    /// See [`EnergyBound::keep`]; `moving`: energy of the object's motion, J.
+    /// See [`EnergyBound::keep`]; `moving` is the energy of the object's motion, J.
     pub fn keep(&mut self, moving: f32) {
         self.energy_bound
-            .keep((1.0 - self.seen.softened) * self.stored + moving);
+            .keep((1.0 - self.status.softened) * self.stored + moving);
     }
 
     /// See [`EnergyBound::bound`].
     pub fn bound(&self, wrench: Wrench, motion: Twist, settings: &Settings) -> Wrench {
         let pending = (settings.passivity.delay_ticks as usize).min(MAX_DELAY_TICKS);
         self.energy_bound
-            .bound(wrench, &self.given[..pending], motion, settings)
+            .bound(wrench, &self.wrenches[..pending], motion, settings)
     }
 
-    /// After the step: the object moved with `twist` under `pull`.
+    /// Books the object's port after the step: it moved with `twist` under `pull`.
     pub fn pulled(&mut self, pull: Wrench, twist: Twist, period_s: f32) {
         self.to_object = (pull.force.dot(twist.linear) + pull.torque.dot(twist.angular)) * period_s;
     }
 
-    /// Nothing acts on the handle, or something else did: the account begins anew.
+    /// Restarts the account. For when nothing acts on the handle, or something else did.
     pub fn forget(&mut self) {
         let mut energy_bound = self.energy_bound;
-        energy_bound.forget();
+        energy_bound.reset();
         *self = Self {
             energy_bound,
             ..Self::new()
         };
     }
 
-    fn account(&mut self, drawn: f32, stored: f32, object_energy: f32, period_s: f32, size: f32) {
-        let seen = &mut self.seen;
-        let mut drawn = seen.drawn_j + drawn;
-        let free = stored + object_energy < FREE * size;
+    /// Books `drawn` (J) and moves the valve; `size` is the tank's, J.
+    fn update_valve(&mut self, drawn: f32, stored: f32, object_energy: f32, period_s: f32, size: f32) {
+        let status = &mut self.status;
+        let mut drawn = status.drawn_j + drawn;
+        let free = stored + object_energy < FREE_SHARE * size;
         if free {
             drawn -= size * period_s / FILLING_FREE_S;
         }
@@ -203,24 +205,24 @@ impl EnergyTank {
         if drawn > half {
             let short = (drawn - half) / half;
             let share = CLOSING * if short < 1.0 { short } else { 1.0 };
-            let closed = share * (1.0 - seen.softened);
-            seen.softened += closed;
+            let closed = share * (1.0 - status.softened);
+            status.softened += closed;
             drawn -= closed * stored;
-        } else if seen.softened > 0.0 {
+        } else if status.softened > 0.0 {
             let time = if free { OPENING_FREE_S } else { OPENING_S };
             let opened = period_s / time;
-            let opened = if opened < seen.softened {
+            let opened = if opened < status.softened {
                 opened
             } else {
-                seen.softened
+                status.softened
             };
             let cost = opened * (stored + object_energy);
             if drawn + cost <= half {
-                seen.softened -= opened;
+                status.softened -= opened;
                 drawn += cost;
             }
         }
-        seen.drawn_j = drawn.clamp(0.0, MOST_DRAWN * size);
+        status.drawn_j = drawn.clamp(0.0, MAX_DEBT * size);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Gap and contacts at one pose, without motion or budget: for measuring, not for the tick.
+//! Probe: gap and contacts at one pose, without motion or budget. For measurement, not for the tick.
 
 pub(crate) mod nearest;
 mod nearest_voxel;

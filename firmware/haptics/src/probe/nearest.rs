@@ -1,9 +1,10 @@
-//! The smallest gap or largest depth of two parts: branch and bound over the same trees and fields the search for contacts walks.
+//! Smallest gap or largest depth of two parts: branch and bound over the trees and fields of the contact search.
 //!
-//! A sphere whose lower bound exceeds the smallest gap found so far holds nothing nearer. One walk each way takes all that a look-up settles by
-//! an analytic face, and offers what overlaps as contacts; until it has found something in the band, leaves beyond the band wait, for their bounds
-//! are loose and seldom needed after. A last walk each way takes what waited, and measures against all faces the points left over that could still
-//! be nearest; when the band held nothing, it goes down by the nearer child first, for a first gap to compare with.
+//! A sphere whose lower bound exceeds the smallest gap found so far is skipped. One traversal in each direction takes all points whose distance a
+//! field query settles by an analytic face, and offers overlapping points as contacts. Until it has found a point in the band, leaves beyond the band
+//! are deferred, for their bounds are loose and seldom needed afterwards. A last traversal in each direction takes the deferred leaves, and measures
+//! against all faces the remaining points that could still be nearest. When the band held no point, it first descends by the nearer child, for an
+//! initial gap to compare with.
 
 use glam::Vec3;
 use mortise_protocol::image::{
@@ -15,24 +16,24 @@ use crate::collision::exact_surface::{OnFace, agreeing, closed_form, exact, on_f
 use crate::collision::search::Traversal;
 use crate::io::Work;
 
-/// The diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
+/// Diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
 
 /// The smallest gap between two parts, or the largest depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// Signed distance, m: gap positive, deepest point negative. By the analytic faces when `exact`, else as the field has it, or the
-    /// voxmap's tangent planes.
+    /// Signed distance, m: positive for a gap, negative for a depth. By the analytic faces when `exact`, else by the field or the voxmap's tangent
+    /// planes.
     pub distance_m: f32,
-    /// The smallest distance the field itself gave, of the points looked at, m: what the tick acts on. Infinite when none lay where the field
+    /// Smallest distance by the field itself among the points queried, m: the distance that the tick uses. Infinite when no point lay where the field
     /// stores distances.
     pub field_distance_m: f32,
-    /// The distance is one to an analytic face or edge, within single precision.
+    /// Whether the distance is one to an analytic face or edge, within single precision.
     pub exact: bool,
-    /// The point lies where the field stores distances, or past a tangent plane; when neither this nor `exact`, the distance is only a bound: at
-    /// least so far apart, or at least so deep.
+    /// Whether the point lies where the field stores distances, or past a tangent plane. When neither this nor `exact`, the distance is only a bound:
+    /// the gap or depth is at least this large.
     pub in_band: bool,
-    /// From the moving part's centre of mass to the point, axes of the fixed part, m.
+    /// Lever arm from the moving part's centre of mass to the point, axes of the fixed part, m.
     pub arm: Vec3,
     /// Face of the moving part, [`mortise_protocol::image::NO_FACE`] when unknown.
     pub moving_face: u16,
@@ -40,16 +41,16 @@ pub struct Nearest {
     pub fixed_face: u16,
 }
 
-/// What was found so far, both ways.
-pub(crate) struct SoFar {
-    /// The smallest.
+/// Result so far, over both directions.
+pub(crate) struct Progress {
+    /// The nearest point.
     pub best: Nearest,
-    /// What was looked at.
+    /// Work done.
     pub work: Work,
 }
 
-impl SoFar {
-    /// What is farther than this is neither nearest nor overlaps, m.
+impl Progress {
+    /// Distance beyond which a point is neither nearest nor overlapping, m.
     #[inline]
     fn limit(&self) -> f32 {
         if self.best.distance_m > 0.0 {
@@ -60,62 +61,62 @@ impl SoFar {
     }
 }
 
-/// One way of a search.
+/// Search in one direction.
 pub(crate) struct NearestSearch<'s, 'i> {
     pair: &'s DirectedPair<'i>,
-    /// The shape whose field it looks up.
+    /// The shape whose field is queried.
     shape: &'s Shape<'i>,
-    /// Distances are stored up to here, m.
+    /// Largest distance that the field stores, m.
     band: f32,
-    /// Interpolated distances are good up to here, m.
+    /// Largest interpolated distance without clamped samples, m.
     resolved: f32,
-    /// What interpolation may overstate, m.
+    /// Largest overestimate by interpolation, m.
     edge_error: f32,
-    /// All faces of the shape have a closed form: what the field leaves open can be measured.
+    /// Whether all faces of the shape have a closed form, so that points the field does not settle can be measured.
     measurable: bool,
-    /// None of the points left over is nearer than this, m.
-    left_over: f32,
-    /// Leaves beyond the band wait before this node.
-    waiting: u32,
-    /// None in the leaves that wait is nearer than this, m.
-    waits_beyond: f32,
+    /// Lower bound of the distances of points not settled, m.
+    open_bound: f32,
+    /// Leaves beyond the band are deferred before this node.
+    deferred_end: u32,
+    /// Lower bound of the distances in deferred leaves, m.
+    deferred_bound: f32,
 }
 
-/// A leaf that is to be looked at.
+/// A leaf to be evaluated.
 struct PendingLeaf<'i> {
     node: u32,
     points: &'i [PointRecord],
-    /// No point of it is nearer, m.
+    /// Lower bound of its points' distances, m.
     bound: f32,
-    /// Its centre lies beyond the band: its points are not expected to be nearest.
+    /// Whether its centre lies beyond the band: its points are unlikely to be nearest.
     beyond: bool,
 }
 
-/// A point as one look-up has it.
-struct Seen {
-    /// Its distance: that to the face where it is `settled`, else as interpolated or a bound, m.
+/// Result of one field query for a point.
+struct PointSample {
+    /// Distance to the face where `settled`, else interpolated or a bound, m.
     distance: f32,
-    /// It is no nearer than this, m.
-    least: f32,
-    /// As the tick has it, m; infinite where nothing is stored.
+    /// Lower bound of the distance, m.
+    lower: f32,
+    /// Distance that the tick uses, m; infinite where nothing is stored.
     rendered: f32,
-    /// The tick may push it.
+    /// Whether the tick may make it push.
     overlaps: bool,
     inside: bool,
     /// Nearest face, if known.
     face: u16,
     in_band: bool,
-    /// An edge itself is nearest: the surfaces give a bound only.
+    /// Whether an edge itself is nearest: then the surfaces give only a bound.
     edge_nearest: bool,
-    /// `distance` is that to an analytic face.
+    /// Whether `distance` is that to an analytic face.
     settled: bool,
 }
 
-impl Seen {
-    /// Neither inside nor in the band.
+impl PointSample {
+    /// A point neither inside nor in the band.
     const NOTHING: Self = Self {
         distance: f32::INFINITY,
-        least: f32::INFINITY,
+        lower: f32::INFINITY,
         rendered: f32::INFINITY,
         overlaps: false,
         inside: false,
@@ -127,7 +128,7 @@ impl Seen {
 }
 
 impl<'s, 'i> NearestSearch<'s, 'i> {
-    /// About to begin.
+    /// Search that has not begun.
     pub fn new(pair: &'s DirectedPair<'i>, shape: &'s Shape<'i>) -> Self {
         let record = shape.field.record();
         Self {
@@ -137,68 +138,68 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             resolved: record.band - DIAGONAL_CELLS * record.cell,
             edge_error: EDGE_ERROR_CELLS * record.cell,
             measurable: closed_form(shape),
-            left_over: f32::INFINITY,
-            waiting: 0,
-            waits_beyond: f32::INFINITY,
+            open_bound: f32::INFINITY,
+            deferred_end: 0,
+            deferred_bound: f32::INFINITY,
         }
     }
 
-    /// All leaves that could hold the nearest point or one that overlaps, as far as a look-up settles their points. What overlaps goes to
-    /// `contacts`. Leaves beyond the band wait as long as nothing in the band was found.
-    pub fn walk(&mut self, so_far: &mut SoFar, contacts: &mut Traversal<'_, '_, '_>) {
-        self.leaves(so_far, u32::MAX, |search, so_far, leaf| {
-            if so_far.best.distance_m > search.band {
-                search.waiting = leaf.node + 1;
+    /// Evaluates all leaves that could hold the nearest point or an overlapping one, as far as a field query settles their points. Overlapping points
+    /// go to `contacts`. Leaves beyond the band are deferred until a point in the band is found.
+    pub fn traverse(&mut self, progress: &mut Progress, contacts: &mut Traversal<'_, '_, '_>) {
+        self.leaves(progress, u32::MAX, |search, progress, leaf| {
+            if progress.best.distance_m > search.band {
+                search.deferred_end = leaf.node + 1;
                 if leaf.beyond {
-                    search.waits_beyond = search.waits_beyond.min(leaf.bound);
+                    search.deferred_bound = search.deferred_bound.min(leaf.bound);
                     return;
                 }
             }
             for point in leaf.points {
-                let seen = search.see(point);
-                if seen.overlaps {
-                    contacts.one(search.pair, leaf.node, point, search.found(&seen, point));
+                let sample = search.sample(point);
+                if sample.overlaps {
+                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
                 }
-                if !search.settle(&seen, point, so_far) {
-                    search.left_over = search.left_over.min(seen.least);
+                if !search.settle(&sample, point, progress) {
+                    search.open_bound = search.open_bound.min(sample.lower);
                 }
             }
-            so_far.work.points += leaf.points.len() as u32;
+            progress.work.points += leaf.points.len() as u32;
         });
     }
 
-    /// What [`Self::walk`] left over: leaves that waited, and points to be measured.
-    pub fn rest(&mut self, so_far: &mut SoFar, contacts: &mut Traversal<'_, '_, '_>) {
-        let needed = |least: f32, limit: f32| least < f32::INFINITY && least <= limit;
-        if needed(self.waits_beyond, so_far.limit()) && so_far.best.distance_m > self.band {
-            self.first(so_far);
+    /// Evaluates what [`Self::traverse`] left open: deferred leaves, and points to be measured.
+    pub fn finish(&mut self, progress: &mut Progress, contacts: &mut Traversal<'_, '_, '_>) {
+        let needed = |lower: f32, limit: f32| lower < f32::INFINITY && lower <= limit;
+        if needed(self.deferred_bound, progress.limit()) && progress.best.distance_m > self.band {
+            self.descend(progress);
         }
-        let measure = needed(self.left_over, so_far.best.distance_m);
-        let end = match (measure, needed(self.waits_beyond, so_far.limit())) {
+        let measure = needed(self.open_bound, progress.best.distance_m);
+        let end = match (measure, needed(self.deferred_bound, progress.limit())) {
             (true, _) => u32::MAX,
-            (false, true) => self.waiting,
+            (false, true) => self.deferred_end,
             (false, false) => return,
         };
-        self.leaves(so_far, end, |search, so_far, leaf| {
-            let waited = leaf.beyond && leaf.node < search.waiting;
-            if !waited && !measure {
+        self.leaves(progress, end, |search, progress, leaf| {
+            let deferred = leaf.beyond && leaf.node < search.deferred_end;
+            if !deferred && !measure {
                 return;
             }
             for point in leaf.points {
-                let seen = search.see(point);
-                if waited && seen.overlaps {
-                    contacts.one(search.pair, leaf.node, point, search.found(&seen, point));
+                let sample = search.sample(point);
+                if deferred && sample.overlaps {
+                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
                 }
-                if waited || !seen.settled {
-                    search.measure(&seen, point, so_far);
+                if deferred || !sample.settled {
+                    search.measure(&sample, point, progress);
                 }
             }
-            so_far.work.points += leaf.points.len() as u32;
+            progress.work.points += leaf.points.len() as u32;
         });
     }
 
-    /// Down by the nearer child, to one leaf; measures the point of it that seems nearest. Every step goes forward, so it ends.
-    fn first(&mut self, so_far: &mut SoFar) {
+    /// Descends by the nearer child to one leaf, and measures the point of it that seems nearest. Terminates because every step goes forward.
+    fn descend(&mut self, progress: &mut Progress) {
         let nodes = self.pair.nodes;
         let mut index = 0;
         while let Some(node) = nodes.get(index) {
@@ -206,15 +207,16 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             if end == index + 1 {
                 let mut nearest = None;
                 for point in node.points(self.pair.points) {
-                    so_far.work.points += 1;
-                    let seen = self.see(point);
-                    if (nearest.as_ref()).is_none_or(|(other, _): &(Seen, _)| seen.distance < other.distance)
+                    progress.work.points += 1;
+                    let sample = self.sample(point);
+                    if (nearest.as_ref())
+                        .is_none_or(|(other, _): &(PointSample, _)| sample.distance < other.distance)
                     {
-                        nearest = Some((seen, point));
+                        nearest = Some((sample, point));
                     }
                 }
-                if let Some((seen, point)) = nearest {
-                    self.measure(&seen, point, so_far);
+                if let Some((sample, point)) = nearest {
+                    self.measure(&sample, point, progress);
                 }
                 return;
             }
@@ -223,7 +225,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             while child < end
                 && let Some(node) = nodes.get(child)
             {
-                let (bound, _) = self.bound(node, so_far);
+                let (bound, _) = self.bound(node, progress);
                 if bound < nearest.0 {
                     nearest = (bound, child);
                 }
@@ -233,27 +235,27 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
     }
 
-    /// Gives `look` every leaf before node `end` in which a point could be nearer than the nearest so far, or overlap.
+    /// Passes to `visit` every leaf before node `end` that may hold an overlapping point or one nearer than the nearest so far.
     #[inline]
     fn leaves(
         &mut self,
-        so_far: &mut SoFar,
+        progress: &mut Progress,
         end: u32,
-        mut look: impl FnMut(&mut Self, &mut SoFar, PendingLeaf<'i>),
+        mut visit: impl FnMut(&mut Self, &mut Progress, PendingLeaf<'i>),
     ) {
         let nodes = self.pair.nodes.get(..end as usize).unwrap_or(self.pair.nodes);
         let mut index = 0;
         while let Some(node) = nodes.get(index) {
-            let (bound, beyond) = self.bound(node, so_far);
-            if bound > so_far.limit() {
+            let (bound, beyond) = self.bound(node, progress);
+            if bound > progress.limit() {
                 index = node.skip as usize;
                 continue;
             }
             if node.skip as usize == index + 1 {
                 let points = node.points(self.pair.points);
-                look(
+                visit(
                     self,
-                    so_far,
+                    progress,
                     PendingLeaf {
                         node: index as u32,
                         points,
@@ -268,15 +270,15 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
 
     /// Lower bound of the signed distance of any point below a node, m; and whether its centre lies beyond the band.
     #[inline(always)]
-    fn bound(&self, node: &NodeRecord, so_far: &mut SoFar) -> (f32, bool) {
-        so_far.work.nodes += 1;
+    fn bound(&self, node: &NodeRecord, progress: &mut Progress) -> (f32, bool) {
+        progress.work.nodes += 1;
         let center = self.pair.to_field.apply(node.center);
         let distance = self.pair.field.bound(center.to_array());
         // Inside, a clamped distance and a bound beyond the band say how deep at least, not at most.
         if distance < -self.resolved {
             return (f32::NEG_INFINITY, false);
         }
-        // No sample is larger than the band: this is no interpolation.
+        // No sample exceeds the band, so this distance is not interpolated.
         let beyond = distance > self.band + self.edge_error;
         let error = if beyond { 0.0 } else { self.edge_error };
         (distance - (node.radius + error), beyond)
@@ -287,9 +289,9 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         self.pair.to_field.apply(point.position)
     }
 
-    /// Looks a point up.
+    /// Queries the field at a point.
     #[inline(always)]
-    fn see(&self, point: &PointRecord) -> Seen {
+    fn sample(&self, point: &PointRecord) -> PointSample {
         let p = self.in_field(point);
         match self.pair.field.place(p.to_array()) {
             Place::Cell(cell) => {
@@ -303,9 +305,9 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                         _ => true,
                     }
                 {
-                    return Seen {
+                    return PointSample {
                         distance,
-                        least: distance,
+                        lower: distance,
                         rendered: distance,
                         overlaps: distance < 0.0,
                         inside: distance < 0.0,
@@ -319,100 +321,106 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             }
             Place::Far { inside, bound } => {
                 // Inside a bound says how deep at least, not at most.
-                Seen {
+                PointSample {
                     distance: if inside { -bound } else { bound },
-                    least: if inside { f32::NEG_INFINITY } else { bound },
+                    lower: if inside { f32::NEG_INFINITY } else { bound },
                     overlaps: inside,
                     inside,
-                    ..Seen::NOTHING
+                    ..PointSample::NOTHING
                 }
             }
         }
     }
 
-    /// Looks up what its cell's faces do not settle; `exact` is what they give.
-    fn interpolated(&self, cell: &Cell<'_>, nearby: Nearby, exact: Option<(f32, u16)>) -> Seen {
+    /// Distance where the cell's faces do not settle it; `exact` is what they give.
+    fn interpolated(&self, cell: &Cell<'_>, nearby: Nearby, exact: Option<(f32, u16)>) -> PointSample {
         let interpolated = self.pair.field.distance(cell);
-        let mut seen = Seen {
+        let mut sample = PointSample {
             distance: interpolated,
-            least: interpolated - self.edge_error,
+            lower: interpolated - self.edge_error,
             rendered: interpolated,
             face: nearby.face(),
-            ..Seen::NOTHING
+            ..PointSample::NOTHING
         };
         if let Some((distance, face)) = exact {
-            seen.rendered = distance;
-            seen.edge_nearest = match nearby {
+            sample.rendered = distance;
+            sample.edge_nearest = match nearby {
                 Nearby::Convex(_) => distance > 0.0,
                 Nearby::Reentrant(_) => distance < 0.0,
                 _ => false,
             };
-            if !seen.edge_nearest {
-                (seen.distance, seen.least, seen.face) = (distance, distance, face);
-            } else if distance > seen.least && distance > 0.0 {
-                // Outside a convex edge the surfaces give no more than the distance.
-                seen.least = distance;
+            if !sample.edge_nearest {
+                (sample.distance, sample.lower, sample.face) = (distance, distance, face);
+            } else if distance > sample.lower && distance > 0.0 {
+                // Outside a convex edge the surfaces give a lower bound.
+                sample.lower = distance;
             }
         }
-        seen.overlaps = seen.rendered < 0.0;
-        seen.inside = seen.distance < 0.0;
-        seen.in_band = seen.face != NO_FACE && seen.distance.abs() <= self.resolved;
-        if seen.distance < -self.resolved {
-            seen.least = f32::NEG_INFINITY;
+        sample.overlaps = sample.rendered < 0.0;
+        sample.inside = sample.distance < 0.0;
+        sample.in_band = sample.face != NO_FACE && sample.distance.abs() <= self.resolved;
+        if sample.distance < -self.resolved {
+            sample.lower = f32::NEG_INFINITY;
         }
-        seen
+        sample
     }
 
-    /// What pushes a settled point.
-    fn found(&self, seen: &Seen, point: &PointRecord) -> Option<OnFace> {
-        if !seen.settled {
+    /// Surface that pushes a settled point.
+    fn found(&self, sample: &PointSample, point: &PointRecord) -> Option<OnFace> {
+        if !sample.settled {
             return None;
         }
-        let found = on_face(self.shape.faces, seen.face, self.in_field(point))?;
+        let found = on_face(self.shape.faces, sample.face, self.in_field(point))?;
         Some(OnFace {
-            distance: seen.distance,
+            distance: sample.distance,
             ..found
         })
     }
 
-    /// Takes a point if what was seen settles it; whether it is done with.
+    /// Uses a point if its sample settles it. Returns whether the point needs no measuring.
     #[inline(always)]
-    fn settle(&self, seen: &Seen, point: &PointRecord, so_far: &mut SoFar) -> bool {
-        if seen.rendered < so_far.best.field_distance_m {
-            so_far.best.field_distance_m = seen.rendered;
+    fn settle(&self, sample: &PointSample, point: &PointRecord, progress: &mut Progress) -> bool {
+        if sample.rendered < progress.best.field_distance_m {
+            progress.best.field_distance_m = sample.rendered;
         }
-        if seen.least > so_far.best.distance_m {
+        if sample.lower > progress.best.distance_m {
             return true;
         }
-        let exact = self.at_face(seen, point);
+        let exact = self.at_face(sample, point);
         if exact.is_none() && self.measurable {
             return false;
         }
-        self.take(seen, exact, point, so_far);
+        self.update_best(sample, exact, point, progress);
         true
     }
 
-    /// Takes a point by what tells its distance best.
-    fn measure(&self, seen: &Seen, point: &PointRecord, so_far: &mut SoFar) {
-        if !self.settle(seen, point, so_far) {
-            let exact = self.measured(seen, point, so_far.best.distance_m);
-            self.take(seen, exact, point, so_far);
+    /// Uses a point by its most accurate distance.
+    fn measure(&self, sample: &PointSample, point: &PointRecord, progress: &mut Progress) {
+        if !self.settle(sample, point, progress) {
+            let exact = self.measured(sample, point, progress.best.distance_m);
+            self.update_best(sample, exact, point, progress);
         }
     }
 
-    fn take(&self, seen: &Seen, exact: Option<f32>, point: &PointRecord, so_far: &mut SoFar) {
-        let distance_m = exact.unwrap_or(seen.distance);
-        if distance_m < so_far.best.distance_m {
+    fn update_best(
+        &self,
+        sample: &PointSample,
+        exact: Option<f32>,
+        point: &PointRecord,
+        progress: &mut Progress,
+    ) {
+        let distance_m = exact.unwrap_or(sample.distance);
+        if distance_m < progress.best.distance_m {
             let (moving_face, fixed_face) = if self.pair.backward {
-                (seen.face, point.face)
+                (sample.face, point.face)
             } else {
-                (point.face, seen.face)
+                (point.face, sample.face)
             };
-            so_far.best = Nearest {
+            progress.best = Nearest {
                 distance_m,
-                field_distance_m: so_far.best.field_distance_m,
+                field_distance_m: progress.best.field_distance_m,
                 exact: exact.is_some(),
-                in_band: seen.in_band,
+                in_band: sample.in_band,
                 arm: self.pair.to_arm.apply(point.position),
                 moving_face,
                 fixed_face,
@@ -420,34 +428,38 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
     }
 
-    /// Distance to the nearest face's surface, where that is the distance.
+    /// Distance to the nearest face's surface, where that is the distance of the point.
     #[inline(always)]
-    fn at_face(&self, seen: &Seen, point: &PointRecord) -> Option<f32> {
-        if seen.settled {
-            return Some(seen.distance);
+    fn at_face(&self, sample: &PointSample, point: &PointRecord) -> Option<f32> {
+        if sample.settled {
+            return Some(sample.distance);
         }
-        if seen.in_band && !seen.edge_nearest {
-            return agreeing(self.shape, seen.face, self.in_field(point), seen.distance);
+        if sample.in_band && !sample.edge_nearest {
+            return agreeing(self.shape, sample.face, self.in_field(point), sample.distance);
         }
         None
     }
 
-    /// Distance by all faces, if it can be had and does not contradict the field; `best`, or more, where it is no less.
-    fn measured(&self, seen: &Seen, point: &PointRecord, best: f32) -> Option<f32> {
-        let field = seen.distance;
-        // Outside, what is no nearer than the nearest so far need not be known.
-        let outside = if seen.in_band { field >= 0.0 } else { !seen.inside };
+    /// Distance by all faces, if available and consistent with the field; `best` or more where it is at least `best`.
+    fn measured(&self, sample: &PointSample, point: &PointRecord, best: f32) -> Option<f32> {
+        let field = sample.distance;
+        // Outside, a distance of at least the smallest so far need not be exact.
+        let outside = if sample.in_band {
+            field >= 0.0
+        } else {
+            !sample.inside
+        };
         let enough = if outside { best } else { f32::INFINITY };
         let edge = point.edge_face != NO_FACE;
         let distance = unsigned_distance(self.shape, self.in_field(point), edge, enough)?;
         if outside && distance >= enough {
             return Some(distance);
         }
-        if seen.in_band {
-            // Next to an edge the sign is the field's only where that is sure of it.
+        if sample.in_band {
+            // Next to an edge the field determines the sign only where it is certain.
             let signed = if field < 0.0 { -distance } else { distance };
             ((signed - field).abs() <= self.edge_error).then_some(signed)
-        } else if seen.inside {
+        } else if sample.inside {
             (distance >= -field - self.edge_error).then_some(-distance)
         } else {
             (distance >= field - self.edge_error).then_some(distance)

@@ -1,17 +1,17 @@
-//! The deepest point of one part against a voxmap of the other.
+//! Deepest point of one part against a voxmap of the other.
 
 use mortise_protocol::image::Voxel;
 
 use crate::baseline::occupancy::{TangentPlane, inward, shrunk};
 use crate::collision::directed_pair::DirectedPair;
 use crate::io::Flags;
-use crate::probe::nearest::{Nearest, SoFar};
+use crate::probe::nearest::{Nearest, Progress};
 
-/// The deepest point of a pair against a voxmap, as the method has it: depth to a tangent plane, else no more than a lower bound of the gap.
+/// Deepest point of a pair against a voxmap, by the method's own distances: depth to a tangent plane, else only a lower bound of the gap.
 ///
-/// Looks at every point that is not known to be farther from all surface voxels than the nearest so far.
-pub(crate) fn nearest_voxel(pair: &DirectedPair<'_>, shrunk_m: f32, so_far: &mut SoFar) {
-    let SoFar { best, work } = so_far;
+/// Queries every point that may be nearer to a surface voxel than the nearest so far.
+pub(crate) fn nearest_voxel(pair: &DirectedPair<'_>, shrunk_m: f32, progress: &mut Progress) {
+    let Progress { best, work } = progress;
     let mut index = 0;
     while let Some(node) = pair.nodes.get(index) {
         work.nodes += 1;
@@ -41,7 +41,7 @@ pub(crate) fn nearest_voxel(pair: &DirectedPair<'_>, shrunk_m: f32, so_far: &mut
                     if gap < best.field_distance_m {
                         best.field_distance_m = gap;
                     }
-                    // Short of the plane the point need not be apart: the surface is somewhere in the voxel.
+                    // Above the plane the point may still touch: the surface is somewhere in the voxel.
                     if gap < 0.0 { (gap, true) } else { (0.0, false) }
                 }
             };

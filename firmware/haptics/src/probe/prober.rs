@@ -1,8 +1,8 @@
-//! How near two parts are at one pose, and what contact would push with: what the tick sees, asked without a motion.
+//! Prober: gap of two parts at one pose, and the contact forces there, by the distances that the tick uses but without a motion.
 //!
-//! For measuring, on a PC as on a board: it walks the trees and fields of the tick's own search, both ways, without its budget and without
-//! what earlier poses left. Forces are those of the contact law at rest, λ = k·depth, k shared as in the tick. A voxmap answers for itself: depth to
-//! its tangent planes, gaps only as bounds, nothing from the analytic faces.
+//! For measurement, on a PC as on a board. It traverses the trees and fields of the tick's own search, in both directions, without its budget and
+//! without the memory of earlier poses. Forces are those of the contact law at rest, λ = k·depth, k shared as in the tick. With a voxmap the results
+//! are its own: depth to its tangent planes, gaps only as bounds, nothing from the analytic faces.
 
 use core::fmt;
 
@@ -18,32 +18,32 @@ use crate::dynamics::body::Body;
 use crate::dynamics::contact_force::{Stiffness, total_force};
 use crate::io::{Flags, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose};
-use crate::probe::nearest::{Nearest, NearestSearch, SoFar};
+use crate::probe::nearest::{Nearest, NearestSearch, Progress};
 use crate::probe::nearest_voxel::nearest_voxel;
 use crate::settings::ContactSettings;
 
-/// What was found at one pose.
+/// Result at one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
-    /// Where the gap is smallest or the depth largest.
+    /// Point of the smallest gap or largest depth.
     pub nearest: Nearest,
     /// Sum of all contact forces on the moving part, about its centre of mass, axes of the fixed part.
     pub wrench: Wrench,
-    /// Points that push.
+    /// Number of points that push.
     pub contacts: u16,
-    /// What was looked at, for gap and contacts together. [`Flags::DEEP`]: some point lies too deep to push;
-    /// [`Flags::CONTACTS_DROPPED`]: more touch than the store holds.
+    /// Work for gap and contacts together. [`Flags::DEEP`]: some point lies too deep to push; [`Flags::CONTACTS_DROPPED`]: more points touch than the
+    /// store holds.
     pub work: Work,
 }
 
 /// A point that pushes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactPoint {
-    /// From the moving part's centre of mass, axes of the fixed part, m.
+    /// Lever arm from the moving part's centre of mass, axes of the fixed part, m.
     pub arm: Vec3,
     /// Unit direction in which the moving part is pushed.
     pub normal: Vec3,
-    /// As the field has it, m, positive.
+    /// Depth by the field, m, positive.
     pub depth_m: f32,
     /// Face of the moving part.
     pub moving_face: u16,
@@ -51,12 +51,12 @@ pub struct ContactPoint {
     pub fixed_face: u16,
 }
 
-/// Why a pose could not be looked at.
+/// Why a pose could not be probed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProbeError {
     /// The scene has no part of this index.
     NoSuchPart {
-        /// Asked for.
+        /// The part requested.
         part: u16,
     },
     /// A part has no distance to itself.
@@ -79,7 +79,7 @@ impl fmt::Display for ProbeError {
 
 impl core::error::Error for ProbeError {}
 
-/// Room for one query. About 60 KiB; make it once.
+/// Memory for one query. About 60 KiB; create it once.
 #[derive(Clone, Debug)]
 pub struct Prober {
     contacts: Contacts,
@@ -93,7 +93,7 @@ impl Default for Prober {
 }
 
 impl Prober {
-    /// Empty.
+    /// Empty memory.
     pub const fn new() -> Self {
         Self {
             contacts: Contacts::new(),
@@ -103,8 +103,8 @@ impl Prober {
 
     /// Gap and contacts of part `moving`, placed at `pose` in the frame of part `fixed`.
     ///
-    /// Cost: a look-up for every tree node and point that could be the nearest or overlaps, both ways; one projection a face, or two, for every point
-    /// next to an edge or beyond the band that could be. Unbounded by a budget: not for the tick.
+    /// Cost: a field query for every tree node and point that could be nearest or overlaps, in both directions; one or two projections per face for
+    /// every point next to an edge or beyond the band that could be nearest. Unbounded by a budget: not for the tick.
     ///
     /// # Errors
     /// [`ProbeError`].
@@ -131,7 +131,7 @@ impl Prober {
         let center = pose.transform_point(body.center_of_mass);
         let pairs = [0, 1].map(|way| DirectedPair::new(way, (&held, pose), (&other, Pose::IDENTITY), center));
 
-        let mut so_far = SoFar {
+        let mut progress = Progress {
             best: Nearest {
                 distance_m: f32::INFINITY,
                 field_distance_m: f32::INFINITY,
@@ -175,18 +175,18 @@ impl Prober {
         let mut searches = [0, 1].map(|way| NearestSearch::new(&pairs[way], [&other, &held][way]));
         for (search, pair) in searches.iter_mut().zip(&pairs) {
             if !pair.field.is_occupancy() {
-                search.walk(&mut so_far, &mut touching);
-            } else if !pair.left_out() {
-                nearest_voxel(pair, shrunk_m, &mut so_far);
+                search.traverse(&mut progress, &mut touching);
+            } else if !pair.unused() {
+                nearest_voxel(pair, shrunk_m, &mut progress);
             }
         }
         for search in &mut searches {
-            search.rest(&mut so_far, &mut touching);
+            search.finish(&mut progress, &mut touching);
         }
-        let SoFar {
+        let Progress {
             best: nearest,
             mut work,
-        } = so_far;
+        } = progress;
         if voxmaps && (nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0) {
             for pair in pairs.iter().filter(|pair| pair.field.is_occupancy()) {
                 touching.all(pair);
@@ -201,7 +201,7 @@ impl Prober {
         let pushing = self.contacts.as_slice().len();
         let k = settings.shared_stiffness(if pushing == 0 { 1.0 } else { pushing as f32 });
         for contact in self.contacts.as_mut_slice() {
-            // At rest: no rate, so neither period nor damping counts.
+            // At rest: no rate, so neither period nor damping has an effect.
             contact.phase = Phase::Parting;
         }
         let k = Stiffness { point: k, guided: k };
@@ -215,7 +215,7 @@ impl Prober {
         })
     }
 
-    /// The points that pushed in the last query, in no order that means anything.
+    /// Points that pushed in the last query, in arbitrary order.
     pub fn contacts(&self) -> impl Iterator<Item = ContactPoint> {
         self.contacts.as_slice().iter().map(|c| ContactPoint {
             arm: c.arm,
