@@ -694,21 +694,46 @@ pub struct Statistics {
     pub stack_max: u32,
 }
 
-/// Kinds of constraint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum ConstraintKind {
-    /// Axis on axis (cylinder in cylinder).
-    Concentric,
-    /// Plane on plane: turns the grabbed part until the planes are parallel; contact determines the distance.
-    Coplanar,
-    /// Axis on axis and apex on apex (cone in cone).
-    Conical,
-    /// Centre on centre.
-    Spherical,
-    /// Centre on axis: sphere of the grabbed part in a cylinder of the other.
-    Annular,
-    /// Axis on centre: cylinder of the grabbed part over a sphere of the other.
-    AnnularBore,
+/// Declares [`ConstraintKind`] and, from the same list, every variant of it and its name.
+macro_rules! constraint_kinds {
+    ($(#[$about:meta])+ pub enum ConstraintKind { $($(#[$doc:meta])+ $name:ident = $word:literal,)+ }) => {
+        $(#[$about])+
+        pub enum ConstraintKind {
+            $($(#[$doc])+ $name,)+
+        }
+
+        impl ConstraintKind {
+            /// Every kind, in the order of the enum.
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$name),+];
+
+            /// Name of the kind. Both annular kinds have the same name: it does not say which part has the sphere.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $word,)+
+                }
+            }
+        }
+    };
+}
+
+constraint_kinds! {
+    /// Kinds of constraint between a surface of the grabbed part and one of another part: the recogniser's, the link's and the force law's.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum ConstraintKind {
+        /// Axis on axis (cylinder in cylinder). Leaves a slide and a rotation.
+        Concentric = "concentric",
+        /// Plane on plane, face to face: turns the grabbed part until the planes are parallel; contact determines the distance. Leaves two slides and a
+        /// rotation.
+        Coplanar = "coplanar",
+        /// Axis on axis and apex on apex, so that circles of one radius coincide (cone in cone). Leaves a rotation.
+        Conical = "conical",
+        /// Centre on centre (sphere in sphere). Leaves three rotations.
+        Spherical = "spherical",
+        /// Centre on axis: sphere of the grabbed part in a cylinder of the other. Leaves a slide and three rotations.
+        Annular = "annular",
+        /// Axis on centre: cylinder of the grabbed part over a sphere of the other. Leaves a slide and three rotations.
+        AnnularBore = "annular",
+    }
 }
 
 /// A point and a direction fixed to a part.

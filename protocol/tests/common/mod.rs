@@ -250,14 +250,7 @@ impl Random {
     }
 
     fn target(&mut self) -> ConstraintTarget {
-        let kinds = [
-            ConstraintKind::Concentric,
-            ConstraintKind::Coplanar,
-            ConstraintKind::Conical,
-            ConstraintKind::Spherical,
-            ConstraintKind::Annular,
-            ConstraintKind::AnnularBore,
-        ];
+        let kinds = ConstraintKind::ALL;
         ConstraintTarget {
             id: self.u16(),
             sequence: self.u16(),
