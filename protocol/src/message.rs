@@ -373,61 +373,85 @@ pub enum DeviceState {
     Fault(Fault),
 }
 
-/// Kind of fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Fault {
-    /// The stop input is open.
-    StopInput,
-    /// No message from the host for too long while armed.
-    HostSilent {
-        /// Time since the last message, ms.
-        silent_ms: u16,
-    },
-    /// An encoder reading jumped farther than the mechanism can move in a tick.
-    EncoderJump {
-        /// Axis.
-        axis: u8,
-    },
-    /// An encoder did not follow a small push of its motor: it is stuck or unplugged, or the mechanism is jammed.
-    EncoderStuck {
-        /// Axis.
-        axis: u8,
-    },
-    /// The handle moves faster than allowed.
-    OverSpeed,
-    /// The handle left the workspace.
-    Workspace,
-    /// A motor driver reports a fault without its kind.
-    Driver {
-        /// Axis.
-        axis: u8,
-    },
-    /// A motor driver reports overcurrent.
-    OverCurrent {
-        /// Axis.
-        axis: u8,
-    },
-    /// A motor or its driver is too hot.
-    OverTemperature {
-        /// Axis.
-        axis: u8,
-    },
-    /// The supply fell below the needs of motors and sensors; the processor still runs.
-    SupplyLow,
-    /// A tick took longer than its period.
-    TickOverrun,
-    /// The scene no longer passes its checks.
-    SceneDamaged,
-    /// The computed wrench is not finite.
-    NonFinite,
-    /// The handle turns faster than allowed.
-    AngularOverSpeed,
-    /// The encoders have lost their reference, although none of them jumped.
-    ReferenceLost,
-    /// The encoders give a position that the links cannot reach.
-    ImpossiblePosture,
-    /// A sensor reading is not finite, or implausible.
-    BadReading,
+/// Declares [`Fault`] and, from the same list, every variant of it.
+macro_rules! faults {
+    ($(#[$about:meta])+ pub enum Fault {
+        $($(#[$doc:meta])+ $name:ident $({ $(#[$field_doc:meta])+ $field:ident: $type:ty, })?,)+
+    }) => {
+        $(#[$about])+
+        pub enum Fault {
+            $($(#[$doc])+ $name $({ $(#[$field_doc])+ $field: $type })?,)+
+        }
+
+        impl Fault {
+            /// Number of kinds.
+            pub const COUNT: usize = [$(stringify!($name)),+].len();
+
+            /// One fault of every kind, in the order of the enum; those with an axis or a time have `number` there.
+            pub const fn every(number: u16) -> [Self; Self::COUNT] {
+                [$(Self::$name $({ $field: number as $type })?),+]
+            }
+        }
+    };
+}
+
+faults! {
+    /// Kind of fault.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Fault {
+        /// The stop input is open.
+        StopInput,
+        /// No message from the host for too long while armed.
+        HostSilent {
+            /// Time since the last message, ms.
+            silent_ms: u16,
+        },
+        /// An encoder reading jumped farther than the mechanism can move in a tick.
+        EncoderJump {
+            /// Axis.
+            axis: u8,
+        },
+        /// An encoder did not follow a small push of its motor: it is stuck or unplugged, or the mechanism is jammed.
+        EncoderStuck {
+            /// Axis.
+            axis: u8,
+        },
+        /// The handle moves faster than allowed.
+        OverSpeed,
+        /// The handle left the workspace.
+        Workspace,
+        /// A motor driver reports a fault without its kind.
+        Driver {
+            /// Axis.
+            axis: u8,
+        },
+        /// A motor driver reports overcurrent.
+        OverCurrent {
+            /// Axis.
+            axis: u8,
+        },
+        /// A motor or its driver is too hot.
+        OverTemperature {
+            /// Axis.
+            axis: u8,
+        },
+        /// The supply fell below the needs of motors and sensors; the processor still runs.
+        SupplyLow,
+        /// A tick took longer than its period.
+        TickOverrun,
+        /// The scene no longer passes its checks.
+        SceneDamaged,
+        /// The computed wrench is not finite.
+        NonFinite,
+        /// The handle turns faster than allowed.
+        AngularOverSpeed,
+        /// The encoders have lost their reference, although none of them jumped.
+        ReferenceLost,
+        /// The encoders give a position that the links cannot reach.
+        ImpossiblePosture,
+        /// A sensor reading is not finite, or implausible.
+        BadReading,
+    }
 }
 
 /// Why a message was not executed.
@@ -670,21 +694,46 @@ pub struct Statistics {
     pub stack_max: u32,
 }
 
-/// Kinds of constraint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum ConstraintKind {
-    /// Axis on axis (cylinder in cylinder).
-    Concentric,
-    /// Plane on plane: turns the grabbed part until the planes are parallel; contact determines the distance.
-    Coplanar,
-    /// Axis on axis and apex on apex (cone in cone).
-    Conical,
-    /// Centre on centre.
-    Spherical,
-    /// Centre on axis: sphere of the grabbed part in a cylinder of the other.
-    Annular,
-    /// Axis on centre: cylinder of the grabbed part over a sphere of the other.
-    AnnularBore,
+/// Declares [`ConstraintKind`] and, from the same list, every variant of it and its name.
+macro_rules! constraint_kinds {
+    ($(#[$about:meta])+ pub enum ConstraintKind { $($(#[$doc:meta])+ $name:ident = $word:literal,)+ }) => {
+        $(#[$about])+
+        pub enum ConstraintKind {
+            $($(#[$doc])+ $name,)+
+        }
+
+        impl ConstraintKind {
+            /// Every kind, in the order of the enum.
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$name),+];
+
+            /// Name of the kind. Both annular kinds have the same name: it does not say which part has the sphere.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $word,)+
+                }
+            }
+        }
+    };
+}
+
+constraint_kinds! {
+    /// Kinds of constraint between a surface of the grabbed part and one of another part: the recogniser's, the link's and the force law's.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum ConstraintKind {
+        /// Axis on axis (cylinder in cylinder). Leaves a slide and a rotation.
+        Concentric = "concentric",
+        /// Plane on plane, face to face: turns the grabbed part until the planes are parallel; contact determines the distance. Leaves two slides and a
+        /// rotation.
+        Coplanar = "coplanar",
+        /// Axis on axis and apex on apex, so that circles of one radius coincide (cone in cone). Leaves a rotation.
+        Conical = "conical",
+        /// Centre on centre (sphere in sphere). Leaves three rotations.
+        Spherical = "spherical",
+        /// Centre on axis: sphere of the grabbed part in a cylinder of the other. Leaves a slide and three rotations.
+        Annular = "annular",
+        /// Axis on centre: cylinder of the grabbed part over a sphere of the other. Leaves a slide and three rotations.
+        AnnularBore = "annular",
+    }
 }
 
 /// A point and a direction fixed to a part.

@@ -192,14 +192,7 @@ fn many_turning_targets_do_no_work_on_a_resting_hand() {
     let settings = Settings::default();
     let mut leaning = Rig::new(&ABOVE, START, &settings);
     let mut crowd = Rig::new(&ABOVE, START, &settings);
-    let kinds = [
-        ConstraintKind::Concentric,
-        ConstraintKind::Coplanar,
-        ConstraintKind::Conical,
-        ConstraintKind::Spherical,
-        ConstraintKind::Annular,
-        ConstraintKind::AnnularBore,
-    ];
+    let kinds = ConstraintKind::ALL;
     for i in 0..40u16 {
         let direction = |k: u16| {
             let a = 2.4 * f32::from(k);

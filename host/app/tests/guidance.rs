@@ -17,12 +17,12 @@ use mortise::viewport::compose::compose;
 use mortise::viewport::picture::Ground;
 use mortise_guide::{GuideSettings, List, Row, Standing, When};
 use mortise_mating::Axis;
-use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId, TargetKind};
-use mortise_protocol::message::{DeviceState, Telemetry, TouchingPair};
+use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId};
+use mortise_protocol::message::{ConstraintKind, DeviceState, Telemetry, TouchingPair};
 use mortise_protocol::parameter::ParameterId;
 
 fn row(session: &Session) -> Option<&Row> {
-    (session.guidance.rows.iter()).find(|row| row.target.kind == TargetKind::Concentric)
+    (session.guidance.rows.iter()).find(|row| row.target.kind == ConstraintKind::Concentric)
 }
 
 fn stands(session: &Session, standing: &Standing) -> bool {
@@ -202,12 +202,12 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
         odd.rows.push(Row {
             target: Target {
                 id: unknown,
-                kind: TargetKind::Concentric,
+                kind: ConstraintKind::Concentric,
                 moving: axis(),
                 fixed: axis(),
                 play_mm: f64::NAN,
                 radius_mm: f64::INFINITY,
-                ball_moves: true,
+                inner_moves: true,
                 moving_faces: vec![],
                 fixed_faces: vec![u32::MAX],
             },

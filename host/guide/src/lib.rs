@@ -19,10 +19,10 @@ use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::CadModel;
 use mortise_mating::Tolerances;
 use mortise_mating::recognise::{
-    Entry, Observation, Recogniser, State, Target, TargetId, TargetKind, Thresholds, TouchingFaces,
+    Entry, Observation, Recogniser, State, Target, TargetId, Thresholds, TouchingFaces,
 };
 use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::{Telemetry, ToDevice};
+use mortise_protocol::message::{ConstraintKind, Telemetry, ToDevice};
 
 use nearby::Nearby;
 pub use row::{List, Row, Standing};
@@ -149,10 +149,11 @@ impl<'a> Guide<'a> {
             misfit: entry.misfit,
             depth_mm: entry.depth_mm,
             inside_mm: match entry.target.kind {
-                TargetKind::Concentric | TargetKind::Conical | TargetKind::Annular => {
-                    Some(self.inside(&entry.target)).filter(|x| x.is_finite())
-                }
-                TargetKind::Coplanar | TargetKind::Spherical => None,
+                ConstraintKind::Concentric
+                | ConstraintKind::Conical
+                | ConstraintKind::Annular
+                | ConstraintKind::AnnularBore => Some(self.inside(&entry.target)).filter(|x| x.is_finite()),
+                ConstraintKind::Coplanar | ConstraintKind::Spherical => None,
             },
             pinned: entry.pinned,
             target: entry.target.clone(),
@@ -188,7 +189,7 @@ impl<'a> Guide<'a> {
             State::Off => Standing::Off,
             State::Far => Standing::Candidate,
             State::Conflict(with) => Standing::Conflict(with.clone()),
-            State::Active if wire::kind(&entry.target).is_none() => Standing::ByContact,
+            State::Active if !wire::is_sent(entry.target.kind) => Standing::ByContact,
             State::Active => match self.sent.get(&entry.target.id) {
                 None => Standing::Waiting,
                 Some(Sent { refused: None, .. }) => Standing::Sent,
@@ -247,7 +248,7 @@ impl<'a> Guide<'a> {
             .is_none_or(|(part, _)| *part != moving_part)
         {
             let mut targets = self.recogniser.possible(moving_part);
-            targets.retain(|target| wire::kind(target).is_some());
+            targets.retain(|target| wire::is_sent(target.kind));
             self.possible = Some((moving_part, targets));
         }
         let limits = self.recogniser.thresholds();
@@ -277,7 +278,7 @@ impl<'a> Guide<'a> {
 
     fn messages(&mut self) -> Vec<ToDevice> {
         let mut active: Vec<&Entry> = (self.recogniser.entries())
-            .filter(|e| e.state == State::Active && wire::kind(&e.target).is_some())
+            .filter(|e| e.state == State::Active && wire::is_sent(e.target.kind))
             .collect();
         active.sort_by_key(|entry| !entry.pinned);
         active.truncate(if self.settings.sending { MAX_SENT } else { 0 });

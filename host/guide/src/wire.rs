@@ -2,24 +2,17 @@
 
 use glam::DVec3;
 use heapless::Vec as BoundedVec;
-use mortise_mating::recognise::{Target, TargetKind};
+use mortise_mating::recognise::Target;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 
 use crate::GuideSettings;
 
-/// The board's constraint kind for a target; `None` for kinds left to contact.
-pub fn kind(target: &Target) -> Option<ConstraintKind> {
-    match target.kind {
-        TargetKind::Concentric => Some(ConstraintKind::Concentric),
-        TargetKind::Conical => Some(ConstraintKind::Conical),
-        TargetKind::Spherical => Some(ConstraintKind::Spherical),
-        TargetKind::Annular if target.ball_moves => Some(ConstraintKind::Annular),
-        TargetKind::Annular => Some(ConstraintKind::AnnularBore),
-        TargetKind::Coplanar => None,
-    }
+/// Whether targets of a kind are sent to the board; planes are left to contact, which holds them face to face without guidance.
+pub fn is_sent(kind: ConstraintKind) -> bool {
+    kind != ConstraintKind::Coplanar
 }
 
-/// The message for a target. `parts` maps each part of the image to a part of the model.
+/// The message for a target; `None` for kinds left to contact. `parts` maps each part of the image to a part of the model.
 pub fn message(
     target: &Target,
     parts: &[usize],
@@ -27,6 +20,9 @@ pub fn message(
     id: u16,
     sequence: u16,
 ) -> Option<ConstraintTarget> {
+    if !is_sent(target.kind) {
+        return None;
+    }
     let image_part = parts.iter().position(|&p| p == target.id.fixed_part)?;
     let feature = |origin: DVec3, direction: DVec3| Feature {
         point: (origin / 1000.0).as_vec3().to_array(),
@@ -44,7 +40,7 @@ pub fn message(
     Some(ConstraintTarget {
         id,
         sequence,
-        kind: kind(target)?,
+        kind: target.kind,
         moving: feature(target.moving.origin, target.moving.direction),
         static_part: u16::try_from(image_part).ok()?,
         fixed: feature(target.fixed.origin, target.fixed.direction),

@@ -3,7 +3,6 @@
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, Face, Frame, Mesh, Part, Shape, Surface};
 use mortise_guide::{Guide, GuideSettings, Standing, When};
-use mortise_mating::recognise::TargetKind;
 use mortise_protocol::message::{
     ConstraintKind, ConstraintTarget, Telemetry, ToDevice, TouchingPair, WirePose, WireWrench,
 };
@@ -152,7 +151,7 @@ fn touch_sends_a_target_that_is_refreshed_before_it_expires_and_cleared_when_far
     let row = &list.rows[0];
     assert_eq!(
         (row.target.kind, &row.standing),
-        (TargetKind::Concentric, &Standing::Sent)
+        (ConstraintKind::Concentric, &Standing::Sent)
     );
     // The peg's end is 10 mm deep in the hole.
     assert!((row.inside_mm.expect("along an axis") - 10.0).abs() < 1e-4);

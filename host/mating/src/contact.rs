@@ -3,6 +3,9 @@
 use glam::DVec3;
 
 /// Kind of a contact, by the surfaces that meet.
+///
+/// Not a [`ConstraintKind`](mortise_protocol::message::ConstraintKind): a contact states where two parts touch as placed in the file, without saying
+/// which of them moves; a constraint states how a moving part could be held to a fixed one, also while they do not touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ContactKind {
     /// Plane on plane.

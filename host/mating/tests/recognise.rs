@@ -6,8 +6,9 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, load_step};
-use mortise_mating::recognise::{Observation, Recogniser, State, TargetKind, Thresholds, TouchingFaces};
+use mortise_mating::recognise::{Observation, Recogniser, State, Thresholds, TouchingFaces};
 use mortise_mating::{Tolerances, identify};
+use mortise_protocol::message::ConstraintKind;
 use proptest::prelude::*;
 
 const FILES: [&str; 4] = [
@@ -63,15 +64,15 @@ fn see(recogniser: &mut Recogniser<'_>, poses: &[DAffine3], touching: &[Touching
     });
 }
 
-fn kinds(recogniser: &Recogniser<'_>) -> Vec<TargetKind> {
+fn kinds(recogniser: &Recogniser<'_>) -> Vec<ConstraintKind> {
     let mut kinds: Vec<_> = recogniser.active().map(|t| t.kind).collect();
-    kinds.sort();
+    kinds.sort_by_key(|&kind| kind as u8);
     kinds
 }
 
 #[test]
 fn each_joint_is_recognised_and_its_freedom_named() {
-    use TargetKind::*;
+    use ConstraintKind::*;
     let cases = [
         (
             "two_pin_exact.step",

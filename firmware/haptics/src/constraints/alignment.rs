@@ -167,14 +167,7 @@ mod tests {
         let center = Vec3::new(0.11, 0.19, -0.09);
         let body = Vec3::new(0.002, 0.001, 0.003);
         let pose = |center: Vec3, q: Quat| Pose::new(center - q * body, q);
-        for kind in [
-            ConstraintKind::Concentric,
-            ConstraintKind::Coplanar,
-            ConstraintKind::Conical,
-            ConstraintKind::Spherical,
-            ConstraintKind::Annular,
-            ConstraintKind::AnnularBore,
-        ] {
+        for kind in ConstraintKind::ALL {
             let t = target(kind);
             let here = Alignment::of(&t, &pose(center, orientation), center, &fixed, length);
             for unknown in 0..6 {

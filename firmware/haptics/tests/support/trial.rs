@@ -407,15 +407,8 @@ pub fn play(bench: &Bench<'_, '_>, settings: &Settings, seed: u64) -> Seen {
 
 /// Any target that the board accepts, with the object at `object`.
 fn target(random: &mut Random, object: &Place, sequence: u16, ids: u64) -> ConstraintTarget {
-    let kinds = [
-        ConstraintKind::Concentric,
-        ConstraintKind::Coplanar,
-        ConstraintKind::Conical,
-        ConstraintKind::Spherical,
-        ConstraintKind::Annular,
-        ConstraintKind::AnnularBore,
-    ];
-    let kind = kinds[random.below(6) as usize];
+    let kinds = ConstraintKind::ALL;
+    let kind = kinds[random.below(kinds.len() as u64) as usize];
     let feature = |point: DVec3, direction: DVec3| Feature {
         point: point.as_vec3().to_array(),
         direction: direction.normalize().as_vec3().to_array(),

@@ -19,7 +19,7 @@ use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
 
 pub use solve::{Freedom, Solution};
-pub use target::{Misfit, Target, TargetId, TargetKind};
+pub use target::{Misfit, Target, TargetId};
 
 use crate::merge::{MergedSurface, merge};
 use crate::tolerances::Tolerances;

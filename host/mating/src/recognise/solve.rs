@@ -11,9 +11,10 @@
 use std::fmt;
 
 use glam::{DAffine3, DQuat, DVec3};
+use mortise_protocol::message::ConstraintKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::target::{Misfit, Target, TargetKind, placed};
+use super::target::{Misfit, Target, placed};
 use crate::contact::Axis;
 
 /// Singular values below this fraction of the largest count as zero: 1 mm over a part of 1 m.
@@ -139,23 +140,23 @@ fn rows(targets: &[Placed<'_>], pose: &DAffine3, center: DVec3, size: f64) -> (D
             [x, z.cross(x)]
         };
         let turned = match target.kind {
-            TargetKind::Concentric => {
+            ConstraintKind::Concentric => {
                 across(b.direction).into_iter().for_each(&mut slide);
                 Some(b.direction * a.direction.dot(b.direction).signum())
             }
-            TargetKind::Coplanar => {
+            ConstraintKind::Coplanar => {
                 slide(b.direction);
                 Some(-b.direction)
             }
-            TargetKind::Conical => {
+            ConstraintKind::Conical => {
                 DVec3::AXES.into_iter().for_each(&mut slide);
                 Some(b.direction)
             }
-            TargetKind::Spherical => {
+            ConstraintKind::Spherical => {
                 DVec3::AXES.into_iter().for_each(&mut slide);
                 None
             }
-            TargetKind::Annular => {
+            ConstraintKind::Annular | ConstraintKind::AnnularBore => {
                 across(target.bore(&a, &b)).into_iter().for_each(&mut slide);
                 None
             }

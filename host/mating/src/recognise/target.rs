@@ -2,37 +2,10 @@
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::Surface;
+use mortise_protocol::message::ConstraintKind;
 
 use crate::contact::Axis;
 use crate::merge::{MergedSurface, Side};
-
-/// Kind of constraint. The letters are those of the notation page: d is a distance, θ an angle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum TargetKind {
-    /// Shaft in bore: axes coincide. Leaves a slide and a rotation.
-    Concentric,
-    /// Planes meet face to face. Leaves two slides and a rotation.
-    Coplanar,
-    /// Taper in taper: axes coincide, and so do circles of one radius. Leaves a rotation.
-    Conical,
-    /// Ball in socket: centres coincide. Leaves three rotations.
-    Spherical,
-    /// Ball in bore: the centre is on the axis. Leaves a slide and three rotations.
-    Annular,
-}
-
-impl TargetKind {
-    /// Name of the kind.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Concentric => "concentric",
-            Self::Coplanar => "coplanar",
-            Self::Conical => "conical",
-            Self::Spherical => "spherical",
-            Self::Annular => "annular",
-        }
-    }
-}
 
 /// Two merged surfaces, one of the moving part and one of a fixed part. Indices into [`crate::merge`] of the parts' shapes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -53,7 +26,7 @@ pub struct Target {
     /// The surfaces.
     pub id: TargetId,
     /// The kind of constraint.
-    pub kind: TargetKind,
+    pub kind: ConstraintKind,
     /// Axis, outward normal, centre (with arbitrary direction), or axis of a cone in the direction of its widening: in the
     /// moving part's frame. Where the surface does not determine the origin, it is in the middle of the moving surface.
     pub moving: Axis,
@@ -63,15 +36,15 @@ pub struct Target {
     pub play_mm: f64,
     /// Radius of the inner surface, mm; 0 for planes and cones.
     pub radius_mm: f64,
-    /// For a ball in a bore: whether the ball belongs to the moving part.
-    pub ball_moves: bool,
+    /// Whether the inner surface (shaft, cone, ball) belongs to the moving part; `false` for planes.
+    pub inner_moves: bool,
     /// Face ids of the moving part: the target accounts for contact between these faces and `fixed_faces`.
     pub moving_faces: Vec<u32>,
     /// Face ids of the fixed part.
     pub fixed_faces: Vec<u32>,
 }
 
-/// Alignment error of a target.
+/// Alignment error of a target. The letters are those of the notation page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
     /// d, mm.
@@ -103,10 +76,15 @@ impl Target {
         let (kind, a, b, radii) = match (moving.surface, fixed.surface) {
             (Surface::Plane { frame: f }, Surface::Plane { frame: g }) => {
                 let foot = middle - f.z * (middle - f.origin).dot(f.z);
-                (TargetKind::Coplanar, at(foot, f.z), at(g.origin, g.z), [0.0; 2])
+                (
+                    ConstraintKind::Coplanar,
+                    at(foot, f.z),
+                    at(g.origin, g.z),
+                    [0.0; 2],
+                )
             }
             (Surface::Cylinder { frame: f, radius: r }, Surface::Cylinder { frame: g, radius: s }) => (
-                TargetKind::Concentric,
+                ConstraintKind::Concentric,
                 on(f.origin, f.z),
                 at(g.origin, g.z),
                 [r, s],
@@ -131,14 +109,14 @@ impl Target {
                 };
                 let same = (x.abs() - y.abs()).abs() < 1e-2;
                 (
-                    same.then_some(TargetKind::Conical)?,
+                    same.then_some(ConstraintKind::Conical)?,
                     beside(f.origin, f.z, r, x),
                     beside(g.origin, g.z, s, y),
                     [0.0; 2],
                 )
             }
             (Surface::Sphere { frame: f, radius: r }, Surface::Sphere { frame: g, radius: s }) => (
-                TargetKind::Spherical,
+                ConstraintKind::Spherical,
                 at(f.origin, f.z),
                 at(g.origin, g.z),
                 [r, s],
@@ -147,12 +125,22 @@ impl Target {
             (Surface::Sphere { frame: f, radius: r }, Surface::Cylinder { frame: g, radius: s })
                 if in_bore > 0.0 =>
             {
-                (TargetKind::Annular, at(f.origin, f.z), at(g.origin, g.z), [r, s])
+                (
+                    ConstraintKind::Annular,
+                    at(f.origin, f.z),
+                    at(g.origin, g.z),
+                    [r, s],
+                )
             }
             (Surface::Cylinder { frame: f, radius: r }, Surface::Sphere { frame: g, radius: s })
                 if in_bore < 0.0 =>
             {
-                (TargetKind::Annular, on(f.origin, f.z), at(g.origin, g.z), [r, s])
+                (
+                    ConstraintKind::AnnularBore,
+                    on(f.origin, f.z),
+                    at(g.origin, g.z),
+                    [r, s],
+                )
             }
             _ => return None,
         };
@@ -163,7 +151,7 @@ impl Target {
             fixed: b,
             play_mm: in_bore * (radii[1] - radii[0]),
             radius_mm: radii[0].min(radii[1]),
-            ball_moves: in_bore > 0.0,
+            inner_moves: in_bore > 0.0,
             moving_faces: moving.faces.clone(),
             fixed_faces: fixed.faces.clone(),
         })
@@ -176,11 +164,13 @@ impl Target {
         let lines = a.direction.cross(b.direction).length();
         let cos = a.direction.dot(b.direction);
         let (distance_mm, angle_rad) = match self.kind {
-            TargetKind::Concentric => (between.reject_from(b.direction).length(), lines.atan2(cos.abs())),
-            TargetKind::Coplanar => (between.dot(b.direction).abs(), lines.atan2(-cos)),
-            TargetKind::Conical => (between.length(), lines.atan2(cos)),
-            TargetKind::Spherical => (between.length(), 0.0),
-            TargetKind::Annular => (between.reject_from(self.bore(&a, &b)).length(), 0.0),
+            ConstraintKind::Concentric => (between.reject_from(b.direction).length(), lines.atan2(cos.abs())),
+            ConstraintKind::Coplanar => (between.dot(b.direction).abs(), lines.atan2(-cos)),
+            ConstraintKind::Conical => (between.length(), lines.atan2(cos)),
+            ConstraintKind::Spherical => (between.length(), 0.0),
+            ConstraintKind::Annular | ConstraintKind::AnnularBore => {
+                (between.reject_from(self.bore(&a, &b)).length(), 0.0)
+            }
         };
         Misfit {
             distance_mm,
@@ -190,7 +180,10 @@ impl Target {
 
     /// Direction of the bore of an annular target.
     pub(crate) fn bore(&self, a: &Axis, b: &Axis) -> DVec3 {
-        if self.ball_moves { b.direction } else { a.direction }
+        match self.kind {
+            ConstraintKind::AnnularBore => a.direction,
+            _ => b.direction,
+        }
     }
 }
 

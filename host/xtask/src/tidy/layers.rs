@@ -70,7 +70,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("firmware/haptics", &["mortise-protocol"]),
     ("firmware", &["mortise-haptics", "mortise-protocol"]),
     ("protocol", &[]),
-    ("host/mating", &["mortise-brep"]),
+    ("host/mating", &["mortise-brep", "mortise-protocol"]),
     (
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use mortise_guide::{List, MAX_SENT, Row, Standing};
-use mortise_mating::recognise::{Freedom, Target, TargetId, TargetKind};
+use mortise_mating::recognise::{Freedom, Target, TargetId};
+use mortise_protocol::message::ConstraintKind;
 
 use crate::session::document::Document;
 
@@ -14,8 +15,8 @@ pub fn title(document: &Document, target: &Target) -> String {
     );
     let kind = target.kind.name();
     let between = match target.kind {
-        TargetKind::Coplanar => "on",
-        _ if target.ball_moves => "in",
+        ConstraintKind::Coplanar => "on",
+        _ if target.inner_moves => "in",
         _ => "over",
     };
     let mut text = format!("{kind}: {moving} {between} {fixed}");
@@ -26,16 +27,16 @@ pub fn title(document: &Document, target: &Target) -> String {
 /// Surfaces with their diameters and the difference between these.
 pub fn surfaces(target: &Target) -> String {
     let (inner, outer) = match target.kind {
-        TargetKind::Concentric => ("shaft", "hole"),
-        TargetKind::Spherical => ("ball", "socket"),
-        TargetKind::Annular => ("ball", "bore"),
-        TargetKind::Conical => {
-            return match target.ball_moves {
+        ConstraintKind::Concentric => ("shaft", "hole"),
+        ConstraintKind::Spherical => ("ball", "socket"),
+        ConstraintKind::Annular | ConstraintKind::AnnularBore => ("ball", "bore"),
+        ConstraintKind::Conical => {
+            return match target.inner_moves {
                 true => "cone in tapered hole".to_owned(),
                 false => "tapered hole over cone".to_owned(),
             };
         }
-        TargetKind::Coplanar => return "flat face on flat face".to_owned(),
+        ConstraintKind::Coplanar => return "flat face on flat face".to_owned(),
     };
     let what_goes_in = 2.0 * (target.radius_mm - target.play_mm.min(0.0));
     let inner = format!("{inner} Ø {what_goes_in:.3}");
@@ -45,7 +46,7 @@ pub fn surfaces(target: &Target) -> String {
         play if play > 0.0 => format!("{play:.3} mm clearance"),
         play => format!("{:.3} mm interference", -play),
     };
-    match target.ball_moves {
+    match target.inner_moves {
         true => format!("{inner} in {outer}: {difference}"),
         false => format!("{outer} over {inner}: {difference}"),
     }
@@ -55,11 +56,11 @@ pub fn surfaces(target: &Target) -> String {
 pub fn alignment(row: &Row) -> String {
     let (d, degrees) = (row.misfit.distance_mm, row.misfit.angle_rad.to_degrees());
     let mut text = match row.target.kind {
-        TargetKind::Concentric => format!("axis off by {d:.3} mm, {degrees:.2}°"),
-        TargetKind::Coplanar => format!("gap {d:.3} mm, {degrees:.2}°"),
-        TargetKind::Conical => format!("off by {d:.3} mm, {degrees:.2}°"),
-        TargetKind::Spherical => format!("centres {d:.3} mm apart"),
-        TargetKind::Annular => format!("centre {d:.3} mm off the axis"),
+        ConstraintKind::Concentric => format!("axis off by {d:.3} mm, {degrees:.2}°"),
+        ConstraintKind::Coplanar => format!("gap {d:.3} mm, {degrees:.2}°"),
+        ConstraintKind::Conical => format!("off by {d:.3} mm, {degrees:.2}°"),
+        ConstraintKind::Spherical => format!("centres {d:.3} mm apart"),
+        ConstraintKind::Annular | ConstraintKind::AnnularBore => format!("centre {d:.3} mm off the axis"),
     };
     match row.inside_mm {
         Some(inside) if inside > 0.0 => text += &format!(", {inside:.1} mm inserted"),
@@ -179,7 +180,7 @@ mod tests {
         }
     }
 
-    fn row(kind: TargetKind, radius_mm: f64, play_mm: f64, ball_moves: bool) -> Row {
+    fn row(kind: ConstraintKind, radius_mm: f64, play_mm: f64, inner_moves: bool) -> Row {
         Row {
             target: Target {
                 id: TargetId {
@@ -193,7 +194,7 @@ mod tests {
                 fixed: axis(DVec3::Z),
                 play_mm,
                 radius_mm,
-                ball_moves,
+                inner_moves,
                 moving_faces: vec![3],
                 fixed_faces: (0..9).collect(),
             },
@@ -226,18 +227,18 @@ mod tests {
 
     #[test]
     fn sizes_are_those_of_both_surfaces_whichever_moves() {
-        let peg = row(TargetKind::Concentric, 8.875, 0.5, true).target;
+        let peg = row(ConstraintKind::Concentric, 8.875, 0.5, true).target;
         assert_eq!(
             surfaces(&peg),
             "shaft Ø 17.750 in hole Ø 18.750: 1.000 mm clearance"
         );
-        let ring = row(TargetKind::Concentric, 8.875, 0.5, false).target;
+        let ring = row(ConstraintKind::Concentric, 8.875, 0.5, false).target;
         assert_eq!(
             surfaces(&ring),
             "hole Ø 18.750 over shaft Ø 17.750: 1.000 mm clearance"
         );
         // With interference `radius_mm` is the hole's, which is smaller than the shaft's.
-        let press = row(TargetKind::Concentric, 9.0, -0.01, true).target;
+        let press = row(ConstraintKind::Concentric, 9.0, -0.01, true).target;
         assert_eq!(
             surfaces(&press),
             "shaft Ø 18.020 in hole Ø 18.000: 0.020 mm interference"
@@ -248,7 +249,7 @@ mod tests {
 
     #[test]
     fn a_row_says_how_far_off_and_which_faces() {
-        let row = row(TargetKind::Concentric, 8.875, 0.5, true);
+        let row = row(ConstraintKind::Concentric, 8.875, 0.5, true);
         assert_eq!(
             alignment(&row),
             "axis off by 0.250 mm, 0.50°, 0.4 mm before entry"
@@ -261,8 +262,8 @@ mod tests {
 
     #[test]
     fn a_conflict_names_what_came_first() {
-        let (document, first) = (document(), row(TargetKind::Concentric, 6.0, 0.1, true));
-        let mut other = row(TargetKind::Concentric, 4.0, 0.1, true);
+        let (document, first) = (document(), row(ConstraintKind::Concentric, 6.0, 0.1, true));
+        let mut other = row(ConstraintKind::Concentric, 4.0, 0.1, true);
         other.standing = Standing::Conflict(vec![first.target.id]);
         other.pinned = true;
         let mut list = List {
