@@ -15,6 +15,7 @@ use crate::exchange::{Patience, greet, no_answer, obtain, patience_for, started_
 use crate::faults::FaultLine;
 use crate::heartbeat::{HEARTBEAT, HEARTBEAT_COUNTED, Heartbeat};
 use crate::link::{Answer, Link, Reader};
+use crate::preload::Preload;
 use crate::spec::{EmulatedMode, RigSpec};
 use crate::transport::Transport;
 use crate::{emulator, real_time, serial, simulated};
@@ -62,7 +63,15 @@ impl Client {
     /// # Errors
     /// All of [`RigError`] up to and including `VersionMismatch`.
     pub fn connect(spec: &RigSpec) -> Result<Self, RigError> {
-        Self::connect_through(spec, Ok)
+        Self::connect_through(spec, None, Ok)
+    }
+
+    /// As [`Self::connect`]; an emulated board starts with the scene `image` in its flash, where it fits. Other rigs take it by [`Self::upload`].
+    ///
+    /// # Errors
+    /// As [`Self::connect`].
+    pub fn connect_with_scene(spec: &RigSpec, image: &[u8]) -> Result<Self, RigError> {
+        Self::connect_through(spec, Some(image), Ok)
     }
 
     /// Like [`Self::connect`], through a line with faults that begin on request: [`Client::fault_line`].
@@ -71,13 +80,14 @@ impl Client {
     /// As [`Self::connect`].
     pub fn connect_with_faults(spec: &RigSpec) -> Result<Self, RigError> {
         let line = FaultLine::default();
-        let mut client = Self::connect_through(spec, |stream| line.into_stream(stream))?;
+        let mut client = Self::connect_through(spec, None, |stream| line.into_stream(stream))?;
         client.fault_line = Some(line);
         Ok(client)
     }
 
     fn connect_through(
         spec: &RigSpec,
+        scene: Option<&[u8]>,
         through: impl FnOnce(Transport) -> Result<Transport, RigError>,
     ) -> Result<Self, RigError> {
         let name = spec.to_string();
@@ -92,7 +102,9 @@ impl Client {
             }
             RigSpec::Emulated { mode, firmware } => {
                 let elf = emulator::firmware_path(firmware.as_deref())?;
-                let transport = through(emulator::start(*mode, &elf)?)?;
+                // Without the temporary file the scene is sent, as to any board.
+                let scene = scene.and_then(|image| Preload::new(image).ok().flatten());
+                let transport = through(emulator::start(*mode, &elf, scene)?)?;
                 let client = Self::over_paced(transport, &name, Patience::long(), Some(elf), *mode)?;
                 client.in_lockstep(*mode == EmulatedMode::Lockstep)
             }

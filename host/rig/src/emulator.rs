@@ -8,6 +8,7 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use crate::error::RigError;
+use crate::preload::Preload;
 use crate::spec::EmulatedMode;
 use crate::transport::{READ_WAIT, Transport};
 
@@ -91,7 +92,11 @@ pub(crate) fn available(firmware: Option<&Path>) -> Result<(), String> {
 }
 
 /// Starts QEMU and connects to its UART.
-pub(crate) fn start(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigError> {
+pub(crate) fn start(
+    mode: EmulatedMode,
+    firmware: &Path,
+    scene: Option<Preload>,
+) -> Result<Transport, RigError> {
     let wanted = std::env::var(SERIAL_VARIABLE).unwrap_or_default();
     let pty = match wanted.as_str() {
         "" => cfg!(unix),
@@ -105,13 +110,13 @@ pub(crate) fn start(mode: EmulatedMode, firmware: &Path) -> Result<Transport, Ri
         }
     };
     if pty {
-        start_on_pty(mode, firmware)
+        start_on_pty(mode, firmware, scene)
     } else {
-        start_on_tcp(mode, firmware)
+        start_on_tcp(mode, firmware, scene)
     }
 }
 
-fn command(mode: EmulatedMode, firmware: &Path, serial: &str) -> Command {
+fn command(mode: EmulatedMode, firmware: &Path, scene: Option<&Preload>, serial: &str) -> Command {
     let mut command = Command::new(qemu());
     command
         .args([
@@ -121,6 +126,7 @@ fn command(mode: EmulatedMode, firmware: &Path, serial: &str) -> Command {
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
+    command.args(scene.iter().flat_map(|scene| scene.arguments()));
     if mode != EmulatedMode::Interactive {
         // 2 ns per instruction; `sleep=off` skips idle time, so a run takes no longer than its instructions.
         command.args(["-icount", "shift=1,sleep=off"]);
@@ -197,8 +203,8 @@ fn read_lines(stream: impl Read, to: &mpsc::SyncSender<String>) {
     }
 }
 
-fn start_on_pty(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigError> {
-    let (mut qemu, lines) = spawn(command(mode, firmware, "pty"))?;
+fn start_on_pty(mode: EmulatedMode, firmware: &Path, scene: Option<Preload>) -> Result<Transport, RigError> {
+    let (mut qemu, lines) = spawn(command(mode, firmware, scene.as_ref(), "pty"))?;
     let deadline = Instant::now() + START_WAIT;
     let mut said = Vec::new();
     loop {
@@ -210,7 +216,7 @@ fn start_on_pty(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigErr
                     .and_then(|rest| rest.split_whitespace().next());
                 if let Some(path) = path {
                     let mut transport = crate::serial::open(path)?;
-                    transport.keep = Some(Box::new(qemu));
+                    transport.keep = Some(Box::new((qemu, scene)));
                     return Ok(transport);
                 }
                 said.push(line);
@@ -220,7 +226,7 @@ fn start_on_pty(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigErr
     }
 }
 
-fn start_on_tcp(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigError> {
+fn start_on_tcp(mode: EmulatedMode, firmware: &Path, scene: Option<Preload>) -> Result<Transport, RigError> {
     let no_port = |error: io::Error| RigError::Qemu {
         what: format!("no TCP port on this computer: {error}"),
         hint: "check the firewall for 127.0.0.1".into(),
@@ -229,7 +235,12 @@ fn start_on_tcp(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigErr
     let listener = TcpListener::bind(("127.0.0.1", 0)).map_err(no_port)?;
     listener.set_nonblocking(true).map_err(no_port)?;
     let address = listener.local_addr().map_err(no_port)?;
-    let (mut qemu, lines) = spawn(command(mode, firmware, &format!("tcp:{address},nodelay=on")))?;
+    let (mut qemu, lines) = spawn(command(
+        mode,
+        firmware,
+        scene.as_ref(),
+        &format!("tcp:{address},nodelay=on"),
+    ))?;
     let deadline = Instant::now() + START_WAIT;
     let stream = loop {
         match listener.accept() {
@@ -247,7 +258,7 @@ fn start_on_tcp(mode: EmulatedMode, firmware: &Path) -> Result<Transport, RigErr
     };
     let transport = over_tcp(stream).map_err(no_port)?;
     Ok(Transport {
-        keep: Some(Box::new(qemu)),
+        keep: Some(Box::new((qemu, scene))),
         ..transport
     })
 }

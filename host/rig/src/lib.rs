@@ -34,6 +34,7 @@ mod link;
 mod list;
 mod log;
 mod pipe;
+mod preload;
 mod real_time;
 mod serial;
 mod simulated;

@@ -11,6 +11,7 @@ mod outcome;
 pub mod overlap;
 pub mod port;
 pub mod probe;
+mod report;
 mod run;
 pub mod sample;
 mod scenario;
@@ -22,7 +23,8 @@ pub mod wire;
 
 pub use error::ScenarioError;
 pub use measure::Felt;
-pub use outcome::{Bounds, Outcome, Verdict};
-pub use run::{Listener, Recording, connect, record, run, run_on};
+pub use outcome::{Bounds, Outcome, QUANTITIES, Quantity, Verdict, three_digits};
+pub use report::report;
+pub use run::{Listener, Recording, connect, connect_with_scene, record, run, run_on};
 pub use scenario::{Depth, Hand, Integrator, Key, Press, Run, Scenario, Scene, Shell};
 pub use scene::{Body, ClosedForm, PreparedScene};

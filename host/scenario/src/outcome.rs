@@ -1,6 +1,7 @@
 //! What a run of a scenario measured, and whether its bounds hold.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
@@ -117,74 +118,125 @@ pub struct Verdict {
     pub holds: bool,
 }
 
-impl std::fmt::Display for Verdict {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let mark = if self.holds { "ok  " } else { "FAIL" };
-        let bounds = if self.min == self.max {
-            format!("{}", self.min)
+impl Verdict {
+    /// The bound in words, without its unit.
+    pub fn bound(&self) -> String {
+        if self.min == self.max {
+            format!("exactly {}", self.min)
+        } else if self.min == 0.0 {
+            format!("at most {}", self.max)
+        } else if self.max == f64::INFINITY {
+            format!("at least {}", self.min)
         } else {
             format!("{} to {}", self.min, self.max)
-        };
-        match self.value {
-            Some(value) => write!(f, "{mark} {} = {value:.6} ({bounds})", self.what),
-            None => write!(f, "{mark} {} was not measured ({bounds})", self.what),
         }
     }
 }
 
-macro_rules! quantities {
-    ($($name:ident => $get:expr;)+) => {
-        impl Outcome {
-            /// Names that [`Outcome::quantity`] knows and a scenario's `[holds]` may use.
-            pub const QUANTITIES: &'static [&'static str] = &[$(stringify!($name)),+];
-
-            /// A measured quantity by its field's name; `None` when there is none of that name or this run did not measure it.
-            pub fn quantity(&self, name: &str) -> Option<f64> {
-                match name {
-                    $(stringify!($name) => { let get: fn(&Self) -> Option<f64> = $get; get(self) })+
-                    _ => None,
-                }
-            }
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mark = if self.holds { "ok  " } else { "FAIL" };
+        let known = Quantity::named(&self.what);
+        let (what, unit) = known.map_or((self.what.as_str(), ""), |known| (known.what, known.unit));
+        write!(f, "{mark} {what}: ")?;
+        match self.value {
+            Some(value) => write!(f, "{} {unit}", three_digits(value))?,
+            None => write!(f, "not measured")?,
         }
+        write!(f, " ({} {unit})", self.bound())
+    }
+}
+
+/// A measured quantity.
+pub struct Quantity {
+    /// Its field's name, as a scenario's `[holds]` has it.
+    pub name: &'static str,
+    /// What it is, for people.
+    pub what: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    get: fn(&Outcome) -> Option<f64>,
+}
+
+macro_rules! quantities {
+    ($($name:ident, $what:literal, $unit:literal, $get:expr;)+) => {
+        /// Every quantity that a run may measure.
+        pub const QUANTITIES: &[Quantity] = &[
+            $(Quantity { name: stringify!($name), what: $what, unit: $unit, get: $get }),+
+        ];
     };
 }
 
 quantities! {
-    inserted_mm => |o| o.inserted_mm;
-    hole_mm => |o| o.hole_mm;
-    lateral_mm => |o| o.lateral_mm;
-    ticks => |o| Some(f64::from(o.ticks));
-    missed_ticks => |o| Some(f64::from(o.missed_ticks));
-    instructions_per_tick_max => |o| o.instructions_per_tick_max.map(f64::from);
-    instructions_per_tick_mean => |o| o.instructions_per_tick_mean;
-    points_per_tick_max => |o| Some(f64::from(o.points_per_tick_max));
-    peak_force_n => |o| Some(o.peak_force_n);
-    peak_torque_nm => |o| Some(o.peak_torque_nm);
-    press_handle_n => |o| o.press_handle_n;
-    press_hand_n => |o| o.press_hand_n;
-    press_error_percent => |o| o.press_error_percent;
-    penetration_mm => |o| Some(o.penetration_mm);
-    board_penetration_mm => |o| Some(o.board_penetration_mm);
-    contact_impulse_ns => |o| Some(o.contact_impulse_ns);
-    peak_contact_n => |o| Some(o.peak_contact_n);
-    impulse_lost_ns => |o| Some(o.impulse_lost_ns);
-    energy_given_mj => |o| Some(o.energy_given_mj);
-    energy_passed_mj => |o| Some(o.energy_passed_mj);
-    contact_given_mj => |o| Some(o.contact_given_mj);
-    constraint_given_mj => |o| Some(o.constraint_given_mj);
-    samples => |o| Some(f64::from(o.samples));
-    dropped_samples => |o| Some(f64::from(o.dropped_samples));
-    bad_frames => |o| Some(f64::from(o.bad_frames));
-    parameter_messages => |o| Some(f64::from(o.parameter_messages));
-    flags => |o| Some(f64::from(o.flags));
-    degraded_percent => |o| Some(o.degraded_percent);
-    fault_at_ms => |o| o.fault_at_ms;
-    force_after_fault_n => |o| o.force_after_fault_n;
+    inserted_mm, "depth in the hole", "mm", |o| o.inserted_mm;
+    hole_mm, "length of the hole", "mm", |o| o.hole_mm;
+    lateral_mm, "distance from the hole's axis", "mm", |o| o.lateral_mm;
+    penetration_mm, "deepest penetration by the exact surfaces", "mm", |o| Some(o.penetration_mm);
+    board_penetration_mm, "deepest penetration as the board has it", "mm", |o| Some(o.board_penetration_mm);
+    peak_force_n, "largest force on the handle", "N", |o| Some(o.peak_force_n);
+    peak_torque_nm, "largest torque on the handle", "N·m", |o| Some(o.peak_torque_nm);
+    press_handle_n, "force on the handle along the press", "N", |o| o.press_handle_n;
+    press_hand_n, "force of the hand along the press", "N", |o| o.press_hand_n;
+    press_error_percent, "difference of the two", "%", |o| o.press_error_percent;
+    peak_contact_n, "largest contact force", "N", |o| Some(o.peak_contact_n);
+    contact_impulse_ns, "impulse of contacts", "N·s", |o| Some(o.contact_impulse_ns);
+    impulse_lost_ns, "impulse that the hand did not feel", "N·s", |o| Some(o.impulse_lost_ns);
+    energy_given_mj, "energy generated at the handle", "mJ", |o| Some(o.energy_given_mj);
+    energy_passed_mj, "energy through the handle", "mJ", |o| Some(o.energy_passed_mj);
+    contact_given_mj, "energy generated by contacts", "mJ", |o| Some(o.contact_given_mj);
+    constraint_given_mj, "energy generated by contacts and targets", "mJ", |o| Some(o.constraint_given_mj);
+    ticks, "ticks", "", |o| Some(f64::from(o.ticks));
+    missed_ticks, "loop overruns", "ticks", |o| Some(f64::from(o.missed_ticks));
+    instructions_per_tick_max, "longest tick", "instructions", |o| o.instructions_per_tick_max.map(f64::from);
+    instructions_per_tick_mean, "mean tick", "instructions", |o| o.instructions_per_tick_mean;
+    points_per_tick_max, "most points queried in a tick", "", |o| Some(f64::from(o.points_per_tick_max));
+    degraded_percent, "ticks that left points out", "%", |o| Some(o.degraded_percent);
+    samples, "telemetry received", "messages", |o| Some(f64::from(o.samples));
+    dropped_samples, "telemetry dropped by the board", "messages", |o| Some(f64::from(o.dropped_samples));
+    bad_frames, "damaged frames", "", |o| Some(f64::from(o.bad_frames));
+    parameter_messages, "parameters sent", "messages", |o| Some(f64::from(o.parameter_messages));
+    flags, "telemetry flags, all together", "", |o| Some(f64::from(o.flags));
+    fault_at_ms, "time of the fault", "ms", |o| o.fault_at_ms;
+    force_after_fault_n, "largest force after the fault", "N", |o| o.force_after_fault_n;
+}
+
+impl Quantity {
+    /// The quantity of this field.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        QUANTITIES.iter().find(|quantity| quantity.name == name)
+    }
+}
+
+/// `value` to three significant digits, integers whole; thousands apart.
+pub fn three_digits(value: f64) -> String {
+    if !value.is_finite() {
+        return value.to_string();
+    }
+    let decimals = if value == value.trunc() {
+        0
+    } else {
+        // Digits before the point; the rounding may add one, as from 9.996 to 10.0.
+        let magnitude = format!("{value:.2e}");
+        let exponent = magnitude
+            .split_once('e')
+            .and_then(|(_, exponent)| exponent.parse().ok());
+        (2 - exponent.unwrap_or(0i32)).max(0) as usize
+    };
+    let text = format!("{value:.decimals$}");
+    let (sign, digits) = text
+        .strip_prefix('-')
+        .map_or(("", text.as_str()), |rest| ("-", rest));
+    let (whole, part) = digits.split_at(digits.find('.').unwrap_or(digits.len()));
+    let groups: Vec<&str> = (whole.as_bytes().rchunks(3).rev())
+        .filter_map(|group| std::str::from_utf8(group).ok())
+        .collect();
+    format!("{sign}{}{part}", groups.join(","))
 }
 
 impl Outcome {
-    pub(crate) fn knows(quantity: &str) -> bool {
-        Self::QUANTITIES.contains(&quantity)
+    /// A measured quantity by its field's name; `None` when there is none of that name or this run did not measure it.
+    pub fn quantity(&self, name: &str) -> Option<f64> {
+        Quantity::named(name).and_then(|quantity| (quantity.get)(self))
     }
 
     /// Every bound of a scenario's `[holds]` that concerns this rig. A quantity that was not measured does not hold.
@@ -208,5 +260,50 @@ impl Outcome {
                 }
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits_and_integers_are_whole() {
+        for (value, text) in [
+            (42.080978, "42.1"),
+            (0.209712, "0.210"),
+            (9.996, "10.0"),
+            (0.0123456, "0.0123"),
+            (33820.0, "33,820"),
+            (1234567.0, "1,234,567"),
+            (-1234.56, "-1,235"),
+            (0.0, "0"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(three_digits(value), text, "{value}");
+        }
+    }
+
+    #[test]
+    fn a_verdict_has_words_and_units() {
+        let verdict = |what: &str, value, min, max, holds| {
+            let what = what.into();
+            let verdict = Verdict {
+                what,
+                value,
+                min,
+                max,
+                holds,
+            };
+            verdict.to_string()
+        };
+        assert_eq!(
+            verdict("inserted_mm", Some(42.08), 40.0, 43.0, true),
+            "ok   depth in the hole: 42.1 mm (40 to 43 mm)"
+        );
+        assert_eq!(
+            verdict("press_hand_n", None, 0.0, 3.0, false),
+            "FAIL force of the hand along the press: not measured (at most 3 N)"
+        );
     }
 }

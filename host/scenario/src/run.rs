@@ -1,6 +1,7 @@
 //! Playing a scenario on a rig.
 
 use mortise_guide::GuideSettings;
+use mortise_protocol::image::CRC;
 use mortise_protocol::message::{
     Capabilities, CostUnit, DeviceState, Fault, FromDevice, Statistics, Telemetry, ToDevice, flag,
 };
@@ -26,8 +27,23 @@ const FADE_TICKS: u32 = 150;
 /// Everything [`ScenarioError`] lists but `NoSuchFigures`. A bound that does not hold is not an error: see [`Outcome::verdicts`].
 pub fn run(scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError> {
     let scene = PreparedScene::of(scenario)?;
-    let client = connect(scenario, spec)?;
+    let client = connect_with_scene(scenario, spec, &scene)?;
     run_on(&client, scenario, &scene)
+}
+
+/// As [`connect`]; an emulated board starts with the scene, which [`run_on`] then need not send. Not through a line that can fail.
+///
+/// # Errors
+/// `Rig`.
+pub fn connect_with_scene(
+    scenario: &Scenario,
+    spec: &RigSpec,
+    scene: &PreparedScene,
+) -> Result<Client, ScenarioError> {
+    match scenario.faults {
+        Some(_) => connect(scenario, spec),
+        None => Ok(Client::connect_with_scene(&spec.lockstep(), &scene.image)?),
+    }
 }
 
 /// Connects to the rig `spec` in lockstep, through a line that can fail where `scenario` has faults.
@@ -187,7 +203,9 @@ impl Play<'_> {
         if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
             client.request(ToDevice::ClearFault)?;
         }
-        client.upload(&scene.image, &mut |_| {})?;
+        if client.refresh_capabilities()?.scene != Some(CRC.checksum(&scene.image)) {
+            client.upload(&scene.image, &mut |_| {})?;
+        }
         for (name, &value) in &scenario.parameters {
             if let Some(id) = parameter_named(name) {
                 client.request(ToDevice::SetParameter { id, value })?;

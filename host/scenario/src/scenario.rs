@@ -15,7 +15,7 @@ use mortise_rig::Faults;
 use serde::Deserialize;
 
 use crate::error::ScenarioError;
-use crate::outcome::{Bounds, Outcome};
+use crate::outcome::{Bounds, QUANTITIES, Quantity};
 
 /// A scenario.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -42,7 +42,7 @@ pub struct Scenario {
     pub press: Option<Press>,
     /// What goes wrong on the link while the hand moves.
     pub faults: Option<Faults>,
-    /// What must hold: a measured quantity's name and its bounds; see [`Outcome::quantity`].
+    /// What must hold: a measured quantity's name and its bounds; see [`QUANTITIES`].
     pub holds: BTreeMap<String, Bounds>,
 }
 
@@ -270,10 +270,11 @@ impl Scenario {
                     bounds.min, bounds.max
                 ));
             }
-            if !Outcome::knows(quantity) {
+            if Quantity::named(quantity).is_none() {
+                let known: Vec<&str> = QUANTITIES.iter().map(|known| known.name).collect();
                 return wrong(format!(
                     "holds.{quantity} is not measured; measured are {}",
-                    Outcome::QUANTITIES.join(", ")
+                    known.join(", ")
                 ));
             }
         }

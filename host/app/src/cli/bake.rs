@@ -9,7 +9,8 @@ use anyhow::Context as _;
 use mortise_bake::{BakeOptions, BakeReport, Grabbable, Method, Planned, PointshellKind, Progress, Request};
 use mortise_output::{Existing, Output, lines};
 
-use super::{Reading, units};
+use super::reading::Reading;
+use super::units;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]

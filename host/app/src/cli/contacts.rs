@@ -9,7 +9,7 @@ use mortise_mating::{Axis, Contact, Tolerances, identify};
 use mortise_output::lines;
 use serde::Serialize;
 
-use super::Reading;
+use super::reading::Reading;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]

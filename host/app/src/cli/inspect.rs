@@ -8,7 +8,7 @@ use mortise_brep::{CadModel, Part, Surface};
 use mortise_output::lines;
 use serde::Serialize;
 
-use super::Reading;
+use super::reading::Reading;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]

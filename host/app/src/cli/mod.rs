@@ -14,18 +14,13 @@ mod probe;
 mod reading;
 mod rig;
 mod units;
+mod window;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
 
-use clap::{Args, CommandFactory as _, Parser, Subcommand};
-use mortise_output::{Existing, Output, program};
+use clap::{CommandFactory as _, Parser, Subcommand};
+use mortise_output::program;
 use mortise_rig::RigSpec;
-
-use crate::session::Intent;
-use crate::ui::app::{self, Options, Screenshot};
-use reading::Reading;
 
 /// Name of the program.
 const NAME: &str = "mortise";
@@ -39,7 +34,7 @@ struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
-    open: Open,
+    open: window::Open,
 }
 
 #[derive(Debug, Subcommand)]
@@ -62,55 +57,7 @@ enum Command {
     /// Check, send or show the description of a rig
     Rig(rig::Args),
     /// Open the window
-    Open(Open),
-}
-
-/// Contents of the window at the start.
-#[derive(Debug, Args)]
-struct Open {
-    /// STEP file to open
-    file: Option<PathBuf>,
-    #[command(flatten)]
-    reading: Reading,
-    #[command(flatten)]
-    picture: Picture,
-}
-
-/// Options for automation.
-#[derive(Debug, Default, Args)]
-struct Picture {
-    /// Write a PNG of the window, then exit
-    #[arg(long, hide = true, value_name = "PNG")]
-    screenshot: Option<PathBuf>,
-    /// Replace an existing PNG
-    #[arg(long, hide = true, requires = "screenshot")]
-    force: bool,
-    /// Seconds from the start to the screenshot
-    #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
-    after: f64,
-    /// Draw fixed parts as glass
-    #[arg(long, hide = true)]
-    see_through: bool,
-    /// Connect to a rig at once
-    #[arg(long, hide = true, value_name = "RIG", value_parser = rig)]
-    connect: Option<RigSpec>,
-}
-
-impl Picture {
-    fn options(self, mut first: Vec<Intent>) -> anyhow::Result<Options> {
-        if let Some(rig) = self.connect {
-            first.extend([Intent::ChooseRig(rig), Intent::Connect]);
-        }
-        let existing = Existing::from_force(self.force);
-        let check = |file| Output::new(file, existing, &[""; 0]);
-        let file = self.screenshot.map(check).transpose()?;
-        let after = Duration::try_from_secs_f64(self.after).unwrap_or_default();
-        Ok(Options {
-            first,
-            screenshot: file.map(|file| Screenshot { file, after }),
-            see_through: self.see_through,
-        })
-    }
+    Open(window::Open),
 }
 
 /// Runs the program.
@@ -121,16 +68,16 @@ pub fn main() -> ExitCode {
     };
     let result = match cli {
         Cli { command: None, open } => {
-            let checked = open.file.as_deref().map_or(Ok(()), mistyped::check_lone);
-            checked.and_then(|()| window(open))
+            let checked = open.file().map_or(Ok(()), mistyped::check_lone);
+            checked.and_then(|()| window::open(open))
         }
         Cli {
             command: Some(command),
             ..
         } => match command {
             Command::Open(open) => {
-                let checked = open.file.as_deref().map_or(Ok(()), mistyped::check_file);
-                checked.and_then(|()| window(open))
+                let checked = open.file().map_or(Ok(()), mistyped::check_file);
+                checked.and_then(|()| window::open(open))
             }
             Command::Inspect(args) => inspect::run(&args),
             Command::Contacts(args) => contacts::run(&args),
@@ -145,14 +92,7 @@ pub fn main() -> ExitCode {
     program::end(NAME, result)
 }
 
-fn window(open: Open) -> anyhow::Result<ExitCode> {
-    open.reading.apply();
-    let first = open.file.map(Intent::Open).into_iter().collect();
-    app::run(open.picture.options(first)?)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Parses a rig from the command line.
+/// Reads a rig from the command line.
 fn rig(text: &str) -> Result<RigSpec, String> {
     text.parse()
         .map_err(|error: mortise_rig::SpecError| error.to_string())

@@ -7,7 +7,7 @@ use mortise_bake::{Method, PointshellKind};
 use mortise_output::lines;
 use mortise_scenario::probe::{self, Model, ProbeScene};
 
-use super::Reading;
+use super::reading::Reading;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
