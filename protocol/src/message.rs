@@ -526,7 +526,7 @@ pub enum Refusal {
     Rig(RigFault),
     /// This board's mechanism is compiled into its firmware.
     RigFixed,
-    /// The description in flash is damaged or of another release: send it again.
+    /// The board has no sound description of its rig in use: none was sent, or it is damaged or of another release.
     RigDamaged,
     /// The command carries no stamp of this session, or one already seen, or the board has stopped or faulted since it arrived.
     Outdated,

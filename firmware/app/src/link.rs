@@ -407,7 +407,13 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         if self.ends.shared.live() {
             return Err(self.refused_by_motors());
         }
-        if self.rig == Kept::Damaged {
+        // A simulated mechanism is a free handle without a description; what a real one is, nobody knows.
+        let known = match self.rig {
+            Kept::Rig(_) => true,
+            Kept::Nothing => self.simulated || !self.described,
+            Kept::Damaged => false,
+        };
+        if !known {
             return Err(Refusal::RigDamaged);
         }
         let number = self.store.current().ok_or(Refusal::NoScene)?.sequence;

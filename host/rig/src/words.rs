@@ -162,7 +162,7 @@ impl Words for Refusal {
             Self::Busy => "the board's queue is full: try again".into(),
             Self::Rig(fault) => fault.words(),
             Self::RigFixed => "this board's mechanism is compiled into its firmware: change it there, or use a board that takes a description".into(),
-            Self::RigDamaged => "the description of the rig in the board's flash is damaged or of another release: send it again (`mortise rig send`)".into(),
+            Self::RigDamaged => "the board has no sound description of its rig in use (none was sent, it is damaged, or it is of another release): send it (`mortise rig send`), which restarts the board".into(),
             Self::Outdated => {
                 "the command came late, twice, or from before the board's last stop, fault or greeting, and was not executed: check the rig, then repeat the command; if this recurs, connect again".into()
             }

@@ -37,16 +37,16 @@ impl Strings {
     }
 }
 
-pub struct Puppet<const SIMULATED: bool>(Strings);
+pub struct Puppet<const SIMULATED: bool, const DESCRIBED: bool>(Strings);
 
-impl<const SIMULATED: bool> Puppet<SIMULATED> {
+impl<const SIMULATED: bool, const DESCRIBED: bool> Puppet<SIMULATED, DESCRIBED> {
     pub fn new(strings: Strings) -> Self {
         Self(strings)
     }
 }
 
-impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
-    const DESCRIBED: bool = SIMULATED;
+impl<const SIMULATED: bool, const DESCRIBED: bool> Mechanism for Puppet<SIMULATED, DESCRIBED> {
+    const DESCRIBED: bool = DESCRIBED;
 
     fn sense(&mut self) -> Sensed {
         self.0.0.borrow().sensed
@@ -67,4 +67,4 @@ impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
     }
 }
 
-impl<const SIMULATED: bool> Simulation for Puppet<SIMULATED> {}
+impl<const SIMULATED: bool, const DESCRIBED: bool> Simulation for Puppet<SIMULATED, DESCRIBED> {}

@@ -67,9 +67,9 @@ impl Clock for TestClock {
 }
 
 /// Both planes on one thread.
-pub struct Bench<const SIMULATED: bool = true> {
+pub struct Bench<const SIMULATED: bool = true, const DESCRIBED: bool = true> {
     pub link: LinkPlane<'static, 'static, TestFlash>,
-    pub control: ControlPlane<'static, 'static, Puppet<SIMULATED>, TestClock>,
+    pub control: ControlPlane<'static, 'static, Puppet<SIMULATED, DESCRIBED>, TestClock>,
     pub strings: Strings,
     pub clock: TestClock,
     pub wire: Wire,
@@ -80,7 +80,7 @@ pub struct Bench<const SIMULATED: bool = true> {
     pub heard: VecDeque<FromDevice>,
 }
 
-impl Bench<true> {
+impl Bench {
     /// Started, greeted, with a scene of a fixed part 0 and a grabbable part 1.
     pub fn ready() -> Self {
         let mut bench = Self::new(TestFlash::leaked());
@@ -90,7 +90,7 @@ impl Bench<true> {
     }
 }
 
-impl<const SIMULATED: bool> Bench<SIMULATED> {
+impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
     /// Powered on; nothing said yet. Memory is leaked: a bench lives as long as its test.
     pub fn new(flash: TestFlash) -> Self {
         let channels = Box::leak(Box::new(Channels::new()));
