@@ -11,9 +11,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use libtest_mimic::{Arguments, Completion, Failed, Trial};
 use mortise_hil_tests::checks::{CHECKS, Check};
 use mortise_hil_tests::{PORT_VARIABLE, scenarios};
-use mortise_lab::LabError;
-use mortise_lab::scenario::{Outcome, PreparedScene, Scenario, connect, run_on};
 use mortise_rig::{Client, RigSpec, SERIAL_VARIABLE};
+use mortise_scenario::ScenarioError;
+use mortise_scenario::{Outcome, PreparedScene, Scenario, connect, run_on};
 
 fn main() -> ExitCode {
     // First: this program is also the process that reads STEP files for itself.
@@ -154,18 +154,18 @@ struct Bench {
 }
 
 impl Bench {
-    fn scene(&self, scenario: &Scenario) -> Result<Arc<PreparedScene>, LabError> {
+    fn scene(&self, scenario: &Scenario) -> Result<Arc<PreparedScene>, ScenarioError> {
         let key = format!("{:?}", scenario.scene);
         self.scenes.get(key, || PreparedScene::of(scenario).map(Arc::new))
     }
 
-    fn measure(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
+    fn measure(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError> {
         let scene = self.scene(scenario)?;
         let client = connect(scenario, spec)?;
         run_on(&client, scenario, &scene)
     }
 
-    fn outcome(&self, file: &Path, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, LabError> {
+    fn outcome(&self, file: &Path, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError> {
         let key = (file.to_owned(), spec.clone());
         self.outcomes.get(key, || self.measure(scenario, spec))
     }
@@ -173,12 +173,12 @@ impl Bench {
     fn scenario(&self, file: &Path, spec: &RigSpec) -> Result<Completion, Failed> {
         let scenario = Scenario::load(file)?;
         let outcome = match self.outcome(file, &scenario, spec) {
-            Err(error @ LabError::NeedsSimulatedHand { .. }) => {
+            Err(error @ ScenarioError::NeedsSimulatedHand { .. }) => {
                 return Ok(Completion::ignored_with(error.to_string()));
             }
             outcome => outcome?,
         };
-        let verdicts = outcome.verdicts(&scenario);
+        let verdicts = outcome.verdicts(&scenario.holds);
         let lines: Vec<String> = verdicts.iter().map(|verdict| format!("    {verdict}")).collect();
         let text = format!(
             "{} on {spec}, hash {}:\n{}\n    made, every {} ticks seen: at the handle {:.4} of {:.3} mJ, at the object by contacts {:.4} mJ, with targets {:.4} mJ",

@@ -11,13 +11,16 @@ use mortise_bake::Grabbable;
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_scenario::measure::depth;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{PreparedScene, Recording, Scenario};
 use serde::Serialize;
 
 use crate::LabError;
-use crate::chart::{Axis, Chart, Line, Look, Point, Series, write_stack};
+use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::guided::{SIM, inserted, insertion, largest_step, play_to};
-use crate::scenario::{PreparedScene, Recording, Scenario, depth, pose_mm};
 use crate::table::rounded;
 use crate::variant::Variant;
 
@@ -266,20 +269,9 @@ fn charts(courses: &[&Course]) -> Vec<Chart> {
         .collect()
 }
 
-/// Writes `blend-…mm.svg` and `.png`, a pair for each clearance.
-///
-/// # Errors
-/// `Unwritable`.
-pub fn draw(courses: &[Course], folder: &mortise_output::Folder) -> Result<(), LabError> {
-    for clearance in CLEARANCES_MM {
-        let of: Vec<&Course> = (courses.iter())
-            .filter(|course| course.clearance_mm == clearance)
-            .collect();
-        if !of.is_empty() {
-            write_stack(&charts(&of), folder, &format!("blend-{clearance}mm"))?;
-        }
-    }
-    Ok(())
+/// Name of the chart of a clearance.
+fn chart_name(clearance_mm: f64) -> String {
+    format!("blend-{clearance_mm}mm")
 }
 
 impl Guided {
@@ -307,6 +299,46 @@ impl fmt::Display for Course {
             Some(off) => write!(f, "; settled, {off:.1} µm off the axis"),
             None => write!(f, "; guidance never settled"),
         }
+    }
+}
+
+/// The experiment `blend`.
+pub struct Blend;
+
+impl Experiment for Blend {
+    fn name(&self) -> &'static str {
+        "blend"
+    }
+
+    fn about(&self) -> &'static str {
+        "Show force and engagement over an insertion, the thesis' blend beside the default guidance"
+    }
+
+    fn quick(&self) -> &'static str {
+        "the first clearance"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["blend"].map(String::from).into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        CLEARANCES_MM.map(chart_name).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let courses = sweep(form.quick, &mut |course| report(course))?;
+        let moments: Vec<&Moment> = courses.iter().flat_map(|course| &course.moments).collect();
+        let mut findings = Findings::default().rows("blend", &moments)?;
+        for clearance in CLEARANCES_MM {
+            let of: Vec<&Course> = (courses.iter())
+                .filter(|course| course.clearance_mm == clearance)
+                .collect();
+            if !of.is_empty() {
+                findings = findings.stack(chart_name(clearance), charts(&of));
+            }
+        }
+        Ok(findings)
     }
 }
 

@@ -9,12 +9,14 @@ use std::fmt;
 
 use mortise_bake::{Grabbable, SampleFormat};
 use mortise_rig::RigSpec;
+use mortise_scenario::{Bounds, Outcome, PreparedScene, Scenario, ScenarioError, connect, record};
 use serde::Serialize;
 
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
+use crate::exact_fit::made_from;
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
-use crate::scenario::{Bounds, Outcome, PreparedScene, Scenario, connect, record};
 use crate::variant::Variant;
 
 const SCENARIO: &str = include_str!("../data/tight_insertion.toml");
@@ -64,7 +66,7 @@ pub fn trial(variant: &Variant, fit: &Fit, spec: &RigSpec) -> Result<(Trial, Opt
     };
     scenario.holds.insert("penetration_mm".into(), deepest);
     let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
-    let scene = PreparedScene::with(&scenario, &options)?.made_from(*fit);
+    let scene = made_from(PreparedScene::with(&scenario, &options)?, *fit);
     let mut trial = Trial {
         kind: variant.kind(),
         cell_mm: variant.cell_mm,
@@ -79,14 +81,14 @@ pub fn trial(variant: &Variant, fit: &Fit, spec: &RigSpec) -> Result<(Trial, Opt
     };
     let recording = match record(&connect(&scenario, spec)?, &scenario, &scene, None) {
         Ok(recording) => recording,
-        Err(fault @ LabError::Fault { .. }) => {
+        Err(fault @ ScenarioError::Fault { .. }) => {
             trial.why = fault.to_string();
             return Ok((trial, None));
         }
-        Err(error) => return Err(error),
+        Err(error) => return Err(error.into()),
     };
     let outcome = recording.outcome;
-    let verdicts = outcome.verdicts(&scenario);
+    let verdicts = outcome.verdicts(&scenario.holds);
     let broken: Vec<String> = (verdicts.iter().filter(|verdict| !verdict.holds))
         .map(|verdict| verdict.what.clone())
         .collect();
@@ -202,6 +204,44 @@ impl fmt::Display for Trial {
         } else {
             write!(f, " ({})", self.why)
         }
+    }
+}
+
+/// The experiment `clearance`.
+pub struct Clearance;
+
+impl Experiment for Clearance {
+    fn name(&self) -> &'static str {
+        "clearance"
+    }
+
+    fn about(&self) -> &'static str {
+        "Find the smallest clearance that assembles, by method and cell"
+    }
+
+    fn quick(&self) -> &'static str {
+        "one cell of each kind"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["clearance"].map(String::from).into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        ["clearance"].map(String::from).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let mut trials = Vec::new();
+        for variant in variants(form.quick) {
+            smallest(&variant, &CLEARANCES_MM, &mut |trial| {
+                report(&trial);
+                trials.push(trial);
+            })?;
+        }
+        Ok(Findings::default()
+            .rows("clearance", &trials)?
+            .chart("clearance", chart(&trials)))
     }
 }
 

@@ -12,10 +12,10 @@ use mortise_rig::RigSpec;
 use serde::Deserialize;
 
 pub(crate) mod written;
+use mortise_scenario::{Bounds, Hand, Key, Run, Scenario, ScenarioError, Scene, Shell};
 
 use self::written::Written;
 use crate::LabError;
-use crate::scenario::{self, Bounds, Hand, Key, Run, Scenario, Scene, Shell};
 
 /// How far the hand takes a part along each axis, mm.
 const SWEEP_MM: f64 = 30.0;
@@ -168,9 +168,11 @@ pub fn assemblies(cad: &Path, seconds: f64) -> Result<Vec<Moved>, LabError> {
             .into_owned();
         let spec = RigSpec::Simulated { realtime: false };
         let (scenario, part) = sweep(&path, &model, seconds);
-        let (outcome, failed) = match scenario::run(&scenario, &spec) {
+        let (outcome, failed) = match mortise_scenario::run(&scenario, &spec) {
             Ok(outcome) => (Ok((part, outcome.image_bytes)), outcome.missed_ticks > 0),
-            Err(error @ LabError::Bake { .. }) => (Err(error.to_string()), error.to_string().contains('\n')),
+            Err(error @ ScenarioError::Bake { .. }) => {
+                (Err(error.to_string()), error.to_string().contains('\n'))
+            }
             Err(error) => (Err(error.to_string()), true),
         };
         moved.push(Moved {

@@ -2,6 +2,10 @@
 
 use std::path::PathBuf;
 
+use mortise_brep::BrepError;
+use mortise_rig::RigError;
+use mortise_scenario::ScenarioError;
+
 /// Why an experiment could not be made. A bound that does not hold is no error but a verdict.
 #[derive(Debug, thiserror::Error)]
 pub enum LabError {
@@ -24,14 +28,6 @@ pub enum LabError {
     /// A table or chart is not written.
     #[error(transparent)]
     Output(#[from] mortise_output::OutputError),
-    /// A scenario is not written as it should be.
-    #[error("{name}: {what}")]
-    Scenario {
-        /// File or name of the scenario.
-        name: String,
-        /// What is wrong, where.
-        what: String,
-    },
     /// Something given to an experiment cannot be used.
     #[error("{name}: {what}")]
     Input {
@@ -40,48 +36,9 @@ pub enum LabError {
         /// What is wrong, and what to do.
         what: String,
     },
-    /// The STEP file could not be read.
+    /// A scenario could not be played, or a scene not read, baked or probed.
     #[error(transparent)]
-    Brep(#[from] mortise_brep::BrepError),
-    /// The model could not be baked.
-    #[error("{step}: {source}")]
-    Bake {
-        /// STEP file.
-        step: String,
-        /// Why.
-        source: mortise_bake::BakeError,
-    },
-    /// The scene has no part of this name.
-    #[error("{step} has no part `{part}`; it has {known}")]
-    NoSuchPart {
-        /// STEP file.
-        step: String,
-        /// Asked for.
-        part: String,
-        /// Names there are.
-        known: String,
-    },
-    /// The rig could not be used.
-    #[error(transparent)]
-    Rig(#[from] mortise_rig::RigError),
-    /// The scenario moves the handle, and nobody does on this rig.
-    #[error(
-        "{rig} has a real mechanism: the scenario `{scenario}` needs a simulated hand; run it on `sim` or `emulated`"
-    )]
-    NeedsSimulatedHand {
-        /// Rig.
-        rig: String,
-        /// Scenario.
-        scenario: String,
-    },
-    /// The board reported a fault while the scenario ran.
-    #[error("the board reported a fault at tick {tick}: {what}")]
-    Fault {
-        /// Tick.
-        tick: u32,
-        /// Words for it.
-        what: String,
-    },
+    Scenario(#[from] ScenarioError),
     /// There are no figures of this name.
     #[error("there are no figures named `{name}`; there are: {known}")]
     NoSuchFigures {
@@ -98,4 +55,16 @@ pub enum LabError {
         /// What the operating system said.
         source: std::io::Error,
     },
+}
+
+impl From<BrepError> for LabError {
+    fn from(error: BrepError) -> Self {
+        Self::Scenario(error.into())
+    }
+}
+
+impl From<RigError> for LabError {
+    fn from(error: RigError) -> Self {
+        Self::Scenario(error.into())
+    }
 }

@@ -15,6 +15,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec3};
+use mortise_scenario::PreparedScene;
 
 use crate::fit::Fit;
 
@@ -32,6 +33,12 @@ pub(crate) struct ExactFit {
     placed: DAffine3,
 }
 
+/// `scene`, known to be made from `fit`: penetration is then measured in closed form.
+pub(crate) fn made_from(scene: PreparedScene, fit: Fit) -> PreparedScene {
+    let exact = ExactFit::of(&scene, fit);
+    scene.with_closed_form(Box::new(move |pose| exact.penetration_mm(pose)))
+}
+
 /// The peg at a pose.
 #[derive(Clone, Copy, Debug)]
 struct Peg {
@@ -44,11 +51,11 @@ struct Peg {
 }
 
 impl ExactFit {
-    /// Of `fit`; `placed` is the placement its file gives the peg.
-    pub fn new(fit: Fit, placed: DAffine3) -> Self {
+    /// The peg and the hole of `fit`, from which `scene` was made.
+    pub fn of(scene: &PreparedScene, fit: Fit) -> Self {
         Self {
             fit,
-            placed: placed.inverse(),
+            placed: scene.placement().inverse(),
         }
     }
 

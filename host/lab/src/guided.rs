@@ -7,12 +7,14 @@ use glam::DVec3;
 use mortise_guide::{Guide, GuideSettings};
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
 use mortise_rig::{EmulatedMode, RigSpec};
+use mortise_scenario::measure::depth;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{Depth, Key, PreparedScene, Recording, Scenario, connect, record};
 use tempfile::{Builder, NamedTempFile};
 
 use crate::LabError;
 use crate::exact_fit::ExactFit;
 use crate::fit::Fit;
-use crate::scenario::{Depth, Key, PreparedScene, Recording, Scenario, connect, depth, pose_mm, record};
 
 const GUIDED: &str = include_str!("../../../hil-tests/scenarios/guided_fit.toml");
 
@@ -96,7 +98,8 @@ pub(crate) fn play_with(
     guide: &mut Guide<'_>,
 ) -> Result<Recording, LabError> {
     let mut listener = |sample: &Telemetry| guide.hear(sample);
-    record(&connect(scenario, spec)?, scenario, scene, Some(&mut listener))
+    let client = connect(scenario, spec)?;
+    Ok(record(&client, scenario, scene, Some(&mut listener))?)
 }
 
 /// Plays `scenario` while `listener` says what to send.
@@ -106,7 +109,12 @@ pub(crate) fn play_to(
     spec: &RigSpec,
     listener: &mut dyn FnMut(&Telemetry) -> Vec<ToDevice>,
 ) -> Result<Recording, LabError> {
-    record(&connect(scenario, spec)?, scenario, scene, Some(listener))
+    Ok(record(
+        &connect(scenario, spec)?,
+        scenario,
+        scene,
+        Some(listener),
+    )?)
 }
 
 /// The first target that the guide makes of what touches when `scenario` is played in-process without any.

@@ -18,13 +18,16 @@ use mortise_guide::GuideSettings;
 use mortise_protocol::image::{BRICK_CELLS, Field, NO_FACE, SceneImage, Voxel};
 use mortise_protocol::message::{Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_scenario::measure::depth;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{Depth, PreparedScene, Scenario, ScenarioError};
 use serde::Serialize;
 
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::guided::{SIM, inserted, key, play_to};
-use crate::scenario::{Depth, PreparedScene, Scenario, depth, pose_mm};
 use crate::study::faas::{FIG_35_HZ, TABLE_6};
 use crate::table::rounded;
 use crate::variant::Variant;
@@ -204,7 +207,7 @@ pub fn counts() -> Result<Vec<Count>, LabError> {
         let file = fit(peg, CASES[0].engaged_mm).file()?;
         let model = load_step(file.path())?;
         let options = Variant::textbook(VOXEL_MM).options(Grabbable::Named(vec!["peg".into()]));
-        let named = |source| LabError::Bake {
+        let named = |source| ScenarioError::Bake {
             step: "the pair of table 6".into(),
             source,
         };
@@ -547,5 +550,44 @@ impl fmt::Display for Count {
             "table 6, {}: Faas {} voxels, ours {} ({:+.2} %)",
             self.part, self.faas, self.ours, self.off_percent
         )
+    }
+}
+
+/// The experiment `hybrid`.
+pub struct Hybrid;
+
+impl Experiment for Hybrid {
+    fn name(&self) -> &'static str {
+        "hybrid"
+    }
+
+    fn about(&self) -> &'static str {
+        "The thesis' hybrid method on voxmaps: its three methods on its two pegs, beside table 6 and fig. 35"
+    }
+
+    fn quick(&self) -> &'static str {
+        "the low-clearance peg in the first case"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["hybrid", "hybrid-rate", "hybrid-table-6"]
+            .map(String::from)
+            .into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        ["hybrid"].map(String::from).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let counts = counts()?;
+        counts.iter().for_each(|count| report(count));
+        let courses = sweep(form.quick, &mut |course| report(course))?;
+        let windows: Vec<&Window> = courses.iter().flat_map(|course| &course.windows).collect();
+        Ok(Findings::default()
+            .rows("hybrid-table-6", &counts)?
+            .rows("hybrid", &courses)?
+            .rows("hybrid-rate", &windows)?
+            .chart("hybrid", chart(&courses)))
     }
 }

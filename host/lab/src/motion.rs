@@ -6,10 +6,10 @@ use mortise_bake::{BakeReport, Grabbable, bake};
 use mortise_brep::load_step;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, RigSpec};
+use mortise_scenario::{Bounds, Key, Outcome, PreparedScene, Press, Scenario, ScenarioError, run_on};
 
 use crate::error::LabError;
 use crate::fit::Fit;
-use crate::scenario::{Bounds, Key, Outcome, PreparedScene, Press, Scenario, run_on};
 use crate::variant::Variant;
 
 const PRESSED: &str = include_str!("../data/pressed.toml");
@@ -143,7 +143,7 @@ pub fn play(
     let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
     let scene = PreparedScene::with(&scenario, &options)?;
     let outcome = run_on(&Client::connect(&spec.lockstep())?, &scenario, &scene)?;
-    let broken = (outcome.verdicts(&scenario).iter())
+    let broken = (outcome.verdicts(&scenario.holds).iter())
         .filter(|verdict| !verdict.holds)
         .map(ToString::to_string)
         .collect();
@@ -158,10 +158,11 @@ pub fn report(variant: &Variant, fit: &Fit) -> Result<BakeReport, LabError> {
     let file = fit.file()?;
     let model = load_step(file.path())?;
     let options = variant.options(Grabbable::Named(vec!["peg".into()]));
-    let baked = bake(&model, &options, &|_| ControlFlow::Continue(())).map_err(|source| LabError::Bake {
-        step: file.path().display().to_string(),
-        source,
-    })?;
+    let baked =
+        bake(&model, &options, &|_| ControlFlow::Continue(())).map_err(|source| ScenarioError::Bake {
+            step: file.path().display().to_string(),
+            source,
+        })?;
     Ok(baked.report)
 }
 

@@ -9,11 +9,13 @@ use std::fmt;
 use mortise_bake::SampleFormat;
 use mortise_protocol::message::Refusal;
 use mortise_rig::{EmulatedMode, RigError, RigSpec};
+use mortise_scenario::ScenarioError;
 use serde::Serialize;
 
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::clearance::{CELLS_MM, CLEARANCES_MM, smallest};
 use crate::error::LabError;
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::motion::{Motion, play};
 use crate::peer;
@@ -127,12 +129,12 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
     let instructions = match play(variant, &Fit::thesis(COUNTED_MM), pressed, None, &board) {
         Ok((outcome, _)) => outcome.instructions_per_tick_max,
         // A model too coarse for the fit pushes until the board gives up: it has no cost then.
-        Err(LabError::Fault { .. }) => None,
+        Err(LabError::Scenario(ScenarioError::Fault { .. })) => None,
         // One too large for the board is never looked at there.
-        Err(LabError::Rig(RigError::Refused {
+        Err(LabError::Scenario(ScenarioError::Rig(RigError::Refused {
             reason: Refusal::SceneTooLarge { .. },
             ..
-        })) => None,
+        }))) => None,
         Err(error) => return Err(error),
     };
     let smallest = if looked_for {
@@ -271,6 +273,39 @@ impl fmt::Display for Entry {
             write!(f, "; assembles down to {smallest} µm")?;
         }
         Ok(())
+    }
+}
+
+/// The experiment `pareto`.
+pub struct Pareto;
+
+impl Experiment for Pareto {
+    fn name(&self) -> &'static str {
+        "pareto"
+    }
+
+    fn about(&self) -> &'static str {
+        "Hold accuracy against cost: error, smallest clearance, instructions, nanoseconds, bytes"
+    }
+
+    fn quick(&self) -> &'static str {
+        "fewer models"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["pareto"].map(String::from).into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        ["pareto-ticks", "pareto-time"].map(String::from).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let entries = sweep(form.quick, &mut |entry| report(entry))?;
+        Ok(Findings::default()
+            .rows("pareto", &entries)?
+            .chart("pareto-ticks", ticks_chart(&entries))
+            .chart("pareto-time", time_chart(&entries)))
     }
 }
 

@@ -11,13 +11,16 @@ use mortise_bake::Grabbable;
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_scenario::measure::depth;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{PreparedScene, Recording, Scenario};
 use serde::Serialize;
 
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::guided::{emulated, inserted, key, known_target, play_to, refreshed};
-use crate::scenario::{PreparedScene, Recording, Scenario, depth, pose_mm};
 use crate::table::rounded;
 use crate::variant::Variant;
 
@@ -370,6 +373,43 @@ impl fmt::Display for Course {
             self.slowest_hz,
             self.missed_ticks
         )
+    }
+}
+
+/// The experiment `rate`.
+pub struct Rate;
+
+impl Experiment for Rate {
+    fn name(&self) -> &'static str {
+        "rate"
+    }
+
+    fn about(&self) -> &'static str {
+        "Show the rate that a tick allows over an insertion: collision only, guided, guided with recognition; emulated board"
+    }
+
+    fn quick(&self) -> &'static str {
+        "the first two pairs"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["rate"].map(String::from).into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        PAIRS.map(|pair| pair.name.to_owned()).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let courses = sweep(form.quick, &mut |course| report(course))?;
+        let windows: Vec<&Window> = courses.iter().flat_map(|course| &course.windows).collect();
+        let mut findings = Findings::default().rows("rate", &windows)?;
+        for pair in &PAIRS {
+            if courses.iter().any(|course| course.pair == pair.name) {
+                findings = findings.chart(pair.name, chart(pair, &courses));
+            }
+        }
+        Ok(findings)
     }
 }
 

@@ -8,10 +8,10 @@ use std::io::Write as _;
 use glam::{DQuat, DVec3};
 use mortise_bake::{BakeOptions, Grabbable};
 use mortise_brep::{CadModel, LoadOptions, load_step_with};
+use mortise_scenario::probe::{NamedPose, Pair, ProbeRow, ProbeScene};
 use tempfile::{Builder, NamedTempFile};
 
 use crate::error::LabError;
-use crate::probe::{NamedPose, Pair, ProbeRow, ProbeScene};
 use crate::variant::Variant;
 
 /// Its STEP text; parts `block` and `peg`.

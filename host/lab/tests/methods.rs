@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::{DQuat, DVec3};
 use mortise_bake::{Method, PointshellKind};
 use mortise_brep::load_step;
-use mortise_lab::probe::{Model, NamedPose, ProbeRow, ProbeScene, Resolution};
+use mortise_scenario::probe::{Model, NamedPose, ProbeRow, ProbeScene, Resolution};
 
 /// Block of 40 mm with a hole of 18.75 mm through it, along z from its top at z = 0; peg of 18.73 × 60 mm.
 fn file() -> PathBuf {

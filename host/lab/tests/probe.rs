@@ -5,10 +5,10 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
-use mortise_lab::LabError;
-use mortise_lab::probe::{NamedPose, ProbeScene, Resolution, read_poses};
 use mortise_lab::scene_p::{By, aside, ask};
 use mortise_lab::variant::Variant;
+use mortise_scenario::ScenarioError;
+use mortise_scenario::probe::{NamedPose, ProbeScene, Resolution, read_poses};
 
 /// Gaps: the samples along circles are as dense as a bound of 5 µm asks (cell/100), which between curves as alike as these leaves a tenth of
 /// a micrometre, but a peg against a flat may come between two samples.
@@ -86,11 +86,11 @@ fn force_points_out_of_the_wall() {
 #[test]
 fn mistakes_are_one_line() {
     let absent = read_poses(Path::new("absent.csv")).expect_err("there is none");
-    assert!(matches!(absent, LabError::Unreadable { .. }), "{absent}");
+    assert!(matches!(absent, ScenarioError::Unreadable { .. }), "{absent}");
     let absent = ProbeScene::load(Path::new("absent.step"), None)
         .err()
         .expect("there is none");
-    assert!(matches!(absent, LabError::Unreadable { .. }), "{absent}");
+    assert!(matches!(absent, ScenarioError::Unreadable { .. }), "{absent}");
     let scene = ProbeScene::load(&file(), Some(2.0)).expect("the file is part of the sources");
     let unknown = scene.pair("pin", None).expect_err("there is none");
     assert!(unknown.to_string().contains("no part `pin`"), "{unknown}");

@@ -15,7 +15,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     let consent = Consent::take(&mut arguments);
     let mut headless = arguments.iter().any(|argument| argument == "--headless");
     if !headless && !display_is_there() {
-        eprintln!("There is no display here: running with --headless.");
+        eprintln!("There is no display here: running with --headless, and building without the window.");
         arguments.push("--headless".to_owned());
         headless = true;
     }
@@ -46,7 +46,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
             (true, None) => arguments.extend(["--rig".to_owned(), "emulated".to_owned()]),
         }
     }
-    run(&program::build_mortise(&root)?, &arguments)
+    run(&program::build_mortise(&root, !headless)?, &arguments)
 }
 
 fn run(program: &Path, arguments: &[String]) -> Result<ExitCode> {

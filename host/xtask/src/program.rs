@@ -10,6 +10,60 @@ use crate::shell;
 
 /// Package and program name of the desktop program.
 pub const MORTISE: &str = "mortise";
+/// Package and program name of the experiments.
+pub const LAB: &str = "mortise-lab";
+
+/// The programs that a person runs, built.
+#[derive(Clone, Debug)]
+pub struct Programs {
+    /// [`MORTISE`].
+    pub mortise: PathBuf,
+    /// [`LAB`], beside it.
+    pub lab: PathBuf,
+}
+
+impl Programs {
+    /// Both, among executables as (target's name, path).
+    ///
+    /// # Errors
+    /// When one is not among them.
+    pub fn pick(made: &[(String, PathBuf)]) -> Result<Self> {
+        Ok(Self {
+            mortise: pick(made, MORTISE)?,
+            lab: pick(made, LAB)?,
+        })
+    }
+
+    /// Builds both in the release profile.
+    ///
+    /// # Errors
+    /// When one does not compile.
+    pub fn build(root: &Path) -> Result<Self> {
+        let mut command = shell::cargo(root);
+        command.args([
+            "build",
+            "--release",
+            "--package",
+            MORTISE,
+            "--package",
+            LAB,
+            "--bins",
+        ]);
+        Self::pick(&build(&mut command).context("the programs `mortise` and `mortise-lab` do not build")?)
+    }
+
+    /// Both where an earlier build left them in `folder`.
+    pub fn built(folder: &Path) -> Option<Self> {
+        let path = |name: &str| {
+            let path = folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+            path.is_file().then_some(path)
+        };
+        Some(Self {
+            mortise: path(MORTISE)?,
+            lab: path(LAB)?,
+        })
+    }
+}
 
 /// Runs `build` (a `cargo build …`) and returns the executables it made, as (target's name, path).
 ///
@@ -22,26 +76,27 @@ pub fn build(build: &mut Command) -> Result<Vec<(String, PathBuf)>> {
     Ok(made)
 }
 
-/// Builds the desktop program in the release profile and returns its path.
+/// Builds the desktop program in the release profile and returns its path. Without its window it takes a third of the time.
 ///
 /// # Errors
 /// When the package is missing or does not compile.
-pub fn build_mortise(root: &Path) -> Result<PathBuf> {
+pub fn build_mortise(root: &Path, window: bool) -> Result<PathBuf> {
     let mut command = shell::cargo(root);
     command.args(["build", "--release", "--package", MORTISE, "--bin", MORTISE]);
-    pick(
-        build(&mut command).context("the program `mortise` (host/app) does not build")?,
-        MORTISE,
-    )
+    if !window {
+        command.arg("--no-default-features");
+    }
+    let made = build(&mut command).context("the program `mortise` (host/app) does not build")?;
+    pick(&made, MORTISE)
 }
 
 /// The executable called `name` among `made`.
 ///
 /// # Errors
 /// When the build made none of that name.
-pub fn pick(made: Vec<(String, PathBuf)>, name: &str) -> Result<PathBuf> {
-    match made.into_iter().find(|(target, _)| target == name) {
-        Some((_, path)) => Ok(path),
+pub fn pick(made: &[(String, PathBuf)], name: &str) -> Result<PathBuf> {
+    match made.iter().find(|(target, _)| target == name) {
+        Some((_, path)) => Ok(path.clone()),
         None => bail!("the build made no program called `{name}`"),
     }
 }

@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
-use mortise_lab::scenario::{self, Outcome, Scenario};
+use mortise_output::lines;
 use mortise_rig::{EmulatedMode, RigSpec};
+use mortise_scenario::{PreparedScene, Scenario, connect_with_scene, report, run_on};
 
-use super::{Picture, Reading, output};
-use crate::session::Intent;
-use crate::ui::app;
+use super::reading::Reading;
+use super::{mistyped, window};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -27,7 +28,7 @@ pub struct Args {
     #[command(flatten)]
     reading: Reading,
     #[command(flatten)]
-    picture: Picture,
+    picture: window::Picture,
 }
 
 /// Runs it.
@@ -37,16 +38,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return headless(&args);
     }
     if let Some(file) = &args.file {
-        super::mistyped::check_file(file)?;
+        mistyped::check_file(file)?;
     }
-    let mut first = Vec::new();
-    first.extend(args.file.map(Intent::Open));
-    first.push(Intent::Demo(args.rig));
-    let mut options = args.picture.options(first)?;
-    // What happens in a hole is seen through its walls.
-    options.see_through = true;
-    app::run(options)?;
-    Ok(ExitCode::SUCCESS)
+    window::demo(args.file, args.rig, args.picture)
 }
 
 fn headless(args: &Args) -> anyhow::Result<ExitCode> {
@@ -54,7 +48,7 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     // The sample's file is removed when this is dropped, after the run.
     let sample = match &args.file {
         Some(_) => None,
-        None => Some(crate::sample::File::write()?),
+        None => Some(mortise_scenario::sample::File::write()?),
     };
     let step = match (&args.file, &sample) {
         (Some(file), _) => file.as_path(),
@@ -62,18 +56,23 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
         (None, None) => anyhow::bail!("there is no file to open"),
     };
     let scenario = Scenario::insertion(step)?;
-    let outcome = scenario::run(&scenario, &rig)?;
-    let verdicts = outcome.verdicts(&scenario);
+    let began = Instant::now();
+    let scene = PreparedScene::of(&scenario)?;
+    let client = connect_with_scene(&scenario, &rig, &scene)?;
+    // Standard output carries the result alone.
+    eprintln!(
+        "{rig}: ready after {:.1} s, playing",
+        began.elapsed().as_secs_f64()
+    );
+    let outcome = run_on(&client, &scenario, &scene)?;
+    let verdicts = outcome.verdicts(&scenario.holds);
     if args.json {
-        output::json(&outcome)?;
+        lines::json(&outcome)?;
     } else {
-        table(&outcome)?;
-        for verdict in &verdicts {
-            output::line(&format!("  {verdict}"))?;
-        }
+        lines::text(&report(&outcome, &verdicts))?;
     }
     let holds = verdicts.iter().all(|verdict| verdict.holds);
-    if !holds {
+    if args.json {
         for verdict in verdicts.iter().filter(|verdict| !verdict.holds) {
             eprintln!("mortise: {verdict}");
         }
@@ -83,25 +82,6 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
-}
-
-fn table(outcome: &Outcome) -> anyhow::Result<()> {
-    let millimetres = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |v| format!("{v:.2}"));
-    output::line(&format!(
-        "{} on {} ({}): inserted {} of {} mm in {} ticks, {} missed, at most {:.2} N",
-        outcome.scenario,
-        outcome.rig,
-        outcome.board,
-        millimetres(outcome.inserted_mm),
-        millimetres(outcome.hole_mm),
-        outcome.ticks,
-        outcome.missed_ticks,
-        outcome.peak_force_n,
-    ))?;
-    if let Some(instructions) = outcome.instructions_per_tick_max {
-        output::line(&format!("  dearest tick: {instructions} instructions"))?;
-    }
-    output::line(&format!("  state hash: {}", outcome.state_hash))
 }
 
 /// The emulated board when it is there, else in-process, with a word about it.

@@ -1,13 +1,14 @@
-//! `mortise inspect`: what a STEP file holds.
+//! `mortise inspect`: contents of a STEP file.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use mortise_brep::{CadModel, Part, Surface};
+use mortise_output::lines;
 use serde::Serialize;
 
-use super::{Reading, output};
+use super::reading::Reading;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -44,7 +45,7 @@ struct PartReport<'a> {
     color: Option<[f32; 3]>,
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     args.reading.apply();
     let model = mortise_brep::load_step(&args.file)?;
@@ -56,7 +57,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         warnings: &model.warnings,
     };
     if args.json {
-        output::json(&report)?;
+        lines::json(&report)?;
     } else {
         table(&report)?;
     }
@@ -98,7 +99,7 @@ fn kind(surface: &Surface) -> &'static str {
 
 fn table(report: &Report<'_>) -> anyhow::Result<()> {
     let count = report.parts.len();
-    output::line(&format!(
+    lines::text(&format!(
         "{count} part{}, unit {}",
         if count == 1 { "" } else { "s" },
         report.unit
@@ -112,7 +113,7 @@ fn table(report: &Report<'_>) -> anyhow::Result<()> {
         };
         let mut name = part.path.to_vec();
         name.push(part.name.to_owned());
-        output::line(&format!(
+        lines::text(&format!(
             "  {}: {:.1} mm³, {shell}, faces: {}",
             name.join(" / "),
             part.volume_mm3,
@@ -120,7 +121,7 @@ fn table(report: &Report<'_>) -> anyhow::Result<()> {
         ))?;
     }
     for warning in report.warnings {
-        output::line(&format!("  warning: {warning}"))?;
+        lines::text(&format!("  warning: {warning}"))?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
-//! Commands: the same work as in the window, without one. Each has `--json`.
+//! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: a figure did not hold, or the insertion did not come to its end; 2: not possible, with one line on
-//! standard error that says why.
+//! Exit code 0: done; 1: the insertion was not completed; 2: not possible, with one line on standard error that
+//! gives the reason.
 
 mod bake;
 mod contacts;
@@ -9,49 +9,46 @@ mod demo;
 mod inspect;
 mod lab;
 mod mistyped;
-mod output;
 mod ports;
 mod probe;
 mod reading;
 mod rig;
 mod units;
-mod usage;
+mod window;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
-use mortise_output::{Existing, Output};
+use clap::{CommandFactory as _, Parser, Subcommand};
+use mortise_output::program;
 use mortise_rig::RigSpec;
 
-use crate::session::Intent;
-use crate::ui::app::{self, Options, Screenshot};
-use reading::Reading;
+/// Name of the program.
+const NAME: &str = "mortise";
 
 /// Feel whether CAD parts go together, before anything is made.
 ///
 /// Without a command the window opens.
 #[derive(Debug, Parser)]
-#[command(name = "mortise", version, args_conflicts_with_subcommands = true)]
+#[command(name = NAME, version, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
-    open: Open,
+    open: window::Open,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Say what a STEP file holds: parts, faces, volumes, and what was lost
+    /// List the contents of a STEP file: parts, faces, volumes, and import losses
     Inspect(inspect::Args),
-    /// Find which faces of which parts touch, and how
+    /// Find which faces of which parts touch, and the kinds of contact
     Contacts(contacts::Args),
-    /// Turn a STEP file into a scene image for the board
+    /// Convert a STEP file to a scene image (collision model) for the board
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
     Demo(demo::Args),
-    /// Run experiments and measure figures
+    /// Experiments and figures: the program `mortise-lab`
+    #[command(hide = true)]
     Lab(lab::Args),
     /// Measure gap, depth and contact forces at given poses of one part
     Probe(probe::Args),
@@ -60,75 +57,27 @@ enum Command {
     /// Check, send or show the description of a rig
     Rig(rig::Args),
     /// Open the window
-    Open(Open),
-}
-
-/// What the window starts with.
-#[derive(Debug, Args)]
-struct Open {
-    /// STEP file to open
-    file: Option<PathBuf>,
-    #[command(flatten)]
-    reading: Reading,
-    #[command(flatten)]
-    picture: Picture,
-}
-
-/// For automation.
-#[derive(Debug, Default, Args)]
-struct Picture {
-    /// Write a PNG of the window, then end
-    #[arg(long, hide = true, value_name = "PNG")]
-    screenshot: Option<PathBuf>,
-    /// Replace the PNG where it is there already
-    #[arg(long, hide = true, requires = "screenshot")]
-    force: bool,
-    /// Seconds from the start to the picture
-    #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
-    after: f64,
-    /// Draw fixed parts as glass
-    #[arg(long, hide = true)]
-    see_through: bool,
-    /// Connect to a rig at once
-    #[arg(long, hide = true, value_name = "RIG", value_parser = rig)]
-    connect: Option<RigSpec>,
-}
-
-impl Picture {
-    fn options(self, mut first: Vec<Intent>) -> anyhow::Result<Options> {
-        if let Some(rig) = self.connect {
-            first.extend([Intent::ChooseRig(rig), Intent::Connect]);
-        }
-        let existing = Existing::from_force(self.force);
-        let check = |file| Output::new(file, existing, &[""; 0]);
-        let file = self.screenshot.map(check).transpose()?;
-        let after = Duration::try_from_secs_f64(self.after).unwrap_or_default();
-        Ok(Options {
-            first,
-            screenshot: file.map(|file| Screenshot { file, after }),
-            see_through: self.see_through,
-        })
-    }
+    Open(window::Open),
 }
 
 /// Runs the program.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return usage::tell(&error),
+        Err(error) => return program::usage(NAME, &error, Cli::command()),
     };
     let result = match cli {
         Cli { command: None, open } => {
-            let checked = open.file.as_deref().map_or(Ok(()), mistyped::check_lone);
-            checked.and_then(|()| window(open))
+            let checked = open.file().map_or(Ok(()), mistyped::check_lone);
+            checked.and_then(|()| window::open(open))
         }
         Cli {
             command: Some(command),
             ..
         } => match command {
             Command::Open(open) => {
-                let checked = open.file.as_deref().map_or(Ok(()), mistyped::check_file);
-                checked.and_then(|()| window(open))
+                let checked = open.file().map_or(Ok(()), mistyped::check_file);
+                checked.and_then(|()| window::open(open))
             }
             Command::Inspect(args) => inspect::run(&args),
             Command::Contacts(args) => contacts::run(&args),
@@ -140,55 +89,11 @@ pub fn main() -> ExitCode {
             Command::Rig(args) => rig::run(&args),
         },
     };
-    match result {
-        Ok(code) => code,
-        Err(error) if output::is_closed(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("mortise: {}", one_line(&error));
-            ExitCode::from(2)
-        }
-    }
-}
-
-/// An error with its causes in one line; a cause that the message before it already tells is not told again.
-fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain() {
-        let text = cause.to_string().replace('\n', " ");
-        if line.is_empty() {
-            line = text;
-        } else if !line.contains(&text) {
-            line = format!("{line}: {text}");
-        }
-    }
-    line
-}
-
-fn window(open: Open) -> anyhow::Result<ExitCode> {
-    open.reading.apply();
-    let first = open.file.map(Intent::Open).into_iter().collect();
-    app::run(open.picture.options(first)?)?;
-    Ok(ExitCode::SUCCESS)
+    program::end(NAME, result)
 }
 
 /// Reads a rig from the command line.
 fn rig(text: &str) -> Result<RigSpec, String> {
     text.parse()
         .map_err(|error: mortise_rig::SpecError| error.to_string())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_error_is_one_line_that_tells_each_cause_once() {
-        let cause = anyhow::anyhow!("no room\non the disk");
-        let told = cause.context("cannot write x: no room on the disk");
-        assert_eq!(one_line(&told), "cannot write x: no room on the disk");
-        assert_eq!(
-            one_line(&told.context("baking")),
-            "baking: cannot write x: no room on the disk"
-        );
-    }
 }

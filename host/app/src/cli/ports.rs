@@ -1,10 +1,9 @@
-//! `mortise ports`: the rigs there are.
+//! `mortise ports`: list of the available rigs.
 
 use std::process::ExitCode;
 
+use mortise_output::lines;
 use serde::Serialize;
-
-use super::output;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -24,7 +23,7 @@ struct Row<'a> {
     hint: Option<&'a str>,
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let rigs = mortise_rig::list();
     let rows: Vec<Row<'_>> = (rigs.iter())
@@ -37,13 +36,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         })
         .collect();
     if args.json {
-        output::json_pretty(&rows)?;
+        lines::json_pretty(&rows)?;
         return Ok(ExitCode::SUCCESS);
     }
     for row in &rows {
-        output::line(&format!("{:<20} {} ({})", row.rig, row.label, row.detail))?;
+        lines::text(&format!("{:<20} {} ({})", row.rig, row.label, row.detail))?;
         if let Some(hint) = row.hint {
-            output::line(&format!("{:<20}   not available: {hint}", ""))?;
+            lines::text(&format!("{:<20}   not available: {hint}", ""))?;
         }
     }
     Ok(ExitCode::SUCCESS)

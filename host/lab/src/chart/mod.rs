@@ -164,14 +164,6 @@ impl Axis {
 }
 
 impl Chart {
-    /// Writes `NAME.svg` and `NAME.png` to `folder`.
-    ///
-    /// # Errors
-    /// `Unwritable`; `Input` for a chart without a point.
-    pub fn write(&self, folder: &Folder, name: &str) -> Result<(), LabError> {
-        write_stack(std::slice::from_ref(self), folder, name)
-    }
-
     fn cannot(&self, what: String) -> LabError {
         LabError::Input {
             name: format!("chart `{}`", self.title),
@@ -291,9 +283,7 @@ mod tests {
     #[test]
     fn both_files_are_written_and_read_back() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        chart(&[(1.0, 20.0), (10.0, 2.0)])
-            .write(&out(folder.path()), "test")
-            .expect("two points");
+        write_stack(&[chart(&[(1.0, 20.0), (10.0, 2.0)])], &out(folder.path()), "test").expect("two points");
         let svg = std::fs::read_to_string(folder.path().join("test.svg")).expect("written");
         for words in ["<svg", "x, mm", "y, µm", "10 here", "one"] {
             assert!(svg.contains(words), "{words}");
@@ -338,9 +328,8 @@ mod tests {
     fn a_chart_without_points_says_so() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         for points in [&[][..], &[(0.0, 1.0), (1.0, f64::NAN), (-1.0, 2.0)]] {
-            let error = chart(points)
-                .write(&out(folder.path()), "none")
-                .expect_err("nothing to draw");
+            let error =
+                write_stack(&[chart(points)], &out(folder.path()), "none").expect_err("nothing to draw");
             assert!(error.to_string().contains("no point"), "{error}");
         }
     }

@@ -20,6 +20,7 @@ use mortise_protocol::message::{
 };
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, FaultLine, Faults, RigSpec, Window, describe};
+use mortise_scenario::ScenarioError;
 use serde::Serialize;
 
 use crate::LabError;
@@ -198,10 +199,11 @@ impl Report {
 pub fn run(spec: &RigSpec, seconds: u32, seed: u64, told: &mut dyn FnMut(&Turn)) -> Result<Report, LabError> {
     let client = Client::connect_with_faults(&spec.lockstep())?;
     if !client.capabilities().simulated {
-        return Err(LabError::NeedsSimulatedHand {
+        return Err(ScenarioError::NeedsSimulatedHand {
             rig: client.name().to_owned(),
             scenario: "endurance".into(),
-        });
+        }
+        .into());
     }
     let Some(line) = client.fault_line() else {
         return Err(LabError::Input {

@@ -7,6 +7,7 @@ use fastrand::Rng;
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_bake::{BakeOptions, Grabbable, Method, PointshellKind, bake};
 use mortise_brep::{CadModel, Part, load_step};
+use mortise_scenario::ScenarioError;
 
 use crate::LabError;
 
@@ -126,11 +127,12 @@ impl Scenes {
             image_limit_bytes: random.u64(IMAGE_BYTES),
             ..BakeOptions::default()
         };
-        let baked =
-            bake(&self.stock, &options, &|_| ControlFlow::Continue(())).map_err(|source| LabError::Bake {
+        let baked = bake(&self.stock, &options, &|_| ControlFlow::Continue(())).map_err(|source| {
+            ScenarioError::Bake {
                 step: "a random scene".into(),
                 source,
-            })?;
+            }
+        })?;
         let part = (baked.report.parts.iter().position(|part| part.name == MOVING)).ok_or_else(|| {
             LabError::Input {
                 name: "a random scene".into(),

@@ -160,7 +160,7 @@ mod tests {
         let claims = Claims::kept().expect("reads");
         for (table, rows) in &claims.tables {
             let name = table.strip_suffix(OTHER_FORM).unwrap_or(table);
-            assert!(super::super::NAMES.contains(&name), "{table}");
+            assert!(super::super::names().contains(&name), "{table}");
             for (key, claim) in rows {
                 assert!(claim.is_finite() && *claim >= 0.0, "{table}: {key}: {claim}");
                 assert_eq!(&Row::noted(key, "").key(), key, "{table}");

@@ -3,10 +3,11 @@
 use glam::DVec3;
 use mortise_protocol::message::Telemetry;
 use mortise_rig::{EmulatedMode, RigSpec};
+use mortise_scenario::{Key, Outcome, PreparedScene, Scenario, connect, record, run_on};
 
 use super::{Plan, Row, link, parts};
 use crate::LabError;
-use crate::scenario::{Key, Outcome, PreparedScene, Scenario, connect, pushed, record, run_on};
+use crate::contact_law::pushed;
 
 /// Scenarios that press: where the hand then slides to, mm, and how exact a force is there, N.
 const PRESSES: &[(&str, [f64; 3], f64, &str)] = &[
@@ -85,7 +86,8 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
 }
 
 fn play(scenario: &Scenario, scene: &PreparedScene, spec: &RigSpec) -> Result<Outcome, LabError> {
-    run_on(&mortise_rig::Client::connect(&spec.lockstep())?, scenario, scene)
+    let client = mortise_rig::Client::connect(&spec.lockstep())?;
+    Ok(run_on(&client, scenario, scene)?)
 }
 
 fn scenario(text: &str, plan: &Plan<'_>) -> Result<Scenario, LabError> {

@@ -7,10 +7,10 @@ use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::ToDevice;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, EmulatedMode, Flash, Patience, RigSpec, begin_message, chunk_message, simulate};
+use mortise_scenario::{PreparedScene, Scenario};
 
 use super::{Plan, Row};
 use crate::LabError;
-use crate::scenario::{PreparedScene, Scenario};
 
 /// Frames of each kind.
 const FRAMES: u32 = 500_000;

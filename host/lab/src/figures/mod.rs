@@ -16,8 +16,22 @@ pub use self::claims::{Claims, Count};
 pub use self::row::{Row, Value, Verdict};
 use crate::LabError;
 
+/// Measures the rows of a table.
+type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
+
+/// Every table: its name, and what measures it.
+const TABLES: &[(&str, Measure)] = &[
+    ("end-to-end", end_to_end::measure),
+    ("contact", contact::measure),
+    ("constraints", constraints::measure),
+    ("stability", stability::measure),
+    ("promises", promises::measure),
+];
+
 /// Names of the tables there are.
-pub const NAMES: &[&str] = &["end-to-end", "contact", "constraints", "stability", "promises"];
+pub fn names() -> Vec<&'static str> {
+    TABLES.iter().map(|(name, _)| *name).collect()
+}
 
 /// How a table is measured.
 #[derive(Clone, Copy, Debug)]
@@ -55,15 +69,10 @@ pub fn figures(
 }
 
 fn measure(name: &str, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    match name {
-        "end-to-end" => end_to_end::measure(plan, out),
-        "contact" => contact::measure(plan, out),
-        "constraints" => constraints::measure(plan, out),
-        "stability" => stability::measure(plan, out),
-        "promises" => promises::measure(plan, out),
-        _ => Err(LabError::NoSuchFigures {
-            name: name.to_owned(),
-            known: NAMES.join(", "),
-        }),
-    }
+    let table = TABLES.iter().find(|(known, _)| *known == name);
+    let (_, measure) = table.ok_or_else(|| LabError::NoSuchFigures {
+        name: name.to_owned(),
+        known: names().join(", "),
+    })?;
+    measure(plan, out)
 }

@@ -12,9 +12,9 @@ use glam::DVec3;
 use mortise_haptics::observer::{Observer, Place};
 use mortise_haptics::{Input, Output, Passivity, Pose, Quat, Settings, State, Twist, Vec3, Wrench, tick};
 use mortise_protocol::image::SceneImage;
+use mortise_scenario::port::Port;
 
 use super::oracle::Plant;
-use crate::port::Port;
 
 /// Steps of integration a tick.
 const SUBSTEPS: u32 = 4;

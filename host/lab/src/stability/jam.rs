@@ -17,13 +17,15 @@ use mortise_bake::Grabbable;
 use mortise_protocol::message::{HandScript, Keyframe, ToDevice, WirePose};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, RigSpec};
+use mortise_scenario::measure::depth;
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{Depth, PreparedScene, Scenario};
 use serde::Serialize;
 
 use super::oracle::{COARSE, limit};
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::fit::Fit;
-use crate::scenario::{Depth, PreparedScene, Scenario, depth, pose_mm};
 use crate::variant::Variant;
 
 /// Diametral clearances, mm; the last is exact.

@@ -11,13 +11,14 @@ use mortise_bake::Grabbable;
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
+use mortise_scenario::measure::{energy, object_energy};
+use mortise_scenario::{PreparedScene, Scenario};
 use serde::Serialize;
 
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::fit::Fit;
 use crate::guided::{SIM, insertion, key, largest_step, play_to};
-use crate::scenario::{PreparedScene, Scenario, energy, object_energy};
 use crate::variant::Variant;
 
 /// Shares lost.

@@ -18,12 +18,11 @@ pub mod slab;
 
 use std::rc::Rc;
 
-use mortise_output::Folder;
 use serde::Serialize;
 
-use crate::chart::{Chart, write_stack};
+use crate::chart::Chart;
 use crate::error::LabError;
-use crate::table::write_csv;
+use crate::experiment::{Experiment, Findings, Form, Report};
 
 /// One experiment of any map.
 #[derive(Clone, Debug, Serialize)]
@@ -63,20 +62,10 @@ impl std::fmt::Display for Trial {
 pub struct Map {
     /// Name of its files.
     pub name: &'static str,
-    trials: Vec<Trial>,
-    /// Above one another.
-    charts: Vec<Chart>,
-}
-
-impl Map {
-    /// Writes table (CSV) and chart (SVG and PNG).
-    ///
-    /// # Errors
-    /// `Unwritable`.
-    pub fn write(&self, folder: &Folder) -> Result<(), LabError> {
-        write_csv(&self.trials, folder, self.name)?;
-        write_stack(&self.charts, folder, self.name)
-    }
+    /// Its trials.
+    pub trials: Vec<Trial>,
+    /// Its charts, above one another.
+    pub charts: Vec<Chart>,
 }
 
 /// What each experiment goes to as it is made.
@@ -151,6 +140,42 @@ pub fn maps(quick: bool, only: Option<&str>, out: &mut dyn FnMut(&Trial)) -> Res
         .filter(|(name, _)| only.is_none_or(|only| only == *name))
         .map(|(_, make)| make(quick, out))
         .collect()
+}
+
+/// The experiment `stability`.
+pub struct Stability;
+
+impl Experiment for Stability {
+    fn name(&self) -> &'static str {
+        "stability"
+    }
+
+    fn about(&self) -> &'static str {
+        "Find where closed loops become unstable, theory drawn beside"
+    }
+
+    fn quick(&self) -> &'static str {
+        "fewer points of each map"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        names().into_iter().map(String::from).collect()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        self.rows()
+    }
+
+    fn parts(&self) -> Vec<&'static str> {
+        names()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let maps = maps(form.quick, form.only, &mut |trial| report(trial))?;
+        maps.into_iter().try_fold(Findings::default(), |findings, map| {
+            Ok(findings.rows(map.name, &map.trials)?.stack(map.name, map.charts))
+        })
+    }
 }
 
 #[cfg(test)]

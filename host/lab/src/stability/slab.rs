@@ -2,11 +2,11 @@
 
 use mortise_bake::Grabbable;
 use mortise_protocol::image::SceneImage;
+use mortise_scenario::{PreparedScene, Scenario};
 
 use crate::error::LabError;
 use crate::exact_fit::ExactFit;
 use crate::fit::Fit;
-use crate::scenario::{PreparedScene, Scenario};
 use crate::variant::Variant;
 
 /// A baked slab and peg.
@@ -41,7 +41,7 @@ impl Slab {
         Ok(Self {
             words,
             part: scene.part,
-            exact: scene.exact_fit(fit),
+            exact: ExactFit::of(&scene, fit),
         })
     }
 

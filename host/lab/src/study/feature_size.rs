@@ -14,6 +14,7 @@ use super::operator::{Hand, Task};
 use super::statistics::{Logistic, Regression, Term};
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::table::rounded;
 
@@ -276,6 +277,42 @@ impl fmt::Display for Found<'_> {
             },
             Self::Term(term) => write!(f, "{term}"),
         }
+    }
+}
+
+/// The experiment `feature-size`.
+pub struct FeatureSize;
+
+impl Experiment for FeatureSize {
+    fn name(&self) -> &'static str {
+        "feature-size"
+    }
+
+    fn about(&self) -> &'static str {
+        "Whether a feature's size matters: 62 trials by a simulated operator, beside tables 4 and 5 of the thesis"
+    }
+
+    fn quick(&self) -> &'static str {
+        "the two smallest pegs"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["feature-size", "feature-size-model", "feature-size-tables-4-5"]
+            .map(String::from)
+            .into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        ["feature-size"].map(String::from).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let study = study(form.quick, &mut |found| report(&found))?;
+        Ok(Findings::default()
+            .rows("feature-size", &study.trials)?
+            .rows("feature-size-tables-4-5", &study.table)?
+            .rows("feature-size-model", &study.terms)?
+            .chart("feature-size", chart(&study)))
     }
 }
 

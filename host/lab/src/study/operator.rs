@@ -7,12 +7,12 @@ use std::f64::consts::TAU;
 use mortise_bake::Grabbable;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::Client;
+use mortise_scenario::{PreparedScene, Scenario, ScenarioError, run_on};
 use tempfile::NamedTempFile;
 
 use crate::LabError;
 use crate::fit::Fit;
 use crate::guided::{SIM, key};
-use crate::scenario::{PreparedScene, Scenario, run_on};
 use crate::variant::Variant;
 
 const SCENARIO: &str = include_str!("../../data/tight_insertion.toml");
@@ -147,13 +147,13 @@ impl Task {
                 peak_n: Some(outcome.peak_force_n),
                 degraded_percent: Some(outcome.degraded_percent),
             }),
-            Err(LabError::Fault { .. }) => Ok(Went {
+            Err(ScenarioError::Fault { .. }) => Ok(Went {
                 through: false,
                 inserted_mm: None,
                 peak_n: None,
                 degraded_percent: None,
             }),
-            Err(error) => Err(error),
+            Err(error) => Err(error.into()),
         }
     }
 }

@@ -17,6 +17,7 @@ use super::operator::{Hand, Task};
 use super::statistics::{Logistic, Term};
 use crate::LabError;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
+use crate::experiment::{Experiment, Findings, Form, Report};
 use crate::fit::Fit;
 use crate::table::rounded;
 
@@ -385,6 +386,39 @@ impl fmt::Display for Found<'_> {
                 row.pooled_p
             ),
         }
+    }
+}
+
+/// The experiment `shrink`.
+pub struct Shrink;
+
+impl Experiment for Shrink {
+    fn name(&self) -> &'static str {
+        "shrink"
+    }
+
+    fn about(&self) -> &'static str {
+        "Which voxels let a peg into its hole, and what shrinking does: designs of 27 trials by a simulated operator, beside table 3 of the thesis"
+    }
+
+    fn quick(&self) -> &'static str {
+        "one space-filling design"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        ["shrink", "shrink-table-3"].map(String::from).into()
+    }
+
+    fn charts(&self) -> Vec<String> {
+        ["shrink"].map(String::from).into()
+    }
+
+    fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
+        let study = study(form.quick, &mut |found| report(&found))?;
+        Ok(Findings::default()
+            .rows("shrink", &study.trials)?
+            .rows("shrink-table-3", &study.table)?
+            .chart("shrink", chart(&study)))
     }
 }
 

@@ -28,7 +28,7 @@ pub struct Artefact {
 pub enum Made {
     /// A page: `cargo xtask figures NAME`.
     Page { quick: bool },
-    /// A sweep: `mortise lab NAME --out docs/figures`.
+    /// A sweep: `mortise-lab NAME --out docs/figures`.
     Sweep { quick: bool },
     /// By a person at the window.
     ByHand,
@@ -44,7 +44,9 @@ const LAW: &[&str] = &[
 /// The closed loop: control plane, rig, recognition and guidance besides.
 const LOOP: &[&str] = &[
     "protocol/src",
+    "firmware/mechanism/src",
     "firmware/app/src",
+    "firmware/simulation/src",
     "firmware/boards/mps2-an500/src",
     "host/rig/src",
     "host/mating/src",
@@ -53,10 +55,23 @@ const LOOP: &[&str] = &[
     "host/app/samples",
 ];
 const CHART: &[&str] = &["host/lab/src/chart", "host/lab/src/table.rs"];
+/// A scenario played and measured.
+const SCENARIO: &[&str] = &[
+    "host/scenario/src/hand.rs",
+    "host/scenario/src/measure.rs",
+    "host/scenario/src/outcome.rs",
+    "host/scenario/src/overlap.rs",
+    "host/scenario/src/port.rs",
+    "host/scenario/src/run.rs",
+    "host/scenario/src/scenario.rs",
+    "host/scenario/src/scene.rs",
+    "host/scenario/src/truth.rs",
+    "host/scenario/src/wire.rs",
+];
 const TRIAL: &[&str] = &[
     "host/lab/src/fit.rs",
+    "host/lab/src/exact_fit.rs",
     "host/lab/src/variant.rs",
-    "host/lab/src/scenario",
     "host/lab/src/clearance.rs",
     "host/lab/src/motion.rs",
 ];
@@ -70,8 +85,10 @@ pub const ARTEFACTS: &[Artefact] = &[
         sources: &[
             LAW,
             LOOP,
+            SCENARIO,
             TRIAL,
             &[
+                "host/lab/src/contact_law.rs",
                 "host/lab/src/figures/end_to_end.rs",
                 "host/lab/src/figures/link.rs",
                 "host/lab/src/figures/parts.rs",
@@ -83,11 +100,12 @@ pub const ARTEFACTS: &[Artefact] = &[
         made: Made::Page { quick: true },
         sources: &[
             LAW,
+            SCENARIO,
             TRIAL,
             &[
                 "host/lab/src/figures/contact",
                 "host/lab/src/scene_p.rs",
-                "host/lab/src/probe.rs",
+                "host/scenario/src/probe.rs",
                 "host/lab/src/peer.rs",
             ],
         ],
@@ -95,7 +113,14 @@ pub const ARTEFACTS: &[Artefact] = &[
     Artefact {
         name: "constraints",
         made: Made::Page { quick: true },
-        sources: &[LAW, LOOP, TRIAL, GUIDED, &["host/lab/src/figures/constraints"]],
+        sources: &[
+            LAW,
+            LOOP,
+            SCENARIO,
+            TRIAL,
+            GUIDED,
+            &["host/lab/src/figures/constraints"],
+        ],
     },
     Artefact {
         name: "stability",
@@ -103,6 +128,7 @@ pub const ARTEFACTS: &[Artefact] = &[
         sources: &[
             LAW,
             LOOP,
+            SCENARIO,
             TRIAL,
             GUIDED,
             &[
@@ -118,6 +144,7 @@ pub const ARTEFACTS: &[Artefact] = &[
         sources: &[
             LAW,
             LOOP,
+            SCENARIO,
             TRIAL,
             GUIDED,
             &["host/lab/src/figures/promises", "host/app/src/cli"],
@@ -128,12 +155,13 @@ pub const ARTEFACTS: &[Artefact] = &[
         made: Made::Sweep { quick: false },
         sources: &[
             LAW,
+            SCENARIO,
             TRIAL,
             CHART,
             &[
                 "host/lab/src/pareto.rs",
                 "host/lab/src/scene_p.rs",
-                "host/lab/src/probe.rs",
+                "host/scenario/src/probe.rs",
                 "host/lab/src/peer.rs",
             ],
         ],
@@ -141,37 +169,37 @@ pub const ARTEFACTS: &[Artefact] = &[
     Artefact {
         name: "clearance",
         made: Made::Sweep { quick: false },
-        sources: &[LAW, TRIAL, CHART],
+        sources: &[LAW, SCENARIO, TRIAL, CHART],
     },
     Artefact {
         name: "blend",
         made: Made::Sweep { quick: false },
-        sources: &[LAW, TRIAL, GUIDED, CHART, &["host/lab/src/blend.rs"]],
+        sources: &[LAW, SCENARIO, TRIAL, GUIDED, CHART, &["host/lab/src/blend.rs"]],
     },
     Artefact {
         name: "rate",
         made: Made::Sweep { quick: true },
-        sources: &[LAW, TRIAL, GUIDED, CHART, &["host/lab/src/rate.rs"]],
+        sources: &[LAW, SCENARIO, TRIAL, GUIDED, CHART, &["host/lab/src/rate.rs"]],
     },
     Artefact {
         name: "shrink",
         made: Made::Sweep { quick: false },
-        sources: &[LAW, TRIAL, CHART, &["host/lab/src/study"]],
+        sources: &[LAW, SCENARIO, TRIAL, CHART, &["host/lab/src/study"]],
     },
     Artefact {
         name: "feature-size",
         made: Made::Sweep { quick: false },
-        sources: &[LAW, TRIAL, CHART, &["host/lab/src/study"]],
+        sources: &[LAW, SCENARIO, TRIAL, CHART, &["host/lab/src/study"]],
     },
     Artefact {
         name: "hybrid",
         made: Made::Sweep { quick: false },
-        sources: &[LAW, TRIAL, GUIDED, CHART, &["host/lab/src/hybrid.rs"]],
+        sources: &[LAW, SCENARIO, TRIAL, GUIDED, CHART, &["host/lab/src/hybrid.rs"]],
     },
     Artefact {
         name: "stability-maps",
         made: Made::Sweep { quick: false },
-        sources: &[LAW, TRIAL, GUIDED, CHART, &["host/lab/src/stability"]],
+        sources: &[LAW, SCENARIO, TRIAL, GUIDED, CHART, &["host/lab/src/stability"]],
     },
     Artefact {
         name: "window",
@@ -184,7 +212,7 @@ pub const ARTEFACTS: &[Artefact] = &[
 const WRITTEN: &[&str] = &["sweeps.md", "claims.json", "manifest.json"];
 
 impl Artefact {
-    /// The experiment of `mortise lab`, and the start of its files' names.
+    /// The experiment of `mortise-lab`, and the start of its files' names.
     pub fn experiment(&self) -> &'static str {
         self.name.strip_suffix("-maps").unwrap_or(self.name)
     }
@@ -195,7 +223,7 @@ impl Artefact {
         match self.made {
             Made::Page { quick } => format!("cargo xtask figures {}{}", self.name, option(quick)),
             Made::Sweep { quick } => format!(
-                "mortise lab {}{} --out {FOLDER} --force",
+                "mortise-lab {}{} --out {FOLDER} --force",
                 self.experiment(),
                 option(quick)
             ),

@@ -20,10 +20,11 @@ use anyhow::{Context, Result, bail};
 use self::artefacts::{ARTEFACTS, Artefact, Made};
 use self::claims::Claims;
 pub use self::row::{Row, count};
+use crate::program::Programs;
 use crate::setup::{self, Consent, Group};
-use crate::{firmware, program, shell};
+use crate::{firmware, shell};
 
-/// What one run of `mortise lab figures` gave.
+/// What one run of `mortise-lab figures` gave.
 #[derive(Debug)]
 pub struct Measured {
     /// The rows, in the program's order.
@@ -32,7 +33,7 @@ pub struct Measured {
     pub success: bool,
 }
 
-/// What `mortise lab figures` judges rows by.
+/// What `mortise-lab figures` judges rows by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
     /// The claims it was built with; a row without one makes the last row fail.
@@ -79,7 +80,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
         return Ok(ExitCode::FAILURE);
     }
     firmware::build(&root, firmware::EMULATED)?;
-    let program = program::build_mortise(&root)?;
+    let program = Programs::build(&root)?.lab;
     let all_hold = match name {
         Some(name) => {
             let by = if options.contains(&"--claim") {
@@ -114,7 +115,7 @@ fn page_is_quick(name: &str) -> Option<bool> {
 /// Measures a table, keeps the claims of new rows and writes the page; true if every bound holds.
 fn write_page(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<bool> {
     let Some(of_page) = page_is_quick(name).map(|page| page == quick) else {
-        bail!("there is no table `{name}`; `mortise lab figures --help` names them");
+        bail!("there is no table `{name}`; `mortise-lab figures --help` names them");
     };
     let measured = measure(root, program, name, quick, by)?;
     let mut claims = Claims::read(root)?;
@@ -218,7 +219,7 @@ fn page_of(root: &Path, table: &str) -> Result<Vec<Row>> {
     Ok(quoted::page_rows(&page))
 }
 
-/// Runs `mortise lab figures NAME --json` and prints each row as it comes.
+/// Runs `mortise-lab figures NAME --json` and prints each row as it comes.
 ///
 /// # Errors
 /// When the program cannot be started or prints no rows, or something that is not a row.
@@ -226,7 +227,7 @@ pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> 
     let mut command = Command::new(program);
     command
         .current_dir(root)
-        .args(["lab", "figures", name, "--json", "--claims", by.option()]);
+        .args(["figures", name, "--json", "--claims", by.option()]);
     if quick {
         command.arg("--quick");
     }
@@ -241,11 +242,11 @@ pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> 
         Err(error) => foreign.push(format!("{error:#}: {line}")),
     });
     if let Some(first) = foreign.first() {
-        bail!("`mortise lab figures {name} --json` printed what is not a row ({first})");
+        bail!("`mortise-lab figures {name} --json` printed what is not a row ({first})");
     }
     if rows.is_empty() {
         run?;
-        bail!("`mortise lab figures {name} --json` printed no row");
+        bail!("`mortise-lab figures {name} --json` printed no row");
     }
     Ok(Measured {
         rows,

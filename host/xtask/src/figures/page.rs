@@ -4,7 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::{Row, count};
 
-/// A sweep that belongs to a table: the experiment of `mortise lab` that makes it, and the charts it leaves in `docs/figures`, drawn from one table
+/// A sweep that belongs to a table: the experiment of `mortise-lab` that makes it, and the charts it leaves in `docs/figures`, drawn from one table
 /// of the experiment's name, or each from one of its own.
 struct Sweep {
     table: &'static str,
@@ -81,7 +81,7 @@ pub fn text(name: &str, quick: bool, rows: &[Row]) -> String {
 /// The charts of a sweep as a page shows them.
 fn charts(sweep: &Sweep) -> String {
     let experiment = sweep.experiment;
-    let mut text = format!("\n`mortise lab {experiment} --out docs/figures --force` makes the following");
+    let mut text = format!("\n`mortise-lab {experiment} --out docs/figures --force` makes the following");
     if sweep.own_tables {
         text.push_str(".\n");
     } else {
@@ -102,7 +102,7 @@ fn page(name: &str, quick: bool, rows: &[Row], date: &str) -> String {
     let title = title[..1].to_uppercase() + &title[1..];
     let mut text = format!(
         "# Figures: {title}\n\n\
-         Written by `cargo xtask figures {name}{option}` on {date} from what `mortise lab figures {name}{option} --json`\n\
+         Written by `cargo xtask figures {name}{option}` on {date} from what `mortise-lab figures {name}{option} --json`\n\
          measured; {}. Ticks, instructions, bytes, forces and lengths come out the same on every\n\
          machine. Times do not: take them as this one machine's.\n\n\
          A claim is the figure that is stated for a row ([claims.json](claims.json)). The bound is the nearer of what is required and\n\

@@ -84,7 +84,7 @@ fn make(root: &Path, program: &Path, artefact: &Artefact) -> Result<bool> {
         Made::Page { quick } => write_page(root, program, artefact.name, quick, By::Completed),
         Made::Sweep { quick } => {
             let mut command = Command::new(program);
-            command.current_dir(root).args(["lab", artefact.experiment()]);
+            command.current_dir(root).arg(artefact.experiment());
             if quick {
                 command.arg("--quick");
             }

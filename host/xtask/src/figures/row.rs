@@ -1,4 +1,4 @@
-//! One row as `mortise lab figures NAME --json` prints it.
+//! One row as `mortise-lab figures NAME --json` prints it.
 
 use std::collections::HashMap;
 

@@ -14,6 +14,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 
 use self::report::{Counts, Report};
+use crate::program::Programs;
 use crate::setup::{self, Consent, Group};
 use crate::shell;
 
@@ -27,8 +28,8 @@ struct Step {
 /// What steps share.
 struct Bench {
     root: PathBuf,
-    /// The desktop program, once the step `build` made it or an earlier run left it.
-    program: Option<PathBuf>,
+    /// The programs, once the step `build` made them.
+    programs: Option<Programs>,
     /// Tests counted in the step that runs.
     counts: Counts,
 }
@@ -69,7 +70,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     }
     let mut bench = Bench {
         root: shell::root()?,
-        program: None,
+        programs: None,
         counts: Counts::default(),
     };
     let mut report = Report::default();

@@ -1,12 +1,13 @@
 //! The steps, one function each. `window` has a file of its own.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
 use super::Bench;
+use crate::program::Programs;
 use crate::{figures, firmware as boards, fuzz, program, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
@@ -15,7 +16,13 @@ const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// What property tests draw their cases from, unless the environment says otherwise: a commit passes or fails here as it does everywhere. Plain
 /// `cargo test` draws anew each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
-const BOARD_SIDE: [&str; 3] = ["mortise-protocol", "mortise-haptics", "mortise-firmware"];
+const BOARD_SIDE: [&str; 5] = [
+    "mortise-protocol",
+    "mortise-haptics",
+    "mortise-mechanism",
+    "mortise-firmware",
+    "mortise-simulation",
+];
 
 pub fn format(bench: &mut Bench) -> Result<String> {
     shell::run(shell::cargo(&bench.root).args(["fmt", "--all", "--check"]))?;
@@ -114,7 +121,7 @@ pub fn firmware(bench: &mut Bench) -> Result<String> {
 pub fn build(bench: &mut Bench) -> Result<String> {
     let mut command = shell::cargo(&bench.root);
     command.args(["build", "--release", "--workspace", "--all-targets"]);
-    bench.program = Some(program::pick(program::build(&mut command)?, program::MORTISE)?);
+    bench.programs = Some(Programs::pick(&program::build(&mut command)?)?);
     Ok(String::new())
 }
 
@@ -192,24 +199,24 @@ pub fn docs(bench: &mut Bench) -> Result<String> {
         .env("RUSTDOCFLAGS", "-D warnings")
         .args(["doc", "--release", "--workspace", "--no-deps"]);
     shell::run(&mut command)?;
-    let program = bench.program()?;
-    tidy::report(&tidy::check_commands(&bench.root, &program)?)?;
+    let programs = bench.programs()?;
+    tidy::report(&tidy::check_commands(&bench.root, &programs)?)?;
     Ok(String::new())
 }
 
 pub fn figures(bench: &mut Bench) -> Result<String> {
-    let program = bench.program()?;
-    figures::step(&bench.root, &program)
+    let lab = bench.programs()?.lab;
+    figures::step(&bench.root, &lab)
 }
 
 impl Bench {
-    /// The desktop program: from the step `build`, or built now when that step was not asked for.
-    pub fn program(&mut self) -> Result<PathBuf> {
-        match &self.program {
-            Some(path) => Ok(path.clone()),
+    /// The programs: from the step `build`, or built now when that step was not asked for.
+    pub fn programs(&mut self) -> Result<Programs> {
+        match &self.programs {
+            Some(programs) => Ok(programs.clone()),
             None => {
                 build(self)?;
-                self.program.clone().context("the step `build` left no program")
+                self.programs.clone().context("the step `build` left no program")
             }
         }
     }

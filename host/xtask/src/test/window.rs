@@ -39,7 +39,7 @@ pub fn run(bench: &mut Bench) -> Result<String> {
     if !cfg!(target_os = "linux") {
         return Ok("not run: there is no Xvfb on this system".to_owned());
     }
-    let program = bench.program()?;
+    let program = bench.programs()?.mortise;
     // Beside the build, which is where passing files of a run belong.
     let place = program.parent().unwrap_or(Path::new(".")).join("window-test");
     std::fs::create_dir_all(&place)?;

@@ -1,24 +1,24 @@
 //! Checks a command named in docs against the help of the program it calls.
 
 use std::collections::HashMap;
-use std::path::Path;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use crate::program::{LAB, Programs};
 use crate::usage;
 
 /// Help texts, each asked for once.
 pub struct Helps<'a> {
-    program: &'a Path,
+    programs: &'a Programs,
     texts: HashMap<Vec<String>, String>,
 }
 
 impl<'a> Helps<'a> {
-    /// Helps of `cargo xtask` and of `program`, which is the desktop program.
-    pub fn new(program: &'a Path) -> Self {
+    /// Helps of `cargo xtask` and of `programs`.
+    pub fn new(programs: &'a Programs) -> Self {
         Self {
-            program,
+            programs,
             texts: HashMap::new(),
         }
     }
@@ -31,7 +31,7 @@ impl<'a> Helps<'a> {
         complaint(command, &mut |chain| self.text(chain))
     }
 
-    /// Help of the command that `chain` names, beginning with `mortise` or `xtask`.
+    /// Help of the command that `chain` names, beginning with `mortise`, `mortise-lab` or `xtask`.
     fn text(&mut self, chain: &[String]) -> Result<String> {
         if let Some(text) = self.texts.get(chain) {
             return Ok(text.clone());
@@ -42,12 +42,17 @@ impl<'a> Helps<'a> {
                 Some(name) => usage::of(name).with_context(|| format!("`cargo xtask {name}` has no help"))?,
             }
         } else {
-            let output = Command::new(self.program)
+            let path = if chain[0] == LAB {
+                &self.programs.lab
+            } else {
+                &self.programs.mortise
+            };
+            let output = Command::new(path)
                 .args(&chain[1..])
                 .arg("--help")
                 .stdin(Stdio::null())
                 .output()
-                .with_context(|| format!("{} cannot be started", self.program.display()))?;
+                .with_context(|| format!("{} cannot be started", path.display()))?;
             if !output.status.success() {
                 bail!(
                     "`{} --help` failed: {}",
@@ -132,20 +137,20 @@ fn names_option(help: &str, option: &str) -> bool {
 mod tests {
     use super::*;
 
-    const ROOT: &str = "Usage: mortise [FILE] [COMMAND]\n\nCommands:\n  inspect  What is in a file\n  lab      Experiments\n\
-        \x20          and charts\n  help     Print this message\n\nOptions:\n  -h, --help  Print help\n";
+    const ROOT: &str = "Usage: mortise [FILE] [COMMAND]\n\nCommands:\n  inspect  What is in a file\n  probe    Distances\n\
+        \x20          and contacts\n  help     Print this message\n\nOptions:\n  -h, --help  Print help\n";
     const INSPECT: &str =
         "Usage: mortise inspect [OPTIONS] <FILE>\n\nOptions:\n      --json-lines\n  -o, --output <OUT>\n";
-    const LAB: &str =
-        "Usage: mortise lab <COMMAND>\n\nCommands:\n  figures  Measured\n\nOptions:\n      --quick\n";
+    const EXPERIMENTS: &str =
+        "Usage: mortise-lab <COMMAND>\n\nCommands:\n  figures  Measured\n\nOptions:\n      --quick\n";
 
     fn said(command: &str) -> Option<String> {
         complaint(command, &mut |chain| {
             Ok(match chain.join(" ").as_str() {
                 "mortise" => ROOT.to_owned(),
                 "mortise inspect" => INSPECT.to_owned(),
-                "mortise lab" => LAB.to_owned(),
-                "mortise lab figures" => "Options:\n      --quick\n      --json\n".to_owned(),
+                "mortise-lab" => EXPERIMENTS.to_owned(),
+                "mortise-lab figures" => "Options:\n      --quick\n      --json\n".to_owned(),
                 "xtask" => usage::overview(),
                 other => usage::of(other.trim_start_matches("xtask ")).unwrap(),
             })
@@ -160,7 +165,7 @@ mod tests {
             "mortise part.step",
             "mortise inspect FILE -o OUT",
             "mortise inspect --output=x.json",
-            "mortise lab figures end-to-end --quick --json",
+            "mortise-lab figures end-to-end --quick --json",
             "cargo xtask demo --headless --json",
             "cargo xtask figures end-to-end",
             "cargo xtask setup [--yes]",
@@ -179,7 +184,7 @@ mod tests {
                 "mortise inspect FILE --json",
                 "`mortise inspect` has no option `--json`",
             ),
-            ("mortise lab figures x --quickly", "no option `--quickly`"),
+            ("mortise-lab figures x --quickly", "no option `--quickly`"),
             ("cargo xtask tests", "no command `tests`"),
             (
                 "cargo xtask tidy --yes",

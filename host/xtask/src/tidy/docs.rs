@@ -52,7 +52,7 @@ pub fn check_paths(root: &Path, files: &[PathBuf]) -> Result<Vec<Finding>> {
     Ok(findings)
 }
 
-/// `cargo xtask …` and `mortise …` in backticks or as a line of a code block, with their line.
+/// `cargo xtask …`, `mortise …` and `mortise-lab …` in backticks or as a line of a code block, with their line.
 pub fn commands(text: &str) -> Vec<(usize, String)> {
     let in_blocks = block_lines(text).map(|(line, content)| (line, content.trim().trim_start_matches("$ ")));
     in_blocks
@@ -63,7 +63,7 @@ pub fn commands(text: &str) -> Vec<(usize, String)> {
 
 /// The command at the start of `text`, without what the shell does with its output.
 fn command(text: &str) -> Option<String> {
-    let ours = ["cargo xtask", "mortise"];
+    let ours = ["cargo xtask", "mortise", "mortise-lab"];
     let start = ours.iter().find(|start| {
         text.strip_prefix(**start)
             .is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn commands_are_found_in_text_and_blocks_without_the_shells_part() {
         let text = "Run `cargo xtask demo`, or `mortise inspect FILE --json`; the program `mortise` and `mortise-brep`.\n\
-            ```\ncargo xtask test      # everything CI runs\n$ mortise bake a.step -o a.image && ls\nmortised\n```\n";
+            ```\ncargo xtask test      # everything CI runs\n$ mortise bake a.step -o a.image && ls\nmortise-lab rate | head\nmortised\n```\n";
         let found = commands(text);
         let of: Vec<(usize, &str)> = found
             .iter()
@@ -272,6 +272,7 @@ mod tests {
             [
                 (3, "cargo xtask test"),
                 (4, "mortise bake a.step -o a.image"),
+                (5, "mortise-lab rate"),
                 (1, "cargo xtask demo"),
                 (1, "mortise inspect FILE --json"),
             ]

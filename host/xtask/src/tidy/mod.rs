@@ -15,7 +15,8 @@ use anyhow::{Result, bail};
 
 pub use self::layers::target_directory;
 
-use crate::{figures, program, shell};
+use crate::program::Programs;
+use crate::{figures, shell};
 
 /// Something that is not as it must be.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -44,12 +45,11 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     }
     let root = shell::root()?;
     let mut findings = check(&root)?;
-    let program = built_program(&root)?;
-    match &program {
-        Some(program) => findings.extend(check_commands(&root, program)?),
+    match Programs::built(&target_directory(&root)?.join("release")) {
+        Some(programs) => findings.extend(check_commands(&root, &programs)?),
         None => {
             eprintln!(
-                "Not checked: the `mortise …` commands in docs, as the program is not built (`cargo xtask test` does)."
+                "Not checked: the `mortise …` and `mortise-lab …` commands in docs, as the programs are not built (`cargo xtask test` does)."
             );
         }
     }
@@ -80,12 +80,12 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     Ok(findings)
 }
 
-/// Checks each `cargo xtask …` and `mortise …` command in docs against what the programs' help says.
+/// Checks each `cargo xtask …`, `mortise …` and `mortise-lab …` command in docs against what the programs' help says.
 ///
 /// # Errors
-/// When a page cannot be read, or `program` cannot be started.
-pub fn check_commands(root: &Path, program: &Path) -> Result<Vec<Finding>> {
-    let mut helps = commands::Helps::new(program);
+/// When a page cannot be read, or a program cannot be started.
+pub fn check_commands(root: &Path, programs: &Programs) -> Result<Vec<Finding>> {
+    let mut helps = commands::Helps::new(programs);
     let mut findings = Vec::new();
     for page in docs::pages(&tree::files(root)?) {
         let text = tree::read(root, page)?;
@@ -115,13 +115,4 @@ pub fn report(findings: &[Finding]) -> Result<()> {
     } else {
         bail!("tidy: {} found", findings.len())
     }
-}
-
-/// The desktop program, if an earlier build left one.
-fn built_program(root: &Path) -> Result<Option<PathBuf>> {
-    let target = target_directory(root)?;
-    let path = target
-        .join("release")
-        .join(format!("{}{}", program::MORTISE, std::env::consts::EXE_SUFFIX));
-    Ok(path.is_file().then_some(path))
 }

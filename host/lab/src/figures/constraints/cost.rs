@@ -2,6 +2,7 @@
 
 use mortise_bake::Grabbable;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Telemetry, ToDevice};
+use mortise_scenario::{PreparedScene, Recording};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
@@ -9,7 +10,6 @@ use crate::fit::Fit;
 use crate::guided::{emulated, insertion, known_target, play_to};
 use crate::motion::{Motion, script};
 use crate::rate::{self, Mode};
-use crate::scenario::{PreparedScene, Recording};
 use crate::variant::Variant;
 
 const TARGETS: f64 = 4.0;

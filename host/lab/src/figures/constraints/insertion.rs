@@ -3,12 +3,13 @@
 use mortise_bake::Grabbable;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
+use mortise_scenario::{Key, Outcome, PreparedScene};
 
 use crate::LabError;
+use crate::exact_fit::{ExactFit, made_from};
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::guided::{Course, Inserted, SIM, course, emulated, inserted, insertion, key, play};
-use crate::scenario::{Key, Outcome, PreparedScene};
 use crate::variant::Variant;
 
 /// Cells, mm.
@@ -73,8 +74,8 @@ fn played(fit: &Fit, variant: &Variant, thesis: bool, specs: &[RigSpec]) -> Resu
     scenario.run.heed_every_ticks = Some(scenario.run.telemetry_every_ticks);
     scenario.run.telemetry_every_ticks = 1;
     let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
-    let scene = PreparedScene::with(&scenario, &options)?.made_from(*fit);
-    let exact = scene.exact_fit(*fit);
+    let scene = made_from(PreparedScene::with(&scenario, &options)?, *fit);
+    let exact = ExactFit::of(&scene, *fit);
     specs
         .iter()
         .map(|spec| {
@@ -220,7 +221,7 @@ fn pushed(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         scenario.run.telemetry_every_ticks = 1;
         scenario.run.heed_every_ticks = Some(10);
         let options = Variant::field(CELL_MM).options(Grabbable::Named(vec!["peg".into()]));
-        let scene = PreparedScene::with(&scenario, &options)?.made_from(fit);
+        let scene = made_from(PreparedScene::with(&scenario, &options)?, fit);
         let recording = play(&scenario, &scene, &SIM)?;
         let seen = inserted(&scenario, &scene, &recording.samples);
         let what = |of: &str| {

@@ -3,11 +3,12 @@
 use glam::DVec3;
 use mortise_guide::GuideSettings;
 use mortise_mating::recognise::State;
+use mortise_scenario::PreparedScene;
+use mortise_scenario::wire::pose_mm;
 
 use crate::LabError;
 use crate::figures::Row;
 use crate::guided::{SIM, file, key, play_with, script};
-use crate::scenario::{PreparedScene, pose_mm};
 
 struct Joint {
     name: &'static str,

@@ -11,12 +11,12 @@ use mortise_bake::Grabbable;
 use mortise_guide::{Guide, GuideSettings};
 use mortise_protocol::message::{HandScript, Keyframe, Telemetry, ToDevice, WirePose};
 use mortise_rig::{Client, Event};
+use mortise_scenario::{PreparedScene, ScenarioError};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::guided::{emulated, insertion};
-use crate::scenario::PreparedScene;
 use crate::variant::Variant;
 
 const MEDIAN_MS: f64 = 30.0;
@@ -151,7 +151,7 @@ impl Bench<'_, '_> {
                     }
                     Event::Fault { tick, fault } => {
                         let what = mortise_rig::describe(fault);
-                        return Err(LabError::Fault { tick, what });
+                        return Err(ScenarioError::Fault { tick, what }.into());
                     }
                     _ => {}
                 }

@@ -6,12 +6,12 @@ use mortise_bake::Grabbable;
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{DeviceState, Telemetry, ToDevice};
 use mortise_rig::{Client, Faults, RigSpec, Window};
+use mortise_scenario::{PreparedScene, Recording, Scenario, ScenarioError};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::guided::{SIM, inserted, insertion, key, largest_step, play_to};
-use crate::scenario::{PreparedScene, Recording, Scenario};
 use crate::variant::Variant;
 
 /// Ticks between what the guide hears.
@@ -73,7 +73,7 @@ fn play(scenario: &Scenario, scene: &PreparedScene) -> Result<Result<Recording, 
     };
     match play_to(scenario, scene, &SIM, &mut listener) {
         Ok(recording) => Ok(Ok(recording)),
-        Err(fault @ LabError::Fault { .. }) => Ok(Err(fault.to_string())),
+        Err(fault @ LabError::Scenario(ScenarioError::Fault { .. })) => Ok(Err(fault.to_string())),
         Err(other) => Err(other),
     }
 }

@@ -2,11 +2,11 @@
 
 use mortise_guide::{GuideSettings, When};
 use mortise_protocol::message::Telemetry;
+use mortise_scenario::{Depth, Key, PreparedScene, Scenario};
 
 use crate::LabError;
 use crate::figures::Row;
 use crate::guided::{SIM, file, key, play, play_with, script};
-use crate::scenario::{Depth, Key, PreparedScene, Scenario};
 
 /// Plate of 15 mm with ten holes of 8.05 mm, 16 mm apart, three of them taken, and a free pin of 8 × 30 mm.
 const STEP: &str = include_str!("../../../data/fixture_row.step");

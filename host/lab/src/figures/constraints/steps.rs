@@ -2,13 +2,14 @@
 
 use mortise_bake::Grabbable;
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
+use mortise_scenario::wire::pose_mm;
+use mortise_scenario::{PreparedScene, Recording, Scenario};
 
 use super::cost::peg_in_hole;
 use crate::LabError;
 use crate::figures::Row;
 use crate::fit::Fit;
 use crate::guided::{SIM, insertion, key, largest_step, play_to};
-use crate::scenario::{PreparedScene, Recording, Scenario, pose_mm};
 use crate::variant::Variant;
 
 /// Largest step of force and torque between two ticks.

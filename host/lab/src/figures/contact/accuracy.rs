@@ -2,13 +2,13 @@
 
 use glam::{DQuat, DVec3};
 use mortise_bake::Grabbable;
+use mortise_scenario::probe::{NamedPose, ProbeRow, ProbeScene};
 
 use super::{CELL_MM, TIGHT_MM};
 use crate::LabError;
 use crate::figures::Row;
 use crate::fit::Fit;
 use crate::peer;
-use crate::probe::{NamedPose, ProbeRow, ProbeScene};
 use crate::scene_p::{self, By};
 use crate::variant::Variant;
 
@@ -84,7 +84,7 @@ pub(super) fn centred(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     };
     let ask = |variant: &Variant| -> Result<ProbeRow, LabError> {
         let scene = ProbeScene::bake(fit.file()?.path(), &variant.options(Grabbable::All))?;
-        scene.probe(scene.pair("peg", Some("block"))?, &pose)
+        Ok(scene.probe(scene.pair("peg", Some("block"))?, &pose)?)
     };
     let what = |variant: &Variant, what: &str| {
         format!(

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use mortise_bake::{BakeError, BakeOptions, Grabbable, Request, SignOptions, bake, check_signs};
 use mortise_brep::{CadModel, LoadOptions, load_step};
+use mortise_scenario::ScenarioError;
 
 use crate::figures::{Plan, Row};
 use crate::variant::Variant;
@@ -103,9 +104,9 @@ fn planned(path: &Path, model: &CadModel) -> Result<(f64, f64, bool), LabError> 
 
 fn refusal(path: &Path) -> impl Fn(BakeError) -> LabError {
     let step = path.display().to_string();
-    move |source| LabError::Bake {
-        step: step.clone(),
-        source,
+    move |source| {
+        let step = step.clone();
+        ScenarioError::Bake { step, source }.into()
     }
 }
 

@@ -9,8 +9,8 @@ use crate::clearance::trial;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::motion::{Motion, play, report};
-use crate::scenario::Outcome;
 use crate::variant::Variant;
+use mortise_scenario::Outcome;
 
 /// Instructions a tick in contact may take.
 const CONTACT: f64 = 120_000.0;

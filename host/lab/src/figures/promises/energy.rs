@@ -5,11 +5,11 @@ use std::thread;
 use mortise_bake::Grabbable;
 use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
+use mortise_scenario::{PreparedScene, Scenario};
 
 use super::{Plan, Row};
 use crate::LabError;
 use crate::fit::Fit;
-use crate::scenario::{PreparedScene, Scenario};
 use crate::variant::Variant;
 
 #[path = "../../../../../firmware/haptics/tests/support/trial.rs"]

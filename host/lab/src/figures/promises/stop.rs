@@ -12,10 +12,10 @@ use mortise_protocol::message::{
     FromDevice, HandScript, Keyframe, Statistics, Telemetry, ToDevice, Version, WirePose,
 };
 use mortise_rig::{Client, Flash, PIPE_CAPACITY, Patience, RigError, Transport, simulate};
+use mortise_scenario::{PreparedScene, Scenario};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
-use crate::scenario::{PreparedScene, Scenario};
 
 /// Commands before STOP.
 const COMMANDS: usize = 200;
@@ -58,9 +58,8 @@ pub fn ticks_until_off(plan: &Plan<'_>, stop: bool) -> Result<f64, LabError> {
     client.upload(&scene.image, &mut |_| {})?;
     drop(client);
     run(&flash, scene.part, stop).map_err(|error| {
-        LabError::Rig(RigError::LinkLost {
-            why: error.to_string(),
-        })
+        let why = error.to_string();
+        RigError::LinkLost { why }.into()
     })
 }
 

@@ -2,11 +2,11 @@
 
 use fastrand::Rng;
 use mortise_rig::RigSpec;
+use mortise_scenario::{Hand, Key, PreparedScene, Scenario, ScenarioError, connect, run_on};
 
 use crate::LabError;
 use crate::figures::stability::faults;
 use crate::figures::{Plan, Row};
-use crate::scenario::{Hand, Key, PreparedScene, Scenario, connect, run_on};
 
 /// Seconds of the still press.
 const PRESS_S: f64 = 60.0;
@@ -85,8 +85,8 @@ fn still_press(scenario: &Scenario, scene: &PreparedScene) -> Result<Row, LabErr
             // A press that was none shows nothing.
             if outcome.peak_force_n > 9.5 { 0.0 } else { f64::NAN }
         }
-        Err(LabError::Fault { .. }) => 1.0,
-        Err(other) => return Err(other),
+        Err(ScenarioError::Fault { .. }) => 1.0,
+        Err(other) => return Err(other.into()),
     };
     let what = format!("still press of 10 N for {PRESS_S} s without tremor: faults");
     Ok(Row::exactly(what, faults, "", 0.0))

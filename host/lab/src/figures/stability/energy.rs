@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use mortise_rig::RigSpec;
+use mortise_scenario::{Outcome, Scenario, run};
 use tempfile::NamedTempFile;
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::fit::Fit;
-use crate::scenario::{Outcome, Scenario, run};
 use crate::stability::lapses;
 
 /// Most energy made at the handle over any interval, mJ, and of what passed, %.
@@ -105,7 +105,7 @@ fn play(name: &str, text: &str, step: &Path) -> Result<Outcome, LabError> {
     scenario.scene.step = step.to_owned();
     // Every tick: the handle's true motion is known then, and what a held force does in it.
     scenario.run.telemetry_every_ticks = 1;
-    run(&scenario, &RigSpec::Simulated { realtime: false })
+    Ok(run(&scenario, &RigSpec::Simulated { realtime: false })?)
 }
 
 #[cfg(test)]

@@ -1,0 +1,124 @@
+//! The window's arguments, and how it opens. A build without the feature `window` takes the same arguments and refuses in one line.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use mortise_rig::RigSpec;
+
+use super::reading::Reading;
+
+/// Contents of the window at the start.
+#[derive(Debug, Args)]
+pub struct Open {
+    /// STEP file to open
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
+    #[command(flatten)]
+    picture: Picture,
+}
+
+impl Open {
+    /// The STEP file, where one is named.
+    pub fn file(&self) -> Option<&Path> {
+        self.file.as_deref()
+    }
+}
+
+/// Options for automation.
+#[derive(Debug, Default, Args)]
+pub struct Picture {
+    /// Write a PNG of the window, then exit
+    #[arg(long, hide = true, value_name = "PNG")]
+    screenshot: Option<PathBuf>,
+    /// Replace an existing PNG
+    #[arg(long, hide = true, requires = "screenshot")]
+    force: bool,
+    /// Seconds from the start to the screenshot
+    #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
+    after: f64,
+    /// Draw fixed parts as glass
+    #[arg(long, hide = true)]
+    see_through: bool,
+    /// Connect to a rig at once
+    #[arg(long, hide = true, value_name = "RIG", value_parser = super::rig)]
+    connect: Option<RigSpec>,
+}
+
+/// Opens the window.
+pub fn open(open: Open) -> anyhow::Result<ExitCode> {
+    open.reading.apply();
+    shown::open(open.file, open.picture)
+}
+
+/// Opens the window with the sample insertion, or that of `file`.
+pub fn demo(file: Option<PathBuf>, rig: Option<RigSpec>, picture: Picture) -> anyhow::Result<ExitCode> {
+    shown::demo(file, rig, picture)
+}
+
+#[cfg(feature = "window")]
+mod shown {
+    use std::path::PathBuf;
+    use std::process::ExitCode;
+    use std::time::Duration;
+
+    use mortise_output::{Existing, Output};
+    use mortise_rig::RigSpec;
+
+    use super::Picture;
+    use crate::session::Intent;
+    use crate::ui::app::{self, Options, Screenshot};
+
+    pub fn open(file: Option<PathBuf>, picture: Picture) -> anyhow::Result<ExitCode> {
+        let first = file.map(Intent::Open).into_iter().collect();
+        app::run(options(picture, first)?)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    pub fn demo(file: Option<PathBuf>, rig: Option<RigSpec>, picture: Picture) -> anyhow::Result<ExitCode> {
+        let mut first = Vec::new();
+        first.extend(file.map(Intent::Open));
+        first.push(Intent::Demo(rig));
+        let mut options = options(picture, first)?;
+        // Glass walls show the insertion inside the hole.
+        options.see_through = true;
+        app::run(options)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn options(picture: Picture, mut first: Vec<Intent>) -> anyhow::Result<Options> {
+        if let Some(rig) = picture.connect {
+            first.extend([Intent::ChooseRig(rig), Intent::Connect]);
+        }
+        let existing = Existing::from_force(picture.force);
+        let check = |file| Output::new(file, existing, &[""; 0]);
+        let file = picture.screenshot.map(check).transpose()?;
+        let after = Duration::try_from_secs_f64(picture.after).unwrap_or_default();
+        Ok(Options {
+            first,
+            screenshot: file.map(|file| Screenshot { file, after }),
+            see_through: picture.see_through,
+        })
+    }
+}
+
+#[cfg(not(feature = "window"))]
+mod shown {
+    use std::path::PathBuf;
+    use std::process::ExitCode;
+
+    use mortise_rig::RigSpec;
+
+    use super::Picture;
+
+    const NONE: &str = "this build of mortise has no window; build it with `cargo build --release`";
+
+    pub fn open(_: Option<PathBuf>, _: Picture) -> anyhow::Result<ExitCode> {
+        anyhow::bail!("{NONE}; `mortise --help` lists what there is without one")
+    }
+
+    pub fn demo(_: Option<PathBuf>, _: Option<RigSpec>, _: Picture) -> anyhow::Result<ExitCode> {
+        anyhow::bail!("{NONE}; without one: `mortise demo --headless`")
+    }
+}

@@ -1,0 +1,51 @@
+//! Commands: a table of figures, the endurance run, and one for each experiment of the table. Each has `--json`.
+//!
+//! Exit code 0: done; 1: a figure does not hold; 2: not possible, with one line on standard error that says why.
+
+mod endurance;
+mod experiments;
+mod figures;
+mod row;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+use mortise_output::program;
+
+use experiments::Chosen;
+
+const NAME: &str = "mortise-lab";
+
+/// Experiments on Mortise, and the figures it is measured by.
+#[derive(Debug, Parser)]
+#[command(name = NAME, version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Measure a table of figures; exit code 1 when one does not hold
+    Figures(figures::Args),
+    /// Keep a board busy for an hour of its own time, and see whether anything wears; exit code 1 when it does
+    Endurance(endurance::Args),
+    #[command(flatten)]
+    Experiment(Chosen),
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return program::usage(NAME, &error, Cli::command()),
+    };
+    program::end(
+        NAME,
+        match &cli.command {
+            Command::Figures(args) => figures::run(args),
+            Command::Endurance(args) => endurance::run(args),
+            Command::Experiment(chosen) => chosen.run(),
+        },
+    )
+}

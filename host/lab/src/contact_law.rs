@@ -1,0 +1,143 @@
+//! What the contact law makes of the exact surfaces: the force on the moving part that its pointshell and the other parts' would get if every
+//! distance were the exact surface's.
+//!
+//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, φ its signed distance from the other part's exact surface at the end of the tick
+//! (f64, CAD faces: no field, no image but for where the points are), φ̇ its change over the tick, along the exact surface's normal. That
+//! is held against the contact force the board tells of the same tick.
+//!
+//! The poses are told in single precision: half a unit in the last place of 0.05 m and of a quaternion is 2 nm each at the peg's rim, 0.8 mN a point
+//! at 200 kN/m.
+
+use glam::{DAffine3, DVec3};
+use mortise_haptics::Settings;
+use mortise_protocol::image::SceneImage;
+use mortise_protocol::message::Telemetry;
+
+use mortise_scenario::wire::{pose_mm, vector};
+use mortise_scenario::{Body, PreparedScene};
+
+use crate::error::LabError;
+
+/// Farther off than this, mm, a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.
+const REACH_MM: f64 = 0.02;
+
+/// One tick's contact force on the moving part, N.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pushed {
+    /// As told.
+    pub told: DVec3,
+    /// By the exact surfaces.
+    pub exact: DVec3,
+}
+
+/// Every pair of neighbouring ticks of `samples`.
+///
+/// # Errors
+/// `Input`, never for what the baker wrote.
+pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec<Pushed>, LabError> {
+    let shells = shells(scene)?;
+    let bodies = scene.bodies();
+    let moving = usize::from(scene.part);
+    let mut clear: Vec<[Clear; 2]> = (bodies.iter().enumerate())
+        .map(|(index, _)| [Clear::new(shells[moving].len()), Clear::new(shells[index].len())])
+        .collect();
+    let poses = samples.windows(2).filter_map(|pair| {
+        let [(_, before), (_, after)] = [pair[0].object.as_ref()?, pair[1].object.as_ref()?];
+        (pair[1].tick == pair[0].tick + 1).then(|| ([pose_mm(before), pose_mm(after)], &pair[1]))
+    });
+    let mut all = Vec::new();
+    for (poses, sample) in poses {
+        let mut exact = Vec::new();
+        for (index, other) in bodies.iter().enumerate().filter(|&(index, _)| index != moving) {
+            let to_other = poses.map(|pose| other.placement.inverse() * pose);
+            let to_part = to_other.map(|to| to.inverse());
+            let [forward, backward] = &mut clear[index];
+            forward.touching(&shells[moving], &to_other, other, &mut |gap, rate, normal| {
+                exact.push((gap, rate, other.placement.transform_vector3(normal)));
+            });
+            let part = &bodies[moving];
+            backward.touching(&shells[index], &to_part, part, &mut |gap, rate, normal| {
+                exact.push((gap, rate, -poses[1].transform_vector3(normal)));
+            });
+        }
+        all.push(Pushed {
+            told: vector(sample.contact.force),
+            exact: force(&exact),
+        });
+    }
+    Ok(all)
+}
+
+/// Sum over points of gap (mm), rate (mm/s) and direction.
+fn force(points: &[(f64, f64, DVec3)]) -> DVec3 {
+    let law = Settings::default().contact;
+    let touching = points.iter().filter(|(gap, ..)| *gap < 0.0).count().max(1);
+    let each = f64::from(law.stiffness_n_per_m);
+    let k = 1e-3 * each.min(f64::from(law.total_stiffness_n_per_m) / touching as f64);
+    (points.iter())
+        .map(|&(gap, rate, normal)| k * (-(gap + f64::from(law.damping_s) * rate.min(0.0))).max(0.0) * normal)
+        .sum()
+}
+
+/// Points of each part's shell, mm, its shape's frame.
+fn shells(scene: &PreparedScene) -> Result<Vec<Vec<DVec3>>, LabError> {
+    let mut words = vec![0u32; scene.image.len().div_ceil(4)];
+    bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..scene.image.len()].copy_from_slice(&scene.image);
+    let image = SceneImage::open(bytemuck::cast_slice(&words)).map_err(|error| LabError::Input {
+        name: "scene".into(),
+        what: error.to_string(),
+    })?;
+    Ok((0..image.parts().len())
+        .map(|part| {
+            let points = image.shape_of_part(part).points.iter();
+            points.map(|point| 1e3 * vector(point.position)).collect()
+        })
+        .collect())
+}
+
+/// How far points are known to be clear of a body: a distance changes by no more than its point moves.
+struct Clear {
+    at: Vec<DVec3>,
+    distance: Vec<f64>,
+}
+
+impl Clear {
+    fn new(points: usize) -> Self {
+        Self {
+            at: vec![DVec3::ZERO; points],
+            distance: vec![f64::NEG_INFINITY; points],
+        }
+    }
+
+    /// Gap, rate and outward normal (of `body`, its frame) of every point within reach, moved from the first to the second of `to_body` in a tick.
+    fn touching(
+        &mut self,
+        points: &[DVec3],
+        to_body: &[DAffine3; 2],
+        body: &Body,
+        out: &mut dyn FnMut(f64, f64, DVec3),
+    ) {
+        let hertz = 1.0 / f64::from(Settings::default().period_s);
+        for (i, &point) in points.iter().enumerate() {
+            let [before, after] = to_body.map(|to| to.transform_point3(point));
+            if self.distance[i] - after.distance(self.at[i]) > REACH_MM {
+                continue;
+            }
+            let Some(nearest) = body.surface.nearest(after) else {
+                continue;
+            };
+            (self.at[i], self.distance[i]) = (after, nearest.distance);
+            if nearest.distance > REACH_MM {
+                continue;
+            }
+            let was = body
+                .surface
+                .nearest(before)
+                .map_or(nearest.distance, |was| was.distance);
+            let outward = (after - nearest.point) * nearest.distance.signum();
+            if let Some(normal) = outward.try_normalize() {
+                out(nearest.distance, hertz * (nearest.distance - was), normal);
+            }
+        }
+    }
+}

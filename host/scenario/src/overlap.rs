@@ -1,0 +1,88 @@
+//! How deep parts overlap by their exact surfaces, at every sample.
+//!
+//! Points on the exact surface of the moving part are looked up in the exact surface of each other part, and the other way round. A look-up costs
+//! microseconds and a run has millions of them; most are not needed: a signed distance changes by no more than its point has moved, so one looked up
+//! once need not be again before it could be deeper than the deepest so far. What is left out changes nothing in the result.
+
+use glam::{DAffine3, DVec3};
+use mortise_protocol::message::Telemetry;
+
+use crate::scene::{Body, PreparedScene};
+use crate::wire::pose_mm;
+
+/// What is known of a part's points in another part.
+struct Known {
+    /// Where each was looked up last, the other part's frame, mm.
+    at: Vec<DVec3>,
+    /// Signed distance there, mm.
+    distance: Vec<f64>,
+}
+
+impl Known {
+    fn nothing(points: &[DVec3]) -> Self {
+        Self {
+            at: points.to_vec(),
+            distance: vec![f64::NEG_INFINITY; points.len()],
+        }
+    }
+
+    /// Deepest of `points` (moved by `to_body`) inside `body`, mm, unless that is less than `most`.
+    fn deeper(&mut self, points: &[DVec3], to_body: &DAffine3, body: &Body, most: f64) -> f64 {
+        let mut deepest = most;
+        let known = self.at.iter_mut().zip(&mut self.distance);
+        for (&point, (at, distance)) in points.iter().zip(known) {
+            let place = to_body.transform_point3(point);
+            if *distance - place.distance(*at) >= -deepest {
+                continue;
+            }
+            *at = place;
+            // Outside the sphere about the body it is as far off as that at least.
+            let off = place.distance(body.center) - body.radius;
+            *distance = if off > 0.0 {
+                off
+            } else {
+                (body.surface.nearest(place)).map_or(f64::INFINITY, |nearest| nearest.distance)
+            };
+            deepest = deepest.max(-*distance);
+        }
+        deepest
+    }
+}
+
+/// Deepest point of the moving part in any other, or of any other in it, over all samples, mm; 0 when nowhere inside. In closed form where the scene
+/// has one.
+pub fn penetration_mm(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
+    match scene.closed_form() {
+        Some(closed_form) => (samples.iter().filter_map(|sample| sample.object.as_ref()))
+            .map(|(_, pose)| closed_form(&pose_mm(pose)))
+            .fold(0.0, f64::max),
+        None => penetration_by_points_mm(scene, samples),
+    }
+}
+
+/// The same by points on either part's surface, mm: what lies between them is not seen.
+pub fn penetration_by_points_mm(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
+    let bodies = scene.bodies();
+    let moving = usize::from(scene.part);
+    let Some(part) = bodies.get(moving) else {
+        return 0.0;
+    };
+    let mut known: Vec<[Known; 2]> = (bodies.iter())
+        .map(|other| [Known::nothing(&part.points), Known::nothing(&other.points)])
+        .collect();
+    let mut most = 0.0;
+    for (_, pose) in samples.iter().filter_map(|sample| sample.object.as_ref()) {
+        let pose = pose_mm(pose);
+        let here = pose.transform_point3(part.center);
+        for (index, (other, [forward, backward])) in bodies.iter().zip(&mut known).enumerate() {
+            let there = other.placement.transform_point3(other.center);
+            if index == moving || here.distance(there) > part.radius + other.radius {
+                continue;
+            }
+            let to_other = other.placement.inverse() * pose;
+            most = forward.deeper(&part.points, &to_other, other, most);
+            most = backward.deeper(&other.points, &to_other.inverse(), part, most);
+        }
+    }
+    most
+}

@@ -1,0 +1,509 @@
+//! Gap, depth and contact forces of two parts at given poses, by the force law's own trees and fields.
+//!
+//! What outside comparisons call: poses come from a CSV file, the scene from a STEP file or a baked image, and each row says how far apart or
+//! how deep, what pushes, what was looked at, and how long it took here. The distance is [`mortise_haptics::Probe`]'s; nothing is computed
+//! beside it.
+
+use std::fmt;
+use std::hint::black_box;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use glam::{DQuat, DVec3};
+use mortise_bake::{BakeOptions, Grabbable, Method, PointshellKind, bake};
+use mortise_brep::load_step;
+use mortise_haptics::{Flags, Pose, Prober, Quat, Settings, Vec3};
+use mortise_protocol::image::{MAGIC, NO_FACE, SceneImage};
+use serde::Serialize;
+
+use crate::error::ScenarioError;
+
+/// Columns a file of poses must have, in any order.
+pub const COLUMNS: [&str; 8] = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"];
+/// How far a quaternion may be from unit length: four decimals in each of its numbers leave half of that.
+const UNIT_TOLERANCE: f64 = 1e-3;
+/// Poses a file may hold: each is some kilobytes of work, and a file larger than this is a mistake.
+const MAX_POSES: usize = 1_000_000;
+/// Times each query is made: what else the computer does makes one longer, never shorter, so the least is taken.
+const REPEATS: usize = 33;
+/// A question that takes longer is asked once, ns.
+const LONG_NS: u64 = 5_000_000;
+/// Farthest a position may be, mm: what the force law takes for a place.
+const FARTHEST_MM: f64 = 100e3;
+
+/// One line of a file of poses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPose {
+    /// Its name.
+    pub name: String,
+    /// Origin of the moving part in the fixed part's frame, mm.
+    pub position_mm: DVec3,
+    /// Moving part to fixed part, unit length.
+    pub orientation: DQuat,
+}
+
+/// Reads a file of poses: CSV, a first line with the [`COLUMNS`], numbers in mm, quaternions of unit length. Empty lines and lines
+/// from `#` are passed over.
+///
+/// # Errors
+/// `Unreadable`; `Input` with the line and what is wrong in it.
+pub fn read_poses(path: &Path) -> Result<Vec<NamedPose>, ScenarioError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    parse_poses(&text).map_err(|(line, what)| ScenarioError::Input {
+        name: format!("{}:{line}", path.display()),
+        what,
+    })
+}
+
+/// As [`read_poses`], from the text; a mistake comes with its line.
+fn parse_poses(text: &str) -> Result<Vec<NamedPose>, (usize, String)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = (text.lines().enumerate())
+        .map(|(index, line)| (index + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let expected = COLUMNS.join(",");
+    let (line, header) = lines
+        .next()
+        .ok_or_else(|| (1, format!("no poses; begin with the line `{expected}`")))?;
+    let header: Vec<&str> = header.split(',').map(cell).collect();
+    let mut places = [0; COLUMNS.len()];
+    for (place, column) in places.iter_mut().zip(COLUMNS) {
+        *place = (header.iter().position(|&h| h == column)).ok_or_else(|| {
+            (
+                line,
+                format!("no column `{column}`; begin with the line `{expected}`"),
+            )
+        })?;
+    }
+    let mut poses = Vec::new();
+    for (line, text) in lines {
+        if poses.len() == MAX_POSES {
+            return Err((line, format!("more than {MAX_POSES} poses; split the file")));
+        }
+        let cells: Vec<&str> = text.split(',').map(cell).collect();
+        poses.push(pose(&cells, header.len(), &places).map_err(|what| (line, what))?);
+    }
+    if poses.is_empty() {
+        return Err((line, "no poses below the header; add at least one line".into()));
+    }
+    Ok(poses)
+}
+
+/// A cell without blanks and quotation marks around it.
+fn cell(text: &str) -> &str {
+    text.trim().trim_matches('"')
+}
+
+fn pose(cells: &[&str], columns: usize, places: &[usize; COLUMNS.len()]) -> Result<NamedPose, String> {
+    if cells.len() != columns {
+        return Err(format!(
+            "{} cells under {columns} columns; give every column one",
+            cells.len()
+        ));
+    }
+    let number = |index: usize| {
+        let (column, text) = (COLUMNS[index], cells[places[index]]);
+        let value: f64 = text
+            .parse()
+            .map_err(|_| format!("{column} is `{text}`; give a number"))?;
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(format!("{column} is {text}; give a finite number"))
+        }
+    };
+    let position_mm = DVec3::new(number(1)?, number(2)?, number(3)?);
+    if position_mm.abs().max_element() > FARTHEST_MM {
+        return Err(format!(
+            "the position is beyond {FARTHEST_MM} mm; give millimetres"
+        ));
+    }
+    let [qw, qx, qy, qz] = [number(4)?, number(5)?, number(6)?, number(7)?];
+    let orientation = DQuat::from_xyzw(qx, qy, qz, qw);
+    let length = orientation.length();
+    if (length - 1.0).abs() > UNIT_TOLERANCE {
+        return Err(format!(
+            "the quaternion's length is {length:.6}; give qw,qx,qy,qz of length 1"
+        ));
+    }
+    Ok(NamedPose {
+        name: cells[places[0]].to_owned(),
+        position_mm,
+        orientation: orientation.normalize(),
+    })
+}
+
+/// A scene to ask, from a STEP file or an image.
+pub struct ProbeScene {
+    /// For messages.
+    name: String,
+    /// The image in words, so that it is aligned.
+    image: Vec<u32>,
+    /// Names of its parts; an image has none, there they are numbers.
+    parts: Vec<String>,
+}
+
+/// How a STEP file is to be baked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Model {
+    /// Cell edge, mm; `None`: as [`BakeOptions`] chooses.
+    pub cell_mm: Option<f64>,
+    /// How contact is found; `None`: as [`BakeOptions`] chooses, or as the image has it.
+    pub method: Option<Method>,
+    /// What the pointshells are made of.
+    pub shell: PointshellKind,
+}
+
+/// A moving part and a fixed one, by their places in the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// The part that is placed.
+    pub moving: u16,
+    /// The part it is placed against.
+    pub fixed: u16,
+}
+
+impl ProbeScene {
+    /// Reads `path`: a baked image as it is, a STEP file baked with cells of `cell_mm` (`None`: as [`BakeOptions`] chooses).
+    ///
+    /// # Errors
+    /// `Unreadable`, `Brep`, `Bake`; `Input` for a damaged image, or one given a cell size.
+    pub fn load(path: &Path, cell_mm: Option<f64>) -> Result<Self, ScenarioError> {
+        let model = Model {
+            cell_mm,
+            ..Model::default()
+        };
+        Self::load_by(path, &model)
+    }
+
+    /// As [`Self::load`], a STEP file as `model` says.
+    ///
+    /// # Errors
+    /// As [`Self::load`]; `Input` for an image of another method.
+    pub fn load_by(path: &Path, model: &Model) -> Result<Self, ScenarioError> {
+        let cell_mm = model.cell_mm;
+        let name = path.display().to_string();
+        let unreadable = |source| ScenarioError::Unreadable {
+            path: path.to_owned(),
+            source,
+        };
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        if !bytes.starts_with(&MAGIC) {
+            return Self::bake(
+                path,
+                &BakeOptions {
+                    method: model.method.unwrap_or_default(),
+                    shell: model.shell,
+                    cell_mm,
+                    // A probe is asked for accuracy: the shell is to err no more than the field does on the radii of common parts.
+                    epsilon_mm: cell_mm.map(|cell| cell / 100.0),
+                    grabbable: Grabbable::All,
+                    // What is asked for here need not fit a board.
+                    image_limit_bytes: if cell_mm.is_some() {
+                        u64::from(u32::MAX)
+                    } else {
+                        1 << 20
+                    },
+                    ..BakeOptions::default()
+                },
+            );
+        }
+        let bad = |what: String| ScenarioError::Input {
+            name: name.clone(),
+            what,
+        };
+        if cell_mm.is_some() {
+            return Err(bad(
+                "an image has its cells already; leave the cell size out".into()
+            ));
+        }
+        let image = words(&bytes);
+        let scene = SceneImage::open(bytemuck::cast_slice(&image))
+            .map_err(|error| bad(format!("{error}; bake it again")))?;
+        let voxels = (0..scene.shape_count()).any(|shape| scene.shape(shape).field.is_occupancy());
+        if model
+            .method
+            .is_some_and(|method| (method == Method::Occupancy) != voxels)
+        {
+            return Err(bad(
+                "an image has its method already, and it is the other one; bake the STEP file again".into(),
+            ));
+        }
+        let parts = (0..scene.parts().len()).map(|index| index.to_string()).collect();
+        Ok(Self { name, image, parts })
+    }
+
+    /// Reads the STEP file at `path` and bakes it as `options` say.
+    ///
+    /// # Errors
+    /// `Unreadable`, `Brep`, `Bake`.
+    pub fn bake(path: &Path, options: &BakeOptions) -> Result<Self, ScenarioError> {
+        let name = path.display().to_string();
+        let model = load_step(path)?;
+        let baked =
+            bake(&model, options, &|_| ControlFlow::Continue(())).map_err(|source| ScenarioError::Bake {
+                step: name.clone(),
+                source,
+            })?;
+        let parts = baked.report.parts.into_iter().map(|part| part.name).collect();
+        Ok(Self {
+            name,
+            image: words(&baked.image),
+            parts,
+        })
+    }
+
+    /// Bytes of the image, to the next four.
+    pub fn image_bytes(&self) -> usize {
+        size_of_val(self.image.as_slice())
+    }
+
+    /// The parts named so; `fixed` may be left out where there are two.
+    ///
+    /// # Errors
+    /// `NoSuchPart`; `Input` when `fixed` is left out and there is a choice, or both are one part.
+    pub fn pair(&self, moving: &str, fixed: Option<&str>) -> Result<Pair, ScenarioError> {
+        let moving = self.part(moving)?;
+        let bad = |what: String| ScenarioError::Input {
+            name: self.name.clone(),
+            what,
+        };
+        let fixed = match fixed {
+            Some(name) => self.part(name)?,
+            None if self.parts.len() == 2 => 1 - moving,
+            None => {
+                return Err(bad(format!(
+                    "{} parts; say with --against which one is fixed: {}",
+                    self.parts.len(),
+                    self.parts.join(", ")
+                )));
+            }
+        };
+        if moving == fixed {
+            return Err(bad("a part has no distance to itself; choose two parts".into()));
+        }
+        Ok(Pair { moving, fixed })
+    }
+
+    fn part(&self, name: &str) -> Result<u16, ScenarioError> {
+        (self.parts.iter().position(|part| part == name))
+            .and_then(|index| u16::try_from(index).ok())
+            .ok_or_else(|| ScenarioError::NoSuchPart {
+                step: self.name.clone(),
+                part: name.to_owned(),
+                known: self.parts.join(", "),
+            })
+    }
+
+    /// Asks for one pose, several times for the least it takes here.
+    ///
+    /// # Errors
+    /// `Input` when the force law refuses the pose.
+    pub fn probe(&self, pair: Pair, named: &NamedPose) -> Result<ProbeRow, ScenarioError> {
+        let bad = |what: String| ScenarioError::Input {
+            name: format!("{}, pose `{}`", self.name, named.name),
+            what,
+        };
+        // It was opened before, so this cannot fail but for a bug, and then it says so.
+        let scene =
+            SceneImage::open(bytemuck::cast_slice(&self.image)).map_err(|error| bad(error.to_string()))?;
+        let [x, y, z, w] = named.orientation.as_quat().to_array();
+        let pose = Pose::new(
+            Vec3::from_array((1e-3 * named.position_mm).as_vec3().to_array()),
+            Quat::from_xyzw(x, y, z, w),
+        );
+        let settings = Settings::default().contact;
+        let mut prober = Box::new(Prober::new());
+        let (mut least_ns, mut result) = (u64::MAX, None);
+        for _ in 0..REPEATS {
+            let start = Instant::now();
+            let found = prober.probe(&scene, pair.moving, pair.fixed, black_box(&pose), &settings);
+            let taken = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+            result = Some(black_box(found).map_err(|error| bad(error.to_string()))?);
+            least_ns = least_ns.min(taken);
+            if taken > LONG_NS {
+                break;
+            }
+        }
+        let found = result.ok_or_else(|| bad("nothing was asked".into()))?;
+        let com = scene
+            .shape_of_part(usize::from(pair.moving))
+            .record
+            .center_of_mass;
+        let center = pose.transform_point(Vec3::from_array(com));
+        let mm = |arm: Vec3| (center + arm).to_array().map(|x| 1e3 * f64::from(x));
+        let face = |face: u16| (face != NO_FACE).then_some(face);
+        let nearest = found.nearest;
+        let voxels = scene.shape_of_part(usize::from(pair.fixed)).field.is_occupancy();
+        Ok(ProbeRow {
+            name: named.name.clone(),
+            distance_mm: 1e3 * f64::from(nearest.distance_m),
+            field_distance_mm: (nearest.field_distance_m.is_finite())
+                .then(|| 1e3 * f64::from(nearest.field_distance_m)),
+            resolution: match (nearest.exact, nearest.in_band) {
+                (true, _) => Resolution::Exact,
+                (false, true) if voxels => Resolution::TangentPlane,
+                (false, true) => Resolution::Field,
+                (false, false) => Resolution::Bound,
+            },
+            nearest_mm: mm(nearest.arm),
+            moving_face: face(nearest.moving_face),
+            fixed_face: face(nearest.fixed_face),
+            contacts: found.contacts,
+            contact_points: (prober.contacts())
+                .map(|c| ContactRow {
+                    point_mm: mm(c.arm),
+                    normal: c.normal.to_array(),
+                    depth_mm: 1e3 * f64::from(c.depth_m),
+                    moving_face: face(c.moving_face),
+                    fixed_face: face(c.fixed_face),
+                })
+                .collect(),
+            force_n: found.wrench.force.to_array(),
+            torque_nm: found.wrench.torque.to_array(),
+            nodes: found.work.nodes,
+            points: found.work.points,
+            least_ns,
+            flags: (Flags::NAMES.iter())
+                .filter(|(flag, _)| found.work.flags.contains(*flag))
+                .map(|&(_, name)| name)
+                .collect(),
+        })
+    }
+}
+
+/// Bytes in words of the computer's own order, the last filled up with zeros.
+fn words(bytes: &[u8]) -> Vec<u32> {
+    let mut words = vec![0; bytes.len().div_ceil(size_of::<u32>())];
+    bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..bytes.len()].copy_from_slice(bytes);
+    words
+}
+
+/// What a distance is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Resolution {
+    /// To an analytic face or edge.
+    Exact,
+    /// Interpolated in the field.
+    Field,
+    /// To the plane through a voxel's centre: all a voxmap has.
+    TangentPlane,
+    /// At least so far apart, or at least so deep: the field ends nearer than that.
+    Bound,
+}
+
+/// What was found at one pose. Positions and directions in the fixed part's frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProbeRow {
+    /// The pose's name.
+    pub name: String,
+    /// Gap positive, deepest penetration negative, mm.
+    pub distance_mm: f64,
+    /// The same as the field interpolates it, or as the voxmap's tangent planes have it, mm: what the force law acts on; none beyond them.
+    pub field_distance_mm: Option<f64>,
+    /// What `distance_mm` is worth.
+    pub resolution: Resolution,
+    /// The point it was found at, mm.
+    pub nearest_mm: [f64; 3],
+    /// Face of the moving part there.
+    pub moving_face: Option<u16>,
+    /// Face of the fixed part there.
+    pub fixed_face: Option<u16>,
+    /// Points that push.
+    pub contacts: u16,
+    /// They, each.
+    pub contact_points: Vec<ContactRow>,
+    /// On the moving part, N.
+    pub force_n: [f32; 3],
+    /// On the moving part about its centre of mass, N m.
+    pub torque_nm: [f32; 3],
+    /// Tree nodes looked at.
+    pub nodes: u32,
+    /// Points looked up.
+    pub points: u32,
+    /// Least time of a query on this computer, ns.
+    pub least_ns: u64,
+    /// What was out of the ordinary.
+    pub flags: Vec<&'static str>,
+}
+
+/// A point that pushes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ContactRow {
+    /// Where, mm.
+    pub point_mm: [f64; 3],
+    /// Direction in which the moving part is pushed.
+    pub normal: [f32; 3],
+    /// How deep, mm, positive.
+    pub depth_mm: f64,
+    /// Face of the moving part.
+    pub moving_face: Option<u16>,
+    /// Face of the fixed part.
+    pub fixed_face: Option<u16>,
+}
+
+impl fmt::Display for ProbeRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let worth = match self.resolution {
+            Resolution::Exact => "exact",
+            Resolution::Field => "by the field",
+            Resolution::TangentPlane => "to a tangent plane",
+            Resolution::Bound => "at least",
+        };
+        let [x, y, z] = self.force_n;
+        write!(
+            f,
+            "{}: {:+.4} mm ({worth}), {} contacts, force {x:.3} {y:.3} {z:.3} N, {} points, {} ns",
+            self.name, self.distance_mm, self.contacts, self.points, self.least_ns
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_in_any_order() {
+        let text = "# from a model\nqw,qx,qy,qz,z,y,x,name\n\n1,0,0,0,3,2,1,\"in\"\r\n";
+        let poses = parse_poses(text).expect("well formed");
+        assert_eq!(
+            poses,
+            [NamedPose {
+                name: "in".into(),
+                position_mm: DVec3::new(1.0, 2.0, 3.0),
+                orientation: DQuat::IDENTITY,
+            }]
+        );
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        let header = "name,x,y,z,qw,qx,qy,qz";
+        let cases = [
+            (String::new(), 1, "no poses"),
+            (header.to_owned(), 1, "add at least one"),
+            (
+                "name,x,y,z,qw,qx,qy\na,0,0,0,1,0,0".to_owned(),
+                1,
+                "no column `qz`",
+            ),
+            (format!("{header}\na,0,0,0,1,0,0"), 2, "7 cells under 8 columns"),
+            (format!("{header}\n\na,0,NaN,0,1,0,0,0"), 3, "y is NaN"),
+            (format!("{header}\na,0,0,inf,1,0,0,0"), 2, "z is inf"),
+            (format!("{header}\na,0,zero,0,1,0,0,0"), 2, "y is `zero`"),
+            (format!("{header}\na,0,0,0,1,1,0,0"), 2, "length is 1.414214"),
+            (format!("{header}\na,1e9,0,0,1,0,0,0"), 2, "give millimetres"),
+        ];
+        for (text, line, part) in cases {
+            let (at, what) = parse_poses(&text).expect_err(part);
+            assert_eq!(at, line, "{what}");
+            assert!(what.contains(part), "{what}");
+        }
+    }
+}

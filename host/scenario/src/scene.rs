@@ -1,0 +1,170 @@
+//! From STEP file to scene image, with what measuring needs beside it: exact surfaces and sample points.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+use mortise_bake::{
+    BakeOptions, BakeReport, ExactSurface, Grabbable, PointshellOptions, bake, sample_pointshell,
+};
+use mortise_brep::{CadModel, load_step};
+use mortise_guide::{Guide, GuideSettings};
+
+use crate::error::ScenarioError;
+use crate::scenario::Scenario;
+
+/// Chord error of the points that penetration is measured at, as a share of the part's radius: 5 µm on a part of 100 mm, a tenth of the 0.05 mm that
+/// matter there.
+const EPSILON: f64 = 1e-4;
+/// Their largest spacing, likewise: 4 mm.
+const SPACING: f64 = 0.08;
+
+/// A baked scene with its geometry.
+pub struct PreparedScene {
+    /// The image.
+    pub image: Vec<u8>,
+    /// The geometry it came from.
+    pub model: CadModel,
+    /// What was baked.
+    pub report: BakeReport,
+    /// Index of the part to grab, in the image.
+    pub part: u16,
+    bodies: Vec<Body>,
+    /// Its penetration in closed form, where that is known.
+    closed_form: Option<ClosedForm>,
+}
+
+/// Deepest point of either of two solids inside the other, mm, with the moving part's shape at a pose (mm, world); 0 when nowhere inside.
+pub type ClosedForm = Box<dyn Fn(&DAffine3) -> f64 + Send + Sync>;
+
+/// A part as measuring sees it.
+pub struct Body {
+    /// Its exact surface, shape frame, mm.
+    pub surface: ExactSurface,
+    /// Points on its surface, shape frame, mm.
+    pub points: Vec<DVec3>,
+    /// Centre of a sphere about it, shape frame, mm.
+    pub center: DVec3,
+    /// The sphere's radius, mm.
+    pub radius: f64,
+    /// Shape to world where the file places it, mm.
+    pub placement: DAffine3,
+}
+
+impl PreparedScene {
+    /// Reads, bakes, and samples the scene of `scenario`.
+    ///
+    /// # Errors
+    /// `Brep`, `Bake`, `NoSuchPart`.
+    pub fn of(scenario: &Scenario) -> Result<Self, ScenarioError> {
+        let options = BakeOptions {
+            method: scenario.scene.method,
+            shell: scenario.scene.pointshell(),
+            cell_mm: scenario.scene.cell_mm,
+            grabbable: Grabbable::Named(vec![scenario.scene.part.clone()]),
+            ..BakeOptions::default()
+        };
+        Self::with(scenario, &options)
+    }
+
+    /// As [`Self::of`], baked as `options` say, whatever the scenario does.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn with(scenario: &Scenario, options: &BakeOptions) -> Result<Self, ScenarioError> {
+        let model = load_step(&scenario.scene.step)?;
+        Self::bake(&scenario.scene.step, model, &scenario.scene.part, options)
+    }
+
+    fn bake(step: &Path, model: CadModel, part: &str, options: &BakeOptions) -> Result<Self, ScenarioError> {
+        let name = || step.display().to_string();
+        if !model.parts.iter().any(|known| known.name == part) {
+            let known: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
+            return Err(ScenarioError::NoSuchPart {
+                step: name(),
+                part: part.to_owned(),
+                known: known.join(", "),
+            });
+        }
+        let baked = bake(&model, options, &|_| ControlFlow::Continue(()))
+            .map_err(|source| ScenarioError::Bake { step: name(), source })?;
+        let index = baked.report.parts.iter().position(|baked| baked.name == part);
+        let Some(index) = index.and_then(|index| u16::try_from(index).ok()) else {
+            return Err(ScenarioError::NoSuchPart {
+                step: name(),
+                part: part.to_owned(),
+                known: "parts, but this one has no surface".into(),
+            });
+        };
+        let bodies = (baked.report.parts.iter())
+            .map(|baked| body(&model, baked.model_part))
+            .collect();
+        Ok(Self {
+            image: baked.image,
+            model,
+            report: baked.report,
+            part: index,
+            bodies,
+            closed_form: None,
+        })
+    }
+
+    /// The same with its penetration in closed form, which is then what runs measure.
+    pub fn with_closed_form(self, closed_form: ClosedForm) -> Self {
+        Self {
+            closed_form: Some(closed_form),
+            ..self
+        }
+    }
+
+    /// See [`Self::with_closed_form`].
+    pub(crate) fn closed_form(&self) -> Option<&ClosedForm> {
+        self.closed_form.as_ref()
+    }
+
+    /// Where the file places the moving part: its shape to world, mm.
+    pub fn placement(&self) -> DAffine3 {
+        let part = self.bodies.get(usize::from(self.part));
+        part.map(|part| part.placement).unwrap_or_default()
+    }
+
+    /// What recognises and sends constraints in this scene.
+    pub fn guide(&self, settings: GuideSettings) -> Guide<'_> {
+        let parts = self.report.parts.iter().map(|part| part.model_part).collect();
+        Guide::new(&self.model, parts, settings)
+    }
+
+    /// Its parts, in the image's order.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// Index in the image of the part named so.
+    pub fn part_named(&self, name: &str) -> Option<usize> {
+        self.report.parts.iter().position(|part| part.name == name)
+    }
+}
+
+fn body(model: &CadModel, part: usize) -> Body {
+    let part = &model.parts[part];
+    let surface = ExactSurface::new(&model.shapes[part.shape]);
+    let vertices = &surface.shape().mesh.vertices;
+    let (low, high) = vertices
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &vertex| {
+            (low.min(vertex), high.max(vertex))
+        });
+    let center = 0.5 * (low + high);
+    let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f64::max);
+    let options = PointshellOptions::everywhere(EPSILON * radius, SPACING * radius);
+    let points: Vec<DVec3> = (sample_pointshell(&surface, &options).points.iter())
+        .map(|point| point.position)
+        .collect();
+    Body {
+        surface,
+        points,
+        center,
+        radius,
+        placement: part.placement,
+    }
+}
