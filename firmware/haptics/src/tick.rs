@@ -22,26 +22,26 @@ use crate::passivity::energy_bound::Hold;
 use crate::settings::{Integrator, Settings};
 use crate::state::State;
 
-/// What held the object back may be gone from one tick to the next. Then it starts with this speed, m/s, and grows faster by [`FASTER`] a tick, until
-/// it has caught up with the motion that nothing holds back: 3 ticks to 0.1 m/s, which 10 N give 0.1 kg in one.
+/// Initial speed of an object whose obstacle vanishes from one tick to the next, m/s: the search allows for it and for growth by [`FASTER`] a tick, until
+/// it reaches the free motion: 3 ticks to 0.1 m/s, which 10 N give 0.1 kg in one.
 const START_M_PER_S: f32 = 0.02;
 /// See [`START_M_PER_S`].
 const FASTER: f32 = 2.0;
 
-/// Moves the held object by one period and gives the wrench the handle must feel.
+/// Moves the held object by one period and returns the wrench that the handle must render.
 ///
-/// Order: input check; coupling; step without contacts, which tells how far anything can move; search within that; step with contacts;
-/// motion; reaction; limits.
+/// Order: input check; coupling and energy balance; force terms; step without contacts, which bounds how far anything can move; contact search within
+/// that bound; step with contacts; motion; reaction; limits.
 ///
-/// **Contract.** Called every [`Settings::period_s`]. Work is bounded: [`crate::ContactSettings::point_budget`] look-ups, 256 contacts, 8
-/// solves with contacts. Past a bound the tick degrades in the order the flag's documentation states and says so in [`Work::flags`]; it never panics
-/// and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
-/// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; another one is safe but meaningless.
+/// **Contract.** Called every [`Settings::period_s`]. Work is bounded: [`crate::ContactSettings::point_budget`] field queries, 256 contacts, 8
+/// solves with contacts. Beyond a bound the tick degrades in the order stated in the flag's documentation and reports it in [`Work::flags`]; it never
+/// panics and never returns a wrench above [`crate::LimitSettings`] or one that is not finite. A bad input or a failed step gives a zero wrench and
+/// leaves the object where it was. `scene` must be the one given to [`State::load_scene`]; with another one the result is safe but meaningless.
 ///
 /// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-23, thesis pair with 20 µm clearance baked at 0.5 mm cells
-/// with a pointshell of 25 µm: 72,900 instructions at worst pressed to the wall with 5 N and slid at 10 mm/s, 19,400 in free motion; with a
-/// pointshell of 5 µm 114,280, points left out in 96 % of the ticks, and 20,020 (`mortise lab figures contact --quick`). A peg of 0.7 m
-/// with 0.2 mm clearance and a shell of 50 µm, pressed likewise and slid at 20 mm/s, needs more than the default budget, is thinned, and stays below
+/// with a pointshell of 25 µm: at most 72,900 instructions pressed to the wall with 5 N and slid at 10 mm/s, 19,400 in free motion; with a
+/// pointshell of 5 µm 114,280, points decimated in 96 % of the ticks, and 20,020 (`mortise-lab figures contact --quick`). A peg of 0.7 m
+/// with 0.2 mm clearance and a shell of 50 µm, pressed in the same way and slid at 20 mm/s, exceeds the default budget, is decimated, and stays below
 /// 120,000. Into a fit of 0.02 mm: 128,300 guided, 119,840 by collision alone (`mortise-lab rate --quick`); 121,880 with four different targets
 /// (`mortise-lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
@@ -211,7 +211,7 @@ fn free_motion(
     };
     let reach = grabbed.body.reach;
     let slowed = slow_down(&mut free.twist, reach, given.fastest());
-    // As far as it would go with nothing in the way. A part that leans on something stays there, and need not be searched as far as if it let go.
+    // The free motion, or less: a part that leans on something stays there, so its search need not reach as far as if it were let go.
     let likely = FASTER * point_speed(grabbed.twist, reach) + START_M_PER_S;
     let margin = settings.contact.margin_m
         + given.braking_margin()
