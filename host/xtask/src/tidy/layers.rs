@@ -83,8 +83,10 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-firmware",
             "mortise-guide",
             "mortise-haptics",
+            "mortise-mechanism",
             "mortise-protocol",
             "mortise-rig",
+            "mortise-simulation",
         ],
     ),
     // Experiments are a program of their own.
