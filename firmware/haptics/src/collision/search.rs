@@ -122,7 +122,7 @@ impl<'i> Search<'_, 'i> {
             on_points: traversal.on_points / LOOKUP,
         };
         if let Some(stop) = stop {
-            work.flags.insert(Flags::BUDGET_EXCEEDED);
+            work.flags.insert(Flags::BUDGET);
             contacts.carry(&self.motions[0], |leaf| {
                 let seen = if start < stop {
                     start <= leaf && leaf < stop

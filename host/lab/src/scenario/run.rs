@@ -3,8 +3,8 @@
 use glam::{DQuat, DVec3};
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{
-    Capabilities, CostUnit, DeviceState, Fault, FromDevice, HandScript, Keyframe, Statistics, Telemetry,
-    ToDevice, WirePose, flag,
+    Capabilities, CostUnit, DeviceState, Fault, Flags, FromDevice, HandScript, Keyframe, Statistics,
+    Telemetry, ToDevice, WirePose,
 };
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe};
@@ -449,7 +449,9 @@ fn outcome(
         parameter_messages: play.messages,
         flags: samples.iter().fold(0, |flags, sample| flags | sample.flags),
         degraded_percent: {
-            let degraded = (samples.iter()).filter(|s| s.flags & (flag::BUDGET | flag::CONTACTS) != 0);
+            let mut incomplete = Flags::BUDGET;
+            incomplete.insert(Flags::CONTACTS);
+            let degraded = (samples.iter()).filter(|s| Flags::from_bits(s.flags).intersects(incomplete));
             100.0 * degraded.count() as f64 / samples.len().max(1) as f64
         },
         fault: play.fault.map(|(_, fault)| describe(fault)),
