@@ -2,9 +2,9 @@
 
 use glam::{Quat, Vec3};
 use heapless::Vec;
-use mortise_haptics::{FacePair, Flags, GuidanceState, Pose, Wrench};
+use mortise_haptics::{FacePair, GuidanceState, Pose, Wrench};
 use mortise_protocol::limits::MAX_PAIRS;
-use mortise_protocol::message::{Guidance, TouchingPair, WirePose, WireWrench, flag};
+use mortise_protocol::message::{Guidance, TouchingPair, WirePose, WireWrench};
 
 /// A pose for the wire.
 pub fn pose_to_wire(pose: &Pose) -> WirePose {
@@ -62,55 +62,4 @@ pub fn pairs_to_wire(pairs: &[FacePair]) -> Vec<TouchingPair, MAX_PAIRS> {
             insertion: pair.insertion_m,
         })
         .collect()
-}
-
-/// Each flag of the force law and its bit on the wire.
-pub const FLAGS_ON_WIRE: [(Flags, u16); Flags::NAMES.len()] = [
-    (Flags::BUDGET_EXCEEDED, flag::BUDGET),
-    (Flags::CONTACTS_DROPPED, flag::CONTACTS),
-    (Flags::UNSETTLED, flag::UNSETTLED),
-    (Flags::DEEP, flag::DEEP),
-    (Flags::SPEED_LIMITED, flag::SPEED_LIMIT),
-    (Flags::SATURATED_FORCE, flag::COUPLING_FORCE),
-    (Flags::SATURATED_TORQUE, flag::COUPLING_TORQUE),
-    (Flags::FORCE_LIMITED, flag::FORCE_LIMIT),
-    (Flags::TORQUE_LIMITED, flag::TORQUE_LIMIT),
-    (Flags::FORCE_SLEW_LIMITED, flag::FORCE_SLEW),
-    (Flags::TORQUE_SLEW_LIMITED, flag::TORQUE_SLEW),
-    (Flags::BAD_INPUT, flag::BAD_INPUT),
-    (Flags::NON_FINITE, flag::NON_FINITE),
-    (Flags::SOFTENED, flag::SOFTENED),
-];
-
-/// What the force law says was out of the ordinary, in the wire's bits.
-pub fn flags_to_wire(flags: Flags) -> u16 {
-    let mut wire = 0;
-    for (ours, theirs) in FLAGS_ON_WIRE {
-        if flags.intersects(ours) {
-            wire |= theirs;
-        }
-    }
-    wire
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Whatever the force law flags reaches the host as one bit that nothing else sets.
-    #[test]
-    fn each_flag_has_a_bit_of_its_own() {
-        let mut taken = 0u16;
-        for (flag, name) in Flags::NAMES {
-            let bit = flags_to_wire(flag);
-            assert_eq!(bit.count_ones(), 1, "{name}");
-            assert_eq!(taken & bit, 0, "{name} shares its bit");
-            assert!(flag::ALL.iter().any(|(known, ..)| *known == bit), "{name}");
-            taken |= bit;
-        }
-        assert_eq!(flags_to_wire(Flags::empty()), 0);
-        // The one bit that the board sets and the force law does not.
-        let all = flag::ALL.iter().fold(0, |all, (bit, ..)| all | bit);
-        assert_eq!(all & !taken, flag::PAIRS);
-    }
 }

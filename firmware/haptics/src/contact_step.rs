@@ -164,8 +164,7 @@ fn search(
     };
     let start = memory.resume;
     let (stopped, used) = search.run(start, &mut memory.coherence, &mut memory.contacts, work);
-    work.flags
-        .insert_if(search.decimation > 0, Flags::BUDGET_EXCEEDED);
+    work.flags.insert_if(search.decimation > 0, Flags::BUDGET);
     memory.resume = stopped.unwrap_or(NodeCursor::FIRST);
     memory.busy = used.all > budget / 2;
     let touching = memory.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
@@ -178,8 +177,7 @@ fn search(
         lost: memory.contacts.lost(),
     });
     memory.sharing = larger(larger(touching as f32, 1.0), memory.sharing * SHARING_DECAY);
-    work.flags
-        .insert_if(memory.contacts.dropped(), Flags::CONTACTS_DROPPED);
+    work.flags.insert_if(memory.contacts.dropped(), Flags::CONTACTS);
     used.all
 }
 

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::limits::MAX_PAIRS;
+pub use mortise_protocol::message::Flags;
 
 use crate::math::pose::{Pose, Twist, Wrench};
 
@@ -91,108 +92,4 @@ pub struct Work {
     pub solves: u8,
     /// Exceptional conditions.
     pub flags: Flags,
-}
-
-/// Set of conditions a tick reports.
-#[derive(Clone, Copy, Default, PartialEq, Eq)]
-pub struct Flags(u16);
-
-impl Flags {
-    /// The work reached [`crate::ContactSettings::point_budget`]: points are decimated evenly, and when that does not suffice the rest waits for the
-    /// next ticks; contacts found before stay in force.
-    pub const BUDGET_EXCEEDED: Self = Self(1 << 0);
-    /// More candidates than the store holds: the deepest were kept, and of the rest those that a rotation would bring to touch first. Where more
-    /// touch than fit, points are decimated from the next tick on ([`Self::BUDGET_EXCEEDED`]).
-    pub const CONTACTS_DROPPED: Self = Self(1 << 1);
-    /// The set of touching points had not converged after the last solve allowed.
-    pub const UNSETTLED: Self = Self(1 << 2);
-    /// Penetration too deep: the field gives no direction at a point, which does not push.
-    pub const DEEP: Self = Self(1 << 3);
-    /// The object was held to its speed limit.
-    pub const SPEED_LIMITED: Self = Self(1 << 4);
-    /// The coupling slipped at its force limit.
-    pub const SATURATED_FORCE: Self = Self(1 << 5);
-    /// The coupling slipped at its torque limit.
-    pub const SATURATED_TORQUE: Self = Self(1 << 6);
-    /// The handle's force was reduced to its limit.
-    pub const FORCE_LIMITED: Self = Self(1 << 7);
-    /// The rate of change of the handle's force was reduced to its limit.
-    pub const FORCE_SLEW_LIMITED: Self = Self(1 << 8);
-    /// The input was not finite, out of range, or not a rotation: zero wrench, no motion.
-    pub const BAD_INPUT: Self = Self(1 << 9);
-    /// The step gave a non-finite result: zero wrench, object stopped where it was.
-    pub const NON_FINITE: Self = Self(1 << 10);
-    /// Damped for stability: the coupling had generated energy, and the handle's wrench is scaled down.
-    pub const SOFTENED: Self = Self(1 << 11);
-    /// The handle's torque was reduced to its limit.
-    pub const TORQUE_LIMITED: Self = Self(1 << 12);
-    /// The rate of change of the handle's torque was reduced to its limit.
-    pub const TORQUE_SLEW_LIMITED: Self = Self(1 << 13);
-
-    /// Every flag with its name, in order of bits.
-    pub const NAMES: [(Self, &'static str); 14] = [
-        (Self::BUDGET_EXCEEDED, "budget exceeded"),
-        (Self::CONTACTS_DROPPED, "contacts dropped"),
-        (Self::UNSETTLED, "unsettled"),
-        (Self::DEEP, "deep"),
-        (Self::SPEED_LIMITED, "speed limited"),
-        (Self::SATURATED_FORCE, "saturated force"),
-        (Self::SATURATED_TORQUE, "saturated torque"),
-        (Self::FORCE_LIMITED, "force limited"),
-        (Self::FORCE_SLEW_LIMITED, "force slew limited"),
-        (Self::BAD_INPUT, "bad input"),
-        (Self::NON_FINITE, "non-finite"),
-        (Self::SOFTENED, "softened"),
-        (Self::TORQUE_LIMITED, "torque limited"),
-        (Self::TORQUE_SLEW_LIMITED, "torque slew limited"),
-    ];
-
-    /// No flag.
-    pub const fn empty() -> Self {
-        Self(0)
-    }
-
-    /// Bits as sent in telemetry.
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
-    /// Flags from telemetry; unknown bits are kept.
-    pub const fn from_bits(bits: u16) -> Self {
-        Self(bits)
-    }
-
-    /// Whether all of `other` are set.
-    pub const fn contains(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// Whether any of `other` is set.
-    pub const fn intersects(self, other: Self) -> bool {
-        self.0 & other.0 != 0
-    }
-
-    /// Sets all of `other`.
-    pub fn insert(&mut self, other: Self) {
-        self.0 |= other.0;
-    }
-
-    /// Sets all of `other` when `condition` holds.
-    pub fn insert_if(&mut self, condition: bool, other: Self) {
-        if condition {
-            self.insert(other);
-        }
-    }
-}
-
-impl core::fmt::Debug for Flags {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let mut set = f.debug_set();
-        for (flag, name) in Self::NAMES {
-            if self.contains(flag) {
-                set.entry(&format_args!("{name}"));
-            }
-        }
-        set.finish()
-    }
 }

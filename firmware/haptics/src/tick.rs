@@ -172,7 +172,7 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     // Nothing beyond the margin was evaluated, so nothing may move farther.
     let fastest = smaller(reach.margin / period_s, given.fastest());
     let slowed = slow_down(&mut twist, grabbed.body.reach, fastest);
-    work.flags.insert_if(reach.slowed || slowed, Flags::SPEED_LIMITED);
+    work.flags.insert_if(reach.slowed || slowed, Flags::SPEED_LIMIT);
     grabbed.advance(twist, period_s);
     let finite = grabbed.twist.is_finite() && grabbed.pose().is_finite() && solution.contact.is_finite();
     finite.then(|| Moved {

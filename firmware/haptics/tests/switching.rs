@@ -236,7 +236,7 @@ fn another_method_takes_over_without_a_step() {
 fn unwanted() -> Flags {
     let mut flags = Flags::NON_FINITE;
     flags.insert(Flags::UNSETTLED);
-    flags.insert(Flags::FORCE_SLEW_LIMITED);
-    flags.insert(Flags::TORQUE_SLEW_LIMITED);
+    flags.insert(Flags::FORCE_SLEW);
+    flags.insert(Flags::TORQUE_SLEW);
     flags
 }

@@ -92,7 +92,7 @@ fn recovers_after_an_overload() {
     let mut hand = Hand::at([0.0; 3]);
     hand.push = [5.0, 0.0, 0.0];
     state.grab(&scene, 1, &hand.pose()).unwrap();
-    let degraded = |seen: &Seen| seen.flags.contains(Flags::BUDGET_EXCEEDED);
+    let degraded = |seen: &Seen| seen.flags.contains(Flags::BUDGET);
     let rest = |_: u32, hand: &mut Hand, _: Option<&_>| hand.goal[2] = 0.0;
     let shake = |t: u32, hand: &mut Hand, _: Option<&_>| hand.goal[2] = 20e-3 * (0.2 * f64::from(t)).sin();
     // The first pass over everything takes many ticks, and decimates nothing permanently.

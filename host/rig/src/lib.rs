@@ -56,4 +56,4 @@ pub use simulated::{Flash, simulate};
 pub use spec::{EmulatedMode, RigSpec, SpecError};
 pub use transport::{READ_WAIT, Transport};
 pub use upload::{UPLOAD_WINDOW, UploadProgress, begin_message, chunk_message};
-pub use words::{FLAG_WORDS, Words, describe, describe_flags};
+pub use words::{Words, describe, describe_flags};

@@ -1,6 +1,6 @@
 //! The board's messages in words for the operator: what happened, and what to do.
 
-use mortise_protocol::message::{DeviceState, Fault, Refusal, ResetReason, ToDevice, flag};
+use mortise_protocol::message::{DeviceState, Fault, Flags, Refusal, ResetReason, ToDevice};
 
 /// An item of the protocol that can be expressed in words.
 pub trait Words {
@@ -19,33 +19,9 @@ impl<W: Words> Words for &W {
     }
 }
 
-/// Each flag of the telemetry in words, most important first.
-pub const FLAG_WORDS: [(u16, &str); flag::ALL.len()] = [
-    (flag::NON_FINITE, "the computed force was not finite"),
-    (
-        flag::BAD_INPUT,
-        "a sensor reading was not a number or out of proportion",
-    ),
-    (flag::FORCE_LIMIT, "force limit acts"),
-    (flag::TORQUE_LIMIT, "torque limit acts"),
-    (flag::FORCE_SLEW, "limit on change of force acts"),
-    (flag::TORQUE_SLEW, "limit on change of torque acts"),
-    (flag::COUPLING_FORCE, "the coupling slips: force"),
-    (flag::COUPLING_TORQUE, "the coupling slips: torque"),
-    (flag::SPEED_LIMIT, "speed limit acts"),
-    (flag::SOFTENED, "damped for stability"),
-    (flag::DEEP, "penetration too deep"),
-    (flag::UNSETTLED, "contacts had not settled"),
-    (flag::BUDGET, "point budget reached"),
-    (flag::CONTACTS, "more contacts than fit"),
-    (flag::PAIRS, "more touching faces than are shown"),
-];
-
 /// The words of a telemetry sample's flags, most important first.
 pub fn describe_flags(flags: u16) -> impl Iterator<Item = &'static str> {
-    (FLAG_WORDS.into_iter())
-        .filter(move |(bit, _)| flags & bit != 0)
-        .map(|(_, words)| words)
+    Flags::from_bits(flags).rows().map(|row| row.words)
 }
 
 impl Words for DeviceState {
@@ -246,21 +222,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn each_flag_has_words_of_its_own() {
-        let mut said = std::collections::BTreeSet::new();
-        for (bit, name, _) in flag::ALL {
-            let words: Vec<_> = describe_flags(*bit).collect();
-            assert_eq!(words.len(), 1, "{name}: {words:?}");
-            assert!(
-                said.insert(words[0]),
-                "{name}: {words:?} is used for another flag too"
-            );
-        }
-        assert_eq!(describe_flags(u16::MAX).count(), flag::ALL.len());
-        assert_eq!(describe_flags(0).count(), 0);
-    }
-
     /// The safety page's operator messages and the protocol page's flags must equal those of the code.
     #[test]
     fn the_pages_have_the_same_words() {
@@ -275,12 +236,13 @@ mod tests {
             assert!(safety.contains(&format!("\"{words}\"")), "{words}");
         }
         let protocol = read("protocol.md");
-        for (bit, name, says) in flag::ALL {
-            let words = describe_flags(*bit).next().expect("tested above");
+        for row in Flags::ALL {
             let row = format!(
-                "| {} | `{name}` | {} | {words} |",
-                bit.trailing_zeros(),
-                says.trim()
+                "| {} | `{}` | {} | {} |",
+                row.flag.bits().trailing_zeros(),
+                row.name,
+                row.meaning,
+                row.words
             );
             assert!(protocol.contains(&row), "{row}");
         }

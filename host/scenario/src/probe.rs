@@ -13,7 +13,7 @@ use std::time::Instant;
 use glam::{DQuat, DVec3};
 use mortise_bake::{BakeOptions, Grabbable, Method, PointshellKind, bake};
 use mortise_brep::load_step;
-use mortise_haptics::{Flags, Pose, Prober, Quat, Settings, Vec3};
+use mortise_haptics::{Pose, Prober, Quat, Settings, Vec3};
 use mortise_protocol::image::{MAGIC, NO_FACE, SceneImage};
 use serde::Serialize;
 
@@ -368,10 +368,7 @@ impl ProbeScene {
             nodes: found.work.nodes,
             points: found.work.points,
             least_ns,
-            flags: (Flags::NAMES.iter())
-                .filter(|(flag, _)| found.work.flags.contains(*flag))
-                .map(|&(_, name)| name)
-                .collect(),
+            flags: found.work.flags.rows().map(|row| row.words).collect(),
         })
     }
 }

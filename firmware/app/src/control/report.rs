@@ -1,12 +1,12 @@
 //! What the control plane tells the link plane: replies, state changes, faults, statistics, telemetry.
 
 use mortise_haptics::Wrench;
-use mortise_protocol::message::{Statistics, Telemetry, flag};
+use mortise_protocol::message::{Flags, Statistics, Telemetry};
 
 use super::ControlPlane;
 use crate::board::{Clock, Mechanism};
 use crate::channel::{EVENTS_AT_ONCE, Event, Reply};
-use crate::wire::{flags_to_wire, guidance_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire};
+use crate::wire::{guidance_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     pub(super) fn lockstep_has_room(&self) -> bool {
@@ -83,13 +83,9 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             .simulation()
             .and_then(|simulation| simulation.hand());
         let output = self.output.as_ref();
-        let mut flags = output.map_or(0, |o| flags_to_wire(o.work.flags));
-        if self.replaced {
-            flags |= flag::BAD_INPUT;
-        }
-        if output.is_some_and(|o| o.pairs.is_full()) {
-            flags |= flag::PAIRS;
-        }
+        let mut flags = output.map_or(Flags::empty(), |o| o.work.flags);
+        flags.insert_if(self.replaced, Flags::BAD_INPUT);
+        flags.insert_if(output.is_some_and(|o| o.pairs.is_full()), Flags::PAIRS);
         Telemetry {
             tick: self.tick,
             handle: pose_to_wire(&self.sensed.handle),
@@ -103,7 +99,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             contact: wrench_to_wire(&output.map_or(Wrench::ZERO, |o| o.contact)),
             hand: hand.as_ref().map(wrench_to_wire),
             points: output.map_or(0, |o| o.work.points.min(u32::from(u16::MAX)) as u16),
-            flags,
+            flags: flags.bits(),
             missed: self.missed_total,
             dropped: self.ends.shared.dropped(),
             guidance: output.map(|o| guidance_to_wire(&o.guidance)).unwrap_or_default(),

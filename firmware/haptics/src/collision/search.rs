@@ -124,7 +124,7 @@ impl<'i> Search<'_, 'i> {
             point_work: traversal.point_work / LOOKUP,
         };
         if let Some(stop) = stop {
-            work.flags.insert(Flags::BUDGET_EXCEEDED);
+            work.flags.insert(Flags::BUDGET);
             contacts.carry(&self.motions[0], |leaf| {
                 let visited = if start < stop {
                     start <= leaf && leaf < stop

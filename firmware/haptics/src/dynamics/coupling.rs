@@ -140,8 +140,8 @@ pub(crate) fn take_hold(
 /// `pull` cut to what the coupling can transmit.
 pub(crate) fn slipping(pull: Wrench, settings: &CouplingSettings, flags: &mut Flags) -> Wrench {
     let slip = Coupling::slip(pull, settings);
-    flags.insert_if(slip.translation < 1.0, Flags::SATURATED_FORCE);
-    flags.insert_if(slip.rotation < 1.0, Flags::SATURATED_TORQUE);
+    flags.insert_if(slip.translation < 1.0, Flags::COUPLING_FORCE);
+    flags.insert_if(slip.rotation < 1.0, Flags::COUPLING_TORQUE);
     Wrench {
         force: pull.force * slip.translation,
         torque: pull.torque * slip.rotation,

@@ -35,10 +35,10 @@ pub(crate) fn limit(
         force: cut(force, settings.force_n).0,
         torque: cut(torque, settings.torque_nm).0,
     };
-    flags.insert_if(cut_force, Flags::FORCE_LIMITED);
-    flags.insert_if(cut_torque, Flags::TORQUE_LIMITED);
-    flags.insert_if(slow_force, Flags::FORCE_SLEW_LIMITED);
-    flags.insert_if(slow_torque, Flags::TORQUE_SLEW_LIMITED);
+    flags.insert_if(cut_force, Flags::FORCE_LIMIT);
+    flags.insert_if(cut_torque, Flags::TORQUE_LIMIT);
+    flags.insert_if(slow_force, Flags::FORCE_SLEW);
+    flags.insert_if(slow_torque, Flags::TORQUE_SLEW);
     if out.is_finite() {
         out
     } else {

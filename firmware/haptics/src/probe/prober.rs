@@ -31,7 +31,7 @@ pub struct Probe {
     pub wrench: Wrench,
     /// Number of points that push.
     pub contacts: u16,
-    /// Work for gap and contacts together. [`Flags::DEEP`]: some point lies too deep to push; [`Flags::CONTACTS_DROPPED`]: more points touch than the
+    /// Work for gap and contacts together. [`Flags::DEEP`]: some point lies too deep to push; [`Flags::CONTACTS`]: more points touch than the
     /// store holds.
     pub work: Work,
 }
@@ -196,8 +196,7 @@ impl Prober {
         work.points += touched.points;
         work.candidates = touched.candidates;
         work.flags.insert(touched.flags);
-        work.flags
-            .insert_if(self.contacts.dropped(), Flags::CONTACTS_DROPPED);
+        work.flags.insert_if(self.contacts.dropped(), Flags::CONTACTS);
         let pushing = self.contacts.as_slice().len();
         let k = settings.shared_stiffness(if pushing == 0 { 1.0 } else { pushing as f32 });
         for contact in self.contacts.as_mut_slice() {

@@ -194,7 +194,7 @@ fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsaf
         if force.length() > limits.force_n * ROUNDING || torque.length() > limits.torque_nm * ROUNDING {
             found.beyond += 1;
         }
-        let taking_back = output.work.flags.intersects(Flags::FORCE_SLEW_LIMITED);
+        let taking_back = output.work.flags.intersects(Flags::FORCE_SLEW);
         let into = input.handle.position.z < -BEYOND_M && input.handle_twist.linear.z < 0.0;
         // Speed of the peg's point under the handle; `object` is about the peg's own frame, the twist about its centre of mass. Falling flat onto the
         // slab from its rim the peg may run ahead of the handle, and drags it along as a body does: that is no wall's doing.
