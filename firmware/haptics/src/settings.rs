@@ -69,9 +69,9 @@ pub struct ContactSettings {
     pub damping_s: f32,
     /// Points that come this near in a tick, by twice the motion so far or without contacts, are taken into the step, m. Default 5 µm.
     pub margin_m: f32,
-    /// Most work a tick, in field look-ups of about 190 instructions: a tree node asked counts 1½, a point out of reach 1, one within the margin 2,
-    /// one that may touch 3, a solve 8 and 5 more for each target. Default 520: of the motions measured with up to four targets none takes more than
-    /// 125,000 instructions a tick (121,580 with four targets, 123,900 guided and 115,700 unguided into a fit of 0.02 mm).
+    /// Most work a tick, in field look-ups of about 190 instructions: a tree node asked counts 1½, a point out of reach 1, one within the margin 1¾,
+    /// one that may touch 3⅛, a solve 8 and 5 more for each target ([`crate::cost`]). Default 520: of the motions measured with up to four targets
+    /// none takes more than 125,000 instructions a tick (121,580 with four targets, 123,900 guided and 115,700 unguided into a fit of 0.02 mm).
     pub point_budget: u32,
     /// How far points of the held part are moved inward along their normals before voxmaps are asked, in voxels of that part: the textbook's
     /// pointshell shrinking. Distance fields know no shrinking. Default 0.

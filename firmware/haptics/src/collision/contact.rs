@@ -6,7 +6,7 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::math::symmetric6::dot;
 
 /// Contacts one tick can carry.
-pub(crate) const MAX_CONTACTS: usize = 256;
+pub const MAX_CONTACTS: usize = 256;
 
 /// A point near or in the other part, linearised about the tick's start.
 #[derive(Clone, Copy, Debug)]
