@@ -85,7 +85,7 @@ parameters! {
     WorkspaceRadius = "m", 0.01, 2.0, 1.0;
     /// Time without a message from the host, while armed, after which a fault is raised.
     HostTimeout = "s", 0.05, 5.0, 0.5;
-    /// Largest work of a tick, in field queries (look-ups); a point that may touch counts 4.
+    /// Largest work of a tick, in field queries (look-ups); a point that may touch counts 3.
     PointBudget = "look-ups", 16.0, 65_535.0, 520.0;
     /// Integration of the object's motion: 0 implicit, 1 explicit (the textbook's, which trembles on stiff contact).
     Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];

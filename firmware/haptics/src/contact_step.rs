@@ -3,7 +3,7 @@
 use mortise_protocol::image::SceneImage;
 
 use crate::baseline::explicit;
-use crate::collision::cost::{SPRING, solve_cost};
+use crate::collision::cost::{LEAST_SOLVES, further_solve_cost, solve_cost, spring_cost};
 use crate::collision::decimation::Searched;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::placement::Placed;
@@ -21,8 +21,6 @@ use crate::state::Resolution;
 /// How fast the number of points that share the total stiffness may fall, a tick: stiffness of points still touching then rises
 /// slowly, and little energy is made of it.
 const SHARING_DECAY: f32 = 0.95;
-/// So many solves with contacts every step may take, whatever the search took; most do with fewer.
-const LEAST_SOLVES: u8 = 4;
 /// The diagonal of a cell, cells.
 const DIAGONAL_CELLS: f32 = 1.733;
 
@@ -136,7 +134,7 @@ fn search(
     let settings = given.settings;
     let (rules, springs) = (constraints.rules, constraints.springs);
     let budget = settings.contact.point_budget;
-    let reserved = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + SPRING * springs as u32;
+    let reserved = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + spring_cost(springs);
     let held_shape = given.scene.shape_of_part(usize::from(grabbed.part));
     let shrunk_m = memory.shrink(settings, &held_shape.field);
     let search = Search {
@@ -215,10 +213,9 @@ fn solve(
     }
 }
 
-/// How many solves there may be with contacts, when so many look-ups are `left`: past the third, a solve takes three eighths of one for each
-/// candidate too.
+/// Most solves with contacts when so many field queries are `left`.
 fn most_solves(left: u32, candidates: u16, springs: usize) -> u8 {
-    let more = left / (solve_cost(springs) + 3 * u32::from(candidates) / 8);
+    let more = left / further_solve_cost(springs, candidates);
     u32::from(LEAST_SOLVES)
         .saturating_add(more)
         .min(u32::from(MAX_SOLVES)) as u8

@@ -39,6 +39,7 @@ mod settings;
 mod state;
 mod tick;
 
+pub use collision::cost;
 pub use constraints::targets::TargetError;
 pub use glam::{Quat, Vec3};
 pub use io::{FacePair, FacePairs, Flags, GuidanceState, Input, Output, Work};

@@ -1,20 +1,17 @@
 //! Cost of a tick on the board, estimated from the model.
 //!
-//! Work is counted in field queries, as in the board's own budget. The figure is an estimate, not a bound: the budget is the bound, at which a tick
-//! decimates its points.
+//! Work is counted in field queries by the table of the board's own budget ([`mortise_haptics::cost`]). The figure is an estimate, not a bound: the
+//! budget is the bound, at which a tick decimates its points.
 
+use mortise_haptics::cost::{
+    CANDIDATE, LEAST_SOLVES, LOOKUP, MAX_CONTACTS, NEAR, NODE, QUERY_INSTRUCTIONS, SOLVE,
+};
 use serde::{Deserialize, Serialize};
 
-/// Instructions of one field query, for a tree node or for a point out of reach.
-pub const PER_LOOKUP: u64 = 150;
-/// Queries counted for a point near the other part.
-pub const NEAR_LOOKUPS: u64 = 2;
-/// Queries counted for a touching point, including its share of the step.
-pub const TOUCHING_LOOKUPS: u64 = 6;
-/// Instructions of a tick without queries.
+/// Instructions of a tick without counted work.
 pub const FIXED: u64 = 6_000;
-/// Most contacts in one step.
-pub const MOST_CONTACTS: u64 = 256;
+/// Solves that the budget reserves: one without contacts, and the least number with them.
+const SOLVES: u64 = 1 + LEAST_SOLVES as u64;
 /// Points per tree node visited: leaves hold 8 to 16 points, and there are as many nodes above them.
 const POINTS_PER_NODE: u64 = 4;
 /// Near points per touching point: a pin pressed to its bore touches along a quarter of its rims.
@@ -27,7 +24,7 @@ pub struct TickCost {
     pub points: u64,
     /// Number of those points that touch.
     pub contacts: u64,
-    /// Field queries, in the units of the board's budget.
+    /// Field queries, as the board's budget counts them.
     pub lookups: u64,
     /// Instructions of that tick.
     pub instructions: u64,
@@ -38,16 +35,31 @@ pub struct TickCost {
 impl TickCost {
     /// Cost with `points` points near, of `all` in total.
     pub fn of(points: u64, all: u64) -> Self {
-        let contacts = points.div_ceil(NEAR_PER_TOUCHING).min(MOST_CONTACTS);
-        let lookups = points.div_ceil(POINTS_PER_NODE)
-            + NEAR_LOOKUPS * (points - contacts)
-            + TOUCHING_LOOKUPS * contacts;
+        let contacts = points.div_ceil(NEAR_PER_TOUCHING).min(MAX_CONTACTS as u64);
+        let eighths = u64::from(SOLVE) * SOLVES
+            + u64::from(NODE) * points.div_ceil(POINTS_PER_NODE)
+            + u64::from(LOOKUP + NEAR) * points
+            + u64::from(CANDIDATE) * contacts;
+        let lookups = eighths.div_ceil(u64::from(LOOKUP));
         Self {
             points,
             contacts,
             lookups,
-            instructions: FIXED + PER_LOOKUP * lookups,
+            instructions: FIXED + u64::from(QUERY_INSTRUCTIONS) * lookups,
             points_at_most: all,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 200 points near, 50 of which touch: 5 solves of 8, 50 nodes of 1½, 200 points of 1¾ and 50 candidates of 1⅜ queries.
+    #[test]
+    fn work_is_counted_as_the_board_counts_it() {
+        let cost = TickCost::of(200, 1_000);
+        assert_eq!((cost.contacts, cost.lookups), (50, 40 + 75 + 350 + 69));
+        assert_eq!(cost.instructions, FIXED + 190 * 534);
     }
 }

@@ -49,7 +49,7 @@ mod winding;
 pub use bake::{Baked, bake};
 pub use choice::ELSEWHERE;
 pub use classic::classic_pointshell;
-pub use cost::{FIXED, MOST_CONTACTS, NEAR_LOOKUPS, PER_LOOKUP, TOUCHING_LOOKUPS, TickCost};
+pub use cost::{FIXED, TickCost};
 pub use distance::{ExactSurface, Nearest};
 pub use error::BakeError;
 pub use field::{BakedField, FieldOptions, SampleFormat, bake_field};

@@ -6,7 +6,7 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::math::symmetric6::dot;
 
 /// Capacity for contacts per tick.
-pub(crate) const MAX_CONTACTS: usize = 256;
+pub const MAX_CONTACTS: usize = 256;
 
 /// A point near the other part or inside it, linearised about the tick's start.
 #[derive(Clone, Copy, Debug)]

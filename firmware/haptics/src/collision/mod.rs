@@ -14,7 +14,7 @@
 pub(crate) mod ancestors;
 pub(crate) mod coherence;
 pub(crate) mod contact;
-pub(crate) mod cost;
+pub mod cost;
 pub(crate) mod decimation;
 pub(crate) mod directed_pair;
 pub(crate) mod exact_surface;
