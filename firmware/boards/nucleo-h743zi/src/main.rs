@@ -16,14 +16,11 @@ use cortex_m_rt as _;
 use defmt_rtt as _;
 
 mod clocks;
-mod crash;
 mod critical;
 mod encoders;
 mod entropy;
 mod flash;
 mod link;
-#[cfg(not(feature = "rtt"))]
-mod log;
 mod mechanism;
 mod memory;
 mod motors;
@@ -39,11 +36,10 @@ const OVERRUN_TICKS: u8 = 2;
 
 #[rtic::app(device = embassy_stm32::pac, peripherals = false)]
 mod app {
-    use core::sync::atomic::{AtomicBool, Ordering};
-
-    use embassy_executor::raw;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::pac;
+    use mortise_board::record::Crash;
+    use mortise_board::{crash, executor, stack};
     use mortise_firmware::board::Identity;
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::ControlPlane;
@@ -51,7 +47,7 @@ mod app {
     use mortise_firmware::store;
     use mortise_mechanism::ceilings::Ceilings;
     use mortise_protocol::message::CostUnit;
-    use nucleo_h743zi::boot::{Crash, reset_reason};
+    use nucleo_h743zi::boot::reset_reason;
     use static_cell::{ConstStaticCell, StaticCell};
 
     use crate::critical::{STOP_PRIORITY, TICK_PRIORITY};
@@ -63,21 +59,9 @@ mod app {
     use crate::tick_timer::{self, Cycles};
     use crate::usb::{InPipe, OutPipe, Port};
     use crate::watchdog::Watchdog;
-    use crate::{BOARD, OVERRUN_TICKS, clocks, crash, encoders, entropy, memory, reset};
+    use crate::{BOARD, OVERRUN_TICKS, clocks, encoders, entropy, memory, reset};
 
     type Control = ControlPlane<'static, 'static, Device, Cycles>;
-
-    /// A tick has run since `idle` last looked.
-    static TICK_RAN: AtomicBool = AtomicBool::new(false);
-    /// The executor has work.
-    static PENDING: AtomicBool = AtomicBool::new(true);
-
-    /// Called by the executor's wakers, also from interrupts.
-    // SAFETY: the name and signature embassy-executor calls; defined once.
-    #[unsafe(export_name = "__pender")]
-    fn pender(_context: *mut ()) {
-        PENDING.store(true, Ordering::Release);
-    }
 
     #[shared]
     struct Shared {}
@@ -166,7 +150,7 @@ mod app {
             Some(Crash::HardFault { pc, status }) => {
                 defmt::error!("restarted after a fault at {:#010x}, CFSR {:#010x}", pc, status);
             }
-            None => defmt::info!("started at {} MHz", core_hz / 1_000_000),
+            Some(Crash::Requested) | None => defmt::info!("started at {} MHz", core_hz / 1_000_000),
         }
 
         let port = Port::new(p.USB_OTG_FS, p.PA12, p.PA11);
@@ -202,7 +186,7 @@ mod app {
             cx.local.watchdog.feed();
         }
         tick_timer::finish();
-        TICK_RAN.store(true, Ordering::Release);
+        executor::note();
     }
 
     /// The stop contact opened. The timer has cut the outputs already; this does it again by another way. The next tick sees the input itself.
@@ -215,35 +199,20 @@ mod app {
 
     #[idle(local = [link])]
     fn idle(cx: idle::Context) -> ! {
-        static EXECUTOR: StaticCell<raw::Executor> = StaticCell::new();
         static INCOMING: StaticCell<InPipe> = StaticCell::new();
         static OUTGOING: StaticCell<OutPipe> = StaticCell::new();
 
-        memory::repaint_stack();
-        let executor = EXECUTOR.init_with(|| raw::Executor::new(core::ptr::null_mut()));
-        let spawner = executor.spawner();
+        stack::repaint();
         let incoming = INCOMING.init_with(InPipe::new);
         let outgoing = OUTGOING.init_with(OutPipe::new);
-        if let Some((plane, port)) = cx.local.link.take() {
-            port.spawn(spawner, incoming, outgoing);
-            if let Ok(task) = link::run(plane, incoming, outgoing) {
-                spawner.spawn(task);
+        let ends = cx.local.link.take();
+        executor::run(|spawner| {
+            if let Some((plane, port)) = ends {
+                port.spawn(spawner, incoming, outgoing);
+                if let Ok(task) = link::run(plane, incoming, outgoing) {
+                    spawner.spawn(task);
+                }
             }
-        }
-        loop {
-            if TICK_RAN.swap(false, Ordering::AcqRel) {
-                link::TICKED.signal(());
-            }
-            PENDING.store(false, Ordering::Release);
-            // SAFETY: only here, never from within a task.
-            unsafe { executor.poll() };
-            // With interrupts masked nothing can come between the check and the sleep; a pending interrupt still ends the sleep.
-            cortex_m::interrupt::disable();
-            if !PENDING.load(Ordering::Acquire) && !TICK_RAN.load(Ordering::Acquire) {
-                cortex_m::asm::wfi();
-            }
-            // SAFETY: ends the section opened three lines above.
-            unsafe { cortex_m::interrupt::enable() };
-        }
+        })
     }
 }

@@ -82,6 +82,13 @@ pub fn cut() {
     cortex_m::asm::dsb();
 }
 
+/// See [`mortise_board::crash`].
+// SAFETY: the hook's name and signature; defined once.
+#[unsafe(no_mangle)]
+fn mortise_cut_motors() {
+    cut();
+}
+
 /// Outputs off; [`Motors::drive`] may switch them on again. For the stop handler.
 pub fn release() {
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));

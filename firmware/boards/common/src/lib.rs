@@ -1,0 +1,25 @@
+//! What boards share. A board crate adds its pins, clocks and interrupts, and [`crash`]'s one hook that turns its motors off.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`executor`] | the idle loop: polls the link's executor, sleeps between interrupts |
+//! | [`log`] | defmt into a bounded ring that the link empties |
+//! | [`crash`] | panic and processor fault: motors off, a record that survives, restart |
+//! | [`stack`] | how deep the stack has been |
+//! | [`ring`], [`record`] | what of this needs no processor |
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod record;
+pub mod ring;
+
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub mod crash;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub mod executor;
+#[cfg(all(target_arch = "arm", target_os = "none", not(feature = "rtt")))]
+pub mod log;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub mod stack;
