@@ -1,7 +1,8 @@
-//! What boards share. A board crate adds its pins, clocks and interrupts, and [`crash`]'s one hook that turns its motors off.
+//! What boards share. A board crate adds its pins, clocks and interrupts, [`device::Hardware`], and [`crash`]'s one hook that turns its motors off.
 //!
 //! | module | what |
 //! |---|---|
+//! | [`device`] | the described mechanism on a real board's encoders and motors |
 //! | [`executor`] | the idle loop: polls the link's executor, sleeps between interrupts |
 //! | [`log`] | defmt into a bounded ring that the link empties |
 //! | [`crash`] | panic and processor fault: motors off, a record that survives, restart |
@@ -12,6 +13,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod device;
 pub mod record;
 pub mod ring;
 
@@ -23,3 +25,8 @@ pub mod executor;
 pub mod log;
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub mod stack;
+
+#[cfg(test)]
+#[path = "../../../app/tests/support/rigs.rs"]
+#[allow(dead_code, reason = "each test file uses its share")]
+mod rigs;

@@ -20,8 +20,8 @@ mod critical;
 mod encoders;
 mod entropy;
 mod flash;
+mod hardware;
 mod link;
-mod mechanism;
 mod memory;
 mod motors;
 mod reset;
@@ -38,6 +38,7 @@ const OVERRUN_TICKS: u8 = 2;
 mod app {
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::pac;
+    use mortise_board::device::Device;
     use mortise_board::record::Crash;
     use mortise_board::{crash, executor, stack};
     use mortise_firmware::board::Identity;
@@ -53,15 +54,15 @@ mod app {
     use crate::critical::{STOP_PRIORITY, TICK_PRIORITY};
     use crate::encoders::Encoders;
     use crate::flash::{SlotFlash, erasing};
+    use crate::hardware::Wired;
     use crate::link::{self, Link};
-    use crate::mechanism::Device;
     use crate::motors::{self, Motors};
     use crate::tick_timer::{self, Cycles};
     use crate::usb::{InPipe, OutPipe, Port};
     use crate::watchdog::Watchdog;
     use crate::{BOARD, OVERRUN_TICKS, clocks, encoders, entropy, memory, reset};
 
-    type Control = ControlPlane<'static, 'static, Device, Cycles>;
+    type Control = ControlPlane<'static, 'static, Device<Wired>, Cycles>;
 
     #[shared]
     struct Shared {}
@@ -141,7 +142,7 @@ mod app {
         let (plane, control) = start(
             CHANNELS.take(),
             flash,
-            Device::new(encoders, motors, rig),
+            Device::new(Wired { encoders, motors }, rig),
             clock,
             identity,
         );
