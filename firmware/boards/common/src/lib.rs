@@ -3,6 +3,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`device`] | the described mechanism on a real board's encoders and motors |
+//! | [`set_value`] | current to duty cycle and direction of a motor driver |
 //! | [`executor`] | the idle loop: polls the link's executor, sleeps between interrupts |
 //! | [`log`] | defmt into a bounded ring that the link empties |
 //! | [`crash`] | panic and processor fault: motors off, a record that survives, restart |
@@ -16,6 +17,7 @@ extern crate std;
 pub mod device;
 pub mod record;
 pub mod ring;
+pub mod set_value;
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub mod crash;

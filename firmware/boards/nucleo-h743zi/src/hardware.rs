@@ -1,10 +1,12 @@
 //! Encoders and motors of this board as the shared device uses them.
 
 use mortise_board::device::Hardware;
-use nucleo_h743zi::drive::{AXES, FULL_CURRENT_A, Setpoint};
+use mortise_board::set_value::{FULL_CURRENT_A, Setpoint};
+use mortise_protocol::limits::MAX_JOINTS as AXES;
+use stm32h743::motor_timer;
 
 use crate::encoders::Encoders;
-use crate::motors::{self, Motors};
+use crate::motors::Motors;
 
 /// See the module.
 pub struct Wired {
@@ -36,7 +38,7 @@ impl Hardware for Wired {
     }
 
     fn supply_low(&mut self) -> bool {
-        motors::supply_is_low()
+        motor_timer::supply_is_low()
     }
 
     fn driver_fault(&mut self, motors: usize) -> Option<u8> {

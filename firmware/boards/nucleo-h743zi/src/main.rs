@@ -4,9 +4,9 @@
 //! |---|---|
 //! | hardware | stop input, processor lock-up, low supply: outputs off through the timer ([`motors`]) |
 //! | 16 | stop input again, by interrupt: the same switch by software |
-//! | 15 | the tick, 1 kHz ([`tick_timer`]): control plane, watchdog |
+//! | 15 | the tick, 1 kHz ([`stm32h743::tick_timer`]): control plane, watchdog |
 //! | low | USB interrupt |
-//! | idle | embassy executor: USB and link plane ([`usb`], [`link`]) |
+//! | idle | embassy executor: USB and link plane ([`stm32h743::usb`], [`stm32h743::link`]) |
 #![no_std]
 #![no_main]
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -15,19 +15,9 @@ use cortex_m_rt as _;
 #[cfg(feature = "rtt")]
 use defmt_rtt as _;
 
-mod clocks;
-mod critical;
 mod encoders;
-mod entropy;
-mod flash;
 mod hardware;
-mod link;
-mod memory;
 mod motors;
-mod reset;
-mod tick_timer;
-mod usb;
-mod watchdog;
 
 /// The board's name in [`mortise_firmware::board::Identity`].
 const BOARD: &str = "nucleo-h743zi";
@@ -48,19 +38,20 @@ mod app {
     use mortise_firmware::store;
     use mortise_mechanism::ceilings::Ceilings;
     use mortise_protocol::message::CostUnit;
-    use nucleo_h743zi::boot::reset_reason;
     use static_cell::{ConstStaticCell, StaticCell};
+    use stm32h743::boot::reset_reason;
+    use stm32h743::critical::{STOP_PRIORITY, TICK_PRIORITY};
+    use stm32h743::flash::{SlotFlash, erasing};
+    use stm32h743::link::{self, Link};
+    use stm32h743::tick_timer::{self, Cycles};
+    use stm32h743::usb::{InPipe, OutPipe, Port};
+    use stm32h743::watchdog::Watchdog;
+    use stm32h743::{clocks, entropy, memory, motor_timer, reset};
 
-    use crate::critical::{STOP_PRIORITY, TICK_PRIORITY};
     use crate::encoders::Encoders;
-    use crate::flash::{SlotFlash, erasing};
     use crate::hardware::Wired;
-    use crate::link::{self, Link};
     use crate::motors::{self, Motors};
-    use crate::tick_timer::{self, Cycles};
-    use crate::usb::{InPipe, OutPipe, Port};
-    use crate::watchdog::Watchdog;
-    use crate::{BOARD, OVERRUN_TICKS, clocks, encoders, entropy, memory, reset};
+    use crate::{BOARD, OVERRUN_TICKS, encoders};
 
     type Control = ControlPlane<'static, 'static, Device<Wired>, Cycles>;
 
@@ -168,20 +159,20 @@ mod app {
     }
 
     /// One millisecond. Budget 480,000 cycles; a longer tick is counted as missed ones, two in a row with live motors are a fault, five reset the board.
-    /// Uses no critical section (see [`crate::critical`]).
+    /// Uses no critical section (see [`stm32h743::critical`]).
     #[task(binds = TIM7, priority = 15, local = [control, watchdog])]
     fn tick(cx: tick::Context) {
         const { assert!(TICK_PRIORITY == 15) };
         tick_timer::acknowledge();
         if erasing() {
             // Scenes must not be read now. The application erases only while motors are off; this makes sure.
-            motors::release();
+            motor_timer::release();
             tick_timer::skip();
         } else {
             cx.local.control.tick();
         }
         // Live outputs in a state without motors: cut them, and let the watchdog start anew.
-        if motors::outputs_on() && !cx.local.control.safety().live() {
+        if motor_timer::outputs_on() && !cx.local.control.safety().live() {
             motors::cut();
         } else {
             cx.local.watchdog.feed();
@@ -194,7 +185,7 @@ mod app {
     #[task(binds = EXTI15_10, priority = 16)]
     fn stop(_cx: stop::Context) {
         const { assert!(STOP_PRIORITY == 16) };
-        motors::release();
+        motor_timer::release();
         motors::acknowledge_stop();
     }
 

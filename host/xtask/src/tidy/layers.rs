@@ -32,6 +32,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         "firmware/boards",
         &[
             "mortise-board",
+            "stm32h743",
             "mortise-firmware",
             "mortise-mechanism",
             "mortise-simulation",

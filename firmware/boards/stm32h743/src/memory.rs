@@ -10,10 +10,10 @@
 //!
 //! No DMA is used (USB moves its data through the OTG FIFO with the processor), so no memory needs to be uncached for that.
 
+use crate::flash_map::{self, Bank};
 use cortex_m::Peripherals;
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::{MPU, SCB};
-use nucleo_h743zi::flash_map::{self, Bank};
 
 /// RASR: execute never.
 const NEVER_EXECUTE: u32 = 1 << 28;

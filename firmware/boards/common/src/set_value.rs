@@ -4,8 +4,6 @@
 //! current between [`ZERO_DUTY`] and [`FULL_DUTY`]; the margins at both ends let a driver tell a broken wire (0 % or 100 %) from a
 //! command. Set every driver to [`FULL_CURRENT_A`] at [`FULL_DUTY`] and no current at [`ZERO_DUTY`].
 
-/// Motors the board has outputs for.
-pub const AXES: usize = 3;
 /// Current at [`FULL_DUTY`], A.
 pub const FULL_CURRENT_A: f32 = 3.0;
 /// Share of the PWM period that means no current.
