@@ -1,4 +1,4 @@
-//! Gives the linker this board's memory map and scripts. Nothing is passed when the library is built for the PC's tests.
+//! Gives the linker this board's memory map and scripts.
 
 use std::env;
 use std::error::Error;
@@ -8,9 +8,6 @@ use std::path::PathBuf;
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=memory.x");
-    if env::var("CARGO_CFG_TARGET_OS")? != "none" {
-        return Ok(());
-    }
     let out = PathBuf::from(env::var("OUT_DIR")?);
     fs::copy("memory.x", out.join("memory.x"))?;
     println!("cargo:rustc-link-search={}", out.display());

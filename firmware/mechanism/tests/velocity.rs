@@ -286,6 +286,12 @@ fn the_stiffest_wall_is_as_measured() {
     assert_near(bare_limit::<AdaptiveWindow<16>>(1), 3.72, 0.05, "16 ticks, late");
     assert_near(bare_limit::<AdaptiveWindow<6>>(0), 23.3, 0.05, "6 ticks");
     assert_near(bare_limit::<AdaptiveWindow<6>>(1), 5.80, 0.05, "6 ticks, late");
+    // A wall of 40 N·s/m, a tick late.
+    let late = Wall { delay: 1, ..BARE };
+    let low_pass = 1e-3 * stiffness_limit::<LowPass>(|_| 40.0, late);
+    assert_near(low_pass, 6.08, 0.05, "low-pass, damped and late");
+    let window = 1e-3 * stiffness_limit::<AdaptiveWindow<16>>(|_| 40.0, late);
+    assert!(window < 0.3, "16 ticks, damped and late: {window}");
 }
 
 fn column<E: Estimator>(name: &str) {

@@ -17,18 +17,28 @@ pub const EMULATED: &str = "mps2-an500";
 /// above call chains of some kilobytes.
 const STACK_BYTES: u64 = 16 * 1024;
 
-/// Names of the boards there are, sorted.
+/// Names of the boards there are, sorted: crates with a linker script.
 pub fn boards(root: &Path) -> Result<Vec<String>> {
+    let names = with_file(root, "memory.x")?;
+    if names.is_empty() {
+        bail!("there is no board in firmware/boards");
+    }
+    Ok(names)
+}
+
+/// Names of the boards and of what they share, sorted.
+pub fn crates(root: &Path) -> Result<Vec<String>> {
+    with_file(root, "Cargo.toml")
+}
+
+fn with_file(root: &Path, file: &str) -> Result<Vec<String>> {
     let directory = root.join("firmware/boards");
     let mut names = Vec::new();
     for entry in std::fs::read_dir(&directory).with_context(|| format!("reading {}", directory.display()))? {
         let entry = entry?;
-        if entry.path().join("Cargo.toml").is_file() {
+        if entry.path().join(file).is_file() {
             names.push(entry.file_name().to_string_lossy().into_owned());
         }
-    }
-    if names.is_empty() {
-        bail!("there is no board in firmware/boards");
     }
     names.sort();
     Ok(names)

@@ -9,10 +9,8 @@
 #![no_std]
 #![no_main]
 
-mod crash;
 mod device;
 mod link_task;
-mod log;
 mod memory;
 mod motors;
 mod timer;
@@ -37,21 +35,25 @@ fn milliseconds() -> u32 {
     MILLISECONDS.load(Ordering::Relaxed)
 }
 
+defmt::timestamp!("{=u32:ms}", milliseconds());
+
 #[rtic::app(device = crate::device, peripherals = false)]
 mod app {
     use core::sync::atomic::Ordering;
 
     use heapless::spsc::{Consumer, Producer, Queue};
+    use mortise_board::record::Crash;
+    use mortise_board::{crash, executor};
     use mortise_firmware::board::Identity;
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::Ticked;
     use mortise_firmware::device::start;
     use mortise_firmware::store;
     use mortise_mechanism::ceilings::Ceilings;
-    use mortise_protocol::message::CostUnit;
+    use mortise_protocol::message::{CostUnit, ResetReason};
 
     use crate::device::Interrupt;
-    use crate::{Control, Link, MILLISECONDS, crash, link_task, memory, motors, timer, uart};
+    use crate::{Control, Link, MILLISECONDS, link_task, memory, motors, timer, uart};
 
     #[shared]
     struct Shared {}
@@ -81,12 +83,18 @@ mod app {
             torque_axes: if rig.is_some() { 0 } else { 3 },
             cost_unit: CostUnit::Instructions,
             cost_budget: timer::BUDGET,
-            reset: crash::reset_reason(),
+            // QEMU's chip has no reset flags.
+            reset: match crash::take(false) {
+                Some(Crash::Requested) => ResetReason::Requested,
+                Some(Crash::Panic { line }) => ResetReason::Panic { line },
+                Some(Crash::HardFault { pc, .. }) => ResetReason::HardFault { pc },
+                None => ResetReason::PowerOn,
+            },
             // The simulated mechanism stands still between ticks: late ticks are counted and do no harm.
             overrun_ticks: 0,
             ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
             // QEMU's chip has no random numbers; each of its runs has a line of its own, on which frames of another run cannot come.
-            entropy: crash::starts().into(),
+            entropy: memory::starts().into(),
         };
         let (bytes_in, bytes_out) = cx.local.bytes.split();
         // Reads the scene in flash before the first tick is due.
@@ -114,29 +122,36 @@ mod app {
     #[task(binds = TIMER0, priority = 3, local = [control])]
     fn tick(cx: tick::Context) {
         timer::clear_interrupt();
-        if timer::is_stopped() {
+        // Then the link pended this tick, and sends what comes of it.
+        let pended = timer::is_stopped();
+        if pended {
             timer::start();
         }
         match cx.local.control.tick() {
             Ticked::Ran => {
                 MILLISECONDS.fetch_add(1, Ordering::Relaxed);
-                link_task::note();
+                executor::note();
             }
-            Ticked::Waiting => timer::stop(),
+            Ticked::Waiting => {
+                timer::stop();
+                if !pended {
+                    executor::note();
+                }
+            }
         }
     }
 
     #[task(binds = UART0RX, priority = 2, local = [bytes_in])]
     fn received(cx: received::Context) {
         if uart::receive(cx.local.bytes_in) {
-            link_task::note();
+            executor::note();
         }
     }
 
     #[task(binds = UART0TX, priority = 1)]
     fn sent(_: sent::Context) {
         uart::sent();
-        link_task::note();
+        executor::note();
     }
 
     #[idle(local = [link, bytes_out])]

@@ -1,4 +1,7 @@
-//! Memory that survives a reset: external RAM standing in for the flash of a real board, and the stack's high-water mark.
+//! Memory that survives a reset: external RAM standing in for the flash of a real board, and the count of starts.
+
+use core::mem::MaybeUninit;
+use core::ptr::{read_volatile, write_volatile};
 
 use cortex_m::peripheral::MPU;
 use mortise_firmware::board::{FlashWord, WRITE_SIZE};
@@ -39,20 +42,21 @@ pub fn guard_stack(mpu: &mut MPU) {
     cortex_m::asm::isb();
 }
 
-// SAFETY: symbols of the linker script; only their addresses are used.
-unsafe extern "C" {
-    static _stack_start: u32;
-    static _stack_end: u32;
-}
+/// Starts since power-on, and the complement by which memory that was never written is told.
+// SAFETY: the section exists in the linker script and start-up leaves it alone; every bit pattern is a valid `MaybeUninit`.
+#[unsafe(link_section = ".uninit.STARTS")]
+static mut STARTS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 
-/// Deepest stack since start, bytes: below it start-up's paint is untouched. Reads the unused part of the stack.
-pub fn deepest_stack() -> u32 {
-    let (top, mut word) = (&raw const _stack_start, &raw const _stack_end);
-    // SAFETY: from the end of the stack's memory to its start, read only.
-    unsafe {
-        while word < top && word.read_volatile() == cortex_m_rt::STACK_PAINT_VALUE {
-            word = word.add(1);
-        }
-        top.byte_offset_from_unsigned(word) as u32
-    }
+/// Starts since power-on, this one included. Call once.
+pub fn starts() -> u32 {
+    // SAFETY: plain words, every pattern is valid; nothing else runs yet.
+    let [starts, check] = unsafe { read_volatile((&raw const STARTS).cast::<[u32; 2]>()) };
+    let starts = if check == !starts {
+        starts.wrapping_add(1)
+    } else {
+        1
+    };
+    // SAFETY: as above.
+    unsafe { write_volatile((&raw mut STARTS).cast::<[u32; 2]>(), [starts, !starts]) };
+    starts
 }

@@ -13,6 +13,13 @@ pub fn off() {
     Registers::FPGAIO.write::<LEDS>(0);
 }
 
+/// See [`mortise_board::crash`].
+// SAFETY: the hook's name and signature; defined once.
+#[unsafe(no_mangle)]
+fn mortise_cut_motors() {
+    off();
+}
+
 /// Simulated mechanism with an enable output.
 pub struct Motors {
     mechanism: SimulatedRig,

@@ -16,7 +16,7 @@ use embassy_stm32::pac::timer::vals::FilterValue;
 use embassy_stm32::peripherals::{PB4, PB5, PC6, PC7, PD12, PD13, TIM3, TIM4, TIM8};
 use embassy_stm32::timer::qei::{Config, Qei, QeiMode};
 use mortise_mechanism::encoder::Follower;
-use nucleo_h743zi::drive::AXES;
+use mortise_protocol::limits::MAX_JOINTS as AXES;
 
 /// Pins of the encoders, named as in the wiring table above.
 pub struct Pins {

@@ -4,9 +4,9 @@
 //! |---|---|
 //! | hardware | stop input, processor lock-up, low supply: outputs off through the timer ([`motors`]) |
 //! | 16 | stop input again, by interrupt: the same switch by software |
-//! | 15 | the tick, 1 kHz ([`tick_timer`]): control plane, watchdog |
+//! | 15 | the tick, 1 kHz ([`stm32h743::tick_timer`]): control plane, watchdog |
 //! | low | USB interrupt |
-//! | idle | embassy executor: USB and link plane ([`usb`], [`link`]) |
+//! | idle | embassy executor: USB and link plane ([`stm32h743::usb`], [`stm32h743::link`]) |
 #![no_std]
 #![no_main]
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -15,22 +15,9 @@ use cortex_m_rt as _;
 #[cfg(feature = "rtt")]
 use defmt_rtt as _;
 
-mod clocks;
-mod crash;
-mod critical;
 mod encoders;
-mod entropy;
-mod flash;
-mod link;
-#[cfg(not(feature = "rtt"))]
-mod log;
-mod mechanism;
-mod memory;
+mod hardware;
 mod motors;
-mod reset;
-mod tick_timer;
-mod usb;
-mod watchdog;
 
 /// The board's name in [`mortise_firmware::board::Identity`].
 const BOARD: &str = "nucleo-h743zi";
@@ -39,11 +26,11 @@ const OVERRUN_TICKS: u8 = 2;
 
 #[rtic::app(device = embassy_stm32::pac, peripherals = false)]
 mod app {
-    use core::sync::atomic::{AtomicBool, Ordering};
-
-    use embassy_executor::raw;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::pac;
+    use mortise_board::device::Device;
+    use mortise_board::record::Crash;
+    use mortise_board::{crash, executor, stack};
     use mortise_firmware::board::Identity;
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::ControlPlane;
@@ -51,33 +38,22 @@ mod app {
     use mortise_firmware::store;
     use mortise_mechanism::ceilings::Ceilings;
     use mortise_protocol::message::CostUnit;
-    use nucleo_h743zi::boot::{Crash, reset_reason};
     use static_cell::{ConstStaticCell, StaticCell};
+    use stm32h743::boot::reset_reason;
+    use stm32h743::critical::{STOP_PRIORITY, TICK_PRIORITY};
+    use stm32h743::flash::{SlotFlash, erasing};
+    use stm32h743::link::{self, Link};
+    use stm32h743::tick_timer::{self, Cycles};
+    use stm32h743::usb::{InPipe, OutPipe, Port};
+    use stm32h743::watchdog::Watchdog;
+    use stm32h743::{clocks, entropy, memory, motor_timer, reset};
 
-    use crate::critical::{STOP_PRIORITY, TICK_PRIORITY};
     use crate::encoders::Encoders;
-    use crate::flash::{SlotFlash, erasing};
-    use crate::link::{self, Link};
-    use crate::mechanism::Device;
+    use crate::hardware::Wired;
     use crate::motors::{self, Motors};
-    use crate::tick_timer::{self, Cycles};
-    use crate::usb::{InPipe, OutPipe, Port};
-    use crate::watchdog::Watchdog;
-    use crate::{BOARD, OVERRUN_TICKS, clocks, crash, encoders, entropy, memory, reset};
+    use crate::{BOARD, OVERRUN_TICKS, encoders};
 
-    type Control = ControlPlane<'static, 'static, Device, Cycles>;
-
-    /// A tick has run since `idle` last looked.
-    static TICK_RAN: AtomicBool = AtomicBool::new(false);
-    /// The executor has work.
-    static PENDING: AtomicBool = AtomicBool::new(true);
-
-    /// Called by the executor's wakers, also from interrupts.
-    // SAFETY: the name and signature embassy-executor calls; defined once.
-    #[unsafe(export_name = "__pender")]
-    fn pender(_context: *mut ()) {
-        PENDING.store(true, Ordering::Release);
-    }
+    type Control = ControlPlane<'static, 'static, Device<Wired>, Cycles>;
 
     #[shared]
     struct Shared {}
@@ -157,7 +133,7 @@ mod app {
         let (plane, control) = start(
             CHANNELS.take(),
             flash,
-            Device::new(encoders, motors, rig),
+            Device::new(Wired { encoders, motors }, rig),
             clock,
             identity,
         );
@@ -166,7 +142,7 @@ mod app {
             Some(Crash::HardFault { pc, status }) => {
                 defmt::error!("restarted after a fault at {:#010x}, CFSR {:#010x}", pc, status);
             }
-            None => defmt::info!("started at {} MHz", core_hz / 1_000_000),
+            Some(Crash::Requested) | None => defmt::info!("started at {} MHz", core_hz / 1_000_000),
         }
 
         let port = Port::new(p.USB_OTG_FS, p.PA12, p.PA11);
@@ -183,67 +159,52 @@ mod app {
     }
 
     /// One millisecond. Budget 480,000 cycles; a longer tick is counted as missed ones, two in a row with live motors are a fault, five reset the board.
-    /// Uses no critical section (see [`crate::critical`]).
+    /// Uses no critical section (see [`stm32h743::critical`]).
     #[task(binds = TIM7, priority = 15, local = [control, watchdog])]
     fn tick(cx: tick::Context) {
         const { assert!(TICK_PRIORITY == 15) };
         tick_timer::acknowledge();
         if erasing() {
             // Scenes must not be read now. The application erases only while motors are off; this makes sure.
-            motors::release();
+            motor_timer::release();
             tick_timer::skip();
         } else {
             cx.local.control.tick();
         }
         // Live outputs in a state without motors: cut them, and let the watchdog start anew.
-        if motors::outputs_on() && !cx.local.control.safety().live() {
+        if motor_timer::outputs_on() && !cx.local.control.safety().live() {
             motors::cut();
         } else {
             cx.local.watchdog.feed();
         }
         tick_timer::finish();
-        TICK_RAN.store(true, Ordering::Release);
+        executor::note();
     }
 
     /// The stop contact opened. The timer has cut the outputs already; this does it again by another way. The next tick sees the input itself.
     #[task(binds = EXTI15_10, priority = 16)]
     fn stop(_cx: stop::Context) {
         const { assert!(STOP_PRIORITY == 16) };
-        motors::release();
+        motor_timer::release();
         motors::acknowledge_stop();
     }
 
     #[idle(local = [link])]
     fn idle(cx: idle::Context) -> ! {
-        static EXECUTOR: StaticCell<raw::Executor> = StaticCell::new();
         static INCOMING: StaticCell<InPipe> = StaticCell::new();
         static OUTGOING: StaticCell<OutPipe> = StaticCell::new();
 
-        memory::repaint_stack();
-        let executor = EXECUTOR.init_with(|| raw::Executor::new(core::ptr::null_mut()));
-        let spawner = executor.spawner();
+        stack::repaint();
         let incoming = INCOMING.init_with(InPipe::new);
         let outgoing = OUTGOING.init_with(OutPipe::new);
-        if let Some((plane, port)) = cx.local.link.take() {
-            port.spawn(spawner, incoming, outgoing);
-            if let Ok(task) = link::run(plane, incoming, outgoing) {
-                spawner.spawn(task);
+        let ends = cx.local.link.take();
+        executor::run(|spawner| {
+            if let Some((plane, port)) = ends {
+                port.spawn(spawner, incoming, outgoing);
+                if let Ok(task) = link::run(plane, incoming, outgoing) {
+                    spawner.spawn(task);
+                }
             }
-        }
-        loop {
-            if TICK_RAN.swap(false, Ordering::AcqRel) {
-                link::TICKED.signal(());
-            }
-            PENDING.store(false, Ordering::Release);
-            // SAFETY: only here, never from within a task.
-            unsafe { executor.poll() };
-            // With interrupts masked nothing can come between the check and the sleep; a pending interrupt still ends the sleep.
-            cortex_m::interrupt::disable();
-            if !PENDING.load(Ordering::Acquire) && !TICK_RAN.load(Ordering::Acquire) {
-                cortex_m::asm::wfi();
-            }
-            // SAFETY: ends the section opened three lines above.
-            unsafe { cortex_m::interrupt::enable() };
-        }
+        })
     }
 }

@@ -16,23 +16,13 @@
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::pac;
-use embassy_stm32::pac::timer::vals::{Bkp, Lock, OcmGp, Ossi, Ossr, Urs};
 use embassy_stm32::peripherals::{PE7, PE8, PE9, PE10, PE11, PE13, PE14, PE15, PF13, PF14, PF15, TIM1};
-use embassy_stm32::rcc;
 use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
 use embassy_stm32::timer::{BkIn1, BreakInputPin, Ch1, Ch2, Ch3, Ch4};
-use nucleo_h743zi::drive::{AXES, Setpoint};
+use mortise_board::set_value::Setpoint;
+use mortise_protocol::limits::MAX_JOINTS as AXES;
+use stm32h743::motor_timer::{MotorTimer, outputs_on, release};
 
-/// PWM frequency of the set value: the highest a maxon ESCON accepts (10 Hz to 5 kHz); the driver switches its power stage by itself.
-const PWM_HZ: u32 = 5_000;
-/// Channel of the enable line, counted from 0.
-const ENABLE: usize = 3;
-/// PWR_CR1.PLS: 2.7 V.
-const SUPPLY_LEVEL: u8 = 0b101;
-/// SYSCFG_CFGR: processor lock-up and supply monitor act on the timers' break input. Not in the PAC; bits as in ST's headers.
-const SYSCFG_CFGR: *mut u32 = 0x5800_0418 as *mut u32;
-const LOCKUP_BREAKS: u32 = 1 << 6;
-const SUPPLY_BREAKS: u32 = 1 << 2;
 /// Bits 13, 14, 15 of port F.
 const DIRECTION_SHIFT: usize = 13;
 const STOP_PIN: usize = 15;
@@ -55,7 +45,7 @@ pub struct Pins {
 
 /// All of the motor side.
 pub struct Motors {
-    period: u32,
+    timer: MotorTimer,
     live: bool,
     faults: [Input<'static>; AXES],
     _directions: [Output<'static>; AXES],
@@ -74,7 +64,7 @@ struct Lines {
 /// Forces all outputs low, from any context, whatever state the program is in: through the timer, and the enable pin once more by itself.
 /// Only a reset brings the enable line back.
 pub fn cut() {
-    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
+    release();
     pac::GPIOE.bsrr().write(|w| w.set_br(ENABLE_PIN, true));
     pac::GPIOE
         .moder()
@@ -82,14 +72,11 @@ pub fn cut() {
     cortex_m::asm::dsb();
 }
 
-/// Outputs off; [`Motors::drive`] may switch them on again. For the stop handler.
-pub fn release() {
-    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
-}
-
-/// PWM and enable line are live.
-pub fn outputs_on() -> bool {
-    pac::TIM1.bdtr().read().moe()
+/// See [`mortise_board::crash`].
+// SAFETY: the hook's name and signature; defined once.
+#[unsafe(no_mangle)]
+fn mortise_cut_motors() {
+    cut();
 }
 
 /// Lets the opening stop contact also raise the EXTI15_10 interrupt. The line watches the pin beside the timer that owns it.
@@ -110,11 +97,6 @@ pub fn acknowledge_stop() {
     pac::EXTI.pr(0).write(|w| w.set_line(STOP_PIN, true));
 }
 
-/// The supply is under the level at which the timer cuts the motors.
-pub fn supply_is_low() -> bool {
-    pac::PWR.csr1().read().pvdo()
-}
-
 /// The stop input is open.
 pub fn stop_is_open() -> bool {
     pac::GPIOE.idr().read().idr(STOP_PIN) == pac::gpio::vals::Idr::HIGH
@@ -122,9 +104,8 @@ pub fn stop_is_open() -> bool {
 
 impl Motors {
     /// Takes the timer and its pins; outputs stay off.
-    pub fn new(_timer: Peri<'static, TIM1>, pins: Pins) -> Self {
-        watch_processor_and_supply();
-        let period = set_up_timer();
+    pub fn new(timer: Peri<'static, TIM1>, pins: Pins) -> Self {
+        let timer = MotorTimer::new(timer);
         // Pins last: until here they float and the resistors outside hold them.
         let line = PwmPinConfig {
             output_type: OutputType::PushPull,
@@ -135,7 +116,7 @@ impl Motors {
         let mut stop = Flex::new(pins.stop);
         stop.set_as_af_unchecked(stop_function, AfType::input(Pull::Up));
         Self {
-            period,
+            timer,
             live: false,
             // Pulled down here against the driver's stronger pull-up.
             faults: [
@@ -163,9 +144,7 @@ impl Motors {
     pub fn drive(&mut self, setpoints: [Setpoint; AXES]) {
         let mut forward = 0u32;
         for (axis, setpoint) in setpoints.iter().enumerate() {
-            // Duty is 0 to 1: at most `period`, which fits 16 bits.
-            let compare = (setpoint.duty * self.period as f32) as u16;
-            pac::TIM1.ccr(axis).write(|w| w.set_ccr(compare));
+            self.timer.set_duty(axis, setpoint.duty);
             forward |= u32::from(setpoint.forward) << (DIRECTION_SHIFT + axis);
         }
         const ALL: u32 = 0b111 << DIRECTION_SHIFT;
@@ -176,27 +155,19 @@ impl Motors {
         if !self.live {
             self.live = true;
             // Does not take while the stop input is open. A stop since the last `stopped` has left its flag, and the next call reports it.
-            pac::TIM1.bdtr().modify(|w| w.set_moe(true));
+            self.timer.enable();
         }
     }
 
     /// Outputs off, enable line low on return.
     pub fn off(&mut self) {
         self.live = false;
-        release();
-        for axis in 0..AXES {
-            pac::TIM1.ccr(axis).write(|w| w.set_ccr(0));
-        }
-        cortex_m::asm::dsb();
+        self.timer.off();
     }
 
     /// The stop input is open, was open for a moment since the last call, or the hardware has cut the outputs for another reason.
     pub fn stopped(&mut self) -> bool {
-        let flags = pac::TIM1.sr().read();
-        let broke = flags.bif(0) || flags.sbif();
-        if broke {
-            clear_breaks();
-        }
+        let broke = self.timer.broke();
         let cut = self.live && !outputs_on();
         stop_is_open() || broke || cut
     }
@@ -206,73 +177,4 @@ impl Motors {
         let faults = self.faults.iter().take(motors);
         { faults }.position(Input::is_low).map(|axis| axis as u8)
     }
-}
-
-/// Clears the break flags; those whose cause is still there stay set.
-fn clear_breaks() {
-    // Flags are cleared by writing 0; 1 leaves the others as they are.
-    pac::TIM1.sr().write(|w| {
-        w.0 = u32::MAX;
-        w.set_bif(0, false);
-        w.set_sbif(false);
-    });
-}
-
-/// Lets a processor lock-up and a supply under 2.7 V act on the timer's break input, until the next reset.
-fn watch_processor_and_supply() {
-    pac::PWR.cr1().modify(|w| {
-        w.set_pls(SUPPLY_LEVEL);
-        w.set_pvde(true);
-    });
-    // SAFETY: SYSCFG is clocked since the HAL's `init`; write-once bits, nobody else writes this register.
-    unsafe {
-        SYSCFG_CFGR.write_volatile(SYSCFG_CFGR.read_volatile() | LOCKUP_BREAKS | SUPPLY_BREAKS);
-    }
-}
-
-/// Sets TIM1 up with all outputs off; returns counts in a PWM period.
-fn set_up_timer() -> u32 {
-    rcc::enable_and_reset::<TIM1>();
-    let period = rcc::frequency::<TIM1>().0 / PWM_HZ;
-    let timer = pac::TIM1;
-    // 240 MHz / 5 kHz = 48,000: fits 16 bits without a prescaler.
-    timer.psc().write_value(0);
-    timer.arr().write(|w| w.set_arr((period - 1) as u16));
-    for axis in 0..AXES {
-        timer.ccmr_output(axis / 2).modify(|w| {
-            w.set_ocm(axis % 2, OcmGp::PWM_MODE1);
-            w.set_ocpe(axis % 2, true);
-        });
-        timer.ccr(axis).write(|w| w.set_ccr(0));
-    }
-    timer
-        .ccmr_output(ENABLE / 2)
-        .modify(|w| w.set_ocm(ENABLE % 2, OcmGp::FORCE_ACTIVE));
-    for channel in 0..=ENABLE {
-        // Idle level low: what a break forces.
-        timer.cr2().modify(|w| w.set_ois(channel, false));
-        timer.ccer().modify(|w| {
-            w.set_ccp(channel, false);
-            w.set_cce(channel, true);
-        });
-    }
-    timer.bdtr().write(|w| {
-        w.set_moe(false);
-        w.set_aoe(false);
-        // Off means driven to the idle level, not floating.
-        w.set_ossi(Ossi::IDLE_LEVEL);
-        w.set_ossr(Ossr::IDLE_LEVEL);
-        // No filter: the path from pin to outputs then needs no clock.
-        w.set_bke(0, true);
-        w.set_bkp(0, Bkp::ACTIVE_HIGH);
-    });
-    // In a write of its own, so that it freezes what the first one set.
-    timer.bdtr().modify(|w| w.set_lock(Lock::LEVEL1));
-    timer.cr1().modify(|w| {
-        w.set_urs(Urs::COUNTER_ONLY);
-        w.set_arpe(true);
-    });
-    timer.egr().write(|w| w.set_ug(true));
-    timer.cr1().modify(|w| w.set_cen(true));
-    period
 }

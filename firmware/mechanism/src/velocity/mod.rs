@@ -14,8 +14,8 @@
 //! | likewise, force a tick late | 5.9 | 3.7 | 5.8 |
 //!
 //! `tests/velocity.rs` measures all of it (2026-11-23; handle of 0.15 kg and 1 N·s/m, 5 µm a count, coupling of 20 N·s/m, no dry friction). The window
-//! of 16 ticks is the quietest, and stable in the large up to more than twice the stiffness of the low-pass; but a motion of few counts it reports 8 ms
-//! late, so that with a delayed force the handle goes on trembling by several counts, and a wall damped by 40 N·s/m never rests. The low-pass
+//! of 16 ticks is the quietest, and large motions stay bounded up to more than twice the stiffness of the low-pass; but it reports a motion of few counts
+//! 8 ms late, so that with a delayed force the handle goes on trembling by some counts, and a wall damped by 40 N·s/m never rests. The low-pass
 //! is in use: it has no such trembling. A window of 6 ticks bears a third more without delay and as much with it.
 
 pub mod adaptive_window;

@@ -47,6 +47,7 @@ const LOOP: &[&str] = &[
     "firmware/mechanism/src",
     "firmware/app/src",
     "firmware/simulation/src",
+    "firmware/boards/common/src",
     "firmware/boards/mps2-an500/src",
     "host/rig/src",
     "host/mating/src",

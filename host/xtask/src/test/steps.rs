@@ -26,7 +26,7 @@ const BOARD_SIDE: [&str; 5] = [
 
 pub fn format(bench: &mut Bench) -> Result<String> {
     shell::run(shell::cargo(&bench.root).args(["fmt", "--all", "--check"]))?;
-    for board in boards::boards(&bench.root)? {
+    for board in boards::crates(&bench.root)? {
         shell::run(boards::cargo(&bench.root, &board).args(["fmt", "--check"]))?;
     }
     Ok(String::new())
@@ -142,7 +142,7 @@ pub fn unit(bench: &mut Bench) -> Result<String> {
 pub fn unit_boards(bench: &mut Bench) -> Result<String> {
     let host = host_triple(&bench.root)?;
     let boards = bench.root.join("firmware/boards");
-    for board in boards::boards(&bench.root)? {
+    for board in boards::crates(&bench.root)? {
         if !boards.join(&board).join("src/lib.rs").is_file() {
             continue;
         }

@@ -31,6 +31,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     (
         "firmware/boards",
         &[
+            "mortise-board",
+            "stm32h743",
             "mortise-firmware",
             "mortise-mechanism",
             "mortise-simulation",
@@ -133,7 +135,7 @@ pub fn check(root: &Path, files: &[PathBuf]) -> Result<Vec<Finding>> {
     if boards.join("Cargo.toml").is_file() {
         packages.extend(self::packages(root, &boards)?);
     } else if boards.is_dir() {
-        for board in crate::firmware::boards(root).unwrap_or_default() {
+        for board in crate::firmware::crates(root).unwrap_or_default() {
             packages.extend(self::packages(root, &boards.join(board))?);
         }
     }

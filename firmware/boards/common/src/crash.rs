@@ -1,8 +1,7 @@
 //! What happens when the firmware fails: motors off, a record that survives, restart.
 //!
-//! Three ways in: a Rust panic, a processor fault (hard fault, or any exception nobody handles), the watchdog. The first two come here. The order is
-//! always motors first; the record second; reset last. If the processor locks up instead, the timer's break input cuts the motors in
-//! hardware ([`crate::motors`]) and the watchdog resets.
+//! Two ways in: a Rust panic, and a processor fault (hard fault, or any exception nobody handles). The order is always motors first; the record
+//! second; reset last. A restart that the host asked for takes the same way out.
 
 use core::arch::naked_asm;
 use core::mem::MaybeUninit;
@@ -11,12 +10,17 @@ use core::ptr::{read_volatile, write_volatile};
 
 use cortex_m::asm::dsb;
 use cortex_m::peripheral::SCB;
-use nucleo_h743zi::boot::{Crash, CrashRecord, RECORD_WORDS, crash, record};
 
-use crate::motors;
+use crate::record::{Crash, CrashRecord, RECORD_WORDS, crash, record};
+
+// SAFETY: the board defines it, without arguments and result; it may be called from any context.
+unsafe extern "Rust" {
+    /// The board's hook: all motors off on return, from any context, whatever state the program is in.
+    safe fn mortise_cut_motors();
+}
 
 /// Record and one spare word. The memory's error correction holds back the last write until the next one: the spare takes that place.
-// SAFETY: the section exists in memory.x and start-up leaves it alone; every bit pattern is a valid `MaybeUninit`.
+// SAFETY: the section exists in every board's memory.x and start-up leaves it alone; every bit pattern is a valid `MaybeUninit`.
 #[unsafe(link_section = ".crash.record")]
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS + 1]> = MaybeUninit::uninit();
 
@@ -48,9 +52,15 @@ fn die(cause: Crash) -> ! {
     SCB::sys_reset()
 }
 
+/// Restarts because the host asked.
+pub fn restart() -> ! {
+    mortise_cut_motors();
+    die(Crash::Requested)
+}
+
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
-    motors::cut();
+    mortise_cut_motors();
     cortex_m::interrupt::disable();
     die(Crash::Panic {
         line: info.location().map_or(0, |at| at.line()),
@@ -89,7 +99,7 @@ unsafe extern "C" fn DefaultHandler() -> ! {
 /// # Safety
 /// Nothing else may run afterwards. Any `frame` is allowed: one outside the stack is not read.
 unsafe extern "C" fn fault(frame: *const u32) -> ! {
-    motors::cut();
+    mortise_cut_motors();
     // SAFETY: symbols of the linker script; only their addresses are used.
     unsafe extern "C" {
         static _stack_end: u32;

@@ -1,7 +1,7 @@
 //! Reads and clears the chip's reset flags.
 
+use crate::boot::ResetFlags;
 use embassy_stm32::pac;
-use nucleo_h743zi::boot::ResetFlags;
 
 /// Why the chip was reset. Once: the flags are cleared, so that the next reset shows its own.
 pub fn take_flags() -> ResetFlags {

@@ -138,7 +138,7 @@ mod tests {
     /// The linker puts no code where a description is erased.
     #[test]
     fn code_ends_where_descriptions_begin() {
-        let script = include_str!("../memory.x");
+        let script = include_str!("../../nucleo-h743zi/memory.x");
         assert!(script.contains("FLASH : ORIGIN = 0x08000000, LENGTH = 768K"));
         assert_eq!(BANK_1 + 768 * 1024, RIGS);
     }

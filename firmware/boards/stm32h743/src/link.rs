@@ -1,20 +1,14 @@
 //! The link plane's task: bytes from the port to the link plane, frames back, once a millisecond and whenever bytes arrive.
 
-use cortex_m::peripheral::SCB;
 use embassy_futures::select::{Either, select};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
+use mortise_board::{crash, executor, stack};
 use mortise_firmware::link::LinkPlane;
 
 use crate::flash::SlotFlash;
-use crate::memory::deepest_stack;
 use crate::usb::{IN_BYTES, InPipe, Out, OutPipe};
 
 /// The link plane of this board.
 pub type Link = LinkPlane<'static, 'static, SlotFlash>;
-
-/// A tick has run. Set by `idle`, not by the tick: the tick uses no critical section.
-pub static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Passes between stack measurements: they read some 100 kB.
 const STACK_EVERY: u32 = 1000;
@@ -30,15 +24,15 @@ pub async fn run(mut plane: Link, incoming: &'static InPipe, outgoing: &'static 
     let mut quiet = 0u32;
     loop {
         // Taken whether or not there is room for answers: a STOP may be in it.
-        if let Either::First(length) = select(incoming.read(&mut buffer), TICKED.wait()).await {
+        if let Either::First(length) = select(incoming.read(&mut buffer), executor::WAKE.wait()).await {
             plane.receive(&buffer[..length], &mut out);
         }
         plane.poll(&mut out);
         #[cfg(not(feature = "rtt"))]
-        crate::log::drain(|bytes| plane.log(bytes, &mut out));
+        mortise_board::log::drain(|bytes| plane.log(bytes, &mut out));
 
         if passes.is_multiple_of(STACK_EVERY) {
-            plane.note_stack(deepest_stack());
+            plane.note_stack(stack::deepest());
         }
         passes = passes.wrapping_add(1);
         quiet = if plane.restart_requested() && outgoing.is_empty() {
@@ -47,8 +41,7 @@ pub async fn run(mut plane: Link, incoming: &'static InPipe, outgoing: &'static 
             0
         };
         if quiet > RESTART_AFTER {
-            crate::motors::cut();
-            SCB::sys_reset();
+            crash::restart();
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Memory protection, caches, stack measurement.
+//! Memory protection and caches.
 //!
 //! | region | what | access |
 //! |---|---|---|
@@ -10,10 +10,10 @@
 //!
 //! No DMA is used (USB moves its data through the OTG FIFO with the processor), so no memory needs to be uncached for that.
 
+use crate::flash_map::{self, Bank};
 use cortex_m::Peripherals;
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::{MPU, SCB};
-use nucleo_h743zi::flash_map::{self, Bank};
 
 /// RASR: execute never.
 const NEVER_EXECUTE: u32 = 1 << 28;
@@ -107,43 +107,4 @@ pub fn forget(address: u32, length: u32) {
         let mut scb: SCB = core::mem::transmute(());
         scb.invalidate_dcache_by_address(address as usize, length as usize);
     }
-}
-
-/// Paints the free part of the stack anew, so that [`deepest_stack`] leaves out what start-up needed (it moves large values about). Once, when `idle`
-/// begins. Interrupts are off for about 0.1 ms.
-pub fn repaint_stack() {
-    // SAFETY: symbols of the linker script; only their addresses are used.
-    unsafe extern "C" {
-        static _stack_end: u32;
-    }
-    /// Left unpainted under the stack pointer, bytes: this function's own needs.
-    const MARGIN: u32 = 256;
-    cortex_m::interrupt::free(|_| {
-        let end = cortex_m::register::msp::read() - MARGIN;
-        let mut at = (&raw const _stack_end) as u32;
-        while at < end {
-            // SAFETY: below the stack pointer and above the guard: nobody's memory while no interrupt can come.
-            unsafe { (at as *mut u32).write_volatile(cortex_m_rt::STACK_PAINT_VALUE) };
-            at += 4;
-        }
-    });
-}
-
-/// Deepest the stack has been since [`repaint_stack`], bytes: looks for paint.
-pub fn deepest_stack() -> u32 {
-    // SAFETY: symbols of the linker script; only their addresses are used.
-    unsafe extern "C" {
-        static _stack_end: u32;
-        static _stack_start: u32;
-    }
-    let (end, start) = (
-        (&raw const _stack_end) as usize,
-        (&raw const _stack_start) as usize,
-    );
-    let mut at = end;
-    // SAFETY: reads the stack's own memory, word by word, above the guard.
-    while at < start && unsafe { (at as *const u32).read_volatile() } == cortex_m_rt::STACK_PAINT_VALUE {
-        at += 4;
-    }
-    (start - at) as u32
 }

@@ -15,6 +15,7 @@
 use core::ptr::write_volatile;
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use crate::flash_map::{self, Bank, SECTOR, SLOT_LENGTH, WORD};
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::{DWT, SCB};
 use embassy_stm32::Peri;
@@ -22,7 +23,6 @@ use embassy_stm32::pac;
 use embassy_stm32::pac::flash::regs::Ccr;
 use embassy_stm32::peripherals::FLASH;
 use mortise_firmware::board::{Flash, FlashError, WRITE_SIZE};
-use nucleo_h743zi::flash_map::{self, Bank, SECTOR, SLOT_LENGTH, WORD};
 
 use crate::memory::{Access, forget, set_access};
 use crate::watchdog;

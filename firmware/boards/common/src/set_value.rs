@@ -4,10 +4,6 @@
 //! current between [`ZERO_DUTY`] and [`FULL_DUTY`]; the margins at both ends let a driver tell a broken wire (0 % or 100 %) from a
 //! command. Set every driver to [`FULL_CURRENT_A`] at [`FULL_DUTY`] and no current at [`ZERO_DUTY`].
 
-use mortise_protocol::rig::Rig;
-
-/// Motors the board has outputs for.
-pub const AXES: usize = 3;
 /// Current at [`FULL_DUTY`], A.
 pub const FULL_CURRENT_A: f32 = 3.0;
 /// Share of the PWM period that means no current.
@@ -38,17 +34,6 @@ impl Setpoint {
             forward: current >= 0.0,
         }
     }
-}
-
-/// What of a description this board can do: no motor is given more than its driver's full current, so that a force keeps its direction; a wrist is not
-/// sensed, because there are inputs for three encoders only.
-pub fn fitted(rig: &Rig) -> Rig {
-    let mut fitted = rig.clone();
-    for joint in &mut fitted.joints {
-        joint.current_limit = joint.current_limit.min(FULL_CURRENT_A);
-    }
-    fitted.wrist = None;
-    fitted
 }
 
 #[cfg(test)]
