@@ -11,6 +11,7 @@ mod firmware;
 mod fuzz;
 mod memory_map;
 mod program;
+mod rust_source;
 mod setup;
 mod shell;
 mod test;

@@ -85,7 +85,7 @@ const COMMANDS: &[Command] = &[
     },
     Command {
         name: "tidy",
-        what: "Check that docs name what exists, that files are short and that layers hold",
+        what: "Check that docs name what exists, that files are short, that layers hold and that no modules need each other",
         arguments: "",
         options: &[],
     },

@@ -37,7 +37,7 @@ struct Bench {
 #[rustfmt::skip]
 const STEPS: &[Step] = &[
     Step { name: "format", what: "rustfmt leaves every source as it is", run: steps::format },
-    Step { name: "tidy", what: "paths named in docs exist, files are short, layers hold", run: steps::tidy },
+    Step { name: "tidy", what: "paths named in docs exist, files are short, layers hold, no modules need each other", run: steps::tidy },
     Step { name: "dependencies", what: "licences, sources, advisories and versions of all that is built on", run: steps::dependencies },
     Step { name: "lint", what: "clippy finds nothing in host crates and their tests", run: steps::lint },
     Step { name: "no-std", what: "board-side crates compile for the microcontroller", run: steps::no_std },

@@ -1,5 +1,6 @@
-//! Checks that keep the repository true: what docs name exists, files stay short, layers hold, no figure is stale.
+//! Checks that keep the repository true: what docs name exists, files stay short, layers hold, no modules need each other, no figure is stale.
 
+mod circles;
 mod commands;
 mod docs;
 mod layers;
@@ -58,7 +59,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, what figures were made from.
+/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, import circles, what figures were made from.
 ///
 /// # Errors
 /// When a file cannot be read, or cargo cannot describe the workspace.
@@ -71,6 +72,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     }
     findings.extend(docs::check_paths(root, &files)?);
     findings.extend(layers::check(root, &files)?);
+    findings.extend(circles::check(root, &files)?);
     let stale = figures::artefacts::complaints(root)?;
     findings.extend(
         stale
