@@ -6,53 +6,26 @@
 
 pub mod artefacts;
 mod claims;
+mod measure;
 mod page;
 mod quoted;
 mod renew;
 mod row;
 mod sources;
+mod write;
 
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 
-use self::artefacts::{ARTEFACTS, Artefact, Made};
 use self::claims::Claims;
+use self::measure::{By, measure};
 pub use self::row::{Row, count};
+use self::write::{page_is_quick, write_page};
 use crate::program::Programs;
 use crate::setup::{self, Consent, Group};
 use crate::{firmware, shell};
-
-/// What one run of `mortise-lab figures` gave.
-#[derive(Debug)]
-pub struct Measured {
-    /// The rows, in the program's order.
-    pub rows: Vec<Row>,
-    /// True if the program ended with success.
-    pub success: bool,
-}
-
-/// What `mortise-lab figures` judges rows by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum By {
-    /// The claims it was built with; a row without one makes the last row fail.
-    Kept,
-    /// The same, and where there is none, what it measures.
-    Completed,
-    /// What it measures.
-    Measured,
-}
-
-impl By {
-    fn option(self) -> &'static str {
-        match self {
-            Self::Kept => "kept",
-            Self::Completed => "completed",
-            Self::Measured => "measured",
-        }
-    }
-}
 
 /// `cargo xtask figures [NAME] [--quick] [--claim]`, `--check`, `--renew [NAME]...` or `--record NAME...`.
 pub fn command(arguments: &[String]) -> Result<ExitCode> {
@@ -101,33 +74,6 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
-}
-
-/// Whether the page of a table is made from the shorter form; `None` when there is no such table.
-fn page_is_quick(name: &str) -> Option<bool> {
-    let of = |artefact: &Artefact| match artefact.made {
-        Made::Page { quick } if artefact.name == name => Some(quick),
-        _ => None,
-    };
-    ARTEFACTS.iter().find_map(of)
-}
-
-/// Measures a table, keeps the claims of new rows and writes the page; true if every bound holds.
-fn write_page(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<bool> {
-    let Some(of_page) = page_is_quick(name).map(|page| page == quick) else {
-        bail!("there is no table `{name}`; `mortise-lab figures --help` names them");
-    };
-    let measured = measure(root, program, name, quick, by)?;
-    let mut claims = Claims::read(root)?;
-    for key in claims.take(name, of_page, &measured.rows) {
-        eprintln!("{}: dropped, no row: {name}: {key}", claims::FILE);
-    }
-    claims.write(root)?;
-    let file = root.join(artefacts::FOLDER).join(format!("{name}.md"));
-    std::fs::write(&file, page::text(name, quick, &measured.rows))
-        .with_context(|| format!("writing {}", file.display()))?;
-    eprintln!("written: docs/figures/{name}.md");
-    Ok(measured.success && !measured.rows.iter().any(Row::fails))
 }
 
 /// The step of `cargo xtask test`: [`check`], once figures have been renewed for the first time; until then, whether the bounds of `end-to-end` hold.
@@ -217,39 +163,4 @@ fn page_of(root: &Path, table: &str) -> Result<Vec<Row>> {
     let page = std::fs::read_to_string(root.join(&file))
         .with_context(|| format!("reading {file}; `--renew` writes it"))?;
     Ok(quoted::page_rows(&page))
-}
-
-/// Runs `mortise-lab figures NAME --json` and prints each row as it comes.
-///
-/// # Errors
-/// When the program cannot be started or prints no rows, or something that is not a row.
-pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<Measured> {
-    let mut command = Command::new(program);
-    command
-        .current_dir(root)
-        .args(["figures", name, "--json", "--claims", by.option()]);
-    if quick {
-        command.arg("--quick");
-    }
-    let mut rows = Vec::new();
-    let mut foreign = Vec::new();
-    let run = shell::run_lines(&mut command, |line| match Row::parse(line) {
-        Ok(row) => {
-            println!("  {}", row.line());
-            rows.push(row);
-        }
-        Err(_) if line.trim().is_empty() => {}
-        Err(error) => foreign.push(format!("{error:#}: {line}")),
-    });
-    if let Some(first) = foreign.first() {
-        bail!("`mortise-lab figures {name} --json` printed what is not a row ({first})");
-    }
-    if rows.is_empty() {
-        run?;
-        bail!("`mortise-lab figures {name} --json` printed no row");
-    }
-    Ok(Measured {
-        rows,
-        success: run.is_ok(),
-    })
 }

@@ -3,18 +3,18 @@
 //! Host crates are checked, tested and run in one profile, `release`, so that nothing large is
 //! compiled twice and what is tested is what a user runs.
 
+mod bench;
 mod report;
 mod steps;
 mod window;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
+use self::bench::Bench;
 use self::report::{Counts, Report};
-use crate::program::Programs;
 use crate::setup::{self, Consent, Group};
 use crate::shell;
 
@@ -23,15 +23,6 @@ struct Step {
     name: &'static str,
     what: &'static str,
     run: fn(&mut Bench) -> Result<String>,
-}
-
-/// What steps share.
-struct Bench {
-    root: PathBuf,
-    /// The programs, once the step `build` made them.
-    programs: Option<Programs>,
-    /// Tests counted in the step that runs.
-    counts: Counts,
 }
 
 #[rustfmt::skip]

@@ -3,41 +3,22 @@
 mod circles;
 mod commands;
 mod docs;
+mod finding;
 mod layers;
 mod sources;
 mod tree;
 mod unsafety;
 
-use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
+pub use self::finding::{Finding, report};
 pub use self::layers::target_directory;
 
 use crate::program::Programs;
 use crate::{figures, shell};
-
-/// Something that is not as it must be.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// File, from the root.
-    pub file: PathBuf,
-    /// Line, counted from one; 0 when it concerns the whole file.
-    pub line: usize,
-    /// What is wrong and what would be right.
-    pub what: String,
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.line {
-            0 => write!(formatter, "{}: {}", self.file.display(), self.what),
-            line => write!(formatter, "{}:{line}: {}", self.file.display(), self.what),
-        }
-    }
-}
 
 /// `cargo xtask tidy`.
 pub fn command(arguments: &[String]) -> Result<ExitCode> {
@@ -102,19 +83,4 @@ pub fn check_commands(root: &Path, programs: &Programs) -> Result<Vec<Finding>> 
         }
     }
     Ok(findings)
-}
-
-/// Prints findings.
-///
-/// # Errors
-/// When there is one.
-pub fn report(findings: &[Finding]) -> Result<()> {
-    for finding in findings {
-        eprintln!("{finding}");
-    }
-    if findings.is_empty() {
-        Ok(())
-    } else {
-        bail!("tidy: {} found", findings.len())
-    }
 }
