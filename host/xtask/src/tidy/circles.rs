@@ -18,12 +18,9 @@ const NOT_YET: &[&str] = &[
     "firmware/app",
     "firmware/boards",
     "firmware/haptics",
-    "hil-tests",
     "host/app",
     "host/bake",
     "host/brep",
-    "host/lab",
-    "host/output",
     "host/rig",
 ];
 
