@@ -3,7 +3,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// Where the headers are when `OCCT_INCLUDE_DIR` does not say: Debian, Homebrew, MacPorts, plain `make install`.
+/// Locations of the headers when `OCCT_INCLUDE_DIR` is not set: Debian, Homebrew, MacPorts, plain `make install`.
 const INCLUDE_DIRS: &[&str] = &[
     "/usr/include/opencascade",
     "/usr/include/occt",
@@ -12,7 +12,7 @@ const INCLUDE_DIRS: &[&str] = &[
     "/opt/local/include/opencascade",
 ];
 
-/// Toolkits both before and after 7.8 regrouped the data exchange, each after those it depends on.
+/// Toolkits common to the versions before and after 7.8, which regrouped the data exchange; each follows those it depends on.
 const COMMON: &[&str] = &[
     "TKernel",
     "TKMath",
@@ -64,7 +64,7 @@ fn main() {
         .include("src")
         .include(&include)
         .std("c++17")
-        // The kernel's headers are not ours to mend.
+        // The kernel's headers are third-party code.
         .flag_if_supported("-Wno-deprecated-declarations")
         .flag_if_supported("-Wno-unused-parameter")
         .compile("mortise-brep-kernel");
@@ -73,13 +73,13 @@ fn main() {
     if let Some(dir) = &libraries {
         println!("cargo:rustc-link-search=native={}", dir.display());
     }
-    // The header that came with the toolkit is the surest sign of which grouping is installed.
+    // The header that comes with the toolkit shows most reliably which grouping is installed.
     let step = if minor_version(&include) >= Some((7, 8)) {
         STEP_NEW
     } else {
         STEP_OLD
     };
-    // Static order does not matter to shared libraries, but dependants-first is right for both.
+    // Shared libraries need no link order, but dependants-first is right for static ones as well.
     for library in step.iter().rev().chain(COMMON.iter().rev()) {
         println!("cargo:rustc-link-lib=dylib={library}");
     }

@@ -1,7 +1,8 @@
 //! Frames: `COBS( sequence: u16 LE | message: postcard | stamp | CRC-32/ISO-HDLC: u32 LE ) 0x00`.
 //!
-//! The [`Stamp`] (session: u32 LE, count: u32 LE) is absent from every frame of a board and from a host's greeting. The checksum covers all before it. The delimiter never occurs inside a frame, so a reader that
-//! has lost its place finds it again at the next zero: at most one good frame is lost to garbage before it.
+//! The [`Stamp`] (session: u32 LE, count: u32 LE) is absent from every frame of a board and from a host's greeting. The checksum covers all preceding
+//! bytes. The delimiter never occurs inside a frame, so a reader that has lost synchronisation regains it at the next zero: garbage costs at most one
+//! good frame after it.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -12,17 +13,17 @@ use crate::limits::MAX_FRAME;
 const SEQUENCE: usize = 2;
 const CHECKSUM: usize = 4;
 
-/// Tells a new command from one that was repeated, delayed, or sent to an earlier session.
+/// Distinguishes a new command from one that was repeated, delayed, or sent to an earlier session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Stamp {
     /// [`crate::message::Capabilities::session`] of the session the command is meant for.
     pub session: u32,
-    /// Rises with every frame the host sends in that session.
+    /// Increases with every frame that the host sends in that session.
     pub count: u32,
 }
 
 impl Stamp {
-    /// Bytes in a frame.
+    /// Size of a stamp in a frame, bytes.
     pub const BYTES: usize = 8;
 
     fn to_bytes(self) -> [u8; Self::BYTES] {
@@ -39,18 +40,18 @@ impl Stamp {
     }
 }
 
-/// What a sound frame carries.
+/// Content of a valid frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received<M> {
     /// Sequence number.
     pub sequence: u16,
-    /// Where the sender gave one.
+    /// The stamp, if the sender included one.
     pub stamp: Option<Stamp>,
     /// The message.
     pub message: M,
 }
 
-/// Why bytes between two delimiters are no frame.
+/// Why bytes between two delimiters are not a valid frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// Longer than [`MAX_FRAME`].
@@ -59,15 +60,15 @@ pub enum FrameError {
     Malformed,
     /// The checksum does not match.
     Crc,
-    /// Sound, but no message of this version. Carries the sequence number so that it can be refused.
+    /// A valid frame whose message is unknown in this version. Contains the sequence number so that the frame can be refused.
     Undecodable(u16),
 }
 
-/// A message did not fit into [`crate::limits::MAX_MESSAGE`] bytes or the buffer given.
+/// A message did not fit into [`crate::limits::MAX_MESSAGE`] bytes or into the given buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge;
 
-/// Writes one frame with delimiter and without a stamp into `out`, which is best [`MAX_FRAME`] long; returns the used part.
+/// Writes one frame with delimiter and without a stamp into `out`; a buffer of [`MAX_FRAME`] bytes is always large enough. Returns the used part.
 pub fn encode<'o, M: Serialize>(sequence: u16, message: &M, out: &'o mut [u8]) -> Result<&'o [u8], TooLarge> {
     encode_stamped(sequence, None, message, out)
 }
@@ -100,7 +101,7 @@ pub fn encode_stamped<'o, M: Serialize>(
     Ok(&out[..=used])
 }
 
-/// Collects bytes into frames. Holds no more than [`MAX_FRAME`] bytes whatever comes.
+/// Collects bytes into frames. Stores at most [`MAX_FRAME`] bytes for any input.
 #[derive(Clone, Debug)]
 pub struct Decoder {
     buffer: [u8; MAX_FRAME],
@@ -115,7 +116,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// Empty.
+    /// Creates an empty decoder.
     pub const fn new() -> Self {
         Self {
             buffer: [0; MAX_FRAME],
@@ -124,14 +125,14 @@ impl Decoder {
         }
     }
 
-    /// Takes one byte; at a delimiter says what came before it. Empty frames (repeated delimiters) are passed over, so a sender may start
-    /// with a delimiter to flush garbage. The stamp, if any, is read and passed over.
+    /// Takes one byte; at a delimiter it returns the result for the bytes before it. Empty frames (repeated delimiters) are skipped, so a sender may
+    /// start with a delimiter to flush garbage. The stamp, if any, is read and discarded.
     pub fn push<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<(u16, M), FrameError>> {
         let received = self.push_stamped(byte)?;
         Some(received.map(|frame| (frame.sequence, frame.message)))
     }
 
-    /// As [`Self::push`], with the stamp.
+    /// As [`Self::push`], but also returns the stamp.
     pub fn push_stamped<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<Received<M>, FrameError>> {
         if byte != 0 {
             if let Some(place) = self.buffer.get_mut(self.used) {

@@ -1,5 +1,5 @@
-//! What host and board share by wire: the [`message`] table, [`frame`]s, [`parameter`]s, the [`rig`]'s description, and the layout
-//! of the [`image`] a scene is stored in. No I/O, no allocation; the only crate both sides know.
+//! The interface between host and board: the [`message`] table, [`frame`]s, [`parameter`]s, the [`rig`]'s description, and the layout of the scene
+//! [`image`]. No I/O, no allocation; the only crate that both sides share.
 #![no_std]
 
 #[cfg(target_endian = "big")]

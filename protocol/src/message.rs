@@ -1,8 +1,8 @@
-//! The message table: all that crosses the link, in one file.
+//! The message table: all messages on the link, in one file.
 //!
-//! Every host message is answered by [`FromDevice::Ack`] or [`FromDevice::Refused`] carrying its sequence number, or by the
-//! value it asks for. [`ToDevice::Hello`] and [`FromDevice::Hello`] keep their place (variant 0) and layout in every version, so that two sides
-//! that share nothing else can still name each other. SI units and radians; quaternions x, y, z, w; poses are frame-to-world.
+//! Every host message is answered by [`FromDevice::Ack`] or [`FromDevice::Refused`] with its sequence number, or by the value it queries.
+//! [`ToDevice::Hello`] and [`FromDevice::Hello`] keep their place (variant 0) and layout in every version, so that two sides with no other common
+//! message can still identify each other. SI units and radians; quaternions x, y, z, w; poses are frame-to-world.
 
 use heapless::{String, Vec};
 use postcard_schema::Schema;
@@ -14,13 +14,13 @@ use crate::limits::*;
 use crate::parameter::ParameterId;
 use crate::rig::{Rig, RigFault};
 
-/// Hash of both message enums' schema and of the bounds they are read with: any change to a message changes it.
+/// Hash of the schemas of both message enums and of the bounds of their lists: any change to a message changes it.
 pub const SCHEMA_HASH: u64 = schema_hash();
 
 const fn schema_hash() -> u64 {
     let to = u64::from_le_bytes(Key::for_path::<ToDevice>("to").to_bytes());
     let from = u64::from_le_bytes(Key::for_path::<FromDevice>("from").to_bytes());
-    // A list's schema does not tell how long it may be, but a longer one cannot be read by the other side.
+    // A list's schema does not contain its maximum length, but the other side cannot read a longer one.
     hash_bounds(to ^ from.rotate_left(32), &WIRE_BOUNDS)
 }
 
@@ -47,12 +47,12 @@ const fn hash_bounds(start: u64, bounds: &[usize]) -> u64 {
     hash
 }
 
-/// Who speaks. Frozen layout.
+/// Version of the sender. Frozen layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Version {
-    /// [`SCHEMA_HASH`] of the speaker.
+    /// [`SCHEMA_HASH`] of the sender.
     pub schema: u64,
-    /// Major, minor, patch of the speaker's release.
+    /// Major, minor, patch of the sender's release.
     pub release: [u16; 3],
 }
 
@@ -83,33 +83,33 @@ const fn release() -> [u16; 3] {
     ]
 }
 
-/// Host to board. Those that [must be fresh](ToDevice::must_be_fresh) need a stamp.
+/// Host to board. Messages that [must be fresh](ToDevice::must_be_fresh) need a stamp.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum ToDevice {
-    /// First message, always answered by [`FromDevice::Hello`]. When the schemas differ both sides stop there, able to name each other.
+    /// First message, always answered by [`FromDevice::Hello`]. When the schemas differ, both sides stop there, each with the other's version.
     Hello(Version),
-    /// Ask for [`FromDevice::Capabilities`].
+    /// Request [`FromDevice::Capabilities`].
     GetCapabilities,
-    /// Motors may be driven from here on. Refused without a scene, in a fault, or with stop pressed.
+    /// Allow the motors to be driven. Refused without a scene, in a fault, or with stop pressed.
     Arm,
     /// Motors off, object released.
     Disarm,
-    /// Motors off now; stays so until [`ToDevice::ClearFault`].
+    /// Motors off immediately; they stay off until [`ToDevice::ClearFault`].
     Stop,
     /// Leave the stopped or faulted state when its cause is gone.
     ClearFault,
-    /// The handle stands in its reference pose: encoders that only count motion start from here. Only while the motors are off.
+    /// The handle is in its reference pose: incremental encoders count from here. Only while the motors are off.
     Home,
-    /// Keeps the link alive; anything else does too.
+    /// Keeps the link alive; any other message does too.
     Heartbeat,
     /// Change a parameter; refused outside its range.
     SetParameter {
-        /// Which.
+        /// Parameter to change.
         id: ParameterId,
-        /// In its unit.
+        /// New value, in its unit.
         value: f32,
     },
-    /// Ask for a parameter; answered by [`FromDevice::Parameter`].
+    /// Query a parameter; answered by [`FromDevice::Parameter`].
     GetParameter(ParameterId),
     /// Couple the handle to a part.
     Grab {
@@ -118,69 +118,70 @@ pub enum ToDevice {
     },
     /// Let go; the part stays where it is.
     Release,
-    /// Put every part back where the scene has it, nothing grabbed. Only while disarmed.
+    /// Reset every part to its place in the scene, with nothing grabbed. Only while disarmed.
     ResetScene,
-    /// Start sending a scene. Only while disarmed. The scene in use stays until commit.
+    /// Start an upload of a scene. Only while disarmed. The scene in use stays until commit.
     SceneBegin {
-        /// Bytes to come.
+        /// Size of the image in bytes.
         length: u32,
-        /// CRC-32/ISO-HDLC of all of them.
+        /// CRC-32/ISO-HDLC of the whole image.
         crc: u32,
         /// Layout version of the image.
         layout: u32,
     },
-    /// The next bytes. `offset` must continue where the last one ended; the last accepted one again is acknowledged again.
+    /// The next bytes. `offset` must continue after the last chunk; a repetition of the last accepted chunk is acknowledged again.
     SceneChunk {
         /// Bytes from the image's start.
         offset: u32,
         /// At most [`MAX_CHUNK`].
         data: Vec<u8, MAX_CHUNK>,
     },
-    /// Check all that came and put it in use, atomically.
+    /// Check the whole upload and put it in use, atomically.
     SceneCommit,
-    /// Forget what came.
+    /// Discard the upload.
     SceneAbort,
     /// Set, refresh or replace a constraint target.
     SetTarget(ConstraintTarget),
-    /// Take a constraint target away.
+    /// Remove a constraint target.
     ClearTarget {
         /// Its id.
         id: u16,
     },
-    /// Telemetry every so many ticks; 0 stops it.
+    /// Send telemetry every `every_ticks` ticks; 0 stops it.
     SetTelemetry {
         /// Ticks between messages.
         every_ticks: u16,
     },
-    /// Ask for [`FromDevice::Statistics`].
+    /// Query [`FromDevice::Statistics`].
     GetStatistics {
-        /// Start counting anew after answering.
+        /// Reset the counters after the answer.
         reset: bool,
     },
-    /// Script for the simulated hand (simulated mechanisms only); its time starts at the tick that takes it.
+    /// Script for the simulated operator's hand (simulated mechanisms only); its time starts at the tick that takes it.
     SimulatedHand(HandScript),
-    /// What goes wrong at the inputs of a simulated mechanism, and when (simulated mechanisms only); replaces what was sent before. Its time starts
-    /// at the tick that takes it.
+    /// Faults at the inputs of a simulated mechanism, and their times (simulated mechanisms only); replaces an earlier list. Its time starts at the
+    /// tick that takes it.
     SimulatedInputs(Vec<InputFault, MAX_INPUT_FAULTS>),
-    /// Lockstep on or off (simulated mechanisms only): on, a tick runs only when released by [`ToDevice::Run`].
+    /// Lockstep on or off (simulated mechanisms only): when on, a tick runs only when released by [`ToDevice::Run`].
     Lockstep(bool),
     /// Release ticks in lockstep; answered by [`FromDevice::Ran`] after the last.
     Run {
-        /// How many.
+        /// Number of ticks.
         ticks: u32,
     },
     /// Restart the board. Refused while armed.
     Restart,
-    /// Keep this description of the rig; in use from the next start on. Only while disarmed, and only by boards whose mechanism is not compiled in.
+    /// Store this description of the rig; it takes effect at the next start. Only while disarmed, and only on boards whose mechanism is not compiled
+    /// in.
     SetRig(Rig),
-    /// Ask for [`FromDevice::Rig`].
+    /// Query [`FromDevice::Rig`].
     GetRig,
 }
 
 impl ToDevice {
-    /// Carried out only once, in its own session and in the order sent: the frame must carry a [stamp](crate::frame::Stamp) whose count is above that
-    /// of every such message before. These are the messages that bring the motors nearer to being driven, or change what drives them. One that
-    /// stops or asks needs none.
+    /// Whether the message is executed only once, in its own session and in the order sent: its frame must carry a [stamp](crate::frame::Stamp) whose
+    /// count is greater than that of every such message before. This applies to messages that bring the motors nearer to being driven, or change what
+    /// drives them. Messages that stop or query need no stamp.
     pub const fn must_be_fresh(&self) -> bool {
         match self {
             Self::Arm
@@ -202,7 +203,7 @@ impl ToDevice {
             | Self::ResetScene
             | Self::SceneChunk { .. }
             | Self::SceneAbort
-            // A target carries a number of its own that rises with every message about it.
+            // A target carries its own number, which increases with every message about it.
             | Self::SetTarget(_)
             | Self::ClearTarget { .. }
             | Self::SetTelemetry { .. }
@@ -225,25 +226,25 @@ impl ToDevice {
 pub enum FromDevice {
     /// Answer to Hello: the board's version.
     Hello(Version),
-    /// What the board can do.
+    /// Capabilities of the board.
     Capabilities(Capabilities),
-    /// Done.
+    /// The message was executed.
     Ack {
         /// Sequence number of the message.
         seq: u16,
     },
-    /// Not done.
+    /// The message was not executed.
     Refused {
         /// Sequence number of the message.
         seq: u16,
-        /// Why.
+        /// Reason of the refusal.
         reason: Refusal,
     },
     /// A parameter's value.
     Parameter {
-        /// Which.
+        /// Parameter.
         id: ParameterId,
-        /// In its unit.
+        /// Value, in its unit.
         value: f32,
     },
     /// The state changed.
@@ -257,16 +258,16 @@ pub enum FromDevice {
     Telemetry(Telemetry),
     /// Counters.
     Statistics(Statistics),
-    /// Something went wrong; motors are off or going off.
+    /// A fault occurred; motors are off or going off.
     Fault {
-        /// Tick it was seen.
+        /// Tick of its detection.
         tick: u32,
-        /// What.
+        /// Kind of fault.
         fault: Fault,
     },
     /// Bytes of defmt log.
     Log(Vec<u8, MAX_LOG>),
-    /// Lockstep ticks are done.
+    /// The lockstep ticks are done.
     Ran {
         /// Ticks since start.
         tick: u32,
@@ -275,50 +276,50 @@ pub enum FromDevice {
     },
     /// The rig's description.
     Rig {
-        /// As kept; `None`: none was sent, or the one kept is damaged.
+        /// The stored description; `None`: none was sent, or the stored one is damaged.
         rig: Option<Rig>,
-        /// It is what the board senses and pushes with; else it will be from the next start on.
+        /// Whether it is in effect; otherwise it takes effect at the next start.
         in_use: bool,
     },
 }
 
-/// What a board can do.
+/// Capabilities of a board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Capabilities {
     /// Board name.
     pub board: String<MAX_NAME>,
-    /// Largest scene image it can hold, bytes.
+    /// Largest scene image that fits, bytes.
     pub scene_capacity: u32,
     /// Layout version it reads.
     pub scene_layout: u32,
     /// CRC of the scene in use; `None` without one.
     pub scene: Option<u32>,
-    /// Ticks in a second.
+    /// Ticks per second.
     pub tick_hz: u16,
-    /// Handle axes it can drive with force, and with torque.
+    /// Number of handle axes that the board can drive with force.
     pub force_axes: u8,
-    /// See above.
+    /// Number of handle axes that the board can drive with torque.
     pub torque_axes: u8,
-    /// The mechanism and hand are simulated on the board.
+    /// Whether mechanism and hand are simulated on the board.
     pub simulated: bool,
-    /// What tick costs are counted in.
+    /// Unit of tick costs.
     pub cost_unit: CostUnit,
-    /// A tick must cost less than this, in `cost_unit`; 0 when there is no deadline.
+    /// Limit of a tick's cost, in `cost_unit`; 0 when there is no deadline.
     pub cost_budget: u32,
-    /// Constraint targets it evaluates at once; 0: none.
+    /// Most constraint targets evaluated at the same time; 0: none.
     pub max_targets: u8,
-    /// Why it started.
+    /// Reason of the last start.
     pub reset: ResetReason,
     /// Its state.
     pub state: DeviceState,
-    /// Names this session: what the host's [stamps](crate::frame::Stamp) carry. Differs in every session and after every start.
+    /// Identifies this session; the host's [stamps](crate::frame::Stamp) carry it. Different in every session and after every start.
     pub session: u32,
 }
 
-/// What tick costs are counted in.
+/// Unit of tick costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum CostUnit {
-    /// Instructions (emulated board in counted mode; host time otherwise).
+    /// Instructions (emulated board in counted mode; otherwise its host's time).
     Instructions,
     /// Processor cycles.
     Cycles,
@@ -340,23 +341,23 @@ pub enum ResetReason {
         /// Source line.
         line: u32,
     },
-    /// The processor met a fault it could not go on from: a bad access, a stack that overflowed.
+    /// The processor raised a fault from which it could not continue, such as a bad access or a stack overflow.
     HardFault {
         /// Address of the instruction; 0 when it could not be read.
         pc: u32,
     },
     /// Supply too low.
     BrownOut,
-    /// The board cannot tell.
+    /// The board cannot determine the reason.
     Unknown,
 }
 
-/// The safety state machine's state.
+/// State of the safety state machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum DeviceState {
     /// Starting; motors off.
     Boot,
-    /// Motors off; encoders do not know where the handle is until [`ToDevice::Home`].
+    /// Motors off; the encoders have no reference until [`ToDevice::Home`].
     Homing,
     /// Motors off, waiting.
     Idle,
@@ -364,72 +365,96 @@ pub enum DeviceState {
     Armed,
     /// A part is grabbed and felt.
     Active,
-    /// Going to zero wrench under damping, then off.
+    /// Ramping to zero wrench under damping, then off.
     SoftStop,
     /// Motors off until cleared.
     Stopped,
-    /// Motors off until the cause is gone and cleared.
+    /// Motors off until the cause is gone and the fault is cleared.
     Fault(Fault),
 }
 
-/// What went wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Fault {
-    /// The stop input is open.
-    StopInput,
-    /// Nothing was heard from the host for too long while armed.
-    HostSilent {
-        /// Milliseconds.
-        silent_ms: u16,
-    },
-    /// An encoder reading jumped further than the mechanism can move in a tick.
-    EncoderJump {
-        /// Axis.
-        axis: u8,
-    },
-    /// An encoder did not follow a small push of its motor: it is stuck or unplugged, or the mechanism is jammed.
-    EncoderStuck {
-        /// Axis.
-        axis: u8,
-    },
-    /// The handle moves faster than allowed.
-    OverSpeed,
-    /// The handle left the workspace.
-    Workspace,
-    /// A motor driver reports a fault without saying which.
-    Driver {
-        /// Axis.
-        axis: u8,
-    },
-    /// A motor driver reports too much current.
-    OverCurrent {
-        /// Axis.
-        axis: u8,
-    },
-    /// A motor or its driver is too hot.
-    OverTemperature {
-        /// Axis.
-        axis: u8,
-    },
-    /// The supply fell below what motors and sensors need; the processor still runs.
-    SupplyLow,
-    /// A tick took longer than its period.
-    TickOverrun,
-    /// The scene does not pass its checks any more.
-    SceneDamaged,
-    /// The computed wrench is not finite.
-    NonFinite,
-    /// The handle turns faster than allowed.
-    AngularOverSpeed,
-    /// The encoders no longer know where the handle is, though none of them jumped.
-    ReferenceLost,
-    /// The encoders say where the links cannot be.
-    ImpossiblePosture,
-    /// A sensor reading is not finite, or out of all proportion.
-    BadReading,
+/// Declares [`Fault`] and, from the same list, every variant of it.
+macro_rules! faults {
+    ($(#[$about:meta])+ pub enum Fault {
+        $($(#[$doc:meta])+ $name:ident $({ $(#[$field_doc:meta])+ $field:ident: $type:ty, })?,)+
+    }) => {
+        $(#[$about])+
+        pub enum Fault {
+            $($(#[$doc])+ $name $({ $(#[$field_doc])+ $field: $type })?,)+
+        }
+
+        impl Fault {
+            /// Number of kinds.
+            pub const COUNT: usize = [$(stringify!($name)),+].len();
+
+            /// One fault of every kind, in the order of the enum; those with an axis or a time have `number` there.
+            pub const fn every(number: u16) -> [Self; Self::COUNT] {
+                [$(Self::$name $({ $field: number as $type })?),+]
+            }
+        }
+    };
 }
 
-/// Why a message was not carried out.
+faults! {
+    /// Kind of fault.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum Fault {
+        /// The stop input is open.
+        StopInput,
+        /// No message from the host for too long while armed.
+        HostSilent {
+            /// Time since the last message, ms.
+            silent_ms: u16,
+        },
+        /// An encoder reading jumped farther than the mechanism can move in a tick.
+        EncoderJump {
+            /// Axis.
+            axis: u8,
+        },
+        /// An encoder did not follow a small push of its motor: it is stuck or unplugged, or the mechanism is jammed.
+        EncoderStuck {
+            /// Axis.
+            axis: u8,
+        },
+        /// The handle moves faster than allowed.
+        OverSpeed,
+        /// The handle left the workspace.
+        Workspace,
+        /// A motor driver reports a fault without its kind.
+        Driver {
+            /// Axis.
+            axis: u8,
+        },
+        /// A motor driver reports overcurrent.
+        OverCurrent {
+            /// Axis.
+            axis: u8,
+        },
+        /// A motor or its driver is too hot.
+        OverTemperature {
+            /// Axis.
+            axis: u8,
+        },
+        /// The supply fell below the needs of motors and sensors; the processor still runs.
+        SupplyLow,
+        /// A tick took longer than its period.
+        TickOverrun,
+        /// The scene no longer passes its checks.
+        SceneDamaged,
+        /// The computed wrench is not finite.
+        NonFinite,
+        /// The handle turns faster than allowed.
+        AngularOverSpeed,
+        /// The encoders have lost their reference, although none of them jumped.
+        ReferenceLost,
+        /// The encoders give a position that the links cannot reach.
+        ImpossiblePosture,
+        /// A sensor reading is not finite, or implausible.
+        BadReading,
+    }
+}
+
+/// Why a message was not executed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
     /// A Hello with this schema must come first.
@@ -447,19 +472,19 @@ pub enum Refusal {
     NotGrabbable,
     /// Outside its range, or not a number.
     OutOfRange {
-        /// Which.
+        /// Parameter.
         id: ParameterId,
         /// Smallest accepted.
         min: f32,
         /// Largest accepted.
         max: f32,
     },
-    /// A chunk that does not continue the last.
+    /// The chunk does not continue after the last one.
     ChunkOrder {
         /// Offset expected.
         expected: u32,
     },
-    /// No upload under way.
+    /// No upload in progress.
     NoUpload,
     /// More bytes than the slot holds.
     SceneTooLarge {
@@ -473,14 +498,14 @@ pub enum Refusal {
     },
     /// The upload is not complete.
     SceneIncomplete {
-        /// Bytes there.
+        /// Bytes received.
         received: u32,
     },
-    /// What arrived is not what was announced.
+    /// The checksum of the received image is not the announced one.
     SceneCrc {
-        /// As announced.
+        /// Checksum announced.
         expected: u32,
-        /// As stored.
+        /// Checksum as stored.
         found: u32,
     },
     /// Not a scene image.
@@ -489,28 +514,28 @@ pub enum Refusal {
     Flash,
     /// Only for simulated mechanisms.
     NotSimulated,
-    /// Not in lockstep, or ticks still to run.
+    /// Not in lockstep, or ticks are still pending.
     Lockstep,
     /// A number that is not finite or not possible.
     BadNumber,
     /// The board's queue is full: try again.
     Busy,
-    /// The frame was sound but no message of this version.
+    /// The frame was valid but its message is unknown in this version.
     Undecodable,
-    /// The description of the rig is not one that can be used.
+    /// The description of the rig cannot be used.
     Rig(RigFault),
     /// This board's mechanism is compiled into its firmware.
     RigFixed,
-    /// The description in flash is damaged or of another release: send it again.
+    /// The board has no sound description of its rig in use: none was sent, or it is damaged or of another release.
     RigDamaged,
-    /// The command carries no stamp of this session, or one that was seen before, or the board has stopped or faulted since it came.
+    /// The command carries no stamp of this session, or one already seen, or the board has stopped or faulted since it arrived.
     Outdated,
 }
 
 /// A rigid pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct WirePose {
-    /// m.
+    /// Position, m.
     pub position: [f32; 3],
     /// Unit quaternion x, y, z, w.
     pub orientation: [f32; 4],
@@ -519,9 +544,9 @@ pub struct WirePose {
 /// Force and torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct WireWrench {
-    /// N.
+    /// Force, N.
     pub force: [f32; 3],
-    /// N·m.
+    /// Torque, N·m.
     pub torque: [f32; 3],
 }
 
@@ -530,22 +555,22 @@ pub struct WireWrench {
 pub struct TouchingPair {
     /// Face of the grabbed part, [`crate::image::NO_FACE`] when unknown.
     pub moving_face: u16,
-    /// The other part.
+    /// Index of the other part.
     pub static_part: u16,
-    /// Its face.
+    /// Face of the other part.
     pub static_face: u16,
     /// The grabbed part's other face where the deepest point lies on an edge, else [`crate::image::NO_FACE`].
     pub moving_edge_face: u16,
-    /// The other part's, likewise.
+    /// The same for the other part.
     pub static_edge_face: u16,
     /// Points in contact.
     pub count: u16,
     /// Deepest penetration, m.
     pub depth: f32,
-    /// Where, world, m.
+    /// Position of the deepest point, world, m.
     pub point: [f32; 3],
-    /// Insertion depth: how far the touching points reach along the axis of the static face, or else the moving one, m; 0 where neither is round.
-    /// Faces that guidance keeps apart do not touch and have none.
+    /// Insertion depth: reach of the touching points along the axis of the static face, or else of the moving one, m; 0 if neither is round. Faces
+    /// kept apart by guidance do not touch and have none.
     pub insertion: f32,
 }
 
@@ -562,11 +587,11 @@ pub struct Telemetry {
     pub wrench: WireWrench,
     /// Contact wrench on the object about its centre of mass.
     pub contact: WireWrench,
-    /// Wrench of the simulated hand on the handle, where the hand is simulated.
+    /// Wrench of the simulated hand on the handle, if the hand is simulated.
     pub hand: Option<WireWrench>,
     /// Cost of this tick, see [`Capabilities::cost_unit`].
     pub cost: u32,
-    /// Points looked at.
+    /// Number of points queried.
     pub points: u16,
     /// See [`flag`].
     pub flags: u16,
@@ -574,39 +599,39 @@ pub struct Telemetry {
     pub missed: u32,
     /// Telemetry messages dropped since start because the link was slower.
     pub dropped: u32,
-    /// How constraint targets stand.
+    /// State of the constraint targets.
     pub guidance: Guidance,
     /// Touching face pairs, deepest first.
     pub pairs: Vec<TouchingPair, MAX_PAIRS>,
 }
 
-/// How constraint targets stand.
+/// State of the constraint targets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Guidance {
-    /// Targets in force; those that fade are not counted.
+    /// Number of targets in force, without those that fade.
     pub active: u8,
-    /// Of those, the joints: the part is so near to where they want it that their faces cannot touch, and have left the work.
+    /// Number of those that act as joints: the part is so near to its target that the mating faces cannot touch, and they are excluded from contact.
     pub joints: u8,
-    /// Largest engagement of any, 0 to 1.
+    /// Largest engagement of all targets, 0 to 1.
     pub engagement: f32,
-    /// What they pull with, on the object about its centre of mass.
+    /// Total wrench of the targets on the object, about its centre of mass.
     pub wrench: WireWrench,
 }
 
 macro_rules! flags {
     ($($(#[doc = $doc:literal])+ $name:ident = $bit:literal;)+) => {
-        /// Bits of [`Telemetry::flags`], each one fact.
+        /// Bits of [`Telemetry::flags`], each with one meaning.
         pub mod flag {
             $($(#[doc = $doc])+ pub const $name: u16 = 1 << $bit;)+
 
-            /// Every bit with its name and what it says, ascending.
+            /// Every bit with its name and its meaning, ascending.
             pub const ALL: &[(u16, &str, &str)] = &[$(($name, stringify!($name), concat!($($doc),+)),)+];
         }
     };
 }
 
 flags! {
-    /// The point budget was reached: some points were not looked at this tick.
+    /// The point budget was reached: some points were not queried this tick.
     BUDGET = 0;
     /// The force limit acted.
     FORCE_LIMIT = 1;
@@ -622,17 +647,17 @@ flags! {
     CONTACTS = 6;
     /// The coupling slipped at its largest force.
     COUPLING_FORCE = 7;
-    /// The handle's wrench is turned down because the loop made energy.
+    /// The handle's wrench is damped because the loop generated energy.
     SOFTENED = 8;
-    /// The part was held to its largest speed, or to what was looked at.
+    /// The part's speed was limited to its maximum, or to the search margin.
     SPEED_LIMIT = 9;
-    /// A point is so deep inside that no way out is known.
+    /// A point is too deep inside for the field to give a way out.
     DEEP = 10;
     /// The step's touching points had not come to rest.
     UNSETTLED = 11;
     /// The coupling slipped at its largest torque.
     COUPLING_TORQUE = 12;
-    /// A sensor reading was not finite or out of all proportion.
+    /// A sensor reading was not finite or implausible.
     BAD_INPUT = 13;
     /// The limit on the change of torque acted.
     TORQUE_SLEW = 14;
@@ -653,15 +678,15 @@ pub struct Statistics {
     pub peak_force: f32,
     /// Largest torque commanded, N·m.
     pub peak_torque: f32,
-    /// Most points looked at in a tick.
+    /// Most points queried in a tick.
     pub points_max: u32,
     /// FNV-1a over the bits of handle pose, object pose and twist, and wrench of every tick since the scene was loaded or reset.
     pub state_hash: u64,
     /// Frames received whole.
     pub frames: u32,
-    /// Frames thrown away: damaged, too long, or undecodable.
+    /// Frames discarded: damaged, too long, or undecodable.
     pub bad_frames: u32,
-    /// Messages thrown away because there was no room for their answer: the host does not read.
+    /// Messages discarded because there was no space for their answer: the host does not read.
     pub unanswered: u32,
     /// Telemetry messages dropped.
     pub dropped: u32,
@@ -669,129 +694,154 @@ pub struct Statistics {
     pub stack_max: u32,
 }
 
-/// Kinds of constraint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum ConstraintKind {
-    /// Axis on axis (cylinder in cylinder).
-    Concentric,
-    /// Plane on plane: turns the grabbed part until they are parallel, and leaves the distance to contact.
-    Coplanar,
-    /// Axis on axis and apex on apex (cone in cone).
-    Conical,
-    /// Centre on centre.
-    Spherical,
-    /// Centre on axis: sphere of the grabbed part in a cylinder of the other.
-    Annular,
-    /// Axis on centre: cylinder of the grabbed part over a sphere of the other.
-    AnnularBore,
+/// Declares [`ConstraintKind`] and, from the same list, every variant of it and its name.
+macro_rules! constraint_kinds {
+    ($(#[$about:meta])+ pub enum ConstraintKind { $($(#[$doc:meta])+ $name:ident = $word:literal,)+ }) => {
+        $(#[$about])+
+        pub enum ConstraintKind {
+            $($(#[$doc])+ $name,)+
+        }
+
+        impl ConstraintKind {
+            /// Every kind, in the order of the enum.
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$name),+];
+
+            /// Name of the kind. Both annular kinds have the same name: it does not say which part has the sphere.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $word,)+
+                }
+            }
+        }
+    };
+}
+
+constraint_kinds! {
+    /// Kinds of constraint between a surface of the grabbed part and one of another part: the recogniser's, the link's and the force law's.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+    pub enum ConstraintKind {
+        /// Axis on axis (cylinder in cylinder). Leaves a slide and a rotation.
+        Concentric = "concentric",
+        /// Plane on plane, face to face: turns the grabbed part until the planes are parallel; contact determines the distance. Leaves two slides and a
+        /// rotation.
+        Coplanar = "coplanar",
+        /// Axis on axis and apex on apex, so that circles of one radius coincide (cone in cone). Leaves a rotation.
+        Conical = "conical",
+        /// Centre on centre (sphere in sphere). Leaves three rotations.
+        Spherical = "spherical",
+        /// Centre on axis: sphere of the grabbed part in a cylinder of the other. Leaves a slide and three rotations.
+        Annular = "annular",
+        /// Axis on centre: cylinder of the grabbed part over a sphere of the other. Leaves a slide and three rotations.
+        AnnularBore = "annular",
+    }
 }
 
 /// A point and a direction fixed to a part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Feature {
-    /// m, shape frame.
+    /// Position, m, shape frame.
     pub point: [f32; 3],
     /// Unit vector, shape frame.
     pub direction: [f32; 3],
 }
 
-/// What the desktop recognised and the board is to guide towards.
+/// A constraint recognised by the desktop program, towards which the board guides.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct ConstraintTarget {
-    /// Names the target; the same id replaces or refreshes it.
+    /// Identifies the target; a message with the same id replaces or refreshes it.
     pub id: u16,
-    /// Counts up with every message about this id; an older one is stale.
+    /// Increases with every message about this id; a lower one is stale.
     pub sequence: u16,
     /// Kind.
     pub kind: ConstraintKind,
     /// Feature of the moving part.
     pub moving: Feature,
-    /// The part it mates with.
+    /// Index of the mating part.
     pub static_part: u16,
     /// Feature of that part.
     pub fixed: Feature,
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness: f32,
-    /// The guidance never pulls harder, N.
+    /// Largest guidance force, N.
     pub force_cap: f32,
-    /// N·m.
+    /// Largest guidance torque, N·m.
     pub torque_cap: f32,
-    /// Fades out unless refreshed within this many ticks.
+    /// The target fades out unless refreshed within this many ticks.
     pub expiry_ticks: u16,
-    /// Moving and static faces whose contact it replaces.
+    /// Moving and static faces whose contact the target replaces.
     pub faces: Vec<(u16, u16), MAX_TARGET_PAIRS>,
 }
 
-/// A simulated hand: a spring-damper that pulls the handle after a moving target, plus a push.
+/// A simulated operator's hand: a spring-damper that pulls the handle towards a moving target, plus a push.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct HandScript {
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness: f32,
-    /// N·s/m.
+    /// Damping, N·s/m.
     pub damping: f32,
-    /// N·m/rad.
+    /// Angular stiffness, N·m/rad.
     pub angular_stiffness: f32,
-    /// N·m·s/rad.
+    /// Angular damping, N·m·s/rad.
     pub angular_damping: f32,
-    /// Tremor's amplitude, m.
+    /// Amplitude of the tremor, m.
     pub tremor: f32,
-    /// Tremor's frequency, Hz.
+    /// Frequency of the tremor, Hz.
     pub tremor_hz: f32,
-    /// Where the hand wants to be, times ascending; before the first the first holds, after the last the last, between them linear (orientation:
-    /// shortest arc).
+    /// Target poses of the hand, times ascending; the first holds before its time and the last after its time, with linear interpolation between
+    /// (orientation: shortest arc).
     pub keyframes: Vec<Keyframe, MAX_KEYFRAMES>,
 }
 
 /// One point of a hand's script.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Keyframe {
-    /// Ticks (ms) since the script was taken.
+    /// Time since the script was taken, ticks (ms).
     pub tick: u32,
     /// Target of the handle.
     pub pose: WirePose,
-    /// Added to the spring's force, N, world.
+    /// Force added to the spring's, N, world.
     pub push: [f32; 3],
 }
 
-/// One thing that goes wrong at the inputs of a simulated mechanism.
+/// A fault at the inputs of a simulated mechanism.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct InputFault {
     /// First tick (ms) since the message was taken.
     pub tick: u32,
-    /// How many ticks it lasts; a glitch comes once, whatever stands here.
+    /// Duration in ticks; a glitch occurs once, regardless of this value.
     pub ticks: u32,
-    /// What.
+    /// Kind of fault.
     pub kind: InputFaultKind,
 }
 
-/// What can go wrong at the inputs of a mechanism. Axes 0 to 2 are the handle's position, 3 to 5 its rotation.
+/// Faults at the inputs of a mechanism. Axes 0 to 2 are the handle's position, 3 to 5 its rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum InputFaultKind {
-    /// An encoder's counter is off by so many counts from here on.
+    /// An encoder's counter is off by `counts` from here on.
     EncoderGlitch {
         /// Axis.
         axis: u8,
-        /// Counts.
+        /// Offset in counts.
         counts: i32,
     },
-    /// An encoder's counter stands still.
+    /// An encoder's counter stops.
     EncoderStuck {
         /// Axis.
         axis: u8,
     },
-    /// The handle's position reads as not a number.
+    /// The handle's position reads as NaN.
     NotANumber,
-    /// A motor driver reports a fault without saying which.
+    /// A motor driver reports a fault without its kind.
     Driver {
         /// Axis.
         axis: u8,
     },
-    /// A motor driver reports too much current.
+    /// A motor driver reports overcurrent.
     OverCurrent {
         /// Axis.
         axis: u8,
     },
-    /// A motor driver reports too much heat.
+    /// A motor driver reports overtemperature.
     OverTemperature {
         /// Axis.
         axis: u8,

@@ -1,11 +1,11 @@
-//! Every adjustable number of the board: unit, range, default, meaning.
+//! All adjustable numbers of the board: unit, range, default, meaning.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 macro_rules! parameters {
     ($($(#[doc = $doc:literal])+ $name:ident = $unit:literal, $min:expr, $max:expr, $default:expr $(, [$($choice:literal),+])?;)+) => {
-        /// Names a parameter.
+        /// Identifies a parameter.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
         pub enum ParameterId { $($(#[doc = $doc])+ $name,)+ }
 
@@ -22,11 +22,11 @@ macro_rules! parameters {
 /// One parameter's row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// Which.
+    /// Identifier.
     pub id: ParameterId,
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// What it is.
+    /// Meaning.
     pub description: &'static str,
     /// SI unit.
     pub unit: &'static str,
@@ -36,14 +36,14 @@ pub struct Parameter {
     pub max: f32,
     /// Value at start.
     pub default: f32,
-    /// What 0, 1, … stand for, when it is a choice (the nearest counts); empty for a quantity.
+    /// Names of the values 0, 1, … of a choice (a value is rounded to the nearest); empty for a quantity.
     pub choices: &'static [&'static str],
 }
 
 impl Parameter {
-    /// What `value` stands for, when it is a choice.
+    /// Name of `value` if the parameter is a choice.
     pub fn choice(&self, value: f32) -> Option<&'static str> {
-        // A float that is negative or not a number becomes 0, a huge one the largest number.
+        // The cast turns a negative number or NaN into 0 and clamps a huge number.
         self.choices.get((value + 0.5) as usize).copied()
     }
 }
@@ -71,34 +71,35 @@ parameters! {
     ForceLimit = "N", 0.0, 20.0, 12.0;
     /// Largest torque commanded to the handle.
     TorqueLimit = "N·m", 0.0, 1.0, 0.5;
-    /// Largest change of force in a second.
+    /// Largest change of force per second.
     ForceSlew = "N/s", 10.0, 20_000.0, 5_000.0;
-    /// Largest change of torque in a second.
+    /// Largest change of torque per second.
     TorqueSlew = "N·m/s", 0.1, 1_000.0, 200.0;
-    /// Handle speed that counts as a fault.
+    /// Handle speed above which a fault is raised.
     SpeedLimit = "m/s", 0.1, 5.0, 2.0;
-    /// Handle rotation speed that counts as a fault: that of a point 50 mm off the axis at the speeds of SpeedLimit.
+    /// Angular speed of the handle above which a fault is raised: that of a point 50 mm off the axis at the speeds of SpeedLimit.
     AngularSpeedLimit = "rad/s", 2.0, 100.0, 40.0;
-    /// Largest mechanical power the motors may put into the handle, force and torque together.
+    /// Largest mechanical power that the motors may put into the handle, force and torque together.
     PowerLimit = "W", 0.1, 100.0, 10.0;
-    /// Distance of the handle from the world's origin that counts as a fault; beyond it no force points outwards.
+    /// Distance of the handle from the world's origin beyond which a fault is raised; no force points outward there.
     WorkspaceRadius = "m", 0.01, 2.0, 1.0;
-    /// Host silence while armed that counts as a fault.
+    /// Time without a message from the host, while armed, after which a fault is raised.
     HostTimeout = "s", 0.05, 5.0, 0.5;
-    /// Most work of a tick, in field look-ups; a point that may touch counts 4.
+    /// Largest work of a tick, in field queries (look-ups); a point that may touch counts 4.
     PointBudget = "look-ups", 16.0, 65_535.0, 520.0;
-    /// How the object is moved: 0 implicit, 1 explicit (the textbook's, which trembles on stiff contact).
+    /// Integration of the object's motion: 0 implicit, 1 explicit (the textbook's, which trembles on stiff contact).
     Integrator = "choice", 0.0, 1.0, 0.0, ["implicit", "explicit"];
-    /// How constraint targets guide: 0 not at all, 1 stiff up to their cap, 2 the blend of the thesis.
+    /// Guidance by constraint targets: 0 none, 1 stiff with limited force, 2 the blend of the thesis.
     Guidance = "choice", 0.0, 2.0, 1.0, ["off", "capped", "thesis"];
-    /// Whether mating faces that an engaged target keeps apart leave the work: 0 no, 1 yes. Nothing is felt of it; for comparing what ticks cost.
+    /// Whether mating faces that an engaged target keeps apart are excluded from contact: 0 no, 1 yes. The forces are the same; for comparing tick
+    /// costs.
     Joints = "choice", 0.0, 1.0, 1.0, ["off", "on"];
-    /// How far points of the part in hand are moved inward before voxmaps are looked up; the textbook's pointshell shrinking, for comparing.
+    /// Distance by which points of the held part are moved inward for voxmap queries; the textbook's pointshell shrinking, for comparison.
     Shrinking = "voxels", 0.0, 1.0, 0.0;
 }
 
 impl ParameterId {
-    /// The row of this parameter.
+    /// Table row of this parameter.
     pub const fn row(self) -> &'static Parameter {
         &PARAMETERS[self as usize]
     }

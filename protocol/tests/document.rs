@@ -1,4 +1,4 @@
-//! `docs/protocol.md` says what the code does: the same messages, refusals, limits and parameters, no more and no fewer.
+//! `docs/protocol.md` agrees with the code: the same messages, refusals, limits and parameters, no more and no fewer.
 
 use mortise_protocol::limits;
 use mortise_protocol::message::{FromDevice, Refusal, ToDevice};

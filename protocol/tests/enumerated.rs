@@ -1,9 +1,9 @@
-//! The frame decoder over whole classes of input, none left out: every string of up to three bytes, and for a frame of every message every one and
-//! two flipped bits, every byte lost, doubled or replaced, every cut and every swap of neighbours.
+//! The frame decoder over complete classes of input: every string of up to three bytes, and for a frame of every message every one and two flipped
+//! bits, every byte lost, doubled or replaced, every truncation and every swap of neighbours.
 //!
-//! What the checksum promises and is checked here: CRC-32/ISO-HDLC finds every one, two and three flipped bits in blocks of this length (its Hamming
-//! distance is 4 up to 11 kB), and every burst of up to 32 bits. A byte replaced is a burst. A byte lost, doubled or swapped moves bits, which no
-//! distance covers; it is found here by trying all.
+//! Properties of the checksum that are checked here: CRC-32/ISO-HDLC finds every one, two and three flipped bits in blocks of this length (its
+//! Hamming distance is 4 up to 11 kB), and every burst of up to 32 bits. A replaced byte is a burst. A byte lost, doubled or swapped shifts bits,
+//! which no Hamming distance covers; all cases are tried here.
 
 mod common;
 
@@ -24,7 +24,7 @@ fn frame<M: Serialize>(sequence: u16, message: &M) -> Vec<u8> {
         .to_vec()
 }
 
-/// What the decoder makes of the bytes, and whether the sound frame behind them is read.
+/// A decoder under test, and the valid frame that must be read after damaged input.
 struct Trial<M> {
     decoder: Decoder,
     sentinel: Vec<u8>,
@@ -42,7 +42,7 @@ impl<M: Serialize + DeserializeOwned + PartialEq + Clone + core::fmt::Debug> Tri
         }
     }
 
-    /// Pushes `bytes` and a delimiter: nothing may be taken for a message but `allowed`, and the next frame must be read.
+    /// Pushes `bytes` and a delimiter: no message other than `allowed` may be decoded, and the next frame must be read.
     fn damaged(&mut self, bytes: &[u8], allowed: Option<&(u16, M)>) {
         self.inputs += 1;
         for &byte in bytes.iter().chain(&[0]) {
@@ -57,7 +57,7 @@ impl<M: Serialize + DeserializeOwned + PartialEq + Clone + core::fmt::Debug> Tri
         assert_eq!(read, Some(Ok(self.expected.clone())), "behind {bytes:02x?}");
     }
 
-    /// Every damage of the classes above to the frame of one message.
+    /// Applies every damage of the classes above to the frame of one message.
     fn every_damage(&mut self, sequence: u16, message: &M) {
         let sound = frame(sequence, message);
         let original = Some((sequence, message.clone()));
@@ -78,7 +78,7 @@ impl<M: Serialize + DeserializeOwned + PartialEq + Clone + core::fmt::Debug> Tri
             }
         }
         for at in 0..sound.len() {
-            // The last byte is the delimiter, and another one follows whatever is pushed.
+            // The last byte is the delimiter, and another one is always pushed after it.
             let whole = original.as_ref().filter(|_| at == sound.len() - 1);
             self.damaged(&sound[..at], whole);
             for value in 0..=u8::MAX {

@@ -1,4 +1,4 @@
-//! A million damaged frames: nothing panics, nothing damaged is taken for sound, and the next frame is read again.
+//! A million damaged frames: no panic, no damaged frame is accepted, and the next frame is read again.
 
 mod common;
 
@@ -33,7 +33,7 @@ fn push_all<M: DeserializeOwned>(
     out.extend(bytes.iter().filter_map(|&byte| decoder.push(byte)));
 }
 
-/// Random bytes, ended by a delimiter, are never a message; the sound frame behind them always is.
+/// Random bytes, ended by a delimiter, are never a message; the valid frame after them is always read.
 #[test]
 fn random_bytes_are_never_a_message() {
     let mut random = Random(0x5eed);
@@ -45,7 +45,7 @@ fn random_bytes_are_never_a_message() {
     let mut out = Vec::new();
     let mut garbage = Vec::new();
     for _ in 0..FRAMES {
-        // Mostly as short as real frames, now and then too long for any.
+        // Mostly as short as real frames, occasionally longer than any.
         let length = if random.below(1000) == 0 {
             random.below(2 * MAX_FRAME)
         } else {
@@ -70,15 +70,15 @@ fn random_bytes_are_never_a_message() {
     }
 }
 
-/// One to four flipped bits in a sound frame: what comes out is either nothing, an error, or (when the flip fell on a delimiter
-/// and joined two frames) still nothing that was not sent. The frame after the next is always read.
+/// One to four flipped bits in a valid frame: the result is nothing, an error, or (when the flip hit a delimiter and joined two frames) nothing that
+/// was not sent. The frame after the next is always read.
 fn flips<M: Serialize + DeserializeOwned + PartialEq + Clone + core::fmt::Debug>(
     seed: u64,
     kinds: usize,
     make: fn(usize, &mut Random) -> M,
 ) {
     let mut random = Random(seed);
-    // Few long ones, so that a million take seconds.
+    // Few long frames, so that a million take seconds.
     let frames: Vec<Sound<M>> = (0..40 * kinds)
         .map(|i| sound(i as u16, make(i % kinds, &mut random)))
         .filter(|s| s.bytes.len() < 200)
@@ -95,7 +95,7 @@ fn flips<M: Serialize + DeserializeOwned + PartialEq + Clone + core::fmt::Debug>
             damaged[*bit / 8] ^= 1 << (*bit % 8);
         }
         if damaged == victim.bytes {
-            // The flips undid each other.
+            // The flips cancelled each other.
             continue;
         }
         let delimiter_hit = damaged.last() != Some(&0);
@@ -135,7 +135,7 @@ fn damaged_board_frames_are_refused_and_the_next_is_read() {
     flips::<FromDevice>(2, FROM_DEVICE, from_device);
 }
 
-/// Cut anywhere, a frame is lost, and only it.
+/// A frame truncated anywhere is lost, and no other frame.
 #[test]
 fn a_frame_cut_anywhere_costs_only_itself() {
     let mut random = Random(3);
@@ -155,7 +155,7 @@ fn a_frame_cut_anywhere_costs_only_itself() {
     }
 }
 
-/// A message of another version under a good checksum is told apart, with its number, so that it can be refused.
+/// A message of another version with a valid checksum is reported with its sequence number, so that it can be refused.
 #[test]
 fn a_sound_frame_of_an_unknown_message_keeps_its_number() {
     let mut wire = [0; MAX_FRAME];
@@ -166,7 +166,7 @@ fn a_sound_frame_of_an_unknown_message_keeps_its_number() {
     assert_eq!(out, [Err(FrameError::Undecodable(0x1234))]);
 }
 
-/// A known message with bytes left over is of another version too.
+/// A known message with trailing bytes is also of another version.
 #[test]
 fn left_over_bytes_make_a_message_undecodable() {
     let mut wire = [0; MAX_FRAME];

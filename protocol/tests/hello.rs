@@ -1,11 +1,11 @@
-//! The greeting is frozen: two programs of any two versions must be able to name each other.
+//! The greeting is frozen: two programs of any two versions must be able to identify each other.
 
 use mortise_protocol::frame::{Decoder, encode};
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{FromDevice, SCHEMA_HASH, ToDevice, Version};
 
-/// Sequence number 0x0102, variant 0, schema 0x0123456789abcdef, release 1.2.300; made with a program of its own (Python: zlib.crc32, COBS
-/// and varints by hand), not with this crate. NEVER change these bytes: boards in the field speak them.
+/// Sequence number 0x0102, variant 0, schema 0x0123456789abcdef, release 1.2.300; made with a separate program (Python: zlib.crc32, COBS and varints
+/// by hand), not with this crate. NEVER change these bytes: boards in the field use them.
 const GOLDEN: [u8; 22] = [
     0x03, 0x02, 0x01, 0x12, 0xef, 0x9b, 0xaf, 0xcd, 0xf8, 0xac, 0xd1, 0x91, 0x01, 0x01, 0x02, 0xac, 0x02,
     0x0b, 0x24, 0x26, 0xc8, 0x00,

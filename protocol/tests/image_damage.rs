@@ -1,11 +1,11 @@
-//! Whatever bytes come in: opening refuses or every access is in bounds.
+//! For any bytes, opening an image either refuses them or makes every access in bounds.
 
 mod scene;
 
 use mortise_protocol::image::*;
 use scene::Aligned;
 
-/// xorshift64*: the same damage every run.
+/// xorshift64*: the same damage in every run.
 struct Random(u64);
 
 impl Random {
@@ -21,7 +21,7 @@ impl Random {
     }
 }
 
-/// Touches everything an image gives access to; returns something that depends on all of it.
+/// Accesses everything that an image gives access to; returns a value that depends on all of it.
 fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
     let mut sum = 0.0;
     for i in 0..image.parts().len() {
@@ -75,7 +75,7 @@ fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
     sum
 }
 
-/// Damage the checksum sees is refused.
+/// Damage that the checksum detects is refused.
 #[test]
 fn damage_is_refused() {
     let good = scene::bytes();
@@ -92,7 +92,7 @@ fn damage_is_refused() {
     }
 }
 
-/// Damage with a checksum that fits (a faulty or hostile writer): refused, or harmless.
+/// Damage with a valid checksum (a faulty or hostile writer) is refused, or harmless.
 #[test]
 fn sealed_damage_never_leads_out_of_bounds() {
     sealed_damage(&scene::bytes());
@@ -139,14 +139,14 @@ fn sealed_damage(good: &[u8]) {
             Err(_) => refused += 1,
         }
     }
-    // Both ways are really taken.
+    // Both outcomes occur.
     assert!(
         opened > 1000 && refused > 1000,
         "{opened} opened, {refused} refused, {sum}"
     );
 }
 
-/// The order of checks tells apart what to do: another layout is said before damage is.
+/// The order of checks determines the remedy: a different layout is reported before damage.
 #[test]
 fn refusals_name_the_reason() {
     let good = scene::bytes();

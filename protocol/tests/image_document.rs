@@ -1,4 +1,4 @@
-//! `docs/scene-image.md` gives every record's size and every field's place as they are.
+//! `docs/scene-image.md` states every record's size and every field's offset as in the code.
 
 use std::mem::offset_of;
 

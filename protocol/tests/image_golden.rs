@@ -1,4 +1,4 @@
-//! The scene image's layout is frozen: bytes made by hand, kept in `tests/golden`, read back through the board's look-up.
+//! The scene image's layout is frozen: hand-made bytes, stored in `tests/golden`, are read back through the board's query.
 
 mod scene;
 
@@ -8,7 +8,7 @@ use scene::Aligned;
 const GOLDEN: &[u8] = include_bytes!("golden/tiny.scene");
 const GOLDEN_OCCUPANCY: &[u8] = include_bytes!("golden/occupancy.scene");
 
-/// A change of layout or meaning shows here. Count up `LAYOUT_VERSION`, then write the file anew with `MORTISE_BLESS=1`.
+/// This test fails on a change of layout or meaning. Increment `LAYOUT_VERSION`, then rewrite the file with `MORTISE_BLESS=1`.
 #[test]
 fn golden_bytes_have_not_changed() {
     let all = [
@@ -34,7 +34,7 @@ fn golden_voxmap_reads_back() {
     let image = SceneImage::open(aligned.bytes()).unwrap();
     let field = image.shape(0).field;
     assert!(field.is_occupancy());
-    // (height in mm, what is there, least distance to a surface voxel in mm)
+    // (height in mm, expected voxel, least distance to a surface voxel in mm)
     for (z, voxel, bound) in [
         (-3.2f32, Voxel::Interior, 4.0f32),
         (1.5, Voxel::Interior, 0.0),
@@ -49,7 +49,7 @@ fn golden_voxmap_reads_back() {
         assert_eq!(sample.voxel, voxel, "{z}");
         assert!((sample.bound - 1e-3 * bound).abs() < 1e-9, "{z}: {sample:?}");
         let inside = voxel == Voxel::Interior;
-        // The distance look-up has only bounds to give.
+        // The distance query returns only bounds.
         assert_eq!(
             field.lookup(p),
             Lookup::Far {
@@ -71,7 +71,7 @@ fn golden_voxmap_reads_back() {
     assert_eq!(beside.voxel, Voxel::Free);
     assert!(beside.bound <= 0.005 && beside.bound > 0.00498, "{beside:?}");
     assert_eq!(field.voxel([f32::NAN; 3]).voxel, Voxel::Free);
-    // A distance field knows no voxels.
+    // A distance field has no voxels.
     let aligned = Aligned::new(GOLDEN);
     let image = SceneImage::open(aligned.bytes()).unwrap();
     assert!(!image.shape(0).field.is_occupancy());
@@ -104,10 +104,10 @@ fn golden_scene_reads_back() {
     let above = shape.field.lookup([0.004, 0.004, 0.012]);
     assert!(matches!(above, Lookup::Far { inside: false, bound } if (bound - 0.004).abs() < 1e-9));
     let beside = shape.field.bound([-0.003, 0.004, 0.020]);
-    // 3 mm beside and 4 mm above the box of 8 × 8 × 16 mm, in which the surface is a padding away from every side.
+    // 3 mm beside and 4 mm above the box of 8 × 8 × 16 mm; the surface is at least the padding away from each of its sides.
     let record = shape.field.record();
     let padding = record.padding() * record.cell;
-    // 4 mm from both sides across.
+    // 4 mm from both sides.
     let far = (0.003 + padding)
         .hypot(0.004 + padding)
         .hypot((padding - 0.004).max(0.0));
@@ -129,7 +129,7 @@ fn golden_scene_reads_back() {
     assert_eq!([face(0.0085), face(0.0095), face(0.0105)], [0, 1, NO_FACE]);
 }
 
-/// A position that is not finite, or far beyond anything, gives a bound, never a panic and never NaN.
+/// A position that is not finite, or extremely far away, gives a bound, never a panic and never NaN.
 #[test]
 fn odd_positions_are_far_outside() {
     let aligned = Aligned::new(GOLDEN);

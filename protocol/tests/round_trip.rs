@@ -1,4 +1,4 @@
-//! Every message survives the wire, and the largest of each kind fits.
+//! Every message is unchanged after a round trip, and the largest of each kind fits.
 
 mod common;
 
@@ -59,7 +59,7 @@ fn name_of(message: &impl core::fmt::Debug) -> String {
         .collect()
 }
 
-/// A message added to the table and forgotten here would go untested.
+/// Fails when a message of the table is missing here and would not be tested.
 #[test]
 fn the_generator_makes_every_message() {
     let mut random = Random(1);

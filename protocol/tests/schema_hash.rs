@@ -1,11 +1,11 @@
-//! A message that changes must change the hash: otherwise two sides would talk past each other with good checksums.
+//! A change to a message must change the hash: otherwise two incompatible sides would exchange frames with valid checksums.
 
 use mortise_protocol::message::{FromDevice, ToDevice};
 use postcard_schema::Schema;
 use postcard_schema::key::Key;
 use postcard_schema::schema::{DataModelType, DataModelVariant, NamedType};
 
-/// The same small table in versions that differ in one respect each.
+/// The same small table in versions that each differ in one respect.
 mod tables {
     pub mod original {
         #[derive(postcard_schema::Schema)]
@@ -109,7 +109,7 @@ fn names(ty: &'static NamedType, found: &mut Vec<&'static str>) {
     }
 }
 
-/// The two tables the hash is made of reach every type that crosses the link.
+/// The two tables that form the hash reach every type that crosses the link.
 #[test]
 fn the_hash_covers_every_type_on_the_wire() {
     let mut found = Vec::new();

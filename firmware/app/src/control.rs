@@ -14,11 +14,11 @@ mod simulation;
 mod watch;
 
 use mortise_haptics::{self as haptics, GrabError, Input, Output, TargetError, Twist, Wrench};
+use mortise_mechanism::ceilings::{Ceilings, restrain};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{ConstraintTarget, Fault, Refusal, Statistics};
 
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
-use crate::ceilings::{Ceilings, restrain};
 use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Epoch, Event, Reply};
 use crate::parameters::{ControlSettings, Parameters};
 use crate::safety::{Action, AfterSoftStop, Event as SafetyEvent, Motors, Safety};
@@ -409,7 +409,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     fn start_anew(&mut self) {
         self.ends.law.restart_slew();
-        if let Some(handle) = self.mechanism.reset() {
+        if let Some(handle) = self
+            .mechanism
+            .simulation()
+            .and_then(|simulation| simulation.reset())
+        {
             self.sensed.handle = handle;
             self.sensed.twist = Twist::ZERO;
         }

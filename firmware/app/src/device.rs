@@ -2,12 +2,13 @@
 //!
 //! ```
 //! use mortise_firmware::board::{Clock, Identity, Outbound};
-//! use mortise_firmware::ceilings::Ceilings;
+//! use mortise_mechanism::ceilings::Ceilings;
 //! use mortise_firmware::channel::Channels;
 //! use mortise_firmware::control::Ticked;
 //! use mortise_firmware::device::start;
-//! use mortise_firmware::ram_flash::{ERASED, RamFlash};
-//! use mortise_firmware::simulated::Simulated;
+//! use mortise_firmware::board::ERASED;
+//! use mortise_simulation::ram_flash::RamFlash;
+//! use mortise_simulation::simulated::Simulated;
 //! use mortise_protocol::message::{CostUnit, ResetReason};
 //!
 //! struct NoClock;
@@ -44,11 +45,12 @@ use crate::parameters::ControlSettings;
 pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
     channels: &'c mut Channels<'s>,
     flash: F,
-    mechanism: M,
+    mut mechanism: M,
     clock: C,
     identity: Identity,
 ) -> (LinkPlane<'c, 's, F>, ControlPlane<'c, 's, M, C>) {
     let (link_ends, control_ends) = channels.split();
+    let simulated = mechanism.simulation().is_some();
     let control = ControlPlane::new(
         control_ends,
         mechanism,
@@ -56,6 +58,6 @@ pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
         &identity,
         ControlSettings::at_start(identity.ceilings),
     );
-    let link = LinkPlane::new(link_ends, flash, identity, M::SIMULATED, M::DESCRIBED);
+    let link = LinkPlane::new(link_ends, flash, identity, simulated, M::DESCRIBED);
     (link, control)
 }

@@ -3,41 +3,29 @@
 //! Two planes. The **control plane** ([`control`]) is one call each millisecond at the highest priority: sensors, safety state machine, force law,
 //! motors. The **link plane** ([`link`]) decodes and checks messages at low priority, keeps scenes in flash ([`store`]) and hands finished values
 //! over through bounded queues ([`channel`]). [`device::start`] puts them together; the same code runs on each board and, on one thread, in the
-//! simulated rig of the host.
+//! simulated rig of the host. What lies between encoder counts and motor currents is [`mortise_mechanism`].
 //!
 //! | module | what |
 //! |---|---|
 //! | [`board`] | what a board must provide |
 //! | [`channel`] | queues and words between the planes |
-//! | [`control`], [`safety`], [`ceilings`], [`statistics`] | the tick; its state machine; the rig's limits; counters and state hash |
+//! | [`control`], [`safety`], [`statistics`] | the tick; its state machine; counters and state hash |
 //! | [`link`], [`parameters`], [`wire`] | messages; values and settings; conversions |
-//! | [`store`], [`ram_flash`] | A/B scene slots, the rig's description; flash in RAM |
-//! | [`kinematics`], [`joints`] | of a described rig: angles to pose and force to torques; counts to angles and torques to currents |
-//! | [`simulated`], [`hand`], [`input_faults`], [`encoder`], [`encoder_watch`] | simulated mechanism and hand, what goes wrong at its inputs; encoder counts; dead encoders |
-//! | [`described`], [`simulated_rig`] | simulated mechanism of a described rig; whichever a simulated board has |
+//! | [`store`] | A/B scene slots, the rig's description |
+//! | [`scripts`] | which scripts a simulated mechanism can follow |
 #![no_std]
 
 #[cfg(test)]
 extern crate std;
 
 pub mod board;
-pub mod ceilings;
 pub mod channel;
 pub mod control;
-pub mod described;
 pub mod device;
-pub mod encoder;
-pub mod encoder_watch;
-pub mod hand;
-pub mod input_faults;
-pub mod joints;
-pub mod kinematics;
 pub mod link;
 pub mod parameters;
-pub mod ram_flash;
 pub mod safety;
-pub mod simulated;
-pub mod simulated_rig;
+pub mod scripts;
 pub mod statistics;
 pub mod store;
 pub mod wire;

@@ -12,6 +12,7 @@ mod fingerprint;
 mod freshness;
 
 use heapless::String;
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::frame::{Decoder, FrameError, Received, encode};
 use mortise_protocol::image::LAYOUT_VERSION;
 use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS};
@@ -21,10 +22,8 @@ use mortise_protocol::message::{
 
 use crate::board::{Flash, Identity, Outbound, TICK_HZ};
 use crate::channel::{Command, CommandKind, EVENTS, Epoch, Event, LinkEnds, Reply, SAMPLES};
-use crate::hand::check_script;
-use crate::input_faults::check_input_faults;
-use crate::kinematics::Model;
 use crate::parameters::Parameters;
+use crate::scripts::{check_input_faults, check_script};
 use crate::store::Store;
 use crate::store::rig::Kept;
 
@@ -408,7 +407,13 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         if self.ends.shared.live() {
             return Err(self.refused_by_motors());
         }
-        if self.rig == Kept::Damaged {
+        // A simulated mechanism is a free handle without a description; what a real one is, nobody knows.
+        let known = match self.rig {
+            Kept::Rig(_) => true,
+            Kept::Nothing => self.simulated || !self.described,
+            Kept::Damaged => false,
+        };
+        if !known {
             return Err(Refusal::RigDamaged);
         }
         let number = self.store.current().ok_or(Refusal::NoScene)?.sequence;

@@ -1,11 +1,11 @@
 //! The parameters' values, and the settings the tick uses, made from them at low priority.
 
 use mortise_haptics::{GuidanceMethod, Integrator, Settings};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::message::Refusal;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
 use crate::board::{TICK_HZ, TICK_S};
-use crate::ceilings::Ceilings;
 
 /// What the control plane needs, finished: swapped in between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,7 +99,7 @@ impl Parameters {
         } else {
             GuidanceMethod::Thesis
         };
-        law.guidance.joints = self.get(P::Joints) >= 0.5;
+        law.guidance.exclusions = self.get(P::Joints) >= 0.5;
         law.validate().map_err(|_| Refusal::BadNumber)?;
         Ok(ControlSettings {
             law,

@@ -39,7 +39,7 @@ pub fn wrench_to_wire(wrench: &Wrench) -> WireWrench {
 pub fn guidance_to_wire(state: &GuidanceState) -> Guidance {
     Guidance {
         active: state.active,
-        joints: state.joints,
+        joints: state.exclusions,
         engagement: state.engagement,
         wrench: wrench_to_wire(&state.wrench),
     }

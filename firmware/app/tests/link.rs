@@ -195,7 +195,7 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
                 bench.begin(&two_parts(1))
             }
             Refusal::NotSimulated => {
-                let mut bench = Bench::<false>::new(TestFlash::leaked());
+                let mut bench = Bench::<false, false>::new(TestFlash::leaked());
                 bench.greet();
                 assert_eq!(bench.request(&ToDevice::Lockstep(true)), Err(reason));
                 assert_eq!(bench.request(&ToDevice::Run { ticks: 1 }), Err(reason));
@@ -218,7 +218,7 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
                 Bench::ready().request(&ToDevice::SetRig(rig))
             }
             Refusal::RigFixed => {
-                let mut bench = Bench::<false>::new(TestFlash::leaked());
+                let mut bench = Bench::<false, false>::new(TestFlash::leaked());
                 bench.greet();
                 bench.request(&ToDevice::SetRig(arm()))
             }

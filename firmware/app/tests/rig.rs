@@ -148,3 +148,30 @@ fn what_cannot_be_a_rig_is_refused_with_the_reason_and_the_one_before_stays() {
     );
     assert_eq!(refused(&|rig| rig.ceilings.workspace = 0.02), RigFault::Workspace);
 }
+
+#[test]
+fn a_real_board_arms_only_with_a_description_in_use() {
+    type Real = Bench<false, true>;
+    let flash = TestFlash::leaked();
+    let mut bench = Real::new(flash.clone());
+    bench.greet();
+    bench.upload(&two_parts(1)).unwrap();
+    assert_eq!(bench.request(&ToDevice::Arm), Err(Refusal::RigDamaged));
+    bench.request(&ToDevice::SetRig(arm())).unwrap();
+    // It is driven with from the next start on: until then nothing is.
+    assert_eq!(bench.request(&ToDevice::Arm), Err(Refusal::RigDamaged));
+    let mut bench = Real::new(flash.clone());
+    bench.greet();
+    bench.request(&ToDevice::Arm).unwrap();
+    // Erased and written only while the motors are off.
+    let operations = flash.operations.get();
+    let refused = bench.request(&ToDevice::SetRig(paddle()));
+    assert!(matches!(refused, Err(Refusal::State(_))), "{refused:?}");
+    assert_eq!(flash.operations.get(), operations);
+    bench.request(&ToDevice::Stop).unwrap();
+    bench.tick();
+    bench.request(&ToDevice::SetRig(paddle())).unwrap();
+    // A mechanism that is simulated has one without a description.
+    let mut bench: Bench = Bench::ready();
+    bench.request(&ToDevice::Arm).unwrap();
+}

@@ -209,7 +209,8 @@ fn a_slot_filled_by_a_tool_is_a_scene() {
 #[test]
 fn more_parts_than_the_board_holds_are_refused() {
     // 257 parts need more than the test flash has, so the check is met with a flash in RAM.
-    use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, RamFlash};
+    use mortise_firmware::board::ERASED;
+    use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
     // A sector for each scene, and one for each of the rig's descriptions.
     let memory = vec![ERASED; 2 * SLOTS * ERASE_SIZE / 32].leak();
     let mut store = Store::open(RamFlash::new(memory));

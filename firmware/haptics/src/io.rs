@@ -1,75 +1,87 @@
-//! What goes into a tick and what comes out.
+//! Inputs and outputs of a tick.
 
 use glam::Vec3;
 use heapless::Vec;
 use mortise_protocol::limits::MAX_PAIRS;
 
-use crate::guidance::GuidanceState;
-use crate::pose::{Pose, Twist, Wrench};
+use crate::math::pose::{Pose, Twist, Wrench};
 
-/// What the mechanism measured.
+/// Measured state of the mechanism.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
     /// Handle in the world (H).
     pub handle: Pose,
     /// Its twist at its origin, world axes.
     pub handle_twist: Twist,
-    /// Whether motors may push: with `false` the object is simulated all the same and [`Output::handle`] is exactly zero.
+    /// Whether motors may push. With `false` the object is simulated all the same and [`Output::handle`] is exactly zero.
     pub enabled: bool,
 }
 
-/// What a tick computed.
+/// Result of a tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// On the handle, at its origin, world axes, after every limit.
+    /// Wrench on the handle, at its origin, world axes, after every limit.
     pub handle: Wrench,
-    /// Of all contacts on the object, at its centre of mass, world axes.
+    /// Wrench of all contacts on the object, at its centre of mass, world axes.
     pub contact: Wrench,
     /// The grabbed part's placement (shape frame in the world) at the tick's end; the last one held while nothing is grabbed.
     pub object: Pose,
     /// Its twist at its centre of mass, world axes.
     pub object_twist: Twist,
-    /// Touching faces, deepest first.
+    /// Touching face pairs, deepest first.
     pub pairs: FacePairs,
-    /// How constraint targets stand.
+    /// State of the constraint targets.
     pub guidance: GuidanceState,
-    /// What the tick had to do.
+    /// Work of the tick.
     pub work: Work,
+}
+
+/// State of the constraint targets, for telemetry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GuidanceState {
+    /// Targets in force (fading ones not counted).
+    pub active: u8,
+    /// Number of those that are contact exclusions at present.
+    pub exclusions: u8,
+    /// Largest engagement of any target, 0 to 1.
+    pub engagement: f32,
+    /// Sum of the targets' wrenches on the object at its centre of mass, world axes.
+    pub wrench: Wrench,
 }
 
 /// Bounded list of touching face pairs, deepest first.
 pub type FacePairs = Vec<FacePair, MAX_PAIRS>;
 
-/// Faces that touch, and how.
+/// A touching face pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FacePair {
-    /// Face of the grabbed part, counted from its shape's first; [`mortise_protocol::image::NO_FACE`] when unknown.
+    /// Face of the grabbed part, index within its shape; [`mortise_protocol::image::NO_FACE`] when unknown.
     pub moving_face: u16,
     /// Index of the other part.
     pub static_part: u16,
-    /// Face of the other part, counted from its shape's first; [`mortise_protocol::image::NO_FACE`] when unknown.
+    /// Face of the other part, index within its shape; [`mortise_protocol::image::NO_FACE`] when unknown.
     pub static_face: u16,
-    /// The grabbed part's other face where the deepest point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
+    /// The grabbed part's second face where the deepest point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
     pub moving_edge_face: u16,
-    /// The other part's, likewise: where it is within 10 µm of an edge.
+    /// The other part's second face, likewise: where the point is within 10 µm of an edge.
     pub static_edge_face: u16,
-    /// Points that touch.
+    /// Number of touching points.
     pub count: u16,
     /// Largest depth at the tick's end, m, positive when penetrating.
     pub depth_m: f32,
-    /// Where that is, world, m.
+    /// Position of the deepest point, world, m.
     pub point: Vec3,
-    /// How far the touching points reach along the axis of the static face, or else the moving one, m; 0 where neither is a cylinder or a cone. The
+    /// Extent of the touching points along the axis of the static face, or else the moving one, m; 0 where neither is a cylinder or a cone. The
     /// insertion depth of Faas 2010.
     pub insertion_m: f32,
 }
 
-/// What a tick had to do: for telemetry and for budgets in tests.
+/// Work of a tick: for telemetry and for budgets in tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Tree nodes looked at.
+    /// Tree nodes queried.
     pub nodes: u32,
-    /// Points looked up in a field.
+    /// Points queried.
     pub points: u32,
     /// Points near enough to enter the step.
     pub candidates: u16,
@@ -77,7 +89,7 @@ pub struct Work {
     pub contacts: u16,
     /// Solves of the step's 6×6 system.
     pub solves: u8,
-    /// What was out of the ordinary.
+    /// Exceptional conditions.
     pub flags: Flags,
 }
 
@@ -86,35 +98,35 @@ pub struct Work {
 pub struct Flags(u16);
 
 impl Flags {
-    /// The work reached [`crate::ContactSettings::point_budget`]: points are left out evenly, and when that is not enough the rest waits for the next
-    /// ticks; what touched stays felt.
+    /// The work reached [`crate::ContactSettings::point_budget`]: points are decimated evenly, and when that does not suffice the rest waits for the
+    /// next ticks; contacts found before stay in force.
     pub const BUDGET_EXCEEDED: Self = Self(1 << 0);
-    /// More candidates than fit: kept were the deepest, and of the rest those that a turn would bring to touch first. Where more touch than fit,
-    /// points are left out evenly from the next tick on ([`Self::BUDGET_EXCEEDED`]).
+    /// More candidates than the store holds: the deepest were kept, and of the rest those that a rotation would bring to touch first. Where more
+    /// touch than fit, points are decimated from the next tick on ([`Self::BUDGET_EXCEEDED`]).
     pub const CONTACTS_DROPPED: Self = Self(1 << 1);
-    /// The set of touching points had not settled after the last solve allowed.
+    /// The set of touching points had not converged after the last solve allowed.
     pub const UNSETTLED: Self = Self(1 << 2);
-    /// A point lies deeper than the field tells a direction: it does not push.
+    /// Penetration too deep: the field gives no direction at a point, which does not push.
     pub const DEEP: Self = Self(1 << 3);
     /// The object was held to its speed limit.
     pub const SPEED_LIMITED: Self = Self(1 << 4);
-    /// The coupling slipped at its largest force.
+    /// The coupling slipped at its force limit.
     pub const SATURATED_FORCE: Self = Self(1 << 5);
-    /// The coupling slipped at its largest torque.
+    /// The coupling slipped at its torque limit.
     pub const SATURATED_TORQUE: Self = Self(1 << 6);
-    /// The handle's force was cut to its limit.
+    /// The handle's force was reduced to its limit.
     pub const FORCE_LIMITED: Self = Self(1 << 7);
-    /// The change of the handle's force was cut to its limit.
+    /// The rate of change of the handle's force was reduced to its limit.
     pub const FORCE_SLEW_LIMITED: Self = Self(1 << 8);
-    /// The input was not finite, out of all proportion, or not a rotation: zero wrench, nothing moved.
+    /// The input was not finite, out of range, or not a rotation: zero wrench, no motion.
     pub const BAD_INPUT: Self = Self(1 << 9);
-    /// The step came out non-finite: zero wrench, object stopped where it was.
+    /// The step gave a non-finite result: zero wrench, object stopped where it was.
     pub const NON_FINITE: Self = Self(1 << 10);
-    /// The coupling had made energy: the handle's wrench is turned down.
+    /// Damped for stability: the coupling had generated energy, and the handle's wrench is scaled down.
     pub const SOFTENED: Self = Self(1 << 11);
-    /// The handle's torque was cut to its limit.
+    /// The handle's torque was reduced to its limit.
     pub const TORQUE_LIMITED: Self = Self(1 << 12);
-    /// The change of the handle's torque was cut to its limit.
+    /// The rate of change of the handle's torque was reduced to its limit.
     pub const TORQUE_SLEW_LIMITED: Self = Self(1 << 13);
 
     /// Every flag with its name, in order of bits.
@@ -135,17 +147,17 @@ impl Flags {
         (Self::TORQUE_SLEW_LIMITED, "torque slew limited"),
     ];
 
-    /// None.
+    /// No flag.
     pub const fn empty() -> Self {
         Self(0)
     }
 
-    /// As sent in telemetry.
+    /// Bits as sent in telemetry.
     pub const fn bits(self) -> u16 {
         self.0
     }
 
-    /// From telemetry; unknown bits are kept.
+    /// Flags from telemetry; unknown bits are kept.
     pub const fn from_bits(bits: u16) -> Self {
         Self(bits)
     }

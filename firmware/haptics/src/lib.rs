@@ -1,80 +1,55 @@
 //! The force law: a pure function of state, scene, settings and inputs.
 //!
-//! [`tick()`] is called at 1 kHz. It pulls the grabbed part (the *object*) towards the handle through a virtual coupling, finds where the
-//! object meets the other parts (points of one in the signed-distance field of the other, both ways), moves the object by one implicit
-//! step, and gives the wrench the handle must feel. No I/O, no allocation, no clock; the same source runs on a PC and on a
-//! Cortex-M7 and gives the same bits: single precision only, `libm` instead of the standard library, no fused multiply-add, one
-//! order of summation.
+//! [`tick()`] is called at 1 kHz. It pulls the grabbed part (the *object*) towards the handle through a virtual coupling, finds where the object
+//! meets the other parts (points of one in the signed distance field of the other, in both directions), moves the object by one implicit step, and
+//! returns the wrench for the handle. No I/O, no allocation, no clock. The same source runs on a PC and on a Cortex-M7 and gives the same bits:
+//! single precision only, `libm` instead of the standard library, no fused multiply-add, one order of summation.
 //!
 //! | module | what |
 //! |---|---|
-//! | `pose`, `rotation` | rigid motions, between rotation vectors and quaternions |
-//! | `settings`, `io`, `state` | what a tick reads, returns and remembers |
-//! | `coupling` | virtual coupling between handle and object |
-//! | `proximity`, `leaf`, `job`, `contact` | sphere tree against field; bounded store of contacts |
-//! | `coherence`, `above`, `walls` | what is not due yet; which leaves have one face before them |
-//! | `overload` | what is left out when there is too much to look at |
-//! | `occupancy` | the same with a voxmap in place of the field: the textbook method, to be compared with |
-//! | `step`, `linear`, `body` | implicit step with contacts; 6×6 solver; mass properties |
-//! | `explicit` | Newton–Euler step, the textbook's, to be compared with |
-//! | `guidance`, `constraint`, `pull` | constraint targets: in force, engaged; errors and their rows; how they pull in a step |
-//! | `joint` | what an engaged target keeps apart leaves the work |
-//! | `counted` | work on a motion that is told in an encoder's counts |
-//! | `passivity` | observer of the energy the coupling makes, and the valve that stops it |
-//! | `grip` | energy account of the handle while targets pull: what they would give that the hand never brought slips or is not passed on |
-//! | `limits`, `touching` | force limits; touching face pairs |
-//! | `tick` | the order in which all this happens |
-//! | `observer` | energy that the hand was given and nobody brought, seen from outside: for measuring, not for the tick |
-//! | `probe`, `nearest`, `analytic` | gap and contacts at one pose, without motion: for measuring, not for the tick |
+//! | `tick`, `contact_step` | order of the calculations in a tick; contact search and solve |
+//! | `settings`, `io`, `state`, `hand` | settings; inputs and outputs of a tick; state kept from tick to tick |
+//! | `math` | rigid motions, 6×6 solver, vectors and scalars |
+//! | `motion` | speed of the object's points within a tick |
+//! | `collision` | contact search: sphere trees against distance fields, advancement bounds, decimation, contact store, face pairs |
+//! | `constraints` | constraint targets: alignment errors, engagement, saturating springs, contact exclusions |
+//! | `dynamics` | virtual coupling, mass properties, force terms, implicit step with contacts, force limits |
+//! | `passivity` | energy tank of the coupling, and the energy bound on what targets deliver to the operator |
+//! | `baseline` | the textbook's methods for comparison: voxmap contact, explicit Newton–Euler step |
+//! | `observer` | energy delivered to the operator beyond what the operator supplied, observed from outside: for measurement, not for the tick |
+//! | `probe` | gap and contacts at one pose, without motion: for measurement, not for the tick |
 //!
 //! Symbols are those of `docs/notation.md`.
 #![no_std]
 #![forbid(unsafe_code)]
 
-mod above;
-mod analytic;
-mod body;
-mod coherence;
-mod constraint;
-mod contact;
-mod counted;
-mod coupling;
-mod explicit;
-mod facing;
-mod grip;
-mod guidance;
+mod baseline;
+mod collision;
+mod constraints;
+mod contact_step;
+mod dynamics;
+mod hand;
 mod io;
-mod job;
-mod joint;
-mod leaf;
-mod limits;
-mod linear;
-mod nearest;
+mod math;
+mod motion;
 pub mod observer;
-mod occupancy;
-mod overload;
 mod passivity;
-mod pose;
 mod probe;
-mod proximity;
-mod pull;
-pub mod rotation;
 mod settings;
 mod state;
-mod step;
 mod tick;
-mod touching;
-mod walls;
 
+pub use constraints::targets::TargetError;
 pub use glam::{Quat, Vec3};
-pub use guidance::{GuidanceState, TargetError};
-pub use io::{FacePair, FacePairs, Flags, Input, Output, Work};
-pub use passivity::Passivity;
-pub use pose::{Pose, Twist, Wrench};
-pub use probe::{ContactPoint, Nearest, Probe, ProbeError, Prober};
+pub use io::{FacePair, FacePairs, Flags, GuidanceState, Input, Output, Work};
+pub use math::pose::{Pose, Twist, Wrench};
+pub use math::rotation;
+pub use passivity::tank::Passivity;
+pub use probe::nearest::Nearest;
+pub use probe::prober::{ContactPoint, Probe, ProbeError, Prober};
 pub use settings::{
-    ContactSettings, CouplingSettings, GuidanceMethod, GuidanceSettings, Integrator, LimitSettings,
-    ObjectSettings, PassivitySettings, Range, Settings, SettingsError, ranges,
+    ContactSettings, CouplingSettings, FrictionSettings, GuidanceMethod, GuidanceSettings, Integrator,
+    LimitSettings, ObjectSettings, PassivitySettings, Range, Settings, SettingsError,
 };
 pub use state::{GrabError, State};
 pub use tick::tick;

@@ -1,63 +1,64 @@
-//! An observer outside of the law: energy that the device gives to the hand beyond what the hand brought, in double precision.
+//! Observer outside of the law: energy that the device delivers to the operator beyond what the operator supplied, in double precision.
 //!
-//! For tests and experiments, not for the tick: nothing of the law reads it. Of the law's inside it knows one thing only, how far the part has slipped
-//! in the hand ([`State::given_way`]): a slip moves the coupling's spring, and the energy of a spring is told by its stretch.
+//! For tests and experiments, not for the tick: the law reads nothing of it. The only internal quantity of the law that it uses is the slip of the
+//! coupling ([`State::slip`]): a slip moves the coupling's spring, and the energy of a spring follows from its stretch.
 //!
 //! # What is measured
 //!
-//! The port is the handle: the wrench commanded in tick k is held while the handle truly moves on to tick k + 1, by Δp and by the rotation vector Δφ,
-//! so the device does on the hand exactly
+//! The port is the handle: the wrench commanded in tick k is held while the handle's true motion to tick k + 1 is Δp and the rotation vector Δφ, so
+//! the work of the device on the hand is exactly
 //!
 //! W_k = F_k·Δp + τ_k·Δφ
 //!
-//! (in the turn, for an axis that is steady within the tick). What may come back to the hand is what is stored at the handle's side of the targets:
+//! (for the rotation, with an axis that is constant within the tick). The energy that may return to the hand is the energy stored on the handle's
+//! side of the targets:
 //!
 //! S_k = U(d, θ) + ½·m·v² + ½·ω·I·ω
 //!
-//! the potential of the coupling's springs, which slip at their limits, about where the part has slipped to, and the energy of the object's motion,
-//! all at the start of tick k. The potential of contacts is left out and so is a target's: what a target stores when it takes hold was brought by
-//! nobody. A loop is passive with the storage S when for all a < b no more leaves the port than is stored less by then; here even what is stored at b
-//! is given to the device, so that guidance may move the part, and
+//! the potential of the coupling's springs, which slip at their limits, measured from the slipped pose, and the kinetic energy of the object, all at
+//! the start of tick k. The potential of contacts is excluded and so is a target's: energy that a target stores when it engages was supplied by
+//! nobody. A loop is passive with the storage S when for all a < b no more energy leaves the port than the decrease of the stored energy. Here even
+//! the energy stored at b is granted to the device, so that guidance may move the part, and
 //!
 //! E = max over all a < b of Σ_{a ≤ k < b} W_k − S_a
 //!
-//! is the energy that the hand was given and nobody brought: the largest rise over *any* interval, so that a loop that dissipates first cannot spend
-//! it later. One pass finds it: with Q, what the hand brought and may still have back,
+//! is the energy delivered to the operator beyond what the operator supplied: the largest rise over *any* interval, so that a loop that dissipates
+//! first cannot spend it later. One pass computes it. With Q, the energy that the operator supplied and may still get back,
 //!
 //! Q ← min(Q, S_k), Q ← Q − W_k, E = max(−Q), Q = 0 at first
 //!
-//! by induction: after tick b, −Q is the larger of what it was plus W_b and of W_b − S_b, which is the maximum over a.
+//! by induction: after tick b, −Q is the larger of its previous value plus W_b and of W_b − S_b, which is the maximum over a.
 
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 use mortise_protocol::image::SceneImage;
 
-use crate::pose::{Pose, Wrench};
+use crate::math::pose::{Pose, Wrench};
 use crate::settings::Settings;
 use crate::state::State;
 
-/// Largest rise of a sum over any interval, beyond what was stored at the interval's start.
+/// Largest rise of a sum over any interval, beyond the energy stored at the interval's start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rise {
     /// Q.
-    brought: f64,
-    most: f64,
+    credit: f64,
+    largest: f64,
 }
 
 impl Rise {
-    /// So much is stored now; what was brought and is not in it is dissipated.
+    /// Limits the credit to the energy stored now, J: the rest is dissipated.
     pub fn stored(&mut self, energy: f64) {
-        self.brought = self.brought.min(energy);
+        self.credit = self.credit.min(energy);
     }
 
-    /// So much was given.
+    /// Books work delivered to the operator, J.
     pub fn gave(&mut self, work: f64) {
-        self.brought -= work;
-        self.most = self.most.max(-self.brought);
+        self.credit -= work;
+        self.largest = self.largest.max(-self.credit);
     }
 
     /// E, 0 or more.
     pub fn most(&self) -> f64 {
-        self.most
+        self.largest
     }
 }
 
@@ -71,7 +72,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// In single precision, as the law is told.
+    /// In single precision, as the law receives it.
     pub fn pose(&self) -> Pose {
         Pose::new(self.position.as_vec3(), self.orientation.as_quat())
     }
@@ -99,7 +100,7 @@ impl Place {
     }
 }
 
-/// See the module.
+/// Observer of one held part; see the module.
 #[derive(Clone, Debug)]
 pub struct Observer {
     rise: Rise,
@@ -107,7 +108,7 @@ pub struct Observer {
     offset: Place,
     center_of_mass: DVec3,
     mass: f64,
-    /// Over mass, part's frame, m².
+    /// Inertia over mass, part's frame, m².
     inertia: DMat3,
     settings: Settings,
     /// The object at the tick's start, and its linear and angular velocity.
@@ -118,7 +119,7 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// Of a part that was grabbed by the handle at `handle` just now; `None` when none is in hand.
+    /// Observer of a part that was grabbed by the handle at `handle` just now; `None` when none is held.
     pub fn new(scene: &SceneImage<'_>, state: &State, settings: &Settings, handle: &Place) -> Option<Self> {
         let part = usize::from(state.grabbed()?);
         let (object, _) = state.object()?;
@@ -130,13 +131,13 @@ impl Observer {
             DVec3::new(xy, yy, yz),
             DVec3::new(xz, yz, zz),
         );
-        // As the law bounds it: scaled down to its upper bound, the lower one added.
+        // Bounded as in the law: scaled down to its upper bound, the lower one added.
         let largest = [inertia.x_axis, inertia.y_axis, inertia.z_axis]
             .map(|row| row.abs().element_sum())
             .into_iter()
             .fold(0.0, f64::max);
         let squared = |radius: f32| f64::from(radius) * f64::from(radius);
-        let (least, most) = (
+        let (lower, upper) = (
             squared(of_object.gyration_min_m),
             squared(of_object.gyration_max_m),
         );
@@ -145,7 +146,7 @@ impl Observer {
             offset: handle.inverse().compose(&Place::of(&object)),
             center_of_mass: double(Vec3::from_array(record.center_of_mass)),
             mass: f64::from(of_object.mass_kg),
-            inertia: inertia * (most / largest).min(1.0) + DMat3::from_diagonal(DVec3::splat(least)),
+            inertia: inertia * (upper / largest).min(1.0) + DMat3::from_diagonal(DVec3::splat(lower)),
             settings: *settings,
             object: Place::of(&object),
             twist: [DVec3::ZERO; 2],
@@ -153,7 +154,7 @@ impl Observer {
         })
     }
 
-    /// Before a tick: where the object is and how it moves.
+    /// Records, before a tick, where the object is and how it moves.
     pub fn look(&mut self, state: &State) {
         if let Some((pose, twist)) = state.object() {
             self.object = Place::of(&pose);
@@ -161,7 +162,7 @@ impl Observer {
         }
     }
 
-    /// After it, `state` being what it left, with the handle truly at `from`; its `wrench` is held while the handle moves to `to`.
+    /// Books a tick after it: `state` is the result, the handle was truly at `from`, and the `wrench` is held while it moves to `to`.
     pub fn tick(&mut self, state: &State, from: &Place, to: &Place, wrench: &Wrench) {
         let stored = self.stored(state, from);
         self.rise.stored(stored);
@@ -177,24 +178,24 @@ impl Observer {
         self.rise.most()
     }
 
-    /// All work that passed either way, J.
+    /// All work that passed in either direction, J.
     pub fn passed_j(&self) -> f64 {
         self.passed
     }
 
     /// S, J.
     fn stored(&self, state: &State, handle: &Place) -> f64 {
-        let slip = state.given_way();
+        let slip = state.slip();
         let place = handle.compose(&self.offset);
         let center = |at: &Place| at.orientation * self.center_of_mass + at.position;
         let stretch = center(&place) - center(&self.object) - handle.orientation * double(slip.linear);
         let angle = rotation_vector(self.object.orientation, place.orientation)
             - handle.orientation * double(slip.angular);
         let c = &self.settings.coupling;
-        let spring = |k: f32, most: f32, stretch: DVec3| {
-            let (k, most, d) = (f64::from(k), f64::from(most), stretch.length());
-            if k * d > most {
-                most * (d - 0.5 * most / k)
+        let spring = |k: f32, max: f32, stretch: DVec3| {
+            let (k, max, d) = (f64::from(k), f64::from(max), stretch.length());
+            if k * d > max {
+                max * (d - 0.5 * max / k)
             } else {
                 0.5 * k * d * d
             }

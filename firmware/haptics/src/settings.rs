@@ -1,9 +1,52 @@
-//! Settings of the force law, their defaults and ranges.
+//! Settings of the force law: each with its meaning, unit, default and range, in one place.
 //!
-//! Made and checked at low priority, handed to the tick as finished values. The defaults suit a hand-held part and a handle of about
-//! 0.15 kg: an object of 0.1 kg on a coupling of 1 kN/m is critically damped at b = 2·√(k·m) = 20 N s/m.
+//! Made and checked at low priority, handed to the tick as finished values. A default that a host can change comes from the parameter table of
+//! the protocol ([`mortise_protocol::parameter`]). The defaults suit a hand-held part and a handle of about 0.15 kg: an object of 0.1 kg on a coupling of
+//! 1 kN/m is critically damped at b = 2·√(k·m) = 20 N s/m. A range is where the law was tried, not where it would break.
 
 use core::fmt;
+
+use mortise_protocol::parameter::ParameterId;
+
+/// Default of a setting that a host can change.
+const fn host(parameter: ParameterId) -> f32 {
+    parameter.row().default
+}
+
+/// Declares a group of settings: `field: type = default, min => max;`, the range left out where any value is accepted.
+macro_rules! group {
+    ($(#[$about:meta])* $group:ident: $path:literal {
+        $($(#[$doc:meta])* $field:ident: $type:ty = $default:expr $(, $min:expr => $max:expr)?;)+
+    }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $group {
+            $(
+                $(#[$doc])*
+                ///
+                #[doc = concat!("Default `", stringify!($default), "`" $(, ", from `", stringify!($min), "` to `", stringify!($max), "`")?, ".")]
+                pub $field: $type,
+            )+
+        }
+
+        impl Default for $group {
+            fn default() -> Self {
+                Self { $($field: $default,)+ }
+            }
+        }
+
+        impl $group {
+            fn validate(&self) -> Result<(), SettingsError> {
+                $($(check(
+                    concat!($path, ".", stringify!($field)),
+                    self.$field as f32,
+                    Range { min: $min as f32, max: $max as f32 },
+                )?;)?)+
+                Ok(())
+            }
+        }
+    };
+}
 
 /// All of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,68 +55,72 @@ pub struct Settings {
     pub coupling: CouplingSettings,
     /// Between object and the other parts.
     pub contact: ContactSettings,
+    /// At contacts.
+    pub friction: FrictionSettings,
     /// The simulated object.
     pub object: ObjectSettings,
     /// How constraint targets guide.
     pub guidance: GuidanceSettings,
-    /// How much energy the coupling may make.
+    /// How much energy the coupling may generate.
     pub passivity: PassivitySettings,
     /// What may reach the motors.
     pub limits: LimitSettings,
     /// Time from tick to tick (h in the notation), s. Default 1 ms.
     pub period_s: f32,
-    /// How the object is moved. Default [`Integrator::Implicit`].
+    /// Integrator of the object's motion. Default [`Integrator::Implicit`].
     pub integrator: Integrator,
 }
 
-/// How the object is moved from tick to tick.
+/// Integrator of the object's motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Integrator {
     /// Backward Euler: stable at any contact stiffness.
     #[default]
     Implicit,
     /// Newton–Euler with forces of the tick's start, eqs. 11–12 of Faas 2010, with its speed limit and pre-contact braking, eqs. 5–6: the
-    /// textbook's, which trembles once h²·k/m of all touching points together comes near 4. [`ContactSettings::damping_s`] has no part in it.
+    /// textbook's, which oscillates once h²·k/m of all touching points together comes near 4. [`ContactSettings::damping_s`] has no effect on it.
     Explicit,
 }
 
-/// Virtual coupling, eqs. 1–2 of Faas 2010: F = k_T·d − b_T·v, τ = k_R·θ − b_R·ω, with v and ω of the object relative to the handle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CouplingSettings {
-    /// k_T, N/m. Stiffer feels crisper and asks more damping of the handle (Colgate–Schenkel: b > k_T·h/2). Default 1000.
-    pub k_t_n_per_m: f32,
-    /// b_T, N s/m. Default 20.
-    pub b_t: f32,
-    /// k_R, N m/rad. Default 0.5.
-    pub k_r: f32,
-    /// b_R, N m s/rad. Default 0.01.
-    pub b_r: f32,
-    /// The coupling slips beyond this force, N: the object lags and the handle feels no more. Default 10.
-    pub force_max_n: f32,
-    /// The coupling slips beyond this torque, N m. Default 0.3.
-    pub torque_max_nm: f32,
+group! {
+    /// Virtual coupling, eqs. 1–2 of Faas 2010: F = k_T·d − b_T·v, τ = k_R·θ − b_R·ω, with v and ω of the object relative to the handle.
+    CouplingSettings: "coupling" {
+        /// k_T, N/m. A stiffer coupling feels crisper and needs more damping of the handle (Colgate–Schenkel: b > k_T·h/2).
+        k_t_n_per_m: f32 = host(ParameterId::CouplingStiffness), 0.0 => 20e3;
+        /// b_T, N s/m.
+        b_t: f32 = host(ParameterId::CouplingDamping), 0.0 => 500.0;
+        /// k_R, N m/rad.
+        k_r: f32 = host(ParameterId::CouplingAngularStiffness), 0.0 => 50.0;
+        /// b_R, N m s/rad.
+        b_r: f32 = host(ParameterId::CouplingAngularDamping), 0.0 => 5.0;
+        /// Force at which the coupling saturates, N: beyond it the object lags and the handle feels no more.
+        force_max_n: f32 = host(ParameterId::CouplingForce), 0.1 => 100.0;
+        /// Torque at which the coupling saturates, N m.
+        torque_max_nm: f32 = host(ParameterId::CouplingTorque), 0.001 => 10.0;
+    }
 }
 
-/// Contact between points of one part and the field of another.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactSettings {
-    /// k of one point, N/m. The implicit step carries 20 kN/m to 2 MN/m and more. Default 200 kN/m.
-    pub stiffness_n_per_m: f32,
-    /// Cap on the sum of k over all points that touch, N/m: with more points each gets less. It bounds the condition number of the step's
-    /// matrix (h²·cap/mass) and is better left high, since a part that lies on many points shares it with the one point at its side.
-    /// Default 20 MN/m: a hundred points at the default stiffness.
-    pub total_stiffness_n_per_m: f32,
-    /// Damping on approach as a ratio of stiffness, s: λ = k·(depth + damping_s · approach speed). Default 0.5 ms.
-    pub damping_s: f32,
-    /// Points that come this near in a tick, by twice the motion so far or without contacts, are taken into the step, m. Default 5 µm.
-    pub margin_m: f32,
-    /// Most work a tick, in field look-ups of about 190 instructions: a tree node asked counts 1½, a point out of reach 1, one within the margin 2,
-    /// one that may touch 3, a solve 8 and 5 more for each target. Default 520: of the motions measured with up to four targets none takes more than
-    /// 125,000 instructions a tick (121,580 with four targets, 123,900 guided and 115,700 unguided into a fit of 0.02 mm).
-    pub point_budget: u32,
-    /// How far points of the held part are moved inward along their normals before voxmaps are asked, in voxels of that part: the textbook's
-    /// pointshell shrinking. Distance fields know no shrinking. Default 0.
-    pub shrinking: f32,
+group! {
+    /// Contact between points of one part and the field of another.
+    ContactSettings: "contact" {
+        /// k of one point, N/m. The implicit step carries 20 kN/m to 2 MN/m and more.
+        stiffness_n_per_m: f32 = host(ParameterId::ContactStiffness), 100.0 => 10e6;
+        /// Limit of the sum of k over all points that touch, N/m: with more points each gets less. It bounds the condition number of the step's matrix
+        /// (h²·limit/mass) and is better left high, because a part that lies on many points shares it with the one point at its side. The default is
+        /// a hundred points at the default stiffness.
+        total_stiffness_n_per_m: f32 = 20e6, 1000.0 => 1e9;
+        /// Damping on approach as a ratio of stiffness, s: λ = k·(depth + damping_s · approach speed).
+        damping_s: f32 = host(ParameterId::ContactDamping), 0.0 => 0.01;
+        /// Points that come this near in a tick, by twice the motion so far or without contacts, enter the step, m.
+        margin_m: f32 = 5e-6, 1e-6 => 1e-3;
+        /// Largest work of a tick, in field queries of about 190 instructions: a tree node queried counts 1½, a point out of reach 1, one within the margin
+        /// 2, one that may touch 3, a solve 8 and 5 more for each target. With the default, of the motions measured with up to four targets none takes
+        /// more than 130,000 instructions a tick (121,880 with four targets, 128,300 guided and 119,840 unguided into a fit of 0.02 mm).
+        point_budget: u32 = host(ParameterId::PointBudget) as u32, 16 => 100_000;
+        /// Distance by which points of the held part are moved inward along their normals for voxmap queries, in voxels of that part: the textbook's
+        /// pointshell shrinking. Distance fields have no shrinking. Beyond a voxel points lie outside of their own voxels, on the wrong side.
+        shrinking: f32 = host(ParameterId::Shrinking), 0.0 => 1.0;
+    }
 }
 
 impl ContactSettings {
@@ -88,31 +135,54 @@ impl ContactSettings {
     }
 }
 
-/// The simulated object: its mass is chosen for the feel, not taken from the CAD part.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObjectSettings {
-    /// kg. Default 0.1.
-    pub mass_kg: f32,
-    /// Lower bound of its radius of gyration, m: keeps slivers from spinning. Default 3 mm.
-    pub gyration_min_m: f32,
-    /// Upper bound of its largest radius of gyration, m: the inertia of a larger part is scaled down as a whole, so that the rotational
-    /// coupling stays as well damped as with a part that fits the hand. Default 20 mm.
-    pub gyration_max_m: f32,
-    /// No point of the object moves faster, m/s: the object lags a faster handle instead of outrunning the look-ahead. Default 1.
-    pub speed_max_m_per_s: f32,
+group! {
+    /// Dry friction at contacts; see `dynamics::friction` in the sources. Off by default: both coefficients are 0.
+    FrictionSettings: "friction" {
+        /// μ_k, kinetic coefficient.
+        kinetic: f32 = 0.0, 0.0 => 2.0;
+        /// μ_s, static coefficient, at least the kinetic one.
+        fixed: f32 = 0.0, 0.0 => 2.0;
+        /// s_S, speed over which the coefficient falls from static to kinetic, m/s: well above the creep speed.
+        stribeck_m_per_s: f32 = 10e-3, 1e-4 => 1.0;
+        /// ε, speed below which friction is viscous, m/s. A smaller one holds better and takes more solves.
+        creep_m_per_s: f32 = 1e-4, 1e-5 => 0.01;
+    }
 }
 
-/// How constraint targets guide; see `guidance` in the sources.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GuidanceSettings {
-    /// Default [`GuidanceMethod::Capped`].
-    pub method: GuidanceMethod,
-    /// Room that contact between guided faces makes, m. Default 0.1 mm.
-    pub allowance_m: f32,
-    /// τ: time in which the way left falls to 1/e, s. Default 20 ms.
-    pub time_s: f32,
-    /// Whether mating faces that an engaged target keeps apart leave the work: nothing is felt of it. Default yes.
-    pub joints: bool,
+impl FrictionSettings {
+    /// Whether contacts have no friction.
+    pub fn is_off(&self) -> bool {
+        self.kinetic == 0.0 && self.fixed == 0.0
+    }
+}
+
+group! {
+    /// The simulated object: its mass is chosen for the feel, not taken from the CAD part.
+    ObjectSettings: "object" {
+        /// Mass, kg.
+        mass_kg: f32 = host(ParameterId::ObjectMass), 0.01 => 10.0;
+        /// Lower bound of its radius of gyration, m: keeps slivers from spinning. At most the upper one.
+        gyration_min_m: f32 = 3e-3, 1e-3 => 1.0;
+        /// Upper bound of its largest radius of gyration, m: the inertia of a larger part is scaled down as a whole, so that the rotational
+        /// coupling stays as well damped as with a part that fits the hand.
+        gyration_max_m: f32 = 20e-3, 1e-3 => 1.0;
+        /// No point of the object moves faster, m/s: the object lags a faster handle instead of outrunning the look-ahead.
+        speed_max_m_per_s: f32 = 1.0, 0.01 => 10.0;
+    }
+}
+
+group! {
+    /// How constraint targets guide; see `constraints` in the sources.
+    GuidanceSettings: "guidance" {
+        /// How a target pulls.
+        method: GuidanceMethod = GuidanceMethod::Capped;
+        /// Allowance added to gaps between guided faces, m.
+        allowance_m: f32 = 0.1e-3, 0.0 => 1e-3;
+        /// τ: time in which the remaining way falls to 1/e, s.
+        time_s: f32 = 20e-3, 1e-3 => 1.0;
+        /// Whether mating faces that an engaged target keeps apart are excluded from contact: the forces are the same.
+        exclusions: bool = true;
+    }
 }
 
 /// How a target pulls.
@@ -120,95 +190,64 @@ pub struct GuidanceSettings {
 pub enum GuidanceMethod {
     /// Not at all: what was engaged fades.
     Off,
-    /// Stiff up to a cap.
+    /// Stiff up to a largest force.
     Capped,
     /// The blend of Faas 2010, for comparison.
     Thesis,
 }
 
-/// What the coupling may make of nothing; see `passivity` in the sources.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PassivitySettings {
-    /// Most energy that the coupling may make and not have dissipated, J; from half of it on the wrench is turned down. 0 switches observer and valve
-    /// off. Default 0.5 mJ: a tap of 0.1 kg at 0.1 m/s.
-    pub tank_j: f32,
-    /// E₀: what targets may give the hand beyond what it has brought, J. Infinite: as much as they like, for comparison. Default 8 µJ: of the 10 µJ
-    /// that the hand is promised the rest is for what encoders and the coupling make.
-    pub endowment_j: f32,
-    /// The handle's own viscous friction, N s/m, as far as it is certain: what it dissipates may be made. Default 0.
-    pub damping: f32,
-    /// The same in rotation, N m s/rad. Default 0.
-    pub angular_damping: f32,
-    /// Whole ticks from a wrench to the motors that give it, at most 4. Default 0: they give it within the period.
-    pub delay_ticks: u32,
-    /// Counts of the encoders at the handle, m: its position is told within half of this. Default 0: told exactly, or not known.
-    pub position_count_m: f32,
-    /// The same of its orientation, rad.
-    pub angle_count_rad: f32,
+group! {
+    /// How much energy the coupling may generate; see `passivity` in the sources.
+    PassivitySettings: "passivity" {
+        /// Largest energy that the coupling may generate and not have dissipated, J; from half of it on the wrench is reduced. 0 switches observer and
+        /// valve off. The default is a tap of 0.1 kg at 0.1 m/s.
+        tank_j: f32 = 0.5e-3, 0.0 => 0.1;
+        /// E₀: energy that targets may deliver to the hand beyond what it has put in, J. Infinite: no bound, for comparison. Of the 10 µJ that the hand is
+        /// promised, the rest is for what encoders and the coupling generate.
+        initial_budget_j: f32 = 8e-6;
+        /// The handle's own viscous friction, N s/m, as far as it is certain: the energy that it dissipates may be generated.
+        damping: f32 = 0.0, 0.0 => 20.0;
+        /// The same in rotation, N m s/rad.
+        angular_damping: f32 = 0.0, 0.0 => 0.1;
+        /// Whole ticks from a wrench to the motors that give it. 0: they give it within the period.
+        delay_ticks: u32 = 0, 0 => MAX_DELAY_TICKS;
+        /// Counts of the encoders at the handle, m: its position is measured within half of this. 0: exactly, or not known.
+        position_count_m: f32 = 0.0, 0.0 => 1e-3;
+        /// The same of its orientation, rad.
+        angle_count_rad: f32 = 0.0, 0.0 => 0.1;
+    }
 }
 
 /// Largest [`PassivitySettings::delay_ticks`].
 pub const MAX_DELAY_TICKS: usize = 4;
 
-/// Last limits before the mechanism.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LimitSettings {
-    /// Length of the force vector, N. Default 12.
-    pub force_n: f32,
-    /// Length of the torque vector about the handle's origin, N m. Default 0.5.
-    pub torque_nm: f32,
-    /// Change of force, N/s. Default 5000 (5 N a tick at 1 kHz).
-    pub force_slew_n_per_s: f32,
-    /// Change of torque, N m/s. Default 200.
-    pub torque_slew_nm_per_s: f32,
+group! {
+    /// Last limits before the mechanism.
+    LimitSettings: "limits" {
+        /// Length of the force vector, N.
+        force_n: f32 = host(ParameterId::ForceLimit), 0.0 => 100.0;
+        /// Length of the torque vector about the handle's origin, N m.
+        torque_nm: f32 = host(ParameterId::TorqueLimit), 0.0 => 10.0;
+        /// Change of force, N/s.
+        force_slew_n_per_s: f32 = host(ParameterId::ForceSlew), 1.0 => 1e6;
+        /// Change of torque, N m/s.
+        torque_slew_nm_per_s: f32 = host(ParameterId::TorqueSlew), 0.01 => 1e5;
+    }
 }
+
+/// Range of [`Settings::period_s`].
+const PERIOD_S: Range = Range { min: 1e-4, max: 0.02 };
 
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            coupling: CouplingSettings {
-                k_t_n_per_m: 1000.0,
-                b_t: 20.0,
-                k_r: 0.5,
-                b_r: 0.01,
-                force_max_n: 10.0,
-                torque_max_nm: 0.3,
-            },
-            contact: ContactSettings {
-                stiffness_n_per_m: 200e3,
-                total_stiffness_n_per_m: 20e6,
-                damping_s: 0.5e-3,
-                margin_m: 5e-6,
-                point_budget: 520,
-                shrinking: 0.0,
-            },
-            object: ObjectSettings {
-                mass_kg: 0.1,
-                gyration_min_m: 3e-3,
-                gyration_max_m: 20e-3,
-                speed_max_m_per_s: 1.0,
-            },
-            guidance: GuidanceSettings {
-                method: GuidanceMethod::Capped,
-                allowance_m: 0.1e-3,
-                time_s: 20e-3,
-                joints: true,
-            },
-            passivity: PassivitySettings {
-                tank_j: 0.5e-3,
-                endowment_j: 8e-6,
-                damping: 0.0,
-                angular_damping: 0.0,
-                delay_ticks: 0,
-                position_count_m: 0.0,
-                angle_count_rad: 0.0,
-            },
-            limits: LimitSettings {
-                force_n: 12.0,
-                torque_nm: 0.5,
-                force_slew_n_per_s: 5000.0,
-                torque_slew_nm_per_s: 200.0,
-            },
+            coupling: CouplingSettings::default(),
+            contact: ContactSettings::default(),
+            friction: FrictionSettings::default(),
+            object: ObjectSettings::default(),
+            guidance: GuidanceSettings::default(),
+            passivity: PassivitySettings::default(),
+            limits: LimitSettings::default(),
             period_s: 1e-3,
             integrator: Integrator::Implicit,
         }
@@ -222,83 +261,6 @@ pub struct Range {
     pub min: f32,
     /// Largest value accepted.
     pub max: f32,
-}
-
-/// Range of each setting: where the law was tried, not where it would break.
-pub mod ranges {
-    use super::Range;
-
-    /// [`super::CouplingSettings::k_t_n_per_m`].
-    pub const K_T_N_PER_M: Range = Range { min: 0.0, max: 20e3 };
-    /// [`super::CouplingSettings::b_t`].
-    pub const B_T: Range = Range { min: 0.0, max: 500.0 };
-    /// [`super::CouplingSettings::k_r`].
-    pub const K_R: Range = Range { min: 0.0, max: 50.0 };
-    /// [`super::CouplingSettings::b_r`].
-    pub const B_R: Range = Range { min: 0.0, max: 5.0 };
-    /// [`super::CouplingSettings::force_max_n`].
-    pub const COUPLING_FORCE_MAX_N: Range = Range { min: 0.1, max: 100.0 };
-    /// [`super::CouplingSettings::torque_max_nm`].
-    pub const COUPLING_TORQUE_MAX_NM: Range = Range {
-        min: 0.001,
-        max: 10.0,
-    };
-    /// [`super::ContactSettings::stiffness_n_per_m`].
-    pub const STIFFNESS_N_PER_M: Range = Range {
-        min: 100.0,
-        max: 10e6,
-    };
-    /// [`super::ContactSettings::total_stiffness_n_per_m`].
-    pub const TOTAL_STIFFNESS_N_PER_M: Range = Range {
-        min: 1000.0,
-        max: 1e9,
-    };
-    /// [`super::ContactSettings::damping_s`].
-    pub const DAMPING_S: Range = Range { min: 0.0, max: 0.01 };
-    /// [`super::ContactSettings::margin_m`].
-    pub const MARGIN_M: Range = Range { min: 1e-6, max: 1e-3 };
-    /// [`super::ContactSettings::point_budget`].
-    pub const POINT_BUDGET: Range = Range {
-        min: 16.0,
-        max: 100_000.0,
-    };
-    /// [`super::ContactSettings::shrinking`]: beyond a voxel points lie outside of their own voxels, on the wrong side.
-    pub const SHRINKING: Range = Range { min: 0.0, max: 1.0 };
-    /// [`super::ObjectSettings::mass_kg`].
-    pub const MASS_KG: Range = Range { min: 0.01, max: 10.0 };
-    /// [`super::ObjectSettings::gyration_min_m`] and [`super::ObjectSettings::gyration_max_m`]; the first must not exceed the second.
-    pub const GYRATION_M: Range = Range { min: 1e-3, max: 1.0 };
-    /// [`super::ObjectSettings::speed_max_m_per_s`].
-    pub const SPEED_MAX_M_PER_S: Range = Range { min: 0.01, max: 10.0 };
-    /// [`super::GuidanceSettings::allowance_m`].
-    pub const ALLOWANCE_M: Range = Range { min: 0.0, max: 1e-3 };
-    /// [`super::GuidanceSettings::time_s`].
-    pub const GUIDANCE_TIME_S: Range = Range { min: 1e-3, max: 1.0 };
-    /// [`super::PassivitySettings::tank_j`].
-    pub const TANK_J: Range = Range { min: 0.0, max: 0.1 };
-    /// [`super::PassivitySettings::damping`].
-    pub const HANDLE_DAMPING: Range = Range { min: 0.0, max: 20.0 };
-    /// [`super::PassivitySettings::angular_damping`].
-    pub const HANDLE_ANGULAR_DAMPING: Range = Range { min: 0.0, max: 0.1 };
-    /// [`super::PassivitySettings::delay_ticks`].
-    pub const DELAY_TICKS: Range = Range {
-        min: 0.0,
-        max: super::MAX_DELAY_TICKS as f32,
-    };
-    /// [`super::PassivitySettings::position_count_m`].
-    pub const POSITION_COUNT_M: Range = Range { min: 0.0, max: 1e-3 };
-    /// [`super::PassivitySettings::angle_count_rad`].
-    pub const ANGLE_COUNT_RAD: Range = Range { min: 0.0, max: 0.1 };
-    /// [`super::LimitSettings::force_n`].
-    pub const FORCE_N: Range = Range { min: 0.0, max: 100.0 };
-    /// [`super::LimitSettings::torque_nm`].
-    pub const TORQUE_NM: Range = Range { min: 0.0, max: 10.0 };
-    /// [`super::LimitSettings::force_slew_n_per_s`].
-    pub const FORCE_SLEW_N_PER_S: Range = Range { min: 1.0, max: 1e6 };
-    /// [`super::LimitSettings::torque_slew_nm_per_s`].
-    pub const TORQUE_SLEW_NM_PER_S: Range = Range { min: 0.01, max: 1e5 };
-    /// [`super::Settings::period_s`].
-    pub const PERIOD_S: Range = Range { min: 1e-4, max: 0.02 };
 }
 
 /// A setting that was refused.
@@ -325,108 +287,39 @@ impl fmt::Display for SettingsError {
 impl core::error::Error for SettingsError {}
 
 impl Settings {
-    /// Checks every number against its range; the first that is outside (or not a number) is named.
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// [`SettingsError`] with the first that is outside of its range, or not a number.
     pub fn validate(&self) -> Result<(), SettingsError> {
-        let Self {
-            coupling,
-            contact,
-            object,
-            guidance,
-            passivity,
-            limits,
-            period_s,
-            integrator: Integrator::Implicit | Integrator::Explicit,
-        } = self;
-        let gyration_max = Range {
-            min: object.gyration_min_m,
-            ..ranges::GYRATION_M
+        self.coupling.validate()?;
+        self.contact.validate()?;
+        self.friction.validate()?;
+        self.object.validate()?;
+        self.guidance.validate()?;
+        self.passivity.validate()?;
+        self.limits.validate()?;
+        check("period_s", self.period_s, PERIOD_S)?;
+        let at_least = |min: f32| Range {
+            min,
+            max: f32::INFINITY,
         };
-        let checks = [
-            ("coupling.k_t_n_per_m", coupling.k_t_n_per_m, ranges::K_T_N_PER_M),
-            ("coupling.b_t", coupling.b_t, ranges::B_T),
-            ("coupling.k_r", coupling.k_r, ranges::K_R),
-            ("coupling.b_r", coupling.b_r, ranges::B_R),
-            (
-                "coupling.force_max_n",
-                coupling.force_max_n,
-                ranges::COUPLING_FORCE_MAX_N,
-            ),
-            (
-                "coupling.torque_max_nm",
-                coupling.torque_max_nm,
-                ranges::COUPLING_TORQUE_MAX_NM,
-            ),
-            (
-                "contact.stiffness_n_per_m",
-                contact.stiffness_n_per_m,
-                ranges::STIFFNESS_N_PER_M,
-            ),
-            (
-                "contact.total_stiffness_n_per_m",
-                contact.total_stiffness_n_per_m,
-                ranges::TOTAL_STIFFNESS_N_PER_M,
-            ),
-            ("contact.damping_s", contact.damping_s, ranges::DAMPING_S),
-            ("contact.margin_m", contact.margin_m, ranges::MARGIN_M),
-            (
-                "contact.point_budget",
-                contact.point_budget as f32,
-                ranges::POINT_BUDGET,
-            ),
-            ("contact.shrinking", contact.shrinking, ranges::SHRINKING),
-            ("object.mass_kg", object.mass_kg, ranges::MASS_KG),
-            ("object.gyration_min_m", object.gyration_min_m, ranges::GYRATION_M),
-            ("object.gyration_max_m", object.gyration_max_m, gyration_max),
-            (
-                "object.speed_max_m_per_s",
-                object.speed_max_m_per_s,
-                ranges::SPEED_MAX_M_PER_S,
-            ),
-            ("guidance.allowance_m", guidance.allowance_m, ranges::ALLOWANCE_M),
-            ("guidance.time_s", guidance.time_s, ranges::GUIDANCE_TIME_S),
-            ("passivity.tank_j", passivity.tank_j, ranges::TANK_J),
-            ("passivity.damping", passivity.damping, ranges::HANDLE_DAMPING),
-            (
-                "passivity.angular_damping",
-                passivity.angular_damping,
-                ranges::HANDLE_ANGULAR_DAMPING,
-            ),
-            (
-                "passivity.delay_ticks",
-                passivity.delay_ticks as f32,
-                ranges::DELAY_TICKS,
-            ),
-            (
-                "passivity.position_count_m",
-                passivity.position_count_m,
-                ranges::POSITION_COUNT_M,
-            ),
-            (
-                "passivity.angle_count_rad",
-                passivity.angle_count_rad,
-                ranges::ANGLE_COUNT_RAD,
-            ),
-            ("limits.force_n", limits.force_n, ranges::FORCE_N),
-            ("limits.torque_nm", limits.torque_nm, ranges::TORQUE_NM),
-            (
-                "limits.force_slew_n_per_s",
-                limits.force_slew_n_per_s,
-                ranges::FORCE_SLEW_N_PER_S,
-            ),
-            (
-                "limits.torque_slew_nm_per_s",
-                limits.torque_slew_nm_per_s,
-                ranges::TORQUE_SLEW_NM_PER_S,
-            ),
-            ("period_s", *period_s, ranges::PERIOD_S),
-        ];
-        for (name, value, range) in checks {
-            // NaN compares false and is refused with the rest.
-            if !(value >= range.min && value <= range.max) {
-                return Err(SettingsError { name, value, range });
-            }
-        }
+        let (friction, object) = (&self.friction, &self.object);
+        check("friction.fixed", friction.fixed, at_least(friction.kinetic))?;
+        check(
+            "object.gyration_max_m",
+            object.gyration_max_m,
+            at_least(object.gyration_min_m),
+        )
+    }
+}
+
+fn check(name: &'static str, value: f32, range: Range) -> Result<(), SettingsError> {
+    // A comparison with NaN is false, so NaN is refused too.
+    if value >= range.min && value <= range.max {
         Ok(())
+    } else {
+        Err(SettingsError { name, value, range })
     }
 }
 

@@ -1,4 +1,4 @@
-//! What the force law remembers from tick to tick.
+//! State of the force law, kept from tick to tick.
 
 use core::fmt;
 
@@ -8,63 +8,36 @@ use mortise_protocol::image::{PART_GRABBABLE, SceneImage, Shape};
 use mortise_protocol::limits::MAX_PARTS;
 use mortise_protocol::message::ConstraintTarget;
 
-use crate::body::{Body, Grabbed};
-use crate::coherence::Coherence;
-use crate::contact::Contacts;
-use crate::guidance::{Guidance, TargetError};
-use crate::overload::Overload;
-use crate::passivity::{Passivity, Tank};
-use crate::pose::{Pose, Twist, Wrench};
-use crate::proximity::Leaf;
-use crate::tick::usable_pose;
+use crate::collision::placement::Placed;
+use crate::constraints::targets::TargetError;
+use crate::dynamics::body::{Body, Grabbed};
+use crate::hand::Hand;
+use crate::math::pose::{Pose, Twist, Wrench, usable_pose};
+use crate::passivity::tank::Passivity;
 
-/// Placements, the grabbed object, and what carries over. About 112 KiB; lives in a static on a board.
+/// Placements, the grabbed object, and everything that carries over. About 112 KiB; lives in a static on a board.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Every part's placement.
     pub(crate) parts: Vec<Placed, MAX_PARTS>,
-    pub(crate) grabbed: Option<Grabbed>,
-    /// What the coupling cannot hold slips in the hand for good.
-    pub(crate) slipping: bool,
-    /// Where the part last held stood.
-    pub(crate) last_object: Option<Pose>,
-    /// Handle wrench of the last tick, for the slew limit.
-    pub(crate) previous_wrench: Wrench,
-    /// Energy account of the coupling.
-    pub(crate) tank: Tank,
-    /// Points touching, rising at once and falling by a twentieth a tick: divides the total contact stiffness.
-    pub(crate) sharing: f32,
-    /// Where to go on after a tick whose budget ran out, else the beginning.
-    pub(crate) resume: Leaf,
-    /// The last tick needed half the look-up budget or more.
-    pub(crate) busy: bool,
-    /// What is left out while there is too much to look at.
-    pub(crate) overload: Overload,
-    /// Contacts that pushed in the last tick.
-    pub(crate) pushing: u16,
-    /// Smallest cell of any field in the scene, m; 0 without parts.
-    pub(crate) finest_cell_m: f32,
-    /// Smallest voxel of any voxmap in the scene, m; 0 when there is none.
-    pub(crate) finest_voxel_m: f32,
-    /// How far points of the held part are moved inward before voxmaps are asked, m.
-    pub(crate) shrunk_m: f32,
-    /// Constraint targets.
-    pub(crate) guidance: Guidance,
-    /// Nodes that need not be looked at yet.
-    pub(crate) coherence: Coherence,
-    /// Scratch of one tick; kept here because a board's stack is small.
-    pub(crate) contacts: Contacts,
+    pub(crate) resolution: Resolution,
+    pub(crate) hand: Hand,
 }
 
-/// A part where it stands.
+/// Finest cells in a scene: the textbook's methods move at most half a cell in a tick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
-    pub pose: Pose,
-    /// Sphere about it, world.
-    pub center: Vec3,
-    pub radius: f32,
-    /// Sphere centre in the shape frame.
-    pub local_center: Vec3,
+pub(crate) struct Resolution {
+    /// Smallest cell of any field, m; 0 without parts.
+    pub cell_m: f32,
+    /// Smallest voxel of any voxmap, m; 0 when there is none.
+    pub voxel_m: f32,
+}
+
+impl Resolution {
+    const NONE: Self = Self {
+        cell_m: 0.0,
+        voxel_m: 0.0,
+    };
 }
 
 /// Why a part could not be grabbed.
@@ -72,19 +45,19 @@ pub(crate) struct Placed {
 pub enum GrabError {
     /// The scene has no part of this index.
     NoSuchPart {
-        /// Asked for.
+        /// The part requested.
         part: u16,
-        /// Parts there are.
+        /// Number of parts in the scene.
         parts: u16,
     },
     /// The part is fixed.
     Fixed {
-        /// Asked for.
+        /// The part requested.
         part: u16,
     },
-    /// Another part is in hand: release it first.
+    /// Another part is held: release it first.
     Busy {
-        /// The one in hand.
+        /// The held part.
         part: u16,
     },
     /// The handle's pose is not usable.
@@ -111,46 +84,33 @@ impl Default for State {
 }
 
 impl State {
-    /// No scene, nothing grabbed. Every bit of it is zero, so that a static lies in `.bss` and takes no flash; make it there, it is too large for
-    /// a board's stack.
+    /// No scene, nothing grabbed. All bits zero, so that a static lies in `.bss` and takes no flash. Construct it in place: it is too large for a
+    /// board's stack.
     pub const fn new() -> Self {
         Self {
             parts: Vec::new(),
-            grabbed: None,
-            slipping: false,
-            last_object: None,
-            previous_wrench: Wrench::ZERO,
-            tank: Tank::new(),
-            sharing: 0.0,
-            resume: Leaf::FIRST,
-            busy: false,
-            overload: Overload::NEW,
-            pushing: 0,
-            finest_cell_m: 0.0,
-            finest_voxel_m: 0.0,
-            shrunk_m: 0.0,
-            guidance: Guidance::new(),
-            coherence: Coherence::new(),
-            contacts: Contacts::new(),
+            resolution: Resolution::NONE,
+            hand: Hand::new(),
         }
     }
 
-    /// Takes over a scene's placements; whatever was grabbed is let go. Parts beyond [`MAX_PARTS`] are left out.
+    /// Loads a scene's placements; a grabbed part is released. Parts beyond [`MAX_PARTS`] are ignored.
     ///
     /// Cost grows with the number of parts; not for the tick.
     pub fn load_scene(&mut self, scene: &SceneImage<'_>) {
         self.release();
-        self.last_object = None;
+        self.hand.last_object = None;
         self.parts.clear();
-        (self.finest_cell_m, self.finest_voxel_m, self.shrunk_m) = (0.0, 0.0, 0.0);
+        self.resolution = Resolution::NONE;
+        self.hand.contact.shrunk_m = 0.0;
         for (index, record) in scene.parts().iter().enumerate().take(MAX_PARTS) {
             let Shape {
                 record: shape, field, ..
             } = scene.shape_of_part(index);
             let cell = field.record().cell;
-            self.finest_cell_m = finer(self.finest_cell_m, cell);
+            self.resolution.cell_m = finer(self.resolution.cell_m, cell);
             if field.is_occupancy() {
-                self.finest_voxel_m = finer(self.finest_voxel_m, cell);
+                self.resolution.voxel_m = finer(self.resolution.voxel_m, cell);
             }
             let pose = Pose::from_arrays(record.position, record.orientation);
             let local_center = Vec3::from_array(shape.center);
@@ -164,9 +124,9 @@ impl State {
         }
     }
 
-    /// Takes part `part` in hand where it stands: the offset between handle and part is kept, so no force arises.
+    /// Grabs part `part` at its placement: the offset between handle and part is kept, so no force arises.
     pub fn grab(&mut self, scene: &SceneImage<'_>, part: u16, handle: &Pose) -> Result<(), GrabError> {
-        if let Some(grabbed) = &self.grabbed {
+        if let Some(grabbed) = &self.hand.grabbed {
             return Err(GrabError::Busy { part: grabbed.part });
         }
         let parts = self.parts.len().min(scene.parts().len());
@@ -184,7 +144,7 @@ impl State {
         }
         let handle = usable_pose(handle).ok_or(GrabError::BadHandle)?;
         let body = Body::of(&scene.shape_of_part(index));
-        self.grabbed = Some(Grabbed {
+        self.hand.grabbed = Some(Grabbed {
             part,
             offset: handle.inverse().compose(placed.pose),
             center: placed.pose.transform_point(body.center_of_mass),
@@ -194,34 +154,34 @@ impl State {
             age: 0,
             body,
         });
-        self.last_object = Some(placed.pose);
-        self.forget_contacts();
+        self.hand.last_object = Some(placed.pose);
+        self.hand.invalidate();
         Ok(())
     }
 
-    /// Lets go: the part stays where it is. The handle's force falls to zero within the slew limit.
+    /// Releases the part, which stays at its placement. The handle's force falls to zero within the slew limit.
     pub fn release(&mut self) {
-        self.grabbed = None;
-        self.forget_contacts();
+        self.hand.grabbed = None;
+        self.hand.invalidate();
     }
 
-    /// Index of the part in hand.
+    /// Index of the held part.
     pub fn grabbed(&self) -> Option<u16> {
-        self.grabbed.as_ref().map(|g| g.part)
+        self.hand.grabbed.as_ref().map(|g| g.part)
     }
 
-    /// Guides the part in hand towards `target` from the next tick on; a target of the same id is refreshed or replaced, one older than that does
-    /// nothing. Grabbing and releasing end all guidance.
+    /// Guides the held part towards `target` from the next tick on. A target with the same id is refreshed or replaced; an older one is ignored.
+    /// Grabbing and releasing end all guidance.
     ///
     /// # Errors
     /// [`TargetError`]; nothing changed.
     pub fn set_target(&mut self, target: &ConstraintTarget) -> Result<(), TargetError> {
-        self.guidance.set(target, self.parts.len(), self.grabbed())
+        self.hand.targets.set(target, self.parts.len(), self.grabbed())
     }
 
-    /// Lets the target of this id fade; none of it is no error.
+    /// Lets the target with this id fade. Unknown ids are ignored.
     pub fn clear_target(&mut self, id: u16) {
-        self.guidance.clear(id);
+        self.hand.targets.clear(id);
     }
 
     /// Number of placed parts.
@@ -229,69 +189,57 @@ impl State {
         self.parts.len()
     }
 
-    /// Where part `part` stands (shape frame in the world).
+    /// Placement of part `part` (shape frame in the world).
     pub fn placement(&self, part: u16) -> Option<Pose> {
         self.parts.get(usize::from(part)).map(|p| p.pose)
     }
 
-    /// The part in hand: placement, and twist at its centre of mass.
+    /// The held part: placement, and twist at its centre of mass.
     pub fn object(&self) -> Option<(Pose, Twist)> {
-        self.grabbed.as_ref().map(|g| (g.pose(), g.twist))
+        self.hand.grabbed.as_ref().map(|g| (g.pose(), g.twist))
     }
 
     /// World position of the held part's centre of mass, m.
     pub fn object_center(&self) -> Option<Vec3> {
-        self.grabbed.as_ref().map(|g| g.center)
+        self.hand.grabbed.as_ref().map(|g| g.center)
     }
 
-    /// How passive the coupling is.
+    /// Energy state of the coupling.
     pub fn passivity(&self) -> Passivity {
-        self.tank.seen
+        self.hand.tank.status
     }
 
-    /// How far the part has slipped in the hand because guidance's pull was not paid for: stretch (m) and angle (rad) of the coupling, handle's axes.
-    /// Zero without targets.
-    pub fn given_way(&self) -> Twist {
-        self.tank.given_way()
+    /// Slip of the coupling, by which guidance is kept from delivering net energy to the operator: stretch (m) and angle (rad) of the coupling,
+    /// handle's axes. Zero without targets.
+    pub fn slip(&self) -> Twist {
+        self.hand.tank.slip()
     }
 
-    /// Whether the part slips in the hand for good where the coupling would have to pull harder than it may, instead of being pulled back with all it
-    /// may.
+    /// Sets whether the coupling slips permanently where it saturates, instead of pulling the part back with its largest force.
     ///
-    /// For as long as a grip is still being made firm ([`crate::CouplingSettings::force_max_n`] raised from tick to tick): a coupling that is
-    /// stretched farther than it can hold would gain d·ΔF with each step of its limit, energy that nobody put in; one that has slipped stores no more
-    /// than it can give back.
+    /// For the time after a grab in which the coupling's limit rises from tick to tick ([`crate::CouplingSettings::force_max_n`]): a coupling
+    /// stretched farther than it can hold would gain d·ΔF with each step of its limit, energy unaccounted for; one that has slipped stores no more
+    /// than it can return.
     pub fn set_slipping(&mut self, slipping: bool) {
-        self.slipping = slipping;
+        self.hand.slipping = slipping;
     }
 
-    /// Forgets the last handle wrench, so that the next one builds up from zero under the slew limit.
+    /// Resets the last handle wrench, so that the next one builds up from zero under the slew limit.
     pub fn restart_slew(&mut self) {
-        self.previous_wrench = Wrench::ZERO;
+        self.hand.previous_wrench = Wrench::ZERO;
     }
 
-    /// Has the next tick look at everything, as after a jump. Coherence changes the work, never the result; this is for showing so.
-    pub fn forget_coherence(&mut self) {
-        self.coherence.forget();
-    }
-
-    fn forget_contacts(&mut self) {
-        self.sharing = 0.0;
-        self.resume = Leaf::FIRST;
-        self.busy = false;
-        self.overload = Overload::NEW;
-        self.pushing = 0;
-        self.tank.forget();
-        self.guidance.forget();
-        self.contacts.clear();
-        self.coherence.forget();
+    /// Voids all advancement bounds, so that the next tick queries everything, as after a jump. Coherence changes the work, never the result; tests
+    /// use this to show it.
+    pub fn invalidate_coherence(&mut self) {
+        self.hand.contact.coherence.invalidate();
     }
 
     /// Writes the held part's placement back to the list of parts.
     pub(crate) fn settle(&mut self) {
-        if let Some(g) = &self.grabbed {
+        if let Some(g) = &self.hand.grabbed {
             let pose = g.pose();
-            self.last_object = Some(pose);
+            self.hand.last_object = Some(pose);
             if let Some(placed) = self.parts.get_mut(usize::from(g.part)) {
                 placed.pose = pose;
                 placed.center = pose.transform_point(placed.local_center);
@@ -300,7 +248,7 @@ impl State {
     }
 }
 
-/// The smaller of a size found so far (0: none) and another.
+/// The smaller of the size found so far (0: none) and another.
 fn finer(known: f32, cell: f32) -> f32 {
     if known > 0.0 && known < cell { known } else { cell }
 }

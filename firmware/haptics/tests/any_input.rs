@@ -1,4 +1,4 @@
-//! Whatever comes in: never a force above its limit, never a number that is not one, never a panic.
+//! Any input: never a force above its limit, never a non-finite number, never a panic.
 
 mod support;
 
@@ -12,7 +12,7 @@ use support::image::Image;
 /// Diametral clearances of [`scene_of`], m.
 const CLEARANCES: [f64; 3] = [20e-6, 0.1e-3, 1e-3];
 
-/// Scene of the `i`th clearance, made once.
+/// Scene of the `i`th clearance, created once.
 fn scene_of(i: usize) -> &'static Image {
     static SCENES: [LazyLock<Image>; 3] = [
         LazyLock::new(|| support::hole_and_peg(CLEARANCES[0], 2e-3)),
@@ -25,7 +25,7 @@ fn scene_of(i: usize) -> &'static Image {
 static SCENE: LazyLock<Image> = LazyLock::new(|| support::hole_and_peg(0.1e-3, 5e-3));
 static VOXELS: LazyLock<Image> = LazyLock::new(|| support::hole_and_peg_in_voxels(0.1e-3, 5e-3));
 
-/// Mostly ordinary, sometimes absurd.
+/// Mostly ordinary numbers, sometimes absurd ones.
 fn number(scale: f32) -> impl Strategy<Value = f32> {
     prop_oneof![
         12 => -scale..scale,
@@ -118,7 +118,7 @@ proptest! {
             prop_assert!(out.handle.torque.length() <= settings.limits.torque_nm);
             let slew = settings.limits.force_slew_n_per_s * settings.period_s;
             let cut_off = !input.enabled || out.work.flags.intersects(Flags::BAD_INPUT);
-            // Falling to zero is allowed at once; the slack is the rounding of a sum of forces of 15 N.
+            // Falling to zero is allowed at once; the tolerance is the rounding of a sum of forces of 15 N.
             prop_assert!(cut_off || (out.handle.force - before.force).length() <= slew + 4e-6);
             before = out.handle;
             if cut_off {
@@ -134,7 +134,7 @@ proptest! {
         }
     }
 
-    /// What is not due is not needed: the same bits with everything looked at every tick.
+    /// Advancement bounds change no result: the same bits with every node queried every tick.
     #[test]
     fn coherence_changes_nothing(
         clearance in 0..CLEARANCES.len(),
@@ -157,7 +157,7 @@ proptest! {
                     handle_twist: Twist { linear: step * 1e3, angular: Vec3::ZERO },
                     enabled: true,
                 };
-                eager.forget_coherence();
+                eager.invalidate_coherence();
                 let a = tick(&mut lazy, &scene, &settings, &input);
                 let b = tick(&mut eager, &scene, &settings, &input);
                 prop_assert_eq!(&a.handle, &b.handle);
@@ -206,7 +206,7 @@ fn settings_that_are_not_numbers_push_nothing() {
             assert!(out.handle.is_finite() && out.object.is_finite(), "{i}: {out:?}");
             assert!(out.handle.force.length() <= 12.0, "{i}: {out:?}");
         }
-        // And with good settings it goes on as if nothing had been.
+        // With valid settings it continues as before.
         let out = tick(&mut state, &scene, &Settings::default(), &input);
         assert!(
             out.handle.is_finite() && out.handle.force.length() > 0.0,
@@ -215,7 +215,7 @@ fn settings_that_are_not_numbers_push_nothing() {
     }
 }
 
-/// In look-ups, as the budget weighs them.
+/// Work in field queries, as the budget weighs it.
 fn cost(work: &mortise_haptics::Work) -> i64 {
     i64::from(work.points) + 4 * i64::from(work.nodes)
 }

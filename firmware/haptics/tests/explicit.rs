@@ -1,4 +1,4 @@
-//! The explicit integrator: right where it is stable, bounded where it is not.
+//! Explicit integrator: correct where it is stable, bounded where it is not.
 
 mod support;
 
@@ -38,7 +38,7 @@ fn held<'s>(scene: &SceneImage<'s>) -> State {
     state
 }
 
-/// A handle at rest, moved by `to` since the grab.
+/// Input of a handle at rest, displaced by `to` since the grab.
 fn at(to: Vec3) -> Input {
     Input {
         handle: Pose::new(to, Quat::IDENTITY),
@@ -72,15 +72,15 @@ fn a_soft_contact_comes_to_rest_where_the_implicit_step_does() {
             "{:?}",
             out.contact
         );
-        // Positions of 5 mm come in steps of 0.47 nm: ten of them a tick.
+        // Positions of 5 mm have a resolution of 0.47 nm: ten steps of it a tick.
         assert!(out.object_twist.linear.length() < 5e-6, "{:?}", out.object_twist);
         assert_eq!(out.work.contacts, 8);
     }
-    // The hand feels the same.
+    // The force on the handle is the same.
     assert!((explicit.handle.force - implicit.handle.force).length() < 3e-3);
 }
 
-/// Kinetic, coupling and contact energy together never exceed what there was by more than the step's own ripple, and go to the bottom.
+/// Kinetic, coupling and contact energy together never exceed the initial energy by more than the step's own ripple, and reach the minimum.
 #[test]
 fn a_soft_contact_makes_no_energy() {
     let image = slab_and_box(0.2e-3);
@@ -109,7 +109,7 @@ fn a_soft_contact_makes_no_energy() {
     assert!((last - rest).abs() < 1e-3 * start, "{last} {rest}");
 }
 
-/// h²·k/m is 80: no explicit step can be stable. It trembles, and stays within every limit; the implicit step rests.
+/// h²·k/m is 80: no explicit step can be stable. It oscillates within every limit; the implicit step comes to rest.
 #[test]
 fn a_stiff_contact_trembles_within_the_limits() {
     for (name, image) in [
@@ -118,7 +118,7 @@ fn a_stiff_contact_trembles_within_the_limits() {
     ] {
         let scene = image.open();
         let down = Vec3::new(0.0, 0.0, -3e-3);
-        // How fast a corner of the box still moves after two seconds, m/s.
+        // Speed of a corner of the box after two seconds, m/s.
         let late = |integrator| {
             let settings = settings(1e6, integrator);
             let outs = run(&scene, &settings, down, 3000);
@@ -144,7 +144,7 @@ fn a_stiff_contact_trembles_within_the_limits() {
     }
 }
 
-/// Free flight towards a flat: within a cell of it half the speed is left after every tick, with no other force about.
+/// Free flight towards a flat face: within a cell of it half the speed remains after every tick, with no other force acting.
 #[test]
 fn braking_halves_the_approach_every_tick() {
     let image = slab_and_box(2e-3);
@@ -174,13 +174,13 @@ fn braking_halves_the_approach_every_tick() {
                 assert!((ratio - 0.5).abs() < 1e-4, "{height}: {ratio}");
                 braked += 1;
             }
-            // Along the flat nothing brakes.
+            // There is no braking along the flat face.
             assert!((out.object_twist.linear.x - 0.03).abs() < 1e-6);
         }
         before = Some(out);
     }
     assert!(braked > 5, "{braked}");
-    // A tenth of a metre a second over: what is left of 0.1 mm.
+    // From a tenth of a metre a second: the remainder of 0.1 mm.
     assert!(before.unwrap().object.position.z > 5e-3);
 }
 

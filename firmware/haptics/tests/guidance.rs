@@ -1,4 +1,4 @@
-//! Constraint targets: they hold the axis, let go of a stronger hand, and never step.
+//! Constraint targets: they hold the axis, yield to a stronger hand, and cause no step in force.
 
 mod support;
 
@@ -14,7 +14,7 @@ fn scene(clearance: f64, engaged: f64) -> support::image::Image {
     support::hole_and_peg(clearance, engaged)
 }
 
-/// Where the hand holds the peg that is `engaged` in its hole.
+/// Handle position of the peg that is `engaged` in its hole, m.
 fn start(engaged: f64) -> [f64; 3] {
     [0.0, 0.0, BLOCK_HALF + PEG_HALF - engaged]
 }
@@ -37,7 +37,7 @@ impl Steps {
     }
 }
 
-/// Guided in: the hand 1 mm and 2° off, 10 Hz tremor of 0.2 mm.
+/// Guided insertion: the hand 1 mm and 2° off, 10 Hz tremor of 0.2 mm.
 fn insert(clearance: f64, settings: &Settings) -> (f64, f64, Seen) {
     let image = scene(clearance, 1e-3);
     let scene = image.open();
@@ -102,7 +102,7 @@ fn goes_in_at_every_fit_and_stays_on_the_axis() {
     }
 }
 
-/// The thesis' spring is softer than the hand's coupling: k_T/(k_T + k_A) of the hand's offset stay.
+/// The thesis' spring is softer than the hand's coupling: k_T/(k_T + k_A) of the hand's offset remain.
 #[test]
 fn the_soft_spring_of_the_thesis_stays_off() {
     let mut settings = Settings::default();
@@ -148,13 +148,13 @@ fn engages_and_expires_without_a_step() {
     assert!(steps.force_n < 0.05 && steps.torque_nm < 2e-3, "{steps:?}");
     // Back at the wall.
     let (pose, _) = state.object().unwrap();
-    // To the depth of the contact and what interpolation at 0.5 mm cells adds on this radius in two directions, 7 µm.
+    // Within the depth of the contact and the error of interpolation at 0.5 mm cells on this radius in two directions, 7 µm.
     assert!((pose.position.x - 0.5e-3).abs() < 15e-6, "{}", pose.position.x);
 }
 
 #[test]
 fn a_stronger_hand_gets_away_without_a_jump() {
-    // Above the block: nothing but guidance holds.
+    // Above the block only guidance acts.
     let image = scene(1e-3, -5e-3);
     let scene = image.open();
     let mut state = State::new();
@@ -170,7 +170,7 @@ fn a_stronger_hand_gets_away_without_a_jump() {
     let mut steps = Steps::default();
     let mut away = None;
     for t in 0..2000 {
-        // 2 N/s.
+        // A ramp of 2 N/s.
         hand.push[0] = 2e-3 * f64::from(t);
         let (out, _) = run(&mut state, &scene, &settings, &mut hand, 1, still);
         steps.add(&out);
@@ -190,7 +190,8 @@ fn a_stronger_hand_gets_away_without_a_jump() {
     assert!(steps.force_n < 0.05, "{steps:?}");
 }
 
-/// A box pressed flat on a slab while so many targets hold it upright: how deep it gets and the least points a tick looks at once it lies.
+/// A box pressed flat on a slab while this many targets hold it upright. Returns its largest depth and the smallest number of points queried in a
+/// tick once it lies.
 fn pressed_under(targets: usize) -> (f32, u32) {
     let image = support::slab_and_box(0.05e-3, 9);
     let scene = image.open();
@@ -218,9 +219,9 @@ fn pressed_under(targets: usize) -> (f32, u32) {
     (seen.deepest_m, fewest)
 }
 
-/// What targets take of the work of a tick is not taken from contact to the last point.
+/// Targets do not use up the budget that contact needs.
 #[test]
-fn contact_is_felt_however_many_targets_pull() {
+fn contact_is_rendered_however_many_targets_are_active() {
     let (alone, _) = pressed_under(0);
     for targets in [1, 2, 4, MAX_TARGETS] {
         let (deepest, fewest) = pressed_under(targets);
@@ -252,7 +253,7 @@ fn stale_damaged_and_too_many_targets_change_nothing() {
         out.guidance.active
     };
     assert_eq!(state.set_target(&axis_on_axis(5, 100)), Ok(()));
-    // An older one would let it expire at once.
+    // An older target would make it expire at once.
     assert_eq!(state.set_target(&axis_on_axis(4, 1)), Ok(()));
     assert_eq!(state.set_target(&axis_on_axis(5, 1)), Ok(()));
     assert_eq!(count(&mut state), 1);

@@ -1,18 +1,18 @@
-//! A peg goes into its hole, driven by a hand that is not quite straight.
+//! Insertion of a peg into its hole by a hand that is not quite aligned.
 
 mod support;
 
 use mortise_haptics::{Flags, Quat, Settings, State};
 use support::hand::{Hand, Seen, run};
 
-/// Degrees the peg tilts in the hand.
+/// Tilt of the peg in the hand, degrees.
 const TILT_DEG: f32 = 0.5;
-/// The hand starts this far off the axis, m.
+/// Initial distance of the hand from the axis, m.
 const OFFSET_M: f64 = 0.2e-3;
-/// From 1 mm engaged the hand goes down this far, m: through the block and out below it.
+/// Travel of the hand from 1 mm engaged, m: through the block and out below it.
 const TRAVEL_M: f64 = 20e-3;
 
-/// Inserts the peg of a clearance; how deep it went below the block's top, and what was seen.
+/// Inserts the peg of a clearance. Returns its depth below the block's top, and the outcome.
 fn insert(clearance: f64, settings: &Settings) -> (f64, Seen) {
     let image = support::hole_and_peg(clearance, 1e-3);
     let scene = image.open();
@@ -49,7 +49,7 @@ fn goes_in(clearance: f64, settings: &Settings) {
     assert!(depth > TRAVEL_M, "{depth}");
     assert!(seen.deepest_m < 50e-6);
     assert!(seen.peak_force_n < 3.0);
-    // Over no interval did the device give the hand more than was stored.
+    // Over no interval did the device deliver more energy than was stored.
     assert!(seen.made_j < 1e-6, "{seen:?}");
 }
 
@@ -78,7 +78,7 @@ fn soft_and_stiff_contact_alike() {
     }
 }
 
-/// A third of the look-ups it would need: contacts of what is not reached are carried over.
+/// A third of the field queries needed: contacts in leaves not reached are carried over.
 #[test]
 fn on_a_starved_budget() {
     let mut settings = Settings::default();

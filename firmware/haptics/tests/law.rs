@@ -1,4 +1,4 @@
-//! What the force law promises apart from contact: coupling, grabbing, rest, frames.
+//! Properties of the force law apart from contact: coupling, grabbing, rest, frames.
 
 mod support;
 
@@ -75,7 +75,7 @@ fn free_motion_neither_lags_nor_costs() {
                 Vec3::ZERO,
             ),
         );
-        // Where the handle will be when the tick ends.
+        // The handle's place at the tick's end.
         let lag = x + speed * 1e-3 - (out.object.position.x - start.position.x);
         // Ten ulps of 0.1 m.
         assert!(lag.abs() < 1e-7, "{t}: {lag}");
@@ -155,7 +155,7 @@ fn comes_to_rest_where_the_hand_holds_it() {
     }
     let out = out.unwrap();
     let place = goal.compose(start);
-    // What stays is the coupling's last rounding: an ulp of position.
+    // The remainder is the coupling's last rounding: an ulp of position.
     assert!((out.object.position - place.position).length() < 1e-6);
     assert!(out.object_twist.linear.length() < 1e-5);
     assert!(out.object_twist.angular.length() < 1e-3);
@@ -167,7 +167,7 @@ fn half_a_turn_does_not_flip_the_torque() {
     let image = support::slab_and_box(60e-3, 5);
     let scene = image.open();
     let mut settings = Settings::default();
-    // So weak that the object stays behind while the handle turns.
+    // So weak that the object lags while the handle rotates.
     settings.coupling.k_r = 1e-6;
     settings.coupling.b_r = 0.0;
     let mut state = State::new();
@@ -177,7 +177,7 @@ fn half_a_turn_does_not_flip_the_torque() {
     let mut sign_changes = 0;
     let mut last = 0.0f32;
     for t in 0..2000 {
-        // To half a turn in 100 ticks, then trembling about it.
+        // To half a turn in 100 ticks, then oscillating about it.
         let angle = if t < 100 {
             core::f32::consts::PI * t as f32 / 100.0
         } else {
@@ -200,7 +200,7 @@ fn half_a_turn_does_not_flip_the_torque() {
     assert_eq!(sign_changes, 0);
 }
 
-/// Everything moved and turned in the world gives the same, moved and turned.
+/// The same scene moved and rotated in the world gives the same result, moved and rotated.
 #[test]
 fn the_world_frame_does_not_matter() {
     let felt = |place: Pose| {
@@ -218,7 +218,7 @@ fn the_world_frame_does_not_matter() {
             around: 64,
             rings: 2,
         });
-        // The peg lies askew in its own frame's world placement.
+        // The peg's shape frame is oblique in the world.
         let askew = Pose::new(Vec3::new(0.02e-3, 0.01e-3, 3e-3), Quat::from_rotation_z(0.7));
         for (shape, grabbable, pose) in [(block, false, place), (peg, true, place.compose(askew))] {
             w.part(

@@ -1,4 +1,4 @@
-//! Tangent planes against the closed form, and the voxmap's search against looking at everything.
+//! Voxmap contact: tangent planes against the closed form, and the voxmap's search against an exhaustive one.
 
 mod support;
 
@@ -17,7 +17,7 @@ use support::{
 
 /// Voxels that do not divide the slab: its top lies 0.1 mm over the middle of a voxel.
 const CELL: f64 = 0.6e-3;
-/// Single precision of positions of some 30 mm, in a few operations.
+/// Error of single precision for positions of some 30 mm, in a few operations, m.
 const ROUNDING_M: f64 = 3e-8;
 
 /// Points along each side of the box.
@@ -32,14 +32,14 @@ fn settings() -> Settings {
     Settings::default()
 }
 
-/// How far the flat lies over the middle of its voxels, m.
+/// Height of the flat over the middle of its voxels, m.
 fn above_the_middle(map: &Voxmap) -> f64 {
     let (voxel, center) = map.look_up([0.0, 0.0, SLAB.half[2]]);
     assert_eq!(voxel, Voxel::Surface);
     SLAB.half[2] - center[2]
 }
 
-/// A flat on a flat: the depth is that under the middle of the voxel, wherever in it the surface lies.
+/// A flat on a flat: the depth is measured from the middle of the voxel, wherever in it the surface lies.
 #[test]
 fn on_a_flat_the_depth_counts_from_the_middle_of_the_voxel() {
     let scene = FLAT.open();
@@ -72,7 +72,7 @@ fn on_a_flat_the_depth_counts_from_the_middle_of_the_voxel() {
     }
 }
 
-/// Where a point of the box lies that was moved inward by so many metres, and its inward normal.
+/// Position of a point of the box moved inward by this many metres, and its inward normal.
 fn point_at(
     point: &support::solids::SurfacePoint,
     position: DVec3,
@@ -99,7 +99,7 @@ fn by_definition(map: &Voxmap, position: DVec3, turn: DQuat, inward_m: f64) -> V
         .collect()
 }
 
-/// Whether a point lies so near to a voxel's side that single precision may see it in the next.
+/// Whether a point lies so near to a voxel's side that single precision may assign it to the neighbour.
 fn near_a_side(map: &Voxmap, position: DVec3, turn: DQuat, inward_m: f64) -> bool {
     box_of(ACROSS).points().iter().any(|point| {
         let p = point_at(point, position, turn, inward_m).0.to_array();
@@ -134,7 +134,7 @@ proptest! {
         let mut prober = Prober::new();
         let found = prober.probe(&scene, 1, 0, &pose, &contact).unwrap();
         let touching: Vec<_> = expected.iter().filter(|(_, gap)| *gap < 0.0).collect();
-        // Whether a point within rounding of its plane touches single precision may see otherwise.
+        // Single precision may decide otherwise for a point within rounding of its plane.
         let sure = expected.iter().all(|(_, gap)| gap.abs() > ROUNDING_M);
         prop_assume!(sure);
         prop_assert_eq!(usize::from(found.contacts), touching.len());
@@ -151,7 +151,7 @@ proptest! {
         }
     }
 
-    /// What is not due is not needed with voxmaps either.
+    /// Advancement bounds change no result with voxmaps either.
     #[test]
     fn coherence_changes_nothing(
         goals in prop::collection::vec(([-6e-3f32..6e-3, -6e-3f32..6e-3, -25e-3f32..10e-3], 0.0f32..0.2, 1u32..80), 1..5),
@@ -181,7 +181,7 @@ proptest! {
                     handle_twist: Twist { linear: step * 1e3, angular: Vec3::ZERO },
                     enabled: true,
                 };
-                eager.forget_coherence();
+                eager.invalidate_coherence();
                 let a = tick(&mut lazy, &scene, &settings, &input);
                 let b = tick(&mut eager, &scene, &settings, &input);
                 prop_assert_eq!(&a.handle, &b.handle);
@@ -194,7 +194,7 @@ proptest! {
     }
 }
 
-/// Shrinking acts while a part is held: points go in at once and come out at 10 mm/s, and the box comes to rest that much lower and higher again.
+/// Shrinking acts while a part is held: points move inward at once and outward at 10 mm/s, and the box comes to rest lower and higher by as much.
 #[test]
 fn shrinking_changes_while_a_part_lies_on_another() {
     let scene = FLAT.open();
@@ -221,13 +221,13 @@ fn shrinking_changes_while_a_part_lies_on_another() {
     for (rest, share) in rests.iter().zip([0.0, 0.5, 1.0, 0.0]) {
         assert!((rests[0] - rest - share * CELL).abs() < 3e-6, "{rests:?}");
     }
-    // What comes out lifts the box; contact that is met at 10 mm/s may throw it off half as fast again.
+    // Points moving outward lift the box; a contact met at 10 mm/s may throw it off half as fast again.
     assert!(fastest < 0.015, "{fastest}");
 }
 
-/// How far off the axis a hand presses a peg that is half in its hole of voxels, m: by the blend of the thesis, with a target of these `caps` (times the
-/// usual ones), or none.
-fn pressed_aside(caps: Option<f32>) -> f64 {
+/// Distance from the axis to which a hand presses a peg that is half in its hole of voxels, m: by the blend of the thesis, with a target of these
+/// `caps` (times the usual ones), or none.
+fn pressed_off_axis(caps: Option<f32>) -> f64 {
     let image = hole_and_peg_in_voxels(0.2e-3, 10e-3);
     let scene = image.open();
     let mut settings = settings();
@@ -249,11 +249,11 @@ fn pressed_aside(caps: Option<f32>) -> f64 {
     f64::from(state.object().unwrap().0.position.x)
 }
 
-/// Voxels wedge a peg all round where there are 0.1 mm of room. The thesis' blend makes contacts of voxels of guided faces give way, without the
-/// constraint's pull too: x = ½·e^(−θ/θ₀) + ½·e^(−d/d₀) is 1 on the axis, and the peg comes to where the room ends.
+/// Voxels wedge a peg all round where there is 0.1 mm of clearance. The thesis' blend softens contacts of voxels of guided faces, even without the
+/// constraint's spring: x = ½·e^(−θ/θ₀) + ½·e^(−d/d₀) is 1 on the axis, and the peg moves to where the clearance ends.
 #[test]
-fn contacts_of_guided_voxels_give_way() {
-    let [alone, unevaluated, hybrid] = [None, Some(0.0), Some(1.0)].map(pressed_aside);
+fn contacts_of_guided_voxels_are_softened() {
+    let [alone, unevaluated, hybrid] = [None, Some(0.0), Some(1.0)].map(pressed_off_axis);
     println!("{alone} m off alone, {unevaluated} m without the pull, {hybrid} m with it");
     assert!(alone < 5e-6, "{alone}");
     assert!(unevaluated > 50e-6 && unevaluated < 0.4e-3, "{unevaluated}");
@@ -273,7 +273,7 @@ fn a_centred_peg_touches_where_it_does_not() {
     assert!(found.nearest.distance_m < -0.05e-3, "{found:?}");
 }
 
-/// No point is faster than half a voxel a tick: it would be through before it is seen.
+/// No point is faster than half a voxel a tick; otherwise it would pass through before it is detected.
 #[test]
 fn no_point_outruns_the_voxels() {
     let image = slab_and_box_in_voxels(CELL, 30e-3, 4);
@@ -300,7 +300,7 @@ fn no_point_outruns_the_voxels() {
     assert!(farthest <= most * 1.0001 && farthest > 0.99 * most, "{farthest}");
 }
 
-/// In look-ups, as the budget weighs them.
+/// Work in field queries, as the budget weighs it.
 fn cost(work: &mortise_haptics::Work) -> i64 {
     i64::from(work.points) + 4 * i64::from(work.nodes)
 }

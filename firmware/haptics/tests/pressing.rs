@@ -1,11 +1,11 @@
-//! A part pressed against a wall: the hand feels its own force, the part stays outside.
+//! A part pressed against a wall: the hand feels its own force, and the part stays outside.
 
 mod support;
 
 use mortise_haptics::{Settings, State};
 use support::hand::{Hand, run};
 
-/// Felt force (N) and deepest penetration (m) when part 1 is pressed in a direction.
+/// Force on the handle (N) and deepest penetration (m) when part 1 is pressed in a direction.
 fn pressed(image: &support::image::Image, from: [f64; 3], direction: [f64; 3], force: f64) -> (f64, f64) {
     let scene = image.open();
     let mut state = State::new();
@@ -31,7 +31,7 @@ fn pressed(image: &support::image::Image, from: [f64; 3], direction: [f64; 3], f
         1e6 * seen.deepest_m,
         seen
     );
-    // Over no interval did the device give the hand more than was stored.
+    // Over no interval did the device deliver more energy than was stored.
     assert!(seen.made_j < 1e-6, "{seen:?}");
     (felt, f64::from(seen.deepest_m))
 }

@@ -1,4 +1,4 @@
-//! The nearest point found by branch and bound is the nearest of all; what pushes is what overlaps.
+//! Probe: the nearest point found by branch and bound is the nearest of all, and the contacts are the overlapping points.
 
 mod support;
 
@@ -17,7 +17,7 @@ fn settings() -> ContactSettings {
     Settings::default().contact
 }
 
-/// Every point of one part in the field of the other, both ways: smallest distance stored, and number below zero.
+/// Every point of one part in the field of the other, in both directions: smallest distance stored, and number below zero.
 fn brute_force(scene: &SceneImage<'_>, pose: Pose) -> (f32, usize) {
     let (peg, block) = (scene.shape_of_part(1), scene.shape_of_part(0));
     let (mut least, mut touching) = (f32::INFINITY, 0);
@@ -42,7 +42,7 @@ fn brute_force(scene: &SceneImage<'_>, pose: Pose) -> (f32, usize) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
-    /// Where the field has the distance (2 mm about the surface), the walk finds the same point as looking at all of them.
+    /// Where the field stores the distance (2 mm about the surface), the traversal finds the same point as an exhaustive search.
     #[test]
     fn as_brute_force(
         aside in prop::array::uniform2(-0.7e-3f32..0.7e-3),
@@ -58,14 +58,14 @@ proptest! {
         let mut prober = Prober::new();
         let found = prober.probe(&scene, PEG, BLOCK, &pose, &settings()).expect("two parts");
         let (least, touching) = brute_force(&scene, pose);
-        // A point beside the field's grid has a bound only; the probe says so.
+        // A point beside the field's grid has a bound only, and the probe reports it as one.
         prop_assume!(least.abs() < 1.2e-3 && found.nearest.in_band);
-        // Poses are put together in another order: a few roundings of 40 mm, 3.7 nm each.
+        // Poses are composed in another order: a few roundings of 40 mm, 3.7 nm each.
         let rounding = 5e-8;
         prop_assert!((found.nearest.field_distance_m - least).abs() < rounding, "{found:?} {least}");
         if least < -rounding {
             prop_assert!(found.contacts > 0);
-            // The store holds 256; a point within the roundings may count here and not there.
+            // The store holds 256; a point within rounding may count in one and not in the other.
             let kept = prober.contacts().count();
             prop_assert_eq!(kept, usize::from(found.contacts));
             prop_assert!(kept.abs_diff(touching.min(256)) <= 4, "{kept} {touching}");

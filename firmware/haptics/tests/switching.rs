@@ -1,13 +1,13 @@
-//! Targets that come late, twice, in the wrong order or not at all: no step in force, no energy made, and nothing left once they expire.
+//! Targets that arrive late, twice, in the wrong order or not at all: no step in force, no energy generated, and no state left once they expire.
 //!
-//! Energy made is what [`mortise_haptics::observer`] finds: the largest rise over any interval, beyond what is stored. The account lends E₀ once
-//! ([`mortise_haptics::PassivitySettings::endowment_j`]) and what was lent is owed for good, so the number of targets and of switches does not enter.
-//! To E₀ comes what readings in single precision hide of the motion. They round x, less than 2⁻⁴ m here, to 2⁻²⁹ m, so a sum over their
-//! differences misses Σ F·Δe = F·e − Σ e·ΔF by no more than
+//! Energy generated is that of [`mortise_haptics::observer`]: the largest rise over any interval, beyond what is stored. The account grants E₀ once
+//! ([`mortise_haptics::PassivitySettings::initial_budget_j`]) and a debt remains owed, so the number of targets and of switches has no influence. To
+//! E₀ is added the motion that readings in single precision hide. They round x, less than 2⁻⁴ m here, to 2⁻²⁹ m, so a sum over their differences
+//! misses Σ F·Δe = F·e − Σ e·ΔF by no more than
 //!
 //! 2⁻²⁹ m · (F + Σ |ΔF|),
 //!
-//! both of the wrench that acted: 6 nJ for 3 N, and as much again each time the force goes up and down.
+//! both of the wrench that acted: 6 nJ for 3 N, and as much again each time the force rises and falls.
 
 mod support;
 
@@ -21,17 +21,17 @@ use support::{BLOCK_HALF, PEG_HALF, axis_on_axis};
 /// Largest change of the handle's wrench from tick to tick.
 const STEP_N: f32 = 0.05;
 const STEP_NM: f32 = 2e-3;
-/// Ticks in which a target fades and what it held is let go: up to 4 targets of 3 N at 0.015 N a tick between them, and a second.
+/// Ticks in which a target fades and its release damper ends: up to 4 targets of 3 N at 0.015 N a tick between them, and a second.
 const FADED: u32 = 4 * 200 + 1024;
 /// Ticks after which the hand is at rest again: 20 of its time constant, 2·5/400 s.
-const RESTED: u32 = 500;
-/// Ticks in which a part that gave way in the hand by a millimetre is back to a micrometre: ln 1000 of `grip`'s 0.25 s.
-const BACK: u32 = 1730;
+const AT_REST: u32 = 500;
+/// Ticks in which a slip of a millimetre recovers to a micrometre: ln 1000 of the 0.25 s of `energy_bound`.
+const SLIP_RECOVERED: u32 = 1730;
 
-/// What the desktop means to say.
+/// Command of the desktop.
 #[derive(Clone, Copy, Debug)]
-enum Word {
-    /// Target of this id, one of several places of its axis.
+enum Command {
+    /// Target with this id, one of several placements of its axis.
     Set {
         id: u16,
         place: u8,
@@ -42,45 +42,45 @@ enum Word {
     },
 }
 
-/// What becomes of it on the way.
+/// A command and its fate on the link.
 #[derive(Clone, Copy, Debug)]
-struct Sent {
-    /// Ticks after the one before it was sent.
+struct Message {
+    /// Ticks after the previous message.
     after: u32,
-    word: Word,
+    command: Command,
     lost: bool,
-    /// Ticks it takes: what is sent later may come sooner.
+    /// Delay, ticks: a later message may arrive sooner.
     late: u32,
-    /// Ticks after which it comes again.
+    /// Ticks after which it arrives again.
     again: Option<u32>,
 }
 
-fn word() -> impl Strategy<Value = Word> {
+fn command() -> impl Strategy<Value = Command> {
     prop_oneof![
         4 => (0u16..3, 0u8..4, prop_oneof![Just(300u16), 1u16..400])
-            .prop_map(|(id, place, expiry)| Word::Set { id, place, expiry }),
-        1 => (0u16..3).prop_map(|id| Word::Clear { id }),
+            .prop_map(|(id, place, expiry)| Command::Set { id, place, expiry }),
+        1 => (0u16..3).prop_map(|id| Command::Clear { id }),
     ]
 }
 
-fn sent() -> impl Strategy<Value = Sent> {
+fn message() -> impl Strategy<Value = Message> {
     (
         0u32..150,
-        word(),
+        command(),
         prop::bool::weighted(0.3),
         prop_oneof![3 => 0u32..5, 1 => 0u32..200],
         prop::option::weighted(0.3, 0u32..400),
     )
-        .prop_map(|(after, word, lost, late, again)| Sent {
+        .prop_map(|(after, command, lost, late, again)| Message {
             after,
-            word,
+            command,
             lost,
             late,
             again,
         })
 }
 
-/// The hole's axis, or one up to 0.2 mm and 0.6° beside it: no target of the same id is the same.
+/// The hole's axis, or one up to 0.2 mm and 0.6° off: no two placements are equal.
 fn target(id: u16, place: u8, expiry: u16, sequence: u16) -> ConstraintTarget {
     let [x, y, tilt] = [
         [0.0, 0.0, 0.0],
@@ -98,17 +98,17 @@ fn target(id: u16, place: u8, expiry: u16, sequence: u16) -> ConstraintTarget {
     }
 }
 
-/// When what arrives, in order of arrival.
-fn arrivals(all: &[Sent]) -> Vec<(u32, Word, u16)> {
+/// Arrivals (tick, command, sequence number) in order.
+fn arrivals(all: &[Message]) -> Vec<(u32, Command, u16)> {
     let mut arrivals = Vec::new();
     let (mut at, mut sequence) = (0, 65_500u16);
-    for sent in all {
-        at += sent.after;
+    for message in all {
+        at += message.after;
         sequence = sequence.wrapping_add(1);
-        if !sent.lost {
-            arrivals.push((at + sent.late, sent.word, sequence));
-            if let Some(again) = sent.again {
-                arrivals.push((at + sent.late + again, sent.word, sequence));
+        if !message.lost {
+            arrivals.push((at + message.late, message.command, sequence));
+            if let Some(again) = message.again {
+                arrivals.push((at + message.late + again, message.command, sequence));
             }
         }
     }
@@ -119,7 +119,7 @@ fn arrivals(all: &[Sent]) -> Vec<(u32, Word, u16)> {
 /// Half the last place of a coordinate below 2⁻⁴ m in single precision, m.
 const ROUNDED_M: f64 = 1.0 / (1u32 << 29) as f64;
 
-/// The peg `engaged` in its hole, in hand.
+/// The peg `engaged` in its hole, held by a hand.
 fn start(image: &support::image::Image, engaged: f64) -> (State, Hand) {
     let scene = image.open();
     let mut state = State::new();
@@ -135,35 +135,36 @@ static IMAGE: std::sync::LazyLock<support::image::Image> =
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// In the middle of a hole with 0.5 mm of play all round nothing but guidance is felt: what swings by 0.4 mm and a third more touches no wall.
+    /// In the middle of a hole with 0.5 mm of clearance all round only guidance acts: a motion that swings by 0.4 mm and a third more touches no
+    /// wall.
     #[test]
-    fn no_step_no_energy_and_nothing_left(
-        all in prop::collection::vec(sent(), 1..25),
-        aside in prop_oneof![Just(0.0), -0.2e-3..0.2e-3f64],
+    fn no_step_no_energy_and_no_state_left(
+        all in prop::collection::vec(message(), 1..25),
+        offset in prop_oneof![Just(0.0), -0.2e-3..0.2e-3f64],
     ) {
         let scene = IMAGE.open();
         let (mut state, mut hand) = start(&IMAGE, 10e-3);
         let settings = Settings::default();
-        hand.goal[0] = aside;
-        run(&mut state, &scene, &settings, &mut hand, RESTED, |_, _, _| {});
+        hand.goal[0] = offset;
+        run(&mut state, &scene, &settings, &mut hand, AT_REST, |_, _, _| {});
         let arrivals = arrivals(&all);
-        let until = arrivals.iter().map(|(at, word, _)| match word {
-            Word::Set { expiry, .. } => at + u32::from(*expiry),
-            Word::Clear { .. } => *at,
+        let until = arrivals.iter().map(|(at, command, _)| match command {
+            Command::Set { expiry, .. } => at + u32::from(*expiry),
+            Command::Clear { .. } => *at,
         });
         let until = until.max().unwrap_or(0);
         let mut next = arrivals.iter().peekable();
         let mut last: Option<Wrench> = None;
         let mut observer = Observer::new(&scene, &state, &settings, &hand.place()).unwrap();
         let mut changed_n = 0.0;
-        for t in 0..until + FADED + BACK + RESTED {
-            while let Some((_, word, sequence)) = next.next_if(|(at, ..)| *at == t) {
-                match word {
-                    Word::Set { id, place, expiry } => {
+        for t in 0..until + FADED + SLIP_RECOVERED + AT_REST {
+            while let Some((_, command, sequence)) = next.next_if(|(at, ..)| *at == t) {
+                match command {
+                    Command::Set { id, place, expiry } => {
                         let taken = state.set_target(&target(*id, *place, *expiry, *sequence));
                         prop_assert!(matches!(taken, Ok(()) | Err(TargetError::Full)));
                     }
-                    Word::Clear { id } => state.clear_target(*id),
+                    Command::Clear { id } => state.clear_target(*id),
                 }
             }
             observer.look(&state);
@@ -186,16 +187,16 @@ proptest! {
                 prop_assert!(out.guidance.wrench.force.length() == 0.0);
             }
         }
-        let lent = f64::from(settings.passivity.endowment_j);
+        let initial_j = f64::from(settings.passivity.initial_budget_j);
         let rounded = ROUNDED_M * (f64::from(settings.coupling.force_max_n) + changed_n);
-        prop_assert!(observer.given_j() <= lent + rounded, "{} J, rounding {rounded} J", observer.given_j());
-        // Where it was: the hand's spring and nothing else.
+        prop_assert!(observer.given_j() <= initial_j + rounded, "{} J, rounding {rounded} J", observer.given_j());
+        // Back at its initial place: only the hand's spring acts.
         let (pose, _) = state.object().unwrap();
-        prop_assert!((f64::from(pose.position.x) - aside).abs() < 2e-6, "{}", pose.position.x);
+        prop_assert!((f64::from(pose.position.x) - offset).abs() < 2e-6, "{}", pose.position.x);
     }
 }
 
-/// The method is chosen anew while a target holds the part: what pulled fades before another pulls.
+/// The method changes while a target holds the part: the springs of the old method fade before those of the new one act.
 #[test]
 fn another_method_takes_over_without_a_step() {
     use mortise_haptics::GuidanceMethod::{Capped, Off, Thesis};
@@ -203,7 +204,7 @@ fn another_method_takes_over_without_a_step() {
     let (mut state, mut hand) = start(&IMAGE, 10e-3);
     let mut settings = Settings::default();
     hand.goal[0] = 0.4e-3;
-    run(&mut state, &scene, &settings, &mut hand, RESTED, |_, _, _| {});
+    run(&mut state, &scene, &settings, &mut hand, AT_REST, |_, _, _| {});
     let mut last: Option<Wrench> = None;
     let methods = [Capped, Thesis, Capped, Off, Thesis, Off, Capped];
     for t in 0..methods.len() as u32 * 600 {

@@ -1,4 +1,4 @@
-//! Which faces are said to touch: the ones that face each other, with both faces of an edge, and how far in.
+//! Touching face pairs: the faces that face each other, with both faces of an edge, and the insertion depth.
 
 mod support;
 
@@ -14,8 +14,8 @@ const END: u16 = 1;
 const TOP: u16 = 0;
 const HOLE: u16 = 3;
 
-/// What touches once the hand has gone `aside` and tilted for a while, with the peg `engaged` in its hole.
-fn touching(engaged: f64, aside: f64, tilt: f32) -> FacePairs {
+/// Touching pairs after the hand has moved by `offset` and tilted for a while, with the peg `engaged` in its hole.
+fn touching(engaged: f64, offset: f64, tilt: f32) -> FacePairs {
     let image = support::exact_hole_and_peg(0.2e-3, engaged);
     let scene = image.open();
     let mut state = State::new();
@@ -26,7 +26,7 @@ fn touching(engaged: f64, aside: f64, tilt: f32) -> FacePairs {
     let (out, _) = run(&mut state, &scene, &still, &mut hand, 1500, |t, hand, _| {
         let ease = (t as f32 / 500.0).min(1.0);
         hand.orientation = Quat::from_rotation_y(tilt * ease);
-        hand.goal[0] = aside * f64::from(ease);
+        hand.goal[0] = offset * f64::from(ease);
     });
     out.pairs
 }
@@ -36,7 +36,8 @@ fn pair(pairs: &FacePairs, faces: (u16, u16)) -> &FacePair {
     found.unwrap_or_else(|| panic!("no {faces:?} in {pairs:?}"))
 }
 
-/// Tilted in its hole the peg touches with the edge of its end on one side, and on the other the block with its rim: as deep as the peg is in.
+/// Tilted in its hole the peg touches with the edge of its end on one side, and with the block's rim on the other: the insertion depth is that of the
+/// peg.
 #[test]
 fn a_tilted_peg_touches_with_edges_as_deep_as_it_is_in() {
     for engaged in [6e-3, 10e-3, 16e-3] {
@@ -44,7 +45,7 @@ fn a_tilted_peg_touches_with_edges_as_deep_as_it_is_in() {
         let p = pair(&pairs, (SIDE, HOLE));
         let edges = [(END, NO_FACE), (NO_FACE, TOP)];
         assert!(edges.contains(&(p.moving_edge_face, p.static_edge_face)), "{p:?}");
-        // Tilted by the clearance over the depth at most, R of which lies across.
+        // Tilt at most the clearance over the depth; the end's radius R lies across the axis.
         let tilt = 0.2e-3 / engaged;
         assert!(
             (f64::from(p.insertion_m) - engaged).abs() < 2.0 * support::HOLE * tilt,

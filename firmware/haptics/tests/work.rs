@@ -1,4 +1,4 @@
-//! How much a tick has to do, counted; and the same scenes at length for an instruction counter.
+//! Work of a tick, counted; and the same scenes at length for an instruction counter.
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*tick*'` on this test's release binary with one test chosen gives instructions a tick.
 
@@ -17,7 +17,7 @@ fn inside(clearance: f64, push: [f64; 3], sway: f64) -> Seen {
     let mut hand = Hand::at([0.0; 3]);
     hand.push = push;
     state.grab(&scene, 1, &hand.pose()).unwrap();
-    // The first tick looks at everything; what counts is a session.
+    // The first tick queries everything; the measurement is of a session.
     let quiet = |_: u32, _: &mut Hand, _: Option<&_>| {};
     let (_, first) = run(&mut state, &scene, &Settings::default(), &mut hand, 1, quiet);
     let (_, seen) = run(
@@ -44,7 +44,7 @@ fn inside(clearance: f64, push: [f64; 3], sway: f64) -> Seen {
 #[test]
 fn centred_in_a_loose_hole() {
     let seen = inside(1e-3, [0.0; 3], 1e-3);
-    // The gap of 0.5 mm is used up by 20 mm/s in 11 to 22 ticks, each node at its own time.
+    // The gap of 0.5 mm is used up by 20 mm/s in 11 to 22 ticks, each node at its own tick.
     assert!(seen.nodes + seen.points < 500, "{seen:?}");
     assert_eq!(seen.contacts, 0);
 }
@@ -52,7 +52,7 @@ fn centred_in_a_loose_hole() {
 #[test]
 fn pressed_to_the_wall_of_a_close_hole() {
     let seen = inside(20e-6, [5.0, 0.0, 0.0], 1e-3);
-    // 514 points each way, all within the margin; the budget thins them.
+    // 514 points in each direction, all within the margin; the budget decimates them.
     assert!(seen.nodes < 150 && seen.points < 1100, "{seen:?}");
     assert!(seen.contacts > 0);
 }
@@ -80,9 +80,9 @@ fn free_above() {
     assert_eq!(seen.points, 0);
 }
 
-/// What was left out while the part was shaken is looked at again once it rests.
+/// Points decimated while the part was shaken are queried again once it rests.
 #[test]
-fn catches_up_after_an_overload() {
+fn recovers_after_an_overload() {
     let image = support::hole_and_peg(0.2e-3, 25e-3);
     let scene = image.open();
     let mut state = State::new();
@@ -95,7 +95,7 @@ fn catches_up_after_an_overload() {
     let degraded = |seen: &Seen| seen.flags.contains(Flags::BUDGET_EXCEEDED);
     let rest = |_: u32, hand: &mut Hand, _: Option<&_>| hand.goal[2] = 0.0;
     let shake = |t: u32, hand: &mut Hand, _: Option<&_>| hand.goal[2] = 20e-3 * (0.2 * f64::from(t)).sin();
-    // The first look at everything takes many ticks, and leaves nothing out for good.
+    // The first pass over everything takes many ticks, and decimates nothing permanently.
     run(&mut state, &scene, &settings, &mut hand, 300, rest);
     let (_, resting) = run(&mut state, &scene, &settings, &mut hand, 300, rest);
     assert!(!degraded(&resting), "{resting:?}");

@@ -1,13 +1,13 @@
-//! A board made of memory, cheap to build: flash of two small slots, a mechanism that senses what the enumeration wants, a line that can be full.
+//! A board in memory, cheap to build: flash of two small slots, a mechanism whose readings the enumeration controls, a line that can be full.
 
 use std::cell::{Cell, UnsafeCell};
 
 use mortise_firmware::board::{
-    Clock, Drive, Flash, FlashError, Identity, Mechanism, Outbound, SLOTS, Sensed, WRITE_SIZE,
+    Clock, Drive, ERASED, Flash, FlashError, FlashWord, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    WRITE_SIZE,
 };
-use mortise_firmware::ceilings::Ceilings;
-use mortise_firmware::ram_flash::{ERASED, FlashWord};
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{CostUnit, ResetReason};
@@ -28,7 +28,7 @@ pub(crate) const IDENTITY: Identity = Identity {
     entropy: 0,
 };
 
-/// The smallest scene of the protocol's tests, its one part made grabbable.
+/// The smallest scene of the protocol's tests, with its one part made grabbable.
 pub(crate) fn scene() -> Vec<u8> {
     let mut image = include_bytes!("../../../protocol/tests/golden/occupancy.scene").to_vec();
     let word = |at: usize| u32::from_le_bytes([image[at], image[at + 1], image[at + 2], image[at + 3]]);
@@ -40,15 +40,15 @@ pub(crate) fn scene() -> Vec<u8> {
     image
 }
 
-/// The flash chip, and a second one with the same content but for one byte: memory behind a shared reference must not change, so damage exchanges
-/// the chip. References handed out before go on seeing the old one; who asks the flash again sees the damage.
+/// The flash chip, and a second one with the same content except for one byte: memory behind a shared reference must not change, so damage swaps the
+/// chips. Earlier references continue to read the old chip; a new access to the flash reads the damage.
 pub(crate) struct Chip {
     words: [UnsafeCell<[FlashWord; WORDS]>; 2],
     in_use: Cell<usize>,
 }
 
 impl Chip {
-    /// With `scene` in slot 0.
+    /// A chip with `scene` in slot 0.
     pub fn with(scene: &[u8]) -> Self {
         let mut words = [ERASED; WORDS];
         let mut bytes = commit_record(1, scene).to_vec();
@@ -63,12 +63,12 @@ impl Chip {
         }
     }
 
-    /// Changes one byte of the scene in each slot. Once.
+    /// Changes one byte of the scene in each slot, once.
     pub fn damage(&self) {
         if self.in_use.replace(1) == 1 {
             return;
         }
-        // SAFETY: one thread; nobody has seen the second chip yet.
+        // SAFETY: one thread; no reference to the second chip exists yet.
         unsafe {
             let mut words = *self.words[0].get();
             for slot in 0..SLOTS {
@@ -88,7 +88,7 @@ impl Chip {
     }
 }
 
-/// The flash as the store sees it. Notes when it is changed while motors are driven.
+/// The flash as seen by the store. Records a change while motors are driven.
 pub(crate) struct ChipFlash<'s> {
     pub chip: &'s Chip,
     pub rig: &'s Rig,
@@ -104,12 +104,12 @@ unsafe impl<'s> Flash<'s> for ChipFlash<'s> {
         SLOT
     }
 
-    // SAFETY: the trait's contract is the caller's: the slot is not written while the slice lives.
+    // SAFETY: the trait's contract is passed to the caller: the slot is not written while the slice lives.
     unsafe fn slot(&self, slot: usize) -> &'s [u8] {
         match self.chip.word(slot, 0) {
             // SAFETY: SLOT bytes from the slot's first word.
             Ok(first) => unsafe { std::slice::from_raw_parts(first.cast::<u8>(), SLOT) },
-            // No slots for a rig's description.
+            // There are no slots for a rig's description.
             Err(FlashError) => &[],
         }
     }
@@ -131,7 +131,7 @@ unsafe impl<'s> Flash<'s> for ChipFlash<'s> {
     }
 }
 
-/// What the mechanism senses and was last told to do.
+/// Readings of the mechanism, and its last command.
 pub(crate) struct Rig {
     pub sensed: Cell<Sensed>,
     pub driven: Cell<bool>,
@@ -163,8 +163,6 @@ impl Rig {
 pub(crate) struct Puppet<'s>(pub &'s Rig);
 
 impl Mechanism for Puppet<'_> {
-    const SIMULATED: bool = false;
-
     fn sense(&mut self) -> Sensed {
         self.0.sensed.get()
     }
@@ -178,7 +176,7 @@ impl Mechanism for Puppet<'_> {
     }
 }
 
-/// No time passes but in ticks.
+/// A clock in which no time passes except by ticks.
 pub(crate) struct NoClock;
 
 impl Clock for NoClock {

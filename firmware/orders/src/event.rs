@@ -1,8 +1,8 @@
-//! What can happen, one at a time.
+//! The possible events, one at a time.
 
 use std::fmt;
 
-/// A program at the other end of the line. A begins connected; B begins when it greets.
+/// A program at the other end of the line. A is connected at the start; B connects when it greets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Host {
     /// The first.
@@ -20,31 +20,31 @@ pub enum Order {
     Arm,
     /// Couple the part.
     Grab,
-    /// The handle stands in its reference pose.
+    /// The handle is in its reference pose.
     Home,
-    /// Another value for a parameter.
+    /// Change a parameter.
     Set,
-    /// Begin sending a scene, and all of its bytes.
+    /// Begin an upload of a scene, with all of its bytes.
     Upload,
-    /// Put it in use.
+    /// Put the scene in use.
     Commit,
 }
 
-/// Orders, as [`Order`] numbers them.
+/// Number of orders, as [`Order`] numbers them.
 pub(crate) const ORDERS: usize = 7;
 
-/// One step of the world around the two planes.
+/// One step of the environment of the two planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Event {
-    /// A host greets and learns the session's name.
+    /// A host greets and learns the session identifier.
     Hello(Host),
     /// A host sends an order, and it arrives.
     Send(Host, Order),
-    /// Host A sends an order that does not arrive: lost, or held up for [`Event::Deliver`].
+    /// Host A sends an order that does not arrive: it is lost, or delayed until [`Event::Deliver`].
     Hold(Order),
-    /// The newest frame of this order that A ever sent arrives: late, or once more.
+    /// The newest frame of this order that A ever sent arrives: late, or again.
     Deliver(Order),
-    /// Host A asks for the parameter.
+    /// Host A queries the parameter.
     Read,
     /// STOP arrives.
     Stop,
@@ -58,7 +58,7 @@ pub enum Event {
     Full,
     /// One millisecond: the control plane runs.
     Tick,
-    /// The link plane passes on what the control plane said.
+    /// The link plane forwards the output of the control plane.
     Poll,
     /// Long enough for a soft stop to end.
     Wait,
@@ -97,16 +97,16 @@ pub const ALPHABET: [Event; 29] = [
     Event::Wait,
 ];
 
-/// Events that bear on one promise.
+/// Events that concern one promise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Topic {
-    /// What may go wrong.
+    /// Name of the possible failure.
     pub name: &'static str,
-    /// The kinds of events that could make it go wrong, and those that carry them on.
+    /// The events that could cause the failure, and those that propagate them.
     pub events: &'static [Event],
 }
 
-/// The topics, each with so few kinds of events that orders of eight can be enumerated.
+/// The topics, each with so few events that sequences of eight can be enumerated.
 pub const TOPICS: [Topic; 4] = [
     Topic {
         name: "checksum",
@@ -156,7 +156,7 @@ pub const TOPICS: [Topic; 4] = [
     },
 ];
 
-/// Orders of events that the enumeration starts behind: idle, stopped, and with a part grabbed. Not counted in its depth.
+/// Initial sequences of events: idle, stopped, and with a part grabbed. Not counted in the depth.
 pub(crate) const STARTS: [&[Event]; 3] = [
     &[],
     &[Event::Stop, Event::Tick, Event::Poll],

@@ -1,10 +1,10 @@
-//! A model checker for the order of messages: the real control and link planes, led through every order of a few events.
+//! A model checker for the order of messages: it runs the real control and link planes through every sequence of a few events.
 //!
 //! The events are those that decide whether motors are driven: greetings of two hosts, orders that arrive, are lost, late or repeated, STOP, damage
 //! in flash, a lost reference, the stop input, a full line, and the runs of either plane ([`Event`]). After each event the promises of
-//! `docs/safety.md` are looked at ([`Broken`]), by an account of what was sent that shares nothing with the planes. Worlds that go on alike are
-//! taken once: their fingerprint is what in both planes decides what they do, the relation of every frame to the session, and what waits in the
-//! queues.
+//! `docs/safety.md` are checked ([`Broken`]) against a separate record of the sent messages that shares no code with the planes. Equivalent worlds
+//! are explored once: their fingerprint covers the state of both planes that determines their behaviour, the relation of every frame to the session,
+//! and the content of the queues.
 //!
 //! ```
 //! let report = mortise_orders::enumerate(2);

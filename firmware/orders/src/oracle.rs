@@ -1,25 +1,25 @@
-//! What must be true, kept apart from the planes: who sent what when, and what may therefore drive motors.
+//! The properties that must hold, independent of the planes: which host sent which message when, and what may therefore drive motors.
 
 use std::hash::{Hash, Hasher};
 
-/// A promise that an order broke.
+/// A promise that a sequence of events broke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Broken {
-    /// Motors live for a scene whose checksum was not found right after the order to arm.
+    /// Motors live for a scene whose checksum was not verified right after the order to arm.
     NoChecksum,
     /// Motors live without a reference.
     NoReference,
-    /// Motors live by an order that was late, came twice, or is of another session.
+    /// Motors live through an order that was late, repeated, or of another session.
     NotFresh,
-    /// Motors live behind a stop or a fault that no fresh order cleared.
+    /// Motors live after a stop or a fault that no fresh order cleared.
     AfterStop,
-    /// Motors live in the tick behind a STOP.
+    /// Motors live in the tick after a STOP.
     StopLate,
-    /// A value read back that was not in force.
+    /// A value read back that was not in effect.
     ReadBack,
     /// Flash changed while motors were driven.
     FlashWhileLive,
-    /// Motors driven in a state without motors, or the other way round.
+    /// Motors driven in a state without motors, or vice versa.
     StateDiffers,
 }
 
@@ -35,14 +35,14 @@ pub const PROMISES: [Broken; 8] = [
     Broken::StateDiffers,
 ];
 
-/// The world's own account.
+/// Independent record of the events.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Oracle {
-    /// Behind a stop or a fault, and not cleared.
+    /// There was a stop or a fault that is not cleared yet.
     pub must_clear: bool,
-    /// An `Arm` that was fresh arrived since the last tick.
+    /// A fresh `Arm` arrived since the last tick.
     fresh: bool,
-    /// One of them found the checksum right.
+    /// For one of them the checksum was right.
     sound: bool,
     /// A STOP arrived since the last tick.
     stopping: bool,
@@ -71,10 +71,10 @@ impl Oracle {
         }
     }
 
-    /// After a tick. `live`: motors may be driven; `halted`: stopped or in a fault.
+    /// Updates the record after a tick. `live`: motors may be driven; `halted`: stopped or in a fault.
     pub fn tick(&mut self, live: bool, halted: bool, referenced: bool) -> Option<Broken> {
         let began = live && !self.live;
-        // Cleared and armed by orders that followed the STOP, the motors were off in between.
+        // If fresh orders cleared and armed after the STOP, the motors were off in between.
         let anew = began && self.fresh && !self.must_clear;
         let broken = if live && self.stopping && !anew {
             Some(Broken::StopLate)

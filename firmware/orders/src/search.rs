@@ -1,4 +1,4 @@
-//! Every order of events to a depth, worlds that go on alike taken once.
+//! Enumeration of every sequence of events to a depth; equivalent worlds are explored once.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -10,23 +10,23 @@ use crate::event::{ALPHABET, Event, STARTS, TOPICS, Topic};
 use crate::oracle::Broken;
 use crate::world::World;
 
-/// What the enumeration found.
+/// Result of the enumeration.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Events in the longest orders, without those of the start.
+    /// Length of the longest sequences, without the initial one.
     pub depth: usize,
-    /// Orders of events that were covered, of every length to the depth.
+    /// Number of sequences covered, of every length up to the depth.
     pub orders: u128,
-    /// Worlds that differ.
+    /// Number of different worlds.
     pub states: usize,
-    /// Steps carried out.
+    /// Number of steps executed.
     pub steps: u64,
-    /// For each promise that was broken: how many orders break it, and the first of the shortest.
+    /// For each broken promise: the number of sequences that break it, and the first of the shortest.
     pub broken: BTreeMap<Broken, (u128, Vec<Event>)>,
 }
 
 impl Report {
-    /// Orders that broke this promise.
+    /// Number of sequences that broke this promise.
     pub fn count(&self, promise: Broken) -> u128 {
         self.broken.get(&promise).map_or(0, |(orders, _)| *orders)
     }
@@ -36,7 +36,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} orders to depth {}, {} states, {} steps, {} promises broken",
+            "{} sequences to depth {}, {} states, {} steps, {} promises broken",
             self.orders,
             self.depth,
             self.states,
@@ -44,7 +44,7 @@ impl fmt::Display for Report {
             self.broken.len()
         )?;
         for (broken, (orders, first)) in &self.broken {
-            write!(f, "\n  {broken:?} in {orders} orders, first:")?;
+            write!(f, "\n  {broken:?} in {orders} sequences, first:")?;
             for (index, event) in first.iter().enumerate() {
                 write!(f, "{} {event}", if index == 0 { "" } else { "," })?;
             }
@@ -53,22 +53,22 @@ impl fmt::Display for Report {
     }
 }
 
-/// An order of events, and how many orders lead to the same world.
+/// A sequence of events, and the number of sequences that lead to an equivalent world.
 type Node = (Vec<Event>, u128);
 
-/// What one order's next events lead to.
+/// Results of the possible next events of one sequence.
 struct Found {
     path: Vec<Event>,
     orders: u128,
     outcome: Result<u64, Broken>,
 }
 
-/// Tries every order of at most `depth` events of the whole alphabet, see [`enumerate_of`].
+/// Tries every sequence of at most `depth` events of the whole alphabet, see [`enumerate_of`].
 pub fn enumerate(depth: usize) -> Report {
     enumerate_of(&ALPHABET, depth)
 }
 
-/// Tries every order of at most `depth` events of each topic: fewer kinds of events, so that orders may be longer.
+/// Tries every sequence of at most `depth` events of each topic: there are fewer events, so that sequences can be longer.
 pub fn enumerate_topics(depth: usize) -> Vec<(&'static Topic, Report)> {
     let topics = TOPICS.iter();
     topics
@@ -76,9 +76,9 @@ pub fn enumerate_topics(depth: usize) -> Vec<(&'static Topic, Report)> {
         .collect()
 }
 
-/// Tries every order of at most `depth` of `events` behind idle, stopped and active, on as many threads as there are processors.
+/// Tries every sequence of at most `depth` of `events` after idle, stopped and active, on as many threads as there are processors.
 ///
-/// Breadth first: the planes cannot be copied, so each order is carried out from the start. An order that breaks a promise is not continued.
+/// Breadth-first: the planes cannot be copied, so each sequence is executed from the start. A sequence that breaks a promise is not continued.
 pub fn enumerate_of(events: &[Event], depth: usize) -> Report {
     let image = scene();
     let mut report = Report {
@@ -99,7 +99,7 @@ pub fn enumerate_of(events: &[Event], depth: usize) -> Report {
                     let (orders, _) = report.broken.entry(broken).or_insert((0, found.path));
                     *orders += found.orders;
                 }
-                // Seen with fewer events: what follows was covered to a greater depth.
+                // Already reached with fewer events: its continuations were covered to a greater depth.
                 Ok(print) if seen.contains_key(&print) => {}
                 Ok(print) => match place.get(&print) {
                     Some(&index) => next[index].1 += found.orders,
@@ -136,14 +136,14 @@ fn expand(frontier: &[Node], events: &[Event], image: &[u8]) -> Vec<Found> {
             .into_iter()
             .flat_map(|worker| {
                 let found: std::thread::Result<Vec<Found>> = worker.join();
-                // A panic of a plane is a finding of its own: let it show.
+                // A panic of a plane is itself a finding: let it propagate.
                 found.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
             })
             .collect()
     })
 }
 
-/// Each of `events` behind one order.
+/// Executes each of `events` after one sequence.
 fn follow((path, orders): &Node, events: &[Event], image: &[u8]) -> Vec<Found> {
     let mut found = Vec::with_capacity(events.len());
     for &event in events {

@@ -1,4 +1,4 @@
-//! Both planes and everything around them, led through one order of events.
+//! Both planes and their environment, run through one sequence of events.
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
@@ -18,7 +18,7 @@ use crate::board::{Chip, ChipFlash, IDENTITY, Line, NoClock, Puppet, Rig};
 use crate::event::{Event, Host, ORDERS, Order};
 use crate::oracle::{Broken, Oracle};
 
-/// The parameter that is set and read; the two values it is set to, m. The rig stands at the origin, within both.
+/// The parameter that is set and read; its two values, m. The rig is at the origin, within both.
 const PARAMETER: ParameterId = ParameterId::WorkspaceRadius;
 const VALUES: [f32; 2] = [0.05, 0.3];
 /// Ticks of [`Event::Wait`]: a soft stop takes 100.
@@ -28,24 +28,24 @@ const WAIT_TICKS: u32 = 120;
 #[derive(Clone)]
 struct Sent {
     bytes: Vec<u8>,
-    /// Frames that follow it and need no freshness.
+    /// Frames after it that need no freshness.
     rest: Vec<u8>,
     stamp: Stamp,
-    /// Session it was sent in, counted by the greetings.
+    /// Session in which it was sent: number of the greeting.
     session: u32,
     arrived: bool,
 }
 
-/// What a host knows.
+/// State of a host.
 #[derive(Clone, Copy, Default)]
 struct Knows {
-    /// Its session, counted by the greetings; 0: none.
+    /// Its session: number of the greeting; 0: none.
     session: u32,
     stamp: u32,
     count: u32,
 }
 
-/// See the module.
+/// Both planes and their environment; see the module.
 pub(crate) struct World<'c, 's> {
     link: LinkPlane<'c, 's, ChipFlash<'s>>,
     control: ControlPlane<'c, 's, Puppet<'s>, NoClock>,
@@ -56,24 +56,24 @@ pub(crate) struct World<'c, 's> {
     decoder: Decoder,
     sessions: u32,
     hosts: [Knows; 2],
-    /// The newest of each order from A.
+    /// The newest frame of each order from A.
     sent: [Option<Sent>; ORDERS],
-    /// Counts of the newest fresh order that arrived in this session.
+    /// Count of the newest fresh order that arrived in this session.
     newest: u32,
     value: usize,
-    /// Values that were in force since the parameter was asked for; `None`: not asked.
+    /// Values in effect since the parameter was queried; `None`: no query.
     in_force: Option<Vec<f32>>,
-    /// Questions for the parameter without an answer yet.
+    /// Number of queries of the parameter without an answer yet.
     questions: u32,
     oracle: Oracle,
-    /// Events since the last tick that put a command into the queue or made one there outdated, and what each tick made of them since the last poll
-    /// that could pass something on: what the queues hold.
+    /// Content of the queues: the events since the last tick that put a command into the queue or made one in it outdated, and the result of each
+    /// tick since the last poll that could forward anything.
     queued: Vec<Event>,
     said: Vec<(Vec<Event>, Safety)>,
 }
 
 impl<'c, 's> World<'c, 's> {
-    /// Started with a scene, greeted by A.
+    /// Starts with a scene, greeted by A.
     pub fn new(channels: &'c mut Channels<'s>, chip: &'s Chip, rig: &'s Rig, scene: &'s [u8]) -> Self {
         let (link, control) = start(channels, ChipFlash { chip, rig }, Puppet(rig), NoClock, IDENTITY);
         let mut world = Self {
@@ -102,7 +102,7 @@ impl<'c, 's> World<'c, 's> {
         world
     }
 
-    /// Whether the event means anything here.
+    /// Whether the event can occur in this state.
     pub fn can(&self, event: Event) -> bool {
         match event {
             Event::Deliver(order) => self.sent[order as usize].is_some(),
@@ -111,7 +111,7 @@ impl<'c, 's> World<'c, 's> {
         }
     }
 
-    /// Lets it happen; the promise that it broke, if any.
+    /// Executes the event; returns the promise that it broke, if any.
     pub fn step(&mut self, event: Event) -> Option<Broken> {
         let waiting = self.link.waiting();
         let mut broken = None;
@@ -133,7 +133,7 @@ impl<'c, 's> World<'c, 's> {
             }
             Event::Read => {
                 let coming = self.link.parameters().get(PARAMETER);
-                // A second question before the answer to the first: either answer may come, in the order of the questions.
+                // A second query before the answer to the first: either answer may come, in the order of the queries.
                 let acting = self.acting();
                 self.in_force.get_or_insert_default().extend([acting, coming]);
                 self.questions += 1;
@@ -238,7 +238,7 @@ impl<'c, 's> World<'c, 's> {
         }
     }
 
-    /// By the world's own account: never arrived, of this session, and nothing sent after it has arrived.
+    /// By the independent record: the frame never arrived, is of this session, and no later frame has arrived.
     fn is_fresh(&self, sent: &Sent) -> bool {
         !sent.arrived && sent.session == self.sessions && sent.stamp.count > self.newest
     }
@@ -276,7 +276,7 @@ impl<'c, 's> World<'c, 's> {
         );
         let broken = self.oracle.tick(live, halted, self.rig.sensed.get().referenced);
         let differs = live != self.rig.driven.get();
-        // Every command that waited is carried out: what the link plane believes is in force must be.
+        // Every queued command has been executed: the value assumed by the link plane must be in effect.
         let believed = self.link.parameters().get(PARAMETER) == self.acting();
         broken
             .or(differs.then_some(Broken::StateDiffers))
@@ -287,7 +287,7 @@ impl<'c, 's> World<'c, 's> {
         self.control.settings().workspace_m
     }
 
-    /// Takes in what the board said.
+    /// Processes the board's output.
     fn listen(&mut self) -> Option<Broken> {
         let mut broken = None;
         for byte in std::mem::take(&mut self.line.bytes) {
@@ -306,7 +306,7 @@ impl<'c, 's> World<'c, 's> {
         broken
     }
 
-    /// Equal for worlds that go on alike.
+    /// Equal for equivalent worlds.
     pub fn fingerprint(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         let hash = &mut hasher;
@@ -318,7 +318,7 @@ impl<'c, 's> World<'c, 's> {
         for knows in &self.hosts {
             (knows.session == self.sessions, knows.session != 0).hash(hash);
         }
-        // Frames by what they can still do, and in which order they were sent.
+        // Frames by their possible effect, in the order in which they were sent.
         let mut order: Vec<(u32, usize)> = Vec::with_capacity(ORDERS);
         for (index, sent) in self.sent.iter().enumerate() {
             let Some(sent) = sent else {

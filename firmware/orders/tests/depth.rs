@@ -1,8 +1,8 @@
-//! No order of messages breaks a promise.
+//! No sequence of messages breaks a promise.
 
 use mortise_orders::{enumerate, enumerate_topics};
 
-/// What fits into CI; `deep` goes to 8.
+/// The depth that fits into CI; `deep` goes to 8.
 #[test]
 fn no_order_of_four_events_breaks_a_promise() {
     let report = enumerate(4);
@@ -10,7 +10,7 @@ fn no_order_of_four_events_breaks_a_promise() {
     assert!(report.broken.is_empty(), "{report}");
 }
 
-/// Fewer kinds of events at once, longer orders.
+/// Fewer events, longer sequences.
 #[test]
 fn no_order_of_eight_events_of_a_topic_breaks_a_promise() {
     for (topic, report) in enumerate_topics(8) {

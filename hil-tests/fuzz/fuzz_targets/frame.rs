@@ -1,6 +1,6 @@
-//! The frame decoder, in both directions: bytes as they come, and messages in frames whose checksum fits.
+//! The frame decoder, in both directions: raw bytes, and messages in frames with a valid checksum.
 //!
-//! What is decoded must encode again, and that must decode to the same bytes: else the two sides would not mean the same.
+//! A decoded message must encode, and decode again to the same bytes: otherwise the two sides would interpret it differently.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -29,11 +29,11 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// Sequence number and message as they come, checksum and COBS as they should be: chance finds no checksum.
+/// Sequence number and message from the fuzzer, with valid checksum and COBS: random input never has a valid checksum.
 fn frame_around(bytes: &[u8]) -> Vec<u8> {
     let mut raw = bytes.to_vec();
     raw.extend(CRC.checksum(bytes).to_le_bytes());
-    // With the delimiter behind it, which is 0.
+    // With the delimiter after it, which is 0.
     let mut wire = vec![0; cobs::max_encoding_length(raw.len()) + 1];
     let used = cobs::encode(&raw, &mut wire);
     wire.truncate(used + 1);
@@ -46,7 +46,7 @@ fn read<M: Serialize + DeserializeOwned>(wire: &[u8]) {
     for &byte in wire {
         if let Some(Ok((sequence, message))) = decoder.push::<M>(byte) {
             let mut first = [0; MAX_FRAME];
-            // Numbers may be written longer than need be; read and written again they are not.
+            // A number may be encoded longer than necessary; after reading and writing it again it is not.
             let first = encode(sequence, &message, &mut first).expect("what was read fits");
             let mut again = Decoder::new();
             let (number, message) = first

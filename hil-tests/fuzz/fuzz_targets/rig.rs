@@ -1,14 +1,14 @@
-//! A rig's description, as bytes from the link or from flash and as a file's text: whatever they are, what is taken can be driven.
+//! A rig's description, as bytes from the link or from flash and as a file's text: for any input, an accepted description can be driven.
 //!
-//! From what passes the checks the board builds kinematics and drives motors. So a description that is taken must give finite places, currents within
-//! its own limits, and must come back the same from bytes; one that is read from a file must come back from what is written of it. An even first byte
-//! is not part of it and says that the rest is bytes; `#` and `[`, with which a file begins, are odd.
+//! From an accepted description the board builds kinematics and drives motors. So it must give finite positions and currents within its own limits,
+//! and must be unchanged after a round trip through bytes; one read from a file must be unchanged after it is written and read again. An even first
+//! byte is not part of the description and marks the rest as bytes; `#` and `[`, with which a file begins, are odd.
 #![no_main]
 
 use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
-use mortise_firmware::joints::{ENCODERS, Joints};
-use mortise_firmware::kinematics::Model;
+use mortise_mechanism::joints::{ENCODERS, Joints};
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::limits::MAX_MESSAGE;
 use mortise_protocol::rig::Rig;
 use mortise_rig::{abilities, parse_rig, write_rig};
@@ -24,7 +24,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// As the board reads it.
+/// Reads it like the board.
 fn from_bytes(bytes: &[u8]) {
     let Ok(rig) = postcard::from_bytes::<Rig>(bytes) else {
         return;
@@ -41,21 +41,21 @@ fn from_bytes(bytes: &[u8]) {
     assert_eq!(postcard::from_bytes::<Rig>(written).as_ref(), Ok(&rig));
 }
 
-/// As the host reads it.
+/// Reads it like the host.
 fn from_text(text: &str) {
     let Ok(rig) = parse_rig(text, "rig.toml") else {
         return;
     };
     drive(&rig);
     let written = write_rig(&rig);
-    // Six digits: a number at the very end of its range may round out of it.
+    // Six digits: a number at the end of its range may round out of it.
     if let Ok(again) = parse_rig(&written, "rig.toml") {
         assert_eq!(again.joints.len(), rig.joints.len());
         assert_eq!(write_rig(&again), written);
     }
 }
 
-/// Forces in postures all over the joints' ranges, and beyond them: what motors are told stays within their limits.
+/// Forces in postures over the joints' ranges, and beyond them: the commands to the motors stay within their limits.
 fn drive(rig: &Rig) {
     let found = abilities(rig).expect("what was taken has a home");
     assert!(found.home_mm.iter().all(|mm| mm.is_finite()));
@@ -73,7 +73,7 @@ fn drive(rig: &Rig) {
         for force in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::splat(f32::MAX), Vec3::NAN] {
             let currents = joints.currents(force);
             for (current, joint) in currents.iter().zip(&rig.joints) {
-                // Two roundings.
+                // Tolerance of two roundings.
                 assert!(current.abs() <= joint.current_limit * (1.0 + 1e-6), "{current} A");
             }
         }

@@ -1,6 +1,6 @@
-//! The scene image's reader: whatever bytes, opening refuses or every access stays inside, and every distance is a number.
+//! The scene image's reader: for any bytes, opening refuses the image or every access stays inside, and every distance is a number.
 //!
-//! The checksum is made to fit: a writer at fault, or a hostile one, has one that does.
+//! The checksum is made valid, because a faulty or hostile writer also writes a valid one.
 #![no_main]
 
 use std::ops::Range;
@@ -19,7 +19,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// Length and checksum as they should be.
+/// Sets the correct length and checksum.
 fn seal(bytes: &mut [u8]) {
     let length = bytes.len() as u32;
     if let Some(place) = bytes.get_mut(LENGTH).filter(|_| length >= 20) {
@@ -29,7 +29,7 @@ fn seal(bytes: &mut [u8]) {
     }
 }
 
-/// Of the header, behind magic and layout.
+/// Offset of the length in the header, after magic and layout.
 const LENGTH: Range<usize> = 12..16;
 const CRC_AT: Range<usize> = 16..20;
 
@@ -40,7 +40,7 @@ fn use_everything(image: &SceneImage<'_>) {
     for i in 0..image.shape_count() {
         let shape = image.shape(i);
         let mut node = 0;
-        // Both ways through the tree: into each node, and over it.
+        // Both paths through the tree: into each node, and past it.
         while let Some(n) = shape.nodes.get(node) {
             for p in &shape.points[n.first_point as usize..][..n.point_count as usize] {
                 let _ = shape.faces[usize::from(p.face)].sense;

@@ -1,8 +1,8 @@
-//! What stands between a STEP file and the CAD kernel: scanner, checks, units, rewriting.
+//! The stages between a STEP file and the CAD kernel: scanner, checks, units, rewriting.
 //!
-//! The kernel itself is not fuzzed here: it runs in a process of its own whose crash, hang or hunger is an error message
-//! (`host/brep/tests/child.rs`). What is rendered for it must scan again, with as many entities: else the kernel would read something else than was
-//! checked.
+//! The kernel itself is not fuzzed here: it runs in a separate process, whose crash, hang or memory exhaustion is an error message
+//! (`host/brep/tests/child.rs`). The text rendered for it must scan again, with the same number of entities: otherwise the kernel would read
+//! something different from what was checked.
 #![no_main]
 #![allow(dead_code, reason = "the module has more than is fuzzed")]
 

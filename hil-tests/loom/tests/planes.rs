@@ -1,7 +1,7 @@
-//! The real planes on two threads: the link plane takes frames while the control plane ticks, in every interleaving with up to `PREEMPTIONS`
-//! switches that neither thread asked for, and with every stale value the memory model lets it read.
+//! The real planes on two threads: the link plane receives frames while the control plane ticks, in every interleaving with up to `PREEMPTIONS`
+//! preemptions, and with every stale value that the memory model allows it to read.
 //!
-//! - A tick that begins after STOP was taken drives no motor, and neither does any later one.
+//! - A tick that begins after STOP was received drives no motor, and neither does any later one.
 //! - Motors and flash exclude each other: loom watches one cell that a driven motor and a flash operation both write.
 
 mod board;
@@ -12,9 +12,9 @@ use loom::sync::atomic::{AtomicBool, Ordering};
 use loom::thread;
 use mortise_protocol::message::ToDevice;
 
-/// Switches between the threads that loom adds to those the code asks for. Most faults of concurrency need one or two.
+/// Preemptions that loom adds to the switches in the code. Most concurrency faults need one or two.
 const PREEMPTIONS: usize = 3;
-/// Ticks beside the link plane's work.
+/// Ticks during the link plane's work.
 const TICKS: usize = 3;
 
 /// Stack of a thread, in words.
@@ -27,18 +27,18 @@ fn explore(model: impl Fn() + Sync + Send + 'static) {
     let model = std::sync::Arc::new(model);
     builder.check(move || {
         let model = std::sync::Arc::clone(&model);
-        // On a thread of its own for the sake of its stack; loom's first one has little.
+        // On a separate thread because of its stack; loom's first thread has a small one.
         spawn(move || model()).join().expect("the model holds");
     });
 }
 
-/// A thread with room for a board.
+/// Starts a thread with a stack large enough for a board.
 fn spawn<T: Send + 'static>(body: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
     let builder = thread::Builder::new().stack_size(STACK);
     builder.spawn(body).expect("loom starts it")
 }
 
-/// Runs `messages` through the link plane beside `TICKS` ticks; `stopped` is set once the last one was taken.
+/// Runs `messages` through the link plane during `TICKS` ticks; `stopped` is set once the last one was received.
 fn beside(board: &mut Board, messages: Vec<ToDevice>, stop_is_last: bool) -> bool {
     let frames: Vec<Vec<u8>> = messages.iter().map(|message| board.frame(message)).collect();
     let stopped = Arc::new(AtomicBool::new(false));
@@ -76,7 +76,7 @@ fn stop_overtakes_what_was_sent_before_it() {
     explore(|| {
         let mut board = Board::with_scene();
         beside(&mut board, vec![ToDevice::Arm, ToDevice::Stop], true);
-        // Nothing that waited anywhere undoes it.
+        // No pending command undoes it.
         for _ in 0..3 {
             board.round();
             assert!(!board.is_live(), "driven after STOP");
@@ -106,7 +106,7 @@ fn flash_begun_before_arming_keeps_the_motors_off() {
     });
 }
 
-/// The models above say nothing unless motors are driven in some of their ways.
+/// The models above are meaningful only if motors are driven in some of their interleavings.
 #[test]
 fn the_models_reach_driven_motors() {
     use std::sync::atomic::AtomicBool as Plain;

@@ -1,27 +1,27 @@
-//! The queue between the planes, as `heapless` has it: what is read from a slot was written whole before, in order, and a slot is written again
+//! The queue between the planes, as `heapless` implements it: a slot is read only after it was written completely, in order, and is written again
 //! only after it was read.
 //!
-//! Cells that loom watches stand for the slots' memory, which it cannot see. For each item the producer writes a cell before it enqueues, and the
-//! consumer reads it after it dequeues. For each dequeued item the consumer writes a second cell before, and the producer reads it after it has
-//! enqueued the item that takes the same slot. Were an ordering in the queue weaker than release and acquire, loom would report a race.
+//! Loom cannot observe the memory of the slots, so cells that it watches stand for it. For each item the producer writes a cell before it enqueues,
+//! and the consumer reads it after it dequeues. For each dequeued item the consumer first writes a second cell, and the producer reads it after it
+//! has enqueued the item that takes the same slot. If an ordering in the queue were weaker than release and acquire, loom would report a race.
 
 use heapless::spsc::Queue;
 use loom::cell::UnsafeCell;
 use loom::sync::Arc;
 use loom::thread;
 
-/// What the queue holds at once.
+/// Capacity of the queue.
 const SLOTS: usize = 2;
-/// Items sent: every slot of the ring is used, the first ones again.
+/// Number of items sent: every slot of the ring is used, the first ones twice.
 const ITEMS: usize = 4;
 
-/// One cell an item and direction.
+/// One cell per item and direction.
 struct Cells {
     forward: [UnsafeCell<usize>; ITEMS],
     back: [UnsafeCell<usize>; ITEMS],
 }
 
-// SAFETY: loom reports two accesses that are not ordered; that is what is tested.
+// SAFETY: loom reports two accesses that are not ordered; this is the property under test.
 unsafe impl Sync for Cells {}
 
 fn cells() -> [UnsafeCell<usize>; ITEMS] {
@@ -44,7 +44,7 @@ fn items_arrive_whole_and_in_order() {
         let queue = Box::into_raw(Box::new(Queue::<usize, { SLOTS + 1 }>::new()));
         // SAFETY: the only reference. Both halves end before the box is taken back below.
         let (mut producer, mut consumer) = unsafe { &mut *queue }.split();
-        // Both of the queue's atomics are known to the model before the second thread starts.
+        // Both of the queue's atomics are registered with the model before the second thread starts.
         assert_eq!(consumer.len(), 0);
         let cells = Arc::new(Cells {
             forward: cells(),
@@ -57,7 +57,7 @@ fn items_arrive_whole_and_in_order() {
                 while producer.enqueue(item).is_err() {
                     thread::yield_now();
                 }
-                // The ring has one slot more than it holds.
+                // The ring has one slot more than its capacity.
                 if let Some(before) = item.checked_sub(SLOTS) {
                     assert_eq!(read(&far.back[before]), before, "the slot was read before");
                 }
@@ -75,7 +75,7 @@ fn items_arrive_whole_and_in_order() {
             assert_eq!(read(&cells.forward[item]), item, "whole");
         }
         sender.join().expect("the sender ends");
-        // SAFETY: both halves are used no more.
+        // SAFETY: both halves are no longer used.
         drop(unsafe { Box::from_raw(queue) });
     });
 }

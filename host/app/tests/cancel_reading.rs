@@ -1,6 +1,6 @@
-//! A reading that is cancelled in the window leaves no process behind, and its file does not open afterwards.
+//! Cancelling a reading in the window leaves no process behind, and its file does not open afterwards.
 //!
-//! This test program starts itself again as the reading process, so its `main` is its own and calls [`child::init`] first.
+//! The test program starts itself as the reading process, so it defines its own `main` and calls [`child::init`] first.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -11,18 +11,18 @@ use libtest_mimic::{Arguments, Failed, Trial};
 use mortise::session::{Intent, Session};
 use mortise_brep::child;
 
-/// Copies of the sample in one file: the kernel takes several seconds for them.
+/// Copies of the sample in one file, for which the kernel needs several seconds.
 const COPIES: u64 = 400;
-/// Above every number of the sample.
+/// Offset of the copies' entity numbers, above every number of the sample.
 const NUMBERS: u64 = 10_000;
-/// How soon the process must be gone.
+/// Time within which the process must have ended.
 const SOON: Duration = Duration::from_secs(1);
 
 fn main() -> ExitCode {
     child::init();
     let trial = |name, test: fn()| {
         Trial::test(name, move || {
-            // A panic is the failure; libtest-mimic reports it.
+            // The test fails by a panic, which libtest-mimic reports.
             test();
             Ok::<(), Failed>(())
         })
@@ -42,12 +42,12 @@ fn main() -> ExitCode {
         ),
     ];
     let mut arguments = Arguments::from_args();
-    // Each looks for its own file's reader; two at once would only take longer.
+    // Each test searches for the reader of its own file; running two at once would only slow both.
     arguments.test_threads = Some(1);
     libtest_mimic::run(&arguments, tests).exit_code()
 }
 
-/// The sample's entities again and again under other numbers.
+/// The sample's entities repeated under other numbers.
 fn slow_file() -> tempfile::TempPath {
     let sample = include_str!("../samples/pair_d18.75_clear1.00.step");
     let (header, rest) = sample.split_once("DATA;").expect("a data section");
@@ -72,7 +72,7 @@ fn slow_file() -> tempfile::TempPath {
     file.into_temp_path()
 }
 
-/// Processes that read this file; `None` where there is no /proc.
+/// Number of processes that read this file; `None` without /proc.
 fn readers_of(file: &Path) -> Option<usize> {
     let wanted = format!("MORTISE_BREP_CHILD_PATH={}\0", file.display());
     let processes = std::fs::read_dir("/proc").ok()?.flatten();
@@ -84,10 +84,10 @@ fn readers_of(file: &Path) -> Option<usize> {
     )
 }
 
-/// A session that reads `file` in a process of its own; `None` where processes cannot be looked at.
+/// A session that reads `file` in its own process; `None` where processes cannot be listed.
 fn reading(file: &Path) -> Option<Session> {
     if !cfg!(target_os = "linux") {
-        println!("not looked at: which processes there are is read from /proc");
+        println!("skipped: processes are listed from /proc, which is missing here");
         return None;
     }
     let mut session = Session::new(Arc::new(|| {}));
@@ -110,7 +110,7 @@ fn gone_soon(file: &Path, begun: Instant) {
         assert!(begun.elapsed() < SOON, "it still reads");
         std::thread::sleep(Duration::from_millis(2));
     }
-    println!("gone after {:?}", begun.elapsed());
+    println!("ended after {:?}", begun.elapsed());
 }
 
 fn cancelling_ends_the_reading_process() {
@@ -122,8 +122,8 @@ fn cancelling_ends_the_reading_process() {
     std::thread::sleep(Duration::from_millis(100));
     session.poll();
     assert!(!session.is_busy() && session.document.is_none());
-    let told: Vec<&str> = session.notes.iter().map(|note| note.text.as_str()).collect();
-    assert_eq!(told, ["Cancelled"]);
+    let notes: Vec<&str> = session.notes.iter().map(|note| note.text.as_str()).collect();
+    assert_eq!(notes, ["Cancelled"]);
 }
 
 fn opening_another_file_ends_the_reading_process() {

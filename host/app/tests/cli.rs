@@ -1,4 +1,4 @@
-//! The commands, as a person or a script runs them: the real program, its output and its exit code.
+//! The commands as a person or a script runs them: the real program, its output and its exit code.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -20,7 +20,7 @@ fn json(output: &Output) -> Value {
     serde_json::from_str(text).expect("JSON")
 }
 
-/// Exit code 2, nothing on standard output, one line on standard error that names `what`.
+/// Checks for exit code 2, nothing on standard output, and one line on standard error that names `what`.
 fn refused(arguments: &[&str], what: &str) {
     let output = mortise(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {output:?}");
@@ -30,14 +30,14 @@ fn refused(arguments: &[&str], what: &str) {
     assert!(said.starts_with("mortise: ") && said.contains(what), "{said}");
 }
 
-/// The shared parts, where they are.
+/// Folder of the shared parts, if present.
 fn shared() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let folder = std::env::var_os("MORTISE_SHARED").map_or(beside, PathBuf::from);
     folder.join("cad").is_dir().then_some(folder)
 }
 
-/// No window opens for any of these; with a display the program would otherwise run until it is closed.
+/// No window opens for any of these; on a display the program would otherwise run until the window is closed.
 #[test]
 fn a_mistyped_command_gets_a_suggestion_and_no_window() {
     refused(&["opne"], "did you mean `open`?");
@@ -62,7 +62,7 @@ fn inspect_says_what_is_in_the_file() {
     assert_eq!(parts[0]["faces"], serde_json::json!({"plane": 6, "cylinder": 1}));
     assert_eq!(parts[1]["faces"], serde_json::json!({"plane": 2, "cylinder": 1}));
     assert_eq!(parts[1]["closed"], true);
-    // 60 mm of a 17.75 mm cylinder, by the kernel's own integration: relative error below 1e-6.
+    // Volume of 60 mm of a 17.75 mm cylinder, by the kernel's integration: relative error below 1e-6.
     let exact = std::f64::consts::PI * 8.875f64.powi(2) * 60.0;
     let volume = parts[1]["volume_mm3"].as_f64().expect("number");
     assert!((volume / exact - 1.0).abs() < 1e-6, "{volume}");
@@ -82,15 +82,15 @@ fn contacts_of_two_pins_in_their_holes() {
         serde_json::json!(["socket-plate", "two-pin-link"])
     );
     let contacts = report["contacts"].as_array().expect("contacts");
-    let told = |c: &Value| serde_json::json!([c["kind"], c["a"], c["b"], c["count"]]);
+    let row = |c: &Value| serde_json::json!([c["kind"], c["a"], c["b"], c["count"]]);
     assert_eq!(
-        contacts.iter().map(told).collect::<Value>(),
+        contacts.iter().map(row).collect::<Value>(),
         serde_json::json!([
             ["planar", "socket-plate", "two-pin-link", 1],
             ["cylindrical", "socket-plate", "two-pin-link", 2]
         ])
     );
-    // Two pins of 6 mm, 12 mm long; unrolled walls are exact.
+    // Two pins of 6 mm, 12 mm long; the areas of unrolled walls are exact.
     let area = contacts[1]["area_mm2"].as_f64().expect("number");
     assert!(
         (area / (2.0 * std::f64::consts::PI * 6.0 * 12.0) - 1.0).abs() < 1e-9,
@@ -105,7 +105,7 @@ fn contacts_of_two_pins_in_their_holes() {
         text.starts_with("2 parts, 2 pairs of surfaces in contact\n"),
         "{text}"
     );
-    // Of the pair as delivered, nothing touches.
+    // In the sample as delivered, nothing touches.
     let apart = json(&mortise(&["contacts", SAMPLE, "--json"]));
     assert_eq!(apart["contacts"], Value::Array(vec![]));
     refused(&["contacts", "no-such-file.step", "--json"], "no-such-file.step");
@@ -162,7 +162,7 @@ fn bake_writes_an_image_a_board_would_take() {
     ]));
     let bytes = std::fs::read(&out).expect("written");
     assert_eq!(report["image_bytes"], bytes.len());
-    // Reading in place asks for the alignment flash has; a file's bytes have any.
+    // Reading in place requires the alignment of flash; a byte vector has none.
     let words: Vec<u32> = (bytes.chunks_exact(4))
         .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         .collect();
@@ -241,7 +241,7 @@ fn bake_by_the_textbooks_method() {
     let poses = folder.path().join("poses.csv");
     std::fs::write(&poses, "name,x,y,z,qw,qx,qy,qz\nas drawn,0,0,0,1,0,0,0\n").expect("written");
     let poses = poses.to_str().expect("UTF-8");
-    // An image says itself what it is.
+    // An image states its own method.
     refused(
         &[
             "probe",

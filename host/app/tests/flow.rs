@@ -1,5 +1,5 @@
-//! The whole way through the window without a display: open, choose a rig, connect, arm, grab, play, STOP.
-//! Controls are found by what a screen reader would find.
+//! The complete operation through the window without a display: open, choose a rig, connect, arm, grab, play, STOP. Controls are found by
+//! their accessible names, as a screen reader finds them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -37,10 +37,10 @@ fn from_an_empty_window_to_a_felt_insertion_and_stop() {
 
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
 
     click(&mut harness, "Play insertion");
-    // 60 mm of way; the peg's lower end is 20 mm above the hole.
+    // 60 mm of travel; the peg's lower end is 20 mm above the hole.
     until(&mut harness, "the peg is in to the full depth", |s| {
         s.document
             .as_ref()
@@ -60,8 +60,8 @@ fn from_an_empty_window_to_a_felt_insertion_and_stop() {
         "{said}"
     );
     harness.get_all_by_label(&said).next().expect("on screen");
-    let told = |s: &Session| s.notes.iter().filter(|n| n.text.starts_with("Goes in")).count();
-    assert_eq!(told(&harness.state().session), 1);
+    let reports = |s: &Session| s.notes.iter().filter(|n| n.text.starts_with("Goes in")).count();
+    assert_eq!(reports(&harness.state().session), 1);
 
     click(&mut harness, "STOP");
     until(&mut harness, "stopped", |s| {
@@ -91,7 +91,7 @@ fn the_demonstration_goes_from_nothing_to_an_inserted_peg_and_plays_again() {
     assert!(worst(&harness.state().session) < Severity::Warning);
 }
 
-/// Beside the hole, pushed down: the peg stands on the plate, or on the rim.
+/// Pushed down beside the hole, the peg stops on the plate or on the rim.
 #[test]
 fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
     for aside_mm in [0.9, 6.0] {
@@ -102,9 +102,9 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
         harness.state_mut().session.act(off);
         arm(&mut harness);
         harness.state_mut().session.act(Intent::Grab(1));
-        until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
-        let handle = harness.state().session.handle().expect("told");
-        // 20 mm down to the block, and 4 mm into it: 1.6 N of the hand's 400 N/m.
+        until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
+        let handle = harness.state().session.handle().expect("reported");
+        // 20 mm down to the block, and 4 mm further: 1.6 N at the hand's 400 N/m.
         let shifted = |down_mm: f64| {
             let mut pose = handle;
             pose.translation += DVec3::new(aside_mm, 0.0, -down_mm);
@@ -120,7 +120,7 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
         until(&mut harness, "the verdict", |s| s.verdict.is_some());
         let said = harness.state().session.verdict.as_ref().map(ToString::to_string);
         let said = said.expect("just seen");
-        // On the rim a tilted peg's wall may overlap the hole's by a little; whether the rim or the face beside it bears more is as it comes.
+        // On the rim a tilted peg's wall may overlap the hole's by a little; either the rim or the face beside it may bear more.
         let at_the_mouth = said.starts_with("Stuck at 0.0 mm: ") || said.starts_with("Stuck at 0.1 mm: ");
         assert!(at_the_mouth && said.ends_with(" of block"), "{said}");
     }
@@ -131,31 +131,31 @@ fn sending_the_scene_can_be_cancelled_and_begun_again() {
     let mut harness = harness();
     open_sample(&mut harness);
     connect(&mut harness);
-    // As large a scene as fits: the same one again is sent for long enough to be cancelled.
+    // The model is as large as fits, so that a repeated upload takes long enough to be cancelled.
     let session = &mut harness.state_mut().session;
     session.act(Intent::Upload);
     assert_eq!(obstacle(session, &Intent::CancelUpload), None);
     session.act(Intent::CancelUpload);
-    until(&mut harness, "the sending has ended", |s| {
+    until(&mut harness, "the upload has ended", |s| {
         s.connection().is_some_and(|c| c.upload.is_none())
     });
     let session = &harness.state().session;
     let newest = session.notes.newest().expect("a message");
-    assert!(newest.text.starts_with("Sending cancelled"), "{}", newest.text);
+    assert!(newest.text.starts_with("Upload cancelled"), "{}", newest.text);
     assert!(
         session.scene_is_on_board(),
-        "the scene the board had stays in use"
+        "the previous collision model stays in use"
     );
     assert!(worst(session) < Severity::Warning);
     harness.state_mut().session.act(Intent::Upload);
-    until(&mut harness, "sent whole", |s| {
+    until(&mut harness, "uploaded completely", |s| {
         s.notes
             .newest()
-            .is_some_and(|n| n.text == "The scene is on the board")
+            .is_some_and(|n| n.text == "The collision model is on the board")
     });
 }
 
-/// With the motors off and nothing moving, the window is woken every ten seconds, not with every sample: with software rendering each picture
+/// With the motors off and no motion, the window is woken every ten seconds and not by every sample: with software rendering each frame
 /// costs up to half a second of a core.
 #[test]
 fn an_idle_rig_hardly_wakes_the_window() {
@@ -180,8 +180,8 @@ fn an_idle_rig_hardly_wakes_the_window() {
     wait(&mut session, 12.0);
     let samples = session.history.iter().len() - samples;
     let wakes = woken.load(Ordering::Relaxed) - wakes;
-    // 62.5 samples a second.
-    assert!(samples > 360, "{samples} samples arrive all the same");
+    // 62.5 samples per second.
+    assert!(samples > 360, "{samples} samples arrive nevertheless");
     assert!(
         (1..=2).contains(&wakes),
         "woken {wakes} times in 12 s by {samples} samples"
@@ -210,12 +210,12 @@ fn the_part_in_hand_follows_the_pointer() {
     arm(&mut harness);
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
 
     let view = harness.get_by_label("3D view").rect();
     let camera = harness.state().view.camera;
     let middle = harness.state().session.document.as_ref().expect("open").poses[1].translation;
-    // The peg's frame lies at its upper end; half way down it is surely under the pointer.
+    // The peg's frame is at its upper end; its middle is certain to be under the pointer.
     let from = on_screen(&camera, view, middle - 30.0 * DVec3::Z).expect("in front");
     let to = from + egui::vec2(60.0, -40.0);
     harness.drag_at(from);
@@ -327,7 +327,7 @@ fn another_method_bakes_the_scene_again() {
         .act(Intent::ChooseMethod(Method::Occupancy));
     until(&mut harness, "baked again", |s| !s.is_busy());
     assert_eq!(voxmap(&harness.state().session), Some(true));
-    // The same once more changes nothing, so nothing is baked.
+    // Choosing the same method again changes nothing, so nothing is baked.
     harness
         .state_mut()
         .session
@@ -346,7 +346,7 @@ fn parameters_reach_the_board_and_stay_in_range() {
     session.act(Intent::SetParameter(ParameterId::ObjectMass, f32::NAN));
     let row = ParameterId::ObjectMass.row();
     assert_eq!(session.parameters[ParameterId::ObjectMass as usize], row.default);
-    // Connecting anew reads back what the board has.
+    // A new connection reads back the board's values.
     for _ in 0..200 {
         harness.step();
         std::thread::sleep(Duration::from_millis(5));

@@ -1,7 +1,7 @@
-//! Names of parts in scripts that the built-in fonts lack are drawn with fonts of the system, not as boxes.
+//! Part names in scripts that the built-in fonts lack are drawn with fonts of the system, not as boxes.
 //!
-//! The window under test panics when a character has no glyph, so that getting through is the proof; what the glyphs look like is compared
-//! besides. A script that no font of this system has is skipped, in words; set-up installs one that has Japanese.
+//! The window under test panics when a character has no glyph, so completing the test is the proof; the shapes of the glyphs are compared
+//! too. A script that no font of this system covers is skipped with a message; set-up installs a font for Japanese.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ fn is_on_this_system(name: &str) -> bool {
     let system = SystemFontProvider::new();
     let built_in = egui::Context::default();
     let mut own = false;
-    // One pass loads the built-in fonts.
+    // The first pass loads the built-in fonts.
     let _ = built_in.run_ui(egui::RawInput::default(), |_| {});
     built_in.fonts_mut(|fonts| own = fonts.has_glyphs(&FontId::proportional(13.5), name));
     own || name.chars().all(|c| {
@@ -54,7 +54,7 @@ fn rename(harness: &mut Harness<'_, Window>, name: &str) {
     harness.run_steps(3);
 }
 
-/// Coverage of each glyph of `text`, as it is drawn.
+/// Coverage of each glyph of `text` as drawn.
 fn glyphs(harness: &Harness<'_, Window>, text: &str) -> Vec<Vec<u8>> {
     harness.ctx.fonts_mut(|fonts| {
         let galley = fonts.layout_no_wrap(text.to_owned(), FontId::proportional(13.5), Color32::WHITE);

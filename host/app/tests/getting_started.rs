@@ -1,5 +1,5 @@
-//! `docs/getting-started.md` is walked: each step of the operator's list is done in the window, by the labels the page gives, and each command of
-//! the page is run, or named here with the place that runs it. A page that says something else fails.
+//! Executes `docs/getting-started.md`: each step of the operator's list is done in the window, by the page's labels, and each command of
+//! the page is run, or listed here with the step that runs it. A page that differs fails the test.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn page() -> String {
     std::fs::read_to_string(Path::new(ROOT).join("docs/getting-started.md")).expect("the page is there")
 }
 
-/// Numbered steps of a section, each on one line.
+/// Numbered steps of a section, each joined to one line.
 fn steps(page: &str, heading: &str) -> Vec<String> {
     let body = page.split(heading).nth(1).expect(heading);
     let body = body.split("\n#").next().expect("a section");
@@ -37,7 +37,7 @@ fn steps(page: &str, heading: &str) -> Vec<String> {
     steps
 }
 
-/// What stands in asterisks: labels of the window.
+/// The texts between asterisks: labels of the window.
 fn labels(step: &str) -> Vec<&str> {
     let mut found = Vec::new();
     let mut rest = step;
@@ -65,47 +65,47 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
     let page = page();
     let steps = steps(&page, "## Operator");
     let all: Vec<Vec<&str>> = steps.iter().map(|step| labels(step)).collect();
-    // The labels in the order the page gives them; what is done with them follows.
+    // The page's labels in their order; the steps below use them.
     let expected: [&[&str]; 8] = [
         &[],
         &["Open STEP file…", "Open the sample"],
         &["Connect", "Reconnect"],
-        &["Scene", "on the board", "Send the scene"],
+        &["Collision model", "on the board", "Upload model"],
         &["Arm"],
-        &["Grab", "Let go"],
+        &["Grab", "Release"],
         &["STOP", "Clear stop", "Arm"],
-        &["Disarm", "Put parts back"],
+        &["Disarm", "Reset parts"],
     ];
     assert_eq!(
         all, expected,
-        "the page has changed: do its steps here as it says them now"
+        "the page has changed: adapt the steps in this test"
     );
 
     let mut harness = harness();
     harness.run_steps(2);
-    // 2: both buttons are there; the file dialog is the desktop's own.
+    // 2: both buttons exist; the file dialog is the desktop's own.
     harness.get_by_label(all[1][0]);
     click(&mut harness, all[1][1]);
     until(&mut harness, "opened", |s| s.document.is_some());
     harness.get_by_role_and_label(Role::ListBoxOption, "peg");
-    // 3: `sim` is chosen from the start.
+    // 3: `sim` is chosen at the start.
     until(&mut harness, "rigs are listed", |s| !s.rigs.is_empty());
     assert_eq!(harness.state().session.chosen.to_string(), "sim");
     click(&mut harness, all[2][0]);
     until(&mut harness, "connected", is(DeviceState::Idle));
     assert!(harness.query_by_label(all[2][1]).is_none(), "nothing was lost");
-    // 4: nobody presses anything, and it is there.
-    until(&mut harness, "sent by itself", Session::scene_is_on_board);
+    // 4: the upload starts without any action.
+    until(&mut harness, "uploaded automatically", Session::scene_is_on_board);
     harness.run_steps(2);
     harness.get_by_label(all[3][0]);
     harness.get_by_label(all[3][1]);
     assert!(harness.query_by_label(all[3][2]).is_none(), "nothing to press");
     harness.state_mut().session.act(Intent::Bake);
-    until(&mut harness, "baked anew", |s| {
+    until(&mut harness, "baked again", |s| {
         !s.scene_is_on_board() && !s.is_busy()
     });
     harness.state_mut().session.act(Intent::CancelUpload);
-    // Cancelled: then the button is there. A small scene may have arrived before.
+    // If the upload was cancelled, the button is there. A small model may have arrived before.
     until(&mut harness, "sent or cancelled", |s| {
         s.connection().is_some_and(|c| c.upload.is_none())
     });
@@ -117,13 +117,13 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
     // 5.
     click(&mut harness, all[4][0]);
     until(&mut harness, "armed", is(DeviceState::Armed));
-    // 6: a double click on the part's line, then the buttons.
+    // 6: a click on the part's line, then the buttons; later a double click.
     click(&mut harness, "peg");
     click(&mut harness, all[5][0]);
-    until(&mut harness, "in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "held", |s| s.grabbed() == Some(1));
     harness.run_steps(2);
     click(&mut harness, all[5][1]);
-    until(&mut harness, "let go", is(DeviceState::Armed));
+    until(&mut harness, "released", is(DeviceState::Armed));
     let pos = (harness.get_by_role_and_label(Role::ListBoxOption, "peg").rect()).center();
     harness.hover_at(pos);
     harness.step();
@@ -136,7 +136,7 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
         });
     }
     harness.step();
-    until(&mut harness, "in hand by a double click", |s| {
+    until(&mut harness, "grabbed by a double click", |s| {
         s.grabbed() == Some(1)
     });
     // 7.
@@ -148,7 +148,7 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
     harness.run_steps(2);
     click(&mut harness, all[6][2]);
     until(&mut harness, "armed again", is(DeviceState::Armed));
-    // 8: refused while the motors are on, possible afterwards.
+    // 8: refused while the motors are on, possible after disarming.
     let refusal = obstacle(&harness.state().session, &Intent::ResetScene).expect("refused while armed");
     assert!(refusal.contains("motors are off"), "{refusal}");
     harness.run_steps(2);
@@ -161,7 +161,7 @@ fn the_operators_steps_can_be_done_as_the_page_says() {
     assert_eq!(device(&harness), Some(DeviceState::Idle));
 }
 
-/// The builder's steps need a rig; what they point at in the window does not.
+/// The builder's steps need a rig; the labels they name do not.
 #[test]
 fn the_builders_labels_are_in_the_window() {
     let page = page();
@@ -179,11 +179,11 @@ fn the_builders_labels_are_in_the_window() {
     }
 }
 
-/// Where a command of the page is run.
+/// Place where a command of the page is run.
 enum Run {
-    /// Here, with these arguments of `mortise`; the output contains the text.
+    /// In this test, with these arguments of `mortise`; the output contains the text.
     Here(&'static [&'static str], &'static str),
-    /// Elsewhere: needs a display, hardware, or is what runs this test.
+    /// Elsewhere: it needs a display or hardware, or it runs this test.
     Elsewhere(&'static str),
 }
 
@@ -244,10 +244,10 @@ const COMMANDS: [(&str, Run); 19] = [
     ("cargo xtask firmware", Run::Elsewhere("the step `firmware`")),
 ];
 
-/// In a block of its own: it is run with the rig that is always there.
+/// The page's separate block; it is run with the rig that is always available.
 const HEADLESS: &str = "cargo xtask demo --headless --rig emulated --json";
 
-/// Every command in blocks and in the text, without what explains it.
+/// Every command in code blocks and in the text, without trailing comments.
 fn commands(page: &str) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     let mut keep = |text: &str| {
@@ -265,7 +265,7 @@ fn commands(page: &str) -> BTreeSet<String> {
             keep(line);
         }
     }
-    // Inline code may go over the end of a line.
+    // Inline code may continue over the end of a line.
     let text: Vec<&str> = page.split("```").step_by(2).collect();
     for code in text
         .join("\n\n")
@@ -283,7 +283,7 @@ fn commands(page: &str) -> BTreeSet<String> {
 fn every_command_of_the_page_is_run_or_has_its_place() {
     let known: BTreeSet<String> = (COMMANDS.iter().map(|(command, _)| *command))
         .chain([HEADLESS])
-        // Environment before it, as written.
+        // Commands with leading environment variables, as written.
         .map(str::to_owned)
         .collect();
     let there: BTreeSet<String> = (commands(&page()).into_iter())
@@ -291,7 +291,7 @@ fn every_command_of_the_page_is_run_or_has_its_place() {
         .collect();
     assert_eq!(
         there, known,
-        "what the page says (left) is not what is run here (right)"
+        "the page's commands (left) differ from those run here (right)"
     );
     let folder = tempfile::tempdir().expect("a folder");
     let poses: PathBuf = folder.path().join("poses.csv");

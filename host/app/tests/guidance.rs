@@ -1,4 +1,4 @@
-//! Guidance through the window without a display: targets appear by themselves, one is switched off and on, STOP ends all.
+//! Guidance through the window without a display: targets appear automatically, one is switched off and on, STOP ends guidance.
 
 use std::path::Path;
 use std::time::Duration;
@@ -17,12 +17,12 @@ use mortise::viewport::compose::compose;
 use mortise::viewport::picture::Ground;
 use mortise_guide::{GuideSettings, List, Row, Standing, When};
 use mortise_mating::Axis;
-use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId, TargetKind};
-use mortise_protocol::message::{DeviceState, Telemetry, TouchingPair};
+use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId};
+use mortise_protocol::message::{ConstraintKind, DeviceState, Telemetry, TouchingPair};
 use mortise_protocol::parameter::ParameterId;
 
 fn row(session: &Session) -> Option<&Row> {
-    (session.guidance.rows.iter()).find(|row| row.target.kind == TargetKind::Concentric)
+    (session.guidance.rows.iter()).find(|row| row.target.kind == ConstraintKind::Concentric)
 }
 
 fn stands(session: &Session, standing: &Standing) -> bool {
@@ -39,7 +39,7 @@ fn targets_appear_by_themselves_can_be_switched_off_and_end_with_stop() {
     open_sample(&mut harness);
     connect(&mut harness);
     click(&mut harness, "Play insertion");
-    // The hand pushes the peg to the wall at the end: it touches, is recognised, sent, and held by the board.
+    // At the end the hand pushes the peg against the wall: the contact is recognised, and the target is sent and held by the board.
     until(&mut harness, "the peg is guided", |s| {
         stands(s, &Standing::Sent) && guided(s) == 1
     });
@@ -61,7 +61,7 @@ fn targets_appear_by_themselves_can_be_switched_off_and_end_with_stop() {
     until(&mut harness, "switched off", |s| {
         stands(s, &Standing::Off) && guided(s) == 0
     });
-    // Left to the contact, the hand's push takes it to the wall: half the clearance away.
+    // With the target off, the hand's push moves the peg to the wall: half the clearance away.
     until(&mut harness, "it is at the wall", |s| {
         row(s).is_some_and(|row| row.misfit.distance_mm > 0.3)
     });
@@ -80,7 +80,7 @@ fn targets_appear_by_themselves_can_be_switched_off_and_end_with_stop() {
     });
 }
 
-/// Clicks what may have to be scrolled to first.
+/// Scrolls to a control if necessary, and clicks it.
 fn choose(harness: &mut Harness<'_, Window>, label: &str) {
     harness.get_by_label(label).scroll_to_me();
     for _ in 0..20 {
@@ -153,11 +153,11 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     arm(&mut harness);
     click(&mut harness, "peg");
     click(&mut harness, "Grab");
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
     let session = &mut harness.state_mut().session;
     assert!(obstacle(session, &Intent::SwitchTargetOff(unknown, true)).is_some());
 
-    // A list and touching pairs of another world.
+    // A list and touching pairs that belong to another assembly.
     let mut telemetry: Box<Telemetry> = session.telemetry.clone().expect("in hand");
     let pair = TouchingPair {
         moving_face: u16::MAX,
@@ -185,11 +185,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     session.telemetry = Some(telemetry);
     let document = session.document.as_ref().expect("the sample");
     let items = compose(session, document, Camera::default(), false, Ground::Dark, 1.0).items;
-    assert_eq!(
-        items[1].lit_edges,
-        [[0, 2]],
-        "the edge of the part in hand that touches"
-    );
+    assert_eq!(items[1].lit_edges, [[0, 2]], "the touching edge of the held part");
     assert_eq!(items[0].lit_edges, [[3, 5]], "and that of the other");
     let mut odd = List {
         held: Some(1),
@@ -206,12 +202,12 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
         odd.rows.push(Row {
             target: Target {
                 id: unknown,
-                kind: TargetKind::Concentric,
+                kind: ConstraintKind::Concentric,
                 moving: axis(),
                 fixed: axis(),
                 play_mm: f64::NAN,
                 radius_mm: f64::INFINITY,
-                ball_moves: true,
+                inner_moves: true,
                 moving_faces: vec![],
                 fixed_faces: vec![u32::MAX],
             },
@@ -232,7 +228,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     assert!(picture.items.iter().all(|item| item.mates.is_empty()));
     harness.step();
 
-    // A link that is lost takes the list with it.
+    // A lost link clears the list.
     harness.state_mut().session.act(Intent::Disconnect);
     until(&mut harness, "disconnected", |s| s.connection().is_none());
     std::thread::sleep(Duration::from_millis(50));
@@ -254,7 +250,7 @@ fn two_pins_in_two_holes_are_two_targets_and_leave_a_slide() {
     let mut harness = harness();
     harness.step();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../mating/tests/data/two_pin_exact.step");
-    // Assembled as delivered nothing is pressed together, so nothing touches.
+    // As delivered, the assembly has no pressure between its parts and so no contact.
     harness.state_mut().session.act(Intent::GuideWhen(When::Near));
     harness.state_mut().session.act(Intent::Open(file));
     until(&mut harness, "it is baked", |s| {

@@ -1,4 +1,4 @@
-//! STOP and the state at every size of window and every scale: whole, on screen, and nothing over them.
+//! STOP and the state at every window size and scale: complete, on screen, and not covered.
 
 mod common;
 
@@ -8,7 +8,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use mortise::ui::Window;
 
-/// Pixels of common screens, from the smallest projector to 4K.
+/// Resolutions of common screens, pixels, from the smallest projector to 4K.
 const SCREENS: [(f32, f32); 9] = [
     (800.0, 600.0),
     (1024.0, 768.0),
@@ -22,7 +22,7 @@ const SCREENS: [(f32, f32); 9] = [
 ];
 const SCALES: [f32; 6] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
 
-/// What can be under the pointer or read: everything but what only groups others.
+/// Whether a node is visible content; the other roles only group nodes.
 fn is_leaf(role: Role) -> bool {
     matches!(
         role,
@@ -40,18 +40,18 @@ fn is_leaf(role: Role) -> bool {
 
 /// A window of `size` points.
 fn resize(harness: &mut Harness<'_, Window>, size: Vec2, scale: f32) {
-    // A new scale stretches the window of before, so the size comes second.
+    // A new scale stretches the existing window, so the size is set second.
     harness.set_pixels_per_point(scale);
     harness.step();
     harness.set_size(size);
-    // Panels know their sizes from the second picture on.
+    // Panels know their sizes from the second frame on.
     harness.run_steps(3);
     let off = harness.ctx.content_rect().size() - size;
-    // A window has whole pixels.
+    // A window has a whole number of pixels.
     assert!(off.length() < 1.0 / scale, "{off}");
 }
 
-/// STOP's and the state's rectangles; fails when they are not as they should be.
+/// Checks the rectangles of STOP and the state.
 fn check(harness: &mut Harness<'_, Window>, state: &str, what: &str) {
     for &(width, height) in &SCREENS {
         for scale in SCALES {
@@ -60,7 +60,7 @@ fn check(harness: &mut Harness<'_, Window>, state: &str, what: &str) {
             let screen = Rect::from_min_size(egui::Pos2::ZERO, size);
             let at = format!("{what}, {width} × {height} at {scale}");
             let stop = harness.get_by_role_and_label(Role::Button, "STOP");
-            // The chip is the only one of its words in the bar, and higher than a line of text.
+            // The chip is the only node in the bar with this text that is higher than a line of text.
             let chip = harness
                 .get_all_by_role(Role::Label)
                 .find(|node| {
@@ -70,7 +70,7 @@ fn check(harness: &mut Harness<'_, Window>, state: &str, what: &str) {
                 })
                 .unwrap_or_else(|| panic!("{at}: no state"));
             for (name, rect, least) in [("STOP", stop.rect(), 100.0), ("state", chip.rect(), 60.0)] {
-                // Rounding to pixels: half of one each side.
+                // Rounding to pixels: half a pixel on each side.
                 let slack = 0.5 / scale;
                 assert!(
                     screen.expand(slack).contains_rect(rect),
@@ -82,7 +82,7 @@ fn check(harness: &mut Harness<'_, Window>, state: &str, what: &str) {
                 );
                 for other in harness.root().children_recursive() {
                     let node = other.accesskit_node();
-                    // Without a place it is not drawn.
+                    // A node without bounds is not drawn.
                     let placed = node.raw_bounds().is_some();
                     if !is_leaf(node.role()) || !placed || other.rect() == rect {
                         continue;
@@ -108,27 +108,27 @@ fn stop_and_the_state_are_on_screen_at_every_size_and_scale() {
     harness.run_steps(2);
     check(&mut harness, "No rig", "nothing open");
     open_sample(&mut harness);
-    // A name longer than any bar.
+    // A title longer than any bar.
     {
         let document = harness.state_mut().session.document.as_mut().expect("open");
         document.title = "left-bearing-housing-with-extra-long-name-revision-12.step".repeat(3);
         let model = std::sync::Arc::make_mut(&mut document.model);
-        model.parts[1].name = "peg of a name that no bar of any window has room for ".repeat(4);
+        model.parts[1].name = "peg of a name that no bar of any window has space for ".repeat(4);
     }
     connect(&mut harness);
     check(&mut harness, "Idle", "connected");
     arm(&mut harness);
     harness.state_mut().session.act(mortise::session::Intent::Grab(1));
-    until(&mut harness, "the peg is in hand", |s| s.grabbed() == Some(1));
-    check(&mut harness, "In hand", "in hand");
-    // The dialog that asks for a path lies over everything else.
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
+    check(&mut harness, "Holding", "a part is held");
+    // The path dialog lies over everything else.
     harness.state_mut().session.wants_path = true;
     harness.run_steps(2);
-    check(&mut harness, "In hand", "a dialog is open");
+    check(&mut harness, "Holding", "a dialog is open");
     click(&mut harness, "STOP");
 }
 
-/// The same press at the smallest window there is.
+/// A press on STOP at the smallest window size.
 #[test]
 fn stop_works_in_the_smallest_window() {
     let mut harness = harness();

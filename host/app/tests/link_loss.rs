@@ -1,5 +1,5 @@
-//! A lost link in the window: told once, with the reason, and a button that connects again. The board is a simulated one behind a
-//! pseudo-terminal, so that its cable can be cut.
+//! A lost link in the window: reported once, with the reason, and with a button that reconnects. The board is simulated behind a
+//! pseudo-terminal, whose cable can be cut.
 #![cfg(unix)]
 
 use std::io::{ErrorKind, Read, Write};
@@ -17,7 +17,7 @@ use mortise_protocol::message::{DeviceState, ToDevice};
 use mortise_rig::{Flash, RigSpec, Transport, simulate};
 use serialport::{SerialPort as _, TTYPort};
 
-/// Bytes to and fro between a pseudo-terminal and a simulated board; none while it is cut.
+/// A cable between a pseudo-terminal and a simulated board: copies bytes both ways, and none while it is cut.
 struct Cable {
     over: Arc<AtomicBool>,
     cut: Arc<AtomicBool>,
@@ -67,7 +67,7 @@ impl Cable {
                 std::thread::spawn(move || copy(from, to, &over, &cut))
             })
             .collect();
-        // The board ends when both of its pipes are gone.
+        // The board ends when both of its pipes are dropped.
         threads.push(std::thread::spawn(move || drop(keep)));
         Self {
             over,
@@ -112,23 +112,25 @@ fn a_lost_link_is_told_once_with_its_reason_and_reconnect_mends_it() {
     assert_eq!(errors(&harness.state().session), [""; 0]);
 
     cable.cut.store(true, Ordering::Relaxed);
-    // Wishes that are under way when the link goes must not be told beside it.
+    // Requests under way when the link is lost must not be reported separately.
     harness.state_mut().session.act(Intent::Disarm);
     until(&mut harness, "the loss is noticed", |s| s.lost.is_some());
-    // What else was under way has time to complain.
+    // Time for pending requests to be reported.
     for _ in 0..100 {
         harness.step();
         std::thread::sleep(Duration::from_millis(10));
     }
     let session = &harness.state().session;
-    let told = errors(session);
-    assert_eq!(told.len(), 1, "{told:#?}");
-    assert!(told[0].contains("nothing was heard for"), "{told:?}");
+    let reported = errors(session);
+    assert_eq!(reported.len(), 1, "{reported:#?}");
+    assert!(reported[0].contains("nothing was received for"), "{reported:?}");
     assert_eq!(session.device(), None);
     harness.get_by_label("Link lost");
-    // In the card and among the messages.
+    // Once in the card and once among the messages.
     assert_eq!(
-        harness.get_all_by_label_contains("nothing was heard for").count(),
+        harness
+            .get_all_by_label_contains("nothing was received for")
+            .count(),
         2
     );
 
@@ -142,7 +144,7 @@ fn a_lost_link_is_told_once_with_its_reason_and_reconnect_mends_it() {
     assert!(!session.is_armed(), "motors stay off until armed");
 }
 
-/// A board that starts anew is a link lost with the board's own reason.
+/// A restart of the board is reported as a lost link with the board's own reason.
 #[test]
 fn a_board_that_starts_anew_is_told_once_and_reached_again() {
     let cable = Cable::new();
@@ -156,8 +158,11 @@ fn a_board_that_starts_anew_is_told_once_and_reached_again() {
     (harness.state().session.connection().expect("there")).request(ToDevice::Restart);
     until(&mut harness, "the loss is noticed", |s| s.lost.is_some());
     harness.run_steps(20);
-    let told = errors(&harness.state().session);
-    assert!(told.len() == 1 && told[0].contains("started anew"), "{told:#?}");
+    let reported = errors(&harness.state().session);
+    assert!(
+        reported.len() == 1 && reported[0].contains("the board has restarted"),
+        "{reported:#?}"
+    );
     click(&mut harness, "Reconnect");
     until(&mut harness, "connected again", |s| s.device().is_some());
 }

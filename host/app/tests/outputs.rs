@@ -1,4 +1,5 @@
-//! Files that commands write, by the real program: nothing that must stay is destroyed, and every refusal is one line with exit code 2.
+//! Files written by commands, tested with the real program: no existing file is destroyed without --force, and every refusal is one line
+//! with exit code 2.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -14,7 +15,7 @@ fn mortise(folder: &Path, arguments: &[&str]) -> Output {
     (program().current_dir(folder).args(arguments).output()).expect("the program starts")
 }
 
-/// Exit code 2 and one line that says `what`.
+/// Checks for exit code 2 and one line that contains `what`.
 fn refused(output: &Output, what: &str) {
     assert_eq!(output.status.code(), Some(2), "{what}: {output:?}");
     let said = String::from_utf8_lossy(&output.stderr);
@@ -25,7 +26,7 @@ fn refused(output: &Output, what: &str) {
     );
 }
 
-/// On the old code each of these was replaced or written through, with exit code 0.
+/// Regression test: each of these was once replaced or written through, with exit code 0.
 #[cfg(unix)]
 #[test]
 fn bake_destroys_nothing() {
@@ -61,7 +62,7 @@ fn bake_destroys_nothing() {
     assert_eq!(std::fs::read(at("victim")).expect("there"), b"precious");
     assert!(
         bake("new.image", false).status.success(),
-        "a link at an old temporary name is in nobody's way"
+        "a link at an old temporary name has no effect"
     );
     assert_eq!(std::fs::read(at("victim")).expect("there"), b"precious");
     assert!(bake("victim", true).status.success());

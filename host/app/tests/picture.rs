@@ -1,4 +1,4 @@
-//! The 3D view's renderer on whatever graphics device there is, a software one included, without a window.
+//! The 3D view's renderer on any available graphics device, including a software one, without a window.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -13,7 +13,7 @@ use mortise::viewport::renderer::Renderer;
 
 const SIZE: [u32; 2] = [320, 240];
 
-/// A device, or `None` with a message; in CI that is a failure.
+/// A graphics device, or `None` with a message; in CI its absence is a failure.
 fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let opened = pollster::block_on(async {
@@ -122,7 +122,7 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
     renderer.render(&picture(&document, camera));
     let (texture, _) = renderer.texture().expect("resized");
     let pixels = read(&device, &queue, texture);
-    // Block below z = 0, peg above it: their fronts have their own hue, the corner has neither.
+    // The block is below z = 0, the peg above: the front of each has its own hue; the corner is background.
     let (x, y) = at(DVec3::new(0.0, -25.0, -20.0));
     let [r, _, b] = pixel(&pixels, x, y);
     assert!(b > r + 60, "the block is blue: {r} {b}");
@@ -133,18 +133,18 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
     assert!(r.max(g).max(b) < 60, "the corner is background: {r} {g} {b}");
     assert!(pixels.iter().all(|p| p[3] == 255), "the picture is opaque");
 
-    // A face lit up is red, a ghost lets the part behind it through, an arrow lies over everything.
-    let mut told = picture(&document, camera);
+    // A highlighted face is red, a ghost is transparent, an arrow is drawn over everything.
+    let mut scene = picture(&document, camera);
     let front = face_at(&document, DVec3::new(0.0, -25.0, -20.0));
-    told.items[0].lit = vec![front];
-    told.items[1].opacity = 0.3;
-    told.arrows.push(Arrow {
+    scene.items[0].lit = vec![front];
+    scene.items[1].opacity = 0.3;
+    scene.arrows.push(Arrow {
         tail: DVec3::new(-20.0, 0.0, 60.0),
         vector: DVec3::new(0.0, 0.0, 30.0),
         thickness: 4.0,
         color: [0.0, 1.0, 0.0, 1.0],
     });
-    renderer.render(&told);
+    renderer.render(&scene);
     let (texture, _) = renderer.texture().expect("resized");
     let pixels = read(&device, &queue, texture);
     let (x, y) = at(DVec3::new(0.0, -25.0, -20.0));
@@ -154,11 +154,11 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
     let [r, g, _] = pixel(&pixels, x, y);
     assert!(g > r + 60, "the arrow is green: {r} {g}");
 
-    // A face that fits is green, in stripes, until it touches.
+    // A face that fits is striped green unless it touches.
     let (x, y) = at(DVec3::new(0.0, -25.0, -20.0));
-    told.items[0].lit = Vec::new();
-    told.items[0].mates = vec![front];
-    renderer.render(&told);
+    scene.items[0].lit = Vec::new();
+    scene.items[0].mates = vec![front];
+    renderer.render(&scene);
     let (texture, _) = renderer.texture().expect("resized");
     let pixels = read(&device, &queue, texture);
     let along: Vec<[i32; 3]> = (x - 12..x + 12).map(|x| pixel(&pixels, x, y)).collect();
@@ -169,14 +169,14 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
     let blue = |[_, g, b]: &[i32; 3]| b - g;
     let (low, high) = (along.iter().map(blue).min(), along.iter().map(blue).max());
     assert!(high > low.map(|low| low + 30), "striped: {along:?}");
-    told.items[0].lit = vec![front];
-    renderer.render(&told);
+    scene.items[0].lit = vec![front];
+    renderer.render(&scene);
     let (texture, _) = renderer.texture().expect("resized");
     let [r, _, b] = pixel(&read(&device, &queue, texture), x, y);
     assert!(r > b + 60, "touching comes first: {r} {b}");
 }
 
-/// The edge between the block's front and its top, seen from the front above the block's corner.
+/// The edge between the block's front and top, seen from in front of and above the block's corner.
 #[test]
 fn an_edge_that_touches_stands_out_and_no_other_does() {
     let Some((device, queue)) = device() else { return };
@@ -188,11 +188,11 @@ fn an_edge_that_touches_stands_out_and_no_other_does() {
     let mut camera = Camera::default();
     camera.look(View::Front);
     camera.fit(document.extent, aspect);
-    // How much of the picture about a point is nearly white.
+    // Number of nearly white pixels around a point.
     let mut white_at = |lit_edges: Vec<[u32; 2]>, point: DVec3| {
-        let mut told = picture(&document, camera);
-        told.items[0].lit_edges = lit_edges;
-        renderer.render(&told);
+        let mut scene = picture(&document, camera);
+        scene.items[0].lit_edges = lit_edges;
+        renderer.render(&scene);
         let (texture, _) = renderer.texture().expect("resized");
         let pixels = read(&device, &queue, texture);
         let ndc = camera.project(point, aspect).expect("in front");

@@ -33,7 +33,7 @@ fn a_row_a_pose() {
     for (row, (name, exact)) in rows.iter().zip([("in", 0.1), ("pressed", -0.1)]) {
         assert_eq!(row["name"], name);
         let distance = row["distance_mm"].as_f64().expect("a number");
-        // As in the lab's test of this scene: 5 µm and less.
+        // The same bound as in the lab's test of this scene: 5 µm.
         assert!((distance - exact).abs() < 5e-3, "{row}");
         for key in ["contacts", "points", "least_ns"] {
             assert!(row[key].is_u64(), "{row}");

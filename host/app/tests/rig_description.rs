@@ -1,4 +1,4 @@
-//! `mortise rig`, as a rig builder runs it: a sound description, every kind of unsound one, and what a board keeps.
+//! `mortise rig` as a rig builder runs it: a valid description, every kind of invalid one, and the storage on a board.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -22,7 +22,7 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("UTF-8")
 }
 
-/// Exit code 2, nothing on standard output, one line on standard error with each of `pieces`.
+/// Checks for exit code 2, nothing on standard output, and one line on standard error with each of `pieces`.
 fn refused(arguments: &[&str], pieces: &[&str]) {
     let output = mortise(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {output:?}");
@@ -44,14 +44,20 @@ fn check_says_what_a_described_rig_can_do() {
     assert!(output.status.success(), "{output:?}");
     let found: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!((&found["name"], &found["joints"]), (&"hapkit".into(), &1.into()));
-    // One count of 25967 a turn at 65.659 mm.
+    // One count of 25967 per revolution at a radius of 65.659 mm.
     let step = std::f64::consts::TAU * 65.659 / 25967.0;
-    let told = found["resolution_mm"].as_f64().expect("a number");
-    assert!((told / step - 1.0).abs() < 1e-3, "{told} for {step}");
-    // Pulley torque at 1 A, times the gear, over the radius; the ceiling of 5 N below it.
+    let found_value = found["resolution_mm"].as_f64().expect("a number");
+    assert!(
+        (found_value / step - 1.0).abs() < 1e-3,
+        "{found_value} for {step}"
+    );
+    // Pulley torque at 1 A times the gear ratio over the radius; the hardware limit of 5 N is below it.
     let most = 0.03 * 17.4546 / 0.065659;
-    let told = found["force_strongest_n"].as_f64().expect("a number");
-    assert!(most > 5.0 && told <= 5.0 + 1e-6 && told > 4.99, "{told}");
+    let found_value = found["force_strongest_n"].as_f64().expect("a number");
+    assert!(
+        most > 5.0 && found_value <= 5.0 + 1e-6 && found_value > 4.99,
+        "{found_value}"
+    );
 
     for name in ["haply_2diy.toml", "woodenhaptics.toml", "polhem.toml"] {
         let output = mortise(&["rig", "check", text(&example(name))]);
@@ -95,7 +101,7 @@ fn check_says_what_is_wrong_where_and_what_to_do() {
         assert!(good.contains(from), "{from}");
         std::fs::write(&file, good.replacen(from, to, 1)).expect("written");
         refused(&["rig", "check", text(&file)], pieces);
-        // What does not pass the check reaches no board.
+        // A description that fails the check is never sent to a board.
         refused(&["rig", "send", text(&file), "--rig", "sim"], pieces);
     }
     std::fs::write(&file, [0xff, 0xfe, 0x00]).expect("written");
@@ -106,7 +112,7 @@ fn check_says_what_is_wrong_where_and_what_to_do() {
     );
 }
 
-/// Two programs, one after the other: neither may claim that a simulated rig keeps what it was sent.
+/// Two consecutive program runs: neither may claim that a simulated rig stores the description it was sent.
 #[test]
 fn a_simulated_rig_says_that_it_keeps_a_description_only_as_long_as_the_program_runs() {
     let file = example("haply_2diy.toml");

@@ -1,4 +1,4 @@
-//! Bakes a STEP file and prints what came of it: `cargo run --release -p mortise-bake --example bake -- FILE [CELL_MM] [int8|int16] [classic] [all]`.
+//! Bakes a STEP file and prints the result: `cargo run --release -p mortise-bake --example bake -- FILE [CELL_MM] [int8|int16] [classic] [all]`.
 
 use std::ops::ControlFlow;
 use std::time::Instant;

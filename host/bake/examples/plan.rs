@@ -1,4 +1,4 @@
-//! Plans a STEP file and prints what was chosen: `cargo run --release -p mortise-bake --example plan -- FILE ACCURACY_UM [FLASH_KIB] [TICK]`.
+//! Plans a STEP file and prints the plan: `cargo run --release -p mortise-bake --example plan -- FILE ACCURACY_UM [FLASH_KIB] [TICK]`.
 
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -1,15 +1,15 @@
-//! What a model errs, and the coarsest one that errs no more than asked.
+//! Error bounds of a model, and the coarsest cell whose error stays within a bound.
 //!
 //! | error | bound |
 //! |---|---|
-//! | trilinear interpolation of the exact distance | cell²/8·Σ\|κᵢ\|/(1 − \|κᵢ\|·r) over both principal curvatures: these are the sum of the distance's second derivatives along the axes, and r = (¼ + √3) cells is as far from the surface as a corner of a cell within a quarter of a cell of it can be |
+//! | trilinear interpolation of the exact distance | cell²/8·Σ\|κᵢ\|/(1 − \|κᵢ\|·r) over both principal curvatures: the fractions sum to the distance's second derivatives along the axes; r = (¼ + √3) cells is the greatest distance from the surface of a corner of a cell that has a point within a quarter of a cell of it |
 //! | number step | half a step: [`SampleFormat`] |
 //! | 32-bit positions | 4·2⁻²⁴ of the shape's size |
-//! | shell, round in hollow | ε·(1 − R₁/R₂): rims are sampled by s² = 8ε·R₁ and follow a curve that bends nearly as much |
-//! | shell, anything else | ε |
+//! | shell, round in hollow | ε·(1 − R₁/R₂): rims are sampled with spacing s² = 8ε·R₁ and touch a curve of nearly the same curvature |
+//! | shell, all other contacts | ε |
 //!
-//! They hold within a quarter of a cell of the surface, where the nearest point is inside a face that bends less than half a radian a cell. Within a
-//! cell of a sharp edge, or where two surfaces are equally near, interpolation cuts the crease: up to half a cell.
+//! The bounds hold within a quarter of a cell of the surface, where the nearest point is inside a face that bends less than half a radian per cell.
+//! Within a cell of a sharp edge, or where two surfaces are equally near, interpolation smooths the crease: the error is up to half a cell.
 
 use mortise_brep::Surface;
 
@@ -17,14 +17,14 @@ use crate::distance::ExactSurface;
 use crate::field::{FieldOptions, SampleFormat};
 use crate::surface::{parameters, principal_curvatures};
 
-/// Distance from the surface, in cells, up to which the bounds hold: parts that touch are nearer than that.
+/// Distance from the surface, in cells, up to which the bounds hold: touching parts are nearer than that.
 pub const NEAR_CELLS: f64 = 0.25;
-/// Farthest corner of a cell that near, in cells.
+/// Distance of the farthest corner of a cell that near to the surface, in cells.
 pub(crate) const REACH_CELLS: f64 = NEAR_CELLS + 1.733;
-/// A cone nearer to its tip than this part of its largest radius is an edge.
+/// Distance from a cone's tip, as a fraction of its largest radius, within which the cone is treated as an edge.
 const TIP: f64 = 1.0 / 8.0;
 
-/// Largest absolute principal curvatures over a face, 1/mm; 0 for splines, whose bend their tessellation has already lost.
+/// Largest absolute principal curvatures over a face, 1/mm; 0 for splines, whose curvature is already lost in their tessellation.
 pub(crate) fn face_bend(surface: &ExactSurface, face: u32) -> [f64; 2] {
     let shape = surface.shape();
     let kind = &shape.faces[face as usize].surface;
@@ -44,7 +44,7 @@ pub(crate) fn face_bend(surface: &ExactSurface, face: u32) -> [f64; 2] {
         .fold([0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])])
 }
 
-/// Most that interpolation errs near a surface of this bend, mm; infinite where a cell does not resolve it.
+/// Largest interpolation error near a surface with principal curvatures `bend`, mm; infinite where a cell does not resolve it.
 pub(crate) fn interpolation_error(cell_mm: f64, bend: [f64; 2]) -> f64 {
     let reach = REACH_CELLS * cell_mm;
     let of = |k: f64| {
@@ -64,19 +64,19 @@ pub(crate) fn step_error(cell_mm: f64, band_cells: f64, format: SampleFormat) ->
     0.5 * cell_mm / options.units_per_cell()
 }
 
-/// Rounding of positions in 32 bits, mm, for a shape of this size.
+/// Rounding of positions to 32 bits, mm, for a shape of this size.
 pub(crate) fn rounding_error(size_mm: f64) -> f64 {
     4.0 * size_mm * f64::from(f32::EPSILON) / 2.0
 }
 
-/// Whether a cell may resolve a surface of this bend at all when the error is to be `accuracy_mm`: where the cell that would be needed is more than
-/// half a radian wide, the surface is an edge to the field.
+/// Whether a cell can resolve a surface with principal curvatures `bend` at an error of `accuracy_mm`. If the required cell were more than half a
+/// radian wide, the field treats the surface as an edge.
 pub(crate) fn is_resolvable(accuracy_mm: f64, bend: [f64; 2]) -> bool {
     let sharper = bend[0].max(bend[1]);
     sharper <= 0.0 || (8.0 * accuracy_mm / sharper).sqrt() * sharper <= 0.5
 }
 
-/// Largest cell, at most `most`, whose `error` is within `bound`; errors grow with the cell.
+/// Largest cell, at most `most`, whose `error` is within `bound`; errors increase with the cell.
 pub(crate) fn largest_cell(most: f64, bound: f64, error: impl Fn(f64) -> f64) -> f64 {
     if error(most) <= bound {
         return most;

@@ -24,26 +24,26 @@ use crate::tree::node_count;
 /// A scene image and what is in it.
 #[derive(Clone, Debug)]
 pub struct Baked {
-    /// The image's bytes.
+    /// Bytes of the image.
     pub image: Vec<u8>,
-    /// Bytes by part and kind, leaks, doubts.
+    /// Bytes by part and kind, leaks, warnings.
     pub report: BakeReport,
 }
 
-/// Attempts at the largest scale that fits.
+/// Attempts to find the finest scale that fits.
 const ATTEMPTS: usize = 12;
-/// The first, coarse attempt at a scene whose cells are free to choose: a sixteenth of the work, and its bytes tell how far to refine.
+/// Scale of the first, coarse attempt when cells may be chosen freely: it costs a sixteenth of the work, and its byte count shows how far to refine.
 const SCOUT: f64 = 4.0;
-/// Cells in the pointshell's default error bound. It is met only where a lone convex edge or a curved face touches something unlike itself; in
-/// a fit the error is smaller by the ratio of the radii to their difference.
+/// Cell edge over the pointshell's default error bound. The error reaches the bound only where a lone convex edge or a curved face touches a
+/// dissimilar surface; in a fit it is smaller by the factor of the radius difference over the radius.
 const EPSILON_PER_CELL: f64 = 20.0;
-/// Default of the largest spacing along edges, in cells.
+/// Default for the largest spacing along edges, in cells.
 const MAX_SPACING_CELLS: f64 = 4.0;
 
-/// Bakes `model` into a scene image. `progress` is called from any thread; it may stop the work with [`ControlFlow::Break`].
+/// Bakes `model` into a scene image. `progress` is called from any thread; it can stop the work with [`ControlFlow::Break`].
 ///
-/// Parts without a surface are left out with a warning. Cost: see [`crate::bake_field`]; when the cell is free to choose and the image
-/// limit binds, about twice that.
+/// Parts without a surface are skipped with a warning. Cost: see [`crate::bake_field`]; about twice that when the cell may be chosen freely and the
+/// image limit binds.
 ///
 /// # Errors
 /// See [`BakeError`].
@@ -84,14 +84,14 @@ fn too_large(bytes: u64, limit: u64, cell_mm: f64) -> BakeError {
     }
 }
 
-/// What is made of each shape.
+/// Fields and pointshells made for the shapes.
 pub(crate) struct Made {
     pub fields: Vec<BakedField>,
     pub shells: Vec<Pointshell>,
 }
 
 impl Made {
-    /// Bytes it takes in the image, parts and header apart.
+    /// Bytes of the shapes in the image, without parts and header.
     fn bytes(&self) -> u64 {
         let shells = self.shells.iter().map(|shell| {
             let points = shell.points.len();
@@ -108,8 +108,8 @@ fn field_bytes(field: &BakedField) -> u64 {
 }
 
 impl Scene {
-    /// Fields and pointshells, each shape by its own options, with cells of about these sizes (a size too small for the layout is made larger when
-    /// the choice is free).
+    /// Makes fields and pointshells, each shape by its own options, with cells of about these sizes (a size too small for the layout is enlarged when
+    /// the cell may be chosen freely).
     pub fn fields_and_shells(
         &self,
         each: &[BakeOptions],
@@ -126,7 +126,7 @@ impl Scene {
         Ok(Made { fields, shells })
     }
 
-    /// Other pointshells for fields there are.
+    /// Makes new pointshells for existing fields.
     pub fn shells_again(&self, each: &[BakeOptions], prepared: &[ExactSurface], made: &mut Made) {
         let cells = made
             .fields
@@ -140,8 +140,8 @@ impl Scene {
             .collect();
     }
 
-    /// The finest scale, not finer than `first`, whose image fits: from coarse to fine, as bytes grow at most with the inverse square of
-    /// the cell.
+    /// Finds the finest scale, not finer than `first`, whose image fits. It goes from coarse to fine, because bytes grow at most with the inverse
+    /// square of the cell.
     fn fit(
         &self,
         model: &CadModel,
@@ -158,7 +158,7 @@ impl Scene {
             + faces * size_of::<FaceRecord>()
             + 64) as u64;
         let mut scale = SCOUT;
-        // How bytes grow with the inverse of the cell: at most as its square; less where bricks repeat, which two attempts show.
+        // Exponent of the bytes in the inverse cell: 2 at most, less where bricks repeat; two attempts show the actual value.
         let mut power = 2.0;
         let mut best: Option<(f64, Made)> = None;
         let largest_cell = first.iter().copied().fold(0.0, f64::max);
@@ -171,7 +171,7 @@ impl Scene {
                     ..p
                 })
             };
-            // Only the finest attempt there can be moves the bar; the ones before take a fraction of its time.
+            // Only the finest possible attempt moves the progress bar; earlier ones take a fraction of its time.
             let made = if scale <= 1.0 {
                 self.fields_and_shells(each, prepared, cells, progress)?
             } else {
@@ -185,21 +185,21 @@ impl Scene {
                     power = (grown / (coarser / scale).ln()).clamp(1.0, 2.0);
                 }
                 best = Some((scale, made));
-                // A little less than the room there is: an attempt that overshoots is wasted.
+                // Aim a little below the limit: an attempt that overshoots is wasted.
                 let next = (scale / (room * 0.97).max(1.0).powf(1.0 / power)).max(1.0);
                 if next > 0.97 * scale {
                     break;
                 }
                 scale = next;
             } else if let Some((fitting, _)) = best {
-                // Overshot: back half of the way, as long as that is worth another attempt.
+                // Overshot: go back half of the way, as long as another attempt is worthwhile.
                 scale = (scale * fitting).sqrt();
                 power = 2.0;
                 if scale > 0.95 * fitting {
                     break;
                 }
             } else if scale * largest_cell > 1e3 {
-                // Cells of a metre and still too large: parts and faces alone do not fit. The caller says so.
+                // Even cells of a metre are too large: parts and faces alone do not fit. The caller reports it.
                 return Ok(made);
             } else {
                 scale /= (room * 0.9).sqrt().min(0.8);
@@ -298,7 +298,7 @@ impl Scene {
         }
     }
 
-    /// The last word to `progress`.
+    /// Sends the final progress report.
     pub fn done(&self, progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync)) {
         let _ = progress(Progress {
             stage: Stage::Image,
@@ -308,7 +308,7 @@ impl Scene {
         });
     }
 
-    /// The image, however large, as long as its offsets fit 32 bits.
+    /// Assembles the image, of any size whose offsets fit 32 bits.
     pub fn assemble(
         &self,
         model: &CadModel,
@@ -365,10 +365,10 @@ fn shell_options(options: &BakeOptions, cell_mm: f64, partners: &Partners) -> Po
     PointshellOptions {
         epsilon_mm,
         crossing_epsilon_mm: options.crossing_epsilon_mm.unwrap_or(epsilon_mm),
-        // The field shows nothing sharper than a cell: what is, is sampled as if it were a cell's radius.
+        // The field resolves nothing sharper than a cell: sharper features are sampled as if their radius were one cell.
         least_spacing_mm: (4.0 * epsilon_mm * cell_mm).sqrt(),
         max_spacing_mm: options.max_spacing_mm.unwrap_or(MAX_SPACING_CELLS * cell_mm),
-        // A voxmap is asked by one part's points only, so they must lie everywhere.
+        // Only one part's points query a voxmap, so they must cover the whole surface.
         partners: match options.method {
             Method::DistanceField => partners.clone(),
             Method::Occupancy => Partners::Unknown,

@@ -1,4 +1,4 @@
-//! Which bricks hold surface, and how far the others are from it: classification from coarse to fine.
+//! Classification of bricks from coarse to fine: which contain surface, and how far the others are from it.
 
 use glam::DVec3;
 use mortise_protocol::image::{BRICK_CELLS, GridEntry};
@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::distance::{ExactSurface, Scratch};
 use crate::grid::Grid;
 
-/// What a grid entry will say.
+/// Content of a grid entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Class {
     /// The band crosses it: samples are stored.
@@ -23,12 +23,12 @@ pub(crate) enum Class {
 
 /// Edge of the cubes of bricks the classification starts from: a power of two.
 const BLOCK: u32 = 16;
-/// Most boxes looked at to tighten one brick's bound.
+/// Most boxes examined to tighten one brick's bound.
 const REFINEMENTS: usize = 48;
 
-/// Classifies every brick of `grid`: stored when some point of it is within `reach` mm of the surface (and possibly when one is a little
-/// farther), else empty with a true lower bound. Whole blocks far from the surface cost one query. `alive` is asked now and then; false
-/// ends the work early with whatever there is.
+/// Classifies every brick of `grid`: stored when some point of it is within `reach` mm of the surface (possibly also when one is slightly farther),
+/// else empty with a true lower bound. Whole blocks far from the surface cost one query. `alive` is polled regularly; when it returns false the work
+/// ends early with the results so far.
 pub(crate) fn classify(
     surface: &ExactSurface,
     grid: &Grid,
@@ -85,8 +85,8 @@ fn descend(
         return;
     };
     if edge > 1 && far > half_diagonal + reach {
-        // Nowhere near: one sign for the whole block, and each brick's bound from the distance at its own centre, which cannot be less
-        // than the block's by more than the way there.
+        // Far from the surface: one sign for the whole block. Each brick's bound comes from the distance at its own centre, which is at least the
+        // block's distance less the distance between the two centres.
         let inside = is_inside(surface, center, scratch);
         for z in first[2]..(first[2] + edge).min(grid.dims[2]) {
             for y in first[1]..(first[1] + edge).min(grid.dims[1]) {
@@ -126,7 +126,7 @@ fn is_inside(surface: &ExactSurface, p: DVec3, scratch: &mut Scratch) -> bool {
 }
 
 fn empty(grid: &Grid, inside: bool, bound_mm: f64) -> Class {
-    // A millionth for the board's f32 product, a thousandth of a cell for its f32 brick index.
+    // Margins: a millionth for the board's f32 product, a thousandth of a cell for its f32 brick index.
     let cells = (bound_mm * (1.0 - 1e-6) / grid.cell() - 1e-3).floor().max(0.0);
     Class::Empty {
         inside,

@@ -1,4 +1,4 @@
-//! One brick: 9³ exact samples, and for each of its 8³ cells what lies nearest.
+//! One brick: 9³ exact samples, and the nearest face or faces of each of its 8³ cells.
 
 use glam::DVec3;
 use mortise_brep::Surface;
@@ -17,13 +17,13 @@ pub(crate) struct Brick {
     pub index_bits: u16,
     /// Palette indices as stored; empty for 0 bits.
     pub indices: Vec<u8>,
-    /// Entries, ascending, then the groups of faces they refer to.
+    /// Entries, ascending, followed by the groups of faces they refer to.
     pub palette: Vec<u16>,
-    /// Entries, groups apart.
+    /// Number of entries, without groups.
     pub palette_len: u16,
 }
 
-/// Samples brick `at` of `grid`.
+/// Samples the brick at place `at` of `grid`.
 pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOptions, at: [u32; 3]) -> Brick {
     let mut scratch = Scratch::default();
     let units_per_mm = options.units_per_cell() / grid.cell();
@@ -46,7 +46,7 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
                         distance: nearest.distance,
                         face: nearest.face as u16,
                     };
-                    // The next sample along x is one cell away; a new row starts afresh.
+                    // The next sample along x is one cell away; a new row starts without a known bound.
                     within = if x + 1 < BRICK_SAMPLES {
                         nearest.distance.abs() + grid.cell() * (1.0 + 1e-9)
                     } else {
@@ -77,14 +77,15 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
     }
 }
 
-/// Rounds to the format's range, halves away from zero. A hundred-thousandth of a unit is rounded off first, so that the same distance
-/// computed at another place (off by rounding, far less than that) gives the same sample.
+/// Rounds to the format's range, halves away from zero. A hundred-thousandth of a unit is rounded off first, so that the same distance computed at
+/// another place (it differs by rounding, far less than that) gives the same sample.
 fn quantise(units: f64, format: SampleFormat) -> f64 {
     let snapped = (units * 1e5).round() / 1e5;
     snapped.round().clamp(-format.max(), format.max())
 }
 
-/// What lies nearest to each cell: the face of its corners where they agree, else that of its centre, and what exact surfaces say.
+/// Nearest face of each cell: the face of its corners where they agree, else that of its centre; and whether exact surfaces give the distance (see
+/// `CellNearby`).
 fn cells(
     surface: &ExactSurface,
     grid: &Grid,
@@ -127,12 +128,12 @@ fn cells(
     cells
 }
 
-/// What lies nearest to the cells of a brick, as stored.
+/// Nearest faces of the cells of a brick, as stored.
 #[derive(Clone)]
 pub(crate) struct Packed {
-    /// Entries, ascending, then the groups of faces they refer to.
+    /// Entries, ascending, followed by the groups of faces they refer to.
     pub palette: Vec<u16>,
-    /// Entries, groups apart.
+    /// Number of entries, without groups.
     pub palette_len: u16,
     /// 0, 4 or 8.
     pub index_bits: u16,
@@ -140,8 +141,7 @@ pub(crate) struct Packed {
     pub indices: Vec<u8>,
 }
 
-/// More than 256 entries in one brick: the most frequent 255 stay, the others become
-/// [`Nearby::Unknown`].
+/// With more than 256 entries in one brick the most frequent 255 are kept; the others become [`Nearby::Unknown`].
 pub(crate) fn pack(cells: &[Nearby; CELLS_PER_BRICK]) -> Packed {
     let mut entries = cells.to_vec();
     entries.sort_unstable();

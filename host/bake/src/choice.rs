@@ -1,8 +1,8 @@
-//! The coarsest model of one shape that errs no more than asked.
+//! The coarsest model of one shape that meets the requested accuracy.
 //!
-//! The accuracy asked holds where parts fit into one another. Everywhere else, where one part merely runs into another, [`ELSEWHERE`] times as
-//! much does. The cell is the largest that neither a face that fits, nor another face that bends, nor a wall or slot forbids; of the two
-//! number formats the one that then takes fewer bytes.
+//! The requested accuracy applies where parts fit into one another. Everywhere else, where parts merely collide, errors may be [`ELSEWHERE`] times
+//! larger. The cell is the largest one that satisfies every face that fits, every other curved face, and every wall or slot; of the two number
+//! formats, the one that then takes fewer bytes is chosen.
 
 use mortise_brep::Surface;
 
@@ -14,30 +14,30 @@ use crate::field::SampleFormat;
 use crate::planner::ShapePlan;
 use crate::scene::longest_side;
 
-/// How much larger errors may be where nothing fits.
+/// Factor by which errors may be larger on faces that fit nothing.
 pub const ELSEWHERE: f64 = 10.0;
-/// Of the accuracy asked in fits the share the field may take; the rest is the shell's.
+/// Share of the requested accuracy in fits that the field may use; the rest is the shell's.
 const FIELD_SHARE: f64 = 0.75;
-/// Of the accuracy elsewhere the share the field may take.
+/// Share of the accuracy elsewhere that the field may use.
 const FIELD_SHARE_ELSEWHERE: f64 = 0.5;
-/// Largest bound of the shell, in cells: at sharp edges the field errs as much anyway.
+/// Largest error bound of the shell, in cells: at sharp edges the field's error is that large in any case.
 const MOST_EPSILON_CELLS: f64 = 0.5;
-/// Cells along a shape's longest side, at least.
+/// Fewest cells along a shape's longest side.
 const LEAST_CELLS: f64 = 20.0;
-/// Smaller faces, in the shape's area, are no walls: where they are thin they count as edges.
+/// Faces with a smaller share of the shape's area are not walls: where they are thin they are treated as edges.
 const WALL_AREA: f64 = 0.02;
-/// Formats to choose from, with the band each is used with, cells.
+/// Formats to choose from, with the band used for each, cells.
 const FORMATS: [(SampleFormat, f64); 2] = [(SampleFormat::Int16, 2.0), (SampleFormat::Int8, 1.0)];
 
-/// What is known of a shape before its model is chosen.
+/// Requirements of a shape, collected before its model is chosen.
 pub(crate) struct Demand {
     name: String,
     size_mm: f64,
-    /// Faces that fit something: number, bend, relative difference of curvatures, words.
+    /// Faces that fit another part's: number, curvatures, relative difference of curvatures, description.
     fits: Vec<(u32, [f64; 2], f64, String)>,
-    /// Other faces that bend: number, bend, words.
+    /// Other curved faces: number, curvatures, description.
     others: Vec<(u32, [f64; 2], String)>,
-    /// Largest cell that shows the walls and slots, and words.
+    /// Largest cell that resolves the walls and slots, and its description.
     walls: (f64, String),
     left_out: Vec<u32>,
 }
@@ -79,10 +79,10 @@ impl Demand {
         }
     }
 
-    /// The model for `accuracy_mm` in fits.
+    /// The model for an accuracy of `accuracy_mm` in fits.
     pub fn choose(&self, accuracy_mm: f64) -> ShapePlan {
         let models = FORMATS.map(|(format, band)| self.with_format(accuracy_mm, format, band));
-        // Bricks in the band over the surface go with (8 + 2·band)/cell²; so do their bytes.
+        // The number of bricks in the band over the surface is proportional to (8 + 2·band)/cell², and so are their bytes.
         let bytes =
             |m: &ShapePlan| (8.0 + 2.0 * m.band_cells) * m.format.bytes() as f64 / (m.cell_mm * m.cell_mm);
         let [a, b] = models;
@@ -99,7 +99,7 @@ impl Demand {
                 why = reason();
             }
         };
-        // Flats fit flats: there the step alone counts.
+        // Flats fit flats: only the quantisation step matters there.
         take(largest_cell(self.walls.0, FIELD_SHARE * accuracy, base), &|| {
             "a step of the number format on its flats".to_owned()
         });
@@ -130,7 +130,7 @@ impl Demand {
         let resolved = resolved.filter(|b| is_resolvable(FIELD_SHARE_ELSEWHERE * elsewhere, *b));
         let in_fits = worst(&mut self.fits.iter().map(|f| f.1));
         let field = worst(&mut self.fits.iter().map(|f| f.1).chain(resolved));
-        // What the field leaves is the shell's.
+        // The shell gets the share that the field leaves.
         let difference = self.fits.iter().map(|f| f.2).fold(0.0, f64::max);
         let mut epsilon = (elsewhere - field).min(MOST_EPSILON_CELLS * cell);
         if difference > 0.0 {
@@ -161,8 +161,8 @@ fn faces_that_fit(fits: &[(u32, [f64; 2], f64, String)]) -> Vec<u32> {
     faces
 }
 
-/// Largest cell that still shows the walls and slots beside the larger faces: no corner of a cell near the surface may be nearer to another. Their
-/// width is felt for from the middle of each face's largest triangle, inward and outward, by halving.
+/// Largest cell that still resolves the walls and slots beside the larger faces: no corner of a cell near one surface may be nearer to another. Their
+/// width is measured from the middle of each face's largest triangle, inward and outward, by bisection.
 fn walls(surface: &ExactSurface, words: &dyn Fn(u32) -> String) -> (f64, String) {
     let shape = surface.shape();
     let size = longest_side(shape);

@@ -1,9 +1,10 @@
 //! The classic pointshell: a point at the centre of every voxel the surface crosses.
 //!
-//! The textbook baseline (McNeely, Puterbaugh & Troy 1999; Faas & Vance 2010): points lie on the voxels' grid, up to half a voxel's diagonal from
-//! the surface, and their normals are the voxels' own, the direction in which the 26 voxels round them are more free and less solid. Shrinking
-//! moves each point inward along its normal by up to a voxel, which takes back clearance that voxels have eaten. Only what moves has points: the
-//! method looks one way. A point names the faces that cross its voxel, two of them at most. Cost: a few tens of exact queries for each voxel, in parallel.
+//! The textbook baseline (McNeely, Puterbaugh & Troy 1999; Faas & Vance 2010): points lie on the voxel grid, up to half a voxel's diagonal from the
+//! surface. Their normals are those of the voxels: the direction in which the 26 surrounding voxels are more free and less solid. Shrinking moves
+//! each point inward along its normal by up to a voxel, which recovers clearance lost to voxelisation. Only moving parts have points: the method
+//! tests one direction. A point names the faces that cross its voxel, two of them at most. Cost: a few tens of exact queries for each voxel, in
+//! parallel.
 
 use std::collections::HashMap;
 
@@ -19,23 +20,23 @@ use crate::grid::Grid;
 use crate::occupancy::{place, voxels};
 use crate::pointshell::{Pointshell, ShellPoint};
 
-/// A voxel, counted from the grid's origin.
+/// Integer coordinates of a voxel, from the grid's origin.
 type Place = [i64; 3];
 
-/// Most grid entries: beyond, a shell would have millions of points.
+/// Most grid entries: with more, a shell would have millions of points.
 const MAX_ENTRIES: u64 = 1 << 20;
 
-/// One point for each voxel of `voxel_mm` that `surface` crosses, moved inward by `shrink_percent` of a voxel. `part` names it in errors.
+/// Makes one point for each voxel of `voxel_mm` that `surface` crosses, moved inward by `shrink_percent` of a voxel. `part` names it in errors.
 ///
 /// # Errors
-/// [`BakeError::CellTooSmall`] when there would be more voxels than any board holds.
+/// [`BakeError::CellTooSmall`] when there would be more voxels than any board can hold.
 pub fn classic_pointshell(
     surface: &ExactSurface,
     voxel_mm: f64,
     shrink_percent: f64,
     part: &str,
 ) -> Result<Pointshell, BakeError> {
-    // As the voxmap is laid: plane faces run through voxel centres.
+    // Same grid as the voxmap's: plane faces run through voxel centres.
     let mut grid = Grid::over(surface.shape(), voxel_mm, 3.0 * voxel_mm, surface.chord);
     grid.origin_m = grid.origin_m.map(|x| x - 0.5 * grid.cell_m);
     if grid.entries() > MAX_ENTRIES {
@@ -47,7 +48,7 @@ pub fn classic_pointshell(
             enough_mm: voxel_mm * ratio,
         });
     }
-    // From the surface through a crossed voxel to the far side of those round it.
+    // Distance from the surface through a crossed voxel to the far side of its neighbours.
     let classes = classify(surface, &grid, (2.0 * 3f64.sqrt()) * grid.cell(), &|| true);
     let near: Vec<[u32; 3]> = positions(&grid)
         .filter(|&at| classes[grid.index(at)] == Class::Stored)
@@ -99,7 +100,8 @@ pub fn classic_pointshell(
     })
 }
 
-/// Away from the solid voxels, towards the free ones, each by the inverse square of its distance; none where they cancel (a wall of one voxel).
+/// Normal that points away from the solid voxels and towards the free ones, each weighted by the inverse square of its distance; `None` where they
+/// cancel (a wall of one voxel).
 fn voxel_normal(kinds: &HashMap<Place, Voxel>, at: Place) -> Option<DVec3> {
     let mut sum = DVec3::ZERO;
     for z in -1..=1 {

@@ -1,41 +1,42 @@
-//! What a tick costs on the board, estimated from the model.
+//! Cost of a tick on the board, estimated from the model.
 //!
-//! Work is counted as the board's own budget counts it, in look-ups. An estimate, no bound: that is the budget, at which a tick thins its points.
+//! Work is counted in field queries, as in the board's own budget. The figure is an estimate, not a bound: the budget is the bound, at which a tick
+//! decimates its points.
 
 use serde::{Deserialize, Serialize};
 
-/// Instructions of one look-up of a tree node, or of a point out of reach, in a field.
+/// Instructions of one field query, for a tree node or for a point out of reach.
 pub const PER_LOOKUP: u64 = 150;
-/// Look-ups a point near the other part counts.
+/// Queries counted for a point near the other part.
 pub const NEAR_LOOKUPS: u64 = 2;
-/// Look-ups a point counts that touches, with its share of the step.
+/// Queries counted for a touching point, including its share of the step.
 pub const TOUCHING_LOOKUPS: u64 = 6;
-/// Instructions of a tick that looks nothing up.
+/// Instructions of a tick without queries.
 pub const FIXED: u64 = 6_000;
-/// Contacts the step takes at most.
+/// Most contacts in one step.
 pub const MOST_CONTACTS: u64 = 256;
-/// Points to one tree node looked at: leaves hold 8 to 16 points, and there are as many nodes above them.
+/// Points per tree node visited: leaves hold 8 to 16 points, and there are as many nodes above them.
 const POINTS_PER_NODE: u64 = 4;
-/// Points near to one that touches: a pin pressed to its bore touches along a quarter of its rims.
+/// Near points per touching point: a pin pressed to its bore touches along a quarter of its rims.
 const NEAR_PER_TOUCHING: u64 = 4;
 
-/// The dearest tick expected of a part.
+/// Estimated worst-case tick of a part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TickCost {
-    /// Points near while the part sits in all it fits into, its own and its partners'.
+    /// Points near when the part sits in everything it fits into, both its own points and its partners'.
     pub points: u64,
-    /// Of them touching.
+    /// Number of those points that touch.
     pub contacts: u64,
-    /// Look-ups, as the board counts its budget.
+    /// Field queries, in the units of the board's budget.
     pub lookups: u64,
     /// Instructions of that tick.
     pub instructions: u64,
-    /// Points there are, its own and those of all parts it can meet.
+    /// Total number of points: the part's own and those of all parts it can meet.
     pub points_at_most: u64,
 }
 
 impl TickCost {
-    /// Of `points` near, of `all` there are.
+    /// Cost with `points` points near, of `all` in total.
     pub fn of(points: u64, all: u64) -> Self {
         let contacts = points.div_ceil(NEAR_PER_TOUCHING).min(MOST_CONTACTS);
         let lookups = points.div_ceil(POINTS_PER_NODE)

@@ -1,14 +1,14 @@
 //! Exact signed distance to a B-rep shape.
 //!
-//! The tessellation only points the way. A tree of boxes gives the nearest triangle at distance t; the nearest point of the exact shape then
-//! belongs to a face or boundary piece with a triangle within t + 2·chord. Those are few, and each is answered in closed form: projection
-//! onto the face's surface where that falls inside the face's trim, and the exact line or arc of its boundary. Free-form faces are
-//! searched by Newton steps from the near triangles, their edges followed by dense points; see [`ExactSurface::surface_error_mm`] for what
-//! that leaves open. A free-form face whose surface the kernel did not hand out is its tessellation.
+//! The tessellation only locates candidates. A tree of boxes gives the nearest triangle at distance t; the nearest point of the exact shape then
+//! belongs to a face or boundary piece with a triangle within t + 2·chord. Those are few, and each is evaluated in closed form: projection onto the
+//! face's surface where the foot falls inside the face's trim, and the exact line or arc of its boundary. Free-form faces are searched by Newton
+//! steps from the near triangles, and their edges are dense polylines; [`ExactSurface::surface_error_mm`] bounds the remaining error. A free-form
+//! face whose surface the kernel did not provide is represented by its tessellation.
 //!
-//! Sign: from the exact outward normals at the nearest point (Bærentzen & Aanæs 2005: the face's, the sum of two at an edge, angle-weighted
-//! at a vertex), so that a point between a facet and the true cylinder is on the right side. Where the shell is open, at cusps, where normals
-//! cancel, and wherever the two could disagree, the generalised winding number decides away from the surface.
+//! Sign: from the exact outward normals at the nearest point (Bærentzen & Aanæs 2005: the face's, the sum of two at an edge, angle-weighted at a
+//! vertex), so that a point between a facet and the true cylinder is on the right side. Away from the surface, the generalised winding number decides
+//! where the shell is open, at cusps, where normals cancel, and wherever the two methods could disagree.
 //!
 //! Cost: about 1.5 µs near the surface of a simple part (the 1.2 million samples of the 50 mm pair take 0.9 s on two cores, November 2026,
 //! `cargo run --release -p mortise-bake --example bake`), more where many triangles are equally near.
@@ -22,13 +22,13 @@ use crate::topology::{NONE, Topology};
 use crate::triangles::{OnTriangle, TriangleFeature, TriangleTree};
 use crate::winding::WindingTree;
 
-/// Two distances closer than this are the same place, mm: rounding of a few operations on metre-sized coordinates.
+/// Distances that differ by less than this are equal, mm: rounding of a few operations on metre-sized coordinates.
 pub(crate) const SAME_MM: f64 = 1e-9;
 
-/// Two faces whose outward normals add up to less than this meet at a cusp, a knife edge or a crevice of (almost) no angle: a fillet that
-/// runs into a wall. Their sum then says nothing of the side.
+/// Two faces whose outward normals add up to less than this meet at a cusp, a knife edge or a crevice of (almost) zero angle, for example where a
+/// fillet runs into a wall. The sum of the normals then gives no reliable sign.
 const CUSP: f64 = 1e-2;
-/// Sine of the angle to a feature's normal plane below which the normal does not decide.
+/// Sine of the angle to a feature's normal plane below which the normal does not decide the sign.
 const DOUBT: f64 = 1e-4;
 
 /// Nearest point of a shape's exact surface.
@@ -48,14 +48,14 @@ pub struct ExactSurface {
     pub(crate) topology: Topology,
     pub(crate) triangles: TriangleTree,
     winding: WindingTree,
-    /// Most any analytic face's tessellation leaves the face, mm.
+    /// Largest deviation of any analytic face's tessellation from the face, mm.
     pub(crate) chord: f64,
     error: f64,
     /// Whether the winding number decides signs away from the surface.
     by_winding: bool,
 }
 
-/// What a query reuses: one for each thread.
+/// Buffers reused between queries: one set for each thread.
 #[derive(Default)]
 pub(crate) struct Scratch {
     near: Vec<NearTriangle>,
@@ -78,7 +78,7 @@ enum Feature {
 }
 
 impl ExactSurface {
-    /// Prepares `shape`. A closed mesh that winds inward is turned round. Indices must be in range and coordinates finite (as
+    /// Prepares `shape`. A closed mesh that winds inward is reversed. Indices must be in range and coordinates finite (as
     /// [`crate::bake`] checks); a shape without triangles is infinitely far from everything.
     pub fn new(shape: &Shape) -> Self {
         let mut shape = shape.clone();
@@ -107,14 +107,15 @@ impl ExactSurface {
         &self.shape
     }
 
-    /// Most the tessellation of any face leaves that face, mm: not an error of distances, but how far the nearest triangle may mislead.
+    /// Largest deviation of any face's tessellation from that face, mm. It does not enter the error of distances; it bounds how far the nearest
+    /// triangle can be off.
     pub fn chord_error_mm(&self) -> f64 {
         self.chord
     }
 
-    /// Stated bound of the error of distances, mm; 0 when every face is analytic and every edge a line or circle. Else
-    /// [`mortise_brep::EDGE_TOLERANCE_MM`] for other edges, the deviation of splines made from offset surfaces, and the tessellation's own
-    /// measured deflection where a free-form face or edge is known by that only.
+    /// Stated error bound of distances, mm; 0 when every face is analytic and every edge a line or circle. Otherwise it covers
+    /// [`mortise_brep::EDGE_TOLERANCE_MM`] for other edges, the deviation of splines made from offset surfaces, and the tessellation's measured
+    /// deflection where a free-form face or edge is known only by its tessellation.
     pub fn surface_error_mm(&self) -> f64 {
         self.error
     }
@@ -124,12 +125,12 @@ impl ExactSurface {
         self.by_winding
     }
 
-    /// From now on the winding number decides signs away from the surface.
+    /// Makes the winding number decide signs away from the surface in all later queries.
     pub(crate) fn set_sign_by_winding(&mut self) {
         self.by_winding = true;
     }
 
-    /// Winding number of the tessellation at `p`: 1 inside, 0 outside, in between near gaps.
+    /// Winding number of the tessellation at `p`: 1 inside, 0 outside, between these near gaps.
     pub fn winding_number(&self, p: DVec3) -> f64 {
         self.winding.at(p)
     }
@@ -139,21 +140,21 @@ impl ExactSurface {
         self.query(p, f64::INFINITY, &mut Scratch::default())
     }
 
-    /// Lower bound of the unsigned distance from `p`: the tessellation's, less the chord error. Cheaper than [`Self::nearest`].
+    /// Lower bound of the unsigned distance from `p`: the tessellation's distance less the chord error. Cheaper than [`Self::nearest`].
     pub(crate) fn at_least(&self, p: DVec3, within: f64) -> Option<f64> {
         self.triangles
             .nearest(p, within + self.chord)
             .map(|(t, _)| (t - self.chord).max(0.0))
     }
 
-    /// Nearest point, given that the surface is not farther than `within` (any larger value is allowed, infinity too).
+    /// Nearest point, given that the surface is not farther than `within` (any larger value is allowed, including infinity).
     pub(crate) fn query(&self, p: DVec3, within: f64, scratch: &mut Scratch) -> Option<Nearest> {
         let (facet, _) = self
             .triangles
             .nearest(p, within + self.chord + SAME_MM)
             .or_else(|| self.triangles.nearest(p, f64::INFINITY))?;
-        // The nearest exact point is within facet + chord of p, its triangle within facet + 2·chord; 4·chord more hold the boundary
-        // pieces the trim test asks for.
+        // The nearest exact point is within facet + chord of p, its triangle within facet + 2·chord; 4·chord more include the boundary pieces that
+        // the trim test needs.
         let radius = facet + 6.0 * self.chord + 10.0 * SAME_MM;
         let Scratch { near, faces, pieces } = scratch;
         near.clear();
@@ -210,7 +211,7 @@ impl ExactSurface {
                     if d <= best + SAME_MM && self.in_trim(f, q.point, near) {
                         (best, at, face) = (d, q.point, f);
                         let normal = q.normal * self.topology.sense[f as usize];
-                        // At a pole, and at a crease inside the surface, the way to the foot is not along the normal there.
+                        // At a pole, and at a crease inside the surface, the line to the foot is not along the normal there.
                         let along = (p - q.point).dot(normal).abs() >= 0.7 * d;
                         feature = Some(if along || d <= SAME_MM {
                             Feature::Face { normal }
@@ -234,7 +235,7 @@ impl ExactSurface {
                 && let Some(q) = project(surface, p, nearest.on.point)
             {
                 let d = p.distance(q.point);
-                // A face is preferred to its own boundary: its normal gives the sign without a tie.
+                // A face takes precedence over its own boundary: its normal gives the sign without a tie.
                 if d <= best + SAME_MM && self.in_trim(f, q.point, near) {
                     (best, at, face) = (d, q.point, f);
                     feature = Some(Feature::Face {
@@ -244,8 +245,8 @@ impl ExactSurface {
             }
         }
         let Some(feature) = feature else {
-            // Every projection fell outside its trim and no boundary is near (a face whose tessellation is no approximation of it):
-            // the tessellation is the best there is.
+            // Every projection fell outside its trim and no boundary is near (the tessellation does not approximate its face): fall back to the
+            // tessellation.
             let nearest = near.iter().min_by(|a, b| a.distance.total_cmp(&b.distance))?;
             let feature = Feature::Facet {
                 triangle: nearest.triangle,
@@ -291,7 +292,8 @@ impl ExactSurface {
         };
         let outward = (p - at).dot(normal);
         if doubtful || outward.abs() < DOUBT * distance * normal.length() {
-            // Clear of the tessellation the winding number is right; nearer, the way to the foot leads there without crossing the surface.
+            // The winding number is right clear of the tessellation. A nearer point is moved there along the line from its foot, which does not cross
+            // the surface.
             let clear = (4.0 * self.chord + 100.0 * SAME_MM).max(distance);
             let q = at + (p - at) * (clear / distance.max(f64::MIN_POSITIVE));
             return if distance > 0.0 && self.winding.at(q) > 0.5 {
@@ -342,7 +344,7 @@ impl ExactSurface {
     }
 }
 
-/// Takes out triangles with two equal corners: they have no normal and would show up as open sides.
+/// Removes triangles with two equal corners: they have no normal and would appear as open sides.
 fn drop_degenerate(shape: &mut Shape) {
     let mesh = &mut shape.mesh;
     let keep: Vec<bool> = mesh

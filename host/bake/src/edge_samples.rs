@@ -1,8 +1,9 @@
-//! Points along edges: pieces joined to chains, sampled at equal steps by length.
+//! Points along edges: pieces are joined to chains and sampled at equal steps of arc length.
 //!
-//! A sharp convex edge is found by no sample of a smooth partner, so all partners count. A smooth edge (a fillet's) is part of the surface it
-//! borders: partners no sharper than that count, and where it borders a flat, the flats that may lie across that. Concave edges, and smooth
-//! ones between faces that are nowhere convex, are left out: what touches there has an edge of its own, or touches a face beside.
+//! No sample of a smooth partner finds a sharp convex edge, so all partners count for it. A smooth edge (a fillet's) is part of the surface it
+//! borders: it counts partners no sharper than that surface and, where it borders a flat, the flats that may lie across it. Concave edges, and smooth
+//! ones between faces without convex curvature, need no samples: a partner that touches there has an edge of its own, or also touches an adjacent
+//! face.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -19,26 +20,26 @@ use crate::ring_samples::sample_ring;
 
 /// Most points on one chain.
 const MAX_POINTS: f64 = 4000.0;
-/// Faces whose normals differ by a smaller angle (rad) meet smoothly: ten times what modellers and STEP files leave.
+/// Faces whose normals differ by a smaller angle (rad) meet smoothly: ten times the error that modellers and STEP files leave.
 const SMOOTH: f64 = 0.01;
 
-/// What an edge asks for: curvature to sample its length by, apart from its own, and the largest spacing.
+/// Sampling requirement of an edge: partner curvature to add to the edge's own, and the largest spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Demand {
     curvature: f64,
     max_spacing_mm: f64,
-    /// Whether the edge's own curvature counts only as far as the edge bends away from the normals at it.
+    /// Whether the edge's own curvature counts only where the edge bends away from the normals at it.
     away_only: bool,
 }
 
-/// Appends points strictly inside each chain of boundary pieces, and returns the vertices where chains end.
+/// Appends points strictly inside each chain of boundary pieces; returns the vertices where chains end.
 pub(crate) fn sample_edges(
     surface: &ExactSurface,
     options: &PointshellOptions,
     out: &mut Vec<ShellPoint>,
 ) -> BTreeSet<u32> {
     let pieces = &surface.topology.pieces;
-    // One group for each B-rep edge; where that is unknown, for each set of faces that meet.
+    // One group for each B-rep edge; where the edge is unknown, one for each set of adjacent faces.
     let mut groups: BTreeMap<(Option<u32>, Vec<u32>), Vec<u32>> = BTreeMap::new();
     for (i, piece) in pieces.iter().enumerate() {
         let mut faces: Vec<u32> = piece.sides.iter().map(|s| s.face).collect();
@@ -75,7 +76,7 @@ pub(crate) fn sample_edges(
     corners
 }
 
-/// Whether other edges than one closed one end at this vertex.
+/// Whether a vertex is an end of any edges other than a single closed one.
 fn is_corner(surface: &ExactSurface, vertex: u32) -> bool {
     surface
         .topology
@@ -176,7 +177,7 @@ fn sample_chain(
     }
 }
 
-/// What `piece` asks for; `None` when it needs no samples. `convex`: largest convex curvature of each face.
+/// Sampling requirement of `piece`; `None` when it needs no samples. `convex`: largest convex curvature of each face.
 fn demand(
     surface: &ExactSurface,
     piece: &Piece,
@@ -196,7 +197,7 @@ fn demand(
         away_only: true,
     };
     let [first, second] = piece.sides.as_slice() else {
-        // A border of an open shell, or more than two faces: whatever it is, it is sharp.
+        // A border of an open shell, or more than two faces: always treated as sharp.
         return Some(sharp);
     };
     let at = piece.at(0.5);
@@ -220,13 +221,13 @@ fn demand(
             away_only: true,
         });
     }
-    // Into the first face, which lies on the left of its side.
+    // Direction into the first face, which lies on the left of its side.
     let inward = a.cross(piece.tangent(at) * if first.forward { 1.0 } else { -1.0 });
     (b.dot(inward) < 0.0).then_some(sharp)
 }
 
-/// Equal steps along a chain: ∫√((κ + κ')/8ε) ds of them, κ ds being the turn of the tangent and κ' what `demand` adds, each no longer and no
-/// shorter than the limits.
+/// Equal steps along a chain: ∫√((κ + κ')/8ε) ds of them, where κ ds is the turn of the tangent and κ' the addition from `demand`; each step stays
+/// within the limits.
 fn steps(
     surface: &ExactSurface,
     chain: &[Link],
@@ -236,7 +237,7 @@ fn steps(
     closed: bool,
 ) -> usize {
     let pieces = &surface.topology.pieces;
-    // Turn of the tangent in each piece: an arc's own, and half of that at each end between segments.
+    // Turn of the tangent in each piece: an arc's own angle, and half of the corner angle at each end between segments.
     let mut turns: Vec<f64> = chain
         .iter()
         .map(|&(i, _)| own_turn(surface, &pieces[i as usize], demand))
@@ -274,7 +275,7 @@ fn steps(
         .clamp(least, MAX_POINTS) as usize
 }
 
-/// Angle by which the tangent of `piece` turns, as far as that is away from what touches it: a bore's rim bends towards what is in the bore.
+/// Angle by which the tangent of `piece` turns away from a touching partner: a bore's rim bends towards the part in the bore.
 fn own_turn(surface: &ExactSurface, piece: &Piece, demand: &Demand) -> f64 {
     let PieceCurve::Arc { center, .. } = piece.curve else {
         return piece.turn();

@@ -1,59 +1,59 @@
 //! Why a model could not be baked.
 
-/// Why a model could not be baked: what, where, and what to do.
+/// Why a model could not be baked: the cause, its place, and the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BakeError {
     /// No part of the model has a surface.
     #[error("nothing to bake: none of the {parts} parts has a surface; open a file with solids or shells")]
     NothingToBake {
-        /// Parts in the model.
+        /// Number of parts in the model.
         parts: usize,
     },
-    /// More parts than a scene may have.
+    /// More parts than a scene can hold.
     #[error("{parts} parts, but a scene holds at most {limit}: leave out parts that cannot be touched")]
     TooManyParts {
-        /// Parts in the model.
+        /// Number of parts in the model.
         parts: usize,
-        /// Most a scene may have.
+        /// Most parts a scene can hold.
         limit: usize,
     },
     /// More faces than an image can number.
     #[error("part \"{part}\" has {faces} faces, but a shape holds at most {limit}: simplify it or split it")]
     TooManyFaces {
-        /// Part it was found in.
+        /// Part with this shape.
         part: String,
         /// Faces of its shape.
         faces: usize,
-        /// Most a shape may have.
+        /// Most faces a shape can have.
         limit: usize,
     },
-    /// Geometry with NaN or infinity in it, or indices that lead nowhere.
+    /// Geometry with NaN or infinite values, or indices out of range.
     #[error("part \"{part}\" has broken geometry ({what}): repair or re-export it")]
     BrokenGeometry {
-        /// Part it was found in.
+        /// Part with the broken geometry.
         part: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         what: String,
     },
-    /// An option that makes no sense.
+    /// An option out of range.
     #[error("{option} = {value} is out of range: give {expected}")]
     Option {
-        /// Its name.
+        /// Name of the option.
         option: &'static str,
-        /// What was given.
+        /// Value given.
         value: f64,
-        /// What may be given.
+        /// Allowed values.
         expected: &'static str,
     },
     /// A part named in the options is not in the model.
     #[error("no part is named \"{name}\"; the model has: {known}")]
     UnknownPart {
-        /// Name asked for.
+        /// Name given.
         name: String,
-        /// Names there are.
+        /// Names in the model.
         known: String,
     },
-    /// The cell asked for needs more bricks or grid entries than the layout can number.
+    /// The requested cell needs more bricks or grid entries than the layout can number.
     #[error(
         "part \"{part}\" is too large for {cell_mm} mm cells ({what}): use cells of at least {enough_mm:.3} mm"
     )]
@@ -62,9 +62,9 @@ pub enum BakeError {
         part: String,
         /// Cell tried, mm.
         cell_mm: f64,
-        /// Which limit.
+        /// Limit exceeded.
         what: String,
-        /// Cell expected to do, mm.
+        /// Cell that is expected to fit, mm.
         enough_mm: f64,
     },
     /// The image does not fit.
@@ -72,14 +72,14 @@ pub enum BakeError {
         "scene image of {bytes} bytes does not fit into {limit}: use cells of about {enough_mm:.3} mm, int8 samples, or fewer parts"
     )]
     TooLarge {
-        /// Bytes it would have.
+        /// Bytes the image would have.
         bytes: u64,
         /// Bytes allowed.
         limit: u64,
-        /// Cell expected to do, mm.
+        /// Cell that is expected to fit, mm.
         enough_mm: f64,
     },
-    /// The progress callback asked to stop.
+    /// The progress callback requested a stop.
     #[error("baking was cancelled")]
     Cancelled,
 }

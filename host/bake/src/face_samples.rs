@@ -12,7 +12,7 @@ use crate::surface::{angle_range, at_parameters, natural_normal, parameters, pri
 
 /// Most rows of a lattice, and most points of a row: a face that would need more is sampled more sparsely.
 const MAX_ROWS: f64 = 2000.0;
-/// Steps in which the density of rows is summed up.
+/// Steps of the numeric integral of the row density.
 const STEPS: usize = 256;
 
 /// Appends the points inside `face`. `flat_mm`: largest spacing inside spline faces when the partners are known.
@@ -62,7 +62,7 @@ fn sample_analytic(
         }
     };
     let spacings = |at_v: f64| options.face_spacings(principal_curvatures(kind, at_v).map(|k| k * sense));
-    // Rows lie as dense as asked where they lie: their places are equal shares of the summed density.
+    // Rows follow the local density required: they divide the integrated density into equal shares.
     let step = v.1 / STEPS as f64;
     let mut summed = 0.0;
     let sums: Vec<f64> = (0..STEPS)
@@ -78,7 +78,7 @@ fn sample_analytic(
         let i = sums.partition_point(|&s| s < share).min(STEPS - 1);
         let before = if i == 0 { 0.0 } else { sums[i - 1] };
         let at_v = v.0 + step * (i as f64 + (share - before) / (sums[i] - before).max(1e-300));
-        // A row serves its neighbourhood, half-way to the next: as dense as the most curved of it asks.
+        // A row covers its neighbourhood, half-way to the next row: its density is that of the most curved place there.
         let half = spacings(at_v).map_or(0.0, |[_, along]| 0.5 * along / v_scale(kind));
         let neighbourhood = [at_v - half, at_v, at_v + half];
         let across = neighbourhood
@@ -89,7 +89,7 @@ fn sample_analytic(
             continue;
         };
         let columns = count(u.1 * u_scale(kind, at_v), across);
-        // Every other row is shifted by half a step where the row closes on itself: the same count covers more.
+        // Every other row is shifted by half a step where the row closes on itself: the same number of points covers more.
         let shift = if around && row % 2 == 1 { 0.0 } else { 0.5 };
         for column in 0..columns {
             let at_u = u.0 + u.1 * (column as f64 + shift) / columns as f64;
@@ -107,7 +107,7 @@ fn sample_analytic(
     } = *kind
         && sense > 0.0
     {
-        // A tip is sharp, and no edge ends there.
+        // A tip is sharp, although no edge ends there.
         let tip = frame.origin - frame.z * (radius / half_angle.tan());
         push(tip, -frame.z * half_angle.signum());
     }
@@ -117,7 +117,7 @@ fn count(length: f64, spacing: f64) -> usize {
     (length / spacing - 1e-9).ceil().clamp(1.0, MAX_ROWS) as usize
 }
 
-/// Start and span of both parameters; whether the first goes all the way round.
+/// Start and span of both parameters, and whether the first one covers a full turn.
 struct Range {
     u: (f64, f64),
     v: (f64, f64),
@@ -143,7 +143,7 @@ fn parameter_range(surface: &ExactSurface, face: u32, kind: &Surface) -> Option<
         let hi = corners.iter().map(|c| c[i]).fold(f64::NEG_INFINITY, f64::max);
         (lo, hi - lo)
     };
-    // Vertices of a face that goes round leave gaps of a facet; one wider than a third of the circle is an opening.
+    // Vertices of a face that covers a full turn leave gaps of one facet; a gap wider than a third of the circle is an opening.
     let angle = |i: usize| angle_range(&mut corners.iter().map(|c| c[i]).collect::<Vec<_>>(), TAU / 3.0);
     let pole = matches!(kind, Surface::Sphere { .. });
     let (u, v) = match kind {

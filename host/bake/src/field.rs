@@ -1,6 +1,6 @@
 //! Sampling the exact distance into sparse bricks.
 //!
-//! Only bricks with a point within the band of the surface are stored. Trilinear interpolation of exact samples errs by about cell²/(8R) on
+//! Only bricks with a point within the band of the surface are stored. Trilinear interpolation of exact samples has an error of about cell²/(8R) on
 //! a cylinder of radius R and is exact on planes; samples are rounded to `scale`, which adds at most scale/2. Cost: one exact query for
 //! each of 729 samples of a stored brick, in parallel; a few queries for each empty one.
 
@@ -23,7 +23,7 @@ use crate::grid::Grid;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SampleFormat {
-    /// One byte: half the size, steps of a 34th of a cell at a band of two cells, a 46th at one.
+    /// One byte, half the size of int16: steps of a 34th of a cell at a band of two cells, a 46th at one.
     Int8,
     /// Two bytes: steps of an 8700th of a cell at a band of two cells.
     #[default]
@@ -39,7 +39,7 @@ impl SampleFormat {
         }
     }
 
-    /// Its number in a [`FieldRecord`].
+    /// Code of the format in a [`FieldRecord`].
     pub fn code(self) -> u16 {
         match self {
             Self::Int8 => FORMAT_I8,
@@ -68,22 +68,22 @@ pub struct FieldOptions {
 }
 
 impl FieldOptions {
-    /// Units of a sample in one cell: a whole number, so that planes and repeated features at whole-cell offsets give equal bricks.
+    /// Sample units per cell: a whole number, so that planes and repeated features at whole-cell offsets give equal bricks.
     pub(crate) fn units_per_cell(&self) -> f64 {
         (self.format.max() / self.range_cells()).floor().max(1.0)
     }
 
-    /// Distance up to which samples are exact, in cells: the corners of a cell the band touches are at most its diagonal farther. Clamping
-    /// what is beyond lets more bricks be equal.
+    /// Distance up to which samples are exact, in cells: the corners of a cell that the band touches are at most the cell's diagonal farther.
+    /// Clamping samples beyond it makes more bricks equal.
     fn range_cells(&self) -> f64 {
         self.band_cells + 3f64.sqrt()
     }
 }
 
-/// A field on its own: record offsets count from its own arrays.
+/// A standalone field: record offsets count from its own arrays.
 #[derive(Clone, Debug)]
 pub struct BakedField {
-    /// As it will be stored, `first_grid` and `first_brick` 0.
+    /// Record as stored, except that `first_grid` and `first_brick` are 0.
     pub record: FieldRecord,
     /// Grid entries in 16 bits.
     pub grid: Vec<u16>,
@@ -93,23 +93,23 @@ pub struct BakedField {
     pub palette: Vec<u16>,
     /// Samples and palette indices.
     pub blob: Vec<u8>,
-    /// Bytes of `blob` that are samples; the rest are palette indices and padding.
+    /// Number of sample bytes in `blob`; the rest are palette indices and padding.
     pub sample_bytes: usize,
-    /// Grid entries with samples; equal bricks are stored once, so this may be more than there are bricks.
+    /// Number of grid entries with samples; equal bricks are stored once, so this can exceed the number of bricks.
     pub stored_entries: usize,
-    /// Brick centres at which the sign disagreed with the winding number, of those tested.
+    /// Number of tested brick centres at which the sign disagreed with the winding number.
     pub sign_disagreements: usize,
-    /// Brick centres tested.
+    /// Number of brick centres tested.
     pub sign_tests: usize,
 }
 
-/// Most grid entries a field may have (2 bytes each; beyond, nothing would fit a board anyway).
+/// Most grid entries of a field (2 bytes each; a larger grid would not fit any board).
 const MAX_ENTRIES: u64 = 4 << 20;
-/// Most entries with samples a field may have: about 400 MB while baking.
+/// Most entries with samples of a field: they take about 400 MB while baking.
 const MAX_STORED: usize = 200_000;
 
-/// Samples `surface`. `part` names it in errors. `progress` is called from any thread with (bricks done, bricks in all) and may stop the
-/// work. The result does not depend on the number of threads.
+/// Samples `surface`. `part` names it in errors. `progress` is called from any thread with (bricks done, total bricks) and can stop the work. The
+/// result does not depend on the number of threads.
 pub fn bake_field(
     surface: &mut ExactSurface,
     options: &FieldOptions,
@@ -147,9 +147,9 @@ pub fn bake_field(
 
 /// Which bricks of a grid are near the surface.
 pub(crate) struct NearSurface {
-    /// Of every grid entry.
+    /// Class of every grid entry.
     pub classes: Vec<Class>,
-    /// Places of the bricks to store, x fastest.
+    /// Positions of the bricks to store, x fastest.
     pub stored: Vec<[u32; 3]>,
     /// See [`BakedField::sign_tests`].
     pub sign_tests: usize,
@@ -158,7 +158,7 @@ pub(crate) struct NearSurface {
 }
 
 impl NearSurface {
-    /// Bricks of `grid` with a point within `reach` mm of the surface; the winding number decides signs from here on if normals turn out wrong.
+    /// Bricks of `grid` with a point within `reach` mm of the surface. If normals prove wrong, the winding number decides signs from then on.
     pub fn find(
         surface: &mut ExactSurface,
         grid: &Grid,
@@ -194,7 +194,7 @@ impl NearSurface {
             ));
         }
         let (sign_tests, sign_disagreements) = compare_signs(surface, grid, &stored, &classes);
-        // A shell that is closed by count of sides but not by meaning (overlapping, inside-out or doubled solids): the winding number decides.
+        // A shell that is closed by its edge count but has overlapping, inside-out or doubled solids: the winding number decides.
         let classes = if sign_disagreements > 0 && !surface.sign_by_winding() {
             surface.set_sign_by_winding();
             classify(surface, grid, reach, &alive)
@@ -210,7 +210,7 @@ impl NearSurface {
     }
 }
 
-/// Refuses more different bricks than a field can number.
+/// Rejects a field with more different bricks than it can number.
 pub(crate) fn check_brick_count(bricks: usize, cell_mm: f64, part: &str) -> Result<(), BakeError> {
     if bricks <= GridEntry::MAX_BRICKS {
         return Ok(());
@@ -245,7 +245,7 @@ fn compare_signs(
     let near = stored.par_iter().map(|&brick| {
         let p = grid.sample(brick, [half; 3]);
         let nearest = surface.nearest(p)?;
-        // Within two chord errors the tessellation, and so its winding number, may be on the other side.
+        // Within two chord errors the tessellation, and so its winding number, can be on the other side.
         (nearest.distance.abs() > 2.0 * surface.chord + 1e-6).then_some((p, nearest.distance < 0.0))
     });
     let far =
@@ -262,7 +262,7 @@ fn compare_signs(
         .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
 }
 
-/// Puts bricks into arrays, equal ones once: grid entries share bricks, bricks share samples, indices and palettes.
+/// Packs bricks into arrays and stores equal ones once: grid entries share bricks, bricks share samples, indices and palettes.
 fn pack(
     grid: &Grid,
     options: &FieldOptions,
@@ -303,7 +303,7 @@ fn pack(
         };
         let key = (samples, indices, palette_at, palette_len, brick.index_bits);
         let next = records.len();
-        // Numbers past the limit wrap here; the caller refuses such a field.
+        // Numbers past the limit wrap here; the caller rejects such a field.
         let number = *by_record.entry(key).or_insert_with(|| {
             records.push(BrickRecord {
                 samples,

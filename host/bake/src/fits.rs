@@ -1,32 +1,32 @@
-//! Which faces of two shapes can fit into one another: a round one in a hollow one of nearly its radius.
+//! Pairs of faces of two shapes that can fit into one another: a convex one in a concave one of nearly the same radius.
 //!
-//! Known from the shapes alone, wherever they are placed. There the surfaces run along each other, so the least error is felt; flats, which
-//! fit flats, are exact in any field and need no rule.
+//! Fits follow from the shapes alone, independent of their placement. In a fit the surfaces run along each other, so the smallest errors are felt
+//! there. Flats that fit flats are exact in any field and need no rule.
 
 use mortise_brep::Surface;
 
 use crate::distance::ExactSurface;
 
-/// A bore this much larger than what goes into it, in its own radius, is no fit but room.
+/// Largest clearance of a fit, as a share of the bore's radius; a larger one is free space.
 const LOOSEST: f64 = 0.15;
-/// A pin this much larger than its bore, in the bore's radius, is another pin's.
+/// Largest interference of a fit, as a share of the bore's radius; a larger pin belongs to another bore.
 const TIGHTEST: f64 = 0.02;
-/// Cones of half angles closer than this are a fit, rad.
+/// Half angles of cones that fit differ by less than this, rad.
 const SAME_ANGLE: f64 = 0.02;
 
-/// A face of one shape in, or round, a face of another.
+/// A face of one shape inside, or around, a face of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fit {
-    /// Face of the first and of the second shape.
+    /// Faces of the first and of the second shape.
     pub faces: [u32; 2],
-    /// The face of the first is the hollow one.
+    /// Whether the first shape's face is the hollow one.
     pub hollow: bool,
-    /// (bore's radius − pin's)/bore's radius, at least 0: relative difference of their curvatures. 1 when one of them bends in a direction
-    /// in which the other does not.
+    /// (bore's radius − pin's)/bore's radius, at least 0: relative difference of their curvatures. 1 when one of them is curved in a direction in
+    /// which the other is not.
     pub difference: f64,
 }
 
-/// Kind, radius and cone's half angle of a face that bends, negative radius for a hollow one.
+/// Kind, radius and cone half angle of a curved face; the radius is negative for a hollow one.
 fn bend(surface: &ExactSurface, face: u32) -> Option<(Round, f64, f64)> {
     let sense = surface.topology.sense[face as usize];
     match surface.shape().faces[face as usize].surface {
@@ -57,7 +57,7 @@ pub(crate) fn fits(a: &ExactSurface, b: &ExactSurface) -> Vec<Fit> {
     let mut found = Vec::new();
     for &(i, own) in &a {
         for &(j, other) in &b {
-            // The hollow one second.
+            // Put the hollow face second.
             let difference = if own.1 > 0.0 {
                 difference(own, other)
             } else {

@@ -1,4 +1,4 @@
-//! Free-form faces: where on its patch each triangle lies, and the nearest point of a face from its near triangles.
+//! Free-form faces: the parameters of each triangle on its patch, and the nearest point of a face, searched from its near triangles.
 
 use glam::DVec3;
 use mortise_brep::{Shape, Surface};
@@ -7,21 +7,22 @@ use rayon::prelude::*;
 use crate::distance::NearTriangle;
 use crate::patch::{OnPatch, Patch};
 
-/// Most starts of one query on one face.
+/// Most start points of one query on one face.
 const MAX_STARTS: usize = 8;
-/// STEP's customary accuracy times ten, mm: a patch farther than that and the tessellation's own error from its triangles is another surface.
+/// Ten times the customary accuracy of STEP, mm: a patch farther from its triangles than that plus the tessellation's own error is a different
+/// surface.
 const STRANGE_MM: f64 = 1e-2;
 
 /// The free-form faces of a shape.
 pub(crate) struct FreeForms {
-    /// By face: its patch; `None` for analytic faces and for splines of which only the tessellation is known.
+    /// Patch of each face; `None` for analytic faces and for splines known only by their tessellation.
     patches: Vec<Option<Patch>>,
-    /// By triangle: parameters under its centroid.
+    /// Parameters under the centroid of each triangle.
     seeds: Vec<[f64; 2]>,
 }
 
 impl FreeForms {
-    /// Finds each triangle on the patch of its face. Cost: triangles times samples of the patch, 5 ns each.
+    /// Locates each triangle on the patch of its face. Cost: triangles times samples of the patch, 5 ns each.
     pub fn new(shape: &Shape) -> Self {
         let mesh = &shape.mesh;
         let mut patches: Vec<Option<Patch>> = shape.faces.iter().map(|_| None).collect();
@@ -64,7 +65,7 @@ impl FreeForms {
         Self { patches, seeds }
     }
 
-    /// Whether `face` is known beyond its tessellation.
+    /// Exact patch of `face`; `None` where only its tessellation is known.
     pub fn patch(&self, face: u32) -> Option<&Patch> {
         self.patches[face as usize].as_ref()
     }
@@ -75,8 +76,8 @@ impl FreeForms {
             .map(|patch| patch.project(p, self.seeds[t as usize]))
     }
 
-    /// Local minima of the distance from `p` to `face`: one search from each of the face's triangles in `near` that may hold the nearest
-    /// point, nearest first. `chord` is the most the tessellation leaves the face, mm.
+    /// Local minima of the distance from `p` to `face`: one search from each of the face's triangles in `near` that may contain the nearest point,
+    /// nearest first. `chord` is the largest deviation of the tessellation from the face, mm.
     pub fn feet(
         &self,
         face: u32,
@@ -93,7 +94,7 @@ impl FreeForms {
             .map(|n| (n.distance, n.triangle))
             .collect();
         own.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // A triangle that shares a corner with one already searched from leads to the same minimum.
+        // A triangle that shares a corner with one already searched leads to the same minimum.
         let mut seen: Vec<u32> = Vec::new();
         let mut starts = 0;
         let mut best = f64::INFINITY;

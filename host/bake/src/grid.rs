@@ -1,10 +1,10 @@
-//! Where a field's bricks lie: origin, phase and dimensions of its grid.
+//! Placement of a field's bricks: origin, phase and dimensions of its grid.
 
 use glam::DVec3;
 use mortise_brep::{Shape, Surface};
 use mortise_protocol::image::BRICK_CELLS;
 
-/// Placement of a field's grid. Positions are mm, but exactly those the board computes from its stored `f32` metres.
+/// Placement of a field's grid. Positions are in mm and are exactly those the board computes from its stored `f32` metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Grid {
     /// Sample (0,0,0), m, as stored.
@@ -16,16 +16,16 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// A grid of `cell_mm` cells over `shape`, every part of whose surface is at least `reach_mm` inside it.
+    /// Makes a grid of `cell_mm` cells over `shape`; the whole surface is at least `reach_mm` inside it.
     ///
-    /// Its phase lets planes of constant x, y or z fall on sample layers, the largest area first: there, and at the edges between such
-    /// planes, trilinear interpolation is exact. Of the whole cells left to choose, those are taken that let the fewest bricks be near
-    /// such planes. `bulge_mm` is how far the exact surface may leave the tessellation.
+    /// Its phase puts planes of constant x, y or z on sample layers, the largest area first: on these planes, and at the edges between them,
+    /// trilinear interpolation is exact. The remaining whole-cell offset is the one with the fewest bricks near such planes. `bulge_mm` is the
+    /// largest distance of the exact surface from the tessellation.
     pub fn over(shape: &Shape, cell_mm: f64, reach_mm: f64, bulge_mm: f64) -> Self {
         let cell_m = (cell_mm / 1000.0) as f32;
         let cell = f64::from(cell_m) * 1000.0;
         let (lo, hi) = bounding_box(shape);
-        // A tenth of a cell: the stored f32 cell may be smaller than asked by rounding, over thousands of cells.
+        // A tenth of a cell: the stored f32 cell can be smaller than requested by rounding, which adds up over thousands of cells.
         let margin = reach_mm + bulge_mm + 0.1 * cell;
         let mut origin_m = [0.0f32; 3];
         let mut dims = [1u32; 3];
@@ -51,7 +51,7 @@ impl Grid {
         f64::from(self.cell_m) * 1000.0
     }
 
-    /// Position of a sample, counted in cells from the grid's origin, mm.
+    /// Position in mm of a point given in cells from the grid's origin.
     pub fn at(&self, cells: DVec3) -> DVec3 {
         DVec3::from_array(self.origin_m.map(f64::from)) * 1000.0 + cells * self.cell()
     }
@@ -62,7 +62,7 @@ impl Grid {
         self.at(DVec3::new(cells(0), cells(1), cells(2)))
     }
 
-    /// Entries of the grid.
+    /// Number of entries of the grid.
     pub fn entries(&self) -> u64 {
         self.dims.iter().map(|&d| u64::from(d)).product()
     }
@@ -87,10 +87,10 @@ pub(crate) fn bounding_box(shape: &Shape) -> (DVec3, DVec3) {
         })
 }
 
-/// Whole cells to move the origin down so that the neighbourhoods of planes across `axis` spread over the fewest layers of bricks.
+/// Number of whole cells to move the origin down so that the neighbourhoods of planes across `axis` occupy the fewest layers of bricks.
 fn shift(shape: &Shape, axis: usize, cell: f64, first: f64, reach: f64) -> u32 {
-    // Where surface lies across the axis, mm, and how much: planes wholly; a cylinder along another axis touches each of its extremes
-    // with about a sixth of its area (as far as it stays within half a brick of a large radius).
+    // Positions of surface layers across the axis, mm, and their area: the whole area of a plane; for a cylinder along another axis about a sixth of
+    // its area at each extreme (as far as it stays within half a brick of a large radius).
     let mut layers: Vec<(f64, f64)> = Vec::new();
     for face in &shape.faces {
         match face.surface {
@@ -111,7 +111,7 @@ fn shift(shape: &Shape, axis: usize, cell: f64, first: f64, reach: f64) -> u32 {
             .iter()
             .map(|&(at, area)| {
                 let place = ((at - first) / cell + f64::from(shift)).rem_euclid(bricks);
-                // Cells to the nearer boundary between layers of bricks: within reach of it both layers are stored.
+                // Distance to the nearer boundary between brick layers: within reach of it both layers are stored.
                 let clear = place.min(bricks - place) * cell;
                 if clear > reach + 1e-6 * cell {
                     area
@@ -131,13 +131,13 @@ fn shift(shape: &Shape, axis: usize, cell: f64, first: f64, reach: f64) -> u32 {
     best.1
 }
 
-/// Offset in [0, cell) of the sample layers across `axis` that most plane area falls on.
+/// Offset in [0, cell) of the sample layers across `axis` at which they contain the most plane area.
 fn phase(shape: &Shape, axis: usize, cell: f64) -> f64 {
     let layers: Vec<(f64, f64)> = shape
         .faces
         .iter()
         .filter_map(|face| match face.surface {
-            // Turned by less than 1e-9 rad: off by less than a nanometre over a metre.
+            // Tilted by less than 1e-9 rad: the error is less than a nanometre over a metre.
             Surface::Plane { frame } if 1.0 - frame.z[axis].abs() < 1e-18 + f64::EPSILON => {
                 Some((frame.origin[axis].rem_euclid(cell), face.area_mm2.max(1e-6)))
             }
@@ -158,7 +158,7 @@ fn phase(shape: &Shape, axis: usize, cell: f64) -> f64 {
     let mut best = (0.0, 0.0);
     for &(at, _) in &layers {
         let w = weight(at);
-        // By more than rounding, so that equal weights keep the first.
+        // The gain must exceed rounding, so that equal weights keep the first.
         if w > best.0 * (1.0 + 1e-9) {
             best = (w, at);
         }

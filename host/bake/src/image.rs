@@ -1,4 +1,4 @@
-//! Putting the scene image together.
+//! Assembly of the scene image.
 
 use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
 use glam::DAffine3;
@@ -14,7 +14,7 @@ use crate::pointshell::Pointshell;
 use crate::report::ByteCount;
 use crate::tree::{build_tree, round_up};
 
-/// Where a part goes in the scene.
+/// Placement of a part in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartPlacement {
     /// Number returned by [`ImageBuilder::add_shape`].
@@ -40,7 +40,7 @@ pub struct ImageBuilder {
     blob: Vec<u8>,
 }
 
-/// The last palette runs must cover every value their indices can take.
+/// Padding after the palettes: the last palette runs must cover every value their indices can take.
 pub(crate) const PALETTE_PADDING: usize = 256;
 
 impl ImageBuilder {
@@ -60,7 +60,7 @@ impl ImageBuilder {
         let tree = build_tree(&positions, &offsets);
         let (lo, hi) = bounding_box(shape);
         let center = ((lo + hi) / 2000.0).as_vec3();
-        // Half the diagonal holds the tessellation; the exact surface may bulge past it, by less than the grid's own margin of a cell.
+        // Half the diagonal contains the tessellation; the exact surface can bulge past it, by less than the grid's own margin of a cell.
         let radius = tree
             .nodes
             .first()
@@ -161,12 +161,12 @@ impl ImageBuilder {
             + padded(self.blob.len())
     }
 
-    /// Whether nothing was added.
+    /// Whether the image has no shapes and no parts.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty() && self.shapes.is_empty()
     }
 
-    /// The image. The caller sees to it that [`Self::len`] fits 32 bits.
+    /// Returns the image. The caller ensures that [`Self::len`] fits 32 bits.
     pub fn finish(mut self) -> Vec<u8> {
         self.palette.extend([NO_FACE; PALETTE_PADDING]);
         let mut bytes = vec![0; size_of::<Header>()];
@@ -206,7 +206,7 @@ fn append<T: Pod>(bytes: &mut Vec<u8>, records: &[T]) -> Section {
     section
 }
 
-/// The exact surface of a face in metres. `sense` is the B-rep's.
+/// Record of the exact surface of a face, in metres. `sense` is the B-rep's.
 fn face_record(face: &Face) -> FaceRecord {
     let sense = if face.reversed { -1.0 } else { 1.0 };
     let of = |kind: u32, frame: &mortise_brep::Frame, radius: f64, second: f64| FaceRecord {

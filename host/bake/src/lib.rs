@@ -1,11 +1,11 @@
 //! CAD model to scene image: exact signed distance, sparse bricks, pointshell.
 //!
-//! [`bake`] turns a [`CadModel`](mortise_brep::CadModel) (mm) into the bytes that
-//! [`SceneImage`](mortise_protocol::image::SceneImage) reads in place (m). On the way each shape gets
+//! [`bake`] turns a [`CadModel`](mortise_brep::CadModel) (mm) into the bytes that [`SceneImage`](mortise_protocol::image::SceneImage) reads in place
+//! (m). Each shape passes through three stages:
 //!
 //! 1. an [`ExactSurface`]: signed distance to the B-rep itself, not to its facets,
 //! 2. a field: that distance sampled on bricks of 8³ cells, stored only near the surface,
-//! 3. a pointshell on the exact surface, as dense as an error bound asks, under a tree of spheres.
+//! 3. a pointshell on the exact surface, as dense as an error bound requires, under a tree of spheres.
 //!
 //! Work and bytes grow with the surface, not the volume. The bytes do not depend on the number of threads.
 

@@ -1,8 +1,8 @@
-//! Where exact surfaces give the distance in a cell, and how: what the palette says besides the nearest face.
+//! Palette entries beyond the nearest face: whether and how exact surfaces give the distance in a cell.
 //!
-//! A cell is *exact* when the distance at all its corners is that to the unbounded surface of one face. Where a convex edge or corner passes,
-//! the largest of the distances to two or three faces is it (inside and at the faces; outside it is a lower bound of the right sign), where a
-//! re-entrant one passes the smallest. What cannot be shown so from the corners is left to interpolation.
+//! A cell is *exact* when the distance at all its corners equals that to the unbounded surface of one face. At a convex edge or corner the distance
+//! is the largest of the distances to two or three faces (exact inside and at the faces; outside it is a lower bound of the right sign); at a
+//! re-entrant one it is the smallest. Cells for which the corners do not prove either are interpolated.
 
 use glam::DVec3;
 use mortise_brep::Surface;
@@ -10,31 +10,31 @@ use mortise_protocol::image::{BRICK_SAMPLES, NO_FACE, Nearby};
 
 use crate::surface::to_local;
 
-/// Exact distances agree within this, mm: rounding, and vertices a tenth of a micrometre off their curves.
+/// Tolerance of exact distances, mm: rounding, and vertices a tenth of a micrometre off their curves.
 const SAME_MM: f64 = 2e-4;
 
 /// A sample of a brick before rounding.
 #[derive(Clone, Copy)]
 pub(crate) struct ExactSample {
-    /// mm, outside positive; not a number where it was not asked for.
+    /// Distance, mm, outside positive; NaN where it was not computed.
     pub distance: f64,
     /// Nearest face or [`NO_FACE`].
     pub face: u16,
 }
 
-/// What lies nearest to a cell.
+/// Samples and faces from which the nearest faces of a cell are found.
 pub(crate) struct CellNearby<'a> {
-    /// Faces of the shape: surface, and +1 or −1 as the outward normal is the natural one or turned round.
+    /// Faces of the shape: surface, and +1 where the outward normal is the natural one, −1 where it is reversed.
     pub faces: &'a [(Surface, f64)],
     /// 9³ samples of the brick, x fastest.
     pub samples: &'a [ExactSample],
-    /// Position of sample (0, 0, 0), mm, and its step.
+    /// Position of sample (0, 0, 0), mm, and the sample step.
     pub origin: DVec3,
     pub cell: f64,
 }
 
 impl CellNearby<'_> {
-    /// Of the cell with the least corner `at`; `nearest` is the face nearest to it.
+    /// Palette entry of the cell with the lowest corner `at`; `nearest` is the face nearest to it.
     pub fn of(&self, at: [usize; 3], nearest: u16) -> Nearby {
         if nearest > Nearby::MAX_FACES {
             return Nearby::Unknown;
@@ -61,8 +61,8 @@ impl CellNearby<'_> {
         Nearby::Roughly(nearest)
     }
 
-    /// Whether `fold` of the distances to the faces of `group` has, at all corners, the sign of the distance and no larger amount, and is the
-    /// distance where that `must` be so.
+    /// Whether `fold` of the distances to the faces of `group` has, at all corners, the sign of the true distance and no larger magnitude, and equals
+    /// the true distance where `must` requires it.
     fn all(
         &self,
         corners: &[(DVec3, ExactSample); 8],
@@ -83,7 +83,7 @@ impl CellNearby<'_> {
         })
     }
 
-    /// The faces nearest to the samples about a cell, `nearest` first; more than three are none.
+    /// The faces nearest to the samples around a cell, `nearest` first; only `nearest` if there are more than three.
     fn faces_about(&self, at: [usize; 3], nearest: u16) -> [u16; 3] {
         let mut group = [nearest, NO_FACE, NO_FACE];
         let mut count = 1;
@@ -110,7 +110,7 @@ impl CellNearby<'_> {
         self.origin + DVec3::from_array(place.map(|i| i as f64)) * self.cell
     }
 
-    /// Signed distance to the unbounded surface of a face, mm; not a number where it has no closed form.
+    /// Signed distance to the unbounded surface of a face, mm; NaN where it has no closed form.
     fn distance(&self, face: u16, p: DVec3) -> f64 {
         let Some((surface, sense)) = self.faces.get(usize::from(face)) else {
             return f64::NAN;

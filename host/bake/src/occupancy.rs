@@ -1,15 +1,16 @@
 //! The voxmap: which voxels the exact surface crosses, two bits each.
 //!
-//! The textbook baseline (McNeely, Puterbaugh & Troy 1999): *surface* voxels are those the surface crosses, *proximity* voxels the layer round them
-//! outside, *interior* voxels the rest of the solid. The paper scan-converts polygons; here the exact surface decides, so that what the method
-//! errs is the method's own. Nor is the force layer moved outward by two voxels, as the paper does to keep parts a voxel apart: parts with a small
-//! clearance could then never meet.
+//! The textbook baseline (McNeely, Puterbaugh & Troy 1999): *surface* voxels are those the surface crosses, *proximity* voxels the layer around them
+//! outside, *interior* voxels the rest of the solid. The paper scan-converts polygons; here the exact surface decides, so that the measured error is
+//! the method's own. The force layer is not moved outward by two voxels, as the paper does to keep parts a voxel apart: parts with a small clearance
+//! could then never meet.
 //!
-//! The grid is laid so that the largest plane faces across x, y and z run through voxel centres: there the tangent-plane depth is exact, the best the
-//! method can do. Cost: an exact query for each voxel of a stored brick, in parallel, and a few tens where a voxel is nearly crossed.
+//! The grid is placed so that the largest plane faces across x, y and z run through voxel centres: there the tangent-plane depth is exact, which is
+//! the method's best case. Cost: an exact query for each voxel of a stored brick, in parallel, and a few tens where the surface passes close to a
+//! voxel's boundary.
 //!
-//! A surface voxel names the faces that cross it, as section 5.2 of Faas 2010 has it: there a cube as large as the voxel is collided with each face,
-//! here the nearest points to the voxel's centre and corners tell. A face that is nearest to none of the nine, or only outside of the voxel, is
+//! A surface voxel names the faces that cross it, as section 5.2 of Faas 2010 does: there a cube of the voxel's size is collided with each face, here
+//! the nearest points to the voxel's centre and corners identify the faces. A face that is nearest to none of the nine, or only outside the voxel, is
 //! not named.
 
 use std::collections::HashMap;
@@ -30,20 +31,20 @@ use crate::error::BakeError;
 use crate::field::{BakedField, NearSurface, append_aligned, check_brick_count};
 use crate::grid::Grid;
 
-/// Layers of proximity voxels round the surface voxels, as in the paper.
+/// Layers of proximity voxels around the surface voxels, as in the paper.
 pub const PROXIMITY_LAYERS: u32 = 1;
-/// Halvings of a voxel after which what is still not told apart counts as crossed.
+/// Bisections of a voxel after which an undecided cube counts as crossed.
 const HALVINGS: u32 = 5;
-/// A voxel may count as crossed when the surface is this near to it, in voxels: the diagonal of its smallest part.
+/// Distance of the surface at which a voxel can still count as crossed, in voxels: the diagonal of its smallest subdivision.
 pub const CROSSING_TOLERANCE_CELLS: f64 = 1.733 / (1 << HALVINGS) as f64;
 
-/// Most faces that a voxel names.
+/// Most faces named by a voxel.
 const FACES: usize = 3;
 
 /// Voxels of one brick, x fastest.
 pub(crate) struct Voxels {
     pub kinds: [Voxel; CELLS_PER_BRICK],
-    /// Faces that cross its surface voxels, nearest first, [`NO_FACE`] where there are no more.
+    /// Faces that cross its surface voxels, nearest first, filled up with [`NO_FACE`].
     pub faces: [[u16; FACES]; CELLS_PER_BRICK],
 }
 
@@ -57,9 +58,9 @@ pub fn bake_occupancy(
 ) -> Result<BakedField, BakeError> {
     let layers = f64::from(PROXIMITY_LAYERS);
     let mut grid = Grid::over(surface.shape(), cell_mm, (layers + 2.0) * cell_mm, surface.chord);
-    // Sample layers lie on planes; half a voxel off, voxel centres do.
+    // The field's sample layers lie on planes; moved by half a voxel, the voxel centres do.
     grid.origin_m = grid.origin_m.map(|x| x - 0.5 * grid.cell_m);
-    // From the surface through a crossed voxel to the far side of the layers, and a little.
+    // Distance from the surface through a crossed voxel to the far side of the layers, with a small margin.
     let reach = (3f64.sqrt() * layers + 0.1) * grid.cell();
     let near = NearSurface::find(surface, &grid, reach, cell_mm, part, progress)?;
     let surface = &*surface;
@@ -86,7 +87,7 @@ pub fn bake_occupancy(
     Ok(packed)
 }
 
-/// Crossed, inside or outside (as yet free), for each voxel of brick `at`.
+/// State of each voxel of brick `at`: crossed, inside or outside (free for now).
 pub(crate) fn voxels(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Voxels {
     let mut scratch = Scratch::default();
     let mut kinds = [Voxel::Free; CELLS_PER_BRICK];
@@ -110,7 +111,7 @@ pub(crate) fn voxels(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Voxel
     Voxels { kinds, faces }
 }
 
-/// Faces that cross the voxel of half edge `half` about `center`, that of its `nearest` point first.
+/// Faces that cross the voxel of half edge `half` about `center`, starting with that of its `nearest` point.
 fn crossing(
     surface: &ExactSurface,
     center: DVec3,
@@ -120,7 +121,7 @@ fn crossing(
 ) -> [u16; FACES] {
     let mut faces = [nearest.face as u16, NO_FACE, NO_FACE];
     let mut count = 1;
-    // The surface crosses the voxel or its tolerance: it is no farther from a corner than the diagonal, and a little.
+    // The surface crosses the voxel or its tolerance: its distance from a corner is at most the diagonal, plus a small margin.
     let within = 2.1 * half * 3f64.sqrt();
     for corner in 0..8 {
         let side = |axis: u32| if corner >> axis & 1 == 0 { -half } else { half };
@@ -138,7 +139,7 @@ fn crossing(
     faces
 }
 
-/// What a brick's palette says of its voxels. Where all that are crossed are crossed by one face, it stands for the whole brick and takes no bytes.
+/// Palette of a brick's voxels. Where one face crosses all crossed voxels, it applies to the whole brick and takes no bytes.
 fn named(voxels: &Voxels) -> Packed {
     let own = |faces: &[u16; FACES]| match *faces {
         [NO_FACE, ..] => Nearby::Unknown,
@@ -159,8 +160,8 @@ fn named(voxels: &Voxels) -> Packed {
     bricks::pack(&cells)
 }
 
-/// Whether the surface meets the cube of half edge `half` about `center`, its boundary included. By halves: a cube is left out when the surface
-/// is beyond its corners, and taken when its centre's nearest point lies in it; what is left after `halvings` is taken.
+/// Whether the surface meets the cube of half edge `half` about `center`, boundary included. By bisection: a cube is rejected when the surface is
+/// beyond its corners, and accepted when its centre's nearest point lies in it; cubes still undecided after `halvings` are accepted.
 fn crosses(surface: &ExactSurface, center: DVec3, half: f64, halvings: u32, scratch: &mut Scratch) -> bool {
     let corner = half * 3f64.sqrt() * (1.0 + 1e-9);
     if surface.at_least(center, corner).is_none_or(|far| far > corner) {
@@ -172,7 +173,7 @@ fn crosses(surface: &ExactSurface, center: DVec3, half: f64, halvings: u32, scra
     if nearest.distance.abs() > corner {
         return false;
     }
-    // A nanometre: planes that lie on a voxel's boundary belong to both sides whatever the rounding.
+    // Margin of a nanometre: planes that lie on a voxel's boundary belong to both sides regardless of rounding.
     if halvings == 0 || (nearest.point - center).abs().max_element() <= half + 1e-6 {
         return true;
     }
@@ -190,7 +191,7 @@ fn crosses(surface: &ExactSurface, center: DVec3, half: f64, halvings: u32, scra
     })
 }
 
-/// Place in the brick of voxel `i`.
+/// Coordinates in the brick of voxel `i`.
 pub(crate) fn place(i: usize) -> [usize; 3] {
     [
         i % BRICK_CELLS,
@@ -199,7 +200,7 @@ pub(crate) fn place(i: usize) -> [usize; 3] {
     ]
 }
 
-/// The voxels of brick `at`, free ones within [`PROXIMITY_LAYERS`] of a surface voxel (corners included) made proximity.
+/// The voxels of brick `at`, with free ones within [`PROXIMITY_LAYERS`] of a surface voxel (corners included) marked as proximity.
 fn with_proximity(
     grid: &Grid,
     places: &[Option<usize>],
@@ -233,7 +234,7 @@ fn with_proximity(
     out
 }
 
-/// Puts bricks into arrays, equal ones once; those of one kind throughout need no voxels.
+/// Packs bricks into arrays and stores equal ones once; bricks of one uniform kind need no voxels.
 fn pack(
     grid: &Grid,
     near: &NearSurface,
@@ -299,7 +300,7 @@ fn pack(
                 palette_len: named.palette_len,
                 index_bits: named.index_bits,
             });
-            // Numbers past the limit wrap here; the caller refuses such a field.
+            // Numbers past the limit wrap here; the caller rejects such a field.
             (bricks.len() - 1) as u16
         });
         *entry = GridEntry::Brick(number).to_bits();

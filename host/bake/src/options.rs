@@ -1,4 +1,4 @@
-//! What can be asked of a bake, and what it tells meanwhile.
+//! Options of a bake, and its progress reports.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,29 +8,30 @@ use crate::field::SampleFormat;
 /// What to bake and how finely.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeOptions {
-    /// How a part's inside is told from its outside.
+    /// How the inside of a part is distinguished from its outside.
     pub method: Method,
-    /// Cell edge, mm. `None`: a hundredth of the largest part, rounded to 1, 2 or 5, finer for parts much smaller than that, and coarser
-    /// until the image fits [`Self::image_limit_bytes`].
+    /// Cell edge, mm. `None`: a hundredth of the largest part, rounded to 1, 2 or 5; finer for parts much smaller than that, and coarsened until the
+    /// image fits [`Self::image_limit_bytes`].
     pub cell_mm: Option<f64>,
-    /// Cell edges of single parts by their names, mm, in place of [`Self::cell_mm`], which must then be given. Of parts of one shape the first counts.
+    /// Cell edges of single parts by name, mm, which override [`Self::cell_mm`]; that must then be given. For parts that share a shape the first
+    /// entry counts.
     pub part_cells_mm: Vec<(String, f64)>,
     /// Depth and height, in cells, to which the surface's neighbourhood is stored.
     pub band_cells: f64,
     /// Number format of samples.
     pub format: SampleFormat,
-    /// What the pointshells are made of.
+    /// Kind of the pointshells.
     pub shell: PointshellKind,
     /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a twentieth of the cell.
     pub epsilon_mm: Option<f64>,
-    /// That bound where only convex faces touch each other away from edges, crossed shafts above all, mm. `None`: the same.
+    /// The same bound where only convex faces touch each other away from edges, mainly crossed shafts, mm. `None`: as `epsilon_mm`.
     pub crossing_epsilon_mm: Option<f64>,
-    /// Largest spacing of pointshell points along edges, mm: two flat strips narrower than this, across each other, can miss each other.
+    /// Largest spacing of pointshell points along edges, mm. Two flat strips that are narrower than this and cross each other can miss each other.
     /// `None`: four cells.
     pub max_spacing_mm: Option<f64>,
-    /// Which parts may be grabbed.
+    /// Parts that may be grabbed.
     pub grabbable: Grabbable,
-    /// Most bytes the image may have.
+    /// Largest size of the image in bytes.
     pub image_limit_bytes: u64,
 }
 
@@ -53,7 +54,7 @@ impl Default for BakeOptions {
 }
 
 impl BakeOptions {
-    /// Refuses values that make no sense.
+    /// Rejects values out of range.
     pub(crate) fn check(&self) -> Result<(), BakeError> {
         let within = |option, value: f64, least: f64, most: f64, expected| {
             if value >= least && value <= most {
@@ -70,7 +71,7 @@ impl BakeOptions {
         for cell in cells.chain(self.cell_mm) {
             within("cell_mm", cell, 1e-3, 1e3, "0.001 to 1000 mm")?;
         }
-        // Below one diagonal the cells next to the surface would not all be stored.
+        // With less than one diagonal not all cells next to the surface would be stored.
         within("band_cells", self.band_cells, 1.0, 64.0, "1 to 64 cells")?;
         for epsilon in [self.epsilon_mm, self.crossing_epsilon_mm].into_iter().flatten() {
             within("epsilon_mm", epsilon, 1e-6, 1e3, "0.000001 to 1000 mm")?;
@@ -98,22 +99,23 @@ impl BakeOptions {
     }
 }
 
-/// How contact finds depth and direction.
+/// Representation from which contact depth and direction are computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Signed distance, interpolated: depth and direction to micrometres.
+    /// Interpolated signed distance: depth and direction to micrometres.
     #[default]
     DistanceField,
-    /// Two bits a voxel, depth to a tangent plane through its centre (McNeely, Puterbaugh & Troy 1999): the textbook baseline, off by up to a voxel.
+    /// Two bits per voxel, depth to a tangent plane through its centre (McNeely, Puterbaugh & Troy 1999): the textbook baseline, with errors up to a
+    /// voxel.
     Occupancy,
 }
 
 impl Method {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 2] = [Self::DistanceField, Self::Occupancy];
 
-    /// As written on the command line and in files.
+    /// Name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::DistanceField => "distance-field",
@@ -143,35 +145,35 @@ impl std::str::FromStr for Method {
     }
 }
 
-/// What a pointshell is made of.
+/// Kind of pointshell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointshellKind {
-    /// Points on the exact surface, as dense as an error bound asks, on every part.
+    /// Points on the exact surface, as dense as an error bound requires, on every part.
     #[default]
     ErrorBounded,
     /// One point for each voxel the surface crosses, on the parts that may be grabbed (McNeely, Puterbaugh & Troy 1999): the textbook baseline.
     Classic {
-        /// Voxel edge, mm. `None`: the cell.
+        /// Voxel edge, mm. `None`: the field's cell.
         voxel_mm: Option<f64>,
-        /// How far points are moved inward, percent of a voxel.
+        /// Distance by which points are moved inward, percent of a voxel.
         shrink_percent: f64,
     },
 }
 
-/// Which parts may be grabbed and moved; the others are fixed.
+/// Parts that may be grabbed and moved; the others are fixed.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Grabbable {
-    /// Every part but the one of largest volume (a single part stays grabbable).
+    /// Every part except the one of largest volume (a single part can always be grabbed).
     #[default]
     AllButLargest,
     /// Every part.
     All,
-    /// These, by name.
+    /// The parts with these names.
     Named(Vec<String>),
 }
 
-/// What a bake is doing.
+/// Stage of a bake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
@@ -183,15 +185,15 @@ pub enum Stage {
     Image,
 }
 
-/// How far a bake has come.
+/// Progress of a bake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress<'a> {
-    /// What it is doing.
+    /// Current stage.
     pub stage: Stage,
-    /// Part whose shape it is at.
+    /// Part whose shape is being processed.
     pub part: &'a str,
-    /// Shape, from 0, and number of shapes.
+    /// Index of the shape, from 0, and number of shapes.
     pub shape: (usize, usize),
-    /// 0 to 1 within this shape and stage.
+    /// Progress from 0 to 1 within this shape and stage.
     pub fraction: f64,
 }

@@ -1,9 +1,9 @@
-//! How sharply curved the surfaces are that a shape can meet: it decides how densely the shape must be sampled.
+//! Curvature of the surfaces that a shape can meet: it determines how densely the shape must be sampled.
 //!
-//! Two smooth convex surfaces with principal curvatures κ and κ' touch with relative curvature κ + κ'. Both are sampled and both sample sets
-//! are looked up, so the sharper one finds the contact: its own lattice, with spacings sᵢ = √(4ε/(κᵢ + κ')), leaves at most
-//! Σ sᵢ²/8·(κᵢ + κ') ≤ ε. A surface therefore counts only those partners that are *no sharper* than itself. Flat and concave faces need no
-//! samples inside at all: what touches them there is convex, or has an edge or a corner there.
+//! Two smooth convex surfaces with principal curvatures κ and κ' touch with relative curvature κ + κ'. Both are sampled and both sample sets are
+//! queried, so the sharper one finds the contact: its own lattice, with spacings sᵢ = √(4ε/(κᵢ + κ')), misses at most Σ sᵢ²/8·(κᵢ + κ') ≤ ε. A
+//! surface therefore counts only partners that are *no sharper* than itself. Flat and concave faces need no samples inside: a partner that touches
+//! them there is convex, or has an edge or a corner there.
 
 use mortise_brep::Surface;
 
@@ -12,13 +12,13 @@ use crate::fits::room;
 use crate::spline_samples::area_curvatures;
 use crate::surface::{parameters, principal_curvatures};
 
-/// What a shape can meet.
+/// Partners of a shape.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Partners {
-    /// Nothing is known and nothing is relied on: every face is sampled, no two neighbours farther apart than the largest spacing.
+    /// Unknown partners, no assumption: every face is sampled, and no two neighbours are farther apart than the largest spacing.
     #[default]
     Unknown,
-    /// These surfaces and, always, flat and concave ones and edges.
+    /// These surfaces, plus flat and concave ones and edges, which always count.
     Known(Met),
 }
 
@@ -31,14 +31,14 @@ pub struct Met {
     pub bores: Vec<f64>,
 }
 
-/// Smallest and largest convex principal curvature over a face, 1/mm: at each of its points the larger of the two counts.
+/// Smallest and largest convex principal curvature over a face, 1/mm; the larger of the two principal curvatures at each of its points.
 pub type CurvatureRange = [f64; 2];
 
-/// Share of a spline face's area whose curvature is counted: what a tessellation says of its slivers is noise.
+/// Share of a spline face's area whose curvature is used: curvature from a tessellation's slivers is noise.
 const SPLINE_AREA: f64 = 0.9;
 
 impl Partners {
-    /// These surfaces and whatever is flat or concave.
+    /// These surfaces plus any flat or concave one.
     pub fn of<'a>(surfaces: impl IntoIterator<Item = &'a ExactSurface>) -> Self {
         let each: Vec<Met> = surfaces.into_iter().map(Met::of).collect();
         Self::Known(Met::all(&each))
@@ -63,7 +63,7 @@ impl Partners {
         }
     }
 
-    /// Largest difference between the curvature of a shaft of this radius (mm) and that of a bore it fits, 1/mm; `None` where it fits none.
+    /// Largest difference between the curvature of a shaft of this radius (mm) and that of a bore it fits, 1/mm; `None` where it fits no bore.
     pub(crate) fn room(&self, shaft_mm: f64) -> Option<f64> {
         let Self::Known(met) = self else { return None };
         let rooms = met.bores.iter().filter_map(|&bore| room(shaft_mm, bore));
@@ -72,7 +72,7 @@ impl Partners {
 }
 
 impl Met {
-    /// The surfaces of one shape.
+    /// Surfaces of one shape.
     pub(crate) fn of(surface: &ExactSurface) -> Self {
         let faces = surface.shape().faces.iter().enumerate();
         let bores = faces.filter_map(|(face, of)| match of.surface {
@@ -89,7 +89,7 @@ impl Met {
         met
     }
 
-    /// Those of several.
+    /// Surfaces of several shapes.
     pub(crate) fn all<'a>(each: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut all = Self::default();
         for met in each {

@@ -1,9 +1,9 @@
 //! A free-form surface under a face: evaluation and the nearest point to a point near it.
 //!
-//! S(u, v) = Σ Nᵢ Nⱼ wᵢⱼ Pᵢⱼ / Σ Nᵢ Nⱼ wᵢⱼ with derivatives up to the second (Piegl & Tiller, "The NURBS Book", 2.3, 4.4). The foot of a
-//! point p minimises |S(u, v) − p|² by Newton steps in the box of parameters, halved until they descend; where the Hessian is not positive
-//! definite the Gauss–Newton step is taken. From a start in the foot's own triangle it takes 2 to 5 steps of about 1 µs. It is a local
-//! minimum: the caller starts from every triangle that may hold the nearest.
+//! S(u, v) = Σ Nᵢ Nⱼ wᵢⱼ Pᵢⱼ / Σ Nᵢ Nⱼ wᵢⱼ with derivatives up to the second (Piegl & Tiller, "The NURBS Book", 2.3, 4.4). The foot of a point p
+//! minimises |S(u, v) − p|² by Newton steps within the parameter box, halved until they descend; where the Hessian is not positive definite the
+//! Gauss–Newton step is taken. A start in the foot's own triangle takes 2 to 5 steps of about 1 µs. The result is a local minimum: the caller starts
+//! from every triangle that may contain the nearest point.
 
 use glam::DVec3;
 use mortise_brep::SplineSurface;
@@ -12,19 +12,19 @@ use mortise_brep::SplineSurface;
 const MAX_DEGREE: usize = 25;
 const MAX_STEPS: usize = 24;
 const MAX_HALVINGS: usize = 10;
-/// A step shorter than this ends the search, mm: Newton steps double the right digits, so the foot is then good to rounding.
+/// Step length that ends the search, mm: Newton steps double the number of correct digits, so the foot is then exact to rounding.
 const SHORT_MM: f64 = 1e-9;
 
-/// A (rational) B-spline surface in its box of parameters.
+/// A (rational) B-spline surface over its parameter box.
 pub(crate) struct Patch {
     degrees: [usize; 2],
     knots: [Vec<f64>; 2],
     /// w·x, w·y, w·z, w; v runs fastest.
     poles: Vec<[f64; 4]>,
-    /// Poles along v.
+    /// Number of poles along v.
     row: usize,
     bounds: [[f64; 2]; 2],
-    /// First and last line of poles coincide: parameters wrap round.
+    /// Whether first and last line of poles coincide, so that the parameter wraps round.
     closed: [bool; 2],
     /// Largest distance from the face's own surface, mm.
     pub deviation: f64,
@@ -34,9 +34,9 @@ pub(crate) struct Patch {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OnPatch {
     pub uv: [f64; 2],
-    /// mm.
+    /// Position, mm.
     pub point: DVec3,
-    /// Unit, ∂S/∂u × ∂S/∂v; zero where that vanishes (a pole).
+    /// Unit normal ∂S/∂u × ∂S/∂v; zero where that vanishes (a pole).
     pub normal: DVec3,
 }
 
@@ -44,12 +44,12 @@ pub(crate) struct OnPatch {
 struct Jet {
     s: DVec3,
     first: [DVec3; 2],
-    /// uu, uv, vv.
+    /// Second derivatives: uu, uv, vv.
     second: [DVec3; 3],
 }
 
 impl Patch {
-    /// `None` when the degree is beyond the limit or counts do not fit.
+    /// `None` when the degree exceeds the limit or the counts are inconsistent.
     pub fn new(surface: &SplineSurface) -> Option<Self> {
         let degrees = surface.degrees.map(|d| d as usize);
         let mut counts = [0; 2];
@@ -87,11 +87,11 @@ impl Patch {
         })
     }
 
-    /// The local minimum of the distance to `p` that `start` leads to.
+    /// Local minimum of the distance to `p`, reached from `start`.
     pub fn project(&self, p: DVec3, start: [f64; 2]) -> OnPatch {
         let (mut at, mut jet) = self.descend(p, start);
         if let Some(side) = self.collapsed(&jet) {
-            // The tip of a cone: every parameter along the side is the same point, and only some lead down from it.
+            // The tip of a cone: every parameter along the side gives the same point, and only some of them descend from it.
             let (off, there) = self.descend(p, self.best_beside(side, at, p));
             if there.s.distance_squared(p) < jet.s.distance_squared(p) {
                 (at, jet) = (off, there);
@@ -108,13 +108,13 @@ impl Patch {
         }
     }
 
-    /// The parameter along which the surface does not move there (or hardly, for its size).
+    /// The parameter along which the surface does not move there (or hardly moves, relative to its size).
     fn collapsed(&self, jet: &Jet) -> Option<usize> {
         let moves = [0, 1].map(|k| jet.first[k].length() * (self.bounds[k][1] - self.bounds[k][0]));
         (0..2).find(|&k| moves[k] < 1e-6 * moves[1 - k])
     }
 
-    /// Of points a thousandth of the other parameter's range away from a collapsed side, the nearest to `p`.
+    /// The point nearest to `p` among those a thousandth of the other parameter's range away from a collapsed side.
     fn best_beside(&self, side: usize, at: [f64; 2], p: DVec3) -> [f64; 2] {
         const SAMPLES: usize = 32;
         let [lo, hi] = self.bounds[1 - side];
@@ -169,7 +169,7 @@ impl Patch {
         (at, jet)
     }
 
-    /// Points all over the patch, `(uv, point)`: `degree + 1` in each span of knots.
+    /// Points over the whole patch, `(uv, point)`: `degree + 1` in each knot span.
     pub fn grid(&self) -> Vec<([f64; 2], DVec3)> {
         let lines: [Vec<f64>; 2] = [0, 1].map(|k| {
             let degree = self.degrees[k];
@@ -187,7 +187,7 @@ impl Patch {
         uv.map(|uv| (uv, self.jet(uv).s)).collect()
     }
 
-    /// Wrapped or clamped into the box.
+    /// `uv` wrapped or clamped into the parameter box.
     fn inside(&self, uv: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|k| {
             let [lo, hi] = self.bounds[k];
@@ -251,7 +251,7 @@ impl Patch {
     }
 }
 
-/// The step that would end at the minimum were the distance squared quadratic. Parameters that are not free stay.
+/// Newton step: it would end at the minimum if the distance squared were quadratic. Parameters that are not free stay.
 fn newton_step(jet: &Jet, r: DVec3, g: [f64; 2], free: [bool; 2]) -> [f64; 2] {
     let [su, sv] = jet.first;
     let [suu, suv, svv] = jet.second;
@@ -289,7 +289,7 @@ fn newton_step(jet: &Jet, r: DVec3, g: [f64; 2], free: [bool; 2]) -> [f64; 2] {
 fn basis(knots: &[f64], degree: usize, span: usize, t: f64) -> [[f64; MAX_DEGREE + 1]; 3] {
     type Row = [f64; MAX_DEGREE + 1];
     let zero = [0.0; MAX_DEGREE + 1];
-    // From functions of degree d − 1 (local index j − 1 and j are functions i and i + 1) to one of degree d, i = span − d + j.
+    // Recurrence from functions of degree d − 1 (local index j − 1 and j are functions i and i + 1) to one of degree d, i = span − d + j.
     let over = |d: usize, j: usize| {
         let i = span + j - d;
         let left = knots[i + d] - knots[i];
@@ -395,7 +395,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// The foot on a cylinder spelt as a spline is that on the cylinder, or on the patch's border.
+        /// The foot on a cylinder written as a spline equals that on the cylinder, or lies on the patch's border.
         #[test]
         fn a_rational_arc_is_a_circle(rho in 0.5f64..12.0, a in 0.05f64..1.52, z in 0.5f64..19.5, start in prop::array::uniform2(0.0f64..1.0)) {
             let p = DVec3::new(rho * a.cos(), rho * a.sin(), z);
@@ -406,7 +406,7 @@ mod tests {
             prop_assert!((on.normal.dot(foot.with_z(0.0)) / 5.0).abs() > 1.0 - 1e-9);
         }
 
-        /// Derivatives are those of differences, off the knots.
+        /// Derivatives agree with finite differences away from the knots.
         #[test]
         fn derivatives_are_limits_of_differences(u in 0.01f64..2.99, v in -0.99f64..1.99) {
             const H: f64 = 1e-4;
@@ -415,7 +415,7 @@ mod tests {
             let patch = sheet();
             let at = |i: f64, j: f64| patch.jet([u + i * H, v + j * H]).s;
             let jet = patch.jet([u, v]);
-            // Central differences err by H²/6 and H²/12 times derivatives of up to some hundred mm, second ones by rounding over H² as well.
+            // Central differences have an error of H²/6 and H²/12 times derivatives of up to some hundred mm; second ones also have rounding over H².
             prop_assert!(jet.first[0].distance((at(1.0, 0.0) - at(-1.0, 0.0)) / (2.0 * H)) < 1e-4);
             prop_assert!(jet.first[1].distance((at(0.0, 1.0) - at(0.0, -1.0)) / (2.0 * H)) < 1e-4);
             prop_assert!(jet.second[0].distance((at(1.0, 0.0) + at(-1.0, 0.0) - 2.0 * jet.s) / (H * H)) < 1e-2);
@@ -424,7 +424,7 @@ mod tests {
             prop_assert!(jet.second[2].distance((at(0.0, 1.0) + at(0.0, -1.0) - 2.0 * jet.s) / (H * H)) < 1e-2);
         }
 
-        /// Started at the nearest of many samples, no sample is nearer than the foot, and inside the patch the way there is along the normal.
+        /// From the nearest of many samples, the foot is at least as near as every sample, and inside the patch the offset is along the normal.
         #[test]
         fn no_sample_is_nearer_than_the_foot(p in (-5.0f64..35.0, -5.0f64..35.0, -8.0f64..8.0)) {
             let p = DVec3::new(p.0, p.1, p.2);
@@ -436,7 +436,7 @@ mod tests {
             let d = on.point.distance(p);
             prop_assert!(d <= far(&start) + 1e-12);
             let inside = on.uv[0] > 0.0 && on.uv[0] < 3.0 && on.uv[1] > -1.0 && on.uv[1] < 2.0;
-            // The double knot is a crease of curvature only: the normal has no jump there.
+            // The double knot is a discontinuity of curvature only: the normal is continuous there.
             if inside && d > 1e-3 {
                 prop_assert!((p - on.point).dot(on.normal).abs() > d * (1.0 - 1e-9), "{on:?}");
             }

@@ -1,7 +1,7 @@
-//! Pieces of the exact boundary between faces: one for each mesh side where the face changes.
+//! Pieces of the exact boundary between faces: one for each mesh side at which the face changes.
 //!
-//! A piece carries the exact curve between the side's ends: a straight segment, or an arc when the B-rep edge is a circle. Other curves are
-//! followed by points so dense that their chords are within [`mortise_brep::EDGE_TOLERANCE_MM`], where the model has them.
+//! A piece carries the exact curve between the side's ends: a straight segment, or an arc when the B-rep edge is a circle. Other curves are polylines
+//! whose chords are within [`mortise_brep::EDGE_TOLERANCE_MM`], where the model has them.
 
 use glam::DVec3;
 
@@ -10,24 +10,24 @@ use glam::DVec3;
 pub(crate) struct Piece {
     /// Mesh vertices at its ends.
     pub ends: [u32; 2],
-    /// Where those are, mm.
+    /// Positions of the ends, mm.
     pub points: [DVec3; 2],
-    /// What runs between them.
+    /// Curve between the ends.
     pub curve: PieceCurve,
     /// The triangles that meet here.
     pub sides: Vec<PieceSide>,
-    /// B-rep edge it belongs to, where that is known.
+    /// B-rep edge of the piece, if known.
     pub edge: Option<u32>,
 }
 
-/// A triangle's use of a piece.
+/// Use of a piece by a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PieceSide {
     /// Triangle.
     pub triangle: u32,
     /// Its face.
     pub face: u32,
-    /// The triangle runs from `ends[0]` to `ends[1]` (its interior on the left, seen from outside).
+    /// Whether the triangle runs from `ends[0]` to `ends[1]` (its interior on the left, seen from outside).
     pub forward: bool,
 }
 
@@ -44,7 +44,7 @@ pub(crate) enum PieceCurve {
         center: DVec3,
         /// Unit normal of its plane.
         axis: DVec3,
-        /// mm.
+        /// Radius, mm.
         radius: f64,
         /// Unit vector from the centre to the arc's middle.
         middle: DVec3,
@@ -56,15 +56,15 @@ pub(crate) enum PieceCurve {
 /// Nearest point of a piece.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OnPiece {
-    /// mm.
+    /// Position, mm.
     pub point: DVec3,
-    /// 0 or 1 when it is that end.
+    /// 0 or 1 when the point is that end.
     pub end: Option<usize>,
 }
 
 impl PieceCurve {
-    /// The arc of the circle (`center`, unit `axis`, `radius`) between `a` and `b`; `None` when they are not on it within `tolerance`, or
-    /// so far apart that the shorter arc is in doubt.
+    /// The arc of the circle (`center`, unit `axis`, `radius`) between `a` and `b`; `None` when they are not on it within `tolerance`, or so far
+    /// apart that the shorter arc is ambiguous.
     pub fn arc(center: DVec3, axis: DVec3, radius: f64, [a, b]: [DVec3; 2], tolerance: f64) -> Option<Self> {
         let in_plane = |p: DVec3| {
             let d = p - center;
@@ -199,7 +199,7 @@ impl Piece {
                     .windows(3)
                     .map(|w| (w[1] - w[0]).angle_between(w[2] - w[1]));
                 let turns: f64 = turns.filter(|t| t.is_finite()).sum();
-                // Half a side is lost at each end.
+                // Half a side's turn is missing at each end.
                 let sides = points.len() as f64 - 1.0;
                 turns * sides / (sides - 1.0).max(1.0)
             }
@@ -251,7 +251,7 @@ impl Piece {
     }
 }
 
-/// Nearest point of the segment from `a` to `b`; its ends to the bit.
+/// Nearest point of the segment from `a` to `b`; the ends are returned bit-exactly.
 pub(crate) fn on_segment(a: DVec3, b: DVec3, p: DVec3) -> DVec3 {
     let along = b - a;
     let length2 = along.length_squared();

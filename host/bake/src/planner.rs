@@ -1,8 +1,8 @@
-//! The coarsest scene image that meets a request, what was chosen and why, and what it costs.
+//! The coarsest scene image that meets a request, the choices made with their reasons, and its cost.
 //!
-//! For each shape the cell, number format and shell bound come from the accuracy asked, in closed form ([`crate::accuracy`], [`crate::choice`]).
-//! The image is then made and counted. When it does not fit the flash, or the dearest tick not its budget, the accuracy is lowered until both
-//! fit, and that is told as the best there is. Cost: one bake; when the request cannot be met, a few coarser ones.
+//! For each shape the cell, number format and shell bound follow from the requested accuracy in closed form ([`crate::accuracy`], [`crate::choice`]).
+//! The image is then made and measured. When it does not fit the flash, or the worst-case tick exceeds its budget, the accuracy is lowered until both
+//! fit, and the result is reported as the best possible. Cost: one bake; a few coarser ones when the request cannot be met.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -24,23 +24,23 @@ use crate::report::BakeReport;
 use crate::scene::Scene;
 use crate::voids::{others, without_hollows};
 
-/// What is asked of a scene image.
+/// Request for a scene image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Request {
-    /// Most that gaps and depths may err where parts fit into one another, mm; elsewhere [`crate::choice::ELSEWHERE`] times that.
+    /// Largest error of gaps and depths where parts fit into one another, mm; elsewhere [`crate::choice::ELSEWHERE`] times that.
     pub accuracy_mm: f64,
-    /// Most bytes of the image.
+    /// Largest size of the image in bytes.
     pub flash_bytes: u64,
-    /// Most instructions of the dearest tick; `None`: any.
+    /// Most instructions of the worst-case tick; `None`: no limit.
     pub tick_instructions: Option<u64>,
-    /// Which parts may be grabbed.
+    /// Parts that may be grabbed.
     pub grabbable: Grabbable,
 }
 
 /// Model chosen for a shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapePlan {
-    /// First part that places it.
+    /// First part with this shape.
     pub name: String,
     /// Cell edge, mm.
     pub cell_mm: f64,
@@ -48,23 +48,23 @@ pub struct ShapePlan {
     pub format: SampleFormat,
     /// Depth and height to which the surface's neighbourhood is stored, cells.
     pub band_cells: f64,
-    /// The shell's bound, mm.
+    /// Error bound of the shell, mm.
     pub epsilon_mm: f64,
-    /// Its bound where convex faces touch each other away from every edge, mm: larger only where the tick asked leaves no choice.
+    /// Error bound of the shell where convex faces touch each other away from every edge, mm: larger only where the requested tick requires it.
     pub crossing_epsilon_mm: f64,
-    /// Most the field errs where the shape fits another, mm.
+    /// Largest error of the field where the shape fits another, mm.
     pub field_error_in_fits_mm: f64,
-    /// Most the shell misses there, mm.
+    /// Largest error of the shell there, mm.
     pub shell_error_in_fits_mm: f64,
-    /// Most field and shell err together elsewhere, mm; within a cell of sharp edges the field errs up to half a cell.
+    /// Largest combined error of field and shell elsewhere, mm; within a cell of sharp edges the field's error is up to half a cell.
     pub error_elsewhere_mm: f64,
-    /// Faces that fit something.
+    /// Faces that fit another part's.
     pub faces_that_fit: Vec<u32>,
-    /// Faces that bend too sharply to be worth resolving: the field errs there as at sharp edges.
+    /// Faces too sharply curved to resolve: the field's error there is that at sharp edges.
     pub faces_taken_as_edges: Vec<u32>,
-    /// Faces nothing can reach.
+    /// Unreachable faces.
     pub faces_left_out: Vec<u32>,
-    /// What forbids a larger cell.
+    /// Reason why the cell cannot be larger.
     pub why: String,
 }
 
@@ -73,50 +73,50 @@ pub struct ShapePlan {
 pub struct PartTick {
     /// The part.
     pub name: String,
-    /// Its dearest tick.
+    /// Its worst-case tick.
     pub cost: TickCost,
 }
 
-/// What was chosen for an accuracy.
+/// Model chosen for an accuracy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Accuracy it is for, mm.
+    /// Accuracy of the plan, mm.
     pub accuracy_mm: f64,
     /// In the image's order.
     pub shapes: Vec<ShapePlan>,
-    /// Parts that may be grabbed, dearest first.
+    /// Parts that may be grabbed, the costliest first.
     pub ticks: Vec<PartTick>,
     /// Bytes by part and kind.
     pub report: BakeReport,
 }
 
-/// A request's answer.
+/// Result of a request.
 #[derive(Clone, Debug)]
 pub struct Planned {
-    /// Whether the request is met: if not, this is the finest that fits, or, if nothing does, the last tried.
+    /// Whether the request is met: if not, this is the finest plan that fits, or, if nothing fits, the last one tried.
     pub met: bool,
     /// Whether it fits flash and tick.
     pub fits: bool,
-    /// What was chosen.
+    /// The plan.
     pub plan: Plan,
-    /// Its image.
+    /// Image of the plan.
     pub image: Vec<u8>,
 }
 
-/// Attempts at an accuracy that fits, and at one between that and the last that did not.
+/// Attempts to find an accuracy that fits, and then one between that and the last that did not fit.
 const ATTEMPTS: usize = 12;
 const REFINEMENTS: usize = 3;
-/// A scout this many times coarser in accuracy costs a sixteenth; its bytes tell whether the attempt itself is hopeless.
+/// Factor by which a scout is coarser in accuracy: it costs a sixteenth, and its bytes show whether the attempt itself cannot succeed.
 const SCOUT: f64 = 16.0;
-/// Times the bound of crossings may be made four times larger.
+/// Number of times the bound of crossings may be quadrupled.
 const COARSER_CROSSINGS: usize = 4;
-/// No use in looking for a coarser one than this.
+/// Coarsest accuracy tried.
 const COARSEST_MM: f64 = 2.0;
 
-/// Plans and bakes `model`. `progress` as for [`crate::bake`]; it starts anew with each attempt.
+/// Plans and bakes `model`. `progress` as for [`crate::bake`]; it restarts with each attempt.
 ///
 /// # Errors
-/// See [`BakeError`]. A request that cannot be met is none.
+/// See [`BakeError`]. A request that cannot be met is not an error.
 pub fn plan(
     model: &CadModel,
     request: &Request,
@@ -156,7 +156,7 @@ pub fn plan(
             break;
         }
         let cells = |a: &Attempt| a.plan.shapes.iter().map(|s| s.cell_mm).collect::<Vec<_>>();
-        // Walls and slots hold the cells: no accuracy, however low, makes them larger.
+        // Walls and slots limit the cells: a lower accuracy does not make them larger.
         let stuck = attempt
             .as_ref()
             .zip(last.as_ref())
@@ -187,14 +187,14 @@ pub fn plan(
     Ok(told.into_planned(false, fits))
 }
 
-/// How much larger than allowed an attempt is.
+/// Size and cost of an attempt as multiples of their limits.
 #[derive(Clone, Copy)]
 struct Over {
     bytes: f64,
     instructions: f64,
 }
 
-/// Of what the layout cannot even hold.
+/// Excess assumed for an attempt that the layout itself cannot hold.
 const HOPELESS: Over = Over {
     bytes: 4.0,
     instructions: 1.0,
@@ -205,7 +205,7 @@ impl Over {
         self.bytes <= 1.0 && self.instructions <= 1.0
     }
 
-    /// By how much the accuracy is to be lowered: bytes go at most with its inverse, points with the inverse of its root.
+    /// Factor by which to lower the accuracy: bytes grow at most with its inverse, points with the square root of its inverse.
     fn coarser(self) -> f64 {
         (1.05 * self.bytes)
             .max(1.1 * self.instructions * self.instructions)
@@ -213,7 +213,7 @@ impl Over {
     }
 }
 
-/// What does not change from attempt to attempt.
+/// State that does not change between attempts.
 struct Planner<'a> {
     model: &'a CadModel,
     request: &'a Request,
@@ -303,7 +303,7 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// Bakes for `accuracy_mm`; `None` when the layout cannot hold what that takes.
+    /// Bakes for `accuracy_mm`; `None` when the layout cannot hold the result.
     fn attempt(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
         let mut shapes: Vec<ShapePlan> = self.demands.iter().map(|d| d.choose(accuracy_mm)).collect();
         let mut each: Vec<BakeOptions> = shapes.iter().map(|shape| self.options(shape)).collect();
@@ -319,7 +319,7 @@ impl<'a> Planner<'a> {
             made => made?,
         };
         let mut ticks = self.ticks(&made);
-        // Points inside cylinders and cones serve crossed shafts only, and weigh most in a fit: they go first.
+        // Points inside cylinders and cones serve crossed shafts only, and are most of the points in a fit: they are reduced first.
         for _ in 0..COARSER_CROSSINGS {
             if ticks
                 .first()
@@ -369,8 +369,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// What an attempt at `accuracy_mm` will at least need, from a coarser one: the bricks of a prism repeat along it, so bytes grow at least with the
-    /// inverse of the cell. A fifth is taken off for good measure.
+    /// Minimum requirement of an attempt at `accuracy_mm`, extrapolated from a coarser one: the bricks of a prism repeat along it, so bytes grow at
+    /// least with the inverse of the cell. A fifth is subtracted as a margin.
     fn expected(&self, coarser: &Attempt, accuracy_mm: f64) -> Over {
         let shapes = coarser.plan.report.shapes.iter().zip(&coarser.plan.shapes);
         let bytes: f64 = shapes
@@ -387,7 +387,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The dearest tick of each part that may be grabbed: it sits in everything it fits into, or lies flat, whichever has more points near.
+    /// Worst-case tick of each part that may be grabbed: it sits in everything it fits into, or lies flat, whichever has more points near.
     fn ticks(&self, made: &Made) -> Vec<PartTick> {
         let scene = &self.scene;
         let mut ticks: Vec<PartTick> = (0..scene.parts.len())
@@ -398,7 +398,7 @@ impl<'a> Planner<'a> {
                     .filter(|&j| j != i)
                     .map(|j| scene.parts[j].1)
                     .collect();
-                // On a larger flat no more of its border is near than of the smaller one's.
+                // On a larger flat at most as much of its border is near as of the smaller one's.
                 let flat = self.flats(made, own);
                 let flats = met
                     .iter()
@@ -417,10 +417,10 @@ impl<'a> Planner<'a> {
         ticks
     }
 
-    /// Points near when a part of shape `own` sits in all of the parts of shapes `met` it fits: each bore holds one pin, a pin may be in a bore of
-    /// each other part.
+    /// Number of points near when a part of shape `own` sits in all of the parts of shapes `met` that it fits: each bore holds one pin; a pin may be
+    /// in a bore of each other part.
     fn fitted(&self, made: &Made, own: usize, met: &[usize]) -> usize {
-        // For each own face, whether it is hollow, and the points of each partner's face with most.
+        // For each own face, whether it is hollow, and the point count of the largest matching face of each partner.
         let mut held: BTreeMap<u32, (bool, Vec<usize>)> = BTreeMap::new();
         for &other in met {
             let fits = self.fits.iter().find(|(pair, _)| *pair == (own, other));
@@ -445,7 +445,7 @@ impl<'a> Planner<'a> {
         held.into_iter().map(near).sum()
     }
 
-    /// Points round the flat that has most.
+    /// Number of points around the flat that has most.
     fn flats(&self, made: &Made, shape: usize) -> usize {
         let faces = self.prepared[shape].shape().faces.iter().enumerate();
         let flats = faces.filter(|(_, f)| matches!(f.surface, Surface::Plane { .. }));

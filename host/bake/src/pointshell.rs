@@ -1,23 +1,23 @@
-//! The pointshell: samples of the exact surface, as dense as an error bound asks.
+//! The pointshell: samples of the exact surface, as dense as an error bound requires.
 //!
-//! The points of a shape are looked up in its partner's field and the partner's in the shape's, so a place needs a sample only where no
-//! sample of a partner would find it. With ε the bound and κ' the curvature of the partners (see [`crate::partners`]):
+//! The points of a shape query its partner's field and the partner's points query the shape's, so a place needs a sample only where no sample of a
+//! partner would find it. With ε the bound and κ' the curvature of the partners (see [`crate::partners`]):
 //!
 //! | where | spacing |
 //! |---|---|
 //! | inside planes, concave faces, along concave edges | none |
 //! | inside faces convex in some direction | √(4ε/(κᵢ + κ')) in each principal direction i; none where κᵢ + κ' ≤ 0 |
-//! | along convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from what touches it |
+//! | along convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from the touching partner |
 //! | on shafts that fit a bore, beside their rims | a ring, see [`crate::ring_samples`] |
 //!
-//! Two directions of a face share ε, an edge has it alone. Inside faces that do not bend both ways outward, cylinders above all, samples serve
-//! nothing but contact of convex with convex away from every edge, and are many: they may have a bound of their own. So a cylinder that only flats
-//! and bores can meet has its two rims, a ring beside each, and nothing between; a peg's rim in its hole errs by s²/8 times the *difference* of the
-//! two curvatures, and on a flat at tilt α by ε·sin α.
+//! The two directions of a face share ε; an edge uses all of it. Inside faces that are not convex in both directions, mainly cylinders, samples serve
+//! only contact between convex faces away from every edge, and there are many of them: they can have a separate bound. So a cylinder that only flats
+//! and bores can meet has its two rims, a ring beside each, and nothing between; the error of a peg's rim in its hole is s²/8 times the *difference*
+//! of the two curvatures, and on a flat at tilt α it is ε·sin α.
 //!
-//! No such bound holds where two sharp edges cross: a sample s/2 from the crossing lies up to (s/2)·sin(θ/2) less deep, θ the angle between
-//! the edge and the partner's face it dives under. So edges are never sampled more sparsely than `max_spacing_mm`, and a strip of
-//! flat narrower than that can be missed by another one across it.
+//! No such bound holds where two sharp edges cross: a sample s/2 from the crossing is up to (s/2)·sin(θ/2) less deep, where θ is the angle between
+//! the edge and the partner's face it passes under. So edges are never sampled more sparsely than `max_spacing_mm`, and two strips of flat narrower
+//! than that can miss each other when they cross.
 
 use glam::DVec3;
 use mortise_protocol::image::NO_FACE;
@@ -26,26 +26,26 @@ use crate::distance::ExactSurface;
 use crate::grid::bounding_box;
 use crate::partners::Partners;
 
-/// How dense a pointshell is.
+/// Density of a pointshell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointshellOptions {
     /// Bound on how much deeper a contact can be than its deepest sample, mm.
     pub epsilon_mm: f64,
-    /// That bound inside faces that are not convex in both directions, where only another convex face can touch, mm.
+    /// The same bound inside faces that are not convex in both directions, where only another convex face can touch, mm.
     pub crossing_epsilon_mm: f64,
-    /// No spacing need be smaller than this, mm: where the bound asks for less, the error is that of this spacing, s²·κ/8 in each direction.
+    /// Smallest spacing, mm: where the bound would require less, the error is that of this spacing, s²·κ/8 in each direction.
     pub least_spacing_mm: f64,
-    /// Largest spacing along edges, mm; inside faces too where nothing is known of the partners.
+    /// Largest spacing along edges, mm; also inside faces when the partners are unknown.
     pub max_spacing_mm: f64,
-    /// What the shape can meet.
+    /// Partners of the shape.
     pub partners: Partners,
 }
 
-/// Fewer points than this are too few to feel anything by: the shape is then sampled without relying on partners.
+/// Fewest points of a useful shell: with fewer, the shape is sampled without relying on partners.
 const FEWEST: usize = 8;
 
 impl PointshellOptions {
-    /// Samples everywhere, whatever the partners, no two neighbours farther apart than `max_spacing_mm`.
+    /// Samples everywhere, for any partners; no two neighbours are farther apart than `max_spacing_mm`.
     pub fn everywhere(epsilon_mm: f64, max_spacing_mm: f64) -> Self {
         Self {
             epsilon_mm,
@@ -56,7 +56,7 @@ impl PointshellOptions {
         }
     }
 
-    /// Spacing with chord error ε at `curvature` (1/mm), mm, whatever the partners.
+    /// Spacing with chord error ε at `curvature` (1/mm), mm, for any partners.
     pub(crate) fn spacing(&self, curvature: f64) -> f64 {
         (8.0 * self.epsilon_mm / curvature.abs().max(1e-12))
             .sqrt()
@@ -80,7 +80,7 @@ impl PointshellOptions {
         } else {
             self.crossing_epsilon_mm
         };
-        // Equal and opposite to rounding is a fit, which rims and edges find.
+        // Curvatures equal and opposite within rounding are a fit, which rims and edges find.
         (relative[0].min(relative[1]) > 1e-9 * sharper)
             .then(|| relative.map(|k| (4.0 * epsilon / k).sqrt().max(self.least_spacing_mm)))
     }
@@ -89,32 +89,32 @@ impl PointshellOptions {
 /// A sample of the exact surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShellPoint {
-    /// mm, shape frame.
+    /// Position, mm, shape frame.
     pub position: DVec3,
     /// Outward unit normal; on an edge or corner the mean of its faces' normals.
     pub normal: DVec3,
     /// Face it lies on.
     pub face: u16,
-    /// The other face on an edge or corner, else [`NO_FACE`].
+    /// Second face of an edge or corner, else [`NO_FACE`].
     pub edge_face: u16,
 }
 
-/// Points of a shape, those of faces before those of edges before those of corners.
+/// Points of a shape, ordered: faces, then edges, then corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pointshell {
     /// The points.
     pub points: Vec<ShellPoint>,
-    /// How far each lies off the surface, mm, outside positive; empty where all lie on it.
+    /// Distance of each point from the surface, mm, outside positive; empty where all lie on it.
     pub offsets: Vec<f64>,
-    /// Of them inside faces.
+    /// Number of points inside faces.
     pub face_points: usize,
-    /// Of them along edges.
+    /// Number of points along edges.
     pub edge_points: usize,
-    /// Of them at corners.
+    /// Number of points at corners.
     pub corner_points: usize,
 }
 
-/// Samples `surface`. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: grows with area over spacing².
+/// Samples `surface`. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: proportional to area over spacing².
 pub fn sample_pointshell(surface: &ExactSurface, options: &PointshellOptions) -> Pointshell {
     let (low, high) = bounding_box(surface.shape());
     let tenth = ((high - low).max_element() / 10.0).max(1e-3);

@@ -1,4 +1,4 @@
-//! What a bake made: bytes by part and kind, leaks, doubts.
+//! Result of a bake: bytes by part and kind, leaks, warnings.
 
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +29,7 @@ pub struct ByteCount {
 }
 
 impl ByteCount {
-    /// All of them.
+    /// Sum of all kinds.
     pub fn total(&self) -> usize {
         self.samples
             + self.indices
@@ -46,11 +46,11 @@ impl ByteCount {
 /// One shape of the image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapeReport {
-    /// First part that places it.
+    /// First part with this shape.
     pub name: String,
     /// Cell edge, mm.
     pub cell_mm: f64,
-    /// What its field holds.
+    /// Content of its field.
     pub method: Method,
     /// Number format of distances.
     pub format: SampleFormat,
@@ -60,26 +60,26 @@ pub struct ShapeReport {
     pub brick_dims: [u16; 3],
     /// Grid entries with samples.
     pub stored_entries: usize,
-    /// Bricks stored: equal ones once.
+    /// Number of bricks stored; equal ones count once.
     pub bricks: usize,
-    /// Points inside faces, along edges, at corners.
+    /// Number of points inside faces, along edges, at corners.
     pub points: [usize; 3],
     /// Bytes by kind.
     pub bytes: ByteCount,
     /// Mesh edges not used exactly twice; 0 for a closed shape.
     pub open_edges: usize,
-    /// The sign away from the surface is the winding number's, because the shell is open or inconsistent.
+    /// Whether the sign away from the surface is the winding number's, because the shell is open or inconsistent.
     pub sign_by_winding: bool,
-    /// Points at which normals and winding number were compared, and disagreed.
+    /// Number of points at which normals and winding number were compared.
     pub sign_tests: usize,
-    /// See [`Self::sign_tests`].
+    /// Number of those at which they disagreed.
     pub sign_disagreements: usize,
-    /// Most the tessellation leaves the faces, mm (taken out again by exact projection).
+    /// Largest deviation of the tessellation from the faces, mm (removed again by exact projection).
     pub chord_error_mm: f64,
-    /// Stated bound of the exact distance's error, mm: 0 when all is analytic; see [`crate::ExactSurface::surface_error_mm`].
+    /// Stated error bound of the exact distance, mm: 0 when all faces are analytic; see [`crate::ExactSurface::surface_error_mm`].
     #[serde(default)]
     pub surface_error_mm: f64,
-    /// Faces without closed form.
+    /// Number of faces without closed form.
     pub spline_faces: usize,
 }
 
@@ -98,7 +98,7 @@ pub struct PartReport {
     pub bytes: usize,
 }
 
-/// What a bake made.
+/// Report on a bake.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BakeReport {
     /// Bytes of the image.
@@ -109,6 +109,6 @@ pub struct BakeReport {
     pub parts: Vec<PartReport>,
     /// In the image's order.
     pub shapes: Vec<ShapeReport>,
-    /// What was left out or is in doubt, in words.
+    /// Skipped parts and doubtful geometry, as text.
     pub warnings: Vec<String>,
 }

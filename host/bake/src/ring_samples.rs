@@ -1,13 +1,13 @@
-//! A ring of points on a shaft beside its rim, for where that rim passes the rim of a bore.
+//! A ring of points on a shaft beside its rim, for contacts where that rim passes the rim of a bore.
 //!
-//! There the rims are h apart along the axis and the side of the shaft is p deep in the wall. The samples of either rim are then h from a flat,
-//! so they find min(p, h), and where h < p they push along the axis only, however deep the side is. A ring on the side, δ from the rim, finds
-//! min(p, δ − h): together that is all of p up to δ/2. With δ = 4ε the side is found up to a depth of 2ε, and on a shaft tilted by α the
-//! ring is shallower than the rim by δ·tan α: by no more than ε up to 14°.
+//! In that contact the rims are h apart along the axis and the side of the shaft is p deep in the wall. The samples of either rim are then h from a
+//! flat, so they find min(p, h), and where h < p they push along the axis only, regardless of the side's depth. A ring on the side, δ from the rim,
+//! finds min(p, δ − h): together they find all of p up to δ/2. With δ = 4ε the side is found up to a depth of 2ε. On a shaft tilted by α the ring is
+//! shallower than the rim by δ·tan α, which is at most ε up to 14°.
 //!
-//! Round the shaft the depth falls off as s²/8·(κ − κ' + 2ε·κ²), κ the curvature of the shaft, κ' that of the loosest bore it fits (see
-//! [`crate::fits`]), and the last term what a depth of 2ε adds to the room between both: four points in a tight fit. Shafts that fit no bore have no
-//! ring.
+//! Round the shaft the depth decreases as s²/8·(κ − κ' + 2ε·κ²), where κ is the curvature of the shaft, κ' that of the loosest bore it fits (see
+//! [`crate::fits`]), and the last term the clearance that a depth of 2ε adds between both: four points in a tight fit. Shafts that fit no bore have
+//! no ring.
 
 use mortise_brep::Surface;
 use mortise_protocol::image::NO_FACE;
@@ -18,14 +18,14 @@ use crate::piece::{Piece, PieceCurve};
 use crate::pointshell::{PointshellOptions, ShellPoint};
 use crate::surface::natural_normal;
 
-/// Distance from the rim, in error bounds.
+/// Distance of the ring from the rim, in error bounds.
 const BESIDE: f64 = 4.0;
-/// Depth up to which the side is found, in error bounds.
+/// Depth up to which the ring finds the side, in error bounds.
 const DEPTH: f64 = 0.5 * BESIDE;
 /// Most points of a ring.
 const MAX_POINTS: f64 = 1000.0;
 
-/// Appends the ring beside `chain`, a convex edge, where that is the rim of a shaft.
+/// Appends the ring beside `chain`, a convex edge, if that is the rim of a shaft.
 pub(crate) fn sample_ring(
     surface: &ExactSurface,
     chain: &[Link],
@@ -79,7 +79,7 @@ struct Rim {
     inward: glam::DVec3,
 }
 
-/// `piece` as an arc round a shaft; `None` where it is none.
+/// `piece` as an arc round a shaft; `None` if it is not one.
 fn rim(surface: &ExactSurface, piece: &Piece) -> Option<Rim> {
     let PieceCurve::Arc { axis, .. } = piece.curve else {
         return None;
@@ -89,7 +89,7 @@ fn rim(surface: &ExactSurface, piece: &Piece) -> Option<Rim> {
             return None;
         };
         let shaft = surface.topology.sense[side.face as usize] > 0.0;
-        // An oblique cut is an ellipse, no arc; this keeps out an arc that only touches the shaft.
+        // An oblique cut is an ellipse, not an arc; this excludes an arc that only touches the shaft.
         let around = axis.dot(frame.z).abs() > 1.0 - 1e-9;
         let at = piece.at(0.5);
         let along = piece.tangent(at) * if side.forward { 1.0 } else { -1.0 };

@@ -1,4 +1,4 @@
-//! Which shapes and parts of a model go into the image, and the first choice of their cells.
+//! Selection of the shapes and parts of a model for the image, and the initial choice of their cells.
 
 use std::collections::BTreeSet;
 
@@ -13,24 +13,24 @@ use crate::grid::bounding_box;
 use crate::options::{BakeOptions, Grabbable};
 use crate::partners::{Met, Partners};
 
-/// Which shapes and parts of a model go into the image.
+/// Shapes and parts of a model that go into the image.
 pub(crate) struct Scene {
-    /// Model shapes, each once.
+    /// Model shapes, each listed once.
     pub shapes: Vec<usize>,
-    /// First part of each.
+    /// First part with each shape.
     pub names: Vec<String>,
-    /// Model part and index into `shapes`.
+    /// For each part its index in the model and its index into `shapes`.
     pub parts: Vec<(usize, usize)>,
-    /// For each of `parts`.
+    /// Whether each of `parts` may be grabbed.
     pub grabbable: Vec<bool>,
-    /// For each of `shapes`: what it can meet.
+    /// Partners of each of `shapes`.
     pub partners: Vec<Partners>,
-    /// What was left out, in words.
+    /// Skipped parts, as text.
     pub warnings: Vec<String>,
 }
 
 impl Scene {
-    /// Chooses and checks.
+    /// Selects and checks the shapes and parts.
     pub fn new(model: &CadModel, options: &BakeOptions) -> Result<Self, BakeError> {
         let mut scene = Self {
             shapes: Vec::new(),
@@ -87,7 +87,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// What each shape can meet: the other parts of the scene of which one at least may be grabbed, or a second part of the same shape.
+    /// Finds what each shape can meet: the other parts of the scene, if at least one of the two may be grabbed, or a second part of the same shape.
     pub fn find_partners(&mut self, prepared: &[ExactSurface]) {
         let each: Vec<Met> = prepared.par_iter().map(Met::of).collect();
         let of = |shape: usize| {
@@ -96,7 +96,7 @@ impl Scene {
         self.partners = (0..self.shapes.len()).map(of).collect();
     }
 
-    /// Shapes that parts of this shape can meet.
+    /// Shapes whose parts can meet a part of this shape.
     pub fn met_by(&self, shape: usize) -> BTreeSet<usize> {
         let mut met = BTreeSet::new();
         for (i, &(_, own)) in self.parts.iter().enumerate() {
@@ -115,7 +115,7 @@ impl Scene {
             Grabbable::All => Ok(vec![true; self.parts.len()]),
             Grabbable::AllButLargest => {
                 let volume = |i: usize| model.shapes[self.shapes[self.parts[i].1]].volume_mm3.abs();
-                // The first of equals.
+                // The first of equally large parts.
                 let largest = (0..self.parts.len())
                     .rev()
                     .max_by(|&a, &b| volume(a).total_cmp(&volume(b)));
@@ -141,7 +141,7 @@ impl Scene {
         }
     }
 
-    /// First choice of cell for each shape, mm.
+    /// Initial cell for each shape, mm.
     pub fn cells(&self, model: &CadModel, options: &BakeOptions) -> Vec<f64> {
         let sides = self.shapes.iter().map(|&s| longest_side(&model.shapes[s]));
         let largest = sides.clone().fold(0.0, f64::max);
@@ -158,7 +158,7 @@ impl Scene {
     }
 }
 
-/// Longest side of the box about a shape, mm.
+/// Longest side of the bounding box of a shape, mm.
 pub(crate) fn longest_side(shape: &Shape) -> f64 {
     let (lo, hi) = bounding_box(shape);
     (hi - lo).max_element().max(1e-3)
@@ -168,7 +168,7 @@ pub(crate) fn longest_side(shape: &Shape) -> f64 {
 fn round_down_125(x: f64) -> f64 {
     let decade = 10f64.powf(x.log10().floor());
     let digit = x / decade;
-    // A hair of slack: 0.5 must not become 0.2 by rounding of the logarithm.
+    // Tolerance for rounding of the logarithm: 0.5 must not become 0.2.
     let step = if digit >= 5.0 - 1e-9 {
         5.0
     } else if digit >= 2.0 - 1e-9 {
@@ -179,7 +179,7 @@ fn round_down_125(x: f64) -> f64 {
     step * decade
 }
 
-/// Refuses geometry the distance cannot work on: indices that lead nowhere, coordinates that are not finite.
+/// Rejects geometry that distance queries cannot handle: indices out of range, coordinates that are not finite.
 fn check_shape(shape: &Shape, part: &str) -> Result<(), BakeError> {
     let broken = |what: &str| {
         Err(BakeError::BrokenGeometry {
@@ -228,9 +228,9 @@ fn check_shape(shape: &Shape, part: &str) -> Result<(), BakeError> {
     Ok(())
 }
 
-/// Whether two shapes have the same geometry in the same frame, so that one set of data does for both.
+/// Whether two shapes have the same geometry in the same frame, so that they can share one set of data.
 fn same_shape(a: &Shape, b: &Shape) -> bool {
-    // Exporters repeat a body with the last digits different: a nanometre is the same place.
+    // Exporters repeat a body with different last digits: positions within a nanometre are equal.
     const SAME_MM: f64 = 1e-6;
     a.mesh.triangles == b.mesh.triangles
         && a.mesh.triangle_face == b.mesh.triangle_face

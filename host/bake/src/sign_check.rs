@@ -1,17 +1,18 @@
-//! Inside or outside, held against the CAD kernel's own classifier.
+//! Check of inside and outside against the CAD kernel's own classifier.
 //!
-//! Random points in a box a tenth larger than the shape, and as many again close to its surface, are classified three ways: by the kernel,
-//! by [`ExactSurface`], and by a field baked from it and looked up as the board does. Left out, and counted, are points so near the surface
-//! that the approximation's stated error decides:
+//! Random points in a box a tenth larger than the shape, and half as many again close to its surface, are classified three ways: by the kernel, by
+//! [`ExactSurface`], and by a field baked from it and queried as on the board. Points so near the surface that the approximation's stated error
+//! decides are excluded and counted:
 //! - for the exact surface, within its stated error and the model's own accuracy;
-//! - for the field, within √3/2 of a cell and half a step. A trilinear sample is Σ wᵢ dᵢ of distances at the corners xᵢ of a cell, and
-//!   distance grows no faster than the way: |Σ wᵢ dᵢ − d(p)| ≤ Σ wᵢ |xᵢ − p| ≤ √Σ wᵢ |xᵢ − p|² = h √Σ t(1 − t) ≤ h √3/2 (Jensen).
+//! - for the field, within √3/2 of a cell and half a step. A trilinear sample is Σ wᵢ dᵢ of distances at the corners xᵢ of a cell, and distance is
+//!   1-Lipschitz: |Σ wᵢ dᵢ − d(p)| ≤ Σ wᵢ |xᵢ − p| ≤ √Σ wᵢ |xᵢ − p|² = h √Σ t(1 − t) ≤ h √3/2 (Jensen).
 //!
-//! The kernel's classifier shoots one ray a point, and a ray that grazes an edge may go astray. So where it differs from ours it is asked again
-//! about a ball that by its own distance holds no surface; only what it then says by more than three quarters counts.
+//! The kernel's classifier shoots one ray per point, and a ray that grazes an edge can give a wrong answer. So where it differs from ours, points of
+//! a ball that contains no surface by the kernel's own distance are classified as well; the kernel's side counts only if more than three quarters of
+//! them agree.
 //!
-//! Cost: one ray of the kernel a point, 10 µs to 5 ms, in batches, each in a process of its own, as many at once as there are processors. What they
-//! have not answered in the time allowed is left out, and the number of answers says so.
+//! Cost: one ray of the kernel per point, 10 µs to 5 ms, in batches, each in its own process, as many at once as there are processors. Points not
+//! answered in the allowed time are excluded, and the number of answers is reported.
 
 use std::num::NonZero;
 use std::ops::ControlFlow;
@@ -33,75 +34,75 @@ use crate::grid::bounding_box;
 use crate::image::{ImageBuilder, PartPlacement};
 use crate::pointshell::Pointshell;
 
-/// STEP's customary accuracy, mm: what the file itself leaves open about where its faces meet.
+/// Customary accuracy of STEP, mm: the uncertainty in the file itself about where its faces meet.
 const MODEL_MM: f64 = 1e-3;
 
-/// What the kernel calls on the surface, mm.
+/// Distance within which the kernel reports a point as on the surface, mm.
 const KERNEL_MM: f64 = 1e-7;
-/// Points of a ball by which a doubtful answer of the kernel is checked; more than three quarters of them decide.
+/// Points of a ball by which a doubtful answer of the kernel is checked; a majority of more than three quarters decides.
 const BALL: usize = 16;
-/// Points of one batch: each reads the file anew.
+/// Points of one batch: each batch reads the file again.
 const BATCH: usize = 1000;
-/// Most points checked so: the kernel's rays miss one in ten thousand, so more are not its fault.
+/// Most points checked in this way: the kernel's rays fail at one in ten thousand, so a larger number is not the kernel's fault.
 const MOST_DOUBTED: usize = 200;
 
-/// What to compare.
+/// Extent of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignOptions {
-    /// Points in the box; half as many again are close to the surface.
+    /// Number of points in the box; half as many more are close to the surface.
     pub points: usize,
-    /// Cells of the field along the shape's longest side.
+    /// Number of field cells along the shape's longest side.
     pub cells: f64,
-    /// Longest time for the kernel, seconds: points it has not reached by then are left out. Half as much again for doubtful ones.
+    /// Time limit of the kernel, seconds: points not reached by then are excluded. Doubtful points get half as much again.
     pub time_limit_s: u64,
 }
 
 /// A point on the wrong side.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WrongSide {
-    /// In the shape's frame, mm.
+    /// Position in the shape's frame, mm.
     pub point: [f64; 3],
-    /// The kernel: inside.
+    /// Whether the kernel reports it inside.
     pub inside: bool,
     /// Signed distance found, mm.
     pub distance_mm: f64,
-    /// Found by the field; else by the exact surface.
+    /// Whether the field found it; else the exact surface.
     pub field: bool,
 }
 
-/// Signs of one shape.
+/// Comparison of the signs of one shape.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SignCheck {
-    /// Closed by count of mesh edges. For others the kernel's answer means as little as ours.
+    /// Whether the shape is closed by its mesh-edge count. For an open one the kernel's answer is as meaningless as ours.
     pub closed: bool,
-    /// Signs away from the surface come from the winding number.
+    /// Whether signs away from the surface come from the winding number.
     pub by_winding: bool,
-    /// Points there were to ask about.
+    /// Number of points to classify.
     pub asked: usize,
-    /// Of them, points the kernel decided in time.
+    /// Number of them that the kernel decided in time.
     pub points: usize,
-    /// Points the kernel could not decide, or put on the surface.
+    /// Number of points that the kernel could not decide, or reported on the surface.
     pub undecided: usize,
-    /// Nearer than this the sign of the exact surface is not asked, mm.
+    /// Distance below which the sign of the exact surface is not compared, mm.
     pub tolerance_mm: f64,
-    /// Points that near.
+    /// Number of points within `tolerance_mm`.
     pub near: usize,
-    /// Points at which the kernel contradicts itself: it puts most of a ball about the point, which by its own distance holds no surface, on
-    /// the other side. That side is taken.
+    /// Points at which the kernel contradicts itself: it reports most of a ball about the point, which by its own distance contains no surface, on
+    /// the other side. That side is used.
     pub contradictions: usize,
-    /// Points on the wrong side of the exact surface.
+    /// Number of points on the wrong side of the exact surface.
     pub wrong: usize,
     /// Cell of the field, mm.
     pub cell_mm: f64,
-    /// Nearer than this the sign of the field is not asked, mm.
+    /// Distance below which the sign of the field is not compared, mm.
     pub field_tolerance_mm: f64,
-    /// Points that near.
+    /// Number of points within `field_tolerance_mm`.
     pub field_near: usize,
-    /// Of those, points with the other sign all the same: next to sharp edges and in walls thinner than a cell.
+    /// Number of those whose sign is wrong nevertheless: next to sharp edges and in walls thinner than a cell.
     pub field_near_wrong: usize,
-    /// Points farther away on the wrong side of the field.
+    /// Number of points farther away on the wrong side of the field.
     pub field_wrong: usize,
-    /// The first few of all that are wrong.
+    /// The first few of all wrong points.
     pub examples: Vec<WrongSide>,
 }
 
@@ -111,7 +112,7 @@ pub enum SignError {
     /// The kernel gave no answer.
     #[error(transparent)]
     Kernel(#[from] BrepError),
-    /// No field.
+    /// The field could not be baked.
     #[error(transparent)]
     Bake(#[from] BakeError),
     /// The field was baked into an image that does not open.
@@ -158,7 +159,7 @@ pub fn check_signs(
         grabbable: true,
     });
     let image = image.finish();
-    // Aligned as flash is.
+    // Aligned as in flash.
     let mut words = vec![0u32; image.len().div_ceil(4)];
     bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..image.len()].copy_from_slice(&image);
     let image = SceneImage::open(&bytemuck::cast_slice(&words)[..image.len()])
@@ -249,7 +250,7 @@ pub fn check_signs(
     Ok(all)
 }
 
-/// The kernel's answers to as many of `points` as it reaches in `limit_s` seconds, batch by batch, and those points.
+/// The kernel's answers to as many of `points` as it reaches in `limit_s` seconds, batch by batch, and the points answered.
 fn in_batches(
     path: &Path,
     load: &LoadOptions,
@@ -280,7 +281,7 @@ fn in_batches(
         }
         Ok(answers)
     };
-    // Threads, not rayon's: these only wait for processes. Where there are none the kernel works in this one, for one thread.
+    // Plain threads instead of rayon's: these only wait for processes. Without child processes the kernel works in this process, on one thread.
     let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
     let processes = if child::is_ready() { processors } else { 1 };
     let answers = std::thread::scope(|scope| {
@@ -301,8 +302,8 @@ fn in_batches(
     ))
 }
 
-/// Asks the kernel again about the points `doubted`, in a ball about each that by the kernel's own distance holds no surface: all of the ball
-/// is on one side. Puts the side of most into `sides` and returns how many that changed.
+/// Queries the kernel again about the points `doubted`, in a ball about each that contains no surface by the kernel's own distance: the whole ball is
+/// on one side. Puts the majority's side into `sides` and returns the number of changes.
 fn reconsider(
     path: &Path,
     load: &LoadOptions,
@@ -313,14 +314,14 @@ fn reconsider(
 ) -> Result<usize, BrepError> {
     let centers: Vec<DVec3> = doubted.iter().map(|&i| points[i]).collect();
     let feet = match nearest(path, load, index, &centers) {
-        // The first answers stand, then.
+        // The first answers stand in that case.
         Err(BrepError::TimedOut { .. }) => return Ok(0),
         feet => feet?,
     };
     let mut random = SplitMix(2);
     let mut around = Vec::with_capacity(doubted.len() * BALL);
     for (&center, foot) in centers.iter().zip(feet) {
-        // In a cube inside the ball.
+        // Points in a cube inside the ball.
         let reach = foot.map_or(0.0, |f| 0.5 * f.distance);
         around.extend(
             (0..BALL).map(|_| center + DVec3::from_array([0; 3].map(|_| 2.0 * random.unit() - 1.0)) * reach),
@@ -344,7 +345,7 @@ fn reconsider(
 }
 
 fn add(mut a: SignCheck, b: SignCheck) -> SignCheck {
-    /// Enough to find the cause, not enough to flood a report.
+    /// Enough to find the cause without flooding a report.
     const EXAMPLES: usize = 8;
     a.asked += b.asked;
     a.points += b.points;
@@ -360,8 +361,7 @@ fn add(mut a: SignCheck, b: SignCheck) -> SignCheck {
     a
 }
 
-/// `count` points in the box a tenth larger than the shape, then half as many up to `reach` mm off the triangles, each triangle as often as
-/// its area asks.
+/// `count` points in the box a tenth larger than the shape, then half as many up to `reach` mm off the triangles, each triangle weighted by its area.
 fn sample_points(shape: &Shape, count: usize, reach: f64) -> Vec<DVec3> {
     let mut random = SplitMix(1);
     let (lo, hi) = bounding_box(shape);
@@ -391,7 +391,7 @@ fn sample_points(shape: &Shape, count: usize, reach: f64) -> Vec<DVec3> {
         let normal = (b - a).cross(c - a).normalize_or_zero();
         points.push(a + (b - a) * x + (c - a) * y + normal * reach * (2.0 * random.unit() - 1.0));
     }
-    // In no order (Fisher and Yates): whatever the kernel does not reach in time, the others are a fair choice.
+    // Shuffled (Fisher and Yates), so that the points the kernel reaches in time are a fair sample.
     for last in (1..points.len()).rev() {
         points.swap(last, ((last + 1) as f64 * random.unit()) as usize);
     }
@@ -402,7 +402,7 @@ fn sample_points(shape: &Shape, count: usize, reach: f64) -> Vec<DVec3> {
 struct SplitMix(u64);
 
 impl SplitMix {
-    /// In [0, 1).
+    /// Next number in [0, 1).
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

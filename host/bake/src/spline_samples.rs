@@ -1,5 +1,5 @@
-//! Points inside spline faces: above the tessellation, as dense as its own curvature asks in each direction, moved onto the exact surface
-//! where that is known.
+//! Points inside spline faces: placed on the tessellation as densely as its own curvature requires in each direction, then moved onto the exact
+//! surface where that is known.
 //!
 //! The curvature of each triangle comes from how the normals turn between its corners (Rusinkiewicz 2004, "Estimating Curvatures and Their
 //! Derivatives on Triangle Meshes"): a cylinder written as a spline gets few points along its generators, as a true one does.
@@ -27,7 +27,7 @@ pub(crate) fn sample_spline(
         .filter(|&t| mesh.triangle_face[t] == face)
         .collect();
     let normals = vertex_normals(surface, &own);
-    // Points owed so far: small triangles share one.
+    // Accumulated fraction of a point: small triangles share one.
     let mut owed = 0.5;
     for t in own {
         let corners = surface.triangles.corners(t as u32);
@@ -53,7 +53,7 @@ pub(crate) fn sample_spline(
             };
             let flat = a + (b - a) * x + (c - a) * y;
             let foot = surface.topology.free_forms.beside(face, t as u32, flat);
-            // A foot farther off than the facets are is not this facet's.
+            // A foot farther away than the facets' deviation belongs to another facet.
             let chord = surface.topology.chord[face as usize];
             let foot = foot.filter(|on| on.normal != DVec3::ZERO && on.point.distance(flat) <= chord + 1e-6);
             let (position, normal) = match foot {
@@ -73,7 +73,7 @@ pub(crate) fn sample_spline(
     }
 }
 
-/// Point `i` of the R2 low-discrepancy sequence (Roberts 2018), folded into the triangle: even cover for any count.
+/// Point `i` of the R2 low-discrepancy sequence (Roberts 2018), folded into the triangle: even coverage for any count.
 fn cover(i: usize) -> (f64, f64) {
     let x = (0.5 + i as f64 * 0.754_877_666_246_692_7).fract();
     let y = (0.5 + i as f64 * 0.569_840_290_998_053_2).fract();
@@ -119,8 +119,8 @@ pub(crate) fn area_curvatures(surface: &ExactSurface, face: u32) -> Vec<(f64, f6
     own.iter().filter_map(of).collect()
 }
 
-/// Principal curvatures of a triangle, 1/mm, convex positive, the larger absolute one first: the symmetric 2×2 operator that best explains, in the
-/// sense of least squares, the change of the normal along its sides.
+/// Principal curvatures of a triangle, 1/mm, convex positive, the larger absolute one first: those of the symmetric 2×2 operator that is the
+/// least-squares fit to the change of the normal along its sides.
 fn principal_curvatures(facet: DVec3, corners: [DVec3; 3], normals: [DVec3; 3]) -> [f64; 2] {
     let x = facet.any_orthonormal_vector();
     let y = facet.cross(x);

@@ -11,7 +11,7 @@ use mortise_brep::{Frame, Surface};
 /// Nearest point of an untrimmed surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projection {
-    /// mm.
+    /// Position, mm.
     pub point: DVec3,
     /// The surface's natural unit normal there.
     pub normal: DVec3,
@@ -53,7 +53,7 @@ pub(crate) fn project(surface: &Surface, p: DVec3, hint: DVec3) -> Option<Projec
             let distance = (rho - radius) * cos - z * sin;
             let foot_rho = rho - distance * cos;
             if foot_rho < 0.0 {
-                // Nearest to the tip; the mean of the natural normals round it points along ∓z.
+                // Nearest to the tip; the mean of the natural normals around it points along ∓z.
                 return Some(Projection {
                     point: frame.origin - frame.z * (radius * cos / sin),
                     normal: -frame.z * sin.signum(),
@@ -245,7 +245,7 @@ mod tests {
     }
 
     proptest! {
-        /// No sampled point of the surface is nearer than the projection, and the offset is along the normal.
+        /// The projection is at least as near as every sampled point of the surface, and the offset is along the normal.
         #[test]
         fn projection_is_the_nearest_point(
             p in prop::array::uniform3(-15.0f64..15.0),
@@ -268,7 +268,7 @@ mod tests {
             }
         }
 
-        /// Parameters and point undo each other.
+        /// `at_parameters` inverts `parameters`.
         #[test]
         fn parameters_round_trip(u in -3.1f64..3.1, v in -1.5f64..1.5) {
             for surface in surfaces() {

@@ -1,4 +1,4 @@
-//! What the tessellation knows of the B-rep: which mesh sides lie between faces, on which exact curve, and how faces are turned.
+//! B-rep topology recovered from the tessellation: mesh sides between faces, their exact curves, and the orientation of faces.
 
 use std::collections::HashMap;
 
@@ -10,10 +10,10 @@ use crate::free_form::FreeForms;
 use crate::piece::{Piece, PieceCurve, PieceSide, on_segment};
 use crate::surface::{natural_normal, project};
 
-/// Cosine of 170°: outward normals that far apart are as good as opposite.
+/// Cosine of 170°: outward normals that far apart count as opposite.
 const OPPOSITE: f64 = -0.985;
 
-/// No piece, no neighbour.
+/// Index that means no piece or no neighbour.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Boundary pieces, neighbours, senses and chord errors of a shape's tessellation.
@@ -26,13 +26,13 @@ pub(crate) struct Topology {
     pub neighbors: Vec<[u32; 3]>,
     /// For each face: +1 when its outward normal is the surface's natural one, else −1.
     pub sense: Vec<f64>,
-    /// For each face: most its triangles and their boundary leave the exact face, mm.
+    /// For each face: largest deviation of its triangles and their boundary from the exact face, mm.
     pub chord: Vec<f64>,
     /// Angle-weighted outward normal of each vertex (exact face normals; not unit length).
     pub vertex_normals: Vec<DVec3>,
     /// Whether faces with almost opposite normals meet at a vertex.
     pub is_cusp: Vec<bool>,
-    /// Pieces that end at each vertex that has any.
+    /// Pieces that end at each vertex, for vertices with any.
     pub vertex_pieces: HashMap<u32, Vec<u32>>,
     /// Unit outward facet normals; zero for a degenerate triangle.
     pub facet_normals: Vec<DVec3>,
@@ -41,7 +41,7 @@ pub(crate) struct Topology {
 }
 
 impl Topology {
-    /// From the tessellation and exact geometry of `shape`, whose triangles wind outward. Cost: linear in triangles and edges.
+    /// Builds the topology from the tessellation and exact geometry of `shape`, whose triangles wind outward. Cost: linear in triangles and edges.
     pub fn new(shape: &Shape) -> Self {
         let mesh = &shape.mesh;
         let corner = |v: u32| mesh.vertices[v as usize];
@@ -93,8 +93,8 @@ impl Topology {
         topology
     }
 
-    /// Outward unit normal at `q`, a point at triangle `t`, of the face that the triangle belongs to: exact where the face is analytic or
-    /// its patch is known, else the facet's.
+    /// Outward unit normal, at a point `q` of triangle `t`, of the face that the triangle belongs to: exact where the face is analytic or its patch
+    /// is known, else the facet's.
     pub fn outward(&self, shape: &Shape, t: u32, q: DVec3) -> DVec3 {
         let face = shape.mesh.triangle_face[t as usize];
         let natural = natural_normal(&shape.faces[face as usize].surface, q)
@@ -106,7 +106,7 @@ impl Topology {
         }
     }
 
-    /// Bound of the error of distances, mm: see [`crate::ExactSurface::surface_error_mm`].
+    /// Error bound of distances, mm: see [`crate::ExactSurface::surface_error_mm`].
     pub fn error(&self, shape: &Shape) -> f64 {
         let faces = shape
             .faces
@@ -138,7 +138,7 @@ impl Topology {
     }
 }
 
-/// Sense of each face from its own triangles; where it has no (non-degenerate) triangle, from the B-rep.
+/// Sense of each face from its own triangles; from the B-rep if it has no (non-degenerate) triangle.
 fn senses(shape: &Shape, free_forms: &FreeForms) -> Vec<f64> {
     let mesh = &shape.mesh;
     let mut agree = vec![0.0; shape.faces.len()];
@@ -228,10 +228,10 @@ fn split_sides(shape: &Shape) -> Sides {
     (pieces, triangle_pieces, neighbors)
 }
 
-/// A mesh side of an edge: the edge, which side of its polyline, and whether that runs from the lower vertex to the higher.
+/// A mesh side of an edge: the edge, index of the segment of its polyline, and whether that runs from the lower vertex to the higher.
 type SideOfEdge = (u32, usize, bool);
 
-/// Mesh sides that an edge's polyline runs along: vertices are matched by position to a millionth of the shape's size.
+/// Mesh sides along each edge's polyline: vertices are matched by position to a millionth of the shape's size.
 fn edges_by_side(shape: &Shape) -> HashMap<(u32, u32), SideOfEdge> {
     let size = shape
         .mesh
@@ -271,7 +271,7 @@ fn edges_by_side(shape: &Shape) -> HashMap<(u32, u32), SideOfEdge> {
     sides
 }
 
-/// The edge a mesh side lies on and its exact curve: by the edge's own polyline, else the edge of its faces that fits its ends best.
+/// The edge that a mesh side lies on and its exact curve: found by the edge's own polyline, else the edge of its faces that fits its ends best.
 fn exact_curve(
     shape: &Shape,
     edge_of: &HashMap<(u32, u32), SideOfEdge>,
@@ -280,7 +280,7 @@ fn exact_curve(
     points: [DVec3; 2],
     sides: &[PieceSide],
 ) -> (Option<u32>, PieceCurve) {
-    // Half of STEP's customary accuracy of 1e-3 mm: nearer is the same place.
+    // Half of STEP's customary accuracy of 1e-3 mm: points closer than that coincide.
     const TOLERANCE_MM: f64 = 5e-4;
     if let Some(&(e, side, forward)) = edge_of.get(&(ends[0], ends[1])) {
         let curve = curve_through(&shape.edges[e as usize], points, TOLERANCE_MM);
@@ -337,11 +337,10 @@ fn curve_through(edge: &Edge, points: [DVec3; 2], tolerance: f64) -> Option<Piec
     }
 }
 
-/// Most each face's triangles leave its exact surface, with its boundary's sagitta.
+/// Largest deviation of each face's triangles from its exact surface, including its boundary's sagitta.
 ///
-/// Measured at the centroid and at the middles of the sides, where the deviation of a chord from a surface of constant curvature is
-/// largest, times 1.5 for the surfaces whose curvature changes (cone, torus, free forms). Splines without a patch: 0, they are their
-/// tessellation here.
+/// Measured at the centroid and at the middles of the sides, where the deviation of a chord from a surface of constant curvature is largest, times
+/// 1.5 for surfaces of varying curvature (cone, torus, free forms). 0 for splines without a patch, which are represented by their tessellation here.
 fn chords(shape: &Shape, free_forms: &FreeForms, pieces: &[Piece]) -> Vec<f64> {
     let mesh = &shape.mesh;
     let mut chord = vec![0.0f64; shape.faces.len()];

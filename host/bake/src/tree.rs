@@ -15,14 +15,14 @@ pub struct SphereTree {
     pub order: Vec<u32>,
 }
 
-/// A point's offset from the surface counts so many times in the choice of the axis to halve.
+/// Weight of a point's offset from the surface in the choice of the axis to halve.
 const OFFSET_WEIGHT: f32 = 128.0;
 
-/// Builds the tree over `positions` as they will be stored: halves along the longest axis down to leaves of at most 16. Every sphere holds
-/// all points below it, also in the board's `f32`. Cost: n log² n.
+/// Builds the tree over `positions` as they will be stored: it halves along the longest axis down to leaves of at most 16 points. Every sphere
+/// contains all points below it, also in the board's `f32`. Cost: n log² n.
 ///
-/// `offsets` (same unit; empty for none) tell how far points lie off the surface. They count as a fourth axis, so that points of one depth share a
-/// leaf: they come near together, and a leaf of which one point is near is looked at as a whole.
+/// `offsets` (same unit; may be empty) are the points' distances from the surface. They count as a fourth axis, so that points of equal depth share a
+/// leaf: they come near together, and a leaf with one near point is examined as a whole.
 pub fn build_tree(positions: &[[f32; 3]], offsets: &[f32]) -> SphereTree {
     let mut tree = SphereTree {
         nodes: Vec::new(),
@@ -34,7 +34,7 @@ pub fn build_tree(positions: &[[f32; 3]], offsets: &[f32]) -> SphereTree {
     tree
 }
 
-/// Nodes of the tree over `points` points.
+/// Number of nodes of the tree over `points` points.
 pub(crate) fn node_count(points: usize) -> usize {
     match points {
         0 => 0,
@@ -68,7 +68,7 @@ fn split(positions: &[[f32; 3]], offsets: &[f32], tree: &mut SphereTree, first: 
         let axis = (0..4)
             .max_by(|&a, &b| extent[a].total_cmp(&extent[b]).then(b.cmp(&a)))
             .unwrap_or(0);
-        // The index breaks ties, so the order is one and the same everywhere.
+        // The index breaks ties, so the order is the same on every machine.
         run.sort_unstable_by(|&a, &b| along(a, axis).total_cmp(&along(b, axis)).then(a.cmp(&b)));
         let half = count / 2;
         split(positions, offsets, tree, first, half);
@@ -98,13 +98,13 @@ fn sphere(points: &[DVec3]) -> ([f32; 3], f32) {
             best = (radius, center);
         }
     }
-    // Measured again from the centre as stored, rounded up.
+    // Radius measured again from the centre as stored, rounded up.
     let stored = best.1.as_vec3();
     let radius = farthest(stored.as_dvec3()).distance(stored.as_dvec3());
     (stored.to_array(), round_up(radius))
 }
 
-/// The next `f32` not below `x`, and a millionth more for the board's own rounding.
+/// The next `f32` not below `x`, increased by a millionth for the board's own rounding.
 pub(crate) fn round_up(x: f64) -> f32 {
     let mut r = (x * (1.0 + 1e-6)) as f32;
     while f64::from(r) < x {

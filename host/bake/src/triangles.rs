@@ -1,4 +1,4 @@
-//! The tessellation under a tree of boxes: nearest triangle, and all triangles within a distance.
+//! Bounding-volume hierarchy over the tessellation: nearest triangle, and all triangles within a distance.
 
 use glam::DVec3;
 use mortise_brep::Mesh;
@@ -8,9 +8,9 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 /// Nearest point of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OnTriangle {
-    /// mm.
+    /// Position, mm.
     pub point: DVec3,
-    /// Which part of it that is.
+    /// Part of the triangle that contains the point.
     pub feature: TriangleFeature,
 }
 
@@ -59,7 +59,7 @@ impl TriangleTree {
         self.corners[t as usize]
     }
 
-    /// Distance from `p` to the nearest triangle and its number; `None` when that is more than `within`.
+    /// Distance from `p` to the nearest triangle and its number; `None` when the distance exceeds `within`.
     pub fn nearest(&self, p: DVec3, within: f64) -> Option<(f64, u32)> {
         let limit2 = if within.is_finite() {
             within * within * (1.0 + 1e-12) + 1e-24
@@ -144,7 +144,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The tree finds what looking at every triangle finds.
+        /// The tree returns the same results as an exhaustive search.
         #[test]
         fn nearest_equals_brute_force(
             soup in prop::collection::vec(prop::array::uniform9(-10.0f64..10.0), 1..60),

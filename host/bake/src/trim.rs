@@ -1,7 +1,7 @@
-//! Whether a point of a face's surface lies inside the face.
+//! Test whether a point of a face's surface lies inside the face.
 //!
-//! The tessellation decides away from the face's boundary; within a few chord errors of it the exact boundary does, by the side of its
-//! nearest piece on which the point lies. So a point between a hole's circle and the chord of its facets is on the right side.
+//! Away from the face's boundary the tessellation decides; within a few chord errors of it the exact boundary does, by the side of its nearest piece
+//! on which the point lies. So a point between a hole's circle and the chord of its facets is classified correctly.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ impl ExactSurface {
         let of_face = || near.iter().filter(|n| n.face == face);
         let mut facet = f64::INFINITY;
         for n in of_face() {
-            // A triangle whose distance to p already excludes it need not be measured; the first found good enough ends the search.
+            // A triangle whose distance to p already excludes it need not be measured; the first one close enough ends the search.
             let on = nearest_on_triangle(self.triangles.corners(n.triangle), q);
             facet = facet.min(on.point.distance(q));
             if facet <= chord {
@@ -77,7 +77,7 @@ impl ExactSurface {
         self.in_trim(face, q, &near)
     }
 
-    /// Left of the direction in which the face runs along the piece is inside.
+    /// Whether `q` is on the face's inner side, the left of the direction in which the face traverses the piece.
     fn on_inner_side(&self, face: u32, piece: &Piece, at: DVec3, q: DVec3) -> bool {
         let Some(side) = piece.sides.iter().find(|s| s.face == face) else {
             return true;
@@ -90,7 +90,7 @@ impl ExactSurface {
         (q - at).dot(inward) >= 0.0
     }
 
-    /// At a corner of the boundary: the inside is the sector from the outgoing piece anticlockwise to the incoming one.
+    /// Inside test at a corner of the boundary: the inside is the sector from the outgoing piece anticlockwise to the incoming one.
     fn in_sector(&self, face: u32, vertex: u32, at: DVec3, q: DVec3) -> bool {
         let mut out = None;
         let mut back = None;

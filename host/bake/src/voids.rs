@@ -1,15 +1,15 @@
-//! Faces nothing can reach: closed hollows inside a solid with no other part in them.
+//! Unreachable faces: closed hollows inside a solid that contain no other part.
 //!
-//! A hollow is a closed piece of the surface, joined to the rest by no edge, that bounds what is outside it: its own signed volume is
-//! negative. What is beyond it can only get in through the solid, so leaving it out changes nothing that can be felt. It is filled.
+//! A hollow is a closed piece of the surface, connected to the rest by no edge, with the solid outside it: its own signed volume is negative. A part
+//! can enter it only through the solid, so removing it changes nothing that can be felt. It is filled.
 
 use glam::DVec3;
 use mortise_brep::{CadModel, Shape};
 
 use crate::winding::WindingTree;
 
-/// `shape` without its hollows, and the faces left out; `None` when it has none to leave out. `others` gives points (mm, shape frame) of
-/// whatever else there is; a hollow with one of them inside, or with a piece of the shape itself, is kept.
+/// `shape` without its hollows, and the removed faces; `None` when there is nothing to remove. `others` gives points (mm, shape frame) of all other
+/// parts; a hollow that contains one of them, or a piece of the shape itself, is kept.
 pub(crate) fn without_hollows(
     shape: &Shape,
     others: impl FnOnce() -> Vec<DVec3>,
@@ -28,7 +28,7 @@ pub(crate) fn without_hollows(
         let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
         volume[group[t] as usize] += a.dot(b.cross(c)) / 6.0;
     }
-    // An inside-out model is turned round later; what bounds it is its largest piece.
+    // An inside-out model is reversed later; its largest piece is its outer boundary.
     let sense = volume
         .iter()
         .copied()
@@ -88,7 +88,7 @@ pub(crate) fn others(model: &CadModel, part: usize) -> Vec<DVec3> {
     model.parts.iter().enumerate().flat_map(of).collect()
 }
 
-/// For each triangle the piece of the surface it belongs to: those that share vertices are one.
+/// For each triangle the piece of the surface it belongs to: triangles that share vertices belong to the same piece.
 fn groups(shape: &Shape) -> Vec<u32> {
     let mesh = &shape.mesh;
     let mut parent: Vec<u32> = (0..mesh.vertices.len() as u32).collect();

@@ -1,15 +1,15 @@
 //! Generalised winding number: inside or outside, also for shells with gaps.
 //!
-//! w(p) = Σ Ω_t(p) / 4π over all triangles: 1 inside and 0 outside a closed mesh, in between near a gap, so that w > ½ is the best estimate.
-//! Far clusters of triangles are taken as dipoles (Barill, Dickson, Schmidt, Levin, Jacobson 2018, "Fast Winding Numbers for Soups and
-//! Clouds", first order): cost grows with the logarithm of the number of triangles.
+//! w(p) = Σ Ω_t(p) / 4π over all triangles: 1 inside and 0 outside a closed mesh, between these near a gap, so that w > ½ is the best estimate. Far
+//! clusters of triangles are approximated by dipoles (Barill, Dickson, Schmidt, Levin, Jacobson 2018, "Fast Winding Numbers for Soups and Clouds",
+//! first order): cost grows with the logarithm of the number of triangles.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 use mortise_brep::Mesh;
 
-/// A cluster is a dipole from this many radii on: first-order error below 0.02 for closed meshes (property-tested).
+/// Distance, in radii, from which a cluster is approximated by a dipole: first-order error below 0.02 for closed meshes (property-tested).
 const FAR: f64 = 2.5;
 const LEAF: usize = 8;
 
@@ -31,7 +31,7 @@ pub(crate) struct WindingTree {
 }
 
 impl WindingTree {
-    /// Over all triangles of `mesh`.
+    /// Builds the tree over all triangles of `mesh`.
     pub fn new(mesh: &Mesh) -> Self {
         let mut tree = Self {
             nodes: Vec::new(),

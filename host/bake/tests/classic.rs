@@ -1,4 +1,4 @@
-//! The textbook pointshell: a point for each voxel the surface crosses, and for what moves only.
+//! The textbook pointshell: a point for each voxel the surface crosses, on moving parts only.
 
 mod common;
 
@@ -20,7 +20,7 @@ fn classic(shrink_percent: f64) -> BakeOptions {
     }
 }
 
-/// Centres on one grid, no two alike, each voxel crossed, and no crossed voxel left out.
+/// Points are centres on one grid, all different; each lies in a crossed voxel, and every crossed voxel has one.
 #[test]
 fn every_crossed_voxel_has_its_centre() {
     let (r, h, voxel) = (8.875, 30.0, 1.0);
@@ -52,7 +52,7 @@ fn every_crossed_voxel_has_its_centre() {
         };
         let p = DVec3::new(rho * a.cos(), rho * a.sin(), z);
         let near = (-1..=1).any(|k| {
-            // On the boundary between two voxels either will do.
+            // On the boundary between two voxels either one is accepted.
             let aside = ((p - first) / voxel + DVec3::splat(f64::from(k) * 1e-6))
                 .round()
                 .to_array()
@@ -61,7 +61,7 @@ fn every_crossed_voxel_has_its_centre() {
         });
         assert!(near, "{p}");
     }
-    // About the area over voxel²: 4/π times that round the wall, once on the flats.
+    // About the area over voxel²: 4/π times that around the wall, exactly that on the flats.
     let expected = (4.0 / std::f64::consts::PI * std::f64::consts::TAU * r * h
         + std::f64::consts::TAU * r * r)
         / voxel.powi(2);
@@ -73,7 +73,7 @@ fn every_crossed_voxel_has_its_centre() {
     );
 }
 
-/// Voxel normals point outward, roughly; on the flats exactly.
+/// Voxel normals point roughly outward; on the flats exactly.
 #[test]
 fn normals_are_the_voxels_own() {
     let (r, h) = (8.875, 30.0);
@@ -107,7 +107,7 @@ fn shrinking_moves_inward() {
     }
 }
 
-/// The method looks one way: what is fixed has no points, and the image is sound all the same.
+/// The method tests one direction: fixed parts have no points, and the image is still valid.
 #[test]
 fn only_what_moves_has_points() {
     let model = model(vec![

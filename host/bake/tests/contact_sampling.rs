@@ -1,8 +1,8 @@
-//! The error-bounded pointshell, looked up both ways, misses no contact by more than its bound, with as few points as the partners allow.
+//! The error-bounded pointshell, queried both ways, misses no contact by more than its bound, with as few points as the partners allow.
 //!
-//! Oracle: a point of one shape and a point of another, each on its convex hull, are brought together with opposite normals at a gap g. The
-//! plane between them separates the two, so g is exactly their distance; the shells must find it to within ε. A peg in a hole, which no
-//! plane separates, is compared with its four rims followed closely, and with its side where a rim passes a rim.
+//! Oracle: a point of one shape and a point of another, each on its convex hull, are brought together with opposite normals at a gap g. The plane
+//! between them separates the two, so g is exactly their distance; the shells must find it to within ε. A peg in a hole, which no plane separates, is
+//! compared with dense points on its four rims, and on its side where a rim passes a rim.
 
 mod common;
 
@@ -29,7 +29,7 @@ fn pair(a: &Shape, b: &Shape) -> [Sampled; 2] {
         let options = PointshellOptions {
             epsilon_mm: EPSILON,
             crossing_epsilon_mm: EPSILON,
-            // As if nothing were sharper than half a millimetre; of the kinds below only a cone's tip is.
+            // Assumes no radius below half a millimetre; of the kinds below only a cone's tip is sharper.
             least_spacing_mm: (4.0 * EPSILON * 0.5f64).sqrt(),
             max_spacing_mm: MAX_SPACING,
             partners: Partners::of([&surfaces[1 - own]]),
@@ -44,7 +44,7 @@ fn pair(a: &Shape, b: &Shape) -> [Sampled; 2] {
     })
 }
 
-/// Smallest signed distance of any sample of either to the other; `b` lies in `a`'s frame by `place`.
+/// Smallest signed distance of any sample of one shape to the other; `place` is the pose of `b` in `a`'s frame.
 fn sampled_gap([a, b]: &[Sampled; 2], place: DAffine3) -> f64 {
     let back = place.inverse();
     let least = |points: &Pointshell, to: DAffine3, field: &ExactSurface| {
@@ -62,7 +62,7 @@ fn sampled_gap([a, b]: &[Sampled; 2], place: DAffine3) -> f64 {
 struct Feature {
     point: DVec3,
     normal: DVec3,
-    /// Sharp: two of these crossing have no bound.
+    /// Whether the place is sharp: two sharp edges that cross have no bound.
     edge: bool,
 }
 
@@ -88,7 +88,7 @@ impl Kind {
         }
     }
 
-    /// A place of the hull, chosen by `which` and `u`, `v`, `w` in 0..1.
+    /// A place on the hull, chosen by `which` and `u`, `v`, `w` in 0..1.
     fn feature(self, which: u8, [u, v, w]: [f64; 3]) -> Feature {
         let radial = DVec3::new((TAU * u).cos(), (TAU * u).sin(), 0.0);
         let on = |point, normal: DVec3, edge| Feature {
@@ -218,7 +218,7 @@ fn no_contact_is_missed_by_more_than_the_bound() {
                 let mut feature =
                     |kind: Kind| kind.feature((random() * 30.0) as u8, [random(), random(), random()]);
                 let (fa, fb) = (feature(a), feature(b));
-                // Nor is there a bound within a spacing of a cone's tip, where the radius goes to nothing.
+                // There is also no bound within a spacing of a cone's tip, where the radius approaches zero.
                 let blunt = |kind: Kind, f: Feature| !matches!(kind, Kind::Cone { height, .. } if f.point.z > 0.9 * height && f.point.z < height);
                 if fa.edge && fb.edge || !blunt(a, fa) || !blunt(b, fb) {
                     continue;
@@ -271,7 +271,7 @@ proptest! {
         let other = [0.0, height].into_iter().flat_map(|z| rim(hole, z))
             .map(|p| peg_distance(radius, length, back.transform_point3(p)));
         let exact = own.chain(other).fold(f64::INFINITY, f64::min);
-        // Where a rim passes a rim the side lies deeper than either; there are points beside the peg's.
+        // Where a rim passes a rim the side is deeper than either; the peg has points beside its rims.
         let beside = [4.0 * EPSILON, length - 4.0 * EPSILON].into_iter().flat_map(|z| rim(radius, z))
             .map(|p| block_distance(half, height, hole, place.transform_point3(p)));
         let deepest = beside.fold(exact, f64::min);
@@ -285,8 +285,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
-    /// A peg pressed to the wall where its rim passes the rim of its hole, so that neither rim lies deep: its side does. Oracle: the side itself,
-    /// followed closely in closed form.
+    /// A peg pressed to the wall where its rim passes the rim of its hole, so that neither rim is deep, but its side is. Oracle: dense points on the
+    /// side itself, in closed form.
     #[test]
     fn a_rim_that_passes_a_rim(
         loose: bool, about in 0.0f64..TAU, deep in 0.0f64..1.8 * EPSILON, past in -2.5 * EPSILON..2.5 * EPSILON, tilt in 0.0f64..0.03,
@@ -299,7 +299,7 @@ proptest! {
                 &peg(BLOCK.2 - room, 60.0, 24),
             ));
         }
-        // Its lower rim is `past` above the block's lower face and `deep` in the wall; the rest leans away from there.
+        // Its lower rim is `past` above the block's lower face and `deep` in the wall; the rest tilts away from the wall there.
         let wall = DVec3::new(about.cos(), about.sin(), 0.0);
         let place = DAffine3 {
             matrix3: DMat3::from_axis_angle(wall.cross(DVec3::Z), tilt),
@@ -314,22 +314,22 @@ proptest! {
             }
         }
         let found = SHELLS.with(|shells| sampled_gap(&shells[usize::from(loose)], place));
-        // The ring's points are so dense that half-way between two the side is less deep by its bound, at a depth of twice that; and the ring, four
-        // bounds from the rim, is less deep by the tilt.
+        // The ring's density is such that, half-way between two points, the side at a depth of twice the bound is less deep by the bound; and the
+        // ring, four bounds from the rim, is less deep by the tilt.
         let between = EPSILON * (hole - radius + deep) / (hole - radius + 2.0 * EPSILON);
         let bound = between * hole / radius + 4.0 * EPSILON * tilt.tan() + 1e-3;
         prop_assert!(found <= exact + bound, "{found} against {exact}, bound {bound}");
     }
 }
 
-/// What a peg and its block need: rims, edges, corners, beside the peg's rims a ring, nothing inside.
+/// Points that a peg and its block need: rims, edges, corners, a ring beside each of the peg's rims, none inside.
 #[test]
 fn a_fit_needs_only_edges() {
     let [block, peg] = pair(&Kind::Block.shape(), &peg(9.365, 60.0, 24));
     let points = |s: &Sampled| (s.shell.face_points, s.shell.edge_points, s.shell.corner_points);
     // Rims by their own radius: the block has no convex curvature to add.
     let around = (TAU * 9.365 / (8.0f64 * 9.365 * EPSILON).sqrt()).ceil() as usize;
-    // And beside each a ring: four points, as for any tight fit.
+    // Plus a ring beside each: four points, as for any tight fit.
     assert_eq!(points(&peg), (0, 2 * (around + 4), 0));
     let spacing = (8.0f64 * 9.365 * EPSILON).sqrt().min(MAX_SPACING);
     let straight = |l: f64| (l / spacing).ceil() as usize - 1;
@@ -338,7 +338,7 @@ fn a_fit_needs_only_edges() {
     assert_eq!(points(&block), (0, edges + rims, 8));
 }
 
-/// The sharper of two cylinders has the rows; the blunter one relies on it.
+/// The sharper of two cylinders has the rows of points; the blunter one relies on them.
 #[test]
 fn rows_only_where_the_partner_is_no_sharper() {
     let [thick, thin] = pair(&peg(10.0, 60.0, 24), &peg(5.0, 60.0, 24));
@@ -350,7 +350,7 @@ fn rows_only_where_the_partner_is_no_sharper() {
     assert!(a.shell.face_points > 0 && a.shell == b.shell);
 }
 
-/// A foot of a boss, an inner corner, needs no sample; its top does.
+/// The foot of a boss, an inner corner, needs no sample; its top does.
 #[test]
 fn concave_edges_have_no_points() {
     let boss = revolve(
@@ -407,7 +407,7 @@ fn concave_edges_have_no_points() {
     assert!(at(8.0, 15.0) > 10 && at(20.0, 5.0) > 10 && at(20.0, 0.0) > 10);
 }
 
-/// A lone shape, and one whose partners find everything, still have points to be felt by.
+/// A lone shape, and one whose partners find every contact, still have enough points to be felt.
 #[test]
 fn no_shape_is_left_without_points() {
     let ball = ExactSurface::new(&sphere(10.0, 24));

@@ -1,4 +1,4 @@
-//! The writer's images open, and damaged ones are refused or harmless, whatever the damage, also under a checksum that fits.
+//! Written images open; damaged ones are rejected or harmless, for any damage, even with a valid checksum.
 
 mod common;
 
@@ -10,7 +10,7 @@ use mortise_bake::{BakeOptions, SampleFormat, bake};
 use mortise_protocol::image::{CRC, Lookup, SceneImage};
 use proptest::prelude::*;
 
-/// Looks up points all over every shape of an image.
+/// Queries points all over every shape of an image.
 fn look_everywhere(image: &SceneImage<'_>) {
     for i in 0..image.parts().len() {
         let shape = image.shape_of_part(i);
@@ -64,7 +64,7 @@ proptest! {
     ) {
         IMAGE.with(|good| {
             let mut bytes = good.clone();
-            // The records lie before the samples; most damage goes there.
+            // The records precede the samples; most damage is placed there.
             let records = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
             for (at, value, kind) in &hits {
                 let range = if *kind == 0 { bytes.len() } else { records };

@@ -8,7 +8,7 @@ use mortise_bake::ExactSurface;
 use mortise_brep::{Shape, Surface};
 use proptest::prelude::*;
 
-/// A few operations on numbers up to 100 mm, in double precision.
+/// Rounding of a few operations on numbers up to 100 mm, in double precision.
 const EXACT_MM: f64 = 1e-9;
 
 fn check(surface: &ExactSurface, expected: impl Fn(DVec3) -> f64, p: DVec3) -> Result<(), TestCaseError> {
@@ -58,7 +58,7 @@ proptest! {
         BLOCK.with(|s| check(s, |p| block_distance([25.0, 20.0], 30.0, 9.375, p), p))?;
     }
 
-    /// Between the hole's circle and the chords of its facets, on and about both rims too.
+    /// Points between the hole's circle and the chords of its facets, also on and near both rims.
     #[test]
     fn block_is_exact_about_its_hole(p in near_radius(9.375, 0.2, -1.0..31.0)) {
         BLOCK.with(|s| check(s, |p| block_distance([25.0, 20.0], 30.0, 9.375, p), p))?;
@@ -97,7 +97,7 @@ proptest! {
         let expected = |p: DVec3| {
             let rho = p.x.hypot(p.y);
             let slant = r.hypot(h);
-            // Along the slant from base rim to tip, and off it.
+            // Along the slant from base rim to tip, and perpendicular to it.
             let along = (((rho - r) * -r + p.z * h) / slant).clamp(0.0, slant);
             let on = (r - along * r / slant, along * h / slant);
             let side = (rho - on.0).hypot(p.z - on.1);
@@ -109,7 +109,7 @@ proptest! {
     }
 }
 
-/// Every point on the axis of a hole is equally far from the wall all round; the rim's corners likewise.
+/// Degenerate places: points on a hole's axis, equally far from the whole wall or rim; a corner and a point of the rim.
 #[test]
 fn degenerate_places_are_exact() {
     BLOCK.with(|s| {
@@ -160,7 +160,7 @@ fn trim_of_a_half_cylinder_is_respected() {
     assert!((d - (50f64.sqrt() - 5.0)).abs() < EXACT_MM, "{d}");
 }
 
-/// With one facet missing the sign still holds everywhere but in the gap.
+/// With one facet missing the sign is still right everywhere but in the gap.
 #[test]
 fn a_leaky_block_keeps_its_sign() {
     let mut shape = block_with_hole([25.0, 20.0], 30.0, 9.375, 48);
@@ -173,7 +173,7 @@ fn a_leaky_block_keeps_its_sign() {
     let mut wrong = 0;
     let mut tested = 0;
     for i in 0..20_000u32 {
-        // Halton-like cover of the box about the block.
+        // Halton-like coverage of the box around the block.
         let u = |base: f64| (f64::from(i) * base).fract() * 2.0 - 1.0;
         let p = DVec3::new(
             u(0.819_172_5) * 35.0,
@@ -191,7 +191,7 @@ fn a_leaky_block_keeps_its_sign() {
     assert_eq!(wrong, 0, "of {tested}");
 }
 
-/// A shape written inside out is turned round.
+/// A shape written inside out is reversed.
 #[test]
 fn an_inverted_mesh_is_turned_round() {
     let mut shape = sphere(5.0, 12);
@@ -202,7 +202,7 @@ fn an_inverted_mesh_is_turned_round() {
     assert!(surface.nearest(DVec3::ZERO).unwrap().distance < 0.0);
 }
 
-/// Spline faces are their tessellation: the error is its chord error.
+/// Spline faces are represented by their tessellation: the error is its chord error.
 #[test]
 fn a_spline_face_is_its_tessellation() {
     let mut shape = sphere(10.0, 64);
@@ -213,7 +213,7 @@ fn a_spline_face_is_its_tessellation() {
         let u = |base: f64| (f64::from(i) * base).fract() * 40.0 - 20.0;
         let p = DVec3::new(u(0.819_172_5), u(0.671_043_6), u(0.549_700_5));
         let d = surface.nearest(p).unwrap().distance - (p.length() - 10.0);
-        // Two chords: the facets turn in both directions.
+        // Two chord errors: the facets curve in both directions.
         assert!((-1e-9..2.0 * chord + 1e-9).contains(&d), "{d} at {p}");
     }
 }
@@ -274,7 +274,7 @@ thread_local! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
-    /// Beyond a corner of the top face but within its facets' reach: the corner is nearest, not the plane.
+    /// Points beyond a corner of the top face but within its facets' range: the corner is nearest, not the plane.
     #[test]
     fn block_is_exact_about_its_corners(p in points(0.4), q in points(0.05)) {
         let corner = DVec3::new(25.0, 20.0, 30.0);
@@ -286,7 +286,7 @@ proptest! {
         })?;
     }
 
-    /// In the solid about a block-shaped void edges and corners are re-entrant: the sign comes from their own normals.
+    /// In the solid around a block-shaped void edges and corners are re-entrant: the sign comes from their own normals.
     #[test]
     fn a_void_is_exact(p in points(45.0), q in points(3.0)) {
         let expected = |p: DVec3| (p.length() - 60.0).max(-block_distance([25.0, 20.0], 30.0, 9.375, p));
@@ -296,14 +296,14 @@ proptest! {
         })?;
     }
 
-    /// Within reach of a re-entrant corner and of the ends of the rim.
+    /// Points within range of a re-entrant corner and of the ends of the rim.
     #[test]
     fn a_face_is_exact_about_its_corners(p in points(0.5), height in -0.2f64..0.2) {
         for center in [DVec3::ZERO, DVec3::X * 10.0, -DVec3::Y * 10.0, DVec3::new(-7.0, 7.0, 0.0)] {
             let p = center + DVec3::new(p.x, p.y, height);
             let rho = p.x.hypot(p.y);
             let in_quarter = p.x > 0.0 && p.y < 0.0;
-            // In the plane: 0 inside; else to the straight sides (clamped to their ends) or the rim.
+            // Distance in the plane: 0 inside; else to the straight sides (clamped to their ends) or the rim.
             let to_side = |along: f64, across: f64| (along - along.clamp(0.0, 10.0)).hypot(across);
             let flat = if in_quarter {
                 to_side(p.x, p.y).min(to_side(-p.y, p.x))

@@ -1,4 +1,4 @@
-//! Sampled field against the closed form, through the same look-up as the board's.
+//! Sampled field against the closed form, through the board's own query.
 
 mod common;
 
@@ -55,12 +55,12 @@ fn meters(p: DVec3) -> [f32; 3] {
     (p / 1000.0).as_vec3().to_array()
 }
 
-/// Back to the millimetres the board really saw.
+/// The position in millimetres that the board computes.
 fn seen(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from)) * 1000.0
 }
 
-/// f32 rounding of a position up to 0.1 m is 4 nm, of the index arithmetic about 1e-5 cells.
+/// Rounding in f32: 4 nm for a position up to 0.1 m, about 1e-5 cells for the index arithmetic.
 const BOARD_MM: f64 = 2e-5;
 const CELL: f64 = 0.5;
 
@@ -90,7 +90,7 @@ proptest! {
                 return Err(TestCaseError::fail("not stored"));
             };
             let error = f64::from(sample.distance) * 1000.0 - block(seen(p));
-            // The distance curves by 1/r across and not along; r may be smaller by a cell's diagonal within the cell.
+            // The distance has curvature 1/r across and none along; within the cell r can be smaller by a cell's diagonal.
             let bound = CELL * CELL / (8.0 * (r - 0.71)) + 0.5 * b.step_mm() + BOARD_MM;
             prop_assert!(error.abs() <= bound, "{error} > {bound}");
             let g = DVec3::from_array(sample.gradient.map(f64::from));
@@ -101,7 +101,7 @@ proptest! {
         }
     }
 
-    /// Planes are exact but for the steps of the samples.
+    /// Planes are exact except for the quantisation of the samples.
     #[test]
     fn planes_are_exact(x in -24.0f64..24.0, y in 11.0f64..19.0, off in -0.9f64..0.9) {
         for p in [DVec3::new(x, y, 30.0 + off), DVec3::new(x, 20.0 + off, y), DVec3::new(25.0 + off, y - 15.0, 15.0)] {
@@ -109,7 +109,7 @@ proptest! {
             let Lookup::Near(sample) = BLOCK.field().lookup(p) else {
                 return Err(TestCaseError::fail("not stored"));
             };
-            // Next to another face the nearer one curves the field.
+            // Near another face the nearer one curves the field.
             let inner = 20.0 - (y + off.abs());
             if inner > 2.0 * CELL {
                 let error = f64::from(sample.distance) * 1000.0 - block(seen(p));
@@ -118,7 +118,7 @@ proptest! {
         }
     }
 
-    /// Everything within the band is stored; whatever is not has the right sign and a true lower bound.
+    /// Everything within the band is stored; everything else has the right sign and a true lower bound.
     #[test]
     fn far_bounds_are_true(p in prop::array::uniform3(-45.0f64..45.0)) {
         check_bound(&BLOCK, block, DVec3::from_array(p))?;
@@ -126,7 +126,7 @@ proptest! {
         check_bound(&SPHERE, |p| p.length() - 10.0, DVec3::from_array(p))?;
     }
 
-    /// Within the band no clamped sample takes part: a sphere's field is as good as its curvature allows, everywhere there.
+    /// Within the band no clamped sample is used: the error of a sphere's field is bounded by its curvature everywhere there.
     #[test]
     fn the_whole_band_is_sampled_exactly(d in -1.39f64..1.39, u in prop::array::uniform3(-1.0f64..1.0)) {
         let u = DVec3::from_array(u);
@@ -137,7 +137,7 @@ proptest! {
         };
         let r = seen(p).length();
         let error = f64::from(sample.distance) * 1000.0 - (r - 10.0);
-        // A sphere curves by 1/r both ways; r may be smaller by a cell's diagonal within the cell.
+        // A sphere has curvature 1/r in both directions; within the cell r can be smaller by a cell's diagonal.
         let bound = 2.0 * 0.7 * 0.7 / (8.0 * (r - 1.22)) + 0.5 * SPHERE.step_mm() + BOARD_MM;
         prop_assert!(error.abs() <= bound, "{error} > {bound}");
     }
@@ -156,7 +156,7 @@ fn check_bound(b: &Baked, exact: impl Fn(DVec3) -> f64, p: DVec3) -> Result<(), 
     Ok(())
 }
 
-/// The far bounds are worth having: at most a cell and a half and a tenth below the nearest point of the brick.
+/// The far bounds are tight: at most a cell and a half plus a tenth below the distance of the brick's nearest point.
 #[test]
 fn far_bounds_are_tight() {
     let field = SPHERE.field();
@@ -187,14 +187,14 @@ fn far_bounds_are_tight() {
     assert!(empty > 0);
 }
 
-/// Outside the grid the way to its box bounds the way to the surface.
+/// Outside the grid the distance to its box bounds the distance to the surface.
 #[test]
 fn beyond_the_grid_the_box_is_the_bound() {
     let far = f64::from(SPHERE.field().bound([0.5, 0.0, 0.0])) * 1000.0;
     assert!(far > 480.0 && far < 490.0, "{far}");
 }
 
-/// The same bytes on one thread and on three.
+/// One thread and three give the same bytes.
 #[test]
 fn bytes_do_not_depend_on_threads() {
     let make = |threads: usize| {

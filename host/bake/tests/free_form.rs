@@ -1,6 +1,6 @@
-//! Distance to free-form faces, and to those in which a simpler surface was recognised, against the CAD kernel's own search.
+//! Distance to free-form faces, and to those recognised as a simpler surface, against the CAD kernel's own search.
 //!
-//! Files are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; where they are absent the test says so and passes.
+//! Files are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; if they are absent the test reports it and passes.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use mortise_brep::oracle::{self, Side};
 use mortise_brep::{Face, LoadOptions, Shape, Surface, load_step_with};
 use mortise_protocol::image::NO_FACE;
 
-/// One micrometre over what the model itself states, mm.
+/// One micrometre above the model's own stated error, mm.
 const TOLERANCE_MM: f64 = 1e-3;
 
 fn is_written_as_spline(face: &Face) -> bool {
@@ -36,7 +36,7 @@ fn points_near_free_forms(shape: &Shape, count: usize) -> Vec<DVec3> {
         .collect()
 }
 
-/// Samples of free-form faces lie where the kernel has the face, and their normals point out of the solid.
+/// Samples of free-form faces lie on the kernel's face, and their normals point out of the solid.
 fn shell_is_on_the_surface(
     file: &Path,
     load: &LoadOptions,
@@ -44,13 +44,13 @@ fn shell_is_on_the_surface(
     surface: &ExactSurface,
     tolerance: f64,
 ) {
-    /// More than the tolerance, less than any wall.
+    /// Larger than the tolerance, smaller than any wall.
     const STEP_MM: f64 = 0.01;
     let shell = sample_pointshell(surface, &PointshellOptions::everywhere(0.01, 5.0));
     let own: Vec<_> = shell
         .points
         .iter()
-        // At an edge the normal is a mean, and a fillet that runs out into a wall leaves it no side of its own.
+        // At an edge the normal is a mean, and a fillet that runs out into a wall has no well-defined side there.
         .filter(|p| p.edge_face == NO_FACE)
         .filter(|p| is_written_as_spline(&surface.shape().faces[usize::from(p.face)]))
         .collect();
@@ -72,7 +72,7 @@ fn shell_is_on_the_surface(
     }
 }
 
-/// No point the kernel finds is nearer than ours, and ours is on the kernel's surface.
+/// No nearest point found by the kernel is nearer than ours, and ours is on the kernel's surface.
 #[test]
 fn free_forms_agree_with_the_kernel() {
     let root = std::env::var_os("MORTISE_SHARED").map_or_else(
@@ -85,7 +85,7 @@ fn free_forms_agree_with_the_kernel() {
         "soarm_STS3215_03a.step",
         "wrs_02-PANEL.step",
         "NIST_MBE_PMI_5.stp",
-        // Splines only that are cylinders.
+        // All its splines are cylinders.
         "as1-oc-214.stp",
     ];
     let mut skipped = 0;

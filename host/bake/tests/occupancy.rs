@@ -1,4 +1,4 @@
-//! Voxels against the closed form: what the surface crosses, what it does not, and how far from it the rest is.
+//! Voxels against the closed form: those that the surface crosses, those that it does not, and their distance bounds.
 
 mod common;
 
@@ -13,7 +13,7 @@ use mortise_brep::Shape;
 use mortise_protocol::image::{Field, SceneImage, VOXEL_BRICK_BYTES, Voxel};
 use proptest::prelude::*;
 
-/// A baked voxmap, every voxel of it read back through the board's look-up.
+/// A baked voxmap, with every voxel read back through the board's query.
 struct Map {
     field: Field<'static>,
     report: BakeReport,
@@ -58,7 +58,7 @@ impl Map {
         [i % w, i / w % h, i / w / h]
     }
 
-    /// mm.
+    /// Centre of a voxel, mm.
     fn center(&self, at: [usize; 3]) -> DVec3 {
         let origin = DVec3::from_array(self.field.record().origin.map(f64::from)) * 1e3;
         origin + (DVec3::from_array(at.map(|x| x as f64)) + 0.5) * self.cell
@@ -86,7 +86,7 @@ fn ball(p: DVec3) -> f64 {
     p.length() - 10.0
 }
 
-/// Every voxel against samples of the distance inside it: `STEPS`³, so that no point of it is farther from one than half a diagonal.
+/// Compares every voxel with samples of the distance inside it: `STEPS`³ of them, so that every point of it is within half a diagonal of a sample.
 fn compare(map: &Map, distance: fn(DVec3) -> f64) {
     const STEPS: usize = 9;
     let spacing = map.cell / STEPS as f64;
@@ -104,7 +104,7 @@ fn compare(map: &Map, distance: fn(DVec3) -> f64) {
             map.is_surface([x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
         });
         if middle.abs() > 2.7 * map.cell {
-            // The surface is farther than any corner of any neighbour: 1.5·√3.
+            // The surface is farther away than any corner of any neighbour: 1.5·√3.
             assert_eq!(
                 voxel,
                 if middle < 0.0 {
@@ -188,7 +188,7 @@ fn the_bytes_do_not_depend_on_threads() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20_000))]
 
-    /// Wherever the surface is, the voxel there says so.
+    /// Every point of the surface lies in a voxel marked as surface.
     #[test]
     fn the_surface_lies_in_surface_voxels(a in 0.0f64..TAU, z in -1.0f64..1.0, t in 0.0f64..30.0) {
         let u = DVec3::new((1.0 - z * z).sqrt() * a.cos(), (1.0 - z * z).sqrt() * a.sin(), z);
@@ -201,7 +201,7 @@ proptest! {
         prop_assert!(on_wall.faces.contains(&6), "{:?}", on_wall);
     }
 
-    /// No surface voxel is nearer than the bound, in the grid and outside.
+    /// No surface voxel is nearer than the bound, inside the grid and outside.
     #[test]
     fn bounds_are_true(p in prop::array::uniform3(-16.0f64..16.0)) {
         let asked = DVec3::from_array(p);

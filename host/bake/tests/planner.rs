@@ -1,7 +1,7 @@
-//! The planner keeps its promises, and gives no more than was asked.
+//! The planner meets the accuracy it states, and gives no more than requested.
 //!
-//! Promise: the image's own look-up, as the board runs it, against the exact surface, at random points near faces, farther from any edge than
-//! a cell reaches. Near edges the documented half cell is checked instead.
+//! Accuracy: the image's own query, as the board runs it, is compared with the exact surface at random points near faces, farther from any edge than
+//! a cell. Near edges the documented half cell is checked instead.
 
 mod common;
 
@@ -42,7 +42,7 @@ fn pair() -> CadModel {
     ])
 }
 
-/// Points compared, worst error over the promise where the shape fits, elsewhere, and near edges in cells.
+/// Number of points compared; worst error over the stated one where the shape fits and elsewhere; near edges the worst error in cells.
 #[derive(Debug, Default)]
 struct Found {
     points: usize,
@@ -82,7 +82,7 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
                 r(0.549_700_478) - 0.5,
             ) * 0.28
                 * cell;
-            // As the board has it.
+            // Position as the board receives it.
             let at = ((a + (b - a) * x + (c - a) * y + aside) / 1000.0).as_vec3();
             let p = at.as_dvec3() * 1000.0;
             let exact = surface.nearest(p).unwrap();
@@ -158,7 +158,7 @@ fn a_pair_is_as_accurate_as_asked() {
         }
         let found = check_promise(&model, &planned, 10_000);
         println!("{accuracy} µm: {} bytes, {found:?}", planned.image.len());
-        // The promise is no empty one: a good part of it is used.
+        // The stated accuracy is not trivially loose: a good part of it is used.
         assert!(found.points > 4_000 && found.in_fits > 0.5, "{found:?}");
     }
 }
@@ -174,7 +174,7 @@ fn scene_p_is_as_accurate_as_asked() {
     assert!(found.points > 5_000);
 }
 
-/// Coarser is smaller, and as little as was asked.
+/// A coarser request gives a smaller image, no finer than requested.
 #[test]
 fn bytes_follow_the_accuracy() {
     let bytes = |accuracy: f64| run(&pair(), &request(accuracy, 8192)).image.len();
@@ -184,7 +184,7 @@ fn bytes_follow_the_accuracy() {
     assert!(fine as f64 > 1.7 * middle as f64 && (fine as f64) < 4.5 * middle as f64);
 }
 
-/// What cannot be had is answered with the best that can.
+/// An impossible request returns the best possible plan.
 #[test]
 fn the_best_there_is_for_the_flash() {
     let model = pair();
@@ -193,15 +193,15 @@ fn the_best_there_is_for_the_flash() {
     assert!(planned.image.len() <= 200 << 10);
     let best = 1000.0 * planned.plan.accuracy_mm;
     assert!(best > 1.0);
-    // A quarter finer does not fit any more.
+    // A quarter finer no longer fits.
     let finer = run(&model, &request(best / 1.25, 8192));
     assert!(finer.image.len() > 200 << 10, "{best}: {}", finer.image.len());
-    // No more than that is promised: bytes are no smooth function, as bricks that repeat come and go.
+    // Only this much is guaranteed: bytes are not a smooth function, because repeating bricks come and go.
     let asked = run(&model, &request(best, 200));
     assert!(asked.met, "{best}");
 }
 
-/// A tick too short for the points asked: fewer of those that serve only crossed shafts, and if that does not do, said so.
+/// A tick too short for the requested points: the points for crossed shafts are reduced; if that does not suffice, the plan reports it.
 #[test]
 fn the_tick_takes_its_points_where_they_matter_least() {
     let at = |x: f64| DAffine3::from_translation(DVec3::X * x);
@@ -240,7 +240,7 @@ fn the_tick_takes_its_points_where_they_matter_least() {
     assert!(!impossible.met && !impossible.fits);
 }
 
-/// A hollow nothing is in costs nothing; one with a part in it is kept.
+/// An empty hollow costs nothing; one that contains a part is kept.
 #[test]
 fn hollows_are_left_out() {
     let hollow = moved(
@@ -281,7 +281,7 @@ fn nonsense_is_refused() {
     }
 }
 
-/// The shared parts, where they are.
+/// The shared parts, if present.
 #[test]
 fn shared_parts_are_as_accurate_as_asked() {
     let root = std::env::var_os("MORTISE_SHARED").map_or_else(

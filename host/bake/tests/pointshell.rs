@@ -1,5 +1,5 @@
-//! The pointshell lies on the exact surface, inside the trim, as dense as asked and no denser than needed. What relying on partners leaves out
-//! is tested in `contact_sampling.rs`.
+//! The pointshell lies on the exact surface, inside the trim, as dense as requested and no denser than needed. The omission of points that partners
+//! make redundant is tested in `contact_sampling.rs`.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn sample(shape: &Shape, epsilon_mm: f64, max_spacing_mm: f64) -> (ExactSurface,
     (surface, shell)
 }
 
-/// Each point is on the surface, to rounding, whatever the facets are; just outside it along the normal is outside.
+/// Each point is on the surface, to rounding, regardless of the facets; a point slightly off along the normal is outside.
 fn check_on(surface: &ExactSurface, shell: &Pointshell, exact: impl Fn(DVec3) -> f64) {
     for p in &shell.points {
         let d = exact(p.position);
@@ -57,13 +57,13 @@ fn thesis_peg_has_the_points_its_error_bound_asks() {
         "{}",
         shell.points.len()
     );
-    // Around: the least count whose chord error is within the bound. Rims: 2 circles of it; wall: rows of it, 6 mm apart.
+    // Around: the smallest count whose chord error is within the bound. Rims: 2 circles of it; wall: rows of it, 6 mm apart.
     let around = (TAU * r / (8.0f64 * r * epsilon).sqrt()).ceil() as usize;
     let rows = (h / spacing) as usize;
     assert_eq!(shell.edge_points, 2 * around);
     assert_eq!(of_face(&shell, 1).len(), rows * around);
     assert_eq!(shell.corner_points, 0);
-    // Straight: no finer than asked. Flats: about π r² / spacing².
+    // Along straight directions no denser than requested. Flats: about π r² / spacing².
     let flat = of_face(&shell, 0).len();
     assert!((4..=12).contains(&flat), "{flat}");
     for p in &shell.points {
@@ -77,7 +77,7 @@ fn thesis_peg_has_the_points_its_error_bound_asks() {
     }
 }
 
-/// Halving ε makes √2 as many around, not along.
+/// Halving ε gives √2 as many points around, and no more along.
 #[test]
 fn density_follows_the_error_bound() {
     let count = |epsilon: f64| {
@@ -155,7 +155,7 @@ fn cone_keeps_its_points_on_the_slant() {
         assert!(p.position.z > 0.0 && p.position.z <= h);
     }
     assert!(of_face(&shell, 1).len() > 50);
-    // The tip, where no edge ends, once.
+    // The tip, where no edge ends, has one point.
     let tips = shell
         .points
         .iter()
@@ -177,7 +177,7 @@ fn a_spline_cylinder_is_sampled_like_a_cylinder() {
         "{spline} against {exact}"
     );
     for p in of_face(&shell, 1) {
-        // On the facets, within their chord error; the normal is smooth, within the same chord's angle.
+        // Points lie on the facets, within their chord error; the normal is smooth, within the angle of the same chord.
         let radial = DVec3::new(p.position.x, p.position.y, 0.0);
         assert!((radial.length() - 8.875).abs() < 8.875 * (1.0 - (TAU / 128.0).cos()) + 1e-9);
         assert!(p.normal.dot(radial.normalize()) > (TAU / 128.0).cos());

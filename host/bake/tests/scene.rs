@@ -1,4 +1,4 @@
-//! Whole scenes: what is shared, what is grabbable, what fits, what is refused.
+//! Whole scenes: shared data, grabbable parts, fit to the limit, rejected input.
 
 mod common;
 
@@ -51,7 +51,7 @@ fn parts_are_placed_in_meters() {
         "{}",
         peg.record.volume
     );
-    // The sphere about the shape holds all its points and its whole surface.
+    // The sphere around the shape contains all its points and its whole surface.
     for i in 0..image.shape_count() {
         let shape = image.shape(i);
         let c = shape.record.center;
@@ -75,7 +75,7 @@ fn the_pair_fits_half_a_megabyte() {
     assert!(baked.image.len() >= total && baked.image.len() < total + 2048);
 }
 
-/// A smaller limit gives coarser cells, and most of the room is used.
+/// A smaller limit gives coarser cells, and most of the allowed bytes are used.
 #[test]
 fn free_cells_fill_the_room_there_is() {
     for limit in [100 << 10, 220 << 10] {
@@ -96,7 +96,7 @@ fn free_cells_fill_the_room_there_is() {
 #[test]
 fn identical_shapes_are_stored_once() {
     let at = |x: f64| DAffine3::from_translation(DVec3::X * x);
-    // Two of them, so that the pointshell expects its like.
+    // Two of them, so that the pointshell expects a partner of the same shape.
     let two = run(
         &model(vec![
             ("a", peg(5.0, 20.0, 24), at(0.0)),
@@ -162,7 +162,7 @@ fn a_leaky_shape_is_reported_and_flagged() {
     assert_eq!(json["shapes"][0]["format"], "int16");
 }
 
-/// A part that is only wires or points is left out, with a word; the image's parts say which of the model's they are.
+/// A part that is only wires or points is skipped with a warning; each part of the image states its index in the model.
 #[test]
 fn a_part_without_surface_is_left_out() {
     let mut model = pair();
@@ -228,7 +228,7 @@ fn what_cannot_be_baked_is_refused_in_one_line() {
             },
             "epsilon_mm",
         ),
-        // A million grid entries and more.
+        // More than a million grid entries.
         (
             BakeOptions {
                 cell_mm: Some(0.02),

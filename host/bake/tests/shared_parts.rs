@@ -1,6 +1,6 @@
 //! The shared test parts, baked: whole assemblies open, and the thesis pair agrees with its closed form.
 //!
-//! Looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; where they are absent the tests say so and pass.
+//! They are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; if they are absent the tests report it and pass.
 
 mod common;
 
@@ -39,13 +39,13 @@ fn the_thesis_pair_agrees_with_its_closed_form() {
     pair_agrees("01_thesis_pair/pair_d18.75_clear1.00.step", 8.875);
 }
 
-/// Surfaces recognised in splines are as exact as those written as such.
+/// Surfaces recognised in splines are as exact as those written analytically.
 #[test]
 fn the_pair_written_as_splines_agrees_with_the_same_closed_form() {
     pair_agrees("08_hard/pair_clear0.10_nurbs.step", 9.325);
 }
 
-/// A block of 50 × 50 × 40 with an 18.75 mm hole and a peg 60 long, wherever the file puts them.
+/// A block of 50 × 50 × 40 with an 18.75 mm hole and a peg 60 long, wherever the file places them.
 fn pair_agrees(file: &str, peg_radius: f64) {
     let Some(file) = shared(file) else { return };
     let model = load_step(file).unwrap();
@@ -54,7 +54,7 @@ fn pair_agrees(file: &str, peg_radius: f64) {
         &model.shapes[part.shape]
     };
     let (block, peg) = (named("block"), named("peg"));
-    // Middle of the wall's axis within the part. (A centre of mass of splines is integrated to 1e-6 only.)
+    // Middle of the wall's axis within the part. (The centre of mass of splines is integrated only to 1e-6.)
     let center = |shape: &mortise_brep::Shape| {
         let wall = shape.faces.iter().find_map(|f| match f.surface {
             Surface::Cylinder { frame, .. } => Some(frame),
@@ -100,7 +100,7 @@ fn pair_agrees(file: &str, peg_radius: f64) {
     }
     println!("{count} points: largest error {worst:.1e} mm, {wrong} wrong signs");
     assert_eq!(wrong, 0);
-    // STEP text is good to 1e-10 mm, splines are recognised to 1e-11.
+    // STEP text is accurate to 1e-10 mm, splines are recognised to 1e-11.
     assert!(worst < 1e-6, "{worst}");
 }
 
@@ -148,7 +148,7 @@ fn the_motor_and_other_assemblies_bake() {
     }
 }
 
-/// Files by others: each bakes, or one line says why not.
+/// Files by others: each one bakes, or gives one line with the reason why not.
 #[test]
 fn every_real_file_bakes_or_says_why_not() {
     let Some(folder) = shared("real") else { return };
@@ -179,7 +179,7 @@ fn every_real_file_bakes_or_says_why_not() {
         }
     }
     println!("{} of {} files bake", files.len() - refused.len(), files.len());
-    // One malformed on purpose, one whose faceted solid the kernel cannot read.
+    // One is malformed on purpose; the kernel cannot read the faceted solid of the other.
     let known = [
         "brl_ap203_malformed_representation.stp",
         "brl_ap203_mapped_assembly.stp",
@@ -197,7 +197,7 @@ fn bakes(name: &str, model: &CadModel) {
     let image = SceneImage::open(aligned.bytes()).unwrap();
     assert_eq!(image.parts().len(), model.parts.len(), "{name}");
     for shape in &baked.report.shapes {
-        // A closed, consistent part: normals and winding number agree wherever they were compared.
+        // In a closed, consistent part normals and winding number agree wherever they were compared.
         if shape.open_edges == 0 && !shape.sign_by_winding {
             assert_eq!(shape.sign_disagreements, 0, "{name}: {}", shape.name);
         }

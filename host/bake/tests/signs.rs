@@ -1,8 +1,8 @@
-//! Inside and outside of every closed part there is, against the CAD kernel's own classifier.
+//! Inside and outside of all closed parts, against the CAD kernel's own classifier.
 //!
-//! Files are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; where they are absent the tests say so and pass.
-//! `MORTISE_SIGN_POINTS=100000 cargo test --release -p mortise-bake --test signs -- real/` asks for as many points as the stated result; without
-//! it a few hundred a shape, so that the tests stay quick.
+//! Files are looked for in `MORTISE_SHARED`, else in `shared` beside the workspace; if they are absent the tests report it and pass.
+//! `MORTISE_SIGN_POINTS=100000 cargo test --release -p mortise-bake --test signs -- real/` compares as many points as the stated result; without it a
+//! few hundred per shape keep the tests quick.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -50,7 +50,7 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// Shapes looked at so far, by their tessellation to a millionth of a millimetre: many files spell the same parts differently.
+/// Shapes compared so far, by their tessellation to a millionth of a millimetre: many files write the same parts differently.
 static SEEN: Mutex<BTreeSet<u64>> = Mutex::new(BTreeSet::new());
 
 fn is_new(shape: &Shape) -> bool {
@@ -70,7 +70,7 @@ fn signs_of(file: &Path) -> Result<(), Failed> {
     let model = match load_step_with(file, &load) {
         Ok(model) => model,
         Err(error) => {
-            // Refusing a file is another test's concern; here it has no sign to be wrong.
+            // Rejected files are covered by another test; they have no sign to compare.
             println!("not read: {error}");
             return Ok(());
         }
@@ -96,7 +96,7 @@ fn signs_of(file: &Path) -> Result<(), Failed> {
         let start = Instant::now();
         let check = check_signs(file, &load, index, shape, &options)?;
         let failed = check.closed && check.wrong + check.field_wrong > 0;
-        // An answer that did not come is none; only the stated result may be had in parts.
+        // Every point needs an answer here; only the full run for the stated result may be split up.
         if full.is_none() && check.points + check.undecided < check.asked {
             return Err(format!(
                 "{name}: the kernel answered at {} of {} points",

@@ -1,5 +1,4 @@
-//! From a file's bytes to a [`CadModel`]: check the text, let the kernel read it, name the parts, account for
-//! every solid.
+//! From a file's bytes to a [`CadModel`]: checks the text, passes it to the kernel, names the parts, and accounts for every solid.
 
 use crate::external::{self, Joined, text_error};
 use crate::kernel::{self, RawPart, RawResult};
@@ -11,10 +10,10 @@ use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Names that say nothing: what writers put where a body or occurrence has no name of its own.
+/// Placeholder names that writers use for a body or occurrence without its own name.
 const MEANINGLESS: &[&str] = &["", "NONE", "SOLID", "COMPOUND", "COMPSOLID", "SHELL", "SHAPE"];
 
-/// A text that the kernel has read, and what is known of it.
+/// A text that the kernel has read, and the data collected about it.
 struct Source {
     file: Exchange,
     content: Content,
@@ -23,7 +22,7 @@ struct Source {
     document: cxx::UniquePtr<kernel::Document>,
 }
 
-/// Checks and rewrites a STEP file and those it refers to, and lets the kernel read them. The caller holds [`kernel::lock`].
+/// Checks and rewrites a STEP file and the files it refers to, and passes them to the kernel. The caller holds [`kernel::lock`].
 fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
     let shown = path.display().to_string();
     let Joined {
@@ -40,7 +39,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
         }
         return Err(BrepError::NoShape { path: shown, found });
     }
-    // Before the kernel, which would unfold it.
+    // Checked before the kernel reads the text, because the kernel would unfold the assembly.
     let parts = Structure::of(&file).unfolded();
     if parts > options.max_parts as u64 {
         return Err(BrepError::TooManyParts {
@@ -62,7 +61,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
     })
 }
 
-/// Reads a STEP file and asks the kernel something about its shape `shape`, numbered as in [`CadModel::shapes`].
+/// Reads a STEP file and queries the kernel about its shape `shape`, numbered as in [`CadModel::shapes`].
 pub fn ask<T>(
     path: &Path,
     options: &LoadOptions,
@@ -94,7 +93,7 @@ fn kernel_error(path: &str, e: &cxx::Exception) -> BrepError {
     }
 }
 
-/// Reads a STEP file and those it refers to.
+/// Reads a STEP file and the files it refers to.
 pub fn assemble(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
     let _kernel = kernel::lock();
     let Source {
@@ -186,7 +185,7 @@ fn found_instead(file: &Exchange) -> String {
     }
 }
 
-/// The file's length unit for people to read; every length is already in millimetres.
+/// The file's length unit as text for people; every length is already in millimetres.
 fn unit(names: Vec<String>, warnings: &mut Vec<String>) -> String {
     if names.len() > 1 {
         warnings.push(format!(
@@ -200,7 +199,7 @@ fn unit(names: Vec<String>, warnings: &mut Vec<String>) -> String {
     })
 }
 
-/// Every solid of the text must have become a placed solid of the kernel.
+/// Checks that every solid of the text became a placed solid of the kernel.
 fn account(
     path: &str,
     file: &Exchange,
@@ -243,7 +242,7 @@ fn account(
                     result.faces
                 ));
             }
-            // Faces beside solids are left out; the part they stand beside says how many.
+            // Faces beside solids are skipped; the part beside them reports their number.
             Some(result) if !is_solid && result.faces > 0 && !content.solids.is_empty() => {}
             result => {
                 let why = result.map(|r| one_line(&r.message)).filter(|m| !m.is_empty());
@@ -265,7 +264,7 @@ fn account(
     })
 }
 
-/// The kernel's messages may have several lines.
+/// Joins the kernel's message, which may have several lines, into one.
 fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -283,7 +282,7 @@ fn name_parts(file: &Exchange, raw: &[RawPart]) -> Vec<Part> {
             if raw.solids > 1 {
                 name = format!("{name}.{}", raw.solid + 1);
             }
-            // The root is the file's own product: it is above every part and tells them nothing apart.
+            // The root is the file's own product: it is above every part and so does not distinguish them.
             let path = names.into_iter().skip(1).collect();
             Part {
                 name: unique(name, &mut taken),

@@ -1,14 +1,13 @@
-//! Reading in a process of its own.
+//! Reading in a separate process.
 //!
-//! The program starts itself again with a request in its environment; the copy sees it in [`init`], reads the
-//! file, writes a framed [`postcard`] result to standard output and exits. A frame is eight bytes of magic, the
-//! payload's length (64 bits, little-endian) and the payload: whatever the kernel prints around it is skipped.
-//! A question about a shape comes on standard input, after its length. That pipe then stays open for as long as the parent lives:
-//! its end ends the copy, however the parent ended. On Linux the system kills the copy besides, when the thread that started it ends;
-//! that thread waits here until the copy is gone.
+//! The program starts itself again with a request in its environment; the copy detects it in [`init`], reads the file, writes a framed [`postcard`]
+//! result to standard output and exits. A frame is eight bytes of magic, the payload's length (64 bits, little-endian) and the payload: any output of
+//! the kernel around it is skipped. A query about a shape comes on standard input, preceded by its length. That pipe then stays open for as long as
+//! the parent lives: when it closes the copy ends, however the parent ended. On Linux the system also kills the copy when the thread that started it
+//! ends; that thread waits here until the copy is gone.
 //!
-//! Limits: processor time ([`LoadOptions::time_limit_s`]) and address space by the system, `PATIENCE` times the processor time
-//! by the parent's clock, and the length of the answer.
+//! Limits: processor time ([`LoadOptions::time_limit_s`]) and address space, enforced by the system; `PATIENCE` times the processor time, by the
+//! parent's clock; and the length of the answer.
 
 use crate::oracle::{self, Answer, Question};
 use crate::{BrepError, CadModel, LoadOptions, kernel, load_in_process};
@@ -26,30 +25,29 @@ use std::time::{Duration, Instant};
 const PATH_VARIABLE: &str = "MORTISE_BREP_CHILD_PATH";
 const REQUEST_VARIABLE: &str = "MORTISE_BREP_CHILD_REQUEST";
 const MAGIC: &[u8; 8] = b"\x93MTBREP1";
-/// How much of the child's standard error is kept for the message.
+/// Length of the end of the child's standard error that is kept for the message.
 const STDERR_TAIL: usize = 4096;
-/// How often the parent looks whether the child has ended.
+/// Interval at which the parent checks whether the child has ended.
 const POLL: Duration = Duration::from_millis(2);
 
-/// By how much the time by the clock may exceed the processor time: other programs want their share of the machine too.
+/// Allowed ratio of elapsed time to processor time: other programs need their share of the machine too.
 const PATIENCE: u32 = 4;
 
-/// What the environment asks for.
+/// The request in the environment.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Request {
     options: LoadOptions,
-    /// Process that asks.
+    /// Process that sends the request.
     parent: u32,
-    /// A [`Question`] is to be read from standard input; else the model is asked for.
+    /// Whether a [`Question`] is to be read from standard input; else the request is for the model.
     question: bool,
 }
 
 static READY: AtomicBool = AtomicBool::new(false);
 
-/// To be called first thing in `main` of every program that reads STEP files.
+/// Must be called first in `main` of every program that reads STEP files.
 ///
-/// In the reading process this reads the file and exits; in any other it notes that the program can be started
-/// again as a reading process.
+/// In the reading process this reads the file and exits; in any other it records that the program can be started again as a reading process.
 pub fn init() {
     match (
         std::env::var_os(PATH_VARIABLE),
@@ -60,7 +58,7 @@ pub fn init() {
     }
 }
 
-/// [`init`] was called, so reading goes to a child process.
+/// Whether [`init`] was called, so that reading uses a child process.
 pub fn is_ready() -> bool {
     READY.load(Ordering::Acquire)
 }
@@ -81,7 +79,7 @@ fn serve(path: &Path, request: &OsStr) -> ! {
             kernel::end_with_parent(parent);
             kernel::limit_process(options.memory_limit_bytes, options.time_limit_s);
             let question = question.then(|| read_question(std::io::stdin().lock()));
-            // Without the thread the system still ends this process at the end of its processor time.
+            // Without the thread the system still ends this process when its processor time is used up.
             let _ = thread::Builder::new().spawn(|| end_with_pipe(std::io::stdin().lock()));
             match question {
                 None => respond(&load_in_process(path, &options)),
@@ -94,9 +92,9 @@ fn serve(path: &Path, request: &OsStr) -> ! {
     std::process::exit(if written { 0 } else { 3 })
 }
 
-/// Ends this process when the other end of `pipe` is closed, whatever the kernel is doing.
+/// Ends this process when the other end of `pipe` is closed, even while the kernel is busy.
 fn end_with_pipe(mut pipe: impl Read) {
-    // Nothing more is sent: this returns when the parent is gone.
+    // Nothing more is sent, so this returns when the parent is gone.
     let _ = pipe.read(&mut [0]);
     kernel::end_now();
 }
@@ -111,7 +109,7 @@ fn read_question(mut pipe: impl Read) -> Option<Question> {
         .flatten()
 }
 
-/// Whether the frame got out.
+/// Writes the result as a frame; returns whether that succeeded.
 fn respond<T: Serialize>(result: &Result<T, BrepError>) -> bool {
     kernel::flush_output();
     postcard::to_allocvec(result).is_ok_and(|payload| {
@@ -129,7 +127,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions, cancel: &AtomicBool) -> R
     run(path, options, None, cancel)
 }
 
-/// Asks about a shape of `path` in a child process.
+/// Queries a shape of `path` in a child process.
 pub(crate) fn ask(path: &Path, options: &LoadOptions, question: &Question) -> Result<Answer, BrepError> {
     let question = postcard::to_allocvec(question).map_err(|e| process_error(path, &e.to_string()))?;
     run(path, options, Some(question), &AtomicBool::new(false))
@@ -143,11 +141,11 @@ fn run<T: DeserializeOwned>(
 ) -> Result<T, BrepError> {
     let child = spawn(path, options, question.is_some()).map_err(|e| process_error(path, &e.to_string()))?;
     let mut child = Reader(child);
-    // Held until the end: its closing ends the child.
+    // Held until the end: closing it ends the child.
     let _line = child.0.stdin.take().map(|mut pipe| {
         thread::spawn(move || {
             if let Some(question) = question {
-                // A child that dies early breaks the pipe; how it ended is told below.
+                // A child that dies early breaks the pipe; how it ended is reported below.
                 let _ = pipe.write_all(&(question.len() as u64).to_le_bytes());
                 let _ = pipe.write_all(&question);
             }
@@ -206,7 +204,7 @@ struct Reader(Child);
 
 impl Drop for Reader {
     fn drop(&mut self) {
-        // Both fail only when it is already gone.
+        // Both calls fail only when the child is already gone.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -245,7 +243,7 @@ fn wait(child: &mut Child, limit: Duration, ends: &[&AtomicBool]) -> std::io::Re
 /// At most `limit` bytes; sets `flooded` when there are more.
 fn read_answer(pipe: impl Read, limit: u64, flooded: &AtomicBool) -> Vec<u8> {
     let mut bytes = Vec::new();
-    // A broken pipe leaves a frame without its end, which is then no frame.
+    // A broken pipe gives an incomplete frame, which is rejected later.
     let _ = pipe.take(limit.saturating_add(1)).read_to_end(&mut bytes);
     if bytes.len() as u64 > limit {
         flooded.store(true, Ordering::Release);
@@ -282,7 +280,7 @@ fn ending(status: ExitStatus, errors: &[u8]) -> String {
     }
 }
 
-/// The system ended it at the end of its processor time.
+/// Whether the system ended the process because its processor time was used up.
 fn used_up_its_time(status: ExitStatus) -> bool {
     #[cfg(unix)]
     {
@@ -303,7 +301,7 @@ fn how(status: ExitStatus) -> String {
         Some(4) => "illegal instruction".into(),
         Some(6) => "aborted".into(),
         Some(8) => "arithmetic fault".into(),
-        Some(9) => "killed, perhaps for want of memory".into(),
+        Some(9) => "killed, perhaps because memory ran out".into(),
         Some(7 | 11) => "memory access fault".into(),
         Some(signal) => format!("signal {signal}"),
         None => status.to_string(),

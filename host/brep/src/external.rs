@@ -1,8 +1,8 @@
-//! A STEP file with those it refers to, joined into one text.
+//! A STEP file and the files it refers to, joined into one text.
 //!
-//! Referenced files are taken from the folder of the main file and from nowhere else: a name with a folder, an absolute path, a symbolic link or
-//! anything but a regular file is refused. A file that is missing is a warning. Files are read once however often they are referred to; cycles are refused,
-//! depth, number and total size are limited.
+//! Referenced files are read only from the folder of the main file: a name with a folder, an absolute path, a symbolic link or anything but a regular
+//! file is refused. A missing file is a warning. Each file is read once, regardless of the number of references to it; cycles are refused; depth,
+//! number and total size are limited.
 
 use crate::part21::check::{self, Content};
 use crate::part21::documents::{self, Document};
@@ -15,29 +15,29 @@ use std::io::Read as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Deepest chain of files, each referring to the next.
+/// Longest chain of files, each of which refers to the next.
 const MAX_DEPTH: usize = 32;
-/// Most files of one assembly.
+/// Most files per assembly.
 const MAX_FILES: usize = 10_000;
 
 /// The joined text.
 pub struct Joined {
     /// All entities, those of the main file first.
     pub file: Exchange,
-    /// What it holds.
+    /// Its solids and surfaces.
     pub content: Content,
     /// Names of the length units of the main file.
     pub units: Vec<String>,
     /// All files, the main one first.
     pub files: Vec<PathBuf>,
-    /// Names of files that were referred to and are missing.
+    /// Names of referenced files that are missing.
     pub missing: Vec<String>,
 }
 
-/// Reads and checks `path` and all that it refers to.
+/// Reads and checks `path` and all files it refers to.
 ///
 /// # Errors
-/// A fault of any file's text; [`BrepError::Reference`] for a reference that is refused.
+/// A fault in the text of any file; [`BrepError::Reference`] for a refused reference.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Joined, BrepError> {
     let shown = path.display().to_string();
     let bytes = read(path, None, options.text_limit_bytes)?;
@@ -78,7 +78,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Joined, BrepError> {
     set.follow(&shown, &documents, &structure, all, &mut chain)?;
     let mut file = set.joined;
     documents::forget(&mut file);
-    // Each text is sound; together they may still put an assembly into itself.
+    // Each text is valid; together they may still contain an assembly within itself.
     let mut content = check::check(&file).map_err(|e| text_error(&shown, e))?;
     content.warnings = set.warnings;
     Ok(Joined {
@@ -95,18 +95,18 @@ struct Set<'a> {
     folder: &'a Path,
     joined: Exchange,
     files: Vec<PathBuf>,
-    /// Root product of each file and its representation, by name; `None` when it has none that could be told.
+    /// Root product of each file and its representation, by name; `None` when it has no unique one.
     known: HashMap<String, Option<[usize; 2]>>,
-    /// Product definitions that were replaced, and by which.
+    /// Product definitions that were replaced, and their replacements.
     real: HashMap<usize, [usize; 2]>,
     missing: Vec<String>,
     warnings: Vec<String>,
-    /// Bytes of text that may still be read.
+    /// Remaining limit on the bytes of text.
     left: u64,
 }
 
 impl Set<'_> {
-    /// Follows the references of one file, whose entities are `text`. `chain` are the files from the main one to this one.
+    /// Follows the references of one file, whose entities are `text`. `chain` lists the files from the main one to this one.
     fn follow(
         &mut self,
         shown: &str,
@@ -125,7 +125,7 @@ impl Set<'_> {
             }
             if !documents::is_step(&document.name) {
                 self.warnings.push(format!(
-                    "{product} is left out: its shape is in {:?}, which is no STEP file",
+                    "{product} is left out: its shape is in {:?}, which is not a STEP file",
                     document.name
                 ));
                 continue;
@@ -166,7 +166,7 @@ impl Set<'_> {
             };
             let Some(root) = root else {
                 self.warnings.push(format!(
-                    "{product} is left out: {:?} has not exactly one product that could be it",
+                    "{product} is left out: {:?} does not have exactly one matching product",
                     document.name
                 ));
                 continue;
@@ -176,13 +176,13 @@ impl Set<'_> {
         }
         if complete > 0 {
             self.warnings.push(format!(
-                "{shown}: {complete} products have a shape here, so the files they name besides are not read"
+                "{shown}: {complete} products have a shape here, so the files that they also name are not read"
             ));
         }
         Ok(())
     }
 
-    /// Reads and appends one file and all that it refers to; returns its root product.
+    /// Reads and appends one file and all files it refers to; returns its root product.
     fn add(
         &mut self,
         name: &str,
@@ -207,7 +207,7 @@ impl Set<'_> {
             .ok_or_else(|| BrepError::Invalid {
                 path: shown.clone(),
                 line: 1,
-                what: "its entity numbers leave no room for those of other files".into(),
+                what: "its entity numbers leave no numbers for those of other files".into(),
             })?;
         self.files.push(path);
         drop(file);
@@ -228,7 +228,7 @@ impl Set<'_> {
         })
     }
 
-    /// The file of this name beside the main one; `None` when there is none. Letters of the other case will do, as they do on other systems.
+    /// The file of this name beside the main one; `None` when there is none. A name that differs only in case is accepted, as on other systems.
     fn resolve(&self, name: &str) -> Result<Option<(String, Metadata)>, String> {
         let bare = name
             .strip_prefix("./")
@@ -253,12 +253,12 @@ impl Set<'_> {
             ));
         }
         if !found.is_file() {
-            return Err(format!("refers to {name:?}, which is no regular file"));
+            return Err(format!("refers to {name:?}, which is not a regular file"));
         }
         Ok(Some((bare, found)))
     }
 
-    /// The only file whose name differs in case alone.
+    /// The file whose name differs only in case, if it is the only one.
     fn in_other_case(&self, name: &str) -> Option<(String, Metadata)> {
         let wanted = name.to_lowercase();
         let mut found = std::fs::read_dir(self.folder).ok()?.filter_map(|entry| {
@@ -270,7 +270,7 @@ impl Set<'_> {
         Some((name, metadata))
     }
 
-    /// Name of a product, for messages and to find it again.
+    /// Name of a product, for messages and for locating it.
     fn product(&self, definition: usize) -> String {
         let file = &self.joined;
         let product = argument(file, definition, 2).and_then(|formation| argument(file, formation, 2));
@@ -292,7 +292,7 @@ fn parse(shown: &str, bytes: &[u8]) -> Result<(Exchange, Content), BrepError> {
     Ok((file, content))
 }
 
-/// At most `limit` bytes. `expected` is the file that was found under this name: no other is read.
+/// Reads at most `limit` bytes. `expected` is the file that was found under this name: a different file is refused.
 fn read(path: &Path, expected: Option<&Metadata>, limit: u64) -> Result<Vec<u8>, BrepError> {
     let unreadable = |reason: String| BrepError::Unreadable {
         path: path.display().to_string(),

@@ -1,4 +1,4 @@
-//! Free-form faces and edges from the kernel's numbers, as far as they fit the shape they belong to.
+//! Free-form faces and edges from the kernel's numbers, if these are consistent with their shape.
 
 use crate::kernel::{RawCurve, RawFreeForms, RawSpline};
 use crate::{Curve, FineCurve, Shape, SplineSurface, Surface};
@@ -23,7 +23,7 @@ pub fn add(shape: &mut Shape, raw: RawFreeForms) {
         .collect();
 }
 
-/// `None` for one whose counts do not fit together or whose numbers make no surface.
+/// `None` when the counts are inconsistent or the numbers do not define a surface.
 fn spline(raw: RawSpline) -> Option<SplineSurface> {
     let knots = [raw.knots_u, raw.knots_v];
     let degrees = raw.degrees;

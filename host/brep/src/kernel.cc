@@ -103,7 +103,7 @@ std::size_t count(const TopoDS_Shape& shape, TopAbs_ShapeEnum what, TopAbs_Shape
   return n;
 }
 
-// Placements with a scale or a mirror are dealt with below, so they must not throw here.
+// Placements with a scale or a mirror are handled below, so they must not throw here.
 TopoDS_Shape moved(const TopoDS_Shape& shape, const TopLoc_Location& where) {
 #if OCC_VERSION_HEX >= 0x070600
   return shape.Moved(where, false);
@@ -112,7 +112,7 @@ TopoDS_Shape moved(const TopoDS_Shape& shape, const TopLoc_Location& where) {
 #endif
 }
 
-// A leaf found below a product: a solid, or what is left of the product when it has none.
+// A leaf found below a product: a solid, or the rest of the product when it has none.
 struct Leaf {
   TopoDS_Shape shape;
   std::vector<std::pair<std::string, std::string>> path;
@@ -139,7 +139,7 @@ class Walker {
       const TDF_Label label = roots.Value(i);
       const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(label);
       if (shape.IsNull() || (!XCAFDoc_ShapeTool::IsAssembly(label) && mapped.count(shape.TShape().get()) != 0)) continue;
-      // A root that is one placed thing and nothing else is a reference to it: its own shape has the placement in it.
+      // A root that consists of a single placed item is a reference to it: its own shape includes the placement.
       TDF_Label product = label;
       TopLoc_Location where;
       if (XCAFDoc_ShapeTool::GetReferredShape(label, product)) where = XCAFDoc_ShapeTool::GetLocation(label);
@@ -157,7 +157,7 @@ class Walker {
   using Path = std::vector<std::pair<std::string, std::string>>;
   static constexpr int kMaxDepth = 200;
 
-  // Names and colours by identity of the geometry.
+  // Stores names and colours by identity of the geometry.
   void learn(const TDF_Label& label) {
     const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(label);
     if (shape.IsNull()) return;
@@ -212,7 +212,7 @@ class Walker {
       leaves.push_back(leaf);
       loose = 0;
     }
-    // Number the solids within the innermost product that holds them.
+    // Number the solids within the innermost product that contains them.
     std::map<Path, std::size_t> total, seen;
     for (const Leaf& leaf : leaves) ++total[leaf.path];
     for (const Leaf& leaf : leaves) {
@@ -257,7 +257,7 @@ class Walker {
     const gp_Trsf trsf = leaf.shape.Location().Transformation();
     const double scale = trsf.ScaleFactor();
     const bool rigid = std::abs(scale - 1.0) < 1e-12;
-    // Shapes are the same when their geometry, sense and scale (negative: mirrored) are.
+    // Shapes are equal when their geometry, sense and scale (negative: mirrored) are equal.
     const Key key{leaf.shape.TShape().get(), int(leaf.shape.Orientation()), rigid ? 1.0 : scale};
     auto known = known_.find(key);
     if (known == known_.end()) {
@@ -304,7 +304,7 @@ class Walker {
   std::unordered_set<const void*> placed_;
 };
 
-// What became of each solid and surface model.
+// Result for each solid and surface model.
 rust::Vec<RawResult> outcome(const Handle(XSControl_WorkSession) & session, const std::unordered_set<const void*>& placed) {
   rust::Vec<RawResult> results;
   const Handle(StepData_StepModel) model = Handle(StepData_StepModel)::DownCast(session->Model());
@@ -335,7 +335,7 @@ rust::Vec<RawResult> outcome(const Handle(XSControl_WorkSession) & session, cons
   return results;
 }
 
-// A stream over memory that is not copied.
+// A stream over memory, without a copy.
 class View : public std::streambuf {
  public:
   explicit View(rust::Slice<const std::uint8_t> text) {
@@ -369,7 +369,7 @@ std::unique_ptr<Document> read_document(rust::Slice<const std::uint8_t> text, st
   const IFSelect_ReturnStatus status = reader.ChangeReader().ReadStream("model.step", stream);
   if (status != IFSelect_RetDone) throw std::runtime_error("the kernel cannot parse it");
   Handle(TDocStd_Document) document = new TDocStd_Document("MDTV-XCAF");
-  // The document must know its main label's tools before the transfer fills them.
+  // The tools of the document's main label must exist before the transfer fills them.
   XCAFDoc_DocumentTool::ShapeTool(document->Main());
   const bool transferred = reader.Transfer(document);
   auto content = std::make_unique<Document::Content>();
@@ -408,7 +408,7 @@ bool limit_process(std::uint64_t memory_bytes, std::uint64_t cpu_seconds) {
 void end_with_parent(std::uint32_t parent) {
 #if defined(__linux__)
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  // Had it ended before, no signal would come.
+  // If the parent ended before the call, no signal comes.
   if (std::uint32_t(getppid()) != parent) end_now();
 #else
   (void)parent;

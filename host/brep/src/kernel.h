@@ -1,4 +1,4 @@
-// The part of the CAD kernel that Mortise uses, as flat values. See kernel.rs for the meaning of each field.
+// The interface to the CAD kernel, as flat values. See kernel.rs for the meaning of each field.
 #pragma once
 
 #include <Standard_Failure.hxx>
@@ -10,7 +10,7 @@
 
 #include "rust/cxx.h"
 
-// The kernel's exceptions are no std::exception before version 8: every one is turned into an error here.
+// Before version 8 the kernel's exceptions do not derive from std::exception: each one is turned into an error here.
 namespace rust {
 namespace behavior {
 template <typename Try, typename Fail>

@@ -1,16 +1,15 @@
-//! The bridge to the CAD kernel: the only module that speaks C++.
+//! The bridge to the CAD kernel: the only module that calls C++.
 //!
-//! Everything crosses as flat numbers and strings; meaning is given on the Rust side. Names are the tokens
-//! which [`crate::part21`] put into the text, so that no name is decoded by the kernel. The kernel keeps global
-//! state while it reads: callers hold [`lock`].
+//! Everything crosses the bridge as flat numbers and strings; the Rust side interprets them. Names are the tokens that [`crate::part21`] put into the
+//! text, so that the kernel decodes no name. The kernel keeps global state while it reads: callers hold [`lock`].
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 static KERNEL: Mutex<()> = Mutex::new(());
 
-/// Takes the kernel for this thread: its STEP reader is not thread-safe.
+/// Locks the kernel for this thread: its STEP reader is not thread-safe.
 pub fn lock() -> MutexGuard<'static, ()> {
-    // The mutex guards no Rust data, so a panic elsewhere leaves nothing half-changed.
+    // The mutex guards no Rust data, so a panic in another thread leaves no data half-changed.
     KERNEL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -35,27 +34,27 @@ mod ffi {
         shape: usize,
         /// Number of this solid among those of its product, from 0.
         solid: usize,
-        /// How many parts its product has.
+        /// Number of parts of its product.
         solids: usize,
         /// Rotation row by row with the translation as fourth column, mm.
         placement: [f64; 12],
         has_color: bool,
         color: [f32; 3],
-        /// Faces of the product that belong to none of its solids, and were left out.
+        /// Faces of the product that belong to none of its solids, and were skipped.
         loose_faces: usize,
     }
 
-    /// What became of a solid or surface model in the file.
+    /// Result for a solid or surface model of the file.
     #[derive(Clone, Debug)]
     struct RawResult {
-        /// Entity number in the text handed over.
+        /// Entity number in the text given to the kernel.
         entity: usize,
-        /// Faces in the shape it became; 0 when it became none.
+        /// Faces in the resulting shape; 0 when there is none.
         faces: usize,
         solids: usize,
-        /// At least one of its solids or faces is in a part.
+        /// Whether at least one of its solids or faces is in a part.
         placed: bool,
-        /// What the kernel had to say about it, if anything.
+        /// The kernel's message about it, if any.
         message: String,
     }
 
@@ -71,7 +70,7 @@ mod ffi {
         /// A point of the surface near the middle of the face, and the face's outward normal there.
         point: [f64; 3],
         normal: [f64; 3],
-        /// Kind 5: points of the face, each followed by the outward unit normal there.
+        /// Kind 5: points of the face, each followed by its outward unit normal.
         samples: Vec<f64>,
         area: f64,
         edges: Vec<u32>,
@@ -107,22 +106,22 @@ mod ffi {
         inertia: [f64; 9],
         /// Faces that could not be tessellated.
         faces_without_mesh: Vec<u32>,
-        /// Largest distance measured between mesh and surface, and the bound asked for, mm.
+        /// Largest measured distance between mesh and surface, and the requested bound, mm.
         deflection: f64,
         deflection_asked: f64,
     }
 
-    /// A face that is none of the closed forms, as a B-spline surface cut to the face's parameter box.
+    /// A face without a closed form, as a B-spline surface trimmed to the face's parameter box.
     #[derive(Clone, Debug)]
     struct RawSpline {
         face: u32,
         degrees: [u32; 2],
-        /// Each knot as often as its multiplicity.
+        /// Each knot is repeated by its multiplicity.
         knots_u: Vec<f64>,
         knots_v: Vec<f64>,
         /// x, y, z, weight; v runs fastest.
         poles: Vec<f64>,
-        /// Largest distance seen from the face's own surface, mm.
+        /// Largest distance measured from the face's own surface, mm.
         deviation: f64,
     }
 
@@ -130,7 +129,7 @@ mod ffi {
     #[derive(Clone, Debug)]
     struct RawCurve {
         edge: u32,
-        /// For each side of the polyline how many points lie within it; empty when the edge has no parameters.
+        /// For each side of the polyline the number of points within it; empty when the edge has no parameters.
         counts: Vec<u32>,
         points: Vec<f64>,
     }
@@ -141,7 +140,7 @@ mod ffi {
         curves: Vec<RawCurve>,
     }
 
-    // SAFETY: the signatures of kernel.h, which cxx checks when it compiles the bridge; none keeps a reference after it returns.
+    // SAFETY: the signatures of kernel.h, which cxx checks when it compiles the bridge; none of the functions keeps a reference after it returns.
     unsafe extern "C++" {
         include!("kernel.h");
 
@@ -159,21 +158,21 @@ mod ffi {
             angular_rad: f64,
         ) -> Result<RawShape>;
 
-        /// Faces and edges without a closed form, of a shape that [`Document::shape`] has tessellated; edges within the tolerance.
+        /// Faces and edges without a closed form, of a shape that [`Document::shape`] has tessellated; edges are followed within the tolerance.
         fn free_forms(self: &Document, index: usize, tolerance_mm: f64) -> Result<RawFreeForms>;
-        /// Side of each point (x, y, z in turn) of the shape's solid by the kernel's own classifier: 0 inside, 1 outside, 2 within
-        /// the tolerance of the surface, 3 it cannot tell.
+        /// Side of each point (x, y, z in turn) relative to the shape's solid, by the kernel's own classifier: 0 inside, 1 outside, 2 within the
+        /// tolerance of the surface, 3 undecided.
         fn sides(self: &Document, index: usize, points: &[f64], tolerance_mm: f64) -> Result<Vec<u8>>;
-        /// Nearest point of the shape's faces to each point, by the kernel: distance, x, y, z; distance -1 where it finds none.
+        /// Nearest point of the shape's faces to each point, by the kernel: distance, x, y, z; the distance is -1 where it finds none.
         fn feet(self: &Document, index: usize, points: &[f64]) -> Result<Vec<f64>>;
 
-        /// Caps address space (bytes) and processor time (seconds) of this process where the system can; 0 for none.
+        /// Limits address space (bytes) and processor time (seconds) of this process where the system supports it; 0 for no limit.
         fn limit_process(memory_bytes: u64, cpu_seconds: u64) -> bool;
         fn flush_output();
-        /// On Linux the system kills this process when the thread of `parent` that started it ends; ends it at once when `parent`
-        /// is gone already.
+        /// On Linux: makes the system kill this process when the thread of `parent` that started it ends; ends it immediately when `parent` is
+        /// already gone.
         fn end_with_parent(parent: u32);
-        /// Ends this process without running anything more of it.
+        /// Ends this process immediately, without running any more of its code.
         fn end_now();
     }
 }

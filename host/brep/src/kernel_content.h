@@ -1,4 +1,4 @@
-// What a Document holds between reading and tessellation.
+// Content of a Document between reading and tessellation.
 #pragma once
 
 #include <TopoDS_Shape.hxx>

@@ -1,4 +1,4 @@
-// What the kernel itself says about points: an answer to check others by.
+// Point queries answered by the kernel itself: a reference for other computations.
 #include <BRepBuilderAPI_MakeVertex.hxx>
 #include <BRepClass3d_SolidClassifier.hxx>
 #include <BRepExtrema_DistShapeShape.hxx>
@@ -41,7 +41,8 @@ rust::Vec<std::uint8_t> Document::sides(std::size_t index, rust::Slice<const dou
     return out;
   }
   BRepClass3d_SolidClassifier classifier(shape);
-  // A solid whose faces look inward holds infinity; read, it is turned, so its sides are too.
+  // A solid whose faces point inward contains infinity; on loading it is reversed, so its sides are reversed here as
+  // well.
   classifier.PerformInfinitePoint(tolerance_mm);
   const bool inside_out = classifier.State() == TopAbs_IN;
   for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
@@ -50,7 +51,7 @@ rust::Vec<std::uint8_t> Document::sides(std::size_t index, rust::Slice<const dou
       classifier.Perform(gp_Pnt(points[i], points[i + 1], points[i + 2]), tolerance_mm);
       found = side(classifier.State(), inside_out);
     } catch (const Standard_Failure&) {
-      // One ray the kernel cannot follow leaves one point undecided.
+      // A ray that the kernel cannot follow leaves one point undecided.
     }
     out.push_back(found);
   }
@@ -58,7 +59,7 @@ rust::Vec<std::uint8_t> Document::sides(std::size_t index, rust::Slice<const dou
 }
 
 rust::Vec<double> Document::feet(std::size_t index, rust::Slice<const double> points) const {
-  // Its faces alone: from a solid, points inside have no distance.
+  // Only its faces: for a solid, points inside have no distance.
   TopoDS_Compound faces;
   BRep_Builder builder;
   builder.MakeCompound(faces);
@@ -76,7 +77,7 @@ rust::Vec<double> Document::feet(std::size_t index, rust::Slice<const double> po
         for (int k = 0; k < 3; ++k) found[k + 1] = search.PointOnShape2(1).Coord(k + 1);
       }
     } catch (const Standard_Failure&) {
-      // No distance for this one.
+      // This point has no distance.
     }
     for (double value : found) out.push_back(value);
   }

@@ -45,7 +45,7 @@ namespace brep {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-// Relative error asked of each adaptive integral; 1e-9 costs six times as much on large spline models.
+// Relative error required of each adaptive integral; 1e-9 costs six times as much on large spline models.
 constexpr double kQuadrature = 1e-6;
 
 std::array<double, 3> numbers(const gp_XYZ& v) { return {v.X(), v.Y(), v.Z()}; }
@@ -98,7 +98,7 @@ class Describer {
   RawShape run() {
     mass();
     number_edges();
-    // Faces carry the orientation with which they are met first in the shape.
+    // Faces have the orientation with which they first occur in the shape.
     out_.faces.reserve(std::size_t(face_index_.Extent()));
     for (int i = 1; i <= face_index_.Extent(); ++i) face(TopoDS::Face(face_index_(i)), std::uint32_t(i - 1));
     for (int i = 1; i <= all_edges_.Extent(); ++i) finish_edge(i);
@@ -106,8 +106,8 @@ class Describer {
   }
 
  private:
-  // The kernel's plain quadrature is exact on analytic faces between lines and circles, and up to 1 % off on splines
-  // (a cylinder spelt as a spline): those are integrated adaptively.
+  // The kernel's plain quadrature is exact on analytic faces between lines and circles, but up to 1 % off on splines
+  // (such as a cylinder written as a spline): those are integrated adaptively.
   static bool is_plain(const TopoDS_Face& face) {
     if (BRepAdaptor_Surface(face, false).GetType() > GeomAbs_Torus) return false;
     for (TopExp_Explorer it(face, TopAbs_EDGE); it.More(); it.Next()) {
@@ -143,7 +143,7 @@ class Describer {
       for (int column = 0; column < 3; ++column) out_.inertia[3 * row + column] = inertia(row + 1, column + 1);
   }
 
-  // Edges shrunk to a point (the apex of a cone, the pole of a sphere) are no edges to the reader of the model.
+  // Edges that degenerate to a point (the apex of a cone, the pole of a sphere) are not edges of the model.
   void number_edges() {
     std::uint32_t next = 0;
     for (int i = 1; i <= all_edges_.Extent(); ++i) {
@@ -172,7 +172,7 @@ class Describer {
       raw.z = numbers(circle.Axis().Direction().XYZ());
       raw.radius = circle.Radius();
     } else {
-      // Odd, so that a closed curve's samples do not repeat by symmetry.
+      // An odd number, so that a closed curve's samples do not repeat by symmetry.
       constexpr int kPieces = 31;
       first = adaptor.FirstParameter();
       last = adaptor.LastParameter();
@@ -221,13 +221,13 @@ class Describer {
     raw.z = numbers(frame.Direction().XYZ());
   }
 
-  // Outward normal at (u, v): the kernel's natural normal, turned with the face.
+  // Outward normal at (u, v): the kernel's natural normal, reversed if the face is.
   static void sample(const TopoDS_Face& face, const BRepAdaptor_Surface& adaptor, double u, double v, RawFace& raw) {
     gp_Pnt point;
     gp_Vec du, dv;
     adaptor.D1(u, v, point, du, dv);
     gp_Vec normal = du.Crossed(dv);
-    // Where one derivative all but vanishes (a pole), their product says nothing.
+    // Where one derivative almost vanishes (a pole), their product is meaningless.
     normal = normal.Magnitude() > 1e-9 * du.Magnitude() * dv.Magnitude() ? normal.Normalized() : gp_Vec(0, 0, 0);
     if (face.Orientation() == TopAbs_REVERSED) normal.Reverse();
     raw.point = numbers(point.XYZ());
@@ -256,7 +256,7 @@ class Describer {
       const std::size_t index = std::size_t(all_edges_.FindIndex(edge) - 1);
       const std::uint32_t id = edge_number_[index];
       if (id != kNone) {
-        // A seam is met twice in its face, once each way.
+        // A seam occurs twice in its face, once in each direction.
         out_.edges[id].faces.push_back(number);
         if (!listed[index]) raw.edges.push_back(id);
         listed[index] = true;
@@ -270,7 +270,7 @@ class Describer {
     if (!meshed) {
       out_.faces_without_mesh.push_back(number);
     } else {
-      // The middle of the first triangle lies on the face itself, whatever its outline.
+      // The middle of the first triangle lies on the face itself, for any outline.
       if (has_uv(mesh)) {
         int corners[3];
         triangle(mesh, 1, corners);
@@ -324,8 +324,8 @@ class Describer {
     return id;
   }
 
-  // Nodes of the face along one of its edges are those the edge got from the first face that had it: the mesher
-  // divides an edge once for all its faces, in the order of its parameter.
+  // Nodes of the face along one of its edges are those that the first face created for the edge: the mesher divides an
+  // edge once for all its faces, in the order of its parameter.
   void weld(const TopoDS_Edge& edge, std::size_t index, const Handle(Poly_Triangulation) & mesh,
             const TopLoc_Location& place, std::vector<std::uint32_t>& vertex_of_node) {
     const Handle(Poly_PolygonOnTriangulation) polygon = BRep_Tool::PolygonOnTriangulation(edge, mesh, place);
@@ -358,13 +358,13 @@ class Describer {
       if (same) id = shared[std::size_t(i)];
       else if (i == 0) id = shared.front();
       else if (i == count - 1) id = shared.back();
-      // A face that divided the edge otherwise stays open along it; the count of open edges tells.
+      // A face that divided the edge differently stays open along it; the count of open edges reports it.
     }
   }
 
   void triangles(const TopoDS_Face& face, std::uint32_t number, const Handle(Poly_Triangulation) & mesh,
                  const TopLoc_Location& place, std::vector<std::uint32_t>& vertex_of_node) {
-    // A mirrored location turns the triangles as well as the face.
+    // A mirrored location reverses the triangles as well as the face.
     const bool turned = (face.Orientation() == TopAbs_REVERSED) != place.Transformation().IsNegative();
     for (int i = 1; i <= mesh->NbTriangles(); ++i) {
       int corners[3];
@@ -376,7 +376,7 @@ class Describer {
         if (id == kNone) id = add(node(mesh, corners[k]), place);
         ids[k] = id;
       }
-      // Two corners welded into one: nothing is left of it, and its two other sides close on each other.
+      // With two corners welded into one the triangle has no area, and its two other sides coincide.
       if (ids[0] == ids[1] || ids[1] == ids[2] || ids[2] == ids[0]) continue;
       for (std::uint32_t id : ids) out_.triangles.push_back(id);
       out_.triangle_face.push_back(number);
@@ -412,8 +412,8 @@ class Describer {
   RawShape out_{};
 };
 
-// Largest distance seen between the mesh and what it stands for: at the middle of each segment of an edge and of each
-// triangle, where a chord's error is largest.
+// Largest measured distance between the mesh and the exact geometry: at the middle of each segment of an edge and of
+// each triangle, where a chord's error is largest.
 double deviation(const TopoDS_Shape& shape) {
   double worst = 0;
   for (TopExp_Explorer faces(shape, TopAbs_FACE); faces.More(); faces.Next()) {
@@ -474,11 +474,12 @@ RawShape describe(const TopoDS_Shape& shape, const std::unordered_map<const void
     linear = box.IsVoid() ? 0.1 : relative * std::sqrt(box.SquareExtent());
     if (!(linear > 1e-6)) linear = 1e-6;
   }
-  // The mesher may miss its bound on splines, so it is measured and asked for more. The error falls with the square of
-  // a segment's length; where it does not fall, the geometry is at fault and a finer mesh would only grow without end.
+  // The mesher can miss its bound on splines, so the error is measured and a finer mesh requested. The error decreases
+  // with the square of a segment's length; if it does not decrease, the geometry is faulty and a finer mesh would only
+  // grow without limit.
   double ask_linear = linear, ask_angular = angular_rad, found = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
-    // Meshes left from an earlier call, or read from the file, are not ours.
+    // Discard meshes left from an earlier call or read from the file.
     BRepTools::Clean(shape);
     BRepMesh_IncrementalMesh mesher(shape, ask_linear, false, ask_angular, false);
     const double before = found;

@@ -1,4 +1,5 @@
-// What has no closed form, as exactly as it can be handed out: free-form surfaces as splines, free-form edges by points.
+// Geometry without a closed form, as exactly as the kernel can provide it: free-form surfaces as splines, free-form
+// edges as points.
 #include <BRepAdaptor_Curve.hxx>
 #include <BRepAdaptor_Surface.hxx>
 #include <BRepTools.hxx>
@@ -26,12 +27,13 @@ namespace mortise {
 namespace brep {
 namespace {
 
-// Samples along each parameter that measure how well a converted surface fits.
+// Samples along each parameter for measuring the deviation of a converted surface.
 constexpr int kSamples = 8;
-// A mesh side is halved at most this often.
+// Most bisections of a mesh side.
 constexpr int kMaxHalvings = 8;
 
-// Splines and Bezier patches become splines to the bit, extrusions and revolutions but for rounding, offsets within 1e-4.
+// Splines and Bezier patches convert to splines exactly, extrusions and revolutions within rounding, offsets within
+// 1e-4.
 Handle(Geom_BSplineSurface) spline_of(const TopoDS_Face& face) {
   const Handle(Geom_Surface) surface = BRep_Tool::Surface(face);
   double u0, u1, v0, v1;
@@ -44,7 +46,7 @@ Handle(Geom_BSplineSurface) spline_of(const TopoDS_Face& face) {
   try {
     spline = GeomConvert::SurfaceToBSplineSurface(new Geom_RectangularTrimmedSurface(surface, u0, u1, v0, v1));
   } catch (const Standard_Failure&) {
-    // It may not trim to the outline of the face; the whole does as well.
+    // The surface may not trim to the outline of the face; the whole surface serves as well.
     spline = GeomConvert::SurfaceToBSplineSurface(surface);
   }
   if (spline->IsUPeriodic()) spline->SetUNotPeriodic();
@@ -89,7 +91,7 @@ RawSpline describe_spline(const TopoDS_Face& face, std::uint32_t number) {
   return raw;
 }
 
-// Points strictly between two parameters so that each chord is within the tolerance of the curve at its middle.
+// Appends points strictly between two parameters so that each chord is within the tolerance of the curve at its middle.
 void refine(const BRepAdaptor_Curve& curve, double t0, const gp_XYZ& p0, double t1, const gp_XYZ& p1, double tolerance,
             int depth, rust::Vec<double>& out, std::uint32_t& count) {
   const double t = 0.5 * (t0 + t1);
@@ -97,7 +99,7 @@ void refine(const BRepAdaptor_Curve& curve, double t0, const gp_XYZ& p0, double 
   const gp_XYZ chord = p1 - p0;
   const double length = chord.Modulus();
   const double off = length > 0 ? (p - p0).Crossed(chord).Modulus() / length : (p - p0).Modulus();
-  // A point of inflection at the middle would pass for straight: the first halving is never left out.
+  // A point of inflection at the middle would appear straight: the first bisection is always made.
   if (depth == kMaxHalvings || (depth > 0 && off <= tolerance)) return;
   refine(curve, t0, p0, t, p, tolerance, depth + 1, out, count);
   for (int k = 1; k <= 3; ++k) out.push_back(p.Coord(k));
@@ -138,7 +140,7 @@ RawFreeForms Document::free_forms(std::size_t index, double tolerance_mm) const 
     try {
       out.splines.push_back(describe_spline(face, std::uint32_t(i - 1)));
     } catch (const Standard_Failure&) {
-      // It keeps its tessellation.
+      // The face keeps its tessellation.
     }
   }
   std::uint32_t number = 0;
@@ -152,7 +154,7 @@ RawFreeForms Document::free_forms(std::size_t index, double tolerance_mm) const 
     try {
       out.curves.push_back(describe_curve(edge, id, tolerance_mm));
     } catch (const Standard_Failure&) {
-      // It keeps its polyline.
+      // The edge keeps its polyline.
     }
   }
   return out;

@@ -1,11 +1,10 @@
-//! STEP files to parts, faces, edges and tessellation: the only crate that knows the CAD kernel.
+//! STEP files to parts, faces, edges and tessellation: the only crate that uses the CAD kernel.
 //!
-//! [`load_step`] gives a [`CadModel`] of plain values in millimetres and radians. The text is checked and
-//! rewritten here first (`part21`), then read by OpenCASCADE behind one thin bridge (`kernel`), in a process of
-//! its own (`child`), so that neither a crash, a hang nor a memory blow-up of the kernel reaches the program.
-//! What the import loses is said: an error when a solid is missing, a warning otherwise.
+//! [`load_step`] gives a [`CadModel`] of plain values in millimetres and radians. The text is checked and rewritten here first (`part21`), then read
+//! by OpenCASCADE behind one thin bridge (`kernel`), in a separate process (`child`), so that neither a crash, a hang nor excessive memory use of the
+//! kernel affects the program. Losses of the import are reported: an error when a solid is missing, a warning otherwise.
 //!
-//! Programs call [`child::init`] first thing in `main`.
+//! Programs call [`child::init`] first in `main`.
 //!
 //! ```no_run
 //! fn main() -> Result<(), mortise_brep::BrepError> {
@@ -44,7 +43,7 @@ use std::sync::atomic::AtomicBool;
 /// Reads a STEP file (AP203, AP214, AP242) with the default [`LoadOptions`].
 ///
 /// # Errors
-/// One line that says what is wrong, where, and what to do; see [`BrepError`].
+/// One line that states the fault, its place and the remedy; see [`BrepError`].
 pub fn load_step(path: impl AsRef<Path>) -> Result<CadModel, BrepError> {
     load_step_with(path, &LoadOptions::default())
 }
@@ -55,12 +54,12 @@ pub fn load_step(path: impl AsRef<Path>) -> Result<CadModel, BrepError> {
 /// it runs in this process, where the time and memory limits do not hold and a crash of the kernel is fatal.
 ///
 /// # Errors
-/// One line that says what is wrong, where, and what to do; see [`BrepError`].
+/// One line that states the fault, its place and the remedy; see [`BrepError`].
 pub fn load_step_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<CadModel, BrepError> {
     load_step_until(path, options, &AtomicBool::new(false))
 }
 
-/// Reads a STEP file, and gives up within some milliseconds of `cancel` being set: the child process is gone when this returns. A reading in this
+/// Reads a STEP file, and stops within some milliseconds after `cancel` is set: the child process is gone when this returns. A reading in this
 /// process is not interrupted.
 ///
 /// # Errors

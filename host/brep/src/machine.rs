@@ -1,11 +1,11 @@
-//! How much memory the reading process may use on this machine.
+//! Memory limit of the reading process on this machine.
 
-/// Where the system does not say what is available.
+/// Assumed available memory where the system does not report it.
 const UNKNOWN: u64 = 8 << 30;
-/// Below this the kernel's libraries leave too little for any file.
+/// Smallest limit: with less, the kernel's libraries leave too little for any file.
 const LEAST: u64 = 1 << 30;
 
-/// Half of the memory that is available, so that the answer fits into the other half; at least [`LEAST`].
+/// Half of the available memory, so that the answer fits into the other half; at least [`LEAST`].
 pub fn memory_limit_bytes() -> u64 {
     let machine = std::fs::read_to_string("/proc/meminfo")
         .ok()
@@ -15,14 +15,14 @@ pub fn memory_limit_bytes() -> u64 {
     available.map_or(UNKNOWN, |bytes| (bytes / 2).max(LEAST))
 }
 
-/// Bytes that `MemAvailable` of `/proc/meminfo` says.
+/// `MemAvailable` of `/proc/meminfo`, bytes.
 fn available(text: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kibibytes.checked_mul(1024)
 }
 
-/// What the control group (version 2) that this process runs in leaves of its own limit; `None` without a limit.
+/// Memory left under the limit of this process's control group (version 2); `None` without a limit.
 fn group() -> Option<u64> {
     let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
     let own = groups.lines().find_map(|line| line.strip_prefix("0::"))?;

@@ -1,4 +1,4 @@
-//! `mortise-brep FILE…`: reads STEP files and prints what they hold, one line a part.
+//! `mortise-brep FILE…`: reads STEP files and prints their content, one line per part.
 
 use mortise_brep::{CadModel, load_step};
 use std::process::ExitCode;

@@ -1,7 +1,7 @@
-//! What a STEP file holds, as plain values: no CAD-kernel type leaves this crate.
+//! The content of a STEP file as plain values: no CAD-kernel type leaves this crate.
 //!
-//! Lengths are millimetres whatever the file's unit, angles radians, frames right-handed and
-//! orthonormal. A [`Shape`] lives in its own frame; a [`Part`] places it in the assembly.
+//! Lengths are millimetres regardless of the file's unit, angles radians, frames right-handed and orthonormal. A [`Shape`] is in its own frame; a
+//! [`Part`] places it in the assembly.
 
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -12,28 +12,28 @@ use std::path::PathBuf;
 pub struct CadModel {
     /// Name of the length unit in the file ("millimetre", "inch", …); lengths here are already mm.
     pub unit: String,
-    /// Shapes, each once, however often it is placed.
+    /// Shapes, each listed once, regardless of the number of its placements.
     pub shapes: Vec<Shape>,
     /// Placed parts in file order: leaves of the assembly tree.
     pub parts: Vec<Part>,
-    /// What the import noticed or lost, in words.
+    /// Irregularities and losses of the import, as text.
     pub warnings: Vec<String>,
-    /// Files that were read: the one asked for, then those it refers to.
+    /// Files read: the requested one, then those it refers to.
     pub files: Vec<PathBuf>,
 }
 
 /// One placed part: a leaf of the assembly.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Part {
-    /// Product name, made unique within the file by the reader where it has to.
+    /// Product name, made unique within the file by the reader if necessary.
     pub name: String,
     /// Names of the subassemblies above, outermost first.
     pub path: Vec<String>,
     /// Index into [`CadModel::shapes`].
     pub shape: usize,
-    /// Shape frame to assembly frame: a rigid motion (a mirrored placement gets a shape of its own).
+    /// Shape frame to assembly frame: a rigid motion (a mirrored placement has its own shape).
     pub placement: DAffine3,
-    /// Linear RGB in 0..1 where the file gives one.
+    /// Linear RGB in 0..1 if the file gives one.
     pub color: Option<[f32; 3]>,
 }
 
@@ -46,11 +46,11 @@ pub struct Shape {
     pub edges: Vec<Edge>,
     /// Tessellation, welded by topology.
     pub mesh: Mesh,
-    /// What lies under the faces that are [`Surface::Spline`], where the kernel could tell.
+    /// Surfaces under the [`Surface::Spline`] faces, where the kernel could convert them.
     pub splines: Vec<SplineSurface>,
-    /// Finer points of the edges that are [`Curve::Other`].
+    /// Denser points of the edges that are [`Curve::Other`].
     pub curves: Vec<FineCurve>,
-    /// Largest distance measured between the tessellation and what it stands for, mm.
+    /// Largest measured distance between the tessellation and the exact geometry, mm.
     pub deflection_mm: f64,
     /// Volume from the exact B-rep, mm³.
     pub volume_mm3: f64,
@@ -60,13 +60,13 @@ pub struct Shape {
     pub center_of_mass: DVec3,
     /// Inertia tensor about the centre of mass at unit density, mm⁵, row by row.
     pub inertia_mm5: [[f64; 3]; 3],
-    /// Every mesh edge is used exactly twice, once each way.
+    /// Whether every mesh edge is used exactly twice, once in each direction.
     pub closed: bool,
     /// Mesh edges not used exactly twice (0 when closed).
     pub open_edges: usize,
 }
 
-/// A tensor-product (rational) B-spline surface under a face, cut to the face's box of parameters (Piegl & Tiller, "The NURBS Book", 4.4):
+/// A tensor-product (rational) B-spline surface under a face, trimmed to the face's parameter box (Piegl & Tiller, "The NURBS Book", 4.4):
 /// S(u, v) = Σ Nᵢ(u) Nⱼ(v) wᵢⱼ Pᵢⱼ / Σ Nᵢ(u) Nⱼ(v) wᵢⱼ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SplineSurface {
@@ -74,11 +74,11 @@ pub struct SplineSurface {
     pub face: u32,
     /// Degree in u and in v.
     pub degrees: [u32; 2],
-    /// Knots in u and in v, not falling, each as often as its multiplicity: poles + degree + 1 of them.
+    /// Knots in u and in v, non-decreasing, each repeated by its multiplicity: poles + degree + 1 of them.
     pub knots: [Vec<f64>; 2],
     /// x, y, z (mm) and weight of each pole; v runs fastest.
     pub poles: Vec<[f64; 4]>,
-    /// Largest distance seen from the face's own surface, mm: 0 for a spline, rounding for an extrusion or revolution, more for an offset.
+    /// Largest distance measured from the face's own surface, mm: 0 for a spline, rounding for an extrusion or revolution, more for an offset.
     pub deviation_mm: f64,
 }
 
@@ -91,7 +91,7 @@ pub struct FineCurve {
     pub between: Vec<Vec<DVec3>>,
 }
 
-/// How closely [`FineCurve`] follows its edge, mm: a quarter of a micrometre, well below the micrometre asked of distances.
+/// Accuracy with which [`FineCurve`] follows its edge, mm: a quarter of a micrometre, well below the micrometre required of distances.
 pub const EDGE_TOLERANCE_MM: f64 = 2.5e-4;
 
 /// A B-rep face.
@@ -99,15 +99,15 @@ pub const EDGE_TOLERANCE_MM: f64 = 2.5e-4;
 pub struct Face {
     /// The exact surface it lies on, or one recognised in a spline (see `fit_mm`).
     pub surface: Surface,
-    /// Largest distance seen between the file's spline and `surface`, which was recognised in it, mm; `None`: as written.
+    /// Largest distance measured between the file's spline and the `surface` recognised in it, mm; `None`: as written in the file.
     pub fit_mm: Option<f64>,
-    /// The face's outward normal is the surface's natural normal turned round.
+    /// Whether the face's outward normal is the reverse of the surface's natural normal.
     pub reversed: bool,
     /// Area, mm².
     pub area_mm2: f64,
     /// Bounding edges: indices into [`Shape::edges`].
     pub edges: Vec<u32>,
-    /// Linear RGB in 0..1 where the file colours this face.
+    /// Linear RGB in 0..1 if the file colours this face.
     pub color: Option<[f32; 3]>,
 }
 
@@ -128,16 +128,16 @@ pub struct Frame {
 /// away from the centre (sphere) or from the tube's centre circle (torus).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Surface {
-    /// z = 0 of `frame`.
+    /// The plane z = 0 of `frame`.
     Plane {
-        /// Where.
+        /// Frame of the plane.
         frame: Frame,
     },
     /// Distance `radius` from the z axis.
     Cylinder {
         /// Axis along z.
         frame: Frame,
-        /// mm.
+        /// Radius, mm.
         radius: f64,
     },
     /// Distance `radius + z·tan(half_angle)` from the z axis.
@@ -146,23 +146,23 @@ pub enum Surface {
         frame: Frame,
         /// Radius at z = 0, mm.
         radius: f64,
-        /// Radians, either sign.
+        /// Half angle, rad, either sign.
         half_angle: f64,
     },
     /// Distance `radius` from the origin.
     Sphere {
         /// Centre at the origin.
         frame: Frame,
-        /// mm.
+        /// Radius, mm.
         radius: f64,
     },
     /// A tube of radius `minor` about the circle of radius `major` in z = 0.
     Torus {
         /// Axis along z.
         frame: Frame,
-        /// mm.
+        /// Major radius, mm.
         major: f64,
-        /// mm.
+        /// Minor radius, mm.
         minor: f64,
     },
     /// Anything else: Bézier, B-spline, extrusion, revolution, offset.
@@ -170,8 +170,8 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// Signed distance of `p` from the untrimmed surface, positive on the side of the natural normal, mm, and that unit normal
-    /// at the point of the surface beside `p`. `None` for a spline, and where there is no such normal (on an axis, at a centre).
+    /// Signed distance of `p` from the untrimmed surface, positive on the side of the natural normal, mm, and that unit normal at the foot of `p`.
+    /// `None` for a spline, and where the normal is undefined (on an axis, at a centre).
     pub fn distance(&self, p: DVec3) -> Option<(f64, DVec3)> {
         let radial = |frame: &Frame| {
             let d = p - frame.origin;
@@ -210,11 +210,11 @@ impl Surface {
 /// A B-rep edge.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Edge {
-    /// The exact curve it lies on; a spline that is a line or circle to the tolerance of recognition is given as such.
+    /// The exact curve under it; a spline that is a line or circle within the recognition tolerance is given as that.
     pub curve: Curve,
-    /// mm.
+    /// Length, mm.
     pub length_mm: f64,
-    /// Faces that meet here (a seam names its face twice).
+    /// Adjacent faces (a seam lists its face twice).
     pub faces: Vec<u32>,
     /// Points along it, within the tessellation's tolerance, first to last.
     pub polyline: Vec<DVec3>,
@@ -223,18 +223,18 @@ pub struct Edge {
 /// The curve under an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Curve {
-    /// Through `origin` along the unit vector `direction`.
+    /// The line through `origin` along the unit vector `direction`.
     Line {
-        /// mm.
+        /// Point on the line, mm.
         origin: DVec3,
         /// Unit vector.
         direction: DVec3,
     },
-    /// In z = 0 of `frame`.
+    /// A circle around the origin in z = 0 of `frame`.
     Circle {
         /// Axis along z.
         frame: Frame,
-        /// mm.
+        /// Radius, mm.
         radius: f64,
     },
     /// Anything else.
@@ -244,7 +244,7 @@ pub enum Curve {
 /// A triangle mesh whose vertices are shared wherever the B-rep shares them.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Mesh {
-    /// mm.
+    /// Positions, mm.
     pub vertices: Vec<DVec3>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,

@@ -1,4 +1,4 @@
-//! How finely and within which limits a file is read.
+//! Accuracy and limits of reading a file.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,7 +13,7 @@ pub fn set_time_limit_s(seconds: u64) {
     TIME_LIMIT_S.store(seconds, Ordering::Relaxed);
 }
 
-/// How finely and within which limits a file is read.
+/// Accuracy and limits of reading a file.
 ///
 /// The tessellation is for display and as a starting point for exact distances: faces keep their exact surface,
 /// so a coarse mesh costs no accuracy where the surface is analytic.
@@ -26,22 +26,22 @@ pub struct LoadOptions {
     pub relative_deflection: f64,
     /// Largest angle between neighbouring segments, radians: 0.2 gives a circle at least 32 segments.
     pub angular_deflection_rad: f64,
-    /// A spline face within this distance of a plane, cylinder, cone, sphere or torus becomes that surface, and a spline
-    /// edge within it of a line or circle that curve, mm; 0: never.
-    /// The default, a tenth of a micrometre, is what modellers call the same place: nothing downstream can tell.
+    /// A spline face within this distance of a plane, cylinder, cone, sphere or torus is replaced by that surface, and a spline edge within it of a
+    /// line or circle by that curve, mm; 0: never.
+    /// The default, a tenth of a micrometre, is the distance at which modellers treat points as identical: no later step can distinguish them.
     pub recognise_mm: f64,
-    /// Most processor time for reading and tessellation, seconds (child process only). Default: 60, or what [`set_time_limit_s`] says.
+    /// Largest processor time for reading and tessellation, seconds (child process only). Default: 60, or the value of [`set_time_limit_s`].
     pub time_limit_s: u64,
-    /// Largest address space of the reading process, bytes (child process on Linux only; 0 for none). Default: half of the memory
-    /// that is available, at least 1 GiB.
+    /// Largest address space of the reading process, bytes (child process on Linux only; 0 for no limit). Default: half of the available memory, at
+    /// least 1 GiB.
     pub memory_limit_bytes: u64,
-    /// Longest answer of the reading process, bytes: the parts and their triangles (child process only).
+    /// Largest answer of the reading process, bytes: the parts and their triangles (child process only).
     pub answer_limit_bytes: u64,
-    /// Most bytes of STEP text, of a file and of those it refers to.
+    /// Most bytes of STEP text, for a file and the files it refers to together.
     pub text_limit_bytes: u64,
-    /// Most placed parts: an assembly of assemblies can unfold without bound.
+    /// Most placed parts: an assembly of assemblies can unfold without limit.
     pub max_parts: usize,
-    /// Give the model although the kernel lost solids; each loss is then a warning instead of an error.
+    /// Return the model even if the kernel lost solids; each loss is then a warning instead of an error.
     pub allow_lost_solids: bool,
 }
 

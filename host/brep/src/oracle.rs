@@ -1,14 +1,14 @@
-//! What the CAD kernel itself says about points: the answer to check a computation by that has only the plain structs.
+//! Point queries answered by the CAD kernel itself: a reference for computations based only on the plain structs.
 //!
-//! Lengths mm, in the shape's frame. Each call reads the file anew, in a child process where there is one (see [`child`]), and asks point
-//! by point. Cost: [`classify`] shoots one ray at a point, 10 to 500 µs; [`nearest`] looks at every face near enough, about ten times that.
+//! Lengths are in mm, in the shape's frame. Each call reads the file again, in a child process if possible (see [`child`]), and evaluates one point
+//! at a time. Cost: [`classify`] shoots one ray per point, 10 to 500 µs; [`nearest`] examines every face near enough, about ten times that.
 
 use crate::{BrepError, LoadOptions, assemble, child};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Where a point lies.
+/// Side of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Side {
     /// Inside the solid.
@@ -17,7 +17,7 @@ pub enum Side {
     Out,
     /// Within the tolerance of its surface.
     On,
-    /// The kernel cannot tell: not a solid, or a ray it could not follow.
+    /// Undecided by the kernel: not a solid, or a ray that it could not follow.
     Unknown,
 }
 
@@ -26,11 +26,11 @@ pub enum Side {
 pub struct Foot {
     /// Unsigned distance, mm.
     pub distance: f64,
-    /// mm.
+    /// Position, mm.
     pub point: DVec3,
 }
 
-/// What is asked about a shape.
+/// Query about a shape.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Question {
     kind: Kind,
@@ -44,15 +44,15 @@ enum Kind {
     Feet,
 }
 
-/// One entry for each point.
+/// Answer with one entry for each point.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) enum Answer {
     Sides(Vec<Side>),
     Feet(Vec<Option<Foot>>),
 }
 
-/// Side of each of `points` of the solid `shape` (an index into [`crate::CadModel::shapes`]) of the file at `path`, by
-/// `BRepClass3d_SolidClassifier`. A solid whose faces look inward is turned first, as on loading.
+/// Side of each of `points` relative to the solid `shape` (an index into [`crate::CadModel::shapes`]) of the file at `path`, by
+/// `BRepClass3d_SolidClassifier`. A solid whose faces point inward is reversed first, as on loading.
 ///
 /// # Errors
 /// As [`crate::load_step_with`], and [`BrepError::NoSuchShape`].
@@ -70,8 +70,8 @@ pub fn classify(
     }
 }
 
-/// Nearest point of the faces of `shape` to each of `points`, by `BRepExtrema_DistShapeShape`; `None` where the kernel finds none. On
-/// splines its search starts from samples and may miss the nearest: what it finds is then a point of the shape farther away.
+/// Nearest point of the faces of `shape` to each of `points`, by `BRepExtrema_DistShapeShape`; `None` where the kernel finds none. On splines its
+/// search starts from samples and may miss the nearest point: it then returns a point of the shape that is farther away.
 ///
 /// # Errors
 /// As [`classify`].
@@ -107,7 +107,7 @@ fn ask(
     }
 }
 
-/// Asks the kernel in this process.
+/// Queries the kernel in this process.
 pub(crate) fn answer(path: &Path, options: &LoadOptions, question: &Question) -> Result<Answer, BrepError> {
     let flat: Vec<f64> = question.points.iter().flat_map(|p| p.to_array()).collect();
     let shape = question.shape;

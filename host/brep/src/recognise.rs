@@ -1,13 +1,12 @@
-//! Planes, cylinders, spheres, cones and tori hidden in spline surfaces.
+//! Recognition of planes, cylinders, spheres, cones and tori in spline surfaces.
 //!
-//! Some systems write every surface as a spline. From points p and outward unit normals n of the exact spline, linear least
-//! squares gives a first guess: all n alike (plane); n ⟂ a, then p = c + r n across a (cylinder); p = c + r n (sphere); a·n
-//! constant and n·(p − apex) = 0 (cone); normals that all meet one line, then p = c + r n in the half-plane through it
-//! (torus; Pottmann & Randrup 1998). Gauss–Newton on the distances then makes it a least-squares fit (Marshall, Lukács &
-//! Martin 2001); its largest distance is the fit error. A fit counts when that error is within the tolerance and every
-//! normal agrees, so the surface may stand for the spline.
+//! Some systems write every surface as a spline. From points p and outward unit normals n of the exact spline, linear least squares gives an initial
+//! guess: all n equal (plane); n ⟂ a, then p = c + r n across a (cylinder); p = c + r n (sphere); a·n constant and n·(p − apex) = 0 (cone); normals
+//! that all intersect one line, then p = c + r n in the half-plane through it (torus; Pottmann & Randrup 1998). Gauss–Newton on the distances then
+//! refines it to a least-squares fit (Marshall, Lukács & Martin 2001); its largest distance is the fit error. A fit is accepted, and the surface
+//! replaces the spline, when that error is within the tolerance and every normal agrees.
 //!
-//! Cost: a few passes over some hundreds of samples a face.
+//! Cost: a few passes over some hundreds of samples per face.
 
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, SymmetricEigen, Vector3, Vector4};
@@ -17,20 +16,20 @@ use crate::{Frame, Surface};
 /// A point of a surface and the outward unit normal there.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// mm.
+    /// Position, mm.
     pub point: DVec3,
     /// Unit vector.
     pub normal: DVec3,
 }
 
-/// One triangle's corners and middles.
+/// Fewest samples: one triangle's corners, side middles and centre.
 const FEWEST: usize = 7;
-/// Largest angle between a spline's normal and that of what stands for it, radians: a ripple of 1 µm over 1 mm.
+/// Largest angle between a spline's normal and that of its replacement, radians: a ripple of 1 µm over 1 mm.
 const NORMAL_RAD: f64 = 3e-3;
-/// A radius this many times larger than the face is guessed from next to no curvature.
+/// Largest ratio of radius to face size: a larger radius is estimated from almost no curvature.
 const FLATTEST: f64 = 1e3;
 
-/// The simplest surface within `within` mm of all samples, and its largest distance from one; `None` when there is none.
+/// The simplest surface within `within` mm of all samples, and its largest distance from a sample; `None` when there is none.
 pub fn surface(samples: &[Sample], within: f64) -> Option<(Surface, f64)> {
     if samples.len() < FEWEST || within.is_nan() || within <= 0.0 {
         return None;
@@ -51,7 +50,7 @@ pub fn surface(samples: &[Sample], within: f64) -> Option<(Surface, f64)> {
 struct Cloud<'a> {
     samples: &'a [Sample],
     center: DVec3,
-    /// Radius of the ball about `center` that holds all points, mm.
+    /// Radius of the ball about `center` that contains all points, mm.
     size: f64,
 }
 
@@ -74,7 +73,7 @@ impl<'a> Cloud<'a> {
         self.samples.iter().map(|s| (s.point - self.center, s.normal))
     }
 
-    /// Refined, checked, and with its error.
+    /// The refined and checked surface, with its error.
     fn fit(&self, guess: Surface, within: f64) -> Option<(Surface, f64)> {
         let mut best = (guess, self.error(&guess)?);
         for _ in 0..6 {
@@ -95,15 +94,15 @@ impl<'a> Cloud<'a> {
         })
     }
 
-    /// All normals along the natural one, or all against it.
+    /// Whether all normals are along the natural normal, or all against it.
     fn normals_agree(&self, surface: &Surface) -> bool {
         let cos = |s: &Sample| surface.distance(s.point).map_or(0.0, |(_, n)| n.dot(s.normal));
         let sign = cos(&self.samples[0]).signum();
         self.samples.iter().all(|s| cos(s) * sign >= NORMAL_RAD.cos())
     }
 
-    /// One Gauss–Newton step. Moving the surface by a twist (v, ω) about the centre changes the distance of p by
-    /// −n·(v + ω × p); what does not change it (sliding along an axis) is left out by the pseudo-inverse.
+    /// One Gauss–Newton step. Moving the surface by a twist (v, ω) about the centre changes the distance of p by −n·(v + ω × p); the pseudo-inverse
+    /// ignores motions that do not change it (sliding along an axis).
     fn step(&self, surface: &Surface) -> Option<Surface> {
         let shapes = shape_count(surface);
         let mut jtj = DMatrix::<f64>::zeros(6 + shapes, 6 + shapes);
@@ -146,7 +145,7 @@ fn shape_count(surface: &Surface) -> usize {
     }
 }
 
-/// Change of the distance of `p` with the surface's own sizes: its radii, or a cone's angle times `size`.
+/// Derivative of the distance of `p` with respect to the surface's own sizes: its radii, or a cone's angle times `size`.
 fn shape_derivative(surface: &Surface, p: DVec3, size: f64, out: &mut [f64]) -> Option<()> {
     match *surface {
         Surface::Plane { .. } | Surface::Spline => {}
@@ -221,7 +220,7 @@ fn plausible(surface: &Surface, size: f64) -> bool {
     }
 }
 
-/// z and a direction that x shall be near.
+/// Frame with the given z, and x near `near_x`.
 fn frame(origin: DVec3, z: DVec3, near_x: DVec3) -> Frame {
     let z = z.normalize();
     let x = near_x
@@ -252,7 +251,7 @@ fn plane(cloud: &Cloud) -> Option<Surface> {
     })
 }
 
-/// Direction in which the vectors reach least: eigenvector of Σ v vᵀ.
+/// Direction in which the vectors extend least: eigenvector of Σ v vᵀ.
 fn least(vectors: impl Iterator<Item = DVec3>) -> Option<DVec3> {
     let sum = vectors.fold(Matrix3::zeros(), |sum, v| sum + vector(v) * vector(v).transpose());
     let eigen = SymmetricEigen::new(sum);
@@ -335,7 +334,7 @@ fn cone(cloud: &Cloud) -> Option<Surface> {
     })
 }
 
-/// The axis (a, ā) meets every normal: a·(p × n) + ā·n = 0.
+/// Torus whose axis (a, ā) intersects every normal: a·(p × n) + ā·n = 0.
 fn torus(cloud: &Cloud) -> Option<Surface> {
     let mut m = DMatrix::<f64>::zeros(6, 6);
     for (p, n) in cloud.local() {
@@ -429,8 +428,8 @@ mod tests {
     }
 
     proptest! {
-        /// Samples of each kind, inside or outside, give back a surface that holds the whole of the original, also
-        /// beyond the patch; a ripple is measured, and refused when it is above the tolerance.
+        /// Samples of each kind, inside or outside, yield a surface that contains the whole original, also beyond the patch; a ripple is measured,
+        /// and refused when it exceeds the tolerance.
         #[test]
         fn what_was_sampled_is_recognised(
             axis in prop::array::uniform3(-1.0f64..1.0),
@@ -450,7 +449,7 @@ mod tests {
                 Surface::Sphere { frame, radius },
                 Surface::Torus { frame, major: 3.0 * radius, minor: radius },
             ];
-            // On a small patch more would turn the normals too far.
+            // On a small patch a larger ripple would tilt the normals too far.
             let ripple = 5e-4 * (radius / 4.0).min(1.0);
             for truth in surfaces {
                 let turned = |mut samples: Vec<Sample>| {
@@ -461,8 +460,8 @@ mod tests {
                     .ok_or_else(|| TestCaseError::fail(format!("{truth:?} not recognised")))?;
                 prop_assert!(like(&found, &truth), "{found:?} for {truth:?}");
                 prop_assert!(fit < 1e-9, "{fit}");
-                // Half a turn farther on: the parameters are right, not just the patch. A patch of half a radian determines
-                // them (2/0.5)⁴ less well than its points.
+                // Half a turn farther: the parameters are right, not only the patch. A patch of half a radian determines them (2/0.5)⁴ less
+                // accurately than its points.
                 for s in patch(&truth, (start + 3.0, 1.0), 0.0) {
                     let (off, _) = found.distance(s.point).unwrap();
                     prop_assert!(off.abs() < 1e-6, "{off} {found:?} for {truth:?}");

@@ -1,8 +1,7 @@
-//! Lines and circles hidden in spline curves.
+//! Recognition of lines and circles in spline curves.
 //!
-//! A line runs through the ends of its samples. A circle lies in the plane across the direction in which its samples reach
-//! least, about the centre of the linear least squares 2 c·p + k = p² (Kåsa 1976), which is exact for an exact circle. The
-//! largest distance of a sample decides.
+//! A line runs through the ends of its samples. A circle lies in the plane perpendicular to the direction in which its samples extend least, about
+//! the centre of the linear least squares 2 c·p + k = p² (Kåsa 1976), which is exact for an exact circle. The largest distance of a sample decides.
 
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -23,7 +22,7 @@ fn line(samples: &[DVec3], within: f64) -> Option<Curve> {
     let near = samples
         .iter()
         .all(|&p| (p - origin).reject_from_normalized(direction).length() <= within);
-    // A curve that turns back on itself is no line, however near.
+    // A curve that reverses its direction is not a line, however near.
     let onward = samples.windows(2).all(|w| (w[1] - w[0]).dot(direction) > 0.0);
     (near && onward).then_some(Curve::Line { origin, direction })
 }
@@ -69,7 +68,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Points of an arc give its circle back, and the same arc bent out of its plane or its roundness does not.
+        /// Points of an arc yield its circle; the same arc bent out of its plane or out of round does not.
         #[test]
         fn an_arc_is_a_circle_and_a_bent_one_is_not(
             axis in prop::array::uniform3(-1.0f64..1.0),

@@ -1,4 +1,4 @@
-//! One shape from the kernel's numbers: frames made right-handed, orientation made ours, closedness counted.
+//! Conversion of one shape from the kernel's numbers: right-handed frames, outward orientation, closedness.
 
 use crate::kernel::{RawEdge, RawFace, RawShape};
 use crate::recognise::{self, Sample};
@@ -6,7 +6,7 @@ use crate::recognise_curve;
 use crate::{Curve, Edge, Face, Frame, Mesh, Shape, Surface, topology};
 use glam::DVec3;
 
-/// Turns a kernel shape into a [`Shape`]; spline faces within `recognise_mm` of a simpler surface get that one. Notes go to
+/// Converts a kernel shape into a [`Shape`]; spline faces within `recognise_mm` of a simpler surface are replaced by it. Notes are appended to
 /// `notes`.
 pub fn convert(raw: RawShape, recognise_mm: f64, notes: &mut Vec<String>) -> Shape {
     let triangles = raw.triangles.as_chunks().0.to_vec();
@@ -34,7 +34,7 @@ pub fn convert(raw: RawShape, recognise_mm: f64, notes: &mut Vec<String>) -> Sha
             raw.faces.len()
         ));
     }
-    // Twice: for display nothing shows below that, and a seam or pole may honestly measure a little more.
+    // Twice the bound: smaller errors are not visible, and a seam or pole can legitimately measure slightly more.
     if raw.deflection > 2.0 * raw.deflection_asked {
         let (found, asked) = (raw.deflection, raw.deflection_asked);
         notes.push(format!(
@@ -77,7 +77,7 @@ fn face(raw: RawFace, sign: f64, recognise_mm: f64) -> Face {
     let outward = DVec3::from(raw.normal) * sign;
     let reversed = match surface.distance(point) {
         Some((_, natural)) => natural.dot(outward) < 0.0,
-        // A spline's natural normal is the kernel's own; only its sign against the face is known here.
+        // A spline's natural normal is the kernel's own; only its sign relative to the face is known here.
         None => false,
     };
     let color = raw.has_color.then_some(raw.color);
@@ -97,7 +97,7 @@ fn samples(numbers: &[f64]) -> Vec<Sample> {
     pairs.map(|&[point, normal]| Sample { point, normal }).collect()
 }
 
-/// Right-handed whatever the kernel's frame is: y is z × x.
+/// Right-handed for any frame of the kernel: y is z × x.
 fn frame(origin: [f64; 3], x: [f64; 3], z: [f64; 3]) -> Frame {
     let z = DVec3::from(z).normalize();
     let x = DVec3::from(x).reject_from_normalized(z).normalize();
@@ -128,8 +128,8 @@ fn surface(raw: &RawFace, point: DVec3) -> Surface {
     }
 }
 
-/// A face beyond the apex sees the other half of the double cone: there the radius grows the other way. The frame
-/// then moves to the face's height so that the radius at z = 0 is positive.
+/// A face beyond the apex lies on the other half of the double cone, where the radius grows in the other direction. The frame then moves to the
+/// face's height so that the radius at z = 0 is positive.
 fn cone(frame: Frame, radius: f64, half_angle: f64, point: DVec3) -> Surface {
     let z = (point - frame.origin).dot(frame.z);
     let there = radius + z * half_angle.tan();
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_left_handed_frame_comes_out_right_handed() {
-        // Only x and z are taken; a kernel frame with y = x × z instead of z × x cannot show.
+        // Only x and z are used; a kernel frame with y = x × z instead of z × x makes no difference.
         let f = frame([1.0, 2.0, 3.0], [0.0, 1.0, 1e-9], [0.0, 0.0, 1.0]);
         assert!((f.x.cross(f.y) - f.z).length() < 1e-15);
         assert!(f.x.dot(f.z).abs() < 1e-15);

@@ -1,12 +1,12 @@
-//! What a welded triangle mesh says about closedness and volume.
+//! Closedness and volume of a welded triangle mesh.
 
 use crate::Mesh;
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Mesh edges that are not used exactly twice, once each way. Cost: one hash entry an edge.
+/// Number of mesh edges that are not used exactly twice, once in each direction. Cost: one hash entry per edge.
 pub fn open_edges(mesh: &Mesh) -> usize {
-    // (uses from the smaller to the larger vertex, uses the other way)
+    // (uses from the smaller to the larger vertex, uses in the other direction)
     let mut uses: HashMap<(u32, u32), (u32, u32)> = HashMap::with_capacity(mesh.triangles.len() * 3 / 2);
     for t in &mesh.triangles {
         for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
@@ -17,8 +17,8 @@ pub fn open_edges(mesh: &Mesh) -> usize {
     uses.values().filter(|&&count| count != (1, 1)).count()
 }
 
-/// Signed volume by the divergence theorem, Σ a·(b×c)/6, taken about the first vertex to keep digits; positive
-/// when the triangles of a closed mesh turn outward.
+/// Signed volume by the divergence theorem, Σ a·(b×c)/6, relative to the first vertex to keep digits; positive when the triangles of a closed mesh
+/// wind outward.
 pub fn signed_volume(mesh: &Mesh) -> f64 {
     let origin = mesh.vertices.first().copied().unwrap_or(DVec3::ZERO);
     let corner = |i: u32| mesh.vertices[i as usize] - origin;

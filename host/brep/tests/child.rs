@@ -1,6 +1,6 @@
-//! Reading in a child process: crashes, hangs and memory blow-ups of the kernel stay there.
+//! Reading in a child process: crashes, hangs and excessive memory use of the kernel stay there.
 //!
-//! This test program starts itself again, so its `main` is its own and calls [`child::init`] first.
+//! This test program starts itself again, so it has its own `main`, which calls [`child::init`] first.
 
 mod support;
 
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use support::StepText;
 
-/// Names a file that this program is to read, and nothing else.
+/// Name of the environment variable with a file that this program is to read and do nothing else.
 const SLOW_VARIABLE: &str = "MORTISE_BREP_TEST_SLOW";
 
 fn main() -> ExitCode {
@@ -67,7 +67,7 @@ fn main() -> ExitCode {
     ];
     let trial = |(name, test): (&str, fn())| {
         Trial::test(name, move || {
-            // A panic is the failure; libtest-mimic reports it.
+            // A panic is the test's failure; libtest-mimic reports it.
             test();
             Ok::<(), Failed>(())
         })
@@ -81,12 +81,12 @@ fn a_child_reads_what_the_program_itself_would() {
     assert_eq!(model.parts.len(), 2);
     assert!(model.shapes.iter().all(|s| s.closed));
     support::check::check(&model, 1e-6);
-    // Errors come through as they are.
+    // Errors arrive unchanged.
     let error = load_step("no such file.step").unwrap_err();
     assert!(matches!(error, BrepError::Unreadable { .. }), "{error}");
 }
 
-/// The kernel (7.6) follows a null pointer when a product's shape is of a type it does not know.
+/// The kernel (7.6) dereferences a null pointer when a product's shape is of an unknown type.
 fn a_crash_of_the_kernel_is_an_error() {
     let pair = std::fs::read_to_string(support::data("deep_nesting.step")).unwrap();
     let at = pair.rfind("PRODUCT_DEFINITION_SHAPE").unwrap();
@@ -98,7 +98,7 @@ fn a_crash_of_the_kernel_is_an_error() {
     let result = load_step(support::file(&text));
     let error = result.map(|model| model.parts.len()).unwrap_err().to_string();
     assert!(!error.contains('\n'), "{error}");
-    // Newer kernels may report it in words instead.
+    // Newer kernels may report an error message instead.
     assert!(
         error.contains("crashed on it") || error.contains("lost"),
         "{error}"
@@ -122,7 +122,7 @@ fn memory_is_limited() {
         println!("skipped: the address space is limited on Linux only");
         return;
     }
-    // Less than the program and its libraries take before they have read anything: the first allocation fails.
+    // Less than the program and its libraries use before they have read anything: the first allocation fails.
     let options = LoadOptions {
         memory_limit_bytes: 16 << 20,
         ..LoadOptions::default()
@@ -135,7 +135,7 @@ fn memory_is_limited() {
     assert!(error.contains("memory") && !error.contains('\n'), "{error}");
 }
 
-/// A file that takes the kernel several seconds.
+/// A file that takes the kernel several seconds to read.
 fn slow_file() -> tempfile::TempPath {
     let mut text = StepText::millimetres();
     let solids: Vec<u64> = (1..=2500u32)
@@ -173,13 +173,13 @@ fn processor_time_is_limited_and_the_process_ends_with_its_parent() {
             text.split_whitespace().next().map(str::to_owned)
         })
         .expect("a reading process");
-    // A process whose parent does not ask how it ended stays in the list as a zombie.
+    // A process whose parent does not wait for it stays in the list as a zombie.
     let runs = || {
         std::fs::read_to_string(format!("/proc/{child}/stat"))
             .is_ok_and(|stat| !stat.rsplit(')').next().is_some_and(|rest| rest.starts_with(" Z")))
     };
     assert!(runs());
-    // SIGKILL: nothing of the parent runs any more.
+    // SIGKILL: no code of the parent runs after this.
     parent.kill().unwrap();
     parent.wait().unwrap();
     let killed = Instant::now();
@@ -192,7 +192,7 @@ fn processor_time_is_limited_and_the_process_ends_with_its_parent() {
     }
 }
 
-/// The test program's own children are told by the name of the file they read.
+/// The test program's own children are identified by the name of the file they read.
 fn a_reading_that_is_cancelled_leaves_no_process() {
     let file = slow_file();
     let cancel = AtomicBool::new(false);
@@ -217,7 +217,7 @@ fn a_reading_that_is_cancelled_leaves_no_process() {
     assert_eq!(readers_of(&file), 0, "it reads on");
 }
 
-/// Processes that were asked for this file; 0 where there is no /proc.
+/// Number of processes that read this file; 0 if there is no /proc.
 fn readers_of(file: &std::path::Path) -> usize {
     let wanted = format!("MORTISE_BREP_CHILD_PATH={}\0", file.display());
     let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
@@ -243,7 +243,7 @@ fn an_answer_is_limited() {
     assert!(matches!(error, BrepError::AnswerTooLong { .. }), "{error}");
 }
 
-/// The refusal of `text`, within the 5 s that are promised.
+/// The refusal of `text`, which must arrive within 5 s.
 fn refused_at_once(text: StepText) -> BrepError {
     let file = support::file(&text.finish());
     let begun = Instant::now();
@@ -306,7 +306,7 @@ fn the_kernel_classifies_points_and_finds_the_nearest() {
             center + DVec3::new(u(0.819_172_5), u(0.671_043_6), u(0.549_700_5)) * 30.0
         })
         .collect();
-    // Of the box less the cylinder; exact inside and outside near faces, a lower bound beyond edges.
+    // Distance to the box less the cylinder; exact inside and outside near faces, a lower bound beyond edges.
     let expected = |p: DVec3| {
         let p = p - center;
         let outer = (p.abs() - DVec3::new(25.0, 25.0, 20.0)).max_element();
@@ -340,11 +340,11 @@ fn questions_fail_like_reading() {
     assert!(matches!(error, BrepError::TimedOut { seconds: 0, .. }), "{error}");
     let error = oracle::classify(&file, &LoadOptions::default(), 2, &points, 1e-6).unwrap_err();
     assert!(
-        error.to_string().contains("no shape number 2: it has 2"),
+        error.to_string().contains("no shape number 2: the file has 2"),
         "{error}"
     );
     let error = oracle::nearest("no such file.step", &slow, 0, &[]).unwrap_err();
-    // A child that takes any time at all is over this limit.
+    // A child that takes any time at all exceeds this limit.
     assert!(
         matches!(error, BrepError::Unreadable { .. } | BrepError::TimedOut { .. }),
         "{error}"

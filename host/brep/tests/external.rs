@@ -1,4 +1,5 @@
-//! Assemblies whose parts are in files beside them: they read as the same assembly in one file, and nothing outside the folder is read. Reads in-process.
+//! Assemblies whose parts are in separate files beside them: they read like the same assembly in one file, and nothing outside the folder is read.
+//! Reads in-process.
 
 mod support;
 
@@ -9,7 +10,7 @@ use support::{Product, StepText};
 
 const SUBS: usize = 4;
 const PARTS: usize = 8;
-/// Body of a length unit and its millimetres.
+/// Body of a length unit entity and its size in millimetres.
 const UNITS: [(&str, f64); 3] = [
     ("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))", 1.0),
     (
@@ -30,7 +31,7 @@ fn motion(i: usize) -> DAffine3 {
     DAffine3::from_rotation_translation(turn, DVec3::new(12.0 * i, -5.0 * i, 3.0 + i))
 }
 
-/// Axis of the placed product from which its placement is given.
+/// Axis of the placed product relative to which its placement is given.
 fn axis(i: usize) -> DAffine3 {
     motion(i + 3)
 }
@@ -48,7 +49,7 @@ fn part(text: &mut StepText, i: usize, mm: f64) -> Product {
     text.part(&format!("part {i}"), &[solid])
 }
 
-/// Places the parts of sub-assembly `sub`, products made by `child`.
+/// Places the parts of sub-assembly `sub`; `child` creates the products.
 fn sub(
     text: &mut StepText,
     sub: usize,
@@ -85,7 +86,7 @@ fn flat() -> String {
     text.finish()
 }
 
-/// Thirteen files: one, four sub-assemblies, eight parts, each with a unit of its own in turn.
+/// Thirteen files: one assembly, four sub-assemblies, eight parts; the files cycle through the units.
 fn write_set(folder: &Path) {
     let write = |name: &str, text: StepText| std::fs::write(folder.join(name), text.finish()).unwrap();
     let stub = |text: &mut StepText, product: &str, file: &str| {
@@ -114,7 +115,7 @@ fn write_set(folder: &Path) {
     }
 }
 
-/// Every part of both models: name, path, colour, volume and where its corners are.
+/// Compares every part of both models: name, path, colour, volume and the positions of its corners.
 fn assert_same(a: &CadModel, b: &CadModel) {
     assert_eq!(a.parts.len(), b.parts.len());
     for (one, other) in a.parts.iter().zip(&b.parts) {
@@ -124,7 +125,7 @@ fn assert_same(a: &CadModel, b: &CadModel) {
             assert!((c - d).abs() < 1e-6);
         }
         let (shape, like) = (&a.shapes[one.shape], &b.shapes[other.shape]);
-        // Planes: quadrature is exact, so what is left is the rounding of a unit's conversion, a few parts in 10¹⁶ of 100 mm.
+        // Planes: quadrature is exact, so the difference is the rounding of a unit's conversion, a few parts in 10¹⁶ of 100 mm.
         assert!((shape.volume_mm3 / like.volume_mm3 - 1.0).abs() < 1e-12);
         let far = 100.0;
         for corner in [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z] {
@@ -147,7 +148,7 @@ fn a_set_of_thirteen_files_reads_as_the_flat_file() {
         ("millimetre", 1 + SUBS + PARTS)
     );
     assert_same(&set, &flat);
-    // ISO 10303-43: the motion that takes the placed product's axis onto the one it is given.
+    // ISO 10303-43: the motion that takes the placed product's axis onto the given axis.
     for (i, part) in flat.parts.iter().enumerate() {
         let sub = i / 2;
         let of_sub = motion(sub + 10) * axis(sub + 20).inverse();
@@ -209,7 +210,7 @@ fn a_name_may_differ_in_case_and_one_file_serves_several_places() {
     }
 }
 
-/// A main file that refers to `name`, beside a sound part.
+/// A main file with a valid part and a reference to the file `name`.
 fn main_for(folder: &Path, name: &str) -> Result<CadModel, BrepError> {
     let mut text = StepText::millimetres();
     let root = text.assembly("root");
@@ -266,7 +267,7 @@ fn nothing_outside_the_folder_is_read() {
     let error = main_for(&folder, "folder.step")
         .map(|model| model.parts.len())
         .unwrap_err();
-    assert!(error.to_string().contains("no regular file"), "{error}");
+    assert!(error.to_string().contains("not a regular file"), "{error}");
 }
 
 #[test]
@@ -321,7 +322,7 @@ fn a_fault_in_a_referenced_file_is_told_with_its_name() {
     );
 }
 
-/// The kernel opens referenced files by itself, from the working directory: it must not see their names.
+/// The kernel opens referenced files by itself, from the working directory: it must not receive their names.
 #[test]
 fn a_part_that_has_its_shape_here_is_not_read_from_a_file() {
     let folder = tempfile::tempdir().unwrap();

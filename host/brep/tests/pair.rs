@@ -32,7 +32,7 @@ fn mass_properties_equal_closed_forms() {
     let volume = side * side * height - PI * r * r * height;
     let area = 2.0 * (side * side - PI * r * r) + 4.0 * side * height + 2.0 * PI * r * height;
     let zz = side * side * height * (side * side / 6.0) - PI * r * r * height * (r * r / 2.0);
-    // 1e-9: quadrature of polynomials and circles by the kernel, which is exact but for rounding.
+    // 1e-9: quadrature of polynomials and circles by the kernel, which is exact except for rounding.
     assert!(
         (block.volume_mm3 / volume - 1.0).abs() < 1e-9,
         "{} {volume}",
@@ -70,7 +70,7 @@ fn faces_edges_and_colours_are_as_modelled() {
         hole[0].reversed,
         "the outward normal of a hole's wall points to its axis"
     );
-    // The wall is bounded by two circles and a seam; the seam names its face twice.
+    // The wall is bounded by two circles and a seam; the seam lists its face twice.
     let seam = hole[0]
         .edges
         .iter()
@@ -249,7 +249,7 @@ fn a_part_five_levels_down_is_where_it_belongs() {
     };
     let ((p, a), (q, b)) = (axis(0), axis(1));
     assert!(a.cross(b).length() < 1e-9);
-    // The file's coordinates have 15 digits at up to 60 mm; five products of rotations.
+    // The file's coordinates have 15 digits at up to 60 mm; the result is five products of rotations.
     assert!(
         (q - p).reject_from(a).length() < 1e-9,
         "{}",

@@ -1,5 +1,4 @@
-//! Every shared test part against `expected.json` and `real/manifest.csv`. Skipped, and said so, when they are not
-//! there.
+//! Every shared test part against `expected.json` and `real/manifest.csv`. Skipped with a note when they are absent.
 
 mod support;
 
@@ -37,7 +36,7 @@ fn files(folder: &Path, prefix: &str) -> Vec<PathBuf> {
     found
 }
 
-/// Deflection as small as a test can afford, so that volumes can be compared.
+/// The smallest deflection that is fast enough for a test, so that volumes can be compared.
 const OPTIONS: LoadOptions = LoadOptions {
     linear_deflection_mm: None,
     relative_deflection: 5e-4,
@@ -66,12 +65,12 @@ fn our_parts_are_all_there_closed_and_on_their_surfaces() {
         let mut names: Vec<String> = model.parts.iter().map(|p| p.name.clone()).collect();
         let mut want: Vec<String> = expected["parts"].as_array().unwrap().iter().map(leaf).collect();
         if want.is_empty() {
-            // The kernel alone reads nothing from this one; it is motor_flat spelt otherwise.
+            // The kernel alone reads nothing from this file, which is motor_flat in a different notation.
             let flat: Vec<_> = load(&cad.join("05_motor/motor_flat.step")).parts;
             want = flat.into_iter().map(|p| p.name).collect();
         }
         for (name, want) in names.iter_mut().zip(&mut want) {
-            // The kernel has no name for an occurrence without an ASCII letter and gives its number instead.
+            // For an occurrence without an ASCII letter the kernel has no name and gives its number instead.
             if want.chars().all(|c| c.is_ascii_digit()) {
                 assert!(!name.is_ascii(), "{file}: {name}");
                 want.clone_from(name);
@@ -83,7 +82,7 @@ fn our_parts_are_all_there_closed_and_on_their_surfaces() {
         check::check(&model, 1e-6);
         for part in &model.parts {
             let shape = &model.shapes[part.shape];
-            // The kernel's box of a spline is that of its control points: up to twice as large.
+            // The kernel's bounding box of a spline is that of its control points: up to twice as large.
             check::check_volume(
                 shape,
                 2.0 * OPTIONS.relative_deflection * diagonal(shape),
@@ -94,7 +93,7 @@ fn our_parts_are_all_there_closed_and_on_their_surfaces() {
 }
 
 fn leaf(path: &serde_json::Value) -> String {
-    // The oracle joins the names of the tree's levels with slashes.
+    // The reference data join the names of the tree's levels with slashes.
     path.as_str().unwrap().rsplit('/').next().unwrap().into()
 }
 
@@ -131,7 +130,7 @@ fn the_motor_is_the_same_in_every_unit_schema_and_spelling() {
         let got = volumes(file);
         assert_eq!(got.len(), want.len(), "{file}");
         for (name, volume) in &want {
-            // Inch and metre files carry 15 digits of a coordinate; conversion costs a few of them.
+            // Inch and metre files have 15 digits per coordinate; conversion costs a few of them.
             assert!(
                 (got[name] / volume - 1.0).abs() < 1e-8,
                 "{file}: {name} {} {volume}",
@@ -179,7 +178,7 @@ fn a_recognised_surface_is_the_one_the_other_file_writes() {
     };
     let spline = load(&cad.join("08_hard/pair_clear0.10_nurbs.step"));
     let native = load(&cad.join("01_thesis_pair/pair_d18.75_clear0.10.step"));
-    // Vertices and normals of the kernel's mesh on and along the recognised surfaces, to its rounding.
+    // Vertices and normals of the kernel's mesh lie on and along the recognised surfaces, within its rounding.
     check::check(&spline, 1e-9);
     for (part, other) in spline.parts.iter().zip(&native.parts) {
         assert_eq!(part.name, other.name);
@@ -199,7 +198,7 @@ fn a_recognised_surface_is_the_one_the_other_file_writes() {
             shape.faces.iter().filter(plane).count()
         };
         assert_eq!(planes(a), planes(b));
-        // Edges too: circles of the holes and straight edges.
+        // Edges as well: circles of the holes and straight edges.
         assert!(a.edges.iter().all(|e| e.curve != mortise_brep::Curve::Other));
     }
     let off = LoadOptions {
@@ -257,13 +256,13 @@ fn real_files_equal_the_manifest_or_say_why_not() {
         };
         let model = result.unwrap();
         read += 1;
-        // Vertices lie on an edge's curve, which may be off its surfaces by the modeller's tolerance.
+        // Vertices lie on an edge's curve, which can be off its surfaces by the modeller's tolerance.
         check::check(&model, 1e-2);
         let total: f64 = model.parts.iter().map(|p| model.shapes[p.shape].volume_mm3).sum();
-        // The manifest counts the two bodies of this file twice: as definitions and as mapped.
+        // The manifest counts the two bodies of this file twice: as definitions and as mapped items.
         let counted = if name == "chrono_assembly.stp" { 2.0 } else { 1.0 };
-        // Its figures have one or two decimals, and come from the kernel's plain quadrature, which is a few tenths of
-        // a percent off on splines; without splines it is exact.
+        // Its figures have one or two decimals, and come from the kernel's plain quadrature, which is a few tenths of a percent off on splines and
+        // exact without them.
         let splines = row[types].contains("bsp");
         let tolerance = if splines { 3e-3 } else { 1e-6 } * want.abs() + 0.06;
         assert!(
@@ -285,7 +284,7 @@ fn real_files_equal_the_manifest_or_say_why_not() {
             );
             for part in &model.parts {
                 let shape = &model.shapes[part.shape];
-                // Twice for the kernel's box, twice for what the mesher may miss before it is said.
+                // Twice for the kernel's bounding box, twice for the amount by which the mesher may miss its bound without a warning.
                 check::check_volume(
                     shape,
                     4.0 * OPTIONS.relative_deflection * diagonal(shape),
@@ -327,7 +326,7 @@ fn counts(text: &str) -> HashMap<String, usize> {
         .collect()
 }
 
-/// One line of the manifest: commas within quotes do not part.
+/// Fields of one line of the manifest: commas within quotes do not separate.
 fn fields(line: &str) -> Vec<String> {
     let mut fields = vec![String::new()];
     let mut quoted = false;

@@ -1,4 +1,4 @@
-//! STEP texts written here, against what they must give by arithmetic. Reads in-process.
+//! STEP texts written by the tests, compared with arithmetic results. Reads in-process.
 
 mod support;
 
@@ -15,7 +15,7 @@ fn names(model: &CadModel) -> Vec<&str> {
     model.parts.iter().map(|p| p.name.as_str()).collect()
 }
 
-/// Corners of the box of all mesh vertices of a part, placed.
+/// Corners of the bounding box of all mesh vertices of a placed part.
 fn placed_box(model: &CadModel, part: usize) -> (DVec3, DVec3) {
     let part = &model.parts[part];
     let points = model.shapes[part.shape]
@@ -89,7 +89,7 @@ fn an_inside_out_solid_is_turned() {
     assert_outward(&model.shapes[0], DVec3::new(0.5, 1.0, 1.5));
 }
 
-/// All faces of a convex shape look away from a point within.
+/// Checks that all faces of a convex shape point away from a point inside.
 fn assert_outward(shape: &mortise_brep::Shape, inside: DVec3) {
     for (t, &face) in shape.mesh.triangles.iter().zip(&shape.mesh.triangle_face) {
         let [a, b, c] = t.map(|i| shape.mesh.vertices[i as usize]);
@@ -193,7 +193,7 @@ fn an_occurrence_may_be_placed_by_an_operator() {
 const MILLIMETRE: &str = "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))";
 const CENTIMETRE: &str = "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.))";
 
-/// An axis of a block and the axis of the assembly it lies on, in millimetres: a quarter turn about x, and one about z.
+/// An axis of a block and the axis of the assembly onto which it is placed, in millimetres: a quarter turn about x, and one about z.
 fn quarter_turns(parent_mm: f64, child_mm: f64) -> [DAffine3; 2] {
     [
         DAffine3 {
@@ -207,8 +207,8 @@ fn quarter_turns(parent_mm: f64, child_mm: f64) -> [DAffine3; 2] {
     ]
 }
 
-/// ISO 10303-43 places p where item 2 · (item 1)⁻¹ takes it. By hand for [`quarter_turns`]: with d = p − (5, −2, 3) the block's axis sees
-/// (d.x, d.z, −d.y), and the assembly's axis puts (u, v, w) at (100 − v, 20 + u, 30 + w); together (103 − p.z, 15 + p.x, 28 − p.y).
+/// ISO 10303-43 places p at item 2 · (item 1)⁻¹ · p. By hand for [`quarter_turns`]: with d = p − (5, −2, 3), the coordinates in the block's axis are
+/// (d.x, d.z, −d.y), and the assembly's axis takes (u, v, w) to (100 − v, 20 + u, 30 + w); together (103 − p.z, 15 + p.x, 28 − p.y).
 fn assert_on_its_axis(model: &CadModel, part: usize) {
     assert_near(placed_box(model, part).0, DVec3::new(100.0, 15.0, 26.0), 1e-9);
     assert_near(placed_box(model, part).1, DVec3::new(103.0, 16.0, 28.0), 1e-9);
@@ -222,7 +222,7 @@ fn a_component_lies_with_its_own_axis_on_the_one_it_is_given() {
             let solid = text.solid_box("", DVec3::new(1.0, 2.0, 3.0) / child_mm, true);
             let [from, to] = quarter_turns(parent_mm, child_mm);
             let own = text.axis_of(from);
-            // As the standard wants it: each axis is an item of its representation.
+            // As the standard requires: each axis is an item of its representation.
             let block = text.representation("ADVANCED_BREP_SHAPE_REPRESENTATION", &[solid, own]);
             let block = text.product("block", block);
             text.change_unit(parent);
@@ -276,7 +276,7 @@ fn a_mapped_item_lies_with_its_own_axis_on_the_one_it_is_given() {
     }
 }
 
-/// ISO 10303-42 (function first_proj_axis): x is then the origin's, made square to z; along x itself it is the origin's y.
+/// ISO 10303-42 (function first_proj_axis): x is then the origin's, made orthogonal to z; if z is along x itself, the origin's y is used.
 #[test]
 fn an_axis_without_a_reference_direction_is_square_to_its_own() {
     for (z, x) in [
@@ -384,7 +384,7 @@ fn faces_and_solids_keep_their_colours() {
 fn a_solid_that_the_kernel_loses_is_an_error_or_a_warning() {
     let mut text = StepText::millimetres();
     let good = text.solid_box("good", DVec3::splat(1.0), true);
-    // A sound reference structure with no geometry in it.
+    // A valid reference structure without geometry.
     let shell = text.add("CLOSED_SHELL('',())");
     let hollow = text.add(&format!("MANIFOLD_SOLID_BREP('hollow',#{shell})"));
     text.part("pair", &[good, hollow]);
@@ -474,7 +474,7 @@ proptest! {
         let shape = &model.shapes[0];
         let (size, corner) = (size * mm, size * mm);
         let volume = size.x * size.y * size.z;
-        // Planes only: quadrature is exact, so what is left is rounding.
+        // Planes only: quadrature is exact, so the difference is rounding.
         prop_assert!((shape.volume_mm3 / volume - 1.0).abs() < 1e-9);
         prop_assert!(shape.center_of_mass.distance(size / 2.0) < 1e-9 * size.length());
         let xx = volume * (size.y * size.y + size.z * size.z) / 12.0;

@@ -1,12 +1,12 @@
-//! From telemetry to constraint targets: the desktop's half of guidance.
+//! Conversion of telemetry to constraint targets: the desktop side of guidance.
 //!
-//! The recogniser says which constraints the touching faces could keep; this sends them to the board, refreshes them before they expire, and clears
-//! what is let go. Faces that share an edge with touching ones count as touched too: a peg that lands on the rim of its hole touches the
-//! top with its end. A part that guidance holds off the walls touches nothing; as long as its surface is still in or at the other it is
-//! near, and stays guided.
+//! The recogniser determines which constraints the touching faces could satisfy. This crate sends them to the board, refreshes them before
+//! they expire, and clears those that are released. Faces that share an edge with touching ones count as touching too: a peg that lands on
+//! the rim of its hole touches the top with its end. A part that guidance holds off the walls touches nothing; while its surface is still
+//! in or at the other one, it counts as near and stays guided.
 //!
-//! Planes that face each other are not sent: they meet by contact (`docs/notes/stop-planes.md`). Cost: that of the recogniser, once for each
-//! message of telemetry; when near counts, a distance for each pair of surfaces that could mate besides.
+//! Planes that face each other are not sent: they meet by contact (`docs/notes/stop-planes.md`). Cost: that of the recogniser, once per
+//! telemetry message; with [`When::Near`] also a distance for each pair of surfaces that could mate.
 
 mod nearby;
 mod row;
@@ -19,34 +19,34 @@ use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::CadModel;
 use mortise_mating::Tolerances;
 use mortise_mating::recognise::{
-    Entry, Observation, Recogniser, State, Target, TargetId, TargetKind, Thresholds, TouchingFaces,
+    Entry, Observation, Recogniser, State, Target, TargetId, Thresholds, TouchingFaces,
 };
 use mortise_protocol::limits::MAX_TARGETS;
-use mortise_protocol::message::{Telemetry, ToDevice};
+use mortise_protocol::message::{ConstraintKind, Telemetry, ToDevice};
 
 use nearby::Nearby;
 pub use row::{List, Row, Standing};
 pub use settings::{GuideSettings, When};
 
-/// Most targets sent at a time: half of what a board holds, so that those that fade leave room for those that come.
+/// Largest number of targets sent at a time: half of what a board holds, so that fading targets leave space for new ones.
 pub const MAX_SENT: usize = MAX_TARGETS / 2;
 
-/// Candidates are listed when they are off by at most this many times what takes a target up.
+/// Candidates are listed when their alignment error is at most this many times the engagement threshold.
 const LISTED: f64 = 3.0;
 
-/// Keeps a board's targets up to date.
+/// Keeps a board's targets up to date with the telemetry.
 pub struct Guide<'a> {
     model: &'a CadModel,
     /// Model part of each part of the image.
     parts: Vec<usize>,
-    /// Where each part of the model is, mm.
+    /// Present pose of each part of the model, mm.
     poses: Vec<DAffine3>,
     nearby: Nearby<'a>,
     recogniser: Recogniser<'a>,
     settings: GuideSettings,
-    /// Part in hand.
+    /// Held part.
     held: Option<usize>,
-    /// What the part in hand could ever keep; made when it is first asked for.
+    /// All targets that the held part could ever satisfy, computed on first use.
     possible: Option<(usize, Vec<Target>)>,
     sent: BTreeMap<TargetId, Sent>,
     tick: u32,
@@ -56,14 +56,14 @@ pub struct Guide<'a> {
 
 struct Sent {
     id: u16,
-    /// Tick at which it is sent again.
+    /// Tick of the next refresh.
     due: u32,
-    /// The board's last word, when it was no.
+    /// The board's reason, if its last answer was a refusal.
     refused: Option<String>,
 }
 
 impl<'a> Guide<'a> {
-    /// For a scene baked from `model`; `parts` names the model part of each part of the image.
+    /// A guide for a scene baked from `model`; `parts` maps each part of the image to a part of the model.
     pub fn new(model: &'a CadModel, parts: Vec<usize>, settings: GuideSettings) -> Self {
         Self {
             model,
@@ -81,12 +81,12 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// The list the targets come from, for who shows it or chooses in it.
+    /// The recogniser, whose entries can be displayed and chosen.
     pub fn recogniser(&mut self) -> &mut Recogniser<'a> {
         &mut self.recogniser
     }
 
-    /// Changes how targets are found and sent, from the next sample on; those sent already are sent anew.
+    /// Changes how targets are found and sent, from the next sample on; targets on the board are sent again.
     pub fn set(&mut self, settings: GuideSettings) {
         self.settings = settings;
         for sent in self.sent.values_mut() {
@@ -94,26 +94,26 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// Every part is back where the model has it.
+    /// Resets every part to its pose in the model.
     pub fn put_back(&mut self) {
         self.poses = placements(self.model);
     }
 
-    /// The board's answer about the target it knows by `id`.
+    /// Records the board's answer about its target `id`.
     pub fn answered(&mut self, id: u16, result: Result<(), String>) {
         if let Some(sent) = self.sent.values_mut().find(|sent| sent.id == id) {
             sent.refused = result.err();
         }
     }
 
-    /// What to send after this sample.
+    /// Processes a sample; returns the messages to send.
     pub fn hear(&mut self, sample: &Telemetry) -> Vec<ToDevice> {
         self.tick = sample.tick;
         let held = (sample.object.as_ref())
             .and_then(|(held, pose)| Some((*self.parts.get(usize::from(*held))?, pose)));
         self.held = held.map(|(part, _)| part);
         let Some((moving_part, pose)) = held else {
-            // Letting go ends all guidance on the board.
+            // A release ends all guidance on the board.
             self.sent.clear();
             self.recogniser.clear();
             return Vec::new();
@@ -149,10 +149,11 @@ impl<'a> Guide<'a> {
             misfit: entry.misfit,
             depth_mm: entry.depth_mm,
             inside_mm: match entry.target.kind {
-                TargetKind::Concentric | TargetKind::Conical | TargetKind::Annular => {
-                    Some(self.inside(&entry.target)).filter(|x| x.is_finite())
-                }
-                TargetKind::Coplanar | TargetKind::Spherical => None,
+                ConstraintKind::Concentric
+                | ConstraintKind::Conical
+                | ConstraintKind::Annular
+                | ConstraintKind::AnnularBore => Some(self.inside(&entry.target)).filter(|x| x.is_finite()),
+                ConstraintKind::Coplanar | ConstraintKind::Spherical => None,
             },
             pinned: entry.pinned,
             target: entry.target.clone(),
@@ -161,7 +162,7 @@ impl<'a> Guide<'a> {
             .filter(|entry| self.is_worth_reading(entry))
             .map(row)
             .collect();
-        // What guides or is chosen about comes first, whatever its state, so that a line stays where it was clicked.
+        // Targets that guide or have an operator's choice come first, regardless of state, so that a clicked line stays in place.
         rows.sort_by_key(|row| match row.standing {
             Standing::ByContact => 1,
             Standing::Candidate => 2,
@@ -175,7 +176,7 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// Faces at right angles touch all the time: a candidate is listed when it could become a target by a movement of the hand.
+    /// Faces at right angles touch all the time: a candidate is listed only when a movement of the hand could make it a target.
     fn is_worth_reading(&self, entry: &Entry) -> bool {
         let limits = self.recogniser.thresholds();
         let near = entry.misfit.distance_mm <= LISTED * limits.distance_mm
@@ -188,7 +189,7 @@ impl<'a> Guide<'a> {
             State::Off => Standing::Off,
             State::Far => Standing::Candidate,
             State::Conflict(with) => Standing::Conflict(with.clone()),
-            State::Active if wire::kind(&entry.target).is_none() => Standing::ByContact,
+            State::Active if !wire::is_sent(entry.target.kind) => Standing::ByContact,
             State::Active => match self.sent.get(&entry.target.id) {
                 None => Standing::Waiting,
                 Some(Sent { refused: None, .. }) => Standing::Sent,
@@ -199,7 +200,7 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// Faces that touch, and those across an edge from them.
+    /// Touching faces, and those across an edge from them.
     fn touched(&self, moving_part: usize, sample: &Telemetry) -> Vec<TouchingFaces> {
         let mut out = Vec::new();
         for pair in &sample.pairs {
@@ -228,7 +229,7 @@ impl<'a> Guide<'a> {
         out
     }
 
-    /// Targets in force whose surfaces are still in or at each other.
+    /// Active targets whose surfaces are still in or at each other.
     fn kept(&self) -> Vec<TouchingFaces> {
         let limit = match self.settings.when {
             When::Touching => self.settings.near_mm,
@@ -239,7 +240,7 @@ impl<'a> Guide<'a> {
             .collect()
     }
 
-    /// Surfaces that could mate, are lined up, and before each other.
+    /// Pairs of surfaces that could mate, are aligned, and face each other.
     fn approached(&mut self, moving_part: usize) -> Vec<TouchingFaces> {
         if self
             .possible
@@ -247,7 +248,7 @@ impl<'a> Guide<'a> {
             .is_none_or(|(part, _)| *part != moving_part)
         {
             let mut targets = self.recogniser.possible(moving_part);
-            targets.retain(|target| wire::kind(target).is_some());
+            targets.retain(|target| wire::is_sent(target.kind));
             self.possible = Some((moving_part, targets));
         }
         let limits = self.recogniser.thresholds();
@@ -264,7 +265,7 @@ impl<'a> Guide<'a> {
         targets.filter(near).filter_map(faces_of).collect()
     }
 
-    /// How far a target's surfaces are in each other along its axis, mm; negative: apart.
+    /// Overlap of a target's surfaces along its axis, mm; negative: gap.
     fn inside(&self, target: &Target) -> f64 {
         let (a, b) = (target.id.moving_part, target.id.fixed_part);
         let (Some(at), Some(fixed)) = (self.poses.get(a), self.poses.get(b)) else {
@@ -277,7 +278,7 @@ impl<'a> Guide<'a> {
 
     fn messages(&mut self) -> Vec<ToDevice> {
         let mut active: Vec<&Entry> = (self.recogniser.entries())
-            .filter(|e| e.state == State::Active && wire::kind(&e.target).is_some())
+            .filter(|e| e.state == State::Active && wire::is_sent(e.target.kind))
             .collect();
         active.sort_by_key(|entry| !entry.pinned);
         active.truncate(if self.settings.sending { MAX_SENT } else { 0 });
@@ -315,7 +316,7 @@ fn placements(model: &CadModel) -> Vec<DAffine3> {
     model.parts.iter().map(|part| part.placement).collect()
 }
 
-/// A pair of faces that stands for a target.
+/// A pair of faces that represents a target.
 fn faces_of(target: &Target) -> Option<TouchingFaces> {
     Some(TouchingFaces {
         moving_face: *target.moving_faces.first()?,

@@ -1,24 +1,24 @@
-//! What a guide asks of the parts' meshes: faces across an edge, and how far surfaces reach along an axis.
+//! Queries of the parts' meshes: faces across an edge, and extents of surfaces along an axis.
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape, Surface};
 
-/// Of one shape, for each face.
+/// Data of one shape, indexed by face.
 struct Faces {
-    /// The curved faces across its edges.
+    /// The curved faces across each face's edges.
     neighbours: Vec<Vec<u32>>,
-    /// Its corners in the mesh, each once, shape frame, mm.
+    /// Each face's mesh vertices without duplicates, shape frame, mm.
     corners: Vec<Vec<DVec3>>,
 }
 
-/// Of every part of a model.
+/// Data of every part of a model.
 pub struct Nearby<'a> {
     model: &'a CadModel,
     shapes: Vec<Faces>,
 }
 
 impl<'a> Nearby<'a> {
-    /// One pass over every mesh.
+    /// Builds the data in one pass over every mesh.
     pub fn new(model: &'a CadModel) -> Self {
         let faces = |shape: &Shape| Faces {
             neighbours: neighbours(shape),
@@ -30,7 +30,7 @@ impl<'a> Nearby<'a> {
         }
     }
 
-    /// A face and the curved faces across its edges. A face that does not exist is alone.
+    /// A face and the curved faces across its edges; only the face itself if it does not exist.
     pub fn with_neighbours(&self, part: usize, face: u16) -> Vec<u32> {
         let mut faces = vec![u32::from(face)];
         let more = self.faces(part).and_then(|f| f.neighbours.get(usize::from(face)));
@@ -38,7 +38,7 @@ impl<'a> Nearby<'a> {
         faces
     }
 
-    /// How far two groups of faces overlap along `axis`, mm: each is (part, its faces, its place). Negative: how far they are apart.
+    /// Overlap of two groups of faces along `axis`, mm; each group is (part, faces, pose). Negative: gap.
     pub fn overlap(&self, a: (usize, &[u32], &DAffine3), b: (usize, &[u32], &DAffine3), axis: DVec3) -> f64 {
         let (low, high) = self.extent(a, axis);
         let (from, to) = self.extent(b, axis);
@@ -49,7 +49,7 @@ impl<'a> Nearby<'a> {
         self.shapes.get(self.model.parts.get(part)?.shape)
     }
 
-    /// From where to where faces reach.
+    /// Extent of faces along `axis`, from and to.
     fn extent(&self, (part, faces, at): (usize, &[u32], &DAffine3), axis: DVec3) -> (f64, f64) {
         let all = self.faces(part).map_or(&[][..], |f| f.corners.as_slice());
         (faces.iter().filter_map(|&face| all.get(face as usize)).flatten())

@@ -2,51 +2,51 @@
 
 use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId};
 
-/// How a target stands.
+/// Status of a target.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Standing {
-    /// Its faces touch or are near, but it is too far off to be taken up.
+    /// Its faces touch or are near, but its alignment error is too large for it to engage.
     Candidate,
-    /// Contradicts these, which came first.
+    /// Contradicts these targets, which came first.
     Conflict(Vec<TargetId>),
     /// The operator switched it off.
     Off,
-    /// Taken up, and kept by contact alone: planes meet, a bore slides over a ball.
+    /// Active, and held by contact alone: planes meet, a bore slides over a ball.
     ByContact,
-    /// Taken up, but not sent: guidance is off, or the board holds as many as it can.
+    /// Active, but not sent: guidance is off, or the largest number of targets is on the board.
     Waiting,
-    /// On the board.
+    /// Active on the board.
     Sent,
-    /// The board does not take it, and why.
+    /// The board refused it, for this reason.
     Refused(String),
 }
 
-/// One line of the list.
+/// An entry of the list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// The constraint.
     pub target: Target,
-    /// How it stands.
+    /// Its status.
     pub standing: Standing,
-    /// How far it is from being kept.
+    /// Its alignment error.
     pub misfit: Misfit,
-    /// Largest depth at which its faces touch, mm; 0 when they do not.
+    /// Largest depth at which its faces touch, mm; 0 without contact.
     pub depth_mm: f64,
-    /// How far the surfaces are in each other along the axis, mm; negative: how far they still are apart. `None` where there is no axis.
+    /// Overlap of the surfaces along the axis, mm; negative: gap. `None` where there is no axis.
     pub inside_mm: Option<f64>,
-    /// The operator wants it to stay.
+    /// Whether the operator pinned it.
     pub pinned: bool,
 }
 
 /// The whole list.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct List {
-    /// Tick of the sample it was made from.
+    /// Tick of the sample on which the list is based.
     pub tick: u32,
-    /// Part in hand, an index into [`mortise_brep::CadModel::parts`].
+    /// Held part, an index into [`mortise_brep::CadModel::parts`].
     pub held: Option<usize>,
-    /// What could be sent first, then what contact keeps, then candidates; each in order of their surfaces.
+    /// Targets that could be sent come first, then those held by contact, then candidates; each group ordered by surfaces.
     pub rows: Vec<Row>,
-    /// Motion that the targets taken up leave to the part in hand.
+    /// Motion that the active targets leave to the held part.
     pub freedom: Freedom,
 }

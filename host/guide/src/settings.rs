@@ -1,20 +1,20 @@
 //! How targets are found and sent.
 
-/// When a target may be taken up.
+/// Condition under which a target may engage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum When {
-    /// Once faces touch, which the board tells: nothing is pulled in from afar.
+    /// Its faces touch, as reported by the board: guidance pulls nothing in from a distance.
     #[default]
     Touching,
-    /// As soon as surfaces that could mate are lined up and [`GuideSettings::approach_mm`] apart.
+    /// Surfaces that could mate are aligned and at most [`GuideSettings::approach_mm`] apart.
     Near,
 }
 
 impl When {
-    /// All.
+    /// All values.
     pub const ALL: [Self; 2] = [Self::Touching, Self::Near];
 
-    /// In words.
+    /// Name of the value in figures.
     pub fn name(self) -> &'static str {
         match self {
             Self::Touching => "when touching",
@@ -26,21 +26,21 @@ impl When {
 /// How targets are found and sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuideSettings {
-    /// Whether targets are sent at all; recognised they are in any case.
+    /// Whether targets are sent; they are recognised in any case.
     pub sending: bool,
-    /// When a target may be taken up.
+    /// Condition under which a target may engage.
     pub when: When,
     /// k_g, N/m.
     pub stiffness_n_per_m: f32,
     /// F_g, N.
     pub force_cap_n: f32,
-    /// The same of torques, N m.
+    /// Cap on the torque, N m.
     pub torque_cap_nm: f32,
-    /// A target fades this long after its last refresh, ticks.
+    /// Time after its last refresh at which a target fades, ticks.
     pub expiry_ticks: u16,
-    /// A target taken up stays while the surfaces' extents along the axis overlap by more than this, mm (negative: a gap).
+    /// An active target stays while the surfaces overlap along the axis by more than this, mm (negative: a gap).
     pub near_mm: f64,
-    /// Largest gap along the axis at which [`When::Near`] takes a target up, mm.
+    /// Largest gap along the axis at which [`When::Near`] engages a target, mm.
     pub approach_mm: f64,
 }
 

@@ -1,25 +1,18 @@
-//! From a target in millimetres of the model to the board's message.
+//! Conversion of a target in millimetres of the model to the board's message.
 
 use glam::DVec3;
 use heapless::Vec as BoundedVec;
-use mortise_mating::recognise::{Target, TargetKind};
+use mortise_mating::recognise::Target;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 
 use crate::GuideSettings;
 
-/// The board's word for a target's kind; `None` for what is left to contact.
-pub fn kind(target: &Target) -> Option<ConstraintKind> {
-    match target.kind {
-        TargetKind::Concentric => Some(ConstraintKind::Concentric),
-        TargetKind::Conical => Some(ConstraintKind::Conical),
-        TargetKind::Spherical => Some(ConstraintKind::Spherical),
-        TargetKind::Annular if target.ball_moves => Some(ConstraintKind::Annular),
-        TargetKind::Annular => Some(ConstraintKind::AnnularBore),
-        TargetKind::Coplanar => None,
-    }
+/// Whether targets of a kind are sent to the board; planes are left to contact, which holds them face to face without guidance.
+pub fn is_sent(kind: ConstraintKind) -> bool {
+    kind != ConstraintKind::Coplanar
 }
 
-/// The message about a target. `parts` names the model part of each part of the image.
+/// The message for a target; `None` for kinds left to contact. `parts` maps each part of the image to a part of the model.
 pub fn message(
     target: &Target,
     parts: &[usize],
@@ -27,6 +20,9 @@ pub fn message(
     id: u16,
     sequence: u16,
 ) -> Option<ConstraintTarget> {
+    if !is_sent(target.kind) {
+        return None;
+    }
     let image_part = parts.iter().position(|&p| p == target.id.fixed_part)?;
     let feature = |origin: DVec3, direction: DVec3| Feature {
         point: (origin / 1000.0).as_vec3().to_array(),
@@ -36,7 +32,7 @@ pub fn message(
     for &moving in &target.moving_faces {
         for &fixed in &target.fixed_faces {
             if let (Ok(moving), Ok(fixed)) = (u16::try_from(moving), u16::try_from(fixed)) {
-                // The first few are the surface's largest share; the rest is felt as contact.
+                // The first few faces are the largest of the surface; contact with the others stays enabled.
                 let _ = faces.push((moving, fixed));
             }
         }
@@ -44,7 +40,7 @@ pub fn message(
     Some(ConstraintTarget {
         id,
         sequence,
-        kind: kind(target)?,
+        kind: target.kind,
         moving: feature(target.moving.origin, target.moving.direction),
         static_part: u16::try_from(image_part).ok()?,
         fixed: feature(target.fixed.origin, target.fixed.direction),

@@ -1,9 +1,8 @@
-//! A guide on a block with a hole and a peg: what it sends when, and that no telemetry however odd leads it astray.
+//! A guide on a block with a hole and a peg: its messages, and its robustness against arbitrary telemetry.
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, Face, Frame, Mesh, Part, Shape, Surface};
 use mortise_guide::{Guide, GuideSettings, Standing, When};
-use mortise_mating::recognise::TargetKind;
 use mortise_protocol::message::{
     ConstraintKind, ConstraintTarget, Telemetry, ToDevice, TouchingPair, WirePose, WireWrench,
 };
@@ -11,11 +10,11 @@ use proptest::prelude::*;
 
 const HOLE_MM: f64 = 9.375;
 const PEG_MM: f64 = 8.875;
-/// Index in the image of the block and of the peg: not those of the model.
+/// Indices of block and peg in the image, which differ from those in the model.
 const BLOCK: u16 = 1;
 const PEG: u16 = 0;
 
-/// A lone cylinder wall from z = 0 to `length`.
+/// A single cylinder wall from z = 0 to `length`.
 fn wall(radius: f64, length: f64, inner: bool) -> Shape {
     let frame = Frame {
         origin: DVec3::ZERO,
@@ -77,7 +76,7 @@ fn pose(position_mm: DVec3) -> WirePose {
     }
 }
 
-/// The peg's end at `z`, beside the axis by `x`, mm.
+/// A sample with the peg's end at height `z` and offset `x` from the axis, mm.
 fn sample(tick: u32, x: f64, z: f64, touches: bool) -> Telemetry {
     let pair = TouchingPair {
         moving_face: 0,
@@ -138,7 +137,7 @@ fn touch_sends_a_target_that_is_refreshed_before_it_expires_and_cleared_when_far
     assert_eq!(target.static_part, BLOCK, "as the image counts");
     assert_eq!(target.faces.as_slice(), [(0, 0)]);
     let (id, expiry) = (target.id, u32::from(target.expiry_ticks));
-    // Guided off the wall it touches nothing and stays guided; each silence is shorter than the expiry.
+    // Guided off the wall, the peg touches nothing and stays guided; each gap in telemetry is shorter than the expiry.
     let (mut heard, mut sequence) = (16, target.sequence);
     for tick in (32..2000).step_by(16) {
         for target in targets(&guide.hear(&sample(tick, 0.0, -10.0, false))) {
@@ -152,7 +151,7 @@ fn touch_sends_a_target_that_is_refreshed_before_it_expires_and_cleared_when_far
     let row = &list.rows[0];
     assert_eq!(
         (row.target.kind, &row.standing),
-        (TargetKind::Concentric, &Standing::Sent)
+        (ConstraintKind::Concentric, &Standing::Sent)
     );
     // The peg's end is 10 mm deep in the hole.
     assert!((row.inside_mm.expect("along an axis") - 10.0).abs() < 1e-4);
@@ -161,7 +160,7 @@ fn touch_sends_a_target_that_is_refreshed_before_it_expires_and_cleared_when_far
     assert_eq!(cleared, [ToDevice::ClearTarget { id }], "6 mm is another place");
     assert_eq!(guide.list().rows[0].standing, Standing::Candidate);
     guide.hear(&sample(2032, 15.0, -10.0, false));
-    assert_eq!(guide.list().rows, [], "15 mm is none to read about");
+    assert_eq!(guide.list().rows, [], "at 15 mm it is not listed");
 }
 
 #[test]
@@ -196,10 +195,10 @@ fn near_takes_up_what_stands_before_its_hole_and_touching_does_not() {
             let mut guide = guide(&model, when);
             let sent = guide.hear(&sample(0, 1.0, gap, false));
             let expected = usize::from(near && when == When::Near);
-            assert_eq!(targets(&sent).len(), expected, "{gap} mm before, {when:?}");
+            assert_eq!(targets(&sent).len(), expected, "{gap} mm in front, {when:?}");
         }
     }
-    // And it may be chosen while the part is in hand.
+    // The setting may change while a part is held.
     let mut guide = guide(&model, When::Touching);
     assert_eq!(guide.hear(&sample(0, 1.0, 1.0, false)), []);
     guide.set(GuideSettings {
@@ -240,7 +239,7 @@ fn another_cap_goes_to_the_board_at_once_and_its_refusal_is_told() {
     });
     let sent = guide.hear(&sample(16, 0.5, -10.0, true));
     let [target] = targets(&sent)[..] else {
-        panic!("sent anew: {sent:?}")
+        panic!("sent again: {sent:?}")
     };
     assert_eq!(target.force_cap, 1.0);
     guide.answered(target.id, Err("busy".into()));
@@ -251,7 +250,7 @@ fn another_cap_goes_to_the_board_at_once_and_its_refusal_is_told() {
 }
 
 proptest! {
-    /// Parts and faces that do not exist, poses that are none: nothing is sent that names them, and nothing breaks.
+    /// Parts and faces that do not exist, and invalid poses: no message names them, and nothing fails.
     #[test]
     fn odd_telemetry_does_no_harm(
         held in any::<u16>(),

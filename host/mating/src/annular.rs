@@ -7,10 +7,10 @@ use mortise_brep::Frame;
 use crate::overlap::{Chart, Drawing};
 use crate::sphere::SphereDrawing;
 
-/// Directions looked at: the length is right to one of 360 parts.
+/// Number of sampled directions: the length is accurate to one part in 360.
 const STEPS: u32 = 360;
 
-/// Length of the circle about the bore's axis at `height` that lies in both faces, mm.
+/// Length of the circle around the bore's axis at `height` that lies in both faces, mm.
 pub(crate) fn length(
     chart: &Chart,
     bore: &Drawing,
@@ -21,7 +21,7 @@ pub(crate) fn length(
 ) -> f64 {
     let touching = (0..STEPS)
         .filter(|&i| {
-            // Off the multiples of a degree, where modellers put seams.
+            // Offset from the multiples of a degree, where modellers put seams.
             let angle = TAU * (f64::from(i) + 0.381_966) / f64::from(STEPS) - TAU / 2.0;
             let direction = frame.x * angle.cos() + frame.y * angle.sin();
             chart.holds(bore, angle, height) && ball.holds(direction)

@@ -1,13 +1,13 @@
-//! Convex polygons, clipped against each other.
+//! Clipping of convex polygons against each other.
 //!
-//! A vertex is a ray from the origin: (u, v, 1) in a plane, a unit vector on a sphere. A side then spans a plane through the
-//! origin, and the same clipping (Sutherland & Hodgman 1974) serves straight sides in the plane and great circles on the
-//! sphere. The common area of convex polygons is a continuous function of their corners, so sides and corners that coincide
-//! need no special care.
+//! A vertex is a ray from the origin: (u, v, 1) in a plane, a unit vector on a sphere. A side then spans a plane through
+//! the origin, and the same clipping (Sutherland & Hodgman 1974) works for straight sides in the plane and great circles on
+//! the sphere. The common area of convex polygons is a continuous function of their corners, so coincident sides and
+//! corners need no special treatment.
 
 use glam::{DVec2, DVec3};
 
-/// The part of convex `subject` within convex `window`; both anticlockwise, seen from outside. `scratch` is overwritten.
+/// The part of convex `subject` inside convex `window`; both anticlockwise, seen from outside. `scratch` is overwritten.
 pub(crate) fn clip(subject: &[DVec3], window: &[DVec3], out: &mut Vec<DVec3>, scratch: &mut Vec<DVec3>) {
     out.clear();
     out.extend_from_slice(subject);
@@ -95,14 +95,14 @@ mod tests {
     fn octants_are_an_eighth_of_a_sphere() {
         let octant = [DVec3::X, DVec3::Y, DVec3::Z];
         assert!((solid_angle(&octant) - PI / 2.0).abs() < 1e-14);
-        // Turned by an eighth about z, the octants share half.
+        // Rotated by an eighth turn about z, the octants share half.
         let (east, north) = (DVec3::new(1.0, 1.0, 0.0), DVec3::new(-1.0, 1.0, 0.0));
         let turned = [east, north, DVec3::Z];
         assert!((solid_angle(&common(&octant, &turned)) - PI / 4.0).abs() < 1e-14);
     }
 
     proptest! {
-        /// The common area does not depend on which polygon is the window, and the whole is the sum of its parts.
+        /// The common area is independent of which polygon is the window, and the whole is the sum of its parts.
         #[test]
         fn clipping_is_symmetric_and_additive(
             t in prop::array::uniform6(-1.0f64..1.0),

@@ -1,4 +1,4 @@
-//! All contacts of an assembly.
+//! Identification of all contacts of an assembly.
 
 use std::collections::BTreeMap;
 
@@ -16,12 +16,12 @@ use crate::sphere::SphereDrawing;
 use crate::tiles::{FaceTiles, ShapeTiles, Tiles};
 use crate::tolerances::Tolerances;
 
-/// An area with arcs in its outline is right to this share of it, or followed as finely as can be.
+/// Largest relative error of an area whose outline has arcs, unless the arcs are already followed at the finest step.
 const AREA_ERROR: f64 = 1e-3;
 
-/// Finds the contacts between different parts of `model` where it places them, in order of parts and surfaces.
+/// Finds the contacts between different parts of `model` at their placements, ordered by parts and surfaces.
 ///
-/// Cost: a tree over the boxes of all faces, then for each pair of faces whose boxes meet and whose surfaces agree the
+/// Cost: a tree over the boxes of all faces; then, for each pair of faces whose boxes overlap and whose surfaces agree, the
 /// product of their numbers of triangles.
 pub fn identify(model: &CadModel, tolerances: &Tolerances) -> Vec<Contact> {
     let mut shapes: Vec<Option<Prepared>> = model.shapes.iter().map(|_| None).collect();
@@ -55,7 +55,7 @@ pub fn identify(model: &CadModel, tolerances: &Tolerances) -> Vec<Contact> {
     for (i, leaf) in leaves.iter().enumerate() {
         for j in tree.intersect_aabb(&boxes[i]) {
             let other = &leaves[j as usize];
-            // Leaves are in order of parts: each pair once.
+            // Leaves are ordered by part, so each pair is visited once.
             if other.part <= leaf.part {
                 continue;
             }
@@ -128,7 +128,7 @@ impl<'a> Prepared<'a> {
 }
 
 impl PreparedFace {
-    /// Box of the placed face, larger by `margin`.
+    /// Box of the placed face, enlarged by `margin`.
     fn reach(&self, placement: &DAffine3, margin: f64) -> (DVec3, DVec3) {
         let (low, high) = (self.tiles.low, self.tiles.high);
         let m = placement.matrix3;
@@ -145,13 +145,13 @@ struct Touch {
     patches: [u32; 2],
     area: f64,
     length: f64,
-    /// Middle of what they share, in the first part's frame.
+    /// Middle of the common region, in the first part's frame.
     middle: DVec3,
-    /// Along the bore that a ball is in, in the first part's frame.
+    /// Direction of the bore of a ball in a bore, in the first part's frame.
     along: Option<DVec3>,
 }
 
-/// Two faces whose boxes meet.
+/// Two faces whose boxes overlap.
 struct Pair<'a> {
     a: &'a Prepared<'a>,
     b: &'a Prepared<'a>,
@@ -229,7 +229,7 @@ impl Pair<'_> {
         Some((kind, touch))
     }
 
-    /// A ball in a bore, whichever part is which.
+    /// Contact of a ball in a bore, in either order of the parts.
     fn ring(&self, ma: &MergedSurface, theirs: &Surface, fit: f64) -> Option<Touch> {
         let (fa, fb) = (&self.a.faces[self.faces[0]], &self.b.faces[self.faces[1]]);
         let ((ball, ball_tiles, ball_place), (bore, bore_tiles, bore_place)) = {
@@ -279,7 +279,7 @@ fn sphere_center(surface: &Surface) -> Option<DVec3> {
     }
 }
 
-/// Which contact two surfaces can make; `theirs` is the second one in the first one's frame.
+/// Kind of contact that two surfaces can make; `theirs` is the second surface in the frame of the first.
 fn kind(a: &MergedSurface, b: &MergedSurface, theirs: &Surface) -> Option<ContactKind> {
     let facing = [a.side, b.side] == [Side::Convex, Side::Concave]
         || [a.side, b.side] == [Side::Concave, Side::Convex];

@@ -1,14 +1,15 @@
-//! Which faces of which parts fit together, after Iacob, Mitrouchev & Léon, "Contact identification for assembly–disassembly
-//! simulation with a haptic device", The Visual Computer 24 (2008).
+//! Recognition of mating faces between parts, after Iacob, Mitrouchev & Léon, "Contact identification for
+//! assembly–disassembly simulation with a haptic device", The Visual Computer 24 (2008).
 //!
-//! 1. [`merge`]: faces of a shape that lie on one surface become one ([`MergedSurface`]), however the modeller split it.
-//! 2. Boxes of faces in a tree find the pairs that may touch, part against other part.
-//! 3. Two surfaces mate when they are the same within tolerance over their common region, and turn their outsides to each
-//!    other: planes face each other, a shaft is in a bore.
+//! 1. [`merge`]: faces of a shape that lie on one surface become one ([`MergedSurface`]), regardless of how the modeller
+//!    split it.
+//! 2. A tree over the boxes of the faces finds the pairs of different parts that may touch.
+//! 3. Two surfaces mate when they are equal within tolerance over their common region and their outsides face each other:
+//!    plane to plane, shaft in bore.
 //! 4. A contact needs a common area ([`MIN_AREA_MM2`](Tolerances::min_area_mm2)): the trimmed faces overlap, in the plane
 //!    or on the unrolled cylinder, cone or sphere. A sphere in a cylinder touches along a circle (linear annular contact).
 //!
-//! Lengths are millimetres, angles radians; shapes are in their own frame, contacts in the assembly's.
+//! Lengths are in millimetres, angles in radians; shapes are in their own frame, contacts in the assembly's.
 
 mod annular;
 mod clip;

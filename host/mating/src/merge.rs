@@ -1,4 +1,4 @@
-//! Faces of one shape that lie on one surface.
+//! Merging of a shape's faces that lie on one surface.
 
 use glam::DVec3;
 use mortise_brep::{Face, Frame, Shape, Surface};
@@ -6,38 +6,38 @@ use mortise_brep::{Face, Frame, Shape, Surface};
 use crate::same::{Ball, difference};
 use crate::tolerances::Tolerances;
 
-/// On which side of its surface the material is.
+/// Side of a surface on which the material is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// A plane: its frame's z points out of the material.
     Flat,
-    /// Material within: shaft, taper, ball.
+    /// Material inside: shaft, taper, ball.
     Convex,
-    /// Material without: bore, taper hole, socket.
+    /// Material outside: bore, tapered hole, socket.
     Concave,
 }
 
-/// Faces of a shape on one surface and with material on the same side, as one.
+/// The faces of a shape that share a surface and the side of the material, merged.
 #[derive(Clone, Debug)]
 pub struct MergedSurface {
-    /// That of the largest face; plane, cylinder, cone or sphere, in the shape's frame.
+    /// Surface of the largest face; plane, cylinder, cone or sphere, in the shape's frame.
     pub surface: Surface,
-    /// Where the material is.
+    /// Side of the material.
     pub side: Side,
     /// Face ids, largest face first.
     pub faces: Vec<u32>,
-    /// For each of them, the number of its patch: faces joined by an edge are of one patch.
+    /// Patch number of each face: faces joined by an edge belong to one patch.
     pub patches: Vec<u32>,
     /// Sum of the faces' areas, mm².
     pub area_mm2: f64,
-    /// Largest fit error of a face that was recognised in a spline, mm.
+    /// Largest fit error of a face recognised in a spline, mm.
     pub fit_mm: f64,
 }
 
 /// Merges the faces of `shape`: same kind, same side, and within `tolerances` of each other over the smaller face. Tori and
-/// splines are left out. Largest faces first, so the result does not depend on how small faces are noisy.
+/// splines are excluded. Large faces come first, so that noise in small faces does not affect the result.
 ///
-/// Cost: faces × merged surfaces comparisons of a few dot products.
+/// Cost: one comparison of a few dot products per pair of face and merged surface.
 pub fn merge(shape: &Shape, tolerances: &Tolerances) -> Vec<MergedSurface> {
     let balls = balls(shape);
     let mut order: Vec<usize> = (0..shape.faces.len()).collect();
@@ -81,7 +81,7 @@ pub fn merge(shape: &Shape, tolerances: &Tolerances) -> Vec<MergedSurface> {
     merged
 }
 
-/// Surface and side of a face; a plane's frame is turned so that z points outward.
+/// Surface and side of a face; a plane's frame is oriented with z outward.
 fn turned_out(face: &Face) -> Option<(Surface, Side)> {
     let side = if face.reversed {
         Side::Concave
@@ -105,7 +105,7 @@ fn turned_out(face: &Face) -> Option<(Surface, Side)> {
     }
 }
 
-/// A ball about each face's mesh; `None` without one.
+/// A bounding ball of each face's mesh; `None` without a mesh.
 fn balls(shape: &Shape) -> Vec<Option<Ball>> {
     let mut boxes = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); shape.faces.len()];
     for (triangle, &face) in shape.mesh.triangles.iter().zip(&shape.mesh.triangle_face) {
@@ -124,7 +124,7 @@ fn balls(shape: &Shape) -> Vec<Option<Ball>> {
     boxes.into_iter().map(ball).collect()
 }
 
-/// Patch number of each of `faces`, numbered as they are met.
+/// Patch number of each of `faces`, assigned in order of first occurrence.
 fn patches(shape: &Shape, faces: &[u32]) -> Vec<u32> {
     let mut patch = vec![u32::MAX; faces.len()];
     let mut next = 0;

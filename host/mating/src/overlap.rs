@@ -1,8 +1,8 @@
 //! Common area of two faces on one plane, cylinder or cone.
 //!
-//! Both are drawn in one chart: (x, y) of the plane; (angle, height) of a cylinder or cone, where a piece of area is
-//! r(height)/cos(half angle) · d(angle) d(height). r is linear, so a polygon's area is its area in the chart times that factor
-//! at its centroid. Areas of signed convex tiles add up: |A ∩ B| = Σᵢⱼ sᵢ sⱼ |Aᵢ ∩ Bⱼ|.
+//! Both faces are mapped to one chart: (x, y) of the plane; (angle, height) of a cylinder or cone, where an area element is
+//! r(height)/cos(half angle) · d(angle) d(height). r is linear, so a polygon's area is its area in the chart times that
+//! factor at its centroid. Areas of signed convex tiles add up: |A ∩ B| = Σᵢⱼ sᵢ sⱼ |Aᵢ ∩ Bⱼ|.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -13,17 +13,17 @@ use mortise_brep::{Frame, Surface};
 use crate::clip::{area_and_centroid, clip};
 use crate::tiles::Tiles;
 
-/// A plane to draw faces in.
+/// A plane to which faces are mapped.
 pub(crate) struct Chart {
     frame: Frame,
-    /// Angles repeat.
+    /// Whether the first coordinate is an angle, which is periodic.
     round: bool,
-    /// Area of a unit of the chart at height v: factor.0 + v · factor.1.
+    /// Area of a chart unit at height v: factor.0 + v · factor.1.
     factor: (f64, f64),
 }
 
 impl Chart {
-    /// Of a plane, cylinder or cone.
+    /// The chart of a plane, cylinder or cone.
     pub fn new(surface: &Surface) -> Option<Self> {
         let (frame, round, factor) = match *surface {
             Surface::Plane { frame } => (frame, false, (1.0, 0.0)),
@@ -42,7 +42,7 @@ impl Chart {
         Some(Self { frame, round, factor })
     }
 
-    /// Tiles drawn in the chart, moved there by `place`.
+    /// Maps tiles to the chart after moving them by `place`.
     pub fn draw(&self, tiles: &Tiles, place: &DAffine3) -> Drawing {
         let mut drawing = Drawing::default();
         let mut local = Vec::new();
@@ -65,7 +65,7 @@ impl Chart {
         drawing
     }
 
-    /// Area of A ∩ B, mm², and its middle in the chart.
+    /// Area of A ∩ B, mm², and its centroid in the chart.
     pub fn common(&self, a: &Drawing, b: &Drawing) -> (f64, DVec2) {
         let (mut area, mut moment) = (0.0, DVec2::ZERO);
         let (mut polygon, mut moved, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
@@ -92,7 +92,7 @@ impl Chart {
         (area, moment / area)
     }
 
-    /// The point in space at chart coordinates; of a cylinder or cone the point of its axis at that height.
+    /// The point in space at chart coordinates; for a cylinder or cone, the point on its axis at that height.
     pub fn point(&self, at: DVec2) -> DVec3 {
         let f = &self.frame;
         if self.round {
@@ -102,7 +102,7 @@ impl Chart {
         }
     }
 
-    /// Whether a tile of `drawing` holds the point of a cylinder at an angle and height.
+    /// Whether a tile of `drawing` contains the cylinder's point at an angle and height.
     pub fn holds(&self, drawing: &Drawing, angle: f64, height: f64) -> bool {
         // Rounding of an unrolled coordinate.
         let epsilon = 1e-9;
@@ -156,7 +156,8 @@ impl Drawing {
     }
 }
 
-/// Corners of a triangle in the frame of a cylinder or cone, as (angle, height, 1) without a jump; begins within −π..π.
+/// Corners of a triangle in the frame of a cylinder or cone, as (angle, height, 1) without jumps; the first angle is within
+/// −π..π.
 fn unroll(local: &[DVec3], out: &mut Vec<DVec3>) {
     let on_axis = |p: &DVec3| p.x.hypot(p.y) <= 1e-9 * (1.0 + p.z.abs());
     let Some(start) = local.iter().find(|p| !on_axis(p)).map(|p| p.y.atan2(p.x)) else {
@@ -172,7 +173,7 @@ fn unroll(local: &[DVec3], out: &mut Vec<DVec3>) {
             out.push(DVec3::new(angle(p), p.z, 1.0));
             continue;
         }
-        // The tip of a cone is a line in the chart: it spans the angles of its neighbours.
+        // The apex of a cone is a line in the chart: it spans the angles of its neighbours.
         for q in [&local[(i + n - 1) % n], &local[(i + 1) % n]] {
             if !on_axis(q) {
                 out.push(DVec3::new(angle(q), p.z, 1.0));

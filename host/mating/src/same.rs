@@ -1,26 +1,26 @@
-//! How far two surfaces are apart.
+//! Difference between two surfaces.
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{Frame, Surface};
 
-/// Where two surfaces are compared: a ball, mm.
+/// Region in which two surfaces are compared: a ball, mm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
     pub center: DVec3,
     pub radius: f64,
 }
 
-/// How two surfaces of the same kind differ.
+/// Difference between two surfaces of the same kind.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Difference {
     /// Bound on their distance within the ball, mm.
     pub linear: f64,
-    /// Between their axes or normals, and between half angles, radians.
+    /// Angle between their axes or normals, and between half angles, radians.
     pub angular: f64,
 }
 
-/// Bound on how two surfaces of one kind differ within `ball`; their senses do not matter. `None`: of different kinds, or
-/// tori or splines.
+/// Bound on the difference of two surfaces of one kind within `ball`, regardless of their orientation. `None` for different
+/// kinds, and for tori and splines.
 pub(crate) fn difference(a: &Surface, b: &Surface, ball: Ball) -> Option<Difference> {
     let (linear, angular) = match (*a, *b) {
         (Surface::Plane { frame: f }, Surface::Plane { frame: g }) => {
@@ -65,13 +65,13 @@ pub(crate) fn difference(a: &Surface, b: &Surface, ball: Ball) -> Option<Differe
     Some(Difference { linear, angular })
 }
 
-/// Distance between two axes beside the ball's centre, and the angle between them.
+/// Distance of two axes near the ball's centre, and the angle between them.
 fn axes(f: &Frame, g: &Frame, ball: Ball) -> (f64, f64) {
     let foot = |frame: &Frame| frame.origin + frame.z * (ball.center - frame.origin).dot(frame.z);
     (foot(f).distance(foot(g)), angle_between(f.z, g.z))
 }
 
-/// Angle between two lines, 0 to π/2. Unlike the arc cosine it is exact for small angles.
+/// Angle between two lines, 0 to π/2. Unlike the arc cosine it is accurate for small angles.
 fn angle_between(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b).abs())
 }

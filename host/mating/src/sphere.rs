@@ -5,7 +5,8 @@ use glam::{DAffine3, DVec3};
 use crate::clip::{clip, solid_angle};
 use crate::tiles::Tiles;
 
-/// Triangles seen from the sphere's centre: unit corners, anticlockwise from outside, and a cone about each.
+/// Triangles seen from the sphere's centre: corners as unit vectors, anticlockwise from outside, and a bounding cone of
+/// each.
 pub(crate) struct SphereDrawing(Vec<SphereTile>);
 
 struct SphereTile {
@@ -59,7 +60,7 @@ impl SphereDrawing {
         sum
     }
 
-    /// Whether the face lies in a direction from the centre.
+    /// Whether the face contains the given direction from the centre.
     pub fn holds(&self, direction: DVec3) -> bool {
         let inside = |t: &SphereTile| {
             let [a, b, c] = t.corners;

@@ -1,8 +1,8 @@
-//! A face cut into convex tiles that cover it exactly, up to a bound.
+//! Division of a face into convex tiles that cover it exactly, up to an error bound.
 //!
-//! The triangles of the tessellation cover a plane face between straight edges, and the unrolled face of a cylinder, cone or
-//! sphere. Where a plane's edge is an arc, the cap between chord and arc is added (the arc bulges out of the face) or taken
-//! away (a hole). What is left is the error on edges that are neither, estimated from how they turn.
+//! The triangles of the tessellation cover a plane face between straight edges, and the unrolled face of a cylinder, cone
+//! or sphere. Where a plane's edge is an arc, the cap between chord and arc is added (the arc bulges out of the face) or
+//! subtracted (a hole). What remains is the error on edges that are neither lines nor arcs, estimated from their curvature.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -10,14 +10,14 @@ use std::ops::Range;
 use glam::DVec3;
 use mortise_brep::{Curve, Frame, Shape, Surface};
 
-/// Corners of an arc's polygon for a first look; its error is 1/256 of the chord's.
+/// Corners of an arc's polygon in the coarse tiling; its error is 1/256 of the chord's.
 const CAP_STEPS: f64 = 16.0;
-/// Largest distance between an arc and its polygon when it matters, mm.
+/// Largest distance between an arc and its polygon in the fine tiling, mm.
 const FINE_MM: f64 = 2e-6;
-/// Most corners of one cap.
+/// Largest number of corners of one cap.
 const MOST_STEPS: f64 = 4096.0;
 
-/// A convex tile: its corners in [`Tiles::corners`], +1 or −1.
+/// A convex tile: the range of its corners in [`Tiles::corners`], and its sign, +1 or −1.
 pub(crate) type Tile = (Range<usize>, f64);
 
 /// Tiles of one face, in the shape's frame.
@@ -35,16 +35,16 @@ impl Tiles {
     }
 }
 
-/// A side of the boundary that the tiles follow up to an error: an area, length × largest distance.
+/// A boundary edge that the tiles follow only approximately; its error is an area, length × largest distance.
 #[derive(Clone, Copy, Debug)]
 struct Soft {
     ends: [DVec3; 2],
     error_mm2: f64,
-    /// Of an arc: the finer tiling is this much better.
+    /// For an arc: the error of the fine tiling.
     fine_mm2: f64,
 }
 
-/// What the tiling of one face knows.
+/// The tiling of one face with its error bounds.
 #[derive(Clone, Debug)]
 pub(crate) struct FaceTiles {
     pub coarse: Tiles,
@@ -55,7 +55,7 @@ pub(crate) struct FaceTiles {
 }
 
 impl FaceTiles {
-    /// Bound on the error of an area of tiles within a box: coarse and fine.
+    /// Bound on the area error of the tiles within a box: of the coarse and of the fine tiling.
     pub fn slack(&self, low: DVec3, high: DVec3) -> (f64, f64) {
         let inside = |s: &&Soft| {
             s.ends[0].min(s.ends[1]).cmple(high).all() && s.ends[0].max(s.ends[1]).cmpge(low).all()
@@ -69,7 +69,7 @@ impl FaceTiles {
 pub(crate) struct ShapeTiles<'a> {
     shape: &'a Shape,
     triangles: Vec<Vec<u32>>,
-    /// Edges by the mesh vertices of each of their segments, smaller first.
+    /// Edge of each mesh segment, keyed by its two vertices, smaller first.
     segments: HashMap<(u32, u32), Vec<u32>>,
 }
 
@@ -79,7 +79,7 @@ impl<'a> ShapeTiles<'a> {
         for (i, &face) in shape.mesh.triangle_face.iter().enumerate() {
             triangles[face as usize].push(i as u32);
         }
-        // An edge's points are copies of mesh vertices.
+        // The points of an edge are bitwise copies of mesh vertices.
         let key = |v: DVec3| v.to_array().map(f64::to_bits);
         let vertex: HashMap<[u64; 3], u32> = (shape.mesh.vertices.iter().enumerate())
             .map(|(i, &v)| (key(v), i as u32))
@@ -109,7 +109,7 @@ impl<'a> ShapeTiles<'a> {
             high = high.max(c);
         }
         let soft = self.soft(face);
-        // How far the exact face may reach beyond its tiles: sideways over soft edges, outward over chords of its surface.
+        // Extent of the exact face beyond its tiles: sideways at approximated edges, outward over chords of its surface.
         let edge = soft
             .iter()
             .map(|s| s.error_mm2 / s.ends[0].distance(s.ends[1]).max(1e-12))
@@ -131,7 +131,7 @@ impl<'a> ShapeTiles<'a> {
         }
     }
 
-    /// The same with arcs followed to [`FINE_MM`].
+    /// Tiling of one face with arcs followed to [`FINE_MM`].
     pub fn fine(&self, face: u32) -> Tiles {
         self.tiles(face, fine_steps)
     }
@@ -167,7 +167,7 @@ impl<'a> ShapeTiles<'a> {
         tiles
     }
 
-    /// The circle along a side of a triangle of `face`.
+    /// The circle of which a triangle side of `face` is a chord, if any.
     fn arc(&self, face: u32, a: u32, b: u32) -> Option<(Frame, f64)> {
         let edges = self.segments.get(&(a.min(b), a.max(b)))?;
         edges
@@ -184,7 +184,8 @@ impl<'a> ShapeTiles<'a> {
         let mut soft = Vec::new();
         for edge in of.edges.iter().map(|&e| &self.shape.edges[e as usize]) {
             match (&of.surface, &edge.curve) {
-                // Straight in the plane and on the unrolled cylinder or cone; a circle there runs round the axis.
+                // Edges that are straight in the plane or on the unrolled cylinder or cone; a circle around the axis is
+                // straight there.
                 (
                     Surface::Plane { .. } | Surface::Cylinder { .. } | Surface::Cone { .. },
                     Curve::Line { .. },
@@ -215,7 +216,7 @@ fn fine_steps(radius: f64, angle: f64) -> f64 {
         .clamp(CAP_STEPS, MOST_STEPS)
 }
 
-/// The arc from `a` to `b`, less than half a turn, ends included.
+/// The arc from `a` to `b`, less than half a turn, end points included.
 fn arc_points(
     a: DVec3,
     b: DVec3,
@@ -237,8 +238,8 @@ fn arc_points(
     Some(std::iter::once(a).chain(inner).chain([b]).collect())
 }
 
-/// Errors of the segments of a curve that is neither line nor circle: a segment of length l whose direction turns by θ within
-/// the surface is about lθ/8 off.
+/// Errors of the segments of a curve that is neither line nor circle: a segment of length l whose direction turns by θ
+/// within the surface deviates by about lθ/8.
 fn turning(points: &[DVec3], surface: &Surface) -> Vec<Soft> {
     let turn = |i: usize| -> f64 {
         let (Some(p), Some(q)) = (i.checked_sub(1).and_then(|j| points.get(j)), points.get(i + 1)) else {
@@ -265,7 +266,7 @@ fn turning(points: &[DVec3], surface: &Surface) -> Vec<Soft> {
     points.windows(2).enumerate().map(soft).collect()
 }
 
-/// Middles of sides and of the whole.
+/// Midpoints of the sides, and of the whole.
 fn middles(corners: &[DVec3]) -> Vec<DVec3> {
     let n = corners.len();
     let sides = (0..n).map(|i| (corners[i] + corners[(i + 1) % n]) / 2.0);

@@ -1,10 +1,10 @@
-//! What counts as the same place and direction.
+//! Tolerances for equal position and direction.
 
-/// What counts as the same place and direction.
+/// Tolerances for equal position and direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
-    /// Largest distance between two surfaces over their common region, mm. The default, 1 µm, is above what exchange files
-    /// lose (coordinates of seven digits) and below the tightest running fit in use (H6/g5 of 3 mm: 2 µm).
+    /// Largest distance between two surfaces over their common region, mm. The default, 1 µm, is above the rounding of
+    /// exchange files (coordinates of seven digits) and below the tightest running fit in use (H6/g5 of 3 mm: 2 µm).
     pub linear_mm: f64,
     /// Largest angle between their normals or axes, radians.
     pub angular_rad: f64,

@@ -1,5 +1,5 @@
-//! What contacts must not depend on: where the assembly is, the order of its parts, how a modeller splits a face. And the common
-//! area against closed forms. Reads in-process; the files are our own test parts.
+//! Invariance of contacts under motion of the assembly, order of its parts, and splitting of faces. Common areas are
+//! compared with closed forms. Files are read in-process; they are this project's test parts.
 
 mod build;
 
@@ -12,7 +12,7 @@ use mortise_brep::{CadModel, load_step};
 use mortise_mating::{Contact, ContactKind, Tolerances, identify};
 use proptest::prelude::*;
 
-/// A file with its contacts: kind, count, and area (of a ball in a bore: length) by arithmetic.
+/// A file with its contacts: kind, count, and area (of a ball in a bore: length) in closed form.
 type Sample = (CadModel, Vec<(ContactKind, usize, f64)>);
 
 fn samples() -> &'static [Sample] {
@@ -106,12 +106,12 @@ proptest! {
             }
             let mut still = identify(model, &Tolerances::default());
             for c in identify(&other, &Tolerances::default()) {
-                // The one with the same axis, seen from the moved assembly.
+                // The contact with the same axis, transformed from the moved assembly.
                 let same = still.iter().position(|s| {
                     let at = motion.transform_point3(s.axis.origin);
                     let along = motion.transform_vector3(s.axis.direction);
                     s.kind == c.kind && s.count == c.count
-                        // Middles of areas are as good as the areas.
+                        // The error of a middle is bounded like that of the areas.
                         && at.distance(c.axis.origin) < 1e-3
                         && (s.kind == ContactKind::Spherical || along.cross(c.axis.direction).length() < 1e-9)
                         && (size(s) / size(&c) - 1.0).abs() < 1e-3
@@ -125,7 +125,7 @@ proptest! {
         }
     }
 
-    /// However the walls of shaft and bore are cut into faces, they are one contact of the same area.
+    /// The walls of shaft and bore form one contact of the same area, regardless of how they are cut into faces.
     #[test]
     fn a_split_cylinder_is_the_whole_one(
         sectors in (1u32..5, 1u32..5),
@@ -147,7 +147,7 @@ proptest! {
         prop_assert!(c.axis.origin.distance(DVec3::Z * middle) < 1e-6, "{} {middle}", c.axis.origin);
     }
 
-    /// A disc over a hole touches its rim exactly when it is larger, however little, and however both are tessellated.
+    /// A disc over a hole touches its rim if and only if it is larger, by however little, and for any tessellation of both.
     #[test]
     fn a_disc_on_a_hole_shares_the_ring_between_them(
         radius in 2.0f64..60.0,
@@ -170,7 +170,8 @@ proptest! {
         prop_assert!((contacts[0].area_mm2 - area).abs() < bound, "{} {area}", contacts[0].area_mm2);
     }
 
-    /// Radii or planes apart by more than the tolerance do not touch, by less they do; sides that look the same way never.
+    /// Surfaces whose radii or planes differ by more than the tolerance do not touch, by less they do; sides with the same
+    /// orientation never touch.
     #[test]
     fn the_tolerance_decides(apart in prop_oneof![-0.9e-3f64..0.9e-3, 1.1e-3f64..1e-2, -1e-2f64..-1.1e-3]) {
         let near = apart.abs() < 1e-3;

@@ -1,4 +1,4 @@
-//! The recogniser on our own test parts: which constraint, which freedom, what contradicts what, and that the list does not flicker.
+//! The recogniser on this project's test parts: constraints, freedoms, contradictions, and the list's stability.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,8 +6,9 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, load_step};
-use mortise_mating::recognise::{Observation, Recogniser, State, TargetKind, Thresholds, TouchingFaces};
+use mortise_mating::recognise::{Observation, Recogniser, State, Thresholds, TouchingFaces};
 use mortise_mating::{Tolerances, identify};
+use mortise_protocol::message::ConstraintKind;
 use proptest::prelude::*;
 
 const FILES: [&str; 4] = [
@@ -63,15 +64,15 @@ fn see(recogniser: &mut Recogniser<'_>, poses: &[DAffine3], touching: &[Touching
     });
 }
 
-fn kinds(recogniser: &Recogniser<'_>) -> Vec<TargetKind> {
+fn kinds(recogniser: &Recogniser<'_>) -> Vec<ConstraintKind> {
     let mut kinds: Vec<_> = recogniser.active().map(|t| t.kind).collect();
-    kinds.sort();
+    kinds.sort_by_key(|&kind| kind as u8);
     kinds
 }
 
 #[test]
 fn each_joint_is_recognised_and_its_freedom_named() {
-    use TargetKind::*;
+    use ConstraintKind::*;
     let cases = [
         (
             "two_pin_exact.step",
@@ -116,7 +117,7 @@ fn freedoms_of_part_of_the_targets() {
         let mut recogniser = new(model);
         see(&mut recogniser, &poses, &touching);
         assert_eq!(recogniser.freedom().name(), name);
-        // One pin: about and along its own axis, z through (±10, 0).
+        // One pin: rotation and slide along its own axis, z through (±10, 0).
         for turn in recogniser
             .freedom()
             .turns
@@ -157,12 +158,12 @@ fn one_pin_in_two_holes_is_a_conflict_that_names_the_first() {
     assert_eq!(active.len(), 1);
     let conflict = recogniser.entries().find(|e| e.target.id != active[0]).unwrap();
     assert_eq!(conflict.state, State::Conflict(active.clone()));
-    // Pinned, the other comes first and this one waits for it.
+    // Once pinned, the other target comes first and this one waits for it.
     let other = conflict.target.id;
     assert!(recogniser.pin(other, true));
     see(&mut recogniser, &poses(model), &[*walls[0], crossed]);
     assert_eq!(recogniser.active().map(|t| t.id).collect::<Vec<_>>(), [other]);
-    // Switched off, it leaves the place to the first.
+    // Switched off, it yields to the first.
     assert!(recogniser.switch_off(other, true));
     see(&mut recogniser, &poses(model), &[*walls[0], crossed]);
     assert_eq!(recogniser.active().map(|t| t.id).collect::<Vec<_>>(), active);
@@ -175,7 +176,8 @@ fn the_list_does_not_flicker_and_forgets_in_the_end() {
     let limits = Thresholds::default();
     let mut recogniser = new(model);
     let lifted = |by: f64| vec![home[0], DAffine3::from_translation(DVec3::Z * by) * home[1]];
-    // Too far to be taken up; near; a little too far, yet held; too far to be held; and back within the band, not taken up.
+    // Too far to engage; near; slightly too far, but retained; too far to be retained; and back within the band, not
+    // engaged.
     for (by, active) in [(1.2, 0), (0.9, 1), (1.2, 1), (1.45, 1), (1.6, 0), (1.2, 0)] {
         see(&mut recogniser, &lifted(by * limits.distance_mm), &touching);
         assert_eq!(recogniser.active().count(), active, "{by}");
@@ -209,8 +211,8 @@ fn what_does_not_exist_is_passed_over() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// From wherever the hand holds the part within the thresholds, and wherever the assembly is, the same targets are found; and
-    /// along each freedom that is named all of them stay kept.
+    /// The same targets are found from every pose of the held part within the thresholds and every pose of the assembly;
+    /// and along each reported freedom all of them stay satisfied.
     #[test]
     fn targets_are_found_from_near_and_freedoms_are_free(
         axis in prop::array::uniform3(-1.0f64..1.0),

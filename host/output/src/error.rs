@@ -1,8 +1,8 @@
-//! Why a file is not written.
+//! Reasons why a file is not written.
 
 use std::path::PathBuf;
 
-/// Why a file is not written. Each message is one line: what, where, what to do.
+/// Reason why a file is not written. Each message is one line: what, where, what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The target is a file that the command reads.
@@ -10,18 +10,18 @@ pub enum OutputError {
     Input {
         /// Target.
         path: PathBuf,
-        /// The input it is.
+        /// The same file as an input.
         input: PathBuf,
     },
-    /// The target is something else than a regular file.
+    /// The target is not a regular file.
     #[error("{}: is {what}, not a regular file; give another name", .path.display())]
     NotRegular {
         /// Target.
         path: PathBuf,
-        /// What it is.
+        /// Its type.
         what: &'static str,
     },
-    /// There is such a file already.
+    /// The target exists already.
     #[error("{}: exists already; give another name, or --force to replace it", .path.display())]
     Exists {
         /// Target.
@@ -33,12 +33,12 @@ pub enum OutputError {
         /// Target.
         path: PathBuf,
     },
-    /// The system refuses.
+    /// The system refused.
     #[error("{}: cannot be written: {source}; check the path and its permissions", .path.display())]
     Unwritable {
         /// Target.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
 }

@@ -13,8 +13,8 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Makes the folder where there is none, and checks each of `names` in it. To be called before the work begins, with every name that
-    /// may be written.
+    /// Creates the folder if necessary and checks each of `names` in it. Call it before the work begins, with every name that may be
+    /// written.
     ///
     /// # Errors
     /// As [`Output::new`], for the first name that cannot be written.
@@ -41,7 +41,7 @@ impl Folder {
         self.file(name)?.write(bytes)
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }

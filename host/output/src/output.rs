@@ -1,12 +1,12 @@
 //! A file written where a user says, all or nothing.
 //!
-//! An [`Output`] is checked before the work begins and again before it is written. It is never a file that the command reads (the
-//! same file by device and inode, whatever link leads to it), never anything but a regular file (a symbolic link is not followed), and replaces
-//! an existing file only on request. The bytes go to a new file of random name in the same folder, created exclusively, are flushed to the disk, and
-//! then take the target's name in one step; without a request to replace, that step fails when the name is taken meanwhile. So a target is at
-//! every moment absent, the old file, or the whole new one.
+//! An [`Output`] is checked before the work begins and again before it is written. It is never a file that the command reads (identified by
+//! device and inode, through any link), never anything but a regular file (a symbolic link is not followed), and replaces an existing file
+//! only on request. The bytes go to a new file of random name in the same folder, created exclusively, are flushed to the disk, and then
+//! take the target's name in one step; without a request to replace, that step fails if the name has been taken meanwhile. So at every
+//! moment a target is absent, the old file, or the complete new one.
 //!
-//! Limit: between the last check and a requested replacement another process of the same user can still change the name's file.
+//! Limit: between the last check and a requested replacement another process of the same user can still change the file of that name.
 
 use std::fs::{File, Metadata, Permissions};
 use std::io::{self, Write as _};
@@ -22,12 +22,12 @@ use crate::same;
 pub enum Existing {
     /// An existing file is an error.
     Keep,
-    /// An existing regular file is replaced, and its permissions kept.
+    /// An existing regular file is replaced; its permissions are kept.
     Replace,
 }
 
 impl Existing {
-    /// What the option `--force` asks for.
+    /// The value for the option `--force`.
     pub fn from_force(force: bool) -> Self {
         if force { Self::Replace } else { Self::Keep }
     }
@@ -42,10 +42,10 @@ pub struct Output {
 }
 
 impl Output {
-    /// Checks that `path` can become a file and is none of `inputs`. To be called before the work begins.
+    /// Checks that `path` can become a file and is none of `inputs`. Call it before the work begins.
     ///
     /// # Errors
-    /// What stands in the way, see [`OutputError`]; also when the folder takes no new file.
+    /// The reason that prevents it, see [`OutputError`]; also when no file can be created in the folder.
     pub fn new(
         path: impl Into<PathBuf>,
         existing: Existing,
@@ -57,12 +57,12 @@ impl Output {
             inputs: Vec::new(),
         };
         output.add_inputs(inputs)?;
-        // Made and removed again: nothing stays behind when the work is interrupted.
+        // Created and removed again: nothing remains if the work is interrupted.
         output.beside().map_err(|source| output.unwritable(source))?;
         Ok(output)
     }
 
-    /// Further files that must stay as they are, known only after reading.
+    /// Adds files that must not be overwritten and are known only after reading.
     ///
     /// # Errors
     /// The target is one of them.
@@ -72,7 +72,7 @@ impl Output {
         self.check().map(|_| ())
     }
 
-    /// Where the file will be.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -80,7 +80,7 @@ impl Output {
     /// Writes the file, all or nothing.
     ///
     /// # Errors
-    /// As [`Output::new`]; or the disk takes no more.
+    /// As [`Output::new`]; or the disk is full.
     pub fn write(&self, bytes: &[u8]) -> Result<(), OutputError> {
         let replaced = self.check()?;
         let file = self
@@ -108,14 +108,14 @@ impl Output {
         Ok(())
     }
 
-    /// Permissions of the file that is to be replaced, if there is one.
+    /// Permissions of the file to be replaced, if there is one.
     fn check(&self) -> Result<Option<Permissions>, OutputError> {
         if self.path.file_name().is_none() || ends_in_separator(&self.path) {
             return Err(OutputError::NoName {
                 path: self.path.clone(),
             });
         }
-        // Not followed: a link that someone planted leads to a file of theirs or of ours.
+        // A link is not followed: a planted one could lead to any file.
         let found = match std::fs::symlink_metadata(&self.path) {
             Ok(found) => found,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -145,7 +145,7 @@ impl Output {
     fn beside(&self) -> io::Result<NamedTempFile> {
         let mut builder = Builder::new();
         builder.prefix(".mortise-").suffix(".part").rand_bytes(12);
-        // As any new file: what the user's mask leaves of it.
+        // The permissions of any new file, reduced by the user's umask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         builder.tempfile_in(self.folder())
@@ -166,7 +166,7 @@ impl Output {
     }
 }
 
-/// `Path` drops a separator at the end, by which a user says that a folder is meant.
+/// Whether the path ends in a separator, which marks a folder and which `Path` drops.
 fn ends_in_separator(path: &Path) -> bool {
     let bytes = path.as_os_str().as_encoded_bytes();
     bytes
@@ -174,15 +174,15 @@ fn ends_in_separator(path: &Path) -> bool {
         .is_some_and(|&byte| std::path::is_separator(char::from(byte)))
 }
 
-/// Makes the new name last through a power cut, where the system can: the file itself is on the disk already.
+/// Makes the new name durable against loss of power, where the system can: the file itself is on the disk already.
 fn sync(folder: &Path) {
     if cfg!(unix) {
-        // Some file systems do not sync folders; the file is whole either way.
+        // Some file systems do not sync folders; the file is complete in either case.
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
     }
 }
 
-/// What a file that is no regular file is.
+/// Description of a file that is not regular.
 fn kind(found: &Metadata) -> &'static str {
     let kind = found.file_type();
     if kind.is_symlink() {
@@ -204,5 +204,5 @@ fn kind(found: &Metadata) -> &'static str {
             return "a device";
         }
     }
-    "no regular file"
+    "not a regular file"
 }

@@ -1,4 +1,4 @@
-//! What must stay stays: whatever stands at the target, its bytes afterwards are its bytes before, or the whole of the new file.
+//! No data is lost: after any operation the target has its previous bytes or the complete new file.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("temporary folder")
 }
 
-/// Files in the folder, hidden ones too.
+/// Names of the files in the folder, including hidden ones.
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .expect("folder")
@@ -122,7 +122,7 @@ fn only_a_regular_file_is_replaced() {
             .file_type()
             .is_char_device()
     );
-    // Planted between the check and the end of the work.
+    // A link planted between the check and the end of the work.
     let late = at("late");
     let output = Output::new(&late, Existing::Replace, NONE).expect("free");
     symlink(&victim, &late).expect("link");

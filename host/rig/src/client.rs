@@ -1,4 +1,4 @@
-//! The client: what a program does with a rig, whichever it is.
+//! The client: the operations of a program on any rig.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,14 +29,14 @@ pub struct Ran {
     pub state_hash: u64,
 }
 
-/// What this end of the link counted.
+/// Counts at this end of the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkCounts {
-    /// Sound frames from the board.
+    /// Valid frames from the board.
     pub frames: u64,
-    /// Frames thrown away: damaged, too long, undecodable.
+    /// Frames dropped: damaged, too long, undecodable.
     pub bad_frames: u64,
-    /// Telemetry thrown away because this program did not take it in time.
+    /// Telemetry dropped because this program did not take it in time.
     pub dropped_events: u64,
 }
 
@@ -49,7 +49,7 @@ pub struct Client {
     patience: Patience,
     capabilities: Capabilities,
     lockstep: Arc<AtomicBool>,
-    /// Only one message of a kind whose answer carries no number may be under way.
+    /// Serialises messages whose answers carry no sequence number: at most one may be under way.
     asking: Mutex<()>,
     heartbeat: Option<Heartbeat>,
     reader: Option<Reader>,
@@ -57,10 +57,11 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects: opens the rig, greets it until it answers, and asks what it can do. Rigs whose ticks are released by the host are put in lockstep.
+    /// Connects: opens the rig, greets it until it answers, and reads its capabilities. Rigs whose ticks are released by the host are
+    /// switched to lockstep.
     ///
     /// # Errors
-    /// Everything [`RigError`] lists up to and with `VersionMismatch`.
+    /// All of [`RigError`] up to and including `VersionMismatch`.
     pub fn connect(spec: &RigSpec) -> Result<Self, RigError> {
         Self::connect_through(spec, None, Ok)
     }
@@ -73,7 +74,7 @@ impl Client {
         Self::connect_through(spec, Some(image), Ok)
     }
 
-    /// As [`Self::connect`], through a line whose faults begin when asked: [`Client::fault_line`].
+    /// Like [`Self::connect`], through a line with faults that begin on request: [`Client::fault_line`].
     ///
     /// # Errors
     /// As [`Self::connect`].
@@ -121,7 +122,7 @@ impl Client {
         Ok(self)
     }
 
-    /// Connects over a transport of the caller's. `name` is for messages, `elf` the firmware where known (for its log).
+    /// Connects over a transport of the caller's. `name` is used in messages; `elf` is the firmware where known, for its log.
     pub fn over(
         transport: Transport,
         name: &str,
@@ -139,7 +140,7 @@ impl Client {
         mode: EmulatedMode,
     ) -> Result<Self, RigError> {
         let (link, reader) = Link::start(transport, elf)?;
-        // From here on an early return must end the reader: `reader` is held by a guard that does.
+        // From here on an early return must end the reader, which this guard does.
         let guard = Ending {
             link: link.clone(),
             reader: Some(reader),
@@ -164,32 +165,32 @@ impl Client {
         })
     }
 
-    /// What the board can do, as told when the connection was made.
+    /// The board's capabilities, as reported at connection.
     pub fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }
 
-    /// What was connected to, as written.
+    /// Name of the connected rig, as written in its specification.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The faults in this link, where it was made with any.
+    /// The faults in this link, if it was made with any.
     pub fn fault_line(&self) -> Option<&FaultLine> {
         self.fault_line.as_ref()
     }
 
-    /// What the board says unasked.
+    /// Unsolicited messages of the board.
     pub fn events(&self) -> &Events {
         &self.link.events
     }
 
-    /// The state the board last told.
+    /// The last state that the board reported.
     pub fn state(&self) -> DeviceState {
         self.link.state().unwrap_or(self.capabilities.state)
     }
 
-    /// Counters of this end.
+    /// Counts at this end.
     pub fn link_counts(&self) -> LinkCounts {
         LinkCounts {
             frames: self.link.frames.load(Ordering::Relaxed),
@@ -206,13 +207,13 @@ impl Client {
         self.link.send(&message)
     }
 
-    /// Sends and waits until the board has done it or said why not.
+    /// Sends a message and waits until the board has executed or refused it.
     ///
     /// # Errors
     /// `Refused`, `Timeout`, `LinkLost`, `TooLarge`.
     pub fn request(&self, message: ToDevice) -> Result<(), RigError> {
         match &message {
-            // Who greets by hand has begun another session, unless the board does not speak with this version.
+            // A greeting sent explicitly begins another session, unless its version differs from the board's.
             ToDevice::Hello(version) => {
                 let own = *version == Version::own();
                 self.ask(&message)?;
@@ -248,7 +249,7 @@ impl Client {
         }
     }
 
-    /// The board's counters; `reset`: it counts anew after answering.
+    /// The board's counters; with `reset` it restarts them after answering.
     ///
     /// # Errors
     /// As [`Client::request`].
@@ -260,7 +261,7 @@ impl Client {
         }
     }
 
-    /// The description of the rig that the board keeps, and whether it is in use.
+    /// The description of the rig stored on the board, and whether it is in use.
     ///
     /// # Errors
     /// As [`Client::request`].
@@ -271,7 +272,7 @@ impl Client {
         }
     }
 
-    /// Asks again what the board can do: the scene in use and the state change.
+    /// Reads the board's capabilities again, which include the scene in use and the state.
     ///
     /// # Errors
     /// As [`Client::request`].
@@ -290,7 +291,7 @@ impl Client {
         self.request(ToDevice::Lockstep(on))
     }
 
-    /// Lets `ticks` ticks run in lockstep and waits until they are done.
+    /// Runs `ticks` ticks in lockstep and waits until they are done.
     ///
     /// # Errors
     /// As [`Client::request`]; `Refused(Lockstep)` when not in lockstep.
@@ -302,7 +303,7 @@ impl Client {
         }
     }
 
-    /// Motors off, at once. Returns when the message has been written; the answer shows as [`crate::Event::State`].
+    /// Motors off, at once. Returns when the message has been written; the effect is reported as [`crate::Event::State`].
     ///
     /// # Errors
     /// `LinkLost`: the board then stops by itself.
@@ -310,14 +311,14 @@ impl Client {
         self.link.send(&ToDevice::Stop).map(|_| ())
     }
 
-    /// Ends the link from this side: whoever waits for the board (an upload on another thread) gets `LinkLost` at once. No event tells of it.
-    /// Where motors may be on, [`Client::stop`] comes first.
+    /// Ends the link from this side: a thread that waits for the board (such as an upload) gets `LinkLost` at once. No event reports it.
+    /// Where motors may be on, call [`Client::stop`] first.
     pub fn hang_up(&self) {
         self.link.close();
         self.link.lose("this program ended it");
     }
 
-    /// Writes bytes that are no frame, and ends them: for showing that they do no harm.
+    /// Writes bytes that are no frame, and a delimiter: for tests that garbage does no harm.
     ///
     /// # Errors
     /// `LinkLost`.
@@ -325,12 +326,12 @@ impl Client {
         self.link.write_raw(bytes)
     }
 
-    /// Restarts the board and greets it anew over the same link.
+    /// Restarts the board and greets it again over the same link.
     ///
     /// # Errors
     /// As [`Client::request`] and [`Client::connect`].
     pub fn restart(mut self) -> Result<Self, RigError> {
-        // Heartbeats in between are refused, and that is no news.
+        // Heartbeats sent meanwhile are refused, which is expected.
         self.link.forget_greeting();
         self.request(ToDevice::Restart)?;
         let lockstep = self.lockstep.swap(false, Ordering::Relaxed);
@@ -361,7 +362,7 @@ impl Client {
 
     fn obtain(&self, message: &ToDevice) -> Result<Answer, RigError> {
         if matches!(message, ToDevice::Hello(_)) {
-            // Who greets by hand may do so as another version.
+            // An explicit greeting may be that of another version.
             self.link.forget_greeting();
         }
         match obtain(&self.link, message, &self.patience) {
@@ -377,7 +378,7 @@ impl Client {
     }
 }
 
-/// Ends the reader when the connection does not come about.
+/// Ends the reader if connecting fails.
 struct Ending {
     link: Arc<Link>,
     reader: Option<Reader>,

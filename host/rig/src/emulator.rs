@@ -12,31 +12,31 @@ use crate::preload::Preload;
 use crate::spec::EmulatedMode;
 use crate::transport::{READ_WAIT, Transport};
 
-/// Names another QEMU program.
+/// Environment variable that names another QEMU program.
 pub const QEMU_VARIABLE: &str = "MORTISE_QEMU";
-/// Names another firmware ELF.
+/// Environment variable that names another firmware ELF.
 pub const FIRMWARE_VARIABLE: &str = "MORTISE_FIRMWARE";
-/// `pty` or `tcp`: how the UART is reached. Default `pty` on Unix, `tcp` elsewhere.
+/// Environment variable with the connection to the UART, `pty` or `tcp`. Default `pty` on Unix, `tcp` elsewhere.
 pub const SERIAL_VARIABLE: &str = "MORTISE_QEMU_SERIAL";
 
 const BOARD: &str = "mps2-an500";
 const TARGET: &str = "thumbv7em-none-eabihf";
-/// Longest QEMU may take to say where its UART is: a loaded machine starts it in well under a second.
+/// Time limit for QEMU to report its UART: even a loaded machine starts it in well under a second.
 const START_WAIT: Duration = Duration::from_secs(20);
 const INSTALL: &str = "install QEMU (`cargo xtask setup`, or on Debian and Ubuntu `sudo apt-get install qemu-system-arm`), or name one with MORTISE_QEMU; without QEMU use the rig `sim`";
 
-/// Ends QEMU when dropped.
+/// The QEMU process, ended when dropped.
 struct Qemu(Child);
 
 impl Drop for Qemu {
     fn drop(&mut self) {
-        // Already gone is as good.
+        // An error means that it has already ended.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// Path of the emulated board's firmware: `given`, else the environment's ([`FIRMWARE_VARIABLE`]), else the one the workspace builds.
+/// Path of the emulated board's firmware: `given`, else that of [`FIRMWARE_VARIABLE`], else the one that the workspace builds.
 ///
 /// # Errors
 /// `NoFirmware`: no such file.
@@ -69,12 +69,12 @@ pub fn firmware_path(given: Option<&Path>) -> Result<PathBuf, RigError> {
     places.ok_or(RigError::NoFirmware { path: built })
 }
 
-/// The QEMU program to start.
+/// Path of the QEMU program.
 fn qemu() -> PathBuf {
     std::env::var_os(QEMU_VARIABLE).map_or_else(|| "qemu-system-arm".into(), PathBuf::from)
 }
 
-/// Whether QEMU and firmware are there, else what to do.
+/// Whether QEMU and firmware are available; the error says what to do.
 pub(crate) fn available(firmware: Option<&Path>) -> Result<(), String> {
     let found = Command::new(qemu())
         .arg("--version")
@@ -128,14 +128,14 @@ fn command(mode: EmulatedMode, firmware: &Path, scene: Option<&Preload>, serial:
         .stderr(Stdio::piped());
     command.args(scene.iter().flat_map(|scene| scene.arguments()));
     if mode != EmulatedMode::Interactive {
-        // 2 ns an instruction; `sleep=off`: idle time is skipped, so a run takes no longer than its instructions.
+        // 2 ns per instruction; `sleep=off` skips idle time, so a run takes no longer than its instructions.
         command.args(["-icount", "shift=1,sleep=off"]);
     }
     command
 }
 
-/// Starts QEMU on a thread that stays with it and passes on what it says: on Linux QEMU ends with this program, and that goes by the thread which
-/// started it.
+/// Starts QEMU on a thread that stays with it and forwards its output. On Linux QEMU ends with this program, by a signal that is tied to
+/// the thread which started it.
 fn spawn(mut command: Command) -> Result<(Qemu, mpsc::Receiver<String>), RigError> {
     let program = command.get_program().to_string_lossy().into_owned();
     let (to, lines) = mpsc::sync_channel(32);
@@ -147,7 +147,7 @@ fn spawn(mut command: Command) -> Result<(Qemu, mpsc::Receiver<String>), RigErro
         .spawn(move || match command.spawn() {
             Ok(mut child) => {
                 let stdout = child.stdout.take();
-                // Whoever asked waits for it.
+                // The caller waits for it.
                 let _ = started.send(Ok((Qemu(child), to.clone())));
                 if let Some(stdout) = stdout {
                     read_lines(stdout, &to);
@@ -174,19 +174,19 @@ fn spawn(mut command: Command) -> Result<(Qemu, mpsc::Receiver<String>), RigErro
     Ok((qemu, lines))
 }
 
-/// Whatever ends this program, SIGKILL too, which leaves no time for `Drop`: the kernel then kills QEMU. It does so when the thread that starts
-/// `command` ends.
+/// Makes the kernel kill QEMU when this program ends for any reason, including SIGKILL, which leaves no time for `Drop`. The kernel does so
+/// when the thread that starts `command` ends.
 #[cfg(target_os = "linux")]
 fn end_with_this_program(command: &mut Command) {
     use std::os::unix::process::CommandExt as _;
     let parent = std::process::id();
-    // SAFETY: between fork and exec two system calls and no more, which take no lock and no memory.
+    // SAFETY: between fork and exec only two system calls run, which take no lock and no memory.
     unsafe {
         command.pre_exec(move || {
             if libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0 {
                 return Err(io::Error::last_os_error());
             }
-            // Had it ended before, no signal would come.
+            // If the parent had ended already, no signal would come.
             if libc::getppid().cast_unsigned() != parent {
                 return Err(io::ErrorKind::BrokenPipe.into());
             }
@@ -195,10 +195,10 @@ fn end_with_this_program(command: &mut Command) {
     }
 }
 
-/// Passes the lines of `stream` on for as long as it lives, so that QEMU never blocks on a full pipe.
+/// Forwards the lines of `stream` until it ends, so that QEMU never blocks on a full pipe.
 fn read_lines(stream: impl Read, to: &mpsc::SyncSender<String>) {
     for line in BufReader::new(stream).lines().map_while(Result::ok) {
-        // Nobody listens after the start: then lines are only read away.
+        // After the start nothing receives the lines; they are only drained.
         let _ = to.try_send(line);
     }
 }
@@ -231,7 +231,7 @@ fn start_on_tcp(mode: EmulatedMode, firmware: &Path, scene: Option<Preload>) -> 
         what: format!("no TCP port on this computer: {error}"),
         hint: "check the firewall for 127.0.0.1".into(),
     };
-    // This side listens, so that the port is taken before QEMU starts and nobody can be faster.
+    // This side listens, so that the port is taken before QEMU starts and no other process can take it.
     let listener = TcpListener::bind(("127.0.0.1", 0)).map_err(no_port)?;
     listener.set_nonblocking(true).map_err(no_port)?;
     let address = listener.local_addr().map_err(no_port)?;
@@ -295,7 +295,7 @@ fn not_started(qemu: &mut Qemu, said: &[String]) -> RigError {
 mod tests {
     use super::*;
 
-    /// Set in the process that is killed.
+    /// Environment variable that marks the process to be killed.
     const VICTIM: &str = "MORTISE_TEST_VICTIM";
 
     fn sleeper() -> Command {
@@ -304,7 +304,7 @@ mod tests {
         command
     }
 
-    /// Whether it runs: neither gone nor waiting for a parent to take note of its end.
+    /// Whether a process runs, that is, has neither ended nor become a zombie.
     fn runs(process: &str) -> bool {
         std::fs::read_to_string(format!("/proc/{process}/stat")).is_ok_and(|stat| {
             stat.rsplit(") ")
@@ -317,7 +317,7 @@ mod tests {
     fn it_outlives_the_thread_that_asked_for_it() {
         let asked = std::thread::spawn(|| spawn(sleeper()).expect("started"));
         let (mut qemu, _lines) = asked.join().expect("no panic");
-        // Long enough for the signal, which the kernel sends while the thread ends.
+        // Time for the signal, which the kernel sends while the thread ends.
         std::thread::sleep(Duration::from_millis(100));
         assert!(matches!(qemu.0.try_wait(), Ok(None)));
     }
@@ -343,9 +343,9 @@ mod tests {
         let said = BufReader::new(victim.stdout.take().expect("piped"))
             .lines()
             .map_while(Result::ok);
-        // The harness writes the test's name before, on the same line.
+        // The harness writes the test's name before it, on the same line.
         let process = { said }.find_map(|line| Some(line.split_once("started ")?.1.to_owned()));
-        let process = process.expect("it tells of its companion");
+        let process = process.expect("it reports its QEMU process");
         assert!(runs(&process));
         victim.kill().expect("killed");
         victim.wait().expect("ended");

@@ -1,4 +1,4 @@
-//! Everything that can go wrong with a rig, in words: what, where, what to do.
+//! Errors of a rig, in words: what, where, and what to do.
 
 use std::path::PathBuf;
 
@@ -6,17 +6,17 @@ use mortise_protocol::message::{Refusal, Version};
 
 use crate::words::Words;
 
-/// Why a rig could not do what it was asked.
+/// Reason why a rig could not do what was requested.
 #[derive(Debug, thiserror::Error)]
 pub enum RigError {
-    /// The port could not be opened for a reason other than those below.
+    /// The port could not be opened, for a reason other than those below.
     #[error("cannot open {port}: {source}; {hint}")]
     Open {
         /// Port.
         port: String,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
-        /// What to do.
+        /// Remedy.
         hint: String,
     },
     /// There is no such port.
@@ -24,7 +24,7 @@ pub enum RigError {
     NoSuchPort {
         /// Port.
         port: String,
-        /// The ports there are, or what to plug in.
+        /// The available ports, or what to plug in.
         known: String,
     },
     /// Another program has the port.
@@ -40,17 +40,17 @@ pub enum RigError {
     Permission {
         /// Port.
         port: String,
-        /// How to get it.
+        /// How to get the permission.
         fix: String,
     },
-    /// Nothing that speaks this protocol answered.
+    /// No answer in this protocol.
     #[error("{rig} did not answer within {waited_s:.1} s: {hint}")]
     NoAnswer {
         /// Rig.
         rig: String,
-        /// s.
+        /// Waiting time, s.
         waited_s: f64,
-        /// What to do.
+        /// Remedy.
         hint: String,
     },
     /// Program and firmware are of different versions.
@@ -60,27 +60,27 @@ pub enum RigError {
         version_words(.device)
     )]
     VersionMismatch {
-        /// This side.
+        /// Version of this program.
         host: Version,
-        /// The board.
+        /// Version of the board's firmware.
         device: Version,
     },
-    /// The board said no.
+    /// The board refused a request.
     #[error("{what} was refused: {}", .reason.words())]
     Refused {
-        /// What was asked.
+        /// The request.
         what: String,
-        /// Why not.
+        /// The reason.
         reason: Refusal,
     },
     /// The board did not answer in time.
     #[error(
-        "no answer to {what} within {after_ms} ms: the link or the board is stalled; try again, or connect anew"
+        "no answer to {what} within {after_ms} ms: the link or the board is stalled; try again, or reconnect"
     )]
     Timeout {
-        /// What was asked.
+        /// The request.
         what: String,
-        /// ms.
+        /// Waiting time, ms.
         after_ms: u64,
     },
     /// The link is gone.
@@ -88,7 +88,7 @@ pub enum RigError {
         "the link to the board is lost: {why}; the board switches its motors off by itself; connect again"
     )]
     LinkLost {
-        /// What was seen.
+        /// What was observed.
         why: String,
     },
     /// QEMU is missing or did not start.
@@ -96,23 +96,23 @@ pub enum RigError {
     Qemu {
         /// What happened.
         what: String,
-        /// What to do.
+        /// Remedy.
         hint: String,
     },
     /// The firmware for the emulated board is missing.
     #[error("there is no firmware at {}: build it with `cargo xtask firmware mps2-an500`, or name another with MORTISE_FIRMWARE", .path.display())]
     NoFirmware {
-        /// Where it was looked for.
+        /// Path that was searched.
         path: PathBuf,
     },
     /// The message does not fit into a frame.
     #[error("{what} is larger than a frame can carry")]
     TooLarge {
-        /// What was asked.
+        /// The message.
         what: String,
     },
-    /// The bytes handed over for sending are no scene image at all.
-    #[error("{what}: bake a STEP file into a scene image first")]
+    /// The bytes to be sent are no scene image.
+    #[error("{what}: bake a STEP file to a scene image first")]
     NotAScene {
         /// What is wrong with them.
         what: String,
@@ -123,7 +123,7 @@ pub enum RigError {
 }
 
 impl RigError {
-    /// The board's reason when it refused.
+    /// The board's reason for a refusal.
     pub fn refusal(&self) -> Option<Refusal> {
         match self {
             Self::Refused { reason, .. } => Some(*reason),
@@ -131,7 +131,7 @@ impl RigError {
         }
     }
 
-    /// Nothing more can be done over this link.
+    /// Whether the link is lost, so that nothing more can be done over it.
     pub fn is_link_lost(&self) -> bool {
         matches!(self, Self::LinkLost { .. })
     }

@@ -1,4 +1,4 @@
-//! What a board says unasked, in a bounded queue that never makes the reader wait.
+//! Unsolicited messages of a board, in a bounded queue that never blocks the reader.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{RecvTimeoutError, TryRecvError};
@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use mortise_protocol::message::{DeviceState, Fault, Telemetry};
 
-/// Most events that wait; at 1 kHz telemetry about four seconds of them.
+/// Capacity of the queue; at 1 kHz telemetry about four seconds.
 pub const MAX_EVENTS: usize = 4096;
 
-/// Said unasked.
+/// An unsolicited message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// One sample of the loop.
@@ -22,16 +22,16 @@ pub enum Event {
         /// The new state.
         state: DeviceState,
     },
-    /// Something went wrong; motors are off or going off. [`crate::describe`] has the words.
+    /// A fault occurred; motors are off or going off. [`crate::describe`] has the words.
     Fault {
-        /// Tick it was seen.
+        /// Tick in which it was detected.
         tick: u32,
-        /// What.
+        /// The fault.
         fault: Fault,
     },
     /// A line of the board's log.
     Log(String),
-    /// The link is gone, and why. The last event.
+    /// The link is lost, and why. The last event.
     LinkLost(String),
 }
 
@@ -42,7 +42,7 @@ struct Queue {
     closed: bool,
 }
 
-/// The end events are taken from. Cheap to clone; each event is seen by one taker.
+/// The receiving end. Cheap to clone; each event goes to one receiver.
 #[derive(Clone, Debug, Default)]
 pub struct Events {
     shared: Arc<(Mutex<Queue>, Condvar)>,
@@ -53,7 +53,7 @@ impl Events {
         self.shared.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The oldest event, if one waits.
+    /// The oldest queued event, if any.
     pub fn try_recv(&self) -> Result<Event, TryRecvError> {
         let mut queue = self.queue();
         match queue.waiting.pop_front() {
@@ -63,7 +63,7 @@ impl Events {
         }
     }
 
-    /// The oldest event; waits for one no longer than `timeout`.
+    /// The oldest event; waits for one at most `timeout`.
     pub fn recv_timeout(&self, timeout: Duration) -> Result<Event, RecvTimeoutError> {
         let deadline = Instant::now() + timeout;
         let mut queue = self.queue();
@@ -87,17 +87,17 @@ impl Events {
         }
     }
 
-    /// All events that wait now, oldest first.
+    /// All events queued now, oldest first.
     pub fn try_iter(&self) -> impl Iterator<Item = Event> + '_ {
         std::iter::from_fn(|| self.try_recv().ok())
     }
 
-    /// Telemetry thrown away because nobody took it in time.
+    /// Number of telemetry samples dropped because they were not taken in time.
     pub fn dropped(&self) -> u64 {
         self.queue().dropped
     }
 
-    /// Adds an event. When full, the oldest telemetry goes, and the oldest event when there is none: a fault must not be lost to samples.
+    /// Adds an event. When full, drops the oldest telemetry, or the oldest event when there is none: a fault must not be lost to samples.
     pub(crate) fn push(&self, event: Event) {
         let mut queue = self.queue();
         if queue.closed {
@@ -116,7 +116,7 @@ impl Events {
         self.shared.1.notify_one();
     }
 
-    /// No event will come any more; those that wait can still be taken.
+    /// Marks the end: no event will be added; queued ones can still be taken.
     pub(crate) fn close(&self) {
         self.queue().closed = true;
         self.shared.1.notify_all();

@@ -1,4 +1,4 @@
-//! One message and its answer, and the greeting: how often and how long a client asks.
+//! One message and its answer, and the greeting: number of attempts and waiting times of a client.
 
 use std::time::{Duration, Instant};
 
@@ -8,14 +8,14 @@ use crate::error::RigError;
 use crate::link::{Answer, Link};
 use crate::words::Words;
 
-/// How patient a client is.
+/// Waiting times of a client.
 #[derive(Clone, Debug)]
 pub struct Patience {
-    /// Handshake, whole.
+    /// Limit for the whole handshake.
     pub greeting: Duration,
-    /// One answer. A message that may be sent twice without harm is sent [`ATTEMPTS`] times.
+    /// Limit for one answer. A message that may be repeated without harm is sent [`ATTEMPTS`] times.
     pub answer: Duration,
-    /// No sound frame for so long, though asked: the link is lost.
+    /// Time without a valid frame, despite requests, after which the link is lost.
     pub silence: Duration,
 }
 
@@ -31,7 +31,7 @@ impl Default for Patience {
 }
 
 impl Patience {
-    /// For rigs that share this computer: nothing gets lost, but a loaded computer makes them slow.
+    /// For rigs on this computer: no data is lost, but a loaded computer makes them slow.
     pub fn long() -> Self {
         Self {
             greeting: Duration::from_secs(30),
@@ -41,21 +41,21 @@ impl Patience {
     }
 }
 
-/// Sendings of a message that may be repeated.
+/// Number of times a repeatable message is sent.
 pub const ATTEMPTS: u32 = 3;
-/// Sendings after "the queue is full", which changes nothing on the board.
+/// Number of times a message is sent after "the queue is full", which changes nothing on the board.
 const BUSY_ATTEMPTS: u32 = 200;
 const BUSY_PAUSE: Duration = Duration::from_millis(5);
-/// Between two greetings.
+/// Pause between two greetings.
 const GREETING_PAUSE: Duration = Duration::from_millis(250);
-/// A board that has just refused something is there to say why it started.
+/// Wait for the reason of a restart: a board that has just refused a message is able to answer.
 const WHY_WAIT: Duration = Duration::from_secs(1);
-/// Erasing a slot of flash takes seconds on a real board; checking one takes less than an answer may.
+/// Wait for flash: erasing a slot takes seconds on a real board; checking one takes less than an answer may.
 const FLASH_WAIT: Duration = Duration::from_secs(15);
-/// Wall time a lockstep tick may take: an emulated board under load on a slow machine.
+/// Wall time allowed per lockstep tick: an emulated board under load on a slow machine.
 const TICK_WAIT: Duration = Duration::from_millis(20);
 
-/// Sending it twice does what sending it once does.
+/// Whether sending the message twice has the same effect as sending it once.
 fn repeatable(message: &ToDevice) -> bool {
     match message {
         ToDevice::Hello(_)
@@ -79,7 +79,7 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::Lockstep(_) => true,
         ToDevice::Arm
         | ToDevice::ClearFault
-        // The handle may have left its reference pose meanwhile.
+        // The handle may have left its reference pose between the two.
         | ToDevice::Home
         | ToDevice::Grab { .. }
         | ToDevice::SceneCommit
@@ -91,7 +91,7 @@ fn repeatable(message: &ToDevice) -> bool {
     }
 }
 
-/// It brings the motors nearer to being driven: only as long as what the operator saw still holds.
+/// Whether the message brings the motors closer to being driven, so that it must not outlive the state on which the operator decided.
 fn rearms(message: &ToDevice) -> bool {
     matches!(
         message,
@@ -131,7 +131,7 @@ pub(crate) fn obtain(link: &Link, message: &ToDevice, patience: &Patience) -> Re
                 Some(Answer::Refused(Refusal::Busy)) if busy < BUSY_ATTEMPTS => {
                     busy += 1;
                     std::thread::sleep(BUSY_PAUSE);
-                    // After a stop or a fault it is for the operator to decide anew.
+                    // After a stop or a fault the operator must decide again.
                     if rearms(message) && link.halts() != decided {
                         return Err(RigError::Refused {
                             what: message.words(),
@@ -159,7 +159,7 @@ pub(crate) fn obtain(link: &Link, message: &ToDevice, patience: &Patience) -> Re
     }
 }
 
-/// Says hello until the board does, then asks what it can do.
+/// Greets the board until it answers, then reads its capabilities.
 pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capabilities, RigError> {
     let begun = Instant::now();
     let hello = ToDevice::Hello(Version::own());
@@ -171,7 +171,7 @@ pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capa
     }
     };
     loop {
-        // Ends whatever half a frame lies on the wire.
+        // Terminates any incomplete frame on the wire.
         link.write_raw(&[])?;
         let ticket = link.post(&hello)?;
         if let Some(Answer::Value(value)) = ticket.wait(GREETING_PAUSE)?
@@ -206,8 +206,8 @@ pub(crate) fn greet(link: &Link, name: &str, patience: &Patience) -> Result<Capa
     }
 }
 
-/// A board that has started anew has forgotten parameters, targets and grip, so what this program believes of it is wrong: asks why it started and
-/// ends the link with the answer.
+/// Ends the link to a board that has restarted, with the board's reason: it has lost parameters, targets and the held part, so this program's
+/// assumptions about it are invalid.
 pub(crate) fn started_anew(link: &Link, name: &str) -> RigError {
     let patience = Patience {
         greeting: WHY_WAIT,
@@ -218,8 +218,8 @@ pub(crate) fn started_anew(link: &Link, name: &str) -> RigError {
         Ok(capabilities) => capabilities.reset.words(),
         Err(error) => error.to_string(),
     };
-    let why = format!("the board has started anew: {why}");
+    let why = format!("the board has restarted: {why}");
     link.lose(&why);
-    // Another thread may have said it before, or the cable may have gone: the first reason stays.
+    // Another thread may have reported a loss before, or the cable may be unplugged: the first reason stays.
     link.check().err().unwrap_or(RigError::LinkLost { why })
 }

@@ -1,4 +1,4 @@
-//! The heartbeat: keeps the link alive, and notices when it is not and when the board has started anew.
+//! The heartbeat: keeps the link alive, and detects a dead link or a restarted board.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -12,12 +12,12 @@ use crate::exchange::started_anew;
 use crate::link::Link;
 use crate::real_time;
 
-/// Between two heartbeats: a fifth of the default silence the board bears while armed.
+/// Interval of heartbeats: a fifth of the default host timeout of an armed board.
 pub(crate) const HEARTBEAT: Duration = Duration::from_millis(100);
-/// The same for a counted board, whose virtual time runs ahead of the wall clock.
+/// The interval for a counted board, whose virtual time runs ahead of the wall clock.
 pub(crate) const HEARTBEAT_COUNTED: Duration = Duration::from_millis(5);
 
-/// See the module.
+/// See the module's documentation.
 pub(crate) struct Heartbeat {
     ending: Arc<(Mutex<bool>, Condvar)>,
     thread: Option<JoinHandle<()>>,
@@ -37,7 +37,7 @@ impl Heartbeat {
             .spawn({
                 let (ending, name) = (ending.clone(), name.to_owned());
                 move || {
-                    // A board whose clock goes on while this thread waits for a busy computer stops its motors.
+                    // While this thread waits for a busy computer, a board whose clock continues would stop its motors.
                     real_time::ask();
                     loop {
                         let ended = ending.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -53,7 +53,7 @@ impl Heartbeat {
                             started_anew(&link, &name);
                             return;
                         }
-                        // In lockstep the board waits for the host, however long that takes.
+                        // In lockstep the board waits for the host without limit.
                         if lockstep.load(Ordering::Relaxed) {
                             link.forgive_silence();
                             continue;
@@ -63,7 +63,10 @@ impl Heartbeat {
                         }
                         let unheard = link.unheard_for();
                         if unheard > silence {
-                            link.lose(&format!("nothing was heard for {:.1} s", unheard.as_secs_f64()));
+                            link.lose(&format!(
+                                "nothing was received for {:.1} s",
+                                unheard.as_secs_f64()
+                            ));
                             return;
                         }
                     }
@@ -82,7 +85,7 @@ impl Drop for Heartbeat {
         *self.ending.0.lock().unwrap_or_else(PoisonError::into_inner) = true;
         self.ending.1.notify_all();
         if let Some(thread) = self.thread.take() {
-            // A panic there has no more to say here.
+            // A panic there has no further information.
             let _ = thread.join();
         }
     }

@@ -19,8 +19,8 @@
 //! # }
 //! ```
 //!
-//! A thread of its own reads and sorts what the board says: answers go to whoever waits for them, everything else into a
-//! bounded queue of [`Event`]s. Another keeps the link alive and notices when it is not. The protocol is in `docs/protocol.md`.
+//! A separate thread reads and sorts the board's messages: answers go to their waiting callers, all others into a bounded queue of
+//! [`Event`]s. Another thread keeps the link alive and detects its loss. The protocol is in `docs/protocol.md`.
 
 mod client;
 mod description;

@@ -1,4 +1,4 @@
-//! The link: numbers what goes out, reads what comes in on a thread of its own, and brings the two together.
+//! The link: numbers outgoing messages, reads incoming ones on its own thread, and matches answers to requests.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,7 +17,7 @@ use crate::log::{self, LogReader};
 use crate::transport::{Transport, is_quiet, write_whole};
 use crate::words::Words;
 
-/// What answers a message.
+/// Kind of answer that a message expects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Expect {
     Ack,
@@ -55,7 +55,7 @@ impl Expect {
     }
 }
 
-/// What came back.
+/// An answer.
 #[derive(Debug)]
 pub(crate) enum Answer {
     Done,
@@ -63,7 +63,7 @@ pub(crate) enum Answer {
     Value(Box<FromDevice>),
 }
 
-/// A message under way. Forgotten by the link when dropped.
+/// A message under way. Dropping it removes it from the link.
 pub(crate) struct Ticket<'l> {
     link: &'l Link,
     seq: u16,
@@ -84,7 +84,7 @@ struct Desk {
 struct Writer {
     port: Box<dyn std::io::Write + Send>,
     last: Instant,
-    /// Of the last frame; without one the board has not told the session's name yet.
+    /// Stamp of the last frame; `None` until the board has given the session's number.
     stamp: Option<Stamp>,
 }
 
@@ -94,13 +94,13 @@ enum Greeted {
     /// Not greeted yet, or a restart is under way.
     #[default]
     No,
-    /// Greeted with this message, counted as [`Link::sent`] counts.
+    /// Greeted with this message, numbered as by [`Link::sent`].
     With(u64),
-    /// Greeted, and it refused a later message as not greeted: it has started anew.
+    /// Greeted, but a later message was refused as not greeted: the board has restarted.
     Forgotten,
 }
 
-/// Shared by the client, the reader thread and the heartbeat.
+/// State shared by the client, the reader thread and the heartbeat.
 pub(crate) struct Link {
     writer: Mutex<Writer>,
     desk: Mutex<Desk>,
@@ -109,9 +109,9 @@ pub(crate) struct Link {
     closing: AtomicBool,
     state: Mutex<Option<DeviceState>>,
     greeted: Mutex<Greeted>,
-    /// Stops this program sent, and stops and faults the board told of.
+    /// Number of stops sent by this program, and of stops and faults reported by the board.
     halts: AtomicU64,
-    /// Messages sent; a sequence number is the lowest 16 bits of it.
+    /// Number of messages sent; a sequence number is its lowest 16 bits.
     sent: AtomicU64,
     heard: Mutex<Instant>,
     pub(crate) frames: AtomicU64,
@@ -122,7 +122,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A reader thread and whatever the transport keeps alive.
+/// A reader thread and the objects that the transport keeps alive.
 pub(crate) struct Reader {
     thread: Option<JoinHandle<()>>,
     _keep: Option<Box<dyn Send + Sync>>,
@@ -131,7 +131,7 @@ pub(crate) struct Reader {
 impl Reader {
     pub(crate) fn join(&mut self) {
         if let Some(thread) = self.thread.take() {
-            // A panic in the reader has already shown as a lost link.
+            // A panic in the reader has already been reported as a lost link.
             let _ = thread.join();
         }
     }
@@ -180,7 +180,7 @@ impl Link {
         let mut bytes = [0u8; 4096];
         while !self.closing.load(Ordering::Relaxed) {
             let count = match reader.read(&mut bytes) {
-                Ok(0) => return self.lose("the other end has closed it"),
+                Ok(0) => return self.lose("the other end has closed the connection"),
                 Ok(count) => count,
                 Err(error) if is_quiet(&error) => continue,
                 Err(error) => return self.lose(&error.to_string()),
@@ -208,7 +208,7 @@ impl Link {
             }
             FromDevice::Refused { seq, reason } => {
                 let mut greeted = lock(&self.greeted);
-                // A refusal of what was sent before the greeting may come late.
+                // A late refusal of a message from before the greeting does not count.
                 let later = |greeting| self.number(seq) > greeting;
                 if reason == Refusal::NotGreeted && matches!(*greeted, Greeted::With(number) if later(number))
                 {
@@ -289,11 +289,11 @@ impl Link {
         Ok(seq)
     }
 
-    /// Sends and remembers that an answer is due.
+    /// Sends a message and registers that it expects an answer.
     pub(crate) fn post(&self, message: &ToDevice) -> Result<Ticket<'_>, RigError> {
         let mut writer = lock(&self.writer);
         let seq = self.next_sequence(&writer);
-        // Before it is written: the answer may be faster than this thread.
+        // Registered before writing: the answer may be faster than this thread.
         lock(&self.desk).slots.push(Slot {
             seq,
             expect: Expect::of(message),
@@ -304,12 +304,12 @@ impl Link {
         Ok(ticket)
     }
 
-    /// Under the writer's lock, so that messages go out in order.
+    /// Called under the writer's lock, so that messages are sent in order.
     fn next_sequence(&self, _writer: &Writer) -> u16 {
         (self.sent.fetch_add(1, Ordering::Relaxed) + 1) as u16
     }
 
-    /// The newest message of this sequence number, counted as [`Self::sent`] counts.
+    /// The newest message with this sequence number, numbered as by [`Self::sent`].
     fn number(&self, seq: u16) -> u64 {
         let sent = self.sent.load(Ordering::Relaxed);
         sent.saturating_sub(u64::from((sent as u16).wrapping_sub(seq)))
@@ -321,7 +321,8 @@ impl Link {
             self.halts.fetch_add(1, Ordering::SeqCst);
         }
         let mut out = [0u8; MAX_FRAME];
-        // Under the writer's lock, so that counts rise in the order of the frames. A greeting has the frozen layout, without a stamp.
+        // Under the writer's lock, so that the stamp's counts rise in the order of the frames. A greeting has the frozen layout, without a
+        // stamp.
         if let Some(stamp) = &mut writer.stamp {
             stamp.count = stamp.count.wrapping_add(1);
         }
@@ -338,7 +339,7 @@ impl Link {
         })
     }
 
-    /// Writes `bytes` as they are, and a delimiter: whatever garbage lies on the wire ends there.
+    /// Writes `bytes` unchanged, then a delimiter, which ends any garbage on the wire.
     pub(crate) fn write_raw(&self, bytes: &[u8]) -> Result<(), RigError> {
         self.check()?;
         let mut writer = lock(&self.writer);
@@ -352,38 +353,39 @@ impl Link {
         })
     }
 
-    /// Ends the reader and lets go of the port, after what was written.
+    /// Ends the reader and releases the port after pending writes.
     pub(crate) fn close(&self) {
         self.closing.store(true, Ordering::Relaxed);
         lock(&self.writer).port = Box::new(std::io::sink());
     }
 
-    /// The board has named the session: from here on frames are stamped with it.
+    /// Stores the session number given by the board: further frames are stamped with it.
     pub(crate) fn begin_session(&self, session: u32) {
         lock(&self.writer).stamp = Some(Stamp { session, count: 0 });
     }
 
-    /// Changes with every stop and fault this program knows of: what was decided before must not be sent afterwards.
+    /// Number that changes with every known stop and fault: decisions made before it changed must not be sent afterwards.
     pub(crate) fn halts(&self) -> u64 {
         self.halts.load(Ordering::SeqCst)
     }
 
-    /// Time since a frame went out.
+    /// Time since a frame was sent.
     pub(crate) fn silent_for(&self) -> Duration {
         lock(&self.writer).last.elapsed()
     }
 
-    /// Time since a sound frame came in.
+    /// Time since a valid frame was received.
     pub(crate) fn unheard_for(&self) -> Duration {
         lock(&self.heard).elapsed()
     }
 
-    /// Starts counting silence anew, after a pause in which none was to be expected.
+    /// Restarts the silence timer after a pause in which no frames were expected.
     pub(crate) fn forgive_silence(&self) {
         *lock(&self.heard) = Instant::now();
     }
 
-    /// The board was greeted with the message of this sequence number, and knows this program from then on. That it has started anew is not forgotten so.
+    /// Records that the board was greeted with the message of this sequence number and knows this program from then on. A detected restart
+    /// stays recorded.
     pub(crate) fn set_greeted(&self, seq: u16) {
         let mut greeted = lock(&self.greeted);
         if !matches!(*greeted, Greeted::Forgotten) {
@@ -391,17 +393,17 @@ impl Link {
         }
     }
 
-    /// It need not know this program until it is greeted again.
+    /// Records that the board need not know this program until it is greeted again.
     pub(crate) fn forget_greeting(&self) {
         *lock(&self.greeted) = Greeted::No;
     }
 
-    /// It was greeted and knows nothing of it any more.
+    /// Whether the board was greeted but no longer knows of it.
     pub(crate) fn has_started_anew(&self) -> bool {
         matches!(*lock(&self.greeted), Greeted::Forgotten)
     }
 
-    /// The state the board last told.
+    /// The last state that the board reported.
     pub(crate) fn state(&self) -> Option<DeviceState> {
         *lock(&self.state)
     }
@@ -412,12 +414,12 @@ impl Link {
 }
 
 impl Ticket<'_> {
-    /// Number of the message.
+    /// Sequence number of the message.
     pub(crate) fn seq(&self) -> u16 {
         self.seq
     }
 
-    /// Waits for the answer; `None` when none came in time (it may still come: the ticket stays valid).
+    /// Waits for the answer; `None` when it did not come in time (it may still come: the ticket stays valid).
     pub(crate) fn wait(&self, timeout: Duration) -> Result<Option<Answer>, RigError> {
         let deadline = Instant::now() + timeout;
         let mut desk = lock(&self.link.desk);
@@ -443,7 +445,7 @@ impl Ticket<'_> {
         }
     }
 
-    /// Sends `message`, which must be the one the ticket is for, under the same number again.
+    /// Sends `message`, which must be the ticket's, again under the same number.
     pub(crate) fn resend(&self, message: &ToDevice) -> Result<(), RigError> {
         let mut writer = lock(&self.link.writer);
         self.link.write(&mut writer, self.seq, message)

@@ -1,22 +1,22 @@
-//! The rigs there are: simulated ones first, then the serial ports.
+//! List of the available rigs: simulated ones first, then the serial ports.
 
 use crate::spec::{EmulatedMode, RigSpec};
 use crate::{emulator, serial};
 
-/// One line of the rig chooser.
+/// An entry of the rig chooser.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigEntry {
-    /// To connect with.
+    /// Specification to connect with.
     pub spec: RigSpec,
     /// Short name.
     pub label: String,
-    /// What it is; USB ids of a port.
+    /// Description; USB ids of a port.
     pub detail: String,
-    /// Whether it can be used now, else what to do. A port is only tried when it is opened.
+    /// Whether the rig can be used now; the error says what to do. A port is tested only when it is opened.
     pub available: Result<(), String>,
 }
 
-/// All rigs. Starts `qemu-system-arm --version` once to see whether it is there (some 20 ms).
+/// All rigs. Runs `qemu-system-arm --version` once to check for QEMU (some 20 ms).
 pub fn list() -> Vec<RigEntry> {
     let emulated = RigSpec::Emulated {
         mode: EmulatedMode::Interactive,

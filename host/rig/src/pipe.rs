@@ -1,4 +1,4 @@
-//! An in-memory byte pipe with the manners of a serial port: bounded, blocking for a while, closed when an end is dropped.
+//! An in-memory byte pipe that behaves like a serial port: bounded, blocking with a timeout, closed when an end is dropped.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::transport::READ_WAIT;
 
-/// Bytes a pipe holds before a writer has to wait.
+/// Capacity of a pipe in bytes; a writer waits when it is full.
 pub const PIPE_CAPACITY: usize = 64 * 1024;
 
 #[derive(Debug, Default)]
@@ -18,15 +18,15 @@ struct Bytes {
 
 type Shared = Arc<(Mutex<Bytes>, Condvar)>;
 
-/// End to read from.
+/// Reading end.
 #[derive(Debug)]
 pub struct PipeReader(Shared);
 
-/// End to write to.
+/// Writing end.
 #[derive(Debug)]
 pub struct PipeWriter(Shared);
 
-/// A pipe.
+/// Creates a pipe.
 pub fn pipe() -> (PipeWriter, PipeReader) {
     let shared = Shared::default();
     (PipeWriter(shared.clone()), PipeReader(shared))
@@ -55,7 +55,7 @@ fn close(shared: &Shared) {
 }
 
 impl PipeReader {
-    /// Takes what waits, after waiting for something no longer than `timeout`. `Ok(0)`: the writer is gone and nothing is left.
+    /// Takes the available bytes, waiting for them at most `timeout`. `Ok(0)`: the writer is gone and nothing is left.
     pub fn read_within(&mut self, out: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let mut bytes = wait(&self.0, timeout, |bytes| {
             bytes.waiting.is_empty() && !bytes.closed
@@ -84,7 +84,7 @@ impl Read for PipeReader {
 }
 
 impl PipeWriter {
-    /// Puts in what there is room for, after waiting for room no longer than `timeout`; `TimedOut` when there is none.
+    /// Writes as many bytes as there is space for, waiting for space at most `timeout`; `TimedOut` when there is none.
     pub fn write_within(&mut self, data: &[u8], timeout: Duration) -> io::Result<usize> {
         let mut bytes = wait(&self.0, timeout, |bytes| {
             bytes.waiting.len() >= PIPE_CAPACITY && !bytes.closed

@@ -1,14 +1,15 @@
-//! Real-time priority for the thread of the in-process rig and for the heartbeat, so that other programs delay ticks and signs of life less.
+//! Real-time priority for the thread of the in-process rig and for the heartbeat, which reduces delays of ticks and heartbeats by other
+//! programs.
 //!
-//! The lowest real-time priority there is: above every normal thread, below whatever else needs real time. Linux and macOS: round robin by
-//! `pthread_setschedparam`; Windows: time critical. Most systems grant it to some users only; a refusal is told once in a program's life.
+//! The lowest real-time priority: above every normal thread, below all other real-time threads. Linux and macOS: round robin by
+//! `pthread_setschedparam`; Windows: time critical. Most systems grant it to some users only; a refusal is reported once per program run.
 
 use std::sync::{Mutex, PoisonError};
 
-/// A refusal not told yet, and whether one was ever noted.
+/// A refusal not yet reported, and whether one was ever recorded.
 static REFUSAL: Mutex<(Option<String>, bool)> = Mutex::new((None, false));
 
-/// Asks for it for the calling thread, and notes a refusal.
+/// Requests it for the calling thread and records a refusal.
 pub(crate) fn ask() {
     if let Err(error) = set() {
         let mut refusal = REFUSAL.lock().unwrap_or_else(PoisonError::into_inner);
@@ -22,7 +23,7 @@ pub(crate) fn ask() {
     }
 }
 
-/// The refusal, in words; `None` when there was none or it was told before.
+/// The refusal as a sentence; `None` when there was none or it was reported before.
 pub(crate) fn take_refusal() -> Option<String> {
     REFUSAL.lock().unwrap_or_else(PoisonError::into_inner).0.take()
 }

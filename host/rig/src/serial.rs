@@ -1,4 +1,4 @@
-//! Serial ports: opening one by name, with errors that name the fix.
+//! Serial ports: opening one by name, with errors that name the remedy.
 
 use std::io;
 
@@ -7,7 +7,7 @@ use serialport::{ErrorKind, SerialPortInfo, SerialPortType};
 use crate::error::RigError;
 use crate::transport::{READ_WAIT, Transport};
 
-/// Bits in a second asked of the port. USB and pseudo-terminals ignore it.
+/// Bit rate set for the port, bit/s. USB and pseudo-terminals ignore it.
 const BAUD: u32 = 1_000_000;
 
 /// Opens `port` (raw, exclusive).
@@ -17,7 +17,7 @@ pub(crate) fn open(port: &str) -> Result<Transport, RigError> {
         .dtr_on_open(true)
         .open()
         .map_err(|error| refine(port, error))?;
-    // Bytes of an earlier program are no business of ours.
+    // Discards bytes left by an earlier program.
     let _ = reader.clear(serialport::ClearBuffer::All);
     let writer = reader.try_clone().map_err(|error| refine(port, error))?;
     Ok(Transport {
@@ -27,7 +27,7 @@ pub(crate) fn open(port: &str) -> Result<Transport, RigError> {
     })
 }
 
-/// Ports the operating system lists; an error of the listing is an empty list.
+/// Ports that the operating system lists; an empty list if the listing fails.
 pub(crate) fn ports() -> Vec<SerialPortInfo> {
     // The listing of serialport 4.10 panics where /sys/class/tty is absent (some containers).
     #[cfg(target_os = "linux")]
@@ -39,7 +39,7 @@ pub(crate) fn ports() -> Vec<SerialPortInfo> {
     ports
 }
 
-/// What stands on the port: USB names and ids, or the kind of port.
+/// Description of the device on the port: USB names and ids, or the kind of port.
 pub(crate) fn detail(port: &SerialPortInfo) -> String {
     match &port.port_type {
         SerialPortType::UsbPort(usb) => {
@@ -80,8 +80,8 @@ fn refine(port: &str, error: serialport::Error) -> RigError {
     }
 }
 
-/// serialport reports a port held by another program as `NoDevice` with words that tell it from a missing one: EBUSY or
-/// a failed lock on Unix, "access is denied" on Windows.
+/// serialport reports a port held by another program as `NoDevice`; only the error text differs from that of a missing port: EBUSY or a
+/// failed lock on Unix, "access is denied" on Windows.
 fn is_busy(error: &serialport::Error) -> bool {
     let text = error.description.to_lowercase();
     error.kind == ErrorKind::NoDevice && ["busy", "lock", "denied"].iter().any(|word| text.contains(word))
@@ -96,7 +96,7 @@ fn known() -> String {
     }
 }
 
-/// What lets this user open `port`.
+/// How this user gets permission to open `port`.
 pub(crate) fn permission_fix(port: &str) -> String {
     if cfg!(target_os = "macos") {
         return format!("allow it with `sudo chmod a+rw {port}`");

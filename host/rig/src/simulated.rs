@@ -1,5 +1,5 @@
-//! The in-process rig: the board's own planes, scene store and simulated mechanism on a thread of this program, reached through
-//! the same protocol bytes as a board.
+//! The in-process rig: the board's own planes, scene store and simulated mechanism on a thread of this program, reached through the same
+//! protocol bytes as a board.
 
 use std::cell::Cell;
 use std::io;
@@ -9,42 +9,42 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use mortise_firmware::board::{Clock, Identity, Outbound, SLOTS, TICK_HZ};
-use mortise_firmware::ceilings::Ceilings;
+use mortise_firmware::board::{Clock, ERASED, FlashWord, Identity, Outbound, SLOTS, TICK_HZ};
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::Ticked;
 use mortise_firmware::device;
 use mortise_firmware::link::OUTBOUND_MIN;
-use mortise_firmware::ram_flash::{ERASE_SIZE, ERASED, FlashWord, RamFlash};
-use mortise_firmware::simulated_rig::SimulatedRig;
 use mortise_firmware::store;
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::message::{CostUnit, ResetReason};
+use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
+use mortise_simulation::simulated_rig::SimulatedRig;
 
 use crate::error::RigError;
 use crate::pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};
 use crate::real_time;
 use crate::transport::{READ_WAIT, Transport, is_quiet};
 
-/// Bytes of a scene slot: far more than a board has, so that a PC can feel scenes no board could hold yet.
+/// Bytes of a scene slot: far more than any board has, so that a PC can simulate scenes too large for present boards.
 const SLOT: usize = 256 * ERASE_SIZE;
-/// Bytes of all slots: a sector for each of the rig's descriptions too.
+/// Bytes of all slots: for each slot also a sector for a rig description.
 const ALL: usize = SLOTS * (SLOT + ERASE_SIZE);
-/// Bytes a board's output buffer holds.
+/// Capacity of a board's output buffer in bytes.
 const OUTBOUND: usize = 4 * OUTBOUND_MIN;
-/// Boards started in this process.
+/// Number of boards started in this process.
 static STARTS: AtomicU64 = AtomicU64::new(0);
 const TICK: Duration = Duration::from_micros(1_000_000 / TICK_HZ as u64);
-/// Ticks a paced rig makes up for after this computer was busy; the rest count as missed.
+/// Largest number of late ticks that a paced rig makes up after this computer was busy; the rest count as missed.
 const CATCH_UP: u32 = 4;
-/// Pause after missed ticks: a scene too large for this computer must not take a whole core from everything else, real-time priority or not.
+/// Pause after missed ticks: a scene too large for this computer must not occupy a whole core, with or without real-time priority.
 const BREATH: Duration = Duration::from_micros(250);
 
 /// Flash of a simulated board: survives its restarts, and outlives the connection when the caller keeps a clone.
 #[derive(Clone, Debug, Default)]
 pub struct Flash(Arc<Mutex<Vec<FlashWord>>>);
 
-/// Starts a simulated board. With `realtime`, ticks follow the wall clock; otherwise they run as fast as they can, in lockstep
-/// when asked. When another board still holds `flash`, it waits for its end.
+/// Starts a simulated board. With `realtime`, ticks follow the wall clock; otherwise they run as fast as possible, in lockstep on request.
+/// If another board still holds `flash`, waits for its end.
 ///
 /// # Errors
 /// `Thread`.
@@ -65,19 +65,19 @@ pub fn simulate(flash: &Flash, realtime: bool) -> Result<Transport, RigError> {
     })
 }
 
-/// Waits for the board's end, so that its flash is free when the connection is gone. The board ends because its pipes are closed before.
+/// Waits for the board's end, so that its flash is free once the connection is closed. The board ends because its pipes are closed first.
 struct Board(Option<JoinHandle<()>>);
 
 impl Drop for Board {
     fn drop(&mut self) {
         if let Some(thread) = self.0.take() {
-            // A panic there has shown as a lost link.
+            // A panic there has been reported as a lost link.
             let _ = thread.join();
         }
     }
 }
 
-/// Power on, and again after each restart.
+/// Runs the board from power-on, and again after each restart.
 fn run(flash: &Flash, realtime: bool, mut from_host: PipeReader, mut to_host: PipeWriter) {
     if realtime {
         real_time::ask();
@@ -92,7 +92,7 @@ fn run(flash: &Flash, realtime: bool, mut from_host: PipeReader, mut to_host: Pi
     }
 }
 
-/// Runs until a restart is asked for, or (error) the host is gone.
+/// Runs until a restart is requested or the host is gone (error).
 fn power_on(
     memory: &mut [FlashWord],
     reset: ResetReason,
@@ -115,13 +115,13 @@ fn power_on(
         // A described wrist is passive.
         torque_axes: if rig.is_some() { 0 } else { 3 },
         cost_unit: CostUnit::Nanoseconds,
-        // Without pacing nothing is due at any time.
+        // Without pacing no tick has a deadline.
         cost_budget: if realtime { TICK.as_nanos() as u32 } else { 0 },
         reset,
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
         ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
-        // Boards of other processes cannot be reached by frames meant for this one.
+        // A count suffices: frames for this board cannot reach boards of other processes.
         entropy: STARTS.fetch_add(1, Ordering::Relaxed),
     };
     let (mut link, mut control) = device::start(
@@ -134,7 +134,7 @@ fn power_on(
     let mut out = Wire {
         pending: Vec::with_capacity(OUTBOUND),
     };
-    // All a host can have written: what it wrote before a tick is read before that tick.
+    // Holds everything a host can have written: bytes written before a tick are read before that tick.
     let mut input = vec![0u8; PIPE_CAPACITY];
     let mut patience = Duration::ZERO;
     loop {
@@ -155,10 +155,10 @@ fn power_on(
             return Ok(());
         }
         if out.pending.len() < waiting {
-            // What was held back for want of room can go on now.
+            // Output held back for lack of space can continue now.
             patience = Duration::ZERO;
         } else if waiting > 0 {
-            // The host does not read: look again soon.
+            // The host does not read: check again soon.
             patience = patience.min(TICK);
         }
     }
@@ -170,7 +170,7 @@ struct Wire {
 }
 
 impl Wire {
-    /// Never waits: ticks do not wait for a host that does not read.
+    /// Never blocks: ticks do not wait for a host that does not read.
     fn flush(&mut self, to: &mut PipeWriter) -> io::Result<()> {
         if self.pending.is_empty() {
             return Ok(());
@@ -196,12 +196,12 @@ impl Outbound for Wire {
     }
 }
 
-/// When ticks are due.
+/// Deadlines of the ticks.
 struct Pace {
     realtime: bool,
     begun: Cell<Instant>,
     due: Cell<Instant>,
-    /// To wait before the next tick although it is late.
+    /// Wait before the next tick although it is late.
     breath: Cell<Duration>,
 }
 
@@ -224,7 +224,7 @@ impl Pace {
         }
     }
 
-    /// Ticks that are given up because this computer was busy for too long.
+    /// Number of ticks skipped because this computer was busy for too long.
     fn begin_tick(&self) -> u32 {
         let now = Instant::now();
         self.begun.set(now);

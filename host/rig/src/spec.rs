@@ -1,4 +1,4 @@
-//! Which rig: the words a person writes and reads for it.
+//! Specification of a rig and its textual form.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -19,45 +19,45 @@ use std::str::FromStr;
 pub enum RigSpec {
     /// The board's own code in a thread of this program, with its simulated mechanism.
     Simulated {
-        /// Ticks follow the wall clock; otherwise each waits to be released.
+        /// Whether ticks follow the wall clock; otherwise each waits to be released.
         realtime: bool,
     },
     /// The board's firmware in QEMU.
     Emulated {
-        /// How its clock runs.
+        /// Clock mode.
         mode: EmulatedMode,
         /// Firmware ELF; `None`: the one `cargo xtask firmware mps2-an500` builds.
         firmware: Option<PathBuf>,
     },
     /// A board on a serial port.
     Serial {
-        /// Name of the port as the operating system has it (`/dev/ttyACM0`, `COM3`).
+        /// Name of the port in the operating system (`/dev/ttyACM0`, `COM3`).
         port: String,
     },
 }
 
-/// How an emulated board's clock runs.
+/// Clock mode of an emulated board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EmulatedMode {
-    /// About wall-clock speed on a quiet machine: for a person at the window.
+    /// About wall-clock speed on an idle machine: for interactive use in the window.
     Interactive,
-    /// One instruction takes 2 ns of virtual time (`-icount shift=1,sleep=off`): instruction counts and missed
-    /// ticks do not depend on this machine's load. Virtual time runs ahead of the wall clock whenever the board idles, so a host that is armed
-    /// and slow looks silent to the board sooner than it is: what arms belongs in lockstep.
+    /// One instruction takes 2 ns of virtual time (`-icount shift=1,sleep=off`): instruction counts and missed ticks do not depend on this
+    /// machine's load. Virtual time runs ahead of the wall clock whenever the board idles, so a slow host that has armed the board reaches
+    /// the host timeout too early: use lockstep for anything that arms.
     Counted,
-    /// Counted, and a tick runs only when the host releases it: bit-identical run after run.
+    /// Counted, and a tick runs only when the host releases it: bit-identical in every run.
     Lockstep,
 }
 
-/// Text that names no rig.
+/// Reasons why a text specifies no rig.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SpecError {
-    /// Nothing was given.
+    /// The text is empty.
     #[error("no rig was named: write `sim`, `emulated`, or a serial port such as /dev/ttyACM0 or COM3")]
     Empty,
     /// `emulated:` with an unknown mode.
     #[error(
-        "`emulated:{0}` is no mode of the emulated board: write `emulated`, `emulated:counted` or `emulated:lockstep`"
+        "`emulated:{0}` is not a mode of the emulated board: write `emulated`, `emulated:counted` or `emulated:lockstep`"
     )]
     Mode(String),
     /// `emulated@` without a path.
@@ -123,7 +123,7 @@ impl fmt::Display for RigSpec {
 }
 
 impl RigSpec {
-    /// The same rig with ticks released by the host where it can: what a measurement needs. A real port stays as it is.
+    /// The same rig with ticks released by the host where possible, as measurements require. A real port is unchanged.
     pub fn lockstep(&self) -> Self {
         match self {
             Self::Simulated { .. } => Self::Simulated { realtime: false },

@@ -1,18 +1,18 @@
-//! The byte stream under the protocol: two ends, and whatever must live as long as they do.
+//! The byte stream under the protocol: two ends, and the objects that must live as long as they do.
 
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
-/// Longest a `read` may block before it returns [`io::ErrorKind::TimedOut`]: how quickly the reader notices that it should end.
+/// Longest time that `read` blocks before it returns [`io::ErrorKind::TimedOut`]: bounds the reader's reaction to a request to end.
 pub const READ_WAIT: Duration = Duration::from_millis(50);
 
-/// Longest a write may make no progress before the link counts as stalled.
+/// Longest time without progress of a write before the link counts as stalled.
 const WRITE_WAIT: Duration = Duration::from_secs(2);
 
 /// A byte stream to a board.
 ///
-/// `reader.read` returns within about [`READ_WAIT`], with `TimedOut` or `WouldBlock` when nothing came; `Ok(0)` or another
-/// error means that the other end is gone. `keep` is dropped after both: a child process, a thread.
+/// `reader.read` returns within about [`READ_WAIT`], with `TimedOut` or `WouldBlock` when no bytes came; `Ok(0)` or another error means
+/// that the other end is gone. `keep` is dropped after both: a child process, a thread.
 pub struct Transport {
     /// Bytes from the board.
     pub reader: Box<dyn Read + Send>,
@@ -22,7 +22,7 @@ pub struct Transport {
     pub keep: Option<Box<dyn Send + Sync>>,
 }
 
-/// Nothing came this time; the stream is sound.
+/// Whether the error only means that no bytes came; the stream is intact.
 pub(crate) fn is_quiet(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -30,8 +30,8 @@ pub(crate) fn is_quiet(error: &io::Error) -> bool {
     )
 }
 
-/// Writes all of `bytes`, over as many writes as it takes: a port's own timeout must not cut a frame in two while the
-/// board still takes bytes.
+/// Writes all of `bytes`, with as many writes as necessary: a port's own timeout must not cut a frame in two while the board still takes
+/// bytes.
 pub(crate) fn write_whole(writer: &mut dyn Write, mut bytes: &[u8]) -> io::Result<()> {
     let mut progress = Instant::now();
     while !bytes.is_empty() {
@@ -45,13 +45,13 @@ pub(crate) fn write_whole(writer: &mut dyn Write, mut bytes: &[u8]) -> io::Resul
                 if progress.elapsed() > WRITE_WAIT {
                     return Err(io::Error::new(
                         io::ErrorKind::TimedOut,
-                        "the board takes no bytes any more",
+                        "the board no longer takes bytes",
                     ));
                 }
             }
             Err(error) => return Err(error),
         }
     }
-    // No flush: on a serial port that waits until the board has taken every byte, for ever if it stalls.
+    // No flush: on a serial port it waits until the board has taken every byte, which never ends if the board stalls.
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! Sending a scene: begin, chunks with a few under way at once, commit. A lost or repeated chunk is sent again from
-//! where the board says it stands; the scene in use stays until the commit.
+//! Upload of a scene: begin, chunks with a few under way at once, commit. After a lost or repeated chunk, sending resumes at the offset
+//! that the board reports; the scene in use stays until the commit.
 
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
@@ -16,31 +16,31 @@ use crate::exchange::ATTEMPTS;
 use crate::link::Answer;
 use crate::words::Words;
 
-/// Chunks under way at once: hides the round trip, and stays far below the 64 KiB buffers on the way.
+/// Number of chunks under way at once: hides the round trip, and stays far below the 64 KiB buffers on the way.
 pub const UPLOAD_WINDOW: usize = 4;
-/// Times the sending may fall back without the board having taken anything new.
+/// Largest number of resumptions without progress of the board.
 const MAX_SETBACKS: u32 = 8;
 const BUSY_PAUSE: Duration = Duration::from_millis(5);
 
-/// How far the sending is.
+/// Progress of an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UploadProgress {
     /// Bytes the board has acknowledged.
     pub sent: usize,
-    /// Bytes in all.
+    /// Total bytes.
     pub total: usize,
 }
 
-/// The message that starts sending `image`.
+/// The message that begins the upload of `image`.
 ///
 /// # Errors
-/// `NotAScene` when the bytes do not even start like a scene image. Everything else is for the board to judge.
+/// `NotAScene` when the bytes do not start like a scene image. The board checks everything else.
 pub fn begin_message(image: &[u8]) -> Result<ToDevice, RigError> {
     let not = |what: &str| RigError::NotAScene {
         what: what.to_owned(),
     };
     if image.len() < size_of::<Header>() {
-        return Err(not(&format!("{} bytes are no scene image", image.len())));
+        return Err(not(&format!("{} bytes are not a scene image", image.len())));
     }
     if image[..8] != MAGIC {
         return Err(not("the file is not a scene image"));
@@ -53,19 +53,19 @@ pub fn begin_message(image: &[u8]) -> Result<ToDevice, RigError> {
     })
 }
 
-/// The chunk of `image` that starts at `offset`; empty behind its end.
+/// The chunk of `image` that starts at `offset`; empty beyond its end.
 pub fn chunk_message(image: &[u8], offset: usize) -> ToDevice {
     let start = offset.min(image.len());
     let end = (start + MAX_CHUNK).min(image.len());
     ToDevice::SceneChunk {
         offset: start as u32,
-        // The range is never longer than the vector, so nothing is lost here.
+        // The range is never longer than the vector's capacity, so nothing is lost here.
         data: Bounded::from_slice(&image[start..end]).unwrap_or_default(),
     }
 }
 
 impl Client {
-    /// Sends a scene image and puts it in use. `progress` is called after each acknowledged chunk.
+    /// Uploads a scene image and activates it. `progress` is called after each acknowledged chunk.
     ///
     /// # Errors
     /// `NotAScene`; `Refused` with the board's reason (armed, too large, other layout, damaged); `Timeout`, `LinkLost`. The scene that
@@ -78,7 +78,7 @@ impl Client {
         self.upload_while(image, &mut go_on).map(|_| ())
     }
 
-    /// As [`Self::upload`], until `progress` ends it: the board then forgets what it has of the new scene, and the one in use stays.
+    /// Like [`Self::upload`], until `progress` ends it: the board then discards the partial scene, and the one in use stays.
     ///
     /// # Errors
     /// As [`Self::upload`].
@@ -90,7 +90,7 @@ impl Client {
         self.request(begin_message(image)?)?;
         let sent = self.send_chunks(image, progress);
         if !matches!(sent, Ok(ControlFlow::Continue(()))) {
-            // Frees the board's buffer; what went wrong is said by the error itself.
+            // Frees the board's buffer; the error itself is reported by the caller.
             let _ = self.send(ToDevice::SceneAbort);
             return sent;
         }
@@ -98,7 +98,8 @@ impl Client {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// The board refuses a second commit of what it has taken, so when the answer to the first is lost, the scene it says it uses decides.
+    /// Commits the upload. The board refuses a second commit, so if the answer to the first is lost, the scene that it reports as in use
+    /// decides.
     fn commit(&self, crc: u32) -> Result<(), RigError> {
         let mut result = self.request(ToDevice::SceneCommit);
         for _ in 1..ATTEMPTS {
@@ -140,7 +141,7 @@ impl Client {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// Sends from `start` to the end with a window; stops at the first chunk that was not taken.
+    /// Sends from `start` to the end with a window; stops at the first refused chunk.
     fn send_run(
         &self,
         image: &[u8],
@@ -194,9 +195,9 @@ impl Client {
 
 enum Run {
     Done,
-    /// By whoever hears of the progress.
+    /// Ended by the progress callback.
     Ended,
-    /// The board has taken all before `offset`; `why` it went no further.
+    /// The board has taken all bytes before `offset`; `why` is the reason for stopping there.
     StandsAt {
         offset: usize,
         why: RigError,

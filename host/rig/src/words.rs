@@ -1,14 +1,14 @@
-//! What the board says, in words for the operator: what happened, and what to do.
+//! The board's messages in words for the operator: what happened, and what to do.
 
 use mortise_protocol::message::{DeviceState, Fault, Refusal, ResetReason, ToDevice, flag};
 
-/// Something of the protocol that can be said in words.
+/// An item of the protocol that can be expressed in words.
 pub trait Words {
-    /// One sentence without a full stop: what it is and, where there is a choice, what to do.
+    /// One sentence without a full stop: what it is and, where the operator can act, what to do.
     fn words(&self) -> String;
 }
 
-/// A refusal, fault or state in words; see [`Words`].
+/// The words of a refusal, fault or state; see [`Words`].
 pub fn describe<W: Words>(what: W) -> String {
     what.words()
 }
@@ -41,7 +41,7 @@ pub const FLAG_WORDS: [(u16, &str); flag::ALL.len()] = [
     (flag::PAIRS, "more touching faces than are shown"),
 ];
 
-/// What the flags of a telemetry sample say, most important first.
+/// The words of a telemetry sample's flags, most important first.
 pub fn describe_flags(flags: u16) -> impl Iterator<Item = &'static str> {
     (FLAG_WORDS.into_iter())
         .filter(move |(bit, _)| flags & bit != 0)
@@ -70,7 +70,7 @@ impl Words for Fault {
         match self {
             Self::StopInput => "the stop input is open: release the stop button or check its wire, then clear the fault".into(),
             Self::HostSilent { silent_ms } => {
-                format!("the board heard nothing from this computer for {silent_ms} ms: check the cable and the load of this computer, then clear the fault")
+                format!("the board received nothing from this computer for {silent_ms} ms: check the cable and the load of this computer, then clear the fault")
             }
             Self::EncoderJump { axis } => {
                 format!("the encoder of axis {axis} jumped further than the mechanism can move: check its plug and cable, then clear the fault")
@@ -91,16 +91,16 @@ impl Words for Fault {
             }
             Self::SupplyLow => "the supply of the board is too low: check the power supply and its cable, then clear the fault".into(),
             Self::TickOverrun => {
-                "a tick took longer than its millisecond: use a smaller point budget or a coarser scene, then clear the fault".into()
+                "a tick took longer than its millisecond: use a smaller point budget or a coarser collision model, then clear the fault".into()
             }
-            Self::SceneDamaged => "the scene in the board's flash no longer passes its checks: upload it again".into(),
-            Self::NonFinite => "the computed force is not finite: reset the scene, then clear the fault".into(),
+            Self::SceneDamaged => "the collision model in the board's flash no longer passes its checks: upload it again".into(),
+            Self::NonFinite => "the computed force is not finite: reset the parts, then clear the fault".into(),
             Self::AngularOverSpeed => "the handle turned faster than allowed: hold it still, then clear the fault".into(),
             Self::ReferenceLost => {
-                "the encoders no longer know where the handle is: clear the fault, bring the handle to its marked pose, then set the reference".into()
+                "the encoders have lost their reference: clear the fault, bring the handle to its marked pose, then set the reference".into()
             }
             Self::ImpossiblePosture => {
-                "the encoders say where the links cannot be: check their plugs and the reference, then clear the fault".into()
+                "the encoders report an impossible posture of the links: check their plugs and the reference, then clear the fault".into()
             }
             Self::BadReading => {
                 "a sensor reading is not a number or out of all proportion: check the sensors' cables, then clear the fault".into()
@@ -113,14 +113,14 @@ impl Words for ResetReason {
     fn words(&self) -> String {
         match self {
             Self::PowerOn => "the board started with its power or reset button".into(),
-            Self::Requested => "the board restarted because it was asked to".into(),
-            Self::Watchdog => "the board restarted: its watchdog found the force loop standing still".into(),
+            Self::Requested => "the board restarted on request".into(),
+            Self::Watchdog => "the board restarted: its watchdog found the force loop stalled".into(),
             Self::Panic { line } => format!("the board restarted after a panic in line {line}"),
             Self::HardFault { pc } => format!("the board restarted after a processor fault at {pc:#010x}"),
             Self::BrownOut => {
                 "the board restarted because its supply fell too low: check the power supply".into()
             }
-            Self::Unknown => "the board cannot tell why it started".into(),
+            Self::Unknown => "the board does not know why it started".into(),
         }
     }
 }
@@ -130,41 +130,41 @@ impl Words for Refusal {
         match self {
             Self::NotGreeted => "the board has not been greeted by a program of its own version: connect again".into(),
             Self::State(state) => format!("not possible while the board is {}{}", state.words(), hint(state)),
-            Self::NoScene => "there is no scene on the board: upload one".into(),
-            Self::NoSuchPart { parts: 0 } => "the scene on the board has no parts: upload another".into(),
-            Self::NoSuchPart { parts } => format!("the scene has no such part, only 0 to {}", parts - 1),
-            Self::NotGrabbable => "this part is fixed: bake the scene with it grabbable, or choose another".into(),
+            Self::NoScene => "there is no collision model on the board: upload one".into(),
+            Self::NoSuchPart { parts: 0 } => "the collision model on the board has no parts: upload another".into(),
+            Self::NoSuchPart { parts } => format!("the collision model has no such part, only 0 to {}", parts - 1),
+            Self::NotGrabbable => "this part is fixed: bake the collision model with it grabbable, or choose another".into(),
             Self::OutOfRange { id, min, max } => {
                 let row = id.row();
                 format!("{} must be a number from {min} to {max} {}", row.name, row.unit)
             }
             Self::ChunkOrder { expected } => {
-                format!("a piece of the scene is out of order, byte {expected} was expected: send the scene again")
+                format!("a chunk of the collision model is out of order, byte {expected} was expected: upload it again")
             }
-            Self::NoUpload => "no scene is being sent (a restart may have forgotten it): send it again".into(),
+            Self::NoUpload => "no upload is under way (a restart may have ended it): upload the collision model again".into(),
             Self::SceneTooLarge { capacity } => {
-                format!("the scene is larger than the {capacity} bytes the board can hold: bake it coarser or with fewer parts")
+                format!("the collision model is larger than the {capacity} bytes the board can hold: bake it coarser or with fewer parts")
             }
             Self::TooManyParts { capacity } => {
-                format!("the scene has more parts than the {capacity} the board can hold: bake fewer parts")
+                format!("the collision model has more parts than the {capacity} the board can hold: bake fewer parts")
             }
             Self::SceneIncomplete { received } => {
-                format!("only {received} bytes of the scene have arrived: send it again")
+                format!("only {received} bytes of the collision model have arrived: upload it again")
             }
             Self::SceneCrc { expected, found } => format!(
-                "the scene arrived damaged (checksum {found:08x} instead of {expected:08x}): check the cable and send it again"
+                "the collision model arrived damaged (checksum {found:08x} instead of {expected:08x}): check the cable and upload it again"
             ),
             Self::SceneImage(error) => error.to_string(),
-            Self::Flash => "the board's flash could not be erased or written: send the scene again; if it repeats, the flash is worn out".into(),
-            Self::NotSimulated => "only a simulated mechanism can do this, this one is real".into(),
+            Self::Flash => "the board's flash could not be erased or written: upload the collision model again; if it repeats, the flash is worn out".into(),
+            Self::NotSimulated => "only a simulated mechanism can do this, and this one is real".into(),
             Self::Lockstep => "the board is not in lockstep, or still has ticks to run: switch lockstep on and wait for the last run".into(),
             Self::BadNumber => "a number is not finite or not possible".into(),
             Self::Busy => "the board's queue is full: try again".into(),
             Self::Rig(fault) => fault.words(),
             Self::RigFixed => "this board's mechanism is compiled into its firmware: change it there, or use a board that takes a description".into(),
-            Self::RigDamaged => "the description of the rig in the board's flash is damaged or of another release: send it again (`mortise rig send`)".into(),
+            Self::RigDamaged => "the board has no sound description of its rig in use (none was sent, it is damaged, or it is of another release): send it (`mortise rig send`), which restarts the board".into(),
             Self::Outdated => {
-                "the command came late, twice, or from before the board's last stop, fault or greeting, and was not carried out: look at the rig, then give it again; if it repeats, connect again".into()
+                "the command came late, twice, or from before the board's last stop, fault or greeting, and was not executed: check the rig, then repeat the command; if this recurs, connect again".into()
             }
             Self::Undecodable => "the board did not understand the message: flash the firmware of this release".into(),
         }
@@ -186,7 +186,7 @@ impl Words for ToDevice {
     fn words(&self) -> String {
         match self {
             Self::Hello(_) => "the greeting".into(),
-            Self::GetCapabilities => "asking what the board can do".into(),
+            Self::GetCapabilities => "reading the board's capabilities".into(),
             Self::Arm => "arming".into(),
             Self::Disarm => "disarming".into(),
             Self::Stop => "stopping".into(),
@@ -199,17 +199,17 @@ impl Words for ToDevice {
             Self::GetParameter(id) => format!("reading {}", id.row().name),
             Self::Grab { part } => format!("grabbing part {part}"),
             Self::Release => "releasing the part".into(),
-            Self::ResetScene => "putting the parts back".into(),
-            Self::SceneBegin { length, .. } => format!("sending a scene of {length} bytes"),
-            Self::SceneChunk { offset, .. } => format!("sending the scene from byte {offset}"),
-            Self::SceneCommit => "putting the new scene in use".into(),
-            Self::SceneAbort => "giving up sending the scene".into(),
+            Self::ResetScene => "resetting the parts".into(),
+            Self::SceneBegin { length, .. } => format!("uploading a collision model of {length} bytes"),
+            Self::SceneChunk { offset, .. } => format!("uploading the collision model from byte {offset}"),
+            Self::SceneCommit => "activating the new collision model".into(),
+            Self::SceneAbort => "cancelling the upload".into(),
             Self::SetTarget(target) => format!("setting constraint target {}", target.id),
             Self::ClearTarget { id } => format!("clearing constraint target {id}"),
-            Self::SetTelemetry { every_ticks } => format!("asking for telemetry every {every_ticks} ticks"),
+            Self::SetTelemetry { every_ticks } => format!("requesting telemetry every {every_ticks} ticks"),
             Self::GetStatistics { .. } => "reading the counters".into(),
-            Self::SimulatedHand(_) => "giving the simulated hand its script".into(),
-            Self::SimulatedInputs(_) => "giving the simulated inputs their faults".into(),
+            Self::SimulatedHand(_) => "sending the simulated hand its script".into(),
+            Self::SimulatedInputs(_) => "sending the simulated inputs their faults".into(),
             Self::Lockstep(true) => "switching lockstep on".into(),
             Self::Lockstep(false) => "switching lockstep off".into(),
             Self::Run { ticks } => format!("running {ticks} ticks"),
@@ -227,27 +227,10 @@ mod tests {
 
     use super::*;
 
-    const FAULTS: [Fault; 17] = [
-        Fault::StopInput,
-        Fault::HostSilent { silent_ms: 77 },
-        Fault::EncoderJump { axis: 77 },
-        Fault::EncoderStuck { axis: 77 },
-        Fault::OverSpeed,
-        Fault::Workspace,
-        Fault::Driver { axis: 77 },
-        Fault::OverCurrent { axis: 77 },
-        Fault::OverTemperature { axis: 77 },
-        Fault::SupplyLow,
-        Fault::TickOverrun,
-        Fault::SceneDamaged,
-        Fault::NonFinite,
-        Fault::AngularOverSpeed,
-        Fault::ReferenceLost,
-        Fault::ImpossiblePosture,
-        Fault::BadReading,
-    ];
+    /// The number in the words of a fault, in place of an axis or a time.
+    const NUMBER: u16 = 77;
 
-    /// One line each, long enough to mean something, and without a full stop: it goes into the middle of messages.
+    /// Checks for a single line without a full stop, long enough to carry a meaning: it is inserted into messages.
     fn is_a_sentence(words: &str) {
         assert!(words.len() > 12, "{words}");
         assert!(!words.contains('\n') && !words.ends_with('.'), "{words}");
@@ -256,7 +239,7 @@ mod tests {
 
     #[test]
     fn every_fault_says_what_to_do() {
-        for fault in FAULTS {
+        for fault in Fault::every(NUMBER) {
             let words = describe(fault);
             is_a_sentence(&words);
             assert!(words.contains(": "), "what, then what to do: {words}");
@@ -269,13 +252,16 @@ mod tests {
         for (bit, name, _) in flag::ALL {
             let words: Vec<_> = describe_flags(*bit).collect();
             assert_eq!(words.len(), 1, "{name}: {words:?}");
-            assert!(said.insert(words[0]), "{name}: {words:?} is said of another too");
+            assert!(
+                said.insert(words[0]),
+                "{name}: {words:?} is used for another flag too"
+            );
         }
         assert_eq!(describe_flags(u16::MAX).count(), flag::ALL.len());
         assert_eq!(describe_flags(0).count(), 0);
     }
 
-    /// What the page on safety says the operator reads, and the flags of the page on the protocol, are what the code has.
+    /// The safety page's operator messages and the protocol page's flags must equal those of the code.
     #[test]
     fn the_pages_have_the_same_words() {
         let read = |name: &str| {
@@ -283,9 +269,9 @@ mod tests {
             std::fs::read_to_string(path).expect("the page is there")
         };
         let safety = read("safety.md");
-        for fault in FAULTS {
-            // The page says axis n, and n ms.
-            let words = describe(fault).replace(" 77", " n");
+        for fault in Fault::every(NUMBER) {
+            // The page writes axis n, and n ms.
+            let words = describe(fault).replace(&format!(" {NUMBER}"), " n");
             assert!(safety.contains(&format!("\"{words}\"")), "{words}");
         }
         let protocol = read("protocol.md");

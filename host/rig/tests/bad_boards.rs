@@ -1,4 +1,4 @@
-//! Boards and ports that are not as they should be: each gives a message that says what, where and what to do.
+//! Faulty boards and ports: each gives a message that says what, where and what to do.
 
 mod common;
 
@@ -91,14 +91,14 @@ fn a_pulled_cable_shows_as_event_and_error() {
                 ToDevice::GetCapabilities => {
                     far.say(&FromDevice::Capabilities(capabilities(DeviceState::Idle)))
                 }
-                // The cable goes.
+                // The cable is unplugged.
                 ToDevice::Arm => return,
                 _ => {}
             }
         }
     });
     let client = Client::over(transport, "test", short(), None).expect("greeted");
-    let failed = client.request(ToDevice::Arm).expect_err("the cable is gone");
+    let failed = client.request(ToDevice::Arm).expect_err("the cable is unplugged");
     assert!(failed.is_link_lost(), "{failed}");
     let lost = std::iter::from_fn(|| client.events().recv_timeout(Duration::from_secs(5)).ok())
         .any(|event| matches!(event, Event::LinkLost(_)));
@@ -106,8 +106,8 @@ fn a_pulled_cable_shows_as_event_and_error() {
     board.join().expect("ended");
 }
 
-/// A board that fails and starts anew knows no greeting any more; why it started is what the operator reads, whether the program asks for something
-/// or not.
+/// A board that fails and restarts has lost its greeting; the operator reads the reason of the restart, whether or not the program sends
+/// requests.
 #[test]
 fn a_board_that_started_anew_is_told_with_the_reason() {
     for asks in [false, true] {
@@ -131,7 +131,7 @@ fn a_board_that_started_anew_is_told_with_the_reason() {
                     ToDevice::GetCapabilities => far.say(&FromDevice::Capabilities(told.clone())),
                     ToDevice::Disarm => {
                         far.say(&FromDevice::Ack { seq });
-                        // And then it fails.
+                        // The board then fails.
                         greeted = false;
                         told.reset = ResetReason::Panic { line: 4242 };
                     }
@@ -142,9 +142,9 @@ fn a_board_that_started_anew_is_told_with_the_reason() {
         });
         let client = Client::over(transport, "test", short(), None).expect("greeted");
         client.request(ToDevice::Disarm).expect("answered");
-        let reason = "the board has started anew: the board restarted after a panic in line 4242";
+        let reason = "the board has restarted: the board restarted after a panic in line 4242";
         if asks {
-            let failed = client.request(ToDevice::Arm).expect_err("forgotten");
+            let failed = client.request(ToDevice::Arm).expect_err("the greeting is lost");
             assert!(
                 failed.is_link_lost() && failed.to_string().contains(reason),
                 "{failed}"
@@ -162,7 +162,7 @@ fn a_board_that_started_anew_is_told_with_the_reason() {
     }
 }
 
-/// A board that is armed hears STOP when its client goes.
+/// An armed board receives STOP when its client is dropped.
 #[test]
 fn going_away_armed_says_stop() {
     let (transport, mut far) = wire();
@@ -185,7 +185,7 @@ fn going_away_armed_says_stop() {
     assert_eq!(heard.last(), Some(&ToDevice::Stop));
 }
 
-/// A message whose answer is lost is sent again when that does no harm, and only then.
+/// A message whose answer is lost is sent again only when that does no harm.
 #[test]
 fn lost_answers_are_asked_for_again_only_where_harmless() {
     let (transport, mut far) = wire();

@@ -1,4 +1,4 @@
-//! A link that fails on purpose: equal seeds give equal runs, each fault does what it says, and none is left behind.
+//! A link with deliberate faults: equal seeds give equal runs, each fault has its effect, and none remains afterwards.
 
 use mortise_protocol::message::{FromDevice, ToDevice};
 use mortise_protocol::parameter::ParameterId;
@@ -6,7 +6,8 @@ use mortise_rig::{Client, Event, FaultCounts, Faults, RigSpec, Window};
 
 const FAST: RigSpec = RigSpec::Simulated { realtime: false };
 
-/// Half a second with a parameter each 10 ms and telemetry each 5: ticks of the samples the client got, samples overheard, counts.
+/// Runs half a second with a parameter change every 10 ms and telemetry every 5 ms. Returns the ticks of the samples that the client
+/// received, the number of samples overheard, and the counts.
 fn played(faults: &Faults) -> (Vec<u32>, usize, FaultCounts) {
     let client = Client::connect_with_faults(&FAST).expect("in-process");
     let line = client.fault_line().expect("made with one");
@@ -19,13 +20,13 @@ fn played(faults: &Faults) -> (Vec<u32>, usize, FaultCounts) {
         client.send(ToDevice::SetParameter { id, value }).expect("sent");
         client.run(10).expect("time is not harmed");
     }
-    // A sample may come behind the answer to the run, but not behind this one.
+    // A sample may arrive after the answer to the run, but not after this one.
     client.run(0).expect("time is not harmed");
     let overheard = line.overheard();
     let telemetry = |told: &&FromDevice| matches!(told, FromDevice::Telemetry(_));
     let overheard = overheard.iter().filter(telemetry).count();
     line.end();
-    // Sound again at once.
+    // The link works again at once.
     for value in [3.0, 4.0] {
         let id = ParameterId::ForceLimit;
         (client.request(ToDevice::SetParameter { id, value })).expect("sound");
@@ -80,7 +81,7 @@ fn each_fault_is_the_one_asked_for() {
     let (heard, overheard, _) = played(&all_lost);
     assert_eq!((heard.len(), overheard), (0, 100));
 
-    // In the order sent, each frame twice.
+    // Frames arrive in the order sent, each twice.
     let twice = Faults {
         repeat: 1.0,
         ..Faults::default()
@@ -98,7 +99,7 @@ fn each_fault_is_the_one_asked_for() {
     heard.sort_unstable();
     assert_eq!(heard, sound);
 
-    // A pause loses nothing and keeps the order; a cut loses what was under way.
+    // A pause loses nothing and keeps the order; a cut loses the frames under way.
     let stalled = Faults {
         stall: window(100, 200),
         ..Faults::default()
@@ -122,7 +123,7 @@ fn each_fault_is_the_one_asked_for() {
     assert!((800..=1000).contains(&counts.flooded), "{counts:?}");
 }
 
-/// By the wall clock: a pause shorter than the board's patience is none that anybody notices afterwards.
+/// By the wall clock, a pause shorter than the board's host timeout has no lasting effect.
 #[test]
 fn a_pause_by_the_wall_clock_passes() {
     let client = Client::connect_with_faults(&RigSpec::Simulated { realtime: true }).expect("in-process");

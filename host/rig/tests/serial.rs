@@ -1,4 +1,4 @@
-//! A board on a serial port by its name: the simulated board behind a pseudo-terminal, opened as any port is.
+//! A board on a serial port, by the port's name: the simulated board behind a pseudo-terminal, opened like any port.
 #![cfg(unix)]
 
 mod common;
@@ -14,12 +14,12 @@ use mortise_protocol::message::{ResetReason, ToDevice};
 use mortise_rig::{Client, Event, Flash, RigError, RigSpec, Transport, simulate};
 use serialport::{SerialPort, TTYPort};
 
-/// Bytes to and fro between a pseudo-terminal and a simulated board, until `over`.
+/// Copies bytes both ways between a pseudo-terminal and a simulated board, until `over`.
 struct Bridge {
     over: Arc<AtomicBool>,
     threads: Vec<std::thread::JoinHandle<()>>,
     port: String,
-    /// Keeps the terminal alive between two programs that open it, without a lock on it.
+    /// Keeps the terminal open between two programs that use it, without a lock on it.
     _slave: std::fs::File,
 }
 
@@ -62,7 +62,7 @@ impl Bridge {
                 std::thread::spawn(move || copy(from, to, &over))
             })
             .collect();
-        // The board ends when both its pipes are closed, so it is waited for last.
+        // The board ends when both its pipes are closed, so its thread is joined last.
         threads.push(std::thread::spawn(move || drop(keep)));
         Self {
             over,
@@ -93,14 +93,14 @@ fn a_board_is_reached_by_the_name_of_its_port_again_and_again() {
         client.upload(&scene, &mut |_| {}).expect("room");
         client.request(ToDevice::Arm).expect("armed");
     }
-    // The first program went away armed; the next finds the scene, and the motors off.
+    // The first program ended armed; the next finds the scene on the board and the motors off.
     let client = Client::connect(&spec).expect("the board greets again");
     assert_eq!(client.capabilities().scene, Some(CRC.checksum(&scene)));
     let held = Client::connect(&spec).map(|_| ());
     assert!(matches!(held, Err(RigError::Busy { .. })), "{held:?}");
 }
 
-/// Nobody here asked for the restart: the heartbeat notices, and the link ends with the board's own reason.
+/// The restart was not requested by this client: the heartbeat detects it, and the link ends with the board's reason.
 #[test]
 fn a_board_that_starts_anew_says_why() {
     let bridge = Bridge::new();
@@ -116,10 +116,10 @@ fn a_board_that_starts_anew_says_why() {
         });
     assert_eq!(
         told.as_deref(),
-        Some("the board has started anew: the board restarted because it was asked to")
+        Some("the board has restarted: the board restarted on request")
     );
     drop(client);
-    // And it can be reached again.
+    // The board can be reached again.
     let client = Client::connect(&spec).expect("the board greets again");
     assert_eq!(client.capabilities().reset, ResetReason::Requested);
 }

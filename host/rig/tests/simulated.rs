@@ -1,4 +1,4 @@
-//! The in-process rig through the whole client: what it does, what it refuses and in which words, and what it keeps.
+//! The in-process rig through the whole client: its functions, its refusals and their words, and its persistent data.
 
 mod common;
 
@@ -71,7 +71,7 @@ fn arming_without_a_scene_says_what_to_do() {
     let client = connect_fast();
     let said = words(client.request(ToDevice::Arm));
     assert!(
-        said.contains("arming was refused: there is no scene on the board: upload one"),
+        said.contains("arming was refused: there is no collision model on the board: upload one"),
         "{said}"
     );
 }
@@ -83,7 +83,7 @@ fn bad_scenes_are_refused_with_the_reason() {
     let upload = |bytes: &[u8]| client.upload(bytes, &mut |_| {});
 
     let said = words(upload(b"solid cube"));
-    assert!(said.contains("no scene image"), "{said}");
+    assert!(said.contains("are not a scene image"), "{said}");
     let said = words(upload(&[7; 500]));
     assert!(said.contains("not a scene image"), "{said}");
 
@@ -110,7 +110,7 @@ fn bad_scenes_are_refused_with_the_reason() {
     assert!(said.contains("larger than the"), "{said}");
 
     let said = words(client.request(ToDevice::SceneCommit));
-    assert!(said.contains("no scene is being sent"), "{said}");
+    assert!(said.contains("no upload is under way"), "{said}");
 
     assert_eq!(client.refresh_capabilities().expect("an answer").scene, None);
     upload(&good).expect("a sound scene");
@@ -136,7 +136,7 @@ fn upload_tells_its_progress_to_the_end() {
     assert!(seen.windows(2).all(|pair| pair[0].sent < pair[1].sent));
 }
 
-/// Power lost after any number of chunks, and after the last one before the commit: the old scene is found again.
+/// After a loss of power at any chunk, and after the last chunk before the commit, the old scene is found again.
 #[test]
 fn an_upload_cut_at_any_chunk_leaves_the_old_scene() {
     let (old, new) = (image(5 * MAX_CHUNK + 40, 3), image(9 * MAX_CHUNK + 8, 4));
@@ -242,12 +242,12 @@ fn stop_reaches_a_running_board() {
     client.request(ToDevice::Arm).expect("armed again");
 }
 
-/// One byte in 2,000 lost or changed, both ways: the scene arrives whole all the same.
+/// With one byte in 2,000 lost or changed, both ways, the scene still arrives complete.
 #[test]
 fn a_scene_arrives_over_a_bad_link() {
     let Transport { reader, writer, keep } = simulate(&Flash::default(), false).expect("a thread");
     let (to_noise, from_client) = mortise_rig::pipe();
-    // The way to the board runs through a thread that damages it.
+    // A thread damages the bytes on their way to the board.
     let noise = std::thread::spawn(move || {
         let mut writer = writer;
         let mut from = Faulty {
@@ -288,7 +288,7 @@ fn a_scene_arrives_over_a_bad_link() {
     noise.join().expect("the noise ends with the link");
 }
 
-/// Loses what the board says from a commit on, for a while, or the commit itself.
+/// Loses the commit, or everything the board sends for a while from the commit on.
 struct Losing<Inner> {
     inner: Inner,
     from: Arc<Mutex<Option<Instant>>>,
@@ -332,7 +332,7 @@ impl<Inner: Write> Write for Losing<Inner> {
     }
 }
 
-/// The commit or its answer is lost: the scene is in use all the same, and an incomplete one is still refused.
+/// The commit or its answer is lost: the scene is in use nevertheless, and an incomplete one is still refused.
 #[test]
 fn a_lost_commit_and_a_lost_answer_are_made_good() {
     for lost in [true, false] {

@@ -1,11 +1,11 @@
-//! The sample that is part of the program: a block with an 18.75 mm hole and a peg 1 mm thinner, 20 mm above it.
+//! The sample built into the program: a block with an 18.75 mm hole and a peg 1 mm thinner, 20 mm above it.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Its file name.
+/// File name of the sample.
 pub const NAME: &str = "pair_d18.75_clear1.00.step";
-/// Its text.
+/// Contents of the sample.
 pub const STEP: &[u8] = include_bytes!("../../app/samples/pair_d18.75_clear1.00.step");
 
 /// The sample as a file, removed when dropped: the CAD kernel reads files only.
@@ -16,10 +16,10 @@ pub struct File {
 }
 
 impl File {
-    /// Writes it to a new folder of its own among the temporary files.
+    /// Writes the sample to a new private folder among the temporary files.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// The operating system's error.
     pub fn write() -> std::io::Result<Self> {
         let folder = new_folder()?;
         let path = folder.join(NAME);
@@ -28,7 +28,7 @@ impl File {
         Ok(made)
     }
 
-    /// Where it is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -36,13 +36,13 @@ impl File {
 
 impl Drop for File {
     fn drop(&mut self) {
-        // What cannot be removed is left to the system's own tidying of temporary files.
+        // Files that cannot be removed are left to the system's own cleaning of temporary files.
         let _ = std::fs::remove_file(&self.path);
         let _ = std::fs::remove_dir(&self.folder);
     }
 }
 
-/// Creating fails when the name is taken, so nobody else's folder is ever used.
+/// Creation fails when the name exists, so that no folder of another program is ever used.
 fn new_folder() -> std::io::Result<PathBuf> {
     let base = std::env::temp_dir();
     for attempt in 0..1_000 {

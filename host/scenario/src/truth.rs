@@ -10,11 +10,11 @@
 //! is made out of nothing: 10.8 µW for 5 µm, 5.2 N/mm and 1 ms, 32 µW on three axes that tremble. So the mechanism is played again instead, with the
 //! script and the wrenches of the recording. It computes the same bits on every rig; that it does, to the last reading, is checked.
 
-use mortise_firmware::board::{Drive, Mechanism};
-use mortise_firmware::simulated::Simulated;
+use mortise_firmware::board::{Drive, Mechanism, Simulation};
 use mortise_firmware::wire::{pose_to_wire, wrench_to_wire};
 use mortise_haptics::{Vec3, Wrench};
 use mortise_protocol::message::{HandScript, Telemetry};
+use mortise_simulation::simulated::Simulated;
 
 use crate::measure::Felt;
 

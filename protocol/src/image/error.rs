@@ -1,44 +1,44 @@
-//! Why bytes are not a scene image.
+//! Why bytes are not a valid scene image.
 
 use core::fmt;
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// Why bytes were refused as a scene image. Each says what to do where there is a choice.
+/// Why bytes were refused as a scene image. The messages state a remedy where there is one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ImageError {
-    /// Fewer bytes than a header, or than the header says.
+    /// Fewer bytes than a header, or fewer than the header states.
     TooShort {
         /// Bytes needed.
         needed: u32,
-        /// Bytes there.
+        /// Bytes present.
         got: u32,
     },
-    /// Not a scene image.
+    /// No scene image: the magic number is wrong.
     BadMagic,
-    /// Another layout.
+    /// A different layout version.
     Layout {
-        /// This side's version.
+        /// Version that this side reads.
         expected: u32,
-        /// The image's version.
+        /// Version of the image.
         found: u32,
     },
-    /// Damaged.
+    /// The checksum does not match: the image is damaged.
     Crc {
         /// As stored.
         expected: u32,
         /// As computed.
         found: u32,
     },
-    /// The memory it lies in is not aligned to 4 bytes.
+    /// The image is in memory that is not aligned to 4 bytes.
     Misaligned,
     /// A section lies outside the image or overlaps the header.
     Section {
         /// Position in the header's list, from 0.
         section: u8,
     },
-    /// A record refers to something that is not there, or holds a number that cannot be.
+    /// A record refers to something outside the image, or contains an impossible number.
     Record {
         /// Position of its section in the header's list, from 0.
         section: u8,

@@ -1,11 +1,11 @@
-//! Looking up a signed-distance field in place.
+//! In-place queries of a signed-distance field.
 //!
 //! Trilinear interpolation inside a stored brick: on a cylinder of radius R the error is about cell²/(8R). Cost: about half of the 300 instructions
 //! that a point near the surface takes in a tick, counted on an emulated Cortex-M7 on 2026-11-21.
 
 use super::records::*;
 
-/// A field and the arrays it refers to. Made by [`super::SceneImage`], which has checked every index.
+/// A field and the arrays it refers to. Created by [`super::SceneImage`], which has checked every index.
 #[derive(Clone, Copy, Debug)]
 pub struct Field<'a> {
     pub(super) record: &'a FieldRecord,
@@ -16,14 +16,14 @@ pub struct Field<'a> {
     pub(super) inverse_cell: f32,
     /// Cells along x, y, z.
     pub(super) cells: [f32; 3],
-    /// No surface is nearer to the grid's sides, cells.
+    /// Lower bound of the distance from the surface to the grid's sides, cells.
     pub(super) padding: f32,
 }
 
-/// Where a position lies in a field.
+/// Result of a field query.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lookup {
-    /// In a stored brick.
+    /// The position is in a stored brick.
     Near(FieldSample),
     /// No surface within `bound` metres.
     Far {
@@ -34,10 +34,10 @@ pub enum Lookup {
     },
 }
 
-/// Where a position lies in a field, nothing interpolated yet.
+/// Result of a field query without interpolation.
 #[derive(Clone, Copy, Debug)]
 pub enum Place<'a> {
-    /// In a cell of a stored brick.
+    /// The position is in a cell of a stored brick.
     Cell(Cell<'a>),
     /// As [`Lookup::Far`].
     Far {
@@ -52,11 +52,11 @@ pub enum Place<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Cell<'a> {
     brick: &'a BrickRecord,
-    /// Palette entry: what lies nearest to the cell.
+    /// Palette entry: the nearest faces of the cell.
     entry: u16,
-    /// Of the cell in the brick.
+    /// Index of the cell in the brick.
     index: usize,
-    /// Of the position, in cells from the grid's corner.
+    /// The position, in cells from the grid's corner.
     at: [f32; 3],
 }
 
@@ -69,7 +69,7 @@ pub struct FieldSample {
     pub gradient: [f32; 3],
     /// Nearest face, counted from the shape's first, or [`NO_FACE`].
     pub face: u16,
-    /// The nearest faces, and what they say of the distance.
+    /// The nearest faces, and how they give the distance.
     pub nearby: Nearby,
 }
 
@@ -80,7 +80,7 @@ impl<'a> Field<'a> {
     }
 
     /// Distance, gradient and face at `p` (m, shape frame), or a lower bound. A non-finite `p` is far outside with bound 0. A voxmap has no
-    /// distances: bounds everywhere, to its surface voxels.
+    /// distances: it returns bounds everywhere, to its surface voxels.
     #[inline]
     pub fn lookup(&self, p: [f32; 3]) -> Lookup {
         match self.place(p) {
@@ -89,7 +89,8 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Signed distance at `p` (m, shape frame) if stored there, else the signed lower bound: what culling needs, without the gradient's cost.
+    /// Signed distance at `p` (m, shape frame) if stored there, else the signed lower bound: sufficient for culling, without the cost of the
+    /// gradient.
     #[inline]
     pub fn bound(&self, p: [f32; 3]) -> f32 {
         match self.place(p) {
@@ -107,8 +108,8 @@ impl<'a> Field<'a> {
         [(p[0] - o[0]) * k, (p[1] - o[1]) * k, (p[2] - o[2]) * k]
     }
 
-    /// Where `p` (m, shape frame) lies, without interpolating: for who knows the exact surfaces. A voxmap has no cells of distances: bounds
-    /// everywhere, as in [`Self::lookup`].
+    /// Cell that contains `p` (m, shape frame), without interpolation, for a caller that evaluates the exact surfaces. A voxmap has no cells of
+    /// distances: it returns bounds everywhere, as in [`Self::lookup`].
     #[inline(always)]
     pub fn place(&self, p: [f32; 3]) -> Place<'a> {
         let g = self.in_cells(p);
@@ -139,20 +140,20 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// What lies nearest to a cell.
+    /// Nearest faces of a cell.
     #[inline(always)]
     pub fn nearby(&self, cell: &Cell<'_>) -> Nearby {
         self.decoded(cell.brick, cell.entry)
     }
 
-    /// What a palette entry of a brick means.
+    /// Meaning of a palette entry of a brick.
     #[inline(always)]
     fn decoded(&self, brick: &BrickRecord, entry: u16) -> Nearby {
         let palette = &self.palette[brick.palette as usize..];
         Nearby::from_bits(entry, |at| palette.get(usize::from(at)..)?.first_chunk().copied())
     }
 
-    /// What lies nearest to the cell of this index in a brick.
+    /// Nearest faces of the cell with this index in a brick.
     #[inline]
     pub(super) fn nearby_in(&self, brick: &BrickRecord, index: usize) -> Nearby {
         self.decoded(brick, self.palette_entry(brick, index))
@@ -184,17 +185,18 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Whether a grid position lies in the grid; no for one that is not a number.
+    /// Whether a grid position lies in the grid; false for NaN.
     ///
-    /// Compared as bits: those of positive numbers are in the numbers' order, those of negative ones and of what is no number lie above all.
+    /// Compares bit patterns: those of positive numbers are ordered like the numbers, those of negative numbers and NaN are greater than all of
+    /// these.
     #[inline(always)]
     pub(super) fn holds(&self, g: [f32; 3]) -> bool {
         let n = &self.cells;
         g[0].to_bits() < n[0].to_bits() && g[1].to_bits() < n[1].to_bits() && g[2].to_bits() < n[2].to_bits()
     }
 
-    /// Lower bound of the distance (m) from a position outside the grid: that to the box which holds the whole shape, the grid's less its padding.
-    /// 0 for one that is not a number.
+    /// Lower bound of the distance (m) from a position outside the grid: the distance to the box that contains the whole shape, which is the grid
+    /// less its padding. 0 for NaN.
     #[cold]
     pub(super) fn beyond(&self, g: [f32; 3]) -> f32 {
         let mut squared = f32::MIN_POSITIVE;
@@ -211,7 +213,7 @@ impl<'a> Field<'a> {
         sqrt_below(squared) * self.record.cell
     }
 
-    /// The entry and the cell of the brick of a grid position that the grid holds.
+    /// Grid entry of the brick, and index of the cell in it, for a grid position inside the grid.
     #[inline(always)]
     pub(super) fn entry(&self, g: [f32; 3]) -> (GridEntry, usize) {
         let w = [g[0] as u32, g[1] as u32, g[2] as u32];
@@ -223,13 +225,13 @@ impl<'a> Field<'a> {
         (GridEntry::from_bits(self.grid[index as usize]), cell as usize)
     }
 
-    /// The eight samples round a cell, x fastest.
+    /// The eight samples around a cell, x fastest.
     #[inline(always)]
     fn corners(&self, brick: &BrickRecord, cell: usize) -> [f32; 8] {
         let first =
             (cell & 7) + BRICK_SAMPLES * (cell >> 3 & 7) + BRICK_SAMPLES * BRICK_SAMPLES * (cell >> 6 & 7);
         let mut c = [0f32; 8];
-        // All eight lie in the run from the first to the last: one check for it instead of one for each.
+        // All eight are in the run from the first to the last: one bounds check for the run instead of one for each.
         if self.record.format == FORMAT_I8 {
             let run: &[u8; RUN] = chunk(self.blob, brick.samples as usize + first);
             for (c, corner) in c.iter_mut().zip(CORNERS) {
@@ -259,28 +261,28 @@ impl<'a> Field<'a> {
 }
 
 impl Cell<'_> {
-    /// The face whose surface gives the distance all over the cell, where it is one: [`Nearby::Face`], sooner known.
+    /// The face whose surface gives the distance all over the cell, if there is one: a faster test for [`Nearby::Face`].
     #[inline(always)]
     pub fn face(&self) -> Option<u16> {
         (self.entry <= Nearby::MAX_FACES).then_some(self.entry)
     }
 }
 
-/// Trilinear interpolation overstates the distance by no more than this next to a sharp edge or corner: 0.2 cells at a right angle along the grid,
-/// 0.3 across it, 0.5 at a corner, 0.87 at worst were measured.
+/// Largest amount by which trilinear interpolation overstates the distance next to a sharp edge or corner, cells. Measured: 0.2 cells at a right
+/// angle along the grid, 0.3 across it, 0.5 at a corner, 0.87 at worst.
 pub const EDGE_ERROR_CELLS: f32 = 0.9;
 
 /// log₂ of [`BRICK_CELLS`].
 const BRICK_SHIFT: u32 = BRICK_CELLS.trailing_zeros();
-/// Samples from a cell's first corner to each of its corners, x fastest.
+/// Offsets, in samples, from a cell's first corner to each of its corners, x fastest.
 const CORNERS: [usize; 8] = {
     let (row, layer) = (BRICK_SAMPLES, BRICK_SAMPLES * BRICK_SAMPLES);
     [0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1]
 };
-/// Samples from a cell's first corner to its last.
+/// Number of samples from a cell's first corner to its last, both included.
 const RUN: usize = CORNERS[7] + 1;
 
-/// `N` bytes from `at`. An image that was opened holds every run its bricks lead to.
+/// `N` bytes from `at`. An opened image contains every run that its bricks refer to.
 #[inline(always)]
 fn chunk<const N: usize>(blob: &[u8], at: usize) -> &[u8; N] {
     blob[at..]
@@ -288,16 +290,16 @@ fn chunk<const N: usize>(blob: &[u8], at: usize) -> &[u8; N] {
         .expect("checked when the image was opened")
 }
 
-// `entry` packs three bits an axis.
+// `entry` packs three bits per axis.
 const _: () = assert!(BRICK_CELLS == 8);
 
-/// Of a grid position that the grid holds, from its cell's least corner, 0 to 1.
+/// Fractions, 0 to 1, of a grid position inside the grid from its cell's lowest corner.
 #[inline(always)]
 fn within(g: [f32; 3]) -> [f32; 3] {
     g.map(|g| g - (g as u32) as f32)
 }
 
-/// Value between the corners `c` at `f`.
+/// Trilinear interpolation of the corner values `c` at `f`.
 #[inline(always)]
 fn value(c: &[f32; 8], [fx, fy, fz]: [f32; 3]) -> f32 {
     let v = [
@@ -330,12 +332,12 @@ fn gradient(c: &[f32; 8], [fx, fy, fz]: [f32; 3]) -> [f32; 3] {
     ]
 }
 
-/// A lower bound of √x that needs no library: two Newton steps from above would overshoot, so the result is divided back (x/y ≤ √x ≤ y).
+/// A lower bound of √x that needs no library: Newton's iterate y is above the root, so the result is x/y (x/y ≤ √x ≤ y).
 #[inline]
 fn sqrt_below(x: f32) -> f32 {
-    // A square that overflowed: its root is at least that of the largest number.
+    // If the square overflowed, its root is at least that of the largest number.
     let x = if x < f32::MAX { x } else { f32::MAX };
-    // Bit-level first guess within 3.5 % (Kahan/Blinn), one Newton step to 0.06 %, always from above.
+    // Bit-level initial guess within 3.5 % (Kahan/Blinn), one Newton step to 0.06 %, always from above.
     let guess = f32::from_bits((x.to_bits() >> 1) + 0x1fbd_1df5);
     let above = 0.5 * (guess + x / guess);
     x / above

@@ -1,8 +1,7 @@
-//! The scene image: everything the board needs of a scene, read in place from flash.
+//! The scene image: all scene data of the board, read in place from flash.
 //!
-//! Little-endian, SI units, every array aligned to 4 bytes, no pointers: offsets count from the
-//! image's first byte. [`SceneImage::open`] checks every offset, index and number once; after that the accessors
-//! cannot go out of bounds, whatever bytes came in. `docs/scene-image.md` is the written form.
+//! Little-endian, SI units, every array aligned to 4 bytes, no pointers: offsets count from the image's first byte. [`SceneImage::open`] checks every
+//! offset, index and number once; after that the accessors cannot go out of bounds, for any input bytes. `docs/scene-image.md` is the specification.
 //!
 //! ```text
 //! header | parts | shapes | fields | nodes | points | faces | bricks | palette | grid | blob

@@ -1,14 +1,14 @@
-//! Looking up a voxmap in place: two bits a voxel instead of a distance.
+//! In-place queries of a voxmap: two bits per voxel instead of a distance.
 //!
 //! The textbook representation of voxel sampling (McNeely, Puterbaugh & Troy 1999, table of voxel values): a voxel is free, interior, surface or
-//! proximity. It lies in the same grid of bricks as a distance field, 8³ voxels in 128 bytes, a voxel where a distance field has a cell.
-//! Which faces cross a voxel is a palette entry of its brick, as for the cells of a distance field: [`Nearby::Convex`] where there are several.
-//! Cost: one load and a shift once the brick is known.
+//! proximity. It uses the same grid of bricks as a distance field, 8³ voxels in 128 bytes, with one voxel in place of each cell. The faces that cross
+//! a voxel are a palette entry of its brick, as for the cells of a distance field: [`Nearby::Convex`] if there are several. Cost: one load and a
+//! shift once the brick is known.
 
 use super::field::{Field, Place};
 use super::records::*;
 
-/// What a voxel holds, numbered as stored (and as in the paper).
+/// State of a voxel, numbered as stored (and as in the paper).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Voxel {
@@ -23,7 +23,7 @@ pub enum Voxel {
 }
 
 impl Voxel {
-    /// From its two low bits: every pattern has a meaning.
+    /// From its two low bits: every pattern is valid.
     #[inline]
     pub const fn from_bits(bits: u8) -> Self {
         match bits & 3 {
@@ -38,13 +38,13 @@ impl Voxel {
 /// The voxel at a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelSample {
-    /// What it holds.
+    /// State of the voxel.
     pub voxel: Voxel,
-    /// Its centre, m, shape frame. Only where the voxel is stored; else the position asked for.
+    /// Centre of the voxel, m, shape frame, if the voxel is stored; else the queried position.
     pub center: [f32; 3],
-    /// Faces that cross it, counted from the shape's first: the one nearest to its centre and another, [`NO_FACE`] where there is none.
+    /// Faces that cross it, counted from the shape's first: the one nearest to its centre and another; [`NO_FACE`] if there is none.
     pub faces: [u16; 2],
-    /// No surface voxel is nearer than this, m; 0 in a surface voxel and where nothing is known.
+    /// Lower bound of the distance to any surface voxel, m; 0 in a surface voxel and where nothing is known.
     pub bound: f32,
 }
 
@@ -52,7 +52,7 @@ pub struct VoxelSample {
 pub const VOXEL_BRICK_BYTES: usize = CELLS_PER_BRICK / 4;
 
 impl Field<'_> {
-    /// Whether this is a voxmap, to be asked by [`Self::voxel`]; otherwise a distance field, to be asked by [`Self::lookup`].
+    /// Whether this is a voxmap, to be queried by [`Self::voxel`]; otherwise it is a distance field, to be queried by [`Self::lookup`].
     #[inline]
     pub fn is_occupancy(&self) -> bool {
         self.record.format == FORMAT_OCCUPANCY
@@ -100,7 +100,7 @@ impl Field<'_> {
         }
     }
 
-    /// A voxmap's answer to [`Self::place`] inside a brick: it stores no distance.
+    /// Result of [`Self::place`] inside a brick of a voxmap: it stores no distance.
     #[cold]
     pub(super) fn voxel_as_far(&self, brick: &BrickRecord, cell: usize) -> Place<'static> {
         let voxel = self.voxel_of(brick, cell);
@@ -117,7 +117,7 @@ impl Field<'_> {
     #[inline(always)]
     fn voxel_of(&self, brick: &BrickRecord, cell: usize) -> Voxel {
         let voxels = &self.blob[brick.samples as usize..][..VOXEL_BRICK_BYTES];
-        // Four voxels a byte, the first in the lowest bits; `cell` is below 512.
+        // Four voxels per byte, the first in the lowest bits; `cell` is below 512.
         Voxel::from_bits(voxels[cell >> 2] >> (2 * (cell & 3)))
     }
 }

@@ -1,4 +1,4 @@
-//! Opening a scene image: every check once, then access without checks that could fail.
+//! Opening a scene image: all checks are made once, so that later accesses cannot fail.
 
 use bytemuck::{Pod, try_cast_slice};
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -22,7 +22,7 @@ const SECTION_PALETTE: u8 = 7;
 const SECTION_GRID: u8 = 8;
 const SECTION_BLOB: u8 = 9;
 
-/// A scene image, read where it lies.
+/// A scene image, read in place.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneImage<'a> {
     header: &'a Header,
@@ -41,7 +41,7 @@ pub struct SceneImage<'a> {
 /// One shape of an image with its arrays.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape<'a> {
-    /// Numbers of the whole.
+    /// Counts and quantities of the whole shape.
     pub record: &'a ShapeRecord,
     /// Pointshell tree, preorder.
     pub nodes: &'a [NodeRecord],
@@ -56,7 +56,7 @@ pub struct Shape<'a> {
 impl<'a> SceneImage<'a> {
     /// Checks `bytes` (which may be longer than the image) and opens the image in place.
     ///
-    /// Time grows with the image: the checksum reads every byte once. Not for the tick.
+    /// The time is proportional to the image's size: the checksum reads every byte once. Do not call it in the tick.
     pub fn open(bytes: &'a [u8]) -> Result<Self, ImageError> {
         let got = bytes.len() as u32;
         let head = bytes.get(..size_of::<Header>()).ok_or(ImageError::TooShort {
@@ -119,7 +119,7 @@ impl<'a> SceneImage<'a> {
         self.shapes.len()
     }
 
-    /// Shape `index`; panics when `index >= shape_count()`.
+    /// Shape `index`. Panics when `index >= shape_count()`.
     pub fn shape(&self, index: usize) -> Shape<'a> {
         let record = &self.shapes[index];
         let field = &self.fields[record.field as usize];
@@ -142,7 +142,7 @@ impl<'a> SceneImage<'a> {
         }
     }
 
-    /// The shape that part `index` places; panics when there is no such part.
+    /// The shape that part `index` places. Panics when there is no such part.
     pub fn shape_of_part(&self, index: usize) -> Shape<'a> {
         self.shape(self.parts[index].shape as usize)
     }
@@ -176,7 +176,7 @@ impl<'a> SceneImage<'a> {
                 && (1.0 / field.cell).is_finite()
                 && field.scale.is_finite()
                 && field.scale > 0.0
-                // No sample and no difference of samples overflows, in metres or for each cell.
+                // No sample and no difference of samples overflows, neither in metres nor per cell.
                 && (field.scale * 32768.0).is_finite()
                 && (field.scale / field.cell * 131_072.0).is_finite()
                 && field.band.is_finite()
@@ -206,7 +206,7 @@ impl<'a> SceneImage<'a> {
                 8 => fits(brick.indices, CELLS_PER_BRICK as u32, self.blob.len()),
                 _ => false,
             };
-            // Indices are not looked at one by one: the palette run must cover every value they can take.
+            // Indices are not checked one by one: the palette run must cover every value they can take.
             indices_fit
                 && fits(brick.palette, 1 << brick.index_bits, self.palette.len())
                 && brick.palette_len >= 1
@@ -245,7 +245,7 @@ impl<'a> SceneImage<'a> {
     }
 }
 
-/// Bytes of a brick's samples; `None` for a format this side does not know.
+/// Bytes of a brick's samples; `None` for a format that this side does not know.
 fn brick_bytes(format: u16) -> Option<usize> {
     match format {
         FORMAT_I8 => Some(SAMPLES_PER_BRICK),

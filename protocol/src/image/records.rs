@@ -1,10 +1,10 @@
-//! The records a scene image is made of, as they lie in flash.
+//! The records of a scene image, as stored in flash.
 
 use bytemuck::{Pod, Zeroable};
 
 /// First eight bytes of every scene image.
 pub const MAGIC: [u8; 8] = *b"MORTISE\0";
-/// Version of this layout. Any change to a record or its meaning counts it up.
+/// Version of this layout. Any change to a record or its meaning increments it.
 pub const LAYOUT_VERSION: u32 = 2;
 /// Cells along a brick's edge.
 pub const BRICK_CELLS: usize = 8;
@@ -14,7 +14,7 @@ pub const BRICK_SAMPLES: usize = BRICK_CELLS + 1;
 pub const SAMPLES_PER_BRICK: usize = BRICK_SAMPLES * BRICK_SAMPLES * BRICK_SAMPLES;
 /// Cells in a brick, x fastest.
 pub const CELLS_PER_BRICK: usize = BRICK_CELLS * BRICK_CELLS * BRICK_CELLS;
-/// No face: an interior point's second face, or a palette entry nobody owns.
+/// No face: the second face of an interior point, or a palette entry without a face.
 pub const NO_FACE: u16 = u16::MAX;
 
 /// `count` records from byte `offset`.
@@ -80,10 +80,10 @@ pub struct PartRecord {
     pub orientation: [f32; 4],
 }
 
-/// The mesh the field came from was not closed: its sign is a best estimate.
+/// The mesh behind the field was not closed: its sign is a best estimate.
 pub const SHAPE_LEAKY: u32 = 1;
 
-/// Geometry shared by every part that places it.
+/// Geometry shared by all parts that place it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ShapeRecord {
@@ -107,7 +107,7 @@ pub struct ShapeRecord {
     pub center: [f32; 3],
     /// Its radius, m.
     pub radius: f32,
-    /// m³.
+    /// Volume, m³.
     pub volume: f32,
     /// Centre of mass, m.
     pub center_of_mass: [f32; 3],
@@ -130,9 +130,10 @@ pub struct FieldRecord {
     pub origin: [f32; 3],
     /// Cell edge, m.
     pub cell: f32,
-    /// Metres for each unit of a sample; the cell's edge in a voxmap, where nothing uses it.
+    /// Metres per unit of a sample; in a voxmap the cell's edge, which is not used.
     pub scale: f32,
-    /// Samples are exact distances up to this far from the surface, and clamped beyond, m. In a voxmap: no surface voxel is nearer to a free one.
+    /// Distance from the surface up to which samples are exact; they are clamped beyond, m. In a voxmap: every free voxel is at least this far from
+    /// any surface voxel.
     pub band: f32,
     /// Bricks along x, y, z.
     pub brick_dims: [u16; 3],
@@ -147,9 +148,10 @@ pub struct FieldRecord {
 }
 
 impl FieldRecord {
-    /// What surrounds the surface in the grid at least, cells: all within `band` − √3 cells of it is in stored bricks, so in the grid. 0 in a voxmap.
+    /// Smallest margin around the surface in the grid, cells: everything within `band` − √3 cells of the surface is in stored bricks, so in the grid.
+    /// 0 in a voxmap.
     pub fn padding(&self) -> f32 {
-        // The root rounded up by more than the quotient can be off.
+        // The root, rounded up by more than the quotient's possible error.
         const DIAGONAL: f32 = 1.7321;
         if self.format == FORMAT_OCCUPANCY {
             return 0.0;
@@ -160,13 +162,13 @@ impl FieldRecord {
 
 /// One entry of a field's brick grid, as stored in 16 bits.
 ///
-/// Bit 15 clear: the number of a brick (from `first_brick`). Bit 15 set: no brick; bit 14 tells inside (1) from outside (0), bits 0–13
-/// are a lower bound of the distance to the surface (in a voxmap: to a surface voxel) from anywhere in the brick's volume, in cells, rounded down.
+/// Bit 15 clear: the number of a brick (from `first_brick`). Bit 15 set: no brick; bit 14 distinguishes inside (1) from outside (0), bits 0–13 are a
+/// lower bound of the distance to the surface (in a voxmap: to a surface voxel) from anywhere in the brick's volume, in cells, rounded down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridEntry {
     /// Samples are stored.
     Brick(u16),
-    /// No surface near.
+    /// No surface nearby.
     Empty {
         /// Whether this volume is inside the solid.
         inside: bool,
@@ -178,10 +180,10 @@ pub enum GridEntry {
 impl GridEntry {
     /// Most bricks a field can number.
     pub const MAX_BRICKS: usize = 0x8000;
-    /// Largest bound an entry can hold; larger distances are stored as this.
+    /// Largest bound of an entry; larger distances are stored as this.
     pub const MAX_CELLS: u16 = 0x3fff;
 
-    /// From its 16 bits: every pattern has a meaning.
+    /// From its 16 bits: every pattern is valid.
     #[inline]
     pub const fn from_bits(bits: u16) -> Self {
         if bits & 0x8000 == 0 {
@@ -194,7 +196,7 @@ impl GridEntry {
         }
     }
 
-    /// To its 16 bits. A bound too large is stored as [`Self::MAX_CELLS`]; a brick number must be below [`Self::MAX_BRICKS`].
+    /// To its 16 bits. A bound that is too large is stored as [`Self::MAX_CELLS`]; a brick number must be below [`Self::MAX_BRICKS`].
     pub const fn to_bits(self) -> u16 {
         match self {
             Self::Brick(number) => number & 0x7fff,
@@ -210,31 +212,31 @@ impl GridEntry {
     }
 }
 
-/// Which faces lie nearest to a cell, and whether their exact surfaces give the distance there: a palette entry.
+/// A palette entry: the faces nearest to a cell, and whether their exact surfaces give the distance there.
 ///
-/// In 16 bits, the upper two tell which: 00 [`Self::Face`], 01 [`Self::Roughly`], 10 [`Self::Convex`], 11 [`Self::Reentrant`]; the others are the
-/// face, or where in the brick's palette its three faces stand ([`NO_FACE`] for none). [`NO_FACE`] as a whole is [`Self::Unknown`].
+/// Of the 16 bits the upper two are the kind: 00 [`Self::Face`], 01 [`Self::Roughly`], 10 [`Self::Convex`], 11 [`Self::Reentrant`]. The others are
+/// the face, or the index in the brick's palette of its three faces ([`NO_FACE`] for none). [`NO_FACE`] as a whole is [`Self::Unknown`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Nearby {
-    /// Not known.
+    /// Nearest face unknown.
     Unknown,
-    /// All over the cell the distance is that to this face's surface.
+    /// The distance to this face's surface is exact all over the cell.
     Face(u16),
-    /// This face is nearest; the distance is as interpolated.
+    /// This face is nearest; the distance is interpolated.
     Roughly(u16),
-    /// At a convex edge or corner of these faces the largest of the distances to their surfaces has the distance's sign and is no larger in
-    /// amount; inside, and at the faces, it is the distance.
+    /// A convex edge or corner of these faces: the largest of the distances to their surfaces has the sign of the true distance and no larger
+    /// magnitude; inside, and at the faces, it is exact.
     Convex([u16; 3]),
-    /// At a re-entrant one the smallest, likewise; outside, and at the faces, it is the distance.
+    /// A re-entrant edge or corner of these faces: the same for the smallest; outside, and at the faces, it is exact.
     Reentrant([u16; 3]),
 }
 
 impl Nearby {
-    /// Most faces a shape can have whose palettes say more than [`Self::Unknown`].
+    /// Most faces of a shape whose palettes state more than [`Self::Unknown`].
     pub const MAX_FACES: u16 = 0x3fff;
     const KIND: u16 = 0xc000;
 
-    /// From a palette entry; `group` reads three entries of the brick's palette from a place in it.
+    /// From a palette entry; `group` reads three entries of the brick's palette from an index.
     #[inline]
     pub fn from_bits(bits: u16, group: impl FnOnce(u16) -> Option<[u16; 3]>) -> Self {
         let rest = bits & Self::MAX_FACES;
@@ -247,7 +249,7 @@ impl Nearby {
         }
     }
 
-    /// To a palette entry; `at` is where in the brick's palette the three faces stand, for those that have three.
+    /// To a palette entry; `at` is the index in the brick's palette of the three faces, for the kinds that have three.
     pub const fn to_bits(self, at: u16) -> u16 {
         match self {
             Self::Unknown => NO_FACE,
@@ -258,7 +260,7 @@ impl Nearby {
         }
     }
 
-    /// The nearest face and one more that is near, each [`NO_FACE`] where there is none.
+    /// The nearest face and another nearby face, each [`NO_FACE`] if there is none.
     pub const fn two_faces(self) -> [u16; 2] {
         match self {
             Self::Convex([first, second, _]) | Self::Reentrant([first, second, _]) => [first, second],
@@ -294,24 +296,24 @@ pub struct BrickRecord {
 
 /// A sphere about a run of points: one node of the pointshell's tree.
 ///
-/// Preorder: children follow their parent; `skip` is the next node to look at when this one is culled. A leaf has `skip == own index + 1`.
+/// Preorder: children follow their parent; `skip` is the next node to visit when this one is culled. A leaf has `skip == own index + 1`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct NodeRecord {
-    /// m, shape frame.
+    /// Centre, m, shape frame.
     pub center: [f32; 3],
-    /// m.
+    /// Radius, m.
     pub radius: f32,
-    /// First point below it, counted from the shape's first point.
+    /// First point in the subtree, counted from the shape's first point.
     pub first_point: u32,
-    /// Points below it.
+    /// Number of points in the subtree.
     pub point_count: u32,
-    /// Next node when culled, counted from the shape's first node; larger than own index.
+    /// Next node when culled, counted from the shape's first node; greater than the node's own index.
     pub skip: u32,
 }
 
 impl NodeRecord {
-    /// The points below it, of all its shape's. None for a record that leads beyond them, which no image that was opened has.
+    /// The points of this node's subtree, given all points of its shape. Empty for a record out of range, which an opened image cannot contain.
     #[inline]
     pub fn points<'a>(&self, all: &'a [PointRecord]) -> &'a [PointRecord] {
         let first = self.first_point as usize;
@@ -323,13 +325,13 @@ impl NodeRecord {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PointRecord {
-    /// m, shape frame.
+    /// Position, m, shape frame.
     pub position: [f32; 3],
     /// Outward unit normal, octahedral (see [`oct_decode`]).
     pub normal: [i16; 2],
     /// Face it lies on, counted from the shape's first face.
     pub face: u16,
-    /// The other face when it lies on an edge, else [`NO_FACE`].
+    /// The second face if the point is on an edge, else [`NO_FACE`].
     pub edge_face: u16,
 }
 
@@ -337,15 +339,15 @@ pub struct PointRecord {
 pub mod surface_kind {
     /// No closed form.
     pub const OTHER: u32 = 0;
-    /// Through `origin`, normal `axis`.
+    /// Plane through `origin` with normal `axis`.
     pub const PLANE: u32 = 1;
-    /// Axis through `origin` along `axis`, `radius`.
+    /// Cylinder with its axis through `origin` along `axis`, and `radius`.
     pub const CYLINDER: u32 = 2;
-    /// `radius` at `origin`, growing along `axis` by tan(`second`).
+    /// Cone with `radius` at `origin`, which grows along `axis` by tan(`second`).
     pub const CONE: u32 = 3;
-    /// Centre `origin`, `radius`.
+    /// Sphere with centre `origin` and `radius`.
     pub const SPHERE: u32 = 4;
-    /// Centre `origin`, major `radius`, minor `second`.
+    /// Torus with centre `origin`, major `radius` and minor `second`.
     pub const TORUS: u32 = 5;
 }
 
@@ -355,13 +357,13 @@ pub mod surface_kind {
 pub struct FaceRecord {
     /// One of [`surface_kind`].
     pub kind: u32,
-    /// +1 when the outward normal is the surface's natural one, −1 when turned round.
+    /// +1 when the outward normal is the surface's natural one, −1 when reversed.
     pub sense: f32,
-    /// m.
+    /// Origin, m.
     pub origin: [f32; 3],
     /// Unit vector.
     pub axis: [f32; 3],
-    /// m.
+    /// Radius, m.
     pub radius: f32,
     /// Half angle (cone, rad) or minor radius (torus, m).
     pub second: f32,
@@ -442,8 +444,8 @@ mod tests {
                 worst = worst.max(sin);
             }
         }
-        // Half a step in x and y is 1/65534; z gives way by both, so √6/65534 in the octahedron's face,
-        // seen from the centre at 1/√3, where the face is nearest: √18/65534.
+        // Half a step in x and y is 1/65534; z changes by both together, so the error is √6/65534 in the octahedron's face, and seen from the centre
+        // at distance 1/√3, where the face is nearest, √18/65534.
         assert!(worst < 6.5e-5, "{worst}");
     }
 }

@@ -1,32 +1,31 @@
-//! Which faces a region of a field has to do with.
+//! Faces that a region of a field refers to.
 
 use super::field::Field;
 use super::records::*;
 
-/// What `good` tells of a palette: an entry a bit.
+/// Most palette entries whose result `good` can hold: one bit each.
 const MOST_ENTRIES: u16 = u16::BITS as u16;
-/// What coming to a brick takes, in reads.
+/// Cost of reaching a brick, in reads.
 const BRICK: u32 = 6;
 
 impl Field<'_> {
-    /// Whether a look-up anywhere from `low` to `high` (cells from the grid's corner) finds a cell that names this face and no other. Unlike
-    /// [`Self::only`] nothing found is not enough; when the answer is no all the same, and the cost, are as there.
+    /// Whether every query from `low` to `high` (cells from the grid's corner) finds a cell that refers to this face only. Unlike in [`Self::only`],
+    /// finding nothing is not sufficient; the other conditions for `false`, and the cost, are the same.
     pub fn all_at(&self, low: [f32; 3], high: [f32; 3], reads: &mut u32, face: u16) -> bool {
         (0..3).all(|a| low[a] >= 0.0 && high[a] < self.cells[a])
             && self.region(low, high, reads, |found| found == Some(face))
     }
 
-    /// Whether a look-up anywhere from `low` to `high` (cells from the grid's corner) finds nothing, or nothing but faces that `these` says yes to,
-    /// by their exact surfaces. No is also the answer where more than `reads` would have to be read to tell, where either is no number, and of
-    /// voxmaps.
+    /// Whether queries from `low` to `high` (cells from the grid's corner) find nothing, or only faces that `these` accepts, through their exact
+    /// surfaces. It also returns `false` when the test would need more than `reads` reads, when a bound is NaN, and for voxmaps.
     ///
-    /// Cost: what is taken off `reads`, each some 8 instructions: 6 for a brick, one for each entry of its palette, and, of a brick that has to do
-    /// with other faces too, one for each cell of the region.
+    /// Cost: the amount subtracted from `reads`, each about 8 instructions: 6 for a brick, one for each entry of its palette, and, for a brick that
+    /// also refers to other faces, one for each cell of the region.
     pub fn only(&self, low: [f32; 3], high: [f32; 3], reads: &mut u32, these: impl Fn(u16) -> bool) -> bool {
         self.region(low, high, reads, |found| found.is_none_or(&these))
     }
 
-    /// Whether all that a look-up from `low` to `high` finds is good: the one face of a cell, or nothing at all.
+    /// Whether `is_good` accepts everything that queries from `low` to `high` find: the single face of a cell, or nothing.
     #[inline]
     fn region(
         &self,
@@ -42,7 +41,7 @@ impl Field<'_> {
         for a in 0..3 {
             let (from, to, cells) = (low[a], high[a], self.cells[a]);
             if to < 0.0 || from >= cells {
-                // All of it is beyond the grid.
+                // The whole region is outside the grid.
                 return true;
             }
             first[a] = from as u32;
@@ -64,7 +63,7 @@ impl Field<'_> {
         true
     }
 
-    /// The same of cells `from..=to` of a brick.
+    /// The same test for cells `from..=to` of a brick.
     #[inline]
     fn in_brick(
         &self,
@@ -90,7 +89,7 @@ impl Field<'_> {
         let palette = &self.palette[brick.palette as usize..][..usize::from(entries)];
         let mut good = 0u32;
         for (i, &bits) in palette.iter().enumerate() {
-            // Where more than one face is near, not all of them are these.
+            // A cell with several near faces is never accepted.
             good |= u32::from(bits <= Nearby::MAX_FACES && is_good(Some(bits))) << i;
         }
         if good.count_ones() == u32::from(entries) {
@@ -100,7 +99,7 @@ impl Field<'_> {
         if good == 0 || brick.index_bits != 4 || !take(reads, count) {
             return false;
         }
-        // Four bits a cell, so that a row is one word.
+        // Four bits per cell, so that a row is one word.
         let across = to[0] - from[0] + 1;
         (from[2]..=to[2]).all(|z| {
             (from[1]..=to[1]).all(|y| {
@@ -121,7 +120,7 @@ impl Field<'_> {
     }
 }
 
-/// Whether there are so many left; then they are no more.
+/// Whether at least `wanted` are left, and subtracts them; sets `left` to 0 otherwise.
 fn take(left: &mut u32, wanted: u32) -> bool {
     match left.checked_sub(wanted) {
         Some(rest) => {
@@ -135,5 +134,5 @@ fn take(left: &mut u32, wanted: u32) -> bool {
     }
 }
 
-// A row is the eight cells of four bits in a word.
+// A row is eight cells of four bits, one word.
 const _: () = assert!(4 * BRICK_CELLS as u32 == u32::BITS);

@@ -1,15 +1,15 @@
-//! Every number of a rig's description: its key in the file, unit there, range, meaning.
+//! All numbers of a rig's description: key in the file, unit there, range, meaning.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 macro_rules! rig_keys {
     ($($(#[doc = $doc:literal])+ $name:ident = $key:literal, $unit:literal, $si:expr, $min:expr, $max:expr;)+) => {
-        /// Names a number of a description.
+        /// Identifies a number of a description.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Schema)]
         pub enum RigKey { $($(#[doc = $doc])+ $name,)+ }
 
-        /// All of them, in the order of [`RigKey`].
+        /// All numbers, in the order of [`RigKey`].
         pub const RIG_KEYS: &[RigKeyRow] = &[$(RigKeyRow {
             id: RigKey::$name, key: $key, description: concat!($($doc),+), unit: $unit, si: $si, min: $min, max: $max,
         },)+];
@@ -19,15 +19,15 @@ macro_rules! rig_keys {
 /// One number's row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigKeyRow {
-    /// Which.
+    /// Identifier.
     pub id: RigKey,
-    /// Its key in the file, with the table it stands in.
+    /// Key in the file, including its table.
     pub key: &'static str,
-    /// What it is.
+    /// Meaning.
     pub description: &'static str,
     /// Unit in the file.
     pub unit: &'static str,
-    /// That unit in SI units.
+    /// That unit expressed in SI units.
     pub si: f32,
     /// Smallest accepted, in the file's unit.
     pub min: f32,
@@ -41,69 +41,69 @@ const DEG: f32 = core::f32::consts::PI / 180.0;
 rig_keys! {
     /// Paddle: distance of the handle from the joint's axis.
     PaddleRadius = "kinematics.radius_mm", "mm", MM, 5.0, 500.0;
-    /// Pantograph: distance between the axes of its two motors; 0 where they are one.
+    /// Pantograph: distance between the axes of its two motors; 0 if they coincide.
     PantographBase = "kinematics.base_mm", "mm", MM, 0.0, 500.0;
     /// Pantograph: lengths of the two links at the motors, left and right.
     PantographProximal = "kinematics.proximal_mm", "mm", MM, 10.0, 1_000.0;
     /// Pantograph: lengths of the two links at the handle, left and right.
     PantographDistal = "kinematics.distal_mm", "mm", MM, 10.0, 1_000.0;
-    /// Serial arm: height of the shoulder over the base.
+    /// Serial arm: height of the shoulder above the base.
     ArmBaseHeight = "kinematics.base_height_mm", "mm", MM, 0.0, 1_000.0;
     /// Serial arm: length of the upper link.
     ArmUpper = "kinematics.upper_mm", "mm", MM, 10.0, 1_000.0;
     /// Serial arm: length of the lower link.
     ArmLower = "kinematics.lower_mm", "mm", MM, 10.0, 1_000.0;
-    /// Point of the mechanism's own frame that is the world's origin.
+    /// World origin, as a point in the mechanism's own frame.
     Origin = "mount.origin_mm", "mm", MM, -2_000.0, 2_000.0;
-    /// How the mechanism's frame is turned in the world: a rotation vector.
+    /// Rotation of the mechanism's frame in the world: a rotation vector.
     Turn = "mount.turn_deg", "deg", DEG, -180.0, 180.0;
-    /// Encoder counts, all four edges, for a turn of the shaft that carries the encoder.
+    /// Encoder counts, all four edges, per turn of the shaft that carries the encoder.
     Counts = "joint.counts_per_turn", "counts", 1.0, 16.0, 10_000_000.0;
-    /// Motor turns for a turn of the joint: drum over capstan.
+    /// Motor turns per turn of the joint: drum over capstan.
     Gear = "joint.gear", "1", 1.0, 1.0, 1_000.0;
-    /// Torque of the motor for its current.
+    /// Torque of the motor per ampere.
     TorqueConstant = "joint.torque_constant_n_m_per_a", "N·m/A", 1.0, 1e-4, 10.0;
-    /// Largest current the motor is given.
+    /// Largest current of the motor.
     CurrentLimit = "joint.current_limit_a", "A", 1.0, 0.01, 30.0;
     /// Smallest angle the joint can reach.
     RangeFrom = "joint.range_deg[0]", "deg", DEG, -360.0, 360.0;
     /// Largest angle the joint can reach.
     RangeTo = "joint.range_deg[1]", "deg", DEG, -360.0, 360.0;
-    /// Angle of the joint in the pose the mechanism is held in when its counters start.
+    /// Angle of the joint in the pose in which the mechanism is held when its counters start.
     Home = "joint.home_deg", "deg", DEG, -360.0, 360.0;
-    /// Fastest the joint can turn: what reads faster is an encoder fault.
+    /// Largest speed of the joint: a faster reading is an encoder fault.
     Rate = "joint.rate_limit_deg_per_s", "deg/s", DEG, 10.0, 20_000.0;
     /// Coulomb friction at the joint.
     Coulomb = "joint.friction_n_m", "N·m", 1.0, 0.0, 1.0;
     /// Viscous friction at the joint.
     Viscous = "joint.viscous_n_m_s_per_rad", "N·m·s/rad", 1.0, 0.0, 1.0;
-    /// Inertia at the joint, rotor and gear included, handle not.
+    /// Inertia at the joint, including rotor and gear, without the handle.
     Inertia = "joint.inertia_kg_m2", "kg·m²", 1.0, 1e-7, 1.0;
-    /// Encoder counts for a turn of a wrist axis.
+    /// Encoder counts per turn of a wrist axis.
     WristCounts = "wrist.counts_per_turn", "counts", 1.0, 16.0, 10_000_000.0;
-    /// Angles of the wrist in the pose its counters start in.
+    /// Angles of the wrist in the pose in which its counters start.
     WristHome = "wrist.home_deg", "deg", DEG, -360.0, 360.0;
-    /// Directions of the wrist's axes when all its angles are 0, in the frame of the link that carries it: unit vectors.
+    /// Unit vectors of the wrist's axes when all its angles are 0, in the frame of the link that carries it.
     WristAxis = "wrist.axes", "1", 1.0, -1.0, 1.0;
     /// Mass of the handle.
     HandleMass = "handle.mass_kg", "kg", 1.0, 0.001, 5.0;
-    /// Largest force at the handle, whatever the parameters say.
+    /// Largest force at the handle, regardless of the parameters.
     CeilingForce = "ceilings.force_n", "N", 1.0, 0.1, 20.0;
     /// Largest power into the handle.
     CeilingPower = "ceilings.power_w", "W", 1.0, 0.1, 50.0;
     /// Largest speed of the handle.
     CeilingSpeed = "ceilings.speed_m_per_s", "m/s", 1.0, 0.1, 5.0;
-    /// Farthest the handle may be from the world's origin.
+    /// Largest distance of the handle from the world's origin.
     CeilingWorkspace = "ceilings.workspace_mm", "mm", MM, 10.0, 2_000.0;
 }
 
 impl RigKey {
-    /// The row of this number.
+    /// Table row of this number.
     pub const fn row(self) -> &'static RigKeyRow {
         &RIG_KEYS[self as usize]
     }
 
-    /// Whether `si` (SI unit) lies in the range, up to the rounding of the conversion, 2⁻²² of the bound.
+    /// Whether `si` (SI unit) is in the range, up to the rounding of the conversion, 2⁻²² of the bound.
     pub fn holds(self, si: f32) -> bool {
         let row = self.row();
         let (min, max) = (row.min * row.si, row.max * row.si);

@@ -1,7 +1,7 @@
-//! A rig's description: what a board must know of its mechanism, encoders and motors to sense a handle and to push it.
+//! A rig's description: the data on mechanism, encoders and motors that a board needs to sense and drive a handle.
 //!
-//! A rig builder writes it as a file (`firmware/rigs/*.toml`, `docs/rigs.md`); it crosses the link as one message, so that it arrives whole or not at
-//! all; [`Rig::check`] is what host and board both ask before they believe it. Metres, radians, seconds, newtons, amperes here; the file's units are
+//! A rig builder writes it as a file (`firmware/rigs/*.toml`, `docs/rigs.md`). It crosses the link as one message, so that it arrives whole or not at
+//! all, and both host and board accept it only after [`Rig::check`]. Units here are metres, radians, seconds, newtons, amperes; the file's units are
 //! in [`RIG_KEYS`].
 
 mod keys;
@@ -14,19 +14,19 @@ use crate::limits::{MAX_JOINTS, MAX_NAME};
 
 pub use keys::{RIG_KEYS, RigKey, RigKeyRow};
 
-/// Counts a 16-bit counter can move between two ticks before its direction is ambiguous, with a tenth to spare.
+/// Largest motion of a 16-bit counter between two ticks before its direction is ambiguous, with a tenth as margin.
 pub const MAX_COUNTS_PER_TICK: f32 = 29_000.0;
 /// Largest cosine between neighbouring axes of a wrist: 26° apart. The first and the third may be parallel, as in a gimbal.
 const WRIST_COSINE: f32 = 0.9;
 
-/// See the module.
+/// A rig's description; see the module.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Rig {
-    /// What it is called.
+    /// Name of the rig.
     pub name: String<MAX_NAME>,
     /// Links.
     pub kinematics: Kinematics,
-    /// Where the mechanism stands in the world.
+    /// Placement of the mechanism in the world.
     pub mount: Mount,
     /// Joints with motors, in the order of the kinematics.
     pub joints: Vec<Joint, MAX_JOINTS>,
@@ -34,11 +34,11 @@ pub struct Rig {
     pub wrist: Option<Wrist>,
     /// Mass of the handle, kg.
     pub handle_mass: f32,
-    /// What no parameter can go beyond.
+    /// Hardware limits that no parameter can exceed.
     pub ceilings: RigCeilings,
 }
 
-/// How joint angles θ place the handle, in the mechanism's own frame; lengths in m. `docs/rigs.md` has the drawings.
+/// Kinematics: how joint angles θ place the handle, in the mechanism's own frame; lengths in m. Drawings are in `docs/rigs.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Kinematics {
     /// One joint about z: p = radius·(cos θ, sin θ, 0).
@@ -46,8 +46,8 @@ pub enum Kinematics {
         /// Distance of the handle from the axis.
         radius: f32,
     },
-    /// Five links in the plane z = 0. Motors at (∓base/2, 0), angles from x, counter-clockwise; the handle is where the two distal links meet, on the
-    /// left of the way from the left elbow to the right one.
+    /// Five links in the plane z = 0. Motors at (∓base/2, 0), angles from x, counter-clockwise; the handle is where the two distal links meet, to the
+    /// left of the line from the left elbow to the right one.
     Pantograph {
         /// Distance between the motors.
         base: f32,
@@ -69,7 +69,7 @@ pub enum Kinematics {
 }
 
 impl Kinematics {
-    /// Joints it has.
+    /// Number of joints.
     pub const fn joints(&self) -> usize {
         match self {
             Self::Paddle { .. } => 1,
@@ -82,7 +82,7 @@ impl Kinematics {
 /// World from mechanism: x = R·(p − origin).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Mount {
-    /// m, mechanism's frame.
+    /// Origin, m, mechanism's frame.
     pub origin: [f32; 3],
     /// R as a rotation vector, rad.
     pub turn: [f32; 3],
@@ -91,49 +91,49 @@ pub struct Mount {
 /// One joint with its encoder and motor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Joint {
-    /// Counts for a turn of the shaft that carries the encoder.
+    /// Counts per turn of the shaft that carries the encoder.
     pub counts_per_turn: f32,
-    /// The encoder sits on the motor's shaft; else on the joint's.
+    /// Whether the encoder is on the motor's shaft; otherwise it is on the joint's.
     pub encoder_on_motor: bool,
-    /// It counts down when the joint turns forward.
+    /// Whether the encoder counts down when the joint turns forward.
     pub encoder_reversed: bool,
-    /// Motor turns for a turn of the joint.
+    /// Motor turns per turn of the joint.
     pub gear: f32,
-    /// N·m/A.
+    /// Torque per current, N·m/A.
     pub torque_constant: f32,
-    /// A positive current pushes the joint backward.
+    /// Whether a positive current pushes the joint backward.
     pub motor_reversed: bool,
-    /// A.
+    /// Largest current, A.
     pub current_limit: f32,
     /// Smallest and largest angle, rad.
     pub range: [f32; 2],
     /// Angle where counting starts, rad.
     pub home: f32,
-    /// rad/s.
+    /// Largest speed, rad/s.
     pub rate_limit: f32,
     /// Coulomb friction, N·m.
     pub coulomb: f32,
     /// Viscous friction, N·m·s/rad.
     pub viscous: f32,
-    /// kg·m².
+    /// Inertia, kg·m².
     pub inertia: f32,
 }
 
 impl Joint {
-    /// Angle of the joint for an encoder count, rad, signed.
+    /// Joint angle per encoder count, rad, signed.
     pub fn radians_per_count(&self) -> f32 {
         let gear = if self.encoder_on_motor { self.gear } else { 1.0 };
         let sense = if self.encoder_reversed { -1.0 } else { 1.0 };
         sense * core::f32::consts::TAU / (self.counts_per_turn * gear)
     }
 
-    /// Torque at the joint for the motor's current, N·m/A, signed, without losses.
+    /// Joint torque per ampere of the motor's current, N·m/A, signed, without losses.
     pub fn torque_per_ampere(&self) -> f32 {
         let sense = if self.motor_reversed { -1.0 } else { 1.0 };
         sense * self.torque_constant * self.gear
     }
 
-    /// Most counts the encoder moves in a tick of a millisecond.
+    /// Most counts of the encoder in a tick of a millisecond.
     pub fn counts_per_tick(&self) -> f32 {
         1e-3 * self.rate_limit / self.radians_per_count().abs()
     }
@@ -142,72 +142,72 @@ impl Joint {
 /// Three passive axes that meet in the handle's origin: R = R_link · exp(a₁q₁) · exp(a₂q₂) · exp(a₃q₃).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Wrist {
-    /// Unit vectors.
+    /// Unit vectors of the axes.
     pub axes: [[f32; 3]; 3],
-    /// Counts for a turn; negative where the encoder counts down when the axis turns forward.
+    /// Counts per turn; negative if the encoder counts down when the axis turns forward.
     pub counts_per_turn: [f32; 3],
-    /// rad.
+    /// Angles where counting starts, rad.
     pub home: [f32; 3],
 }
 
-/// What no parameter can go beyond; below the firmware's own ceilings.
+/// Hardware limits that no parameter can exceed; they are below the firmware's own limits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct RigCeilings {
-    /// N.
+    /// Force, N.
     pub force: f32,
-    /// W.
+    /// Power, W.
     pub power: f32,
-    /// m/s.
+    /// Speed, m/s.
     pub speed: f32,
-    /// m from the world's origin.
+    /// Distance from the world's origin, m.
     pub workspace: f32,
 }
 
-/// What is wrong with a description.
+/// Fault of a description.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum RigFault {
-    /// A number outside its range, or none.
+    /// A number outside its range, or NaN.
     OutOfRange {
-        /// Which.
+        /// Key of the number.
         key: RigKey,
-        /// Of which joint or axis, from 0.
+        /// Its joint or axis, from 0.
         joint: u8,
-        /// In the file's unit.
+        /// Its value, in the file's unit.
         value: f32,
     },
-    /// The kinematics need another number of joints.
+    /// The kinematics need a different number of joints.
     Joints {
-        /// As many as these.
+        /// Number of joints needed.
         needed: u8,
     },
     /// A joint's range ends before it begins.
     Range {
-        /// Which, from 0.
+        /// Joint, from 0.
         joint: u8,
     },
     /// A joint's home lies outside its range.
     Home {
-        /// Which, from 0.
+        /// Joint, from 0.
         joint: u8,
     },
-    /// At its fastest a joint's encoder moves more counts in a tick than can be told apart.
+    /// At its largest speed a joint's encoder moves more counts per tick than can be distinguished.
     Counts {
-        /// Which, from 0.
+        /// Joint, from 0.
         joint: u8,
     },
-    /// A wrist's axis is no unit vector, or nearly parallel to its neighbour.
+    /// An axis of the wrist is not a unit vector, or is nearly parallel to its neighbour.
     WristAxes,
     /// The links do not reach each other in the home pose.
     Linkage,
-    /// The home pose is singular: in some direction the handle can hardly be pushed.
+    /// The home pose is singular: in some direction the handle can hardly be driven.
     Singular,
     /// The home pose lies outside the workspace.
     Workspace,
 }
 
 impl Rig {
-    /// Whether every number is possible and they agree with each other. What takes kinematics (do the links reach each other?) the board finds out
-    /// when it builds them.
+    /// Checks that every number is possible and that they are consistent. Conditions that need the kinematics (do the links reach each other?) are
+    /// checked by the board when it builds them.
     ///
     /// # Errors
     /// The first fault.
@@ -307,7 +307,7 @@ impl Rig {
 }
 
 impl Wrist {
-    /// Angle of an axis for an encoder count, rad, signed.
+    /// Axis angle per encoder count, rad, signed.
     pub fn radians_per_count(&self, axis: usize) -> f32 {
         core::f32::consts::TAU / self.counts_per_turn[axis]
     }
@@ -321,7 +321,7 @@ impl Wrist {
     }
 }
 
-/// Names the layout of a description in bytes: any change to its types changes it.
+/// Hash of the byte layout of a description: any change to its types changes it.
 pub const fn layout() -> u32 {
     let key = u64::from_le_bytes(postcard_schema::key::Key::for_path::<Rig>("rig").to_bytes());
     (key ^ (key >> 32)) as u32

@@ -88,27 +88,7 @@ impl Random {
     }
 
     fn fault(&mut self) -> Fault {
-        match self.below(17) {
-            0 => Fault::StopInput,
-            1 => Fault::HostSilent {
-                silent_ms: self.u16(),
-            },
-            2 => Fault::EncoderJump { axis: self.u8() },
-            3 => Fault::EncoderStuck { axis: self.u8() },
-            4 => Fault::OverSpeed,
-            5 => Fault::Workspace,
-            6 => Fault::Driver { axis: self.u8() },
-            7 => Fault::OverCurrent { axis: self.u8() },
-            8 => Fault::OverTemperature { axis: self.u8() },
-            9 => Fault::SupplyLow,
-            10 => Fault::TickOverrun,
-            11 => Fault::SceneDamaged,
-            12 => Fault::AngularOverSpeed,
-            13 => Fault::ReferenceLost,
-            14 => Fault::ImpossiblePosture,
-            15 => Fault::BadReading,
-            _ => Fault::NonFinite,
-        }
+        Fault::every(self.u16())[self.below(Fault::COUNT)]
     }
 
     fn state(&mut self) -> DeviceState {
@@ -270,14 +250,7 @@ impl Random {
     }
 
     fn target(&mut self) -> ConstraintTarget {
-        let kinds = [
-            ConstraintKind::Concentric,
-            ConstraintKind::Coplanar,
-            ConstraintKind::Conical,
-            ConstraintKind::Spherical,
-            ConstraintKind::Annular,
-            ConstraintKind::AnnularBore,
-        ];
+        let kinds = ConstraintKind::ALL;
         ConstraintTarget {
             id: self.u16(),
             sequence: self.u16(),

@@ -1,4 +1,4 @@
-//! A tiny scene made by hand: every record, both sample formats, all three widths of palette index.
+//! A tiny hand-made scene: every record, both sample formats, all three widths of palette index.
 
 // Each test binary uses its part of it.
 #![allow(dead_code)]
@@ -24,7 +24,7 @@ impl Aligned {
         &mut bytemuck::cast_slice_mut(&mut self.0)[..self.1]
     }
 
-    /// Writes the checksum that fits the rest.
+    /// Writes the matching checksum.
     pub fn seal(&mut self) {
         let crc = CRC.checksum(&self.bytes()[20..]);
         self.bytes_mut()[16..20].copy_from_slice(&crc.to_le_bytes());

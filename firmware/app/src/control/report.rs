@@ -78,6 +78,10 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     }
 
     fn telemetry(&mut self) -> Telemetry {
+        let hand = self
+            .mechanism
+            .simulation()
+            .and_then(|simulation| simulation.hand());
         let output = self.output.as_ref();
         let mut flags = output.map_or(0, |o| flags_to_wire(o.work.flags));
         if self.replaced {
@@ -97,7 +101,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
                 .map(|(part, (pose, _))| (part, pose_to_wire(&pose))),
             wrench: wrench_to_wire(&self.commanded),
             contact: wrench_to_wire(&output.map_or(Wrench::ZERO, |o| o.contact)),
-            hand: self.mechanism.hand().as_ref().map(wrench_to_wire),
+            hand: hand.as_ref().map(wrench_to_wire),
             points: output.map_or(0, |o| o.work.points.min(u32::from(u16::MAX)) as u16),
             flags,
             missed: self.missed_total,

@@ -1,10 +1,10 @@
 //! What the sensors say, and what in it is a fault.
 
+use mortise_mechanism::ceilings::is_outside;
 use mortise_protocol::message::Fault;
 
 use super::ControlPlane;
 use crate::board::{Clock, DriverFaultKind, Mechanism};
-use crate::ceilings::is_outside;
 use crate::safety::{Event as SafetyEvent, Motors, Safety};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {

@@ -3,8 +3,7 @@
 use std::cell::{Cell, UnsafeCell};
 use std::rc::Rc;
 
-use mortise_firmware::board::{Flash, FlashError, RIG_SLOTS, SLOTS, WRITE_SIZE};
-use mortise_firmware::ram_flash::{ERASED, FlashWord};
+use mortise_firmware::board::{ERASED, Flash, FlashError, FlashWord, RIG_SLOTS, SLOTS, WRITE_SIZE};
 
 pub const SECTOR: usize = 512;
 pub const SLOT: usize = 16 * SECTOR;

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use mortise_firmware::board::{Drive, Mechanism, Sensed};
+use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 
 /// Shared between the test and the mechanism.
 #[derive(Clone)]
@@ -37,17 +37,16 @@ impl Strings {
     }
 }
 
-pub struct Puppet<const SIMULATED: bool>(Strings);
+pub struct Puppet<const SIMULATED: bool, const DESCRIBED: bool>(Strings);
 
-impl<const SIMULATED: bool> Puppet<SIMULATED> {
+impl<const SIMULATED: bool, const DESCRIBED: bool> Puppet<SIMULATED, DESCRIBED> {
     pub fn new(strings: Strings) -> Self {
         Self(strings)
     }
 }
 
-impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
-    const SIMULATED: bool = SIMULATED;
-    const DESCRIBED: bool = SIMULATED;
+impl<const SIMULATED: bool, const DESCRIBED: bool> Mechanism for Puppet<SIMULATED, DESCRIBED> {
+    const DESCRIBED: bool = DESCRIBED;
 
     fn sense(&mut self) -> Sensed {
         self.0.0.borrow().sensed
@@ -62,4 +61,10 @@ impl<const SIMULATED: bool> Mechanism for Puppet<SIMULATED> {
     fn drive(&mut self, drive: Drive) {
         self.0.0.borrow_mut().drives.push(drive);
     }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        SIMULATED.then_some(self)
+    }
 }
+
+impl<const SIMULATED: bool, const DESCRIBED: bool> Simulation for Puppet<SIMULATED, DESCRIBED> {}

@@ -11,11 +11,11 @@ use std::collections::VecDeque;
 use flash::TestFlash;
 use mechanism::{Puppet, Strings};
 use mortise_firmware::board::{Clock, Identity, Outbound};
-use mortise_firmware::ceilings::Ceilings;
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::{ControlPlane, Ticked};
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::*;
@@ -67,9 +67,9 @@ impl Clock for TestClock {
 }
 
 /// Both planes on one thread.
-pub struct Bench<const SIMULATED: bool = true> {
+pub struct Bench<const SIMULATED: bool = true, const DESCRIBED: bool = true> {
     pub link: LinkPlane<'static, 'static, TestFlash>,
-    pub control: ControlPlane<'static, 'static, Puppet<SIMULATED>, TestClock>,
+    pub control: ControlPlane<'static, 'static, Puppet<SIMULATED, DESCRIBED>, TestClock>,
     pub strings: Strings,
     pub clock: TestClock,
     pub wire: Wire,
@@ -80,7 +80,7 @@ pub struct Bench<const SIMULATED: bool = true> {
     pub heard: VecDeque<FromDevice>,
 }
 
-impl Bench<true> {
+impl Bench {
     /// Started, greeted, with a scene of a fixed part 0 and a grabbable part 1.
     pub fn ready() -> Self {
         let mut bench = Self::new(TestFlash::leaked());
@@ -90,7 +90,7 @@ impl Bench<true> {
     }
 }
 
-impl<const SIMULATED: bool> Bench<SIMULATED> {
+impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
     /// Powered on; nothing said yet. Memory is leaked: a bench lives as long as its test.
     pub fn new(flash: TestFlash) -> Self {
         let channels = Box::leak(Box::new(Channels::new()));

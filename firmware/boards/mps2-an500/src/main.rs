@@ -23,7 +23,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt as _;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::link::LinkPlane;
-use mortise_firmware::ram_flash::RamFlash;
+use mortise_simulation::ram_flash::RamFlash;
 
 /// The control plane of this board.
 type Control = ControlPlane<'static, 'static, motors::Motors, timer::TickClock>;
@@ -43,11 +43,11 @@ mod app {
 
     use heapless::spsc::{Consumer, Producer, Queue};
     use mortise_firmware::board::Identity;
-    use mortise_firmware::ceilings::Ceilings;
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::Ticked;
     use mortise_firmware::device::start;
     use mortise_firmware::store;
+    use mortise_mechanism::ceilings::Ceilings;
     use mortise_protocol::message::CostUnit;
 
     use crate::device::Interrupt;

@@ -1,8 +1,8 @@
 //! Memory that survives a reset: external RAM standing in for the flash of a real board, and the stack's high-water mark.
 
 use cortex_m::peripheral::MPU;
-use mortise_firmware::board::WRITE_SIZE;
-use mortise_firmware::ram_flash::{ERASE_SIZE, FlashWord, RamFlash};
+use mortise_firmware::board::{FlashWord, WRITE_SIZE};
+use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 
 /// Start of the external RAM (QEMU puts it here for AN500, at 0x21000000 for the other images of the board).
 const PSRAM: usize = 0x6000_0000;

@@ -1,10 +1,8 @@
 //! The simulated mechanism behind an enable output that can be seen: LED 0 is on while motors are enabled.
 
-use mortise_firmware::board::{Drive, Mechanism, Sensed};
-use mortise_firmware::simulated_rig::SimulatedRig;
-use mortise_haptics::{Pose, Wrench};
-use mortise_protocol::message::{HandScript, InputFault};
+use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 use mortise_protocol::rig::Rig;
+use mortise_simulation::simulated_rig::SimulatedRig;
 
 use crate::device::Registers;
 
@@ -33,7 +31,6 @@ impl Motors {
 }
 
 impl Mechanism for Motors {
-    const SIMULATED: bool = true;
     const DESCRIBED: bool = true;
 
     fn sense(&mut self) -> Sensed {
@@ -58,23 +55,11 @@ impl Mechanism for Motors {
         self.mechanism.count()
     }
 
-    fn hand(&self) -> Option<Wrench> {
-        self.mechanism.hand()
-    }
-
-    fn set_hand(&mut self, script: Option<&HandScript>) {
-        self.mechanism.set_hand(script);
-    }
-
     fn home(&mut self) {
         self.mechanism.home();
     }
 
-    fn set_input_faults(&mut self, faults: &[InputFault]) {
-        self.mechanism.set_input_faults(faults);
-    }
-
-    fn reset(&mut self) -> Option<Pose> {
-        self.mechanism.reset()
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        self.mechanism.simulation()
     }
 }

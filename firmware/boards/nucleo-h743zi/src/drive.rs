@@ -1,34 +1,21 @@
-//! From joint torques to what the current drivers are told.
+//! From motor currents to what the current drivers are given.
 //!
 //! Each driver (maxon ESCON or the like) regulates its motor's current to a set value given as duty cycle and direction. Duty maps linearly to
-//! current between [`Driver::zero_duty`] and [`Driver::full_duty`]; the margins at both ends let a driver tell a broken wire (0 % or 100 %) from a
-//! command.
+//! current between [`ZERO_DUTY`] and [`FULL_DUTY`]; the margins at both ends let a driver tell a broken wire (0 % or 100 %) from a
+//! command. Set every driver to [`FULL_CURRENT_A`] at [`FULL_DUTY`] and no current at [`ZERO_DUTY`].
 
-use glam::Vec3;
+use mortise_protocol::rig::Rig;
 
-/// Motors.
+/// Motors the board has outputs for.
 pub const AXES: usize = 3;
+/// Current at [`FULL_DUTY`], A.
+pub const FULL_CURRENT_A: f32 = 3.0;
+/// Share of the PWM period that means no current.
+pub const ZERO_DUTY: f32 = 0.10;
+/// Share of the PWM period that means [`FULL_CURRENT_A`].
+pub const FULL_DUTY: f32 = 0.90;
 
-/// One motor with its transmission and driver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Driver {
-    /// Joint turn per motor turn (capstan over drum), below 1.
-    pub ratio: f32,
-    /// Torque constant, N·m/A.
-    pub torque_constant: f32,
-    /// The motor turns against the joint's positive sense.
-    pub reversed: bool,
-    /// Largest current commanded, A.
-    pub current_limit: f32,
-    /// Current at `full_duty`, A.
-    pub full_current: f32,
-    /// Share of the period that means no current.
-    pub zero_duty: f32,
-    /// Share of the period that means `full_current`.
-    pub full_duty: f32,
-}
-
-/// What one driver is told for one tick.
+/// What one driver is given for one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setpoint {
     /// Share of the PWM period the line is high, 0 to 1.
@@ -37,43 +24,31 @@ pub struct Setpoint {
     pub forward: bool,
 }
 
-/// Currents (A, signed in the motor's sense) for these joint torques (N·m).
-///
-/// When a motor would exceed its limit all three are scaled by one factor: the force on the handle gets weaker but keeps its
-/// direction. A torque that is not a number, or leads to none, gives no current at all.
-pub fn currents(drivers: &[Driver; AXES], torques: Vec3) -> [f32; AXES] {
-    let mut current = [0.0; AXES];
-    let mut scale = 1.0f32;
-    for axis in 0..AXES {
-        let driver = &drivers[axis];
-        let sense = if driver.reversed { -1.0 } else { 1.0 };
-        // Without losses motor torque = joint torque · (joint turn / motor turn).
-        let wanted = sense * torques[axis] * driver.ratio / driver.torque_constant;
-        if !wanted.is_finite() {
-            return [0.0; AXES];
-        }
-        if wanted.abs() > driver.current_limit {
-            scale = scale.min(driver.current_limit / wanted.abs());
-        }
-        current[axis] = wanted;
-    }
-    current.map(|wanted| wanted * scale)
-}
-
-impl Driver {
-    /// Duty and direction for a current (A). Never outside `zero_duty..=full_duty`; no current when `current` is not a number.
-    pub fn setpoint(&self, current: f32) -> Setpoint {
+impl Setpoint {
+    /// Duty and direction for a current (A). Never outside [`ZERO_DUTY`] to [`FULL_DUTY`]; no current when `current` is not a number.
+    pub fn of(current: f32) -> Self {
         // `min` alone would turn NaN into full current.
         let share = if current.is_finite() {
-            (current.abs() / self.full_current).min(1.0)
+            (current.abs() / FULL_CURRENT_A).min(1.0)
         } else {
             0.0
         };
-        Setpoint {
-            duty: self.zero_duty + share * (self.full_duty - self.zero_duty),
+        Self {
+            duty: ZERO_DUTY + share * (FULL_DUTY - ZERO_DUTY),
             forward: current >= 0.0,
         }
     }
+}
+
+/// What of a description this board can do: no motor is given more than its driver's full current, so that a force keeps its direction; a wrist is not
+/// sensed, because there are inputs for three encoders only.
+pub fn fitted(rig: &Rig) -> Rig {
+    let mut fitted = rig.clone();
+    for joint in &mut fitted.joints {
+        joint.current_limit = joint.current_limit.min(FULL_CURRENT_A);
+    }
+    fitted.wrist = None;
+    fitted
 }
 
 #[cfg(test)]
@@ -81,53 +56,25 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::rig::RIG;
-
-    fn torque() -> impl Strategy<Value = f32> {
-        prop_oneof![8 => -10.0f32..10.0, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY), 1 => Just(-f32::MAX)]
-    }
 
     proptest! {
         #[test]
-        fn never_beyond_the_limit_and_always_a_duty(x in torque(), y in torque(), z in torque()) {
-            let currents = currents(&RIG.drivers, Vec3::new(x, y, z));
-            for (current, driver) in currents.into_iter().zip(&RIG.drivers) {
-                // The scale is rounded once: one part in 2²³.
-                prop_assert!(current.abs() <= driver.current_limit * 1.000_000_2);
-                let setpoint = driver.setpoint(current);
-                prop_assert!((driver.zero_duty..=driver.full_duty).contains(&setpoint.duty));
-            }
-        }
-
-        #[test]
-        fn saturation_keeps_the_direction(x in -10.0f32..10.0, y in -10.0f32..10.0, z in -10.0f32..10.0) {
-            let torques = Vec3::new(x, y, z);
-            let found = currents(&RIG.drivers, torques);
-            let back = |axis: usize| {
-                let driver = &RIG.drivers[axis];
-                let sense = if driver.reversed { -1.0 } else { 1.0 };
-                sense * found[axis] * driver.torque_constant / driver.ratio
-            };
-            let produced = Vec3::new(back(0), back(1), back(2));
-            // Parallel up to rounding: 5 roundings of 2⁻²⁴ on each factor of products under |a||b|.
-            prop_assert!(produced.cross(torques).length() <= 1e-6 * produced.length() * torques.length() + 1e-9);
-            prop_assert!(produced.dot(torques) >= 0.0);
-            prop_assert!(produced.length() <= torques.length() * 1.000_001);
+        fn always_a_duty_within_the_margins(current in any::<f32>()) {
+            prop_assert!((ZERO_DUTY..=FULL_DUTY).contains(&Setpoint::of(current).duty));
         }
     }
 
     #[test]
     fn a_number_that_is_none_gives_no_current() {
-        let driver = RIG.drivers[0];
-        assert_eq!(currents(&RIG.drivers, Vec3::new(1.0, f32::NAN, 0.0)), [0.0; AXES]);
-        assert_eq!(driver.setpoint(f32::NAN).duty, driver.zero_duty);
+        for current in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert_eq!(Setpoint::of(current).duty, ZERO_DUTY);
+        }
     }
 
     #[test]
     fn half_the_full_current_is_half_way_between_the_margins() {
-        let driver = RIG.drivers[1];
-        let setpoint = driver.setpoint(-driver.full_current / 2.0);
-        assert!((setpoint.duty - (driver.zero_duty + driver.full_duty) / 2.0).abs() < 1e-6);
+        let setpoint = Setpoint::of(-FULL_CURRENT_A / 2.0);
+        assert!((setpoint.duty - (ZERO_DUTY + FULL_DUTY) / 2.0).abs() < 1e-6);
         assert!(!setpoint.forward);
     }
 }

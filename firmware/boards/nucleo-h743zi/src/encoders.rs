@@ -2,9 +2,9 @@
 //!
 //! | encoder | timer | A | B |
 //! |---|---|---|---|
-//! | A (base) | TIM4 | PD12 (D29) | PD13 (D28) |
-//! | B (upper link) | TIM3 | PB4 (D25) | PB5 (D22) |
-//! | C (lower link) | TIM8 | PC6 (D16) | PC7 (D21) |
+//! | A (joint 1) | TIM4 | PD12 (D29) | PD13 (D28) |
+//! | B (joint 2) | TIM3 | PB4 (D25) | PB5 (D22) |
+//! | C (joint 3) | TIM8 | PC6 (D16) | PC7 (D21) |
 //!
 //! All four edges count. Inputs have pull-ups for open-collector encoders and are filtered: a level must hold for 8 timer clocks (33 ns), so edges up
 //! to 10 MHz pass and spikes do not.
@@ -15,9 +15,8 @@ use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::FilterValue;
 use embassy_stm32::peripherals::{PB4, PB5, PC6, PC7, PD12, PD13, TIM3, TIM4, TIM8};
 use embassy_stm32::timer::qei::{Config, Qei, QeiMode};
+use mortise_mechanism::encoder::Follower;
 use nucleo_h743zi::drive::AXES;
-use nucleo_h743zi::encoder::{Follower, Reading};
-use nucleo_h743zi::rig::RIG;
 
 /// Pins of the encoders, named as in the wiring table above.
 pub struct Pins {
@@ -38,13 +37,12 @@ pub struct Encoders {
 }
 
 impl Encoders {
-    /// Starts counting from the home counts. `tick_s`: seconds between readings.
+    /// Starts counting from 0.
     pub fn new(
         base: Peri<'static, TIM4>,
         upper: Peri<'static, TIM3>,
         lower: Peri<'static, TIM8>,
         pins: Pins,
-        tick_s: f32,
     ) -> Self {
         let config = Config {
             ch1_pull: Pull::Up,
@@ -62,10 +60,7 @@ impl Encoders {
             pac::TIM3.ccmr_input(0).modify(|w| w.set_icf(channel, filter));
             pac::TIM8.ccmr_input(0).modify(|w| w.set_icf(channel, filter));
         }
-        let raw = [base.count(), upper.count(), lower.count()];
-        let followers = core::array::from_fn(|axis| {
-            Follower::new(RIG.home_counts[axis], raw[axis], RIG.counts_limit(axis, tick_s))
-        });
+        let followers = [base.count(), upper.count(), lower.count()].map(Follower::new);
         Self {
             base,
             upper,
@@ -74,15 +69,13 @@ impl Encoders {
         }
     }
 
-    /// The arm stands in its home posture now.
+    /// The mechanism stands in its home pose: all counts are 0.
     pub fn home(&mut self) {
-        for (follower, counts) in self.followers.iter_mut().zip(RIG.home_counts) {
-            follower.set(counts);
-        }
+        self.followers.iter_mut().for_each(Follower::restart);
     }
 
     /// Reads all three, close together (the counters run on).
-    pub fn read(&mut self) -> [Reading; AXES] {
+    pub fn read(&mut self) -> [i32; AXES] {
         let raw = [self.base.count(), self.upper.count(), self.lower.count()];
         core::array::from_fn(|axis| self.followers[axis].follow(raw[axis]))
     }

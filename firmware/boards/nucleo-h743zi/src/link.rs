@@ -6,12 +6,12 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use mortise_firmware::link::LinkPlane;
 
-use crate::flash::SceneFlash;
+use crate::flash::SlotFlash;
 use crate::memory::deepest_stack;
 use crate::usb::{IN_BYTES, InPipe, Out, OutPipe};
 
 /// The link plane of this board.
-pub type Link = LinkPlane<'static, 'static, SceneFlash>;
+pub type Link = LinkPlane<'static, 'static, SlotFlash>;
 
 /// A tick has run. Set by `idle`, not by the tick: the tick uses no critical section.
 pub static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();

@@ -30,11 +30,10 @@ mod motors;
 mod reset;
 mod tick_timer;
 mod usb;
+mod watchdog;
 
 /// The board's name in [`mortise_firmware::board::Identity`].
 const BOARD: &str = "nucleo-h743zi";
-/// The watchdog resets when so long no healthy tick has fed it: five ticks.
-const WATCHDOG_US: u32 = 5_000;
 /// Ticks missed in a row, motors live, that are a fault.
 const OVERRUN_TICKS: u8 = 2;
 
@@ -45,27 +44,28 @@ mod app {
     use embassy_executor::raw;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::pac;
-    use embassy_stm32::peripherals::IWDG1;
-    use embassy_stm32::wdg::IndependentWatchdog;
-    use mortise_firmware::board::{Identity, TICK_S};
+    use mortise_firmware::board::Identity;
     use mortise_firmware::channel::Channels;
     use mortise_firmware::control::ControlPlane;
     use mortise_firmware::device::start;
+    use mortise_firmware::store;
+    use mortise_mechanism::ceilings::Ceilings;
     use mortise_protocol::message::CostUnit;
     use nucleo_h743zi::boot::{Crash, reset_reason};
     use static_cell::{ConstStaticCell, StaticCell};
 
     use crate::critical::{STOP_PRIORITY, TICK_PRIORITY};
     use crate::encoders::Encoders;
-    use crate::flash::{SceneFlash, erasing};
+    use crate::flash::{SlotFlash, erasing};
     use crate::link::{self, Link};
-    use crate::mechanism::HapticArm;
+    use crate::mechanism::Device;
     use crate::motors::{self, Motors};
     use crate::tick_timer::{self, Cycles};
     use crate::usb::{InPipe, OutPipe, Port};
-    use crate::{BOARD, OVERRUN_TICKS, WATCHDOG_US, clocks, crash, encoders, entropy, memory, reset};
+    use crate::watchdog::Watchdog;
+    use crate::{BOARD, OVERRUN_TICKS, clocks, crash, encoders, entropy, memory, reset};
 
-    type Control = ControlPlane<'static, 'static, HapticArm, Cycles>;
+    type Control = ControlPlane<'static, 'static, Device, Cycles>;
 
     /// A tick has run since `idle` last looked.
     static TICK_RAN: AtomicBool = AtomicBool::new(false);
@@ -85,7 +85,7 @@ mod app {
     #[local]
     struct Local {
         control: &'static mut Control,
-        watchdog: IndependentWatchdog<'static, IWDG1>,
+        watchdog: Watchdog,
         link: Option<(Link, Port)>,
     }
 
@@ -137,26 +137,27 @@ mod app {
                 lower_a: p.PC6,
                 lower_b: p.PC7,
             },
-            TICK_S,
         );
         let clock = Cycles::new(p.TIM7, core_hz, &mut core.DCB, &mut core.DWT);
-        let flash = SceneFlash::new(p.FLASH, core_hz);
+        let flash = SlotFlash::new(p.FLASH, core_hz);
+        let kept = store::rig::kept(&flash);
+        let rig = kept.rig();
 
         let identity = Identity {
             board: BOARD,
-            force_axes: 3,
+            force_axes: rig.map_or(0, |rig| rig.joints.len() as u8),
             torque_axes: 0,
             cost_unit: CostUnit::Cycles,
             cost_budget: core_hz / 1000,
             reset: reset_reason(flags, last_crash),
             overrun_ticks: OVERRUN_TICKS,
-            ceilings: nucleo_h743zi::rig::RIG.ceilings,
+            ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
             entropy: entropy::entropy(),
         };
         let (plane, control) = start(
             CHANNELS.take(),
             flash,
-            HapticArm::new(encoders, motors),
+            Device::new(encoders, motors, rig),
             clock,
             identity,
         );
@@ -169,8 +170,7 @@ mod app {
         }
 
         let port = Port::new(p.USB_OTG_FS, p.PA12, p.PA11);
-        let mut watchdog = IndependentWatchdog::new(p.IWDG1, WATCHDOG_US);
-        watchdog.unleash();
+        let watchdog = Watchdog::start(p.IWDG1);
         tick_timer::start();
         (
             Shared {},
@@ -199,7 +199,7 @@ mod app {
         if motors::outputs_on() && !cx.local.control.safety().live() {
             motors::cut();
         } else {
-            cx.local.watchdog.pet();
+            cx.local.watchdog.feed();
         }
         tick_timer::finish();
         TICK_RAN.store(true, Ordering::Release);

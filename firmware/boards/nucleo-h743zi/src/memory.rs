@@ -5,14 +5,15 @@
 //! | 0 | external memory space 0x6000_0000–0xdfff_ffff (nothing is there) | none: no speculative reads either (ST AN4838) |
 //! | 1 | 0x0000_0000, 64 KiB instruction RAM, unused | none: a null pointer faults |
 //! | 2 | last 256 bytes of the stack | none: an overflow faults |
-//! | 3 | flash bank 2 (scenes) | read-only, cached; see [`Bank2`] |
+//! | 3 | flash bank 2 (scenes) | read-only, cached; see [`Access`] |
+//! | 4 | last two sectors of bank 1 (descriptions) | likewise |
 //!
 //! No DMA is used (USB moves its data through the OTG FIFO with the processor), so no memory needs to be uncached for that.
 
 use cortex_m::Peripherals;
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::{MPU, SCB};
-use nucleo_h743zi::flash_map;
+use nucleo_h743zi::flash_map::{self, Bank};
 
 /// RASR: execute never.
 const NEVER_EXECUTE: u32 = 1 << 28;
@@ -26,14 +27,12 @@ const UNCACHED: u32 = 0b001 << 19;
 /// TEX=0 C=0 B=1: device memory, no speculative access.
 const DEVICE: u32 = 0b01 << 16;
 
-/// Region of flash bank 2.
-const BANK_2_REGION: u32 = 3;
 /// RBAR.VALID: the write also selects the region.
 const VALID: u32 = 1 << 4;
 
-/// How flash bank 2 may be reached.
+/// How the slots in a bank of the flash may be reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bank2 {
+pub enum Access {
     /// Cached, read-only: a stray write faults.
     Read,
     /// Uncached and writable: a flash word is being programmed. Reads wait for it, about 0.1 ms.
@@ -56,19 +55,19 @@ fn set_region(number: u32, base: u32, attributes: u32) {
     }
 }
 
-/// Sets how bank 2 may be reached, in effect on return.
-pub fn set_bank_2(how: Bank2) {
+/// Sets how the slots in `bank` may be reached, in effect on return.
+pub fn set_access(bank: Bank, how: Access) {
     let attributes = match how {
-        Bank2::Read => READ_ONLY | CACHED,
-        Bank2::Program => READ_WRITE | UNCACHED,
-        Bank2::Erase => READ_WRITE | DEVICE,
+        Access::Read => READ_ONLY | CACHED,
+        Access::Program => READ_WRITE | UNCACHED,
+        Access::Erase => READ_WRITE | DEVICE,
+    };
+    let (region, start, length) = match bank {
+        Bank::Two => (3, flash_map::BANK_2, flash_map::BANK_LENGTH),
+        Bank::One => (4, flash_map::RIGS, flash_map::RIGS_LENGTH),
     };
     dsb();
-    set_region(
-        BANK_2_REGION,
-        flash_map::BANK_2,
-        attributes | NEVER_EXECUTE | size(flash_map::BANK_LENGTH as u64),
-    );
+    set_region(region, start, attributes | NEVER_EXECUTE | size(length.into()));
     dsb();
     isb();
 }
@@ -90,7 +89,8 @@ pub fn protect_and_cache(core: &mut Peripherals) {
     );
     set_region(1, 0, NO_ACCESS | NEVER_EXECUTE | DEVICE | size(64 * 1024));
     set_region(2, guard, NO_ACCESS | NEVER_EXECUTE | UNCACHED | size(256));
-    set_bank_2(Bank2::Read);
+    set_access(Bank::One, Access::Read);
+    set_access(Bank::Two, Access::Read);
     // SAFETY: regions are set; everything else keeps the default map (PRIVDEFENA), which is what the program was linked for.
     unsafe { core.MPU.ctrl.write(0b101) };
     dsb();
@@ -102,7 +102,7 @@ pub fn protect_and_cache(core: &mut Peripherals) {
 
 /// Drops cached lines of `length` bytes from `address`, both multiples of 32, after flash changed under them.
 pub fn forget(address: u32, length: u32) {
-    // SAFETY: bank 2 is write-through or uncached, so no line of it is dirty and nothing is lost.
+    // SAFETY: all slots are write-through or uncached, so no line of them is dirty and nothing is lost.
     unsafe {
         let mut scb: SCB = core::mem::transmute(());
         scb.invalidate_dcache_by_address(address as usize, length as usize);

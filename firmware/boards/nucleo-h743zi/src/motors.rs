@@ -201,9 +201,10 @@ impl Motors {
         stop_is_open() || broke || cut
     }
 
-    /// First motor whose driver reports a fault.
-    pub fn driver_fault(&self) -> Option<u8> {
-        self.faults.iter().position(Input::is_low).map(|axis| axis as u8)
+    /// First of `motors` motors whose driver reports a fault; what is not connected reads as one.
+    pub fn driver_fault(&self, motors: usize) -> Option<u8> {
+        let faults = self.faults.iter().take(motors);
+        { faults }.position(Input::is_low).map(|axis| axis as u8)
     }
 }
 

@@ -1,11 +1,11 @@
-//! A handle in a hand, closed round the force law.
+//! Operator model: a handle in a simulated hand, closed round the force law.
 
 use glam::{DQuat, DVec3};
 use mortise_haptics::observer::{Observer, Place};
 use mortise_haptics::{Flags, Input, Output, Pose, Quat, Settings, State, Twist, Vec3, tick};
 use mortise_protocol::image::SceneImage;
 
-/// Handle of a mass, moved by a spring-damper hand and a constant push, its orientation led by the hand alone (passive wrist).
+/// Handle with a mass, driven by the hand's spring and damper and a constant push; its orientation follows the hand alone (passive wrist).
 ///
 /// Integrated in steps of a tenth of a tick (symplectic Euler), the device's force held over the tick.
 #[derive(Clone, Copy)]
@@ -13,7 +13,7 @@ pub struct Hand {
     pub mass_kg: f64,
     pub spring_n_per_m: f64,
     pub damping_n_s_per_m: f64,
-    /// Where the hand wants the handle.
+    /// Goal position of the hand, m.
     pub goal: [f64; 3],
     /// Constant push, N.
     pub push: [f64; 3],
@@ -24,7 +24,7 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// As in the design's trial: 0.15 kg, 400 N/m; the arm's damping 5 N s/m.
+    /// Defaults of the design's trial: 0.15 kg, 400 N/m; the arm's damping 5 N s/m.
     pub fn at(position: [f64; 3]) -> Self {
         Self {
             mass_kg: 0.15,
@@ -50,7 +50,7 @@ impl Hand {
         }
     }
 
-    /// As it truly is.
+    /// True placement, in double precision.
     pub fn place(&self) -> Place {
         Place {
             position: DVec3::from_array(self.position),
@@ -62,7 +62,7 @@ impl Hand {
         Pose::new(vec3(self.position), self.orientation)
     }
 
-    /// One period under the device's force; the work the device did on the handle, J.
+    /// Advances one period under the device's force. Returns the work of the device on the handle, J.
     pub fn advance(&mut self, force: Vec3, period_s: f64) -> f64 {
         let step = period_s / 10.0;
         let force = force.to_array().map(f64::from);
@@ -85,7 +85,7 @@ pub fn vec3(v: [f64; 3]) -> Vec3 {
     Vec3::from_array(v.map(|x| x as f32))
 }
 
-/// What a run showed.
+/// Outcome of a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seen {
     pub peak_force_n: f32,
@@ -98,7 +98,8 @@ pub struct Seen {
     pub unsettled: u32,
     pub solves_sum: u32,
     pub flags: Flags,
-    /// Energy given to the handle over any interval beyond what was stored ([`mortise_haptics::observer`]), J, of a part grabbed just before the run.
+    /// Energy delivered to the operator over any interval beyond the energy stored ([`mortise_haptics::observer`]), J, for a part grabbed just before
+    /// the run.
     pub made_j: f64,
 }
 
@@ -119,7 +120,7 @@ impl Seen {
     }
 }
 
-/// Runs `ticks`, letting `script` steer the hand before each; the last output and what was seen.
+/// Runs `ticks`; `script` steers the hand before each. Returns the last output and the outcome.
 pub fn run(
     state: &mut State,
     scene: &SceneImage<'_>,
@@ -135,7 +136,7 @@ pub fn run(
     for t in 0..ticks {
         script(t, hand, last.as_ref());
         if let Some(observer) = &mut observer {
-            // The wrench of the last tick is held up to here: the script may have turned the handle.
+            // The wrench of the last tick is held up to here: the script may have rotated the handle.
             if let Some(last) = &last {
                 observer.tick(state, &from, &hand.place(), &last.handle);
             }

@@ -1,12 +1,12 @@
-//! A compact scene-image writer for analytic solids: exact distances sampled into 16-bit bricks, or voxels classified by them, points under a
-//! median-split tree.
+//! Scene-image writer for analytic solids: exact distances sampled into 16-bit bricks, or voxels classified by them, and points under a median-split
+//! tree.
 
 use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
 use mortise_protocol::image::*;
 
 use super::solids::{Solid, SurfacePoint};
 
-/// Distances are stored this far from the surface, cells.
+/// Width of the band in which distances are stored, cells.
 const BAND_CELLS: f64 = 4.0;
 const LEAF_POINTS: usize = 8;
 
@@ -45,7 +45,7 @@ impl Image {
 }
 
 impl Writer {
-    /// Fields on cells of this edge, m.
+    /// Writer of distance fields with cells of this edge, m.
     pub fn new(cell: f64) -> Self {
         Self {
             cell,
@@ -64,7 +64,7 @@ impl Writer {
         }
     }
 
-    /// Voxmaps with voxels of this edge, m.
+    /// Writer of voxmaps with voxels of this edge, m.
     pub fn voxmaps(cell: f64) -> Self {
         Self {
             voxmaps: true,
@@ -72,7 +72,7 @@ impl Writer {
         }
     }
 
-    /// With exact surfaces, which cells name where they are the nearest.
+    /// Writer of distance fields with exact surfaces, which cells name where they are nearest.
     pub fn exact(cell: f64) -> Self {
         Self {
             surfaces: true,
@@ -80,7 +80,7 @@ impl Writer {
         }
     }
 
-    /// Adds a shape; its index.
+    /// Adds a shape. Returns its index.
     pub fn shape(&mut self, solid: &dyn Solid) -> u32 {
         let field = if self.voxmaps {
             self.voxmap(solid)
@@ -132,7 +132,7 @@ impl Writer {
         self.shapes.len() as u32 - 1
     }
 
-    /// Places a shape; the part's index.
+    /// Places a shape. Returns the part's index.
     pub fn part(&mut self, shape: u32, grabbable: bool, position: [f32; 3], orientation: [f32; 4]) -> u16 {
         self.parts.push(PartRecord {
             shape,
@@ -195,7 +195,7 @@ impl Writer {
         self.fields.len() as u32 - 1
     }
 
-    /// Every brick of the box is stored: culling is by what bricks say, and by the box.
+    /// Every brick of the box is stored: culling uses the bricks and the box.
     fn voxmap(&mut self, solid: &dyn Solid) -> u32 {
         let cell = self.cell;
         let voxmap = Voxmap::of(solid, cell);
@@ -340,7 +340,7 @@ pub struct Voxmap {
 }
 
 impl Voxmap {
-    /// A voxel is crossed when the distance changes its sign among 5³ places of it, corners included.
+    /// Classifies all voxels. A voxel is crossed when the distance changes its sign among 5³ places in it, corners included.
     pub fn of(solid: &dyn Solid, cell: f64) -> Self {
         const STEPS: usize = 5;
         let half = solid.half_size();
@@ -388,7 +388,7 @@ impl Voxmap {
         }
     }
 
-    /// Free beyond the box.
+    /// Kind of a voxel; free beyond the box.
     pub fn at(&self, at: [usize; 3]) -> Voxel {
         if (0..3).any(|a| at[a] >= self.size[a]) {
             return Voxel::Free;

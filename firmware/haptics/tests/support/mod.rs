@@ -1,4 +1,4 @@
-//! Scenes and hands for the tests.
+//! Scenes and operator models for the tests.
 #![allow(dead_code, reason = "each test file uses its share")]
 
 pub mod hand;
@@ -23,12 +23,12 @@ pub fn hole_and_peg(clearance: f64, engaged: f64) -> Image {
     hole_and_peg_in(Writer::new(0.5e-3), clearance, engaged)
 }
 
-/// The same with exact surfaces.
+/// As [`hole_and_peg`], with exact surfaces.
 pub fn exact_hole_and_peg(clearance: f64, engaged: f64) -> Image {
     hole_and_peg_in(Writer::exact(0.5e-3), clearance, engaged)
 }
 
-/// The same in voxmaps.
+/// As [`hole_and_peg`], in voxmaps.
 pub fn hole_and_peg_in_voxels(clearance: f64, engaged: f64) -> Image {
     hole_and_peg_in(Writer::voxmaps(0.5e-3), clearance, engaged)
 }
@@ -70,7 +70,7 @@ pub fn slab_and_box(height: f64, across: usize) -> Image {
     slab_and_box_in(Writer::new(0.5e-3), height, across)
 }
 
-/// The same in voxmaps of this edge, m.
+/// As [`slab_and_box`], in voxmaps with voxels of this edge, m.
 pub fn slab_and_box_in_voxels(cell: f64, height: f64, across: usize) -> Image {
     slab_and_box_in(Writer::voxmaps(cell), height, across)
 }

@@ -245,7 +245,7 @@ impl Solid for Bolt {
     }
 
     fn mass_properties(&self) -> (f64, [f64; 3]) {
-        // Of the shaft at full length: an object's mass is chosen for the feel, and its inertia bounded.
+        // Those of the shaft at full length: the law sets an object's mass and bounds its inertia.
         Peg {
             radius: self.radius,
             half_length: self.half_length,
@@ -316,7 +316,7 @@ impl Solid for Block {
             0 => Some(plane(self.half[2], 1.0)),
             1 => Some(plane(-self.half[2], -1.0)),
             3 => Some(cylinder(self.hole, -1.0)),
-            // Four planes in one.
+            // Four planes share one face id: no single surface.
             _ => None,
         }
     }
@@ -364,7 +364,7 @@ impl Solid for Block {
         let [x, y, z] = self.half;
         let volume = 8.0 * x * y * z;
         let square = [y * y + z * z, x * x + z * z, x * x + y * y];
-        // The hole is left out: only fixed parts have one here.
+        // Without the hole: only fixed parts have one here.
         (volume, square.map(|s| volume * s / 3.0))
     }
 }

@@ -1,10 +1,10 @@
-//! Random hands and random targets, watched by the observer outside of the law. Shared with the lab, which plays more of them.
+//! Random operator models and random targets, measured by the observer outside of the law. Shared with the lab, which runs more of them.
 //!
-//! A sequence is made of its seed alone. One hand in three is a source of position, which goes its way whatever pushes; the others are mass, spring and
-//! damper in all six degrees of freedom, at a tenth of critical damping and more, lighter and softer than a rig with a hand. Four in ten rest, six go
-//! ways of up to 30 mm and 0.4 rad with accelerations up to 4 m/s² and tremble. Four in ten are told by encoders that count, their speed filtered.
-//! Targets are any that the board takes: all kinds, up to 0.1 m off and any way round, caps up to the largest, stiff or soft; new, replaced, refreshed,
-//! expired, cleared, eight at once, by both methods of guidance and with the method changed on the way.
+//! A sequence depends on its seed alone. One hand in three is a position source, which follows its path regardless of force; the others are mass,
+//! spring and damper in all six degrees of freedom, at a tenth of critical damping and more, lighter and softer than a rig with a hand. Four in ten
+//! are at rest; six follow paths of up to 30 mm and 0.4 rad with accelerations up to 4 m/s² and tremor. Four in ten are measured by counting
+//! encoders, their speed filtered. Targets are any that the board accepts: all kinds, up to 0.1 m off and in any orientation, caps up to the largest,
+//! stiff or soft; new, replaced, refreshed, expired, cleared, eight at once, by both methods of guidance and with changes of the method.
 
 use std::f64::consts::TAU;
 
@@ -15,11 +15,11 @@ use mortise_protocol::image::SceneImage;
 use mortise_protocol::limits::MAX_TARGETS;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature};
 
-/// Steps of a hand's integration in a tick.
+/// Integration steps per tick.
 const SUBSTEPS: u32 = 10;
-/// Filter of the speed that counting encoders tell, s.
+/// Time constant of the speed filter behind counting encoders, s.
 const FILTER_S: f64 = 3e-3;
-/// Counts: m and rad.
+/// Encoder counts: m and rad.
 const COUNT_M: f64 = 5e-6;
 const COUNT_RAD: f64 = TAU / 65_536.0;
 
@@ -44,7 +44,7 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// As often in each decade.
+    /// Log-uniform.
     fn decade(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.unit())
     }
@@ -67,16 +67,16 @@ impl Random {
     }
 }
 
-/// How a hand holds the handle.
+/// Dynamics of the operator model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hold {
-    /// It goes where the hand wants it, whatever pushes.
+    /// Position source: follows its path regardless of force.
     Position,
-    /// Mass (kg), spring (N/m), damping (N s/m), and the same of rotation about the handle's origin.
+    /// Mass (kg), spring (N/m), damping (N s/m), and the same for rotation about the handle's origin.
     Impedance { linear: [f64; 3], angular: [f64; 3] },
 }
 
-/// A hand.
+/// Operator model.
 #[derive(Clone, Debug)]
 struct Operator {
     hold: Hold,
@@ -88,13 +88,13 @@ struct Operator {
     begun: u32,
     ticks: u32,
     tremor: (f64, f64),
-    /// From there it goes.
+    /// Start of its paths.
     start: Place,
     moving: bool,
-    /// Farthest it goes, m.
+    /// Largest distance from the start, m.
     range: f64,
-    /// As counting encoders tell: readings and filtered speeds.
-    told: Option<(Place, Twist)>,
+    /// Readings and filtered speeds of counting encoders, if it has them.
+    readings: Option<(Place, Twist)>,
 }
 
 impl Operator {
@@ -105,7 +105,7 @@ impl Operator {
             let mass = random.decade(0.05, 0.5);
             let inertia = random.decade(0.5e-4, 5e-4);
             let [k, kr] = [random.decade(20.0, 1500.0), random.decade(0.05, 2.0)];
-            // From a tenth to once critical.
+            // Damping ratio from a tenth to one.
             let ratio = random.decade(0.1, 1.0);
             Hold::Impedance {
                 linear: [mass, k, 2.0 * ratio * (k * mass).sqrt()],
@@ -131,12 +131,12 @@ impl Operator {
             start,
             moving,
             range,
-            told: random.chance(0.4).then_some((start, Twist::ZERO)),
+            readings: random.chance(0.4).then_some((start, Twist::ZERO)),
         }
     }
 
-    /// Where it wants the handle at a time in ticks.
-    fn wish(&self, t: f64) -> (DVec3, DVec3) {
+    /// Commanded offset and rotation of the handle at a time in ticks.
+    fn command(&self, t: f64) -> (DVec3, DVec3) {
         let s = if self.ticks == 0 {
             1.0
         } else {
@@ -150,7 +150,7 @@ impl Operator {
         (self.start.position + p + DVec3::new(tremor, 0.3 * tremor, 0.0), r)
     }
 
-    /// Another way begins.
+    /// Starts another path.
     fn choose(&mut self, random: &mut Random, t: u32) {
         if !self.moving || t < self.begun + self.ticks {
             return;
@@ -171,7 +171,7 @@ impl Operator {
             linear: self.velocity.as_vec3(),
             angular: self.angular.as_vec3(),
         };
-        let (place, twist) = match &mut self.told {
+        let (place, twist) = match &mut self.readings {
             None => (self.at, exact),
             Some((place, twist)) => {
                 let count = |x: f64| (x / COUNT_M).round() * COUNT_M;
@@ -203,19 +203,19 @@ impl Operator {
         let (force, torque) = (wrench.force.as_dvec3(), wrench.torque.as_dvec3());
         match self.hold {
             Hold::Position => {
-                let (p, r) = self.wish(f64::from(t + 1));
+                let (p, r) = self.command(f64::from(t + 1));
                 let to = Place {
                     position: p,
                     orientation: DQuat::from_scaled_axis(r) * self.start.orientation,
                 };
-                // A hand knows its own speed, at the tick's end as any sensor would.
+                // The speed is known at the tick's end, as by any sensor.
                 self.velocity = (to.position - self.at.position) / period;
                 self.angular = rotation(self.at.orientation, to.orientation) / period;
                 self.at = to;
             }
             Hold::Impedance { linear, angular } => {
                 for i in 0..SUBSTEPS {
-                    let (p, r) = self.wish(f64::from(t) + f64::from(i) / f64::from(SUBSTEPS));
+                    let (p, r) = self.command(f64::from(t) + f64::from(i) / f64::from(SUBSTEPS));
                     let [m, k, b] = linear;
                     let pull = (p - self.at.position) * k - self.velocity * b;
                     self.velocity += (force + pull) * (h / m);
@@ -237,7 +237,7 @@ fn rotation(from: DQuat, to: DQuat) -> DVec3 {
     (if q.w < 0.0 { -q } else { q }).to_scaled_axis()
 }
 
-/// What was played, and what was seen.
+/// Parameters and outcome of a sequence.
 #[derive(Clone, Debug)]
 #[expect(dead_code, reason = "printed")]
 pub struct Seen {
@@ -246,37 +246,37 @@ pub struct Seen {
     pub moving: bool,
     pub counted: bool,
     pub method: GuidanceMethod,
-    /// Energy beyond what the hand brought, J.
+    /// Energy delivered beyond what the operator supplied, J.
     pub given_j: f64,
     pub passed_j: f64,
     /// Largest force on the handle, N, and its largest change in a tick, N and N m.
     pub peak_n: f64,
     pub step_n: f64,
     pub step_nm: f64,
-    /// Targets taken, and the largest engagement.
+    /// Number of targets accepted, and the largest engagement.
     pub taken: u32,
     pub engaged: f32,
-    /// Ticks in which the object touched something.
+    /// Ticks in which the object was in contact.
     pub touched: u32,
     pub softened: f32,
 }
 
-/// What sequences are played with.
+/// Fixed parameters of the sequences.
 #[derive(Clone, Copy)]
 pub struct Bench<'a, 'i> {
     pub scene: &'a SceneImage<'i>,
-    /// In hand.
+    /// The held part.
     pub part: u16,
-    /// What targets name.
+    /// The part that targets name.
     pub fixed: u16,
-    /// Farthest a hand goes, m.
+    /// Largest distance that a hand moves, m.
     pub range: f64,
     pub ticks: u32,
     /// Whether any targets are sent.
     pub guided: bool,
 }
 
-/// Plays sequence `seed`.
+/// Runs sequence `seed`.
 pub fn play(bench: &Bench<'_, '_>, settings: &Settings, seed: u64) -> Seen {
     let Bench {
         scene,
@@ -303,7 +303,7 @@ pub fn play(bench: &Bench<'_, '_>, settings: &Settings, seed: u64) -> Seen {
     } else {
         GuidanceMethod::Capped
     };
-    if hand.told.is_some() {
+    if hand.readings.is_some() {
         settings.passivity.position_count_m = COUNT_M as f32;
         settings.passivity.angle_count_rad = COUNT_RAD as f32;
     }
@@ -323,7 +323,7 @@ pub fn play(bench: &Bench<'_, '_>, settings: &Settings, seed: u64) -> Seen {
         seed,
         hold: hand.hold,
         moving: hand.moving,
-        counted: hand.told.is_some(),
+        counted: hand.readings.is_some(),
         method,
         given_j: 0.0,
         passed_j: 0.0,
@@ -340,14 +340,14 @@ pub fn play(bench: &Bench<'_, '_>, settings: &Settings, seed: u64) -> Seen {
         hand.choose(&mut random, t);
         while t >= due && guided {
             due = t + 1 + (pace * random.within(0.0, 2.0)) as u32;
-            // One at a time, or as many as there is room for.
+            // One at a time, or as many as the board holds.
             let many = if random.chance(0.15) { MAX_TARGETS } else { 1 };
             for _ in 0..many {
                 let ids = 2 * MAX_TARGETS as u64;
                 match random.below(10) {
                     0 => state.clear_target(random.below(ids) as u16),
                     1..=4 if !known.is_empty() => {
-                        // Refreshed, late or lost between.
+                        // A refresh, possibly late or lost.
                         let i = random.below(known.len() as u64) as usize;
                         sequence = sequence.wrapping_add(1);
                         known[i].sequence = sequence;
@@ -356,7 +356,7 @@ pub fn play(bench: &Bench<'_, '_>, settings: &Settings, seed: u64) -> Seen {
                     _ => {
                         sequence = sequence.wrapping_add(1);
                         let (object, _) = state.object().expect("in hand");
-                        // In the frame of the part it names.
+                        // In the frame of the part that the target names.
                         let seen_from = state.placement(fixed).expect("in the scene").inverse();
                         let object = seen_from.compose(object);
                         let object = Place {
@@ -405,17 +405,10 @@ pub fn play(bench: &Bench<'_, '_>, settings: &Settings, seed: u64) -> Seen {
     seen
 }
 
-/// Any target the board takes, the object standing at `object`.
+/// Any target that the board accepts, with the object at `object`.
 fn target(random: &mut Random, object: &Place, sequence: u16, ids: u64) -> ConstraintTarget {
-    let kinds = [
-        ConstraintKind::Concentric,
-        ConstraintKind::Coplanar,
-        ConstraintKind::Conical,
-        ConstraintKind::Spherical,
-        ConstraintKind::Annular,
-        ConstraintKind::AnnularBore,
-    ];
-    let kind = kinds[random.below(6) as usize];
+    let kinds = ConstraintKind::ALL;
+    let kind = kinds[random.below(kinds.len() as u64) as usize];
     let feature = |point: DVec3, direction: DVec3| Feature {
         point: point.as_vec3().to_array(),
         direction: direction.normalize().as_vec3().to_array(),

@@ -1,8 +1,8 @@
-//! Atomics under the names of `portable-atomic` that the loom model checker sees.
+//! Atomics with the names of `portable-atomic`, in a form that the loom model checker can observe.
 //!
 //! `heapless` and `mortise-firmware` build their queues and words in `const` functions, which loom's atomics do not have. Each atomic here therefore
-//! registers itself with the model at its first use. A model must therefore read each atomic once before it starts its second thread: loom takes the
-//! registration for a write, which has to come before every other thread's accesses, and reports a causality violation otherwise.
+//! registers itself with the model at its first use. A model must therefore read each atomic once before it starts its second thread: loom treats the
+//! registration as a write, which has to come before every other thread's accesses, and reports a causality violation otherwise.
 
 use std::mem::ManuallyDrop;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -55,7 +55,7 @@ macro_rules! atomic {
             /// As in `core`.
             ///
             /// # Errors
-            /// With the value found, where it was another.
+            /// The current value, if it was a different one.
             #[track_caller]
             pub fn compare_exchange(
                 &self,
@@ -71,7 +71,7 @@ macro_rules! atomic {
             /// As in `core`.
             ///
             /// # Errors
-            /// With the value found, where it was another or by chance.
+            /// The current value, if it was a different one or by spurious failure.
             #[track_caller]
             pub fn compare_exchange_weak(
                 &self,
@@ -87,7 +87,7 @@ macro_rules! atomic {
     };
 }
 
-/// Adds what numbers have.
+/// Adds the operations of numbers.
 macro_rules! number {
     ($name:ident, $value:ty) => {
         atomic!($name, $value);
@@ -115,7 +115,7 @@ number!(AtomicU32, u32);
 number!(AtomicU64, u64);
 number!(AtomicUsize, usize);
 
-/// For `heapless`' pools, which need it to compile. No model uses them, and loom does not see it.
+/// Needed to compile the pools of `heapless`. No model uses it, and loom does not observe it.
 #[derive(Debug)]
 pub struct AtomicU128(Mutex<u128>);
 
@@ -138,7 +138,7 @@ impl AtomicU128 {
     /// As in `core`.
     ///
     /// # Errors
-    /// With the value found, where it was another.
+    /// The current value, if it was a different one.
     pub fn compare_exchange_weak(
         &self,
         current: u128,

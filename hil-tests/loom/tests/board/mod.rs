@@ -1,19 +1,19 @@
-//! Both planes over memory of their own, taken apart for two threads and put together again. Nothing is leaked: a model runs many thousand times.
+//! Both planes over their own memory, separated for two threads and joined again. Nothing is leaked: a model runs many thousand times.
 
 use std::cell::UnsafeCell as Plain;
 
 use loom::cell::UnsafeCell;
 use loom::sync::Arc;
 use mortise_firmware::board::{
-    Clock, Drive, Flash, FlashError, Identity, Mechanism, Outbound, SLOTS, Sensed, WRITE_SIZE,
+    Clock, Drive, ERASED, Flash, FlashError, FlashWord, Identity, Mechanism, Outbound, SLOTS, Sensed,
+    Simulation, WRITE_SIZE,
 };
-use mortise_firmware::ceilings::Ceilings;
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_firmware::ram_flash::{ERASED, FlashWord};
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
+use mortise_mechanism::ceilings::Ceilings;
 use mortise_protocol::frame::{Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::MAX_FRAME;
@@ -39,12 +39,12 @@ const IDENTITY: Identity = Identity {
     entropy: 1,
 };
 
-/// What a driven motor and a flash operation both write: loom reports two writes that are not ordered by what the planes tell each other.
+/// A cell that both a driven motor and a flash operation write: loom reports two writes that are not ordered by the synchronisation of the planes.
 struct Exclusive(UnsafeCell<u32>);
 
-// SAFETY: loom reports accesses that are not ordered; that is what is tested.
+// SAFETY: loom reports accesses that are not ordered; this is the property under test.
 unsafe impl Sync for Exclusive {}
-// SAFETY: a number.
+// SAFETY: contains only a number.
 unsafe impl Send for Exclusive {}
 
 impl Exclusive {
@@ -80,7 +80,7 @@ unsafe impl Flash<'static> for ModelFlash {
         SECTOR
     }
 
-    // SAFETY: the trait's contract is the caller's: the slot is not written while the slice lives.
+    // SAFETY: the trait's contract is passed to the caller: the slot is not written while the slice lives.
     unsafe fn slot(&self, slot: usize) -> &'static [u8] {
         if slot >= SLOTS {
             return &[];
@@ -106,12 +106,10 @@ unsafe impl Flash<'static> for ModelFlash {
     }
 }
 
-/// A mechanism at rest whose motors are watched.
+/// A mechanism at rest that records when its motors are driven.
 struct Motors(Arc<Exclusive>);
 
 impl Mechanism for Motors {
-    const SIMULATED: bool = true;
-
     fn sense(&mut self) -> Sensed {
         Sensed::AT_REST
     }
@@ -121,7 +119,13 @@ impl Mechanism for Motors {
             self.0.touch();
         }
     }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
 }
+
+impl Simulation for Motors {}
 
 struct NoClock;
 
@@ -135,7 +139,7 @@ impl Clock for NoClock {
     }
 }
 
-/// A host that reads everything and keeps nothing.
+/// A host that reads everything and stores nothing.
 struct Sink;
 
 impl Outbound for Sink {
@@ -150,7 +154,7 @@ impl Outbound for Sink {
 pub struct Link(LinkPlane<'static, 'static, ModelFlash>);
 
 impl Link {
-    /// Takes bytes of the host.
+    /// Receives bytes from the host.
     pub fn receive(&mut self, bytes: &[u8]) {
         self.0.receive(bytes, &mut Sink);
         self.0.poll(&mut Sink);
@@ -161,7 +165,7 @@ impl Link {
 pub struct Control(ControlPlane<'static, 'static, Motors, NoClock>);
 
 impl Control {
-    /// One millisecond.
+    /// Runs one millisecond.
     pub fn tick(&mut self) {
         self.0.tick();
     }
@@ -174,13 +178,13 @@ impl Control {
 
 /// Both planes.
 pub struct Halves {
-    /// For the one thread.
+    /// For the first thread.
     pub link: Link,
-    /// For the other.
+    /// For the second thread.
     pub control: Control,
 }
 
-/// A board of memory.
+/// A board in memory.
 pub struct Board {
     halves: Option<Halves>,
     channels: *mut Channels<'static>,
@@ -189,7 +193,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Started with a scene in flash, greeted, motors off.
+    /// A board started with a scene in flash, greeted, motors off.
     pub fn with_scene() -> Self {
         let scene = image::two_parts(1);
         let mut content = [ERASED; WORDS];
@@ -225,7 +229,7 @@ impl Board {
         };
         let hello = board.frame(&ToDevice::Hello(Version::own()));
         board.halves().link.receive(&hello);
-        // Also reads every shared word once, so that the model knows it before there are two threads.
+        // Also reads every shared word once, so that the model has registered it before there are two threads.
         for _ in 0..3 {
             board.round();
         }
@@ -236,17 +240,17 @@ impl Board {
         self.halves.as_mut().expect("put back after each use")
     }
 
-    /// Both planes, for two threads.
+    /// Takes both planes, for two threads.
     pub fn take(&mut self) -> Halves {
         self.halves.take().expect("put back after each use")
     }
 
-    /// After the threads.
+    /// Puts the planes back after the threads.
     pub fn put_back(&mut self, halves: Halves) {
         self.halves = Some(halves);
     }
 
-    /// A tick, and the link plane's turn.
+    /// A tick, then a run of the link plane.
     pub fn round(&mut self) {
         let halves = self.halves();
         halves.control.tick();
@@ -258,7 +262,7 @@ impl Board {
         self.halves().control.is_live()
     }
 
-    /// A new message as the host sends it.
+    /// A new message in the form that the host sends.
     pub fn frame(&mut self, message: &ToDevice) -> Vec<u8> {
         self.count += 1;
         let stamp = Stamp {

@@ -1,4 +1,4 @@
-//! `mortise bake`: STEP file to scene image.
+//! `mortise bake`: converts a STEP file to a scene image.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::ops::ControlFlow;
@@ -20,7 +20,7 @@ pub struct Args {
     /// Scene image to write
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Replace OUT where it is there already
+    /// Replace an existing OUT
     #[arg(long)]
     force: bool,
     /// Cell edge, mm [default: chosen so that the image fits]
@@ -31,25 +31,25 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     cell: Option<f64>,
-    /// Most that gaps and depths may err where parts fit, such as 5um (ten times that elsewhere): plans the coarsest model that does
+    /// Largest error of gaps and depths where parts fit, such as 5um (ten times that elsewhere): plans the coarsest model that meets it
     #[arg(long, value_name = "LENGTH", value_parser = units::length_mm)]
     accuracy: Option<f64>,
-    /// Most bytes the image may have, such as 512KiB [default: 1MiB]
+    /// Largest size of the image, such as 512KiB [default: 1MiB]
     #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes)]
     flash: Option<u64>,
-    /// Most instructions of a tick, by estimate
+    /// Largest estimated number of instructions per tick
     #[arg(long, value_name = "INSTRUCTIONS", requires = "accuracy", value_parser = clap::value_parser!(u64).range(1..))]
     tick: Option<u64>,
     /// Contact method: distance-field or occupancy (the textbook's)
     #[arg(long, value_name = "METHOD", default_value_t = Method::DistanceField, conflicts_with = "accuracy")]
     method: Method,
-    /// Pointshell: error-bounded, or classic (the textbook's: one point for each voxel)
+    /// Pointshell: error-bounded, or classic (the textbook's: one point per voxel)
     #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"], conflicts_with = "accuracy")]
     shell: String,
     /// Voxel edge of the classic shell, mm [default: the cell]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     voxel: Option<f64>,
-    /// How far points of the classic shell are moved inward, percent of a voxel
+    /// Inward shift of the classic shell's points, percent of a voxel
     #[arg(
         long,
         value_name = "PERCENT",
@@ -57,17 +57,17 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     shrink: f64,
-    /// Part that may be grabbed, by name; can be given several times [default: all but the largest]
+    /// Part that may be grabbed, by name; repeatable [default: all but the largest]
     #[arg(long, value_name = "NAME")]
     grabbable: Vec<String>,
     #[command(flatten)]
     reading: Reading,
-    /// One JSON object: bytes by part and kind
+    /// Print one JSON object: bytes by part and kind
     #[arg(long)]
     json: bool,
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     args.reading.apply();
     let existing = Existing::from_force(args.force);
@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         if terminal {
             let (index, count) = progress.shape;
             let mut err = std::io::stderr().lock();
-            // A terminal that is gone must not stop the bake.
+            // A closed terminal must not stop the bake.
             let _ = write!(
                 err,
                 "\r\x1b[K{:?} of {} ({}/{count}) {:3.0} %",
@@ -120,7 +120,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let result = mortise_bake::plan(&model, &request, &progress);
         clear(terminal);
         let planned = result.with_context(in_file)?;
-        return tell_plan(args, &target, &request, &planned, &model.warnings);
+        return print_plan(args, &target, &request, &planned, &model.warnings);
     }
     let result = mortise_bake::bake(&model, &options, &progress);
     clear(terminal);
@@ -131,7 +131,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let report = &baked.report;
-    tell_image(args, report)?;
+    print_image(args, report)?;
     for shape in &report.shapes {
         lines::text(&format!(
             "  {}: cells of {:.3} mm, {} bricks, {} points, {} bytes",
@@ -142,7 +142,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             shape.bytes.total()
         ))?;
     }
-    tell_warnings(&model.warnings, report)?;
+    print_warnings(&model.warnings, report)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -152,7 +152,7 @@ fn clear(terminal: bool) {
     }
 }
 
-fn tell_image(args: &Args, report: &BakeReport) -> std::io::Result<()> {
+fn print_image(args: &Args, report: &BakeReport) -> std::io::Result<()> {
     lines::text(&format!(
         "{}: {} bytes, {} parts, {} shapes",
         args.output.display(),
@@ -162,15 +162,15 @@ fn tell_image(args: &Args, report: &BakeReport) -> std::io::Result<()> {
     ))
 }
 
-fn tell_warnings(model: &[String], report: &BakeReport) -> anyhow::Result<()> {
+fn print_warnings(model: &[String], report: &BakeReport) -> anyhow::Result<()> {
     for warning in model.iter().chain(&report.warnings) {
         lines::text(&format!("  warning: {warning}"))?;
     }
     Ok(())
 }
 
-/// What was planned, in words or as JSON; writes the image when the request is met.
-fn tell_plan(
+/// Prints the plan as text or JSON; writes the image when the request is met.
+fn print_plan(
     args: &Args,
     target: &Output,
     request: &Request,
@@ -197,7 +197,7 @@ fn tell_plan(
     }
     let um = |mm: f64| 1000.0 * mm;
     if planned.met {
-        tell_image(args, &plan.report)?;
+        print_image(args, &plan.report)?;
     } else {
         let verdict = if planned.fits {
             format!(
@@ -207,7 +207,7 @@ fn tell_plan(
             )
         } else {
             format!(
-                "nothing fits: even at {:.1} µm it takes {} bytes and about {} instructions",
+                "no model fits: even at {:.1} µm it needs {} bytes and about {} instructions",
                 um(plan.accuracy_mm),
                 plan.report.image_bytes,
                 plan.ticks.first().map_or(0, |tick| tick.cost.instructions)
@@ -221,7 +221,7 @@ fn tell_plan(
     }
     for (shape, made) in plan.shapes.iter().zip(&plan.report.shapes) {
         lines::text(&format!(
-            "  {}: cells of {:.3} mm, {:?}, because of {}; errs {:.2} µm in fits ({:.2} field, {:.2} shell), {:.1} µm elsewhere",
+            "  {}: cells of {:.3} mm, {:?}, limited by {}; error {:.2} µm in fits ({:.2} field, {:.2} shell), {:.1} µm elsewhere",
             shape.name,
             shape.cell_mm,
             shape.format,
@@ -237,7 +237,7 @@ fn tell_plan(
             made.bricks,
             made.bytes.total(),
             count(", taken as edges", shape.faces_taken_as_edges.len()),
-            count(", out of reach and left out", shape.faces_left_out.len()),
+            count(", out of reach, omitted", shape.faces_left_out.len()),
         ))?;
     }
     for tick in plan.ticks.iter().take(3) {
@@ -247,7 +247,7 @@ fn tell_plan(
             tick.name, cost.instructions, cost.points, cost.contacts
         ))?;
     }
-    tell_warnings(warnings, &plan.report)?;
+    print_warnings(warnings, &plan.report)?;
     Ok(code)
 }
 

@@ -1,4 +1,4 @@
-//! `mortise contacts`: which parts touch where, and how.
+//! `mortise contacts`: the contacts between parts, and their kinds.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub struct Args {
     /// One JSON object instead of a table
     #[arg(long)]
     json: bool,
-    /// Largest distance between two surfaces that touch, mm
+    /// Largest distance between two surfaces in contact, mm
     #[arg(long, default_value_t = Tolerances::default().linear_mm, value_name = "MM", allow_negative_numbers = true, value_parser = positive)]
     tolerance: f64,
     /// Largest distance between a spline and the plane, cylinder, cone or sphere recognised in it, mm
@@ -45,24 +45,24 @@ struct Report<'a> {
     warnings: &'a [String],
 }
 
-/// All contacts of one kind between two parts, whose names are in order.
+/// All contacts of one kind between two parts; the names are in alphabetical order.
 #[derive(Debug, Serialize)]
 struct PairReport<'a> {
     kind: &'static str,
     a: &'a str,
     b: &'a str,
-    /// Patches that touch.
+    /// Number of contact patches.
     count: usize,
-    /// Of the contact with the largest area.
+    /// Axis of the contact with the largest area.
     axis: AxisReport,
     radius_mm: Option<f64>,
     half_angle_rad: Option<f64>,
-    /// Of all.
+    /// Total area.
     area_mm2: f64,
     length_mm: f64,
-    /// The worst.
+    /// Largest deviation.
     fit_um: f64,
-    /// One for each two surfaces, faces on one surface merged.
+    /// One entry per pair of surfaces; faces on one surface are merged.
     surfaces: Vec<SurfaceReport>,
 }
 
@@ -75,7 +75,7 @@ struct SurfaceReport {
     area_mm2: f64,
     length_mm: f64,
     fit_um: f64,
-    /// Pairs of face numbers: of `a`, of `b`.
+    /// Pairs of face numbers: of `a` and of `b`.
     faces: Vec<[u32; 2]>,
 }
 
@@ -85,7 +85,7 @@ struct AxisReport {
     direction: [f64; 3],
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     args.reading.apply();
     let options = LoadOptions {
@@ -152,7 +152,7 @@ impl SurfaceReport {
     }
 }
 
-/// `turned`: the parts are named the other way round.
+/// `turned`: the parts are named in reverse order.
 fn surface(contact: &Contact, turned: bool) -> SurfaceReport {
     SurfaceReport {
         count: contact.count,
@@ -200,7 +200,7 @@ fn table(report: &Report<'_>) -> anyhow::Result<()> {
         } else {
             format!("{:.2} mm²", pair.area_mm2)
         };
-        // Below a nanometre it is the rounding of a spline that is one exactly.
+        // Below a nanometre the deviation is rounding of a spline that represents the surface exactly.
         let fit = match pair.fit_um {
             0.0 => String::new(),
             um if um < 1e-3 => ", in splines".to_owned(),

@@ -1,4 +1,4 @@
-//! `mortise inspect`: what a STEP file holds.
+//! `mortise inspect`: contents of a STEP file.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -45,7 +45,7 @@ struct PartReport<'a> {
     color: Option<[f32; 3]>,
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     args.reading.apply();
     let model = mortise_brep::load_step(&args.file)?;

@@ -1,4 +1,4 @@
-//! A lone argument that is neither a command nor a file: an error with a suggestion instead of a window that opens nothing.
+//! Check of a lone argument that is neither a command nor a file: an error with a suggestion instead of an empty window.
 
 use std::path::Path;
 
@@ -6,13 +6,13 @@ use clap::CommandFactory as _;
 
 use super::Cli;
 
-/// Edits (one character added, left out, replaced, or two swapped) that still count as a mistyped command.
+/// Largest number of edits (one character added, omitted, replaced, or two swapped) at which a word counts as a mistyped command.
 const MAX_EDITS: usize = 2;
 
 /// Checks a lone argument before a window opens for it.
 ///
 /// # Errors
-/// One line: there is no such file, with the command that was probably meant when the argument could be one.
+/// One line: the file does not exist, with the probable command when the argument could be one.
 pub(super) fn check_lone(argument: &Path) -> anyhow::Result<()> {
     let typed = argument.as_os_str().to_string_lossy();
     if argument.exists() || !could_be_a_command(&typed) {
@@ -29,10 +29,10 @@ pub(super) fn check_lone(argument: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Checks that there is a file to open, before a window opens.
+/// Checks that the file to open exists, before a window opens.
 ///
 /// # Errors
-/// One line: there is no such file, or it is a folder.
+/// One line: the file does not exist, or is a folder.
 pub(super) fn check_file(file: &Path) -> anyhow::Result<()> {
     if file.is_dir() {
         anyhow::bail!("{} is a folder: name one STEP file", file.display());
@@ -43,23 +43,23 @@ pub(super) fn check_file(file: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// No folder and no extension: a word.
+/// Whether the argument is a single word: no folder and no extension.
 fn could_be_a_command(typed: &str) -> bool {
     !typed.contains(['/', '\\', '.'])
 }
 
-/// The name fewest edits away; the first of equally near ones.
+/// The name with the fewest edits; the first of equals.
 fn nearest<'a>(typed: &str, names: &[&'a str]) -> Option<&'a str> {
     let typed = typed.to_lowercase();
     (names.iter())
         .map(|name| (edits(&typed, name), *name))
-        // Half of a short word changed is another word.
+        // With half of its letters changed, a short word is a different word.
         .filter(|(edits, name)| *edits <= MAX_EDITS && 2 * edits < name.len().max(typed.len()))
         .min_by_key(|(edits, _)| *edits)
         .map(|(_, name)| name)
 }
 
-/// Damerau's distance with adjacent swaps (optimal string alignment): rows of the textbook's table, one a letter of `a`.
+/// Damerau's distance with adjacent swaps (optimal string alignment), computed row by row, one row per letter of `a`.
 fn edits(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
     let mut table = vec![vec![0; b.len() + 1]; a.len() + 1];

@@ -1,7 +1,7 @@
-//! Commands: the same work as in the window, without one. Each has `--json`.
+//! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: the insertion did not come to its end; 2: not possible, with one line on
-//! standard error that says why.
+//! Exit code 0: done; 1: the insertion was not completed; 2: not possible, with one line on standard error that
+//! gives the reason.
 
 mod bake;
 mod contacts;
@@ -39,11 +39,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Say what a STEP file holds: parts, faces, volumes, and what was lost
+    /// List the contents of a STEP file: parts, faces, volumes, and import losses
     Inspect(inspect::Args),
-    /// Find which faces of which parts touch, and how
+    /// Find which faces of which parts touch, and the kinds of contact
     Contacts(contacts::Args),
-    /// Turn a STEP file into a scene image for the board
+    /// Convert a STEP file to a scene image (collision model) for the board
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
     Demo(demo::Args),

@@ -1,4 +1,4 @@
-//! `mortise ports`: the rigs there are.
+//! `mortise ports`: list of the available rigs.
 
 use std::process::ExitCode;
 
@@ -23,7 +23,7 @@ struct Row<'a> {
     hint: Option<&'a str>,
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let rigs = mortise_rig::list();
     let rows: Vec<Row<'_>> = (rigs.iter())

@@ -14,10 +14,10 @@ use super::reading::Reading;
 pub struct Args {
     /// STEP file or baked scene image
     scene: PathBuf,
-    /// The part that is placed: its name, or its number in an image
+    /// Moving part: its name, or its number in an image
     #[arg(long, value_name = "PART")]
     moving: String,
-    /// The part it is placed against [default: the other one of two]
+    /// Part that the moving part is placed against [default: the other one of two]
     #[arg(long, value_name = "PART")]
     against: Option<String>,
     /// CSV with the columns name,x,y,z,qw,qx,qy,qz: mm, moving part in the fixed part's frame
@@ -26,13 +26,13 @@ pub struct Args {
     /// Cell edge of a STEP file's scene, mm [default: chosen so that the image fits]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     cell: Option<f64>,
-    /// How contact is found in a STEP file's scene: distance-field or occupancy [default: distance-field]
+    /// Contact method for a STEP file's scene: distance-field or occupancy [default: distance-field]
     #[arg(long, value_name = "METHOD")]
     method: Option<Method>,
-    /// Pointshell of a STEP file's scene: error-bounded, or classic (the textbook's: one point for each voxel)
+    /// Pointshell of a STEP file's scene: error-bounded, or classic (the textbook's: one point per voxel)
     #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"])]
     shell: String,
-    /// How far points of the classic shell are moved inward, percent of a voxel
+    /// Inward shift of the classic shell's points, percent of a voxel
     #[arg(
         long,
         value_name = "PERCENT",
@@ -42,15 +42,15 @@ pub struct Args {
     shrink: f64,
     #[command(flatten)]
     reading: Reading,
-    /// One JSON object a pose
+    /// One JSON object per pose
     #[arg(long)]
     json: bool,
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     args.reading.apply();
-    // Cheap first: a mistake in the poses need not wait for a bake.
+    // The poses are read first: an error in them is reported without waiting for a bake.
     let poses = probe::read_poses(&args.poses)?;
     let model = Model {
         cell_mm: args.cell,

@@ -1,11 +1,11 @@
-//! How long a STEP file may take to read, for every command that reads one.
+//! Time limit for reading a STEP file, for every command that reads one.
 
 use super::units;
 
 /// Options of every command that reads a STEP file.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub struct Reading {
-    /// Most processor time for reading a STEP file, in seconds [default: 60]
+    /// Limit on the processor time for reading a STEP file, in seconds [default: 60]
     #[arg(long, value_name = "SECONDS", value_parser = units::seconds, allow_negative_numbers = true)]
     timeout: Option<u64>,
 }

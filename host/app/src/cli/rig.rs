@@ -1,4 +1,4 @@
-//! `mortise rig`: the description of a rig, checked, sent, shown.
+//! `mortise rig`: checks, sends and shows the description of a rig.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -17,7 +17,7 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Say what is wrong with a description, or what the rig will be able to do
+    /// Report the errors of a description, or what the rig will be able to do
     Check {
         /// Description (TOML; see docs/rigs.md)
         file: PathBuf,
@@ -25,7 +25,7 @@ enum Action {
         #[arg(long)]
         json: bool,
     },
-    /// Check a description, send it to a board, restart the board, and see that it is in use
+    /// Check a description, send it to a board, restart the board, and verify that it is in use
     Send {
         /// Description (TOML; see docs/rigs.md)
         file: PathBuf,
@@ -33,7 +33,7 @@ enum Action {
         #[arg(long, value_parser = super::rig)]
         rig: RigSpec,
     },
-    /// Print the description a board keeps, as a file
+    /// Print the description stored on a board, as a file
     Show {
         /// sim, emulated, or a serial port
         #[arg(long, value_parser = super::rig)]
@@ -41,19 +41,19 @@ enum Action {
     },
 }
 
-/// Runs it.
+/// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Check { file, json } => {
             let rig = load_rig(file)?;
-            // A description that was read can be asked: reading builds the same model.
+            // Does not fail after a successful reading, which builds the same model.
             let Ok(found) = abilities(&rig) else {
                 anyhow::bail!("{}: cannot work in its home pose", file.display());
             };
             if *json {
                 lines::json(&found)?;
             } else {
-                tell(&found)?;
+                print(&found)?;
             }
         }
         Action::Send { file, rig: spec } => {
@@ -68,19 +68,19 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 (Some(kept), true) if kept == rig => {
                     lines::text(&sent(spec, &client, &rig.name))?;
                 }
-                _ => anyhow::bail!("the board does not use what was sent: send it again"),
+                _ => anyhow::bail!("the board does not use the description that was sent: send it again"),
             }
         }
         Action::Show { rig: spec } => {
             let client = Client::connect(spec)?;
             match client.rig()? {
                 (Some(rig), _) => lines::text(write_rig(&rig).trim_end())?,
-                (None, _) if forgets(spec) => anyhow::bail!(
-                    "{} keeps no description: it lives in this program and ends with it, so what `mortise rig send` gave it is gone; a serial port keeps its own",
+                (None, _) if is_volatile(spec) => anyhow::bail!(
+                    "{} keeps no description: it runs inside this program and ends with it, so a description from `mortise rig send` is lost; a rig on a serial port keeps its own",
                     client.name()
                 ),
                 (None, _) => anyhow::bail!(
-                    "{} keeps no description (or a damaged one): its mechanism is the firmware's own; send one with `mortise rig send`",
+                    "{} keeps no description (or a damaged one): it uses the firmware's built-in mechanism; send one with `mortise rig send`",
                     client.name()
                 ),
             }
@@ -89,23 +89,23 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A rig of this program's own, in-process or emulated: what it keeps is gone when the program ends.
-fn forgets(spec: &RigSpec) -> bool {
+/// Whether the rig runs inside this program, in-process or emulated: it loses its description when the program ends.
+fn is_volatile(spec: &RigSpec) -> bool {
     matches!(spec, RigSpec::Simulated { .. } | RigSpec::Emulated { .. })
 }
 
 fn sent(spec: &RigSpec, client: &Client, name: &str) -> String {
-    if forgets(spec) {
+    if is_volatile(spec) {
         format!(
-            "{} took `{name}` and drove it until this program ended; being part of the program it keeps nothing, a serial port does",
+            "{} used `{name}` until this program ended; a simulated rig stores no description, a rig on a serial port does",
             client.name()
         )
     } else {
-        format!("{} keeps `{name}` and drives it", client.name())
+        format!("{} keeps `{name}` and uses it", client.name())
     }
 }
 
-fn tell(found: &Abilities) -> anyhow::Result<()> {
+fn print(found: &Abilities) -> anyhow::Result<()> {
     let sensed = if found.senses_orientation {
         "position and orientation"
     } else {
@@ -118,7 +118,10 @@ fn tell(found: &Abilities) -> anyhow::Result<()> {
             "  home: {x:.1}, {y:.1}, {z:.1} mm from the world's origin, isotropy {:.2}",
             found.isotropy
         ),
-        format!("  one count: at most {:.4} mm at the handle", found.resolution_mm),
+        format!(
+            "  resolution: one count is at most {:.4} mm at the handle",
+            found.resolution_mm
+        ),
         format!(
             "  force: {:.2} N in the weakest direction, {:.2} N in the strongest",
             found.force_weakest_n, found.force_strongest_n

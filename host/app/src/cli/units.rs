@@ -3,7 +3,7 @@
 /// Millimetres of `5um`, `5µm` or `0.005mm`.
 pub fn length_mm(text: &str) -> Result<f64, String> {
     let units = [("um", 1e-3), ("µm", 1e-3), ("μm", 1e-3), ("mm", 1.0)];
-    number(text, &units).ok_or_else(|| format!("`{text}` is no length; give one such as 5um or 0.005mm"))
+    number(text, &units).ok_or_else(|| format!("`{text}` is not a length; write it as in 5um or 0.005mm"))
 }
 
 /// Bytes of `1MiB`, `512KiB` or `300000`.
@@ -17,16 +17,16 @@ pub fn bytes(text: &str) -> Result<u64, String> {
     ];
     let value = number(text, &units).filter(|v| (1.0..=f64::from(u32::MAX)).contains(v));
     let value =
-        value.ok_or_else(|| format!("`{text}` is no size; give one such as 1MiB, 512KiB or 300000"))?;
-    // In range, and whole bytes are all there is.
+        value.ok_or_else(|| format!("`{text}` is not a size; write it as in 1MiB, 512KiB or 300000"))?;
+    // The value is in range, and a fraction of a byte is dropped.
     Ok(value as u64)
 }
 
-/// Whole seconds, of processor time: `90` or `90s`.
+/// Whole seconds of processor time: `90` or `90s`.
 pub fn seconds(text: &str) -> Result<u64, String> {
     let digits = text.trim().trim_end_matches('s');
     let value = digits.parse::<u64>().ok().filter(|v| (1..=86_400).contains(v));
-    value.ok_or_else(|| format!("`{text}` is no time limit; give whole seconds from 1 to 86400"))
+    value.ok_or_else(|| format!("`{text}` is not a time limit; write whole seconds from 1 to 86400"))
 }
 
 /// The value of a number followed by one of `units`.

@@ -8,7 +8,7 @@ use mortise_rig::RigSpec;
 
 use super::reading::Reading;
 
-/// What the window starts with.
+/// Contents of the window at the start.
 #[derive(Debug, Args)]
 pub struct Open {
     /// STEP file to open
@@ -26,16 +26,16 @@ impl Open {
     }
 }
 
-/// For automation.
+/// Options for automation.
 #[derive(Debug, Default, Args)]
 pub struct Picture {
-    /// Write a PNG of the window, then end
+    /// Write a PNG of the window, then exit
     #[arg(long, hide = true, value_name = "PNG")]
     screenshot: Option<PathBuf>,
-    /// Replace the PNG where it is there already
+    /// Replace an existing PNG
     #[arg(long, hide = true, requires = "screenshot")]
     force: bool,
-    /// Seconds from the start to the picture
+    /// Seconds from the start to the screenshot
     #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
     after: f64,
     /// Draw fixed parts as glass
@@ -81,7 +81,7 @@ mod shown {
         first.extend(file.map(Intent::Open));
         first.push(Intent::Demo(rig));
         let mut options = options(picture, first)?;
-        // What happens in a hole is seen through its walls.
+        // Glass walls show the insertion inside the hole.
         options.see_through = true;
         app::run(options)?;
         Ok(ExitCode::SUCCESS)
@@ -112,7 +112,7 @@ mod shown {
 
     use super::Picture;
 
-    const NONE: &str = "this build of mortise has no window; `cargo build --release` makes one that has";
+    const NONE: &str = "this build of mortise has no window; build it with `cargo build --release`";
 
     pub fn open(_: Option<PathBuf>, _: Picture) -> anyhow::Result<ExitCode> {
         anyhow::bail!("{NONE}; `mortise --help` lists what there is without one")

@@ -1,4 +1,4 @@
-//! A STEP file, read and made ready to be shown.
+//! A STEP file that has been read and prepared for display.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use super::verdict::Watch;
 use crate::viewport::camera::Extent;
 use crate::viewport::mesh::{ShapeMesh, shown};
 
-/// Colours of parts that have none, sRGB: muted, told apart on a dark ground, none of them red (stop) or orange (in hand).
+/// Colours of parts that have none, sRGB: muted, distinguishable on a dark ground, none of them red (stop) or orange (held part).
 const PALETTE: [[u8; 3]; 8] = [
     [150, 163, 178],
     [112, 152, 196],
@@ -27,39 +27,39 @@ const PALETTE: [[u8; 3]; 8] = [
     [160, 176, 116],
 ];
 
-/// What is open.
+/// The open document.
 #[derive(Clone, Debug)]
 pub struct Document {
-    /// Counts up with every file opened.
+    /// Number of the document; each opened file increments it.
     pub generation: u64,
-    /// Where it came from; `None`: the sample.
+    /// Path of the file; `None`: the sample.
     pub path: Option<PathBuf>,
     /// File name without folders, for titles.
     pub title: String,
-    /// What the file holds.
+    /// Contents of the file.
     pub model: Arc<CadModel>,
     /// The assembly.
     pub tree: Vec<Branch>,
-    /// One for each shape.
+    /// One mesh for each shape.
     pub meshes: Arc<Vec<ShapeMesh>>,
-    /// A sphere about each shape, its own frame.
+    /// A bounding sphere of each shape, in the shape's frame.
     pub extents: Vec<Extent>,
-    /// About everything as it was opened.
+    /// Bounding sphere of all parts as opened.
     pub extent: Extent,
     /// sRGB of each part.
     pub colors: Vec<[u8; 3]>,
-    /// Where each part is now, mm.
+    /// Present pose of each part, mm.
     pub poses: Vec<DAffine3>,
-    /// A peg before a hole, if there is one.
+    /// A peg in front of a hole, if the assembly has one.
     pub insertion: Option<Insertion>,
-    /// Says how insertions of the part in hand end.
+    /// Reports how insertions of the held part end.
     pub watch: Watch,
     /// The scene image, once baked.
     pub baked: Option<Arc<Baked>>,
 }
 
 impl Document {
-    /// Reads a STEP file. Takes as long as the CAD kernel does, or until `cancel` is set: call it off the window's thread.
+    /// Reads a STEP file. Takes as long as the CAD kernel does, or until `cancel` is set: call it outside the window's thread.
     ///
     /// # Errors
     /// One line: what, where, what to do.
@@ -72,10 +72,10 @@ impl Document {
         Ok(Self::of(model, Some(path.to_owned()), title, generation))
     }
 
-    /// Reads the sample that is part of the program.
+    /// Reads the sample that is built into the program.
     ///
     /// # Errors
-    /// When it cannot be written to the folder for temporary files, or not be read.
+    /// The sample cannot be written to the folder for temporary files, or not be read.
     pub fn sample(generation: u64, cancel: &AtomicBool) -> anyhow::Result<Self> {
         let file = mortise_scenario::sample::File::write().context("the sample could not be unpacked")?;
         let model = load_step_until(file.path(), &LoadOptions::default(), cancel)?;
@@ -87,7 +87,7 @@ impl Document {
         ))
     }
 
-    /// From a model.
+    /// The document of a model.
     pub fn of(model: CadModel, path: Option<PathBuf>, title: String, generation: u64) -> Self {
         let extents: Vec<Extent> = (model.shapes.iter())
             .map(|shape| Extent::of_points(shape.mesh.vertices.iter().copied()))
@@ -112,7 +112,7 @@ impl Document {
         }
     }
 
-    /// Puts every part back where the file has it.
+    /// Moves every part back to its position in the file.
     pub fn reset_poses(&mut self) {
         for (pose, part) in self.poses.iter_mut().zip(&self.model.parts) {
             *pose = part.placement;
@@ -124,27 +124,27 @@ impl Document {
         self.model.parts.get(part).map_or("?", |p| p.name.as_str())
     }
 
-    /// Whether a part may be grabbed; not before the scene is baked.
+    /// Whether a part may be grabbed; `false` until the scene is baked.
     pub fn is_grabbable(&self, part: usize) -> bool {
         let reports = self.baked.as_ref().map(|b| b.report.parts.as_slice());
         (reports.unwrap_or_default().iter()).any(|r| r.model_part == part && r.grabbable)
     }
 
-    /// Index in the scene of a part of the model; parts without a surface have none.
+    /// Index in the scene of a part of the model; `None` for parts without a surface.
     pub fn scene_part(&self, part: usize) -> Option<u16> {
         let reports = &self.baked.as_ref()?.report.parts;
         let index = reports.iter().position(|r| r.model_part == part)?;
         u16::try_from(index).ok()
     }
 
-    /// The model's part behind an index of the scene.
+    /// Index in the model of a part of the scene.
     pub fn model_part(&self, scene_part: u16) -> Option<usize> {
         let reports = &self.baked.as_ref()?.report.parts;
         reports.get(usize::from(scene_part)).map(|r| r.model_part)
     }
 }
 
-/// A sphere about all parts where they are.
+/// Bounding sphere of all parts at their present poses.
 fn extent_of(model: &CadModel, poses: &[DAffine3]) -> Extent {
     Extent::of_points(model.parts.iter().zip(poses).flat_map(|(part, pose)| {
         (model.shapes.get(part.shape))

@@ -1,7 +1,7 @@
-//! Guidance beside the window: a thread that hears every sample, asks the recogniser, and sends targets to the board.
+//! Guidance outside the window's thread: a thread that receives every sample, runs the recogniser, and sends targets to the board.
 //!
-//! It hears the board's samples straight from the link, so that how often the window is drawn delays nothing. When it is behind, it passes over
-//! all samples but the newest.
+//! The thread takes the board's samples directly from the link, so that the window's frame rate causes no delay. When it is behind, it
+//! skips all samples but the newest.
 
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -14,57 +14,57 @@ use mortise_rig::Client;
 
 use super::work::{Outbox, Update};
 
-/// Most samples and wishes that wait; samples beyond are dropped, for newer ones come.
+/// Largest number of queued samples and commands; further samples are dropped because newer ones follow.
 const MAX_WAITING: usize = 64;
 
-/// To the thread.
-enum Told {
+/// An item of the thread's queue.
+enum Item {
     Sample(Box<Telemetry>),
     Wish(Wish),
 }
 
-/// What the operator may want of it.
+/// A command of the operator to the guidance thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wish {
-    /// Keeps a target in the list and before others, or no longer.
+    /// Pins a target, which keeps it in the list and gives it priority, or unpins it.
     Pin(TargetId, bool),
     /// Switches a target off, or on again.
     SwitchOff(TargetId, bool),
-    /// How targets are found and sent.
+    /// Sets how targets are found and sent.
     Set(GuideSettings),
-    /// Every part is back where the file has it.
+    /// Every part is back at its position in the file.
     PutBack,
 }
 
-/// Where samples and wishes go in: the thread's end, while there is one.
+/// Input of the guidance thread: the sending end of its queue while the thread exists.
 #[derive(Clone, Default)]
-pub struct Tap(Arc<Mutex<Option<SyncSender<Told>>>>);
+pub struct Tap(Arc<Mutex<Option<SyncSender<Item>>>>);
 
 impl Tap {
-    /// Lets the thread hear a sample, when there is one and it is not far behind.
+    /// Queues a sample if there is a thread and its queue is not full.
     pub fn offer(&self, sample: &Telemetry) {
         let mut sender = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(there) = &*sender {
-            let told = there.try_send(Told::Sample(Box::new(sample.clone())));
-            if matches!(told, Err(TrySendError::Disconnected(_))) {
+            let sent = there.try_send(Item::Sample(Box::new(sample.clone())));
+            if matches!(sent, Err(TrySendError::Disconnected(_))) {
                 *sender = None;
             }
         }
     }
 
-    /// Has a wish carried out before the next sample. `false`: it could not be taken now.
+    /// Queues a command to be executed before the next sample. `false`: the queue is full or there is no thread.
     pub fn wish(&self, wish: Wish) -> bool {
         let sender = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        (sender.as_ref()).is_some_and(|there| there.try_send(Told::Wish(wish)).is_ok())
+        (sender.as_ref()).is_some_and(|there| there.try_send(Item::Wish(wish)).is_ok())
     }
 
-    /// Ends the thread once it has done what it is doing.
+    /// Ends the thread after its current step.
     pub fn end(&self) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// Starts a thread for the scene that is on the board now; the one before ends. `parts` names the model part of each part of the scene.
-    /// It holds no connection open: when `client` is gone, so is what it would send.
+    /// Starts a thread for the scene that is now on the board; the previous thread ends. `parts` maps each part of the scene to a part of
+    /// the model. The thread does not keep the connection open: once `client` is gone, its messages are dropped.
     pub fn start(
         &self,
         model: Arc<CadModel>,
@@ -83,15 +83,15 @@ impl Tap {
     }
 }
 
-/// Until the other end is dropped or nobody listens.
-fn run(mut guide: Guide<'_>, told: &Receiver<Told>, client: &Weak<Client>, outbox: &Outbox, link: u64) {
+/// Runs until the sender or the window's receiver is dropped.
+fn run(mut guide: Guide<'_>, items: &Receiver<Item>, client: &Weak<Client>, outbox: &Outbox, link: u64) {
     let mut last = List::default();
-    while let Ok(first) = told.recv() {
+    while let Ok(first) = items.recv() {
         let mut newest = None;
-        for told in std::iter::once(first).chain(told.try_iter()) {
-            match told {
-                Told::Sample(sample) => newest = Some(sample),
-                Told::Wish(wish) => grant(&mut guide, wish),
+        for item in std::iter::once(first).chain(items.try_iter()) {
+            match item {
+                Item::Sample(sample) => newest = Some(sample),
+                Item::Wish(wish) => grant(&mut guide, wish),
             }
         }
         let Some(sample) = newest else { continue };
@@ -100,7 +100,7 @@ fn run(mut guide: Guide<'_>, told: &Receiver<Told>, client: &Weak<Client>, outbo
         }
         let list = guide.list();
         let changed = (&list.held, &list.rows, &list.freedom) != (&last.held, &last.rows, &last.freedom);
-        // A window that is behind hears of the next one instead.
+        // If the window's queue is full, the window receives the next change instead.
         if changed
             && outbox.offer(Update::Guidance {
                 link,
@@ -114,7 +114,7 @@ fn run(mut guide: Guide<'_>, told: &Receiver<Told>, client: &Weak<Client>, outbo
 
 fn grant(guide: &mut Guide<'_>, wish: Wish) {
     match wish {
-        // A target that is no longer there needs no choice.
+        // A target that no longer exists needs no choice.
         Wish::Pin(id, pinned) => _ = guide.recogniser().pin(id, pinned),
         Wish::SwitchOff(id, off) => _ = guide.recogniser().switch_off(id, off),
         Wish::Set(settings) => guide.set(settings),
@@ -122,7 +122,7 @@ fn grant(guide: &mut Guide<'_>, wish: Wish) {
     }
 }
 
-/// Sends and hears the answer. A link that is lost ends itself, and says so elsewhere.
+/// Sends a message and records the answer. A lost link reports itself elsewhere.
 fn send(guide: &mut Guide<'_>, client: &Weak<Client>, message: ToDevice) {
     let Some(client) = client.upgrade() else { return };
     let id = match &message {

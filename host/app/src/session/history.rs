@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use mortise_protocol::message::{Telemetry, WireWrench};
 
-/// Seconds shown.
+/// Time span kept, s.
 pub const SPAN_S: f64 = 10.0;
-/// Most samples kept: at 200 a second the whole span.
+/// Largest number of samples kept: the whole span at 200 samples a second.
 pub const MAX_SAMPLES: usize = 2_000;
 
 /// One sample of the loop.
@@ -24,12 +24,12 @@ pub struct Sample {
     pub contact_nm: f32,
     /// Cost of the tick, in the board's unit.
     pub cost: f32,
-    /// Ticks that came too late since the board started.
+    /// Loop overruns since the board started.
     pub late: u32,
 }
 
 impl Sample {
-    /// Of a telemetry message from a board of `tick_hz` ticks a second.
+    /// The sample of a telemetry message from a board of `tick_hz` ticks a second.
     pub fn of(telemetry: &Telemetry, tick_hz: u16) -> Self {
         let length = |v: [f32; 3]| v.iter().map(|x| x * x).sum::<f32>().sqrt();
         let force = |w: &WireWrench| length(w.force);
@@ -46,14 +46,14 @@ impl Sample {
     }
 }
 
-/// The last [`SPAN_S`] seconds.
+/// The samples of the last [`SPAN_S`] seconds.
 #[derive(Clone, Debug, Default)]
 pub struct History {
     samples: VecDeque<Sample>,
 }
 
 impl History {
-    /// Adds a sample. One from before the newest (the board restarted) starts anew; one that is not finite is left out.
+    /// Adds a sample. One older than the newest (the board restarted) clears the history first; a non-finite sample is dropped.
     pub fn add(&mut self, sample: Sample) {
         let finite = [
             sample.handle_n,
@@ -89,18 +89,18 @@ impl History {
         self.samples.back()
     }
 
-    /// Ticks that came too late within the span.
+    /// Loop overruns within the span.
     pub fn late(&self) -> u32 {
         let ends = self.samples.front().zip(self.samples.back());
         ends.map_or(0, |(oldest, newest)| newest.late.saturating_sub(oldest.late))
     }
 
-    /// Forgets all.
+    /// Removes all samples.
     pub fn clear(&mut self) {
         self.samples.clear();
     }
 
-    /// Largest of what `of` takes from each sample; 0 when there are none.
+    /// Largest value of `of` over all samples; 0 when there are none.
     pub fn largest(&self, of: impl Fn(&Sample) -> f32) -> f32 {
         self.samples.iter().map(of).fold(0.0, f32::max)
     }
@@ -137,7 +137,7 @@ mod tests {
         assert!((history.largest(|s| s.handle_n) - 54.999_9).abs() < 1e-4);
     }
 
-    /// A sum since the start would never go back to none.
+    /// A count since the start would never return to zero.
     #[test]
     fn late_ticks_are_those_of_the_span() {
         let mut history = History::default();

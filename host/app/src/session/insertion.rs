@@ -1,7 +1,7 @@
-//! Finds a peg before a hole, and scripts the simulated hand that puts it in. Pure.
+//! Finds a peg in front of a hole and scripts the simulated hand that inserts it. Pure.
 //!
-//! A candidate is an outer cylinder of one part and a wider inner cylinder of another on nearly the same axis. Not recognition of mating
-//! faces: it only serves to show an insertion without anybody at the handle.
+//! A candidate is an outer cylinder of one part and a wider inner cylinder of another on nearly the same axis. This is no recognition of
+//! mating faces; it only serves to demonstrate an insertion without an operator at the handle.
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, Shape, Surface};
@@ -9,11 +9,11 @@ use mortise_protocol::message::{HandScript, Keyframe};
 
 use super::pose::{moved, to_wire};
 
-/// Axes may lean by this much, rad.
+/// Largest angle between the axes, rad.
 const LEAN: f64 = 0.02;
-/// Walls nearer than this, mm and rad, are one.
+/// Walls closer than this, mm and rad, are the same wall.
 const SAME: f64 = 1e-6;
-/// The hole may be wider by this fraction.
+/// Largest difference of the radii of hole and peg, as a fraction of the hole's radius.
 const SLACK: f64 = 0.2;
 
 /// A peg in front of a hole.
@@ -23,11 +23,11 @@ pub struct Insertion {
     pub moving: usize,
     /// Part with the hole.
     pub fixed: usize,
-    /// The way in, unit vector, world.
+    /// Direction of insertion, unit vector, world.
     pub direction: DVec3,
     /// Middle of the peg, world, mm.
     pub center: DVec3,
-    /// From where the peg is until its end meets the hole's far end, mm.
+    /// Travel of the peg until its end meets the hole's far end, mm.
     pub travel_mm: f64,
     /// Length of the hole, mm.
     pub hole_mm: f64,
@@ -35,16 +35,16 @@ pub struct Insertion {
     pub clearance_mm: f64,
 }
 
-/// How the hand goes about it.
+/// Parameters of the simulated insertion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Manner {
-    /// Beside the axis at the start, mm.
+    /// Lateral offset from the axis at the start, mm.
     pub offset_mm: f64,
-    /// Tilted at the start, rad.
+    /// Tilt at the start, rad.
     pub tilt_rad: f64,
-    /// mm/s.
+    /// Speed, mm/s.
     pub speed_mm_per_s: f64,
-    /// Pushed sideways at the end, N.
+    /// Sideways push at the end, N.
     pub sideways_n: f64,
 }
 
@@ -62,19 +62,19 @@ impl Default for Manner {
 /// A wall of a cylinder, outer or inner.
 #[derive(Clone, Debug)]
 pub struct Wall {
-    /// Whose.
+    /// Part that the wall belongs to.
     pub part: usize,
-    /// A point of the axis, mm.
+    /// A point on the axis, mm.
     pub origin: DVec3,
-    /// Along it, unit vector.
+    /// Direction of the axis, unit vector.
     pub axis: DVec3,
-    /// mm.
+    /// Radius, mm.
     pub radius: f64,
     /// Ends along the axis from the origin, mm.
     pub ends: (f64, f64),
-    /// Of a bore.
+    /// Whether it is a bore's wall.
     pub inner: bool,
-    /// The part's faces it consists of: a modeller may split a wall in halves.
+    /// The part's faces that make up the wall: a modeller may split a wall in halves.
     pub faces: Vec<u32>,
 }
 
@@ -84,12 +84,12 @@ impl Wall {
         self.origin + 0.5 * (self.ends.0 + self.ends.1) * self.axis
     }
 
-    /// mm.
+    /// Distance between the ends, mm.
     pub fn length(&self) -> f64 {
         self.ends.1 - self.ends.0
     }
 
-    /// The same where `pose` has it.
+    /// The wall transformed by `pose`.
     pub fn moved(&self, pose: &DAffine3) -> Self {
         Self {
             origin: pose.transform_point3(self.origin),
@@ -98,7 +98,7 @@ impl Wall {
         }
     }
 
-    /// Takes `other` in when it is another face of the same wall.
+    /// Merges `other` into this wall when it is another face of the same wall.
     fn absorb(&mut self, other: &Self) -> bool {
         let apart = other.origin - self.origin;
         let shift = apart.dot(self.axis);
@@ -111,7 +111,7 @@ impl Wall {
         }
         let along = other.axis.dot(self.axis).signum();
         let [a, b] = [other.ends.0, other.ends.1].map(|end| shift + along * end);
-        // Two bores one after the other are two.
+        // Two separated bores on one axis are two walls.
         if a.min(b) > self.ends.1 + SAME || a.max(b) < self.ends.0 - SAME {
             return false;
         }
@@ -121,7 +121,7 @@ impl Wall {
     }
 }
 
-/// The pair with the least clearance whose peg is not yet all the way in; `None` when there is none.
+/// The pair with the least clearance whose peg is not yet fully inserted; `None` when there is none.
 pub fn find(model: &CadModel, poses: &[DAffine3]) -> Option<Insertion> {
     let walls = walls(model, poses);
     let mut best: Option<Insertion> = None;
@@ -153,7 +153,7 @@ fn pair(peg: &Wall, hole: &Wall) -> Option<Insertion> {
     let direction = if along >= 0.0 { hole.axis } else { -hole.axis };
     let hole_mm = hole.ends.1 - hole.ends.0;
     let peg_mm = peg.ends.1 - peg.ends.0;
-    // Both ends measured from the peg's middle along the way in.
+    // Both ends are measured from the peg's middle along the direction of insertion.
     let travel_mm = along.abs() + 0.5 * hole_mm - 0.5 * peg_mm;
     (travel_mm > 1e-3).then_some(Insertion {
         moving: peg.part,
@@ -172,7 +172,7 @@ fn walls(model: &CadModel, poses: &[DAffine3]) -> Vec<Wall> {
         .collect()
 }
 
-/// Every cylinder wall, in its part's own frame, part by part in the order of their faces.
+/// Every cylinder wall, in its part's frame, ordered by part and face.
 pub fn local_walls(model: &CadModel) -> Vec<Wall> {
     let mut walls: Vec<Wall> = Vec::new();
     for (index, part) in model.parts.iter().enumerate() {
@@ -219,15 +219,15 @@ fn walls_of(shape: &Shape, part: usize) -> Vec<Wall> {
         .collect()
 }
 
-/// The hand's script: first aside and tilted, in all the way, then pushed to the wall. `handle` is where the handle is now; the part is
-/// held where it stands, so the handle goes through the same motions.
+/// The hand's script: start offset and tilted, insert fully, then push against the wall. `handle` is the present pose of the handle; the
+/// part is grabbed at its present pose, so the handle performs the part's motion.
 pub fn script(insertion: &Insertion, handle: &DAffine3, manner: &Manner) -> HandScript {
     let aside = insertion.direction.any_orthonormal_vector();
     let tilt_axis = insertion.direction.cross(aside);
     let stiffness = 400.0;
     let ms = |mm: f64| (1e3 * mm / manner.speed_mm_per_s).ceil() as u32;
     let way = insertion.travel_mm;
-    // Lines up while it comes near: a tilted hand would wedge in a tight hole.
+    // Alignment is corrected during the approach: a tilted hand would wedge in a tight hole.
     let stations = [
         (0, 0.0, 0.0, 0.0),
         (400, 0.0, manner.tilt_rad, manner.offset_mm),
@@ -259,7 +259,7 @@ pub fn script(insertion: &Insertion, handle: &DAffine3, manner: &Manner) -> Hand
     }
 }
 
-/// A hand that simply holds the handle at `pose`.
+/// A script that keeps the handle at `pose`.
 pub fn hold(pose: &DAffine3) -> HandScript {
     HandScript {
         stiffness: 400.0,

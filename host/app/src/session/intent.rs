@@ -1,6 +1,7 @@
-//! What the operator can want, and what stands in the way of it.
+//! The operator's intents and the reasons that block them.
 //!
-//! One place decides: the window greys a button out with the reason [`obstacle`] gives, and the session refuses for the same reason.
+//! Single place of the decision: the window disables a button with the reason from [`obstacle`], and the session refuses for the same
+//! reason.
 
 use std::path::PathBuf;
 
@@ -14,7 +15,7 @@ use mortise_rig::RigSpec;
 use super::Session;
 use super::link::Link;
 
-/// Something the operator wants.
+/// An action that the operator requests.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Intent {
     /// Choose a file in a dialog.
@@ -25,23 +26,23 @@ pub enum Intent {
     OpenSample,
     /// Bake the scene (again).
     Bake,
-    /// Choose how contact is found; bakes the open scene again.
+    /// Choose the contact method; bakes the open scene again.
     ChooseMethod(Method),
-    /// End the reading or baking under way.
+    /// Cancel the reading or baking under way.
     CancelWork,
-    /// Look for rigs again.
+    /// Search for rigs again.
     RefreshRigs,
     /// Choose which rig to connect to.
     ChooseRig(RigSpec),
     /// Connect to the chosen rig.
     Connect,
-    /// Connect again to the rig whose link was lost.
+    /// Reconnect to the rig whose link was lost.
     Reconnect,
-    /// Let the rig go.
+    /// Disconnect the rig.
     Disconnect,
-    /// Send the scene to the board.
+    /// Upload the scene to the board.
     Upload,
-    /// End the sending under way; the scene in use stays.
+    /// Cancel the upload under way; the scene in use stays.
     CancelUpload,
     /// Motors on.
     Arm,
@@ -51,36 +52,36 @@ pub enum Intent {
     Stop,
     /// Leave the stopped or faulted state.
     ClearFault,
-    /// The handle stands at its marked pose.
+    /// Declare that the handle is at its marked pose.
     Home,
-    /// Mark a part in the list and the view.
+    /// Select a part in the list and the view.
     Select(Option<usize>),
-    /// Take a part in hand.
+    /// Grab a part.
     Grab(usize),
-    /// Let it go.
+    /// Release the held part.
     Release,
-    /// Put every part back.
+    /// Move every part back to its position in the file.
     ResetScene,
     /// Change a parameter.
     SetParameter(ParameterId, f32),
-    /// Every parameter to its default.
+    /// Reset every parameter to its default.
     ResetParameters,
-    /// Keep a recognised target in the list and before others, or no longer.
+    /// Pin a recognised target, which keeps it in the list and gives it priority, or unpin it.
     PinTarget(TargetId, bool),
     /// Switch a recognised target off, or on again.
     SwitchTargetOff(TargetId, bool),
-    /// When targets may be taken up.
+    /// Choose when targets may engage.
     GuideWhen(When),
-    /// The force guidance never exceeds, N.
+    /// Set the largest guidance force, N.
     GuideCap(f32),
-    /// Let the simulated hand put the peg in the hole.
+    /// Let the simulated hand insert the peg into the hole.
     PlayInsertion,
-    /// Everything from the sample to the insertion, by itself. `None`: the emulated board if it is there, else in-process.
+    /// Run everything from the sample to the insertion automatically. `None`: the emulated board if it is available, else in-process.
     Demo(Option<RigSpec>),
 }
 
 impl Intent {
-    /// Changes nothing on a rig: never in the way of a running demonstration.
+    /// Whether the intent changes nothing on a rig and so never interrupts a running demonstration.
     pub fn is_passive(&self) -> bool {
         matches!(
             self,
@@ -100,7 +101,7 @@ impl Intent {
 const NO_RIG: &str = "No rig is connected";
 const NO_FILE: &str = "No file is open";
 
-/// Why `intent` is not possible now, in words; `None` when it is. [`Intent::Stop`] always is.
+/// Why `intent` is not possible now (blocked reason), as a sentence; `None` when it is possible. [`Intent::Stop`] always is.
 pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
     let no = |reason: &str| Some(reason.to_owned());
     let armed = session.is_armed();
@@ -122,7 +123,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         },
         Intent::ChooseMethod(_) if session.is_busy() => no("Work is under way"),
         Intent::ChooseMethod(_) => {
-            armed.then(|| "The rig is armed: disarm it before the scene is baked again".to_owned())
+            armed.then(|| "The rig is armed: disarm it before the collision model is baked again".to_owned())
         }
         Intent::CancelWork => (!session.is_busy()).then(|| "Nothing is under way".to_owned()),
         Intent::ChooseRig(_) => match session.link {
@@ -142,7 +143,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Upload => upload(session),
         Intent::CancelUpload => match session.connection() {
             Some(connection) if connection.upload.is_some() => None,
-            _ => no("Nothing is being sent"),
+            _ => no("No upload is under way"),
         },
         Intent::Arm => arm(session),
         Intent::Disarm => match session.device() {
@@ -164,12 +165,12 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Release => match session.device() {
             None => no(NO_RIG),
             Some(DeviceState::Active) => None,
-            Some(_) => no("Nothing is in hand"),
+            Some(_) => no("No part is held"),
         },
         Intent::ResetScene => match session.device() {
             None => no(NO_RIG),
             Some(_) if armed => no("Only while the motors are off: disarm first"),
-            Some(_) if !session.scene_is_on_board() => no("The scene is not on the board"),
+            Some(_) if !session.scene_is_on_board() => no("The collision model is not on the board"),
             Some(_) => None,
         },
         Intent::SetParameter(..) | Intent::ResetParameters => {
@@ -206,10 +207,10 @@ fn upload(session: &Session) -> Option<String> {
         return no(NO_RIG);
     };
     if document.baked.is_none() {
-        return no("The scene is not baked yet");
+        return no("The collision model is not baked yet");
     }
     if connection.upload.is_some() {
-        return no("The scene is being sent");
+        return no("The collision model is being uploaded");
     }
     session
         .is_armed()
@@ -230,10 +231,10 @@ fn arm(session: &Session) -> Option<String> {
         DeviceState::Idle => {}
     }
     if session.document.is_none() {
-        return no("Open a STEP file first: without it the window cannot show what is felt");
+        return no("Open a STEP file first: without it the window cannot show the parts");
     }
     if !session.scene_is_on_board() {
-        return no("The scene is not on the board yet");
+        return no("The collision model is not on the board yet");
     }
     None
 }
@@ -251,7 +252,7 @@ fn grab(session: &Session, part: usize) -> Option<String> {
     if !document.is_grabbable(part) {
         return no("This part is fixed: the largest part of the assembly stays where it is");
     }
-    (session.grabbed() == Some(part)).then(|| "It is in hand".to_owned())
+    (session.grabbed() == Some(part)).then(|| "It is held".to_owned())
 }
 
 fn play(session: &Session) -> Option<String> {
@@ -260,20 +261,20 @@ fn play(session: &Session) -> Option<String> {
         return no(NO_FILE);
     };
     if document.insertion.is_none() {
-        return no("No peg stands in front of a hole in this assembly");
+        return no("This assembly has no peg in front of a hole");
     }
     if session.is_touring() {
-        return no("It is playing");
+        return no("It is already running");
     }
     let Some(connection) = session.connection() else {
         return no(NO_RIG);
     };
     if !connection.capabilities.simulated {
-        return no("This rig has a real handle: the hand is yours");
+        return no("This rig has a real handle: move it yourself");
     }
     match connection.state {
         DeviceState::Stopped | DeviceState::Fault(_) => no("Stopped: clear the stop first"),
-        _ if !session.scene_is_on_board() => no("The scene is not on the board yet"),
+        _ if !session.scene_is_on_board() => no("The collision model is not on the board yet"),
         _ => None,
     }
 }

@@ -1,7 +1,7 @@
-//! The connection to a rig, beside the window.
+//! The connection to a rig, outside the window's thread.
 //!
-//! One thread connects and then carries out commands one after another; another passes on what the board says unasked.
-//! STOP goes past both: it is written by whoever calls [`Connection::stop`], even while a scene is being sent.
+//! One thread connects and then executes commands one after another; another forwards the board's events. STOP bypasses both: the caller of
+//! [`Connection::stop`] writes it, even during an upload.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -20,126 +20,127 @@ use super::document::Document;
 use super::guidance::Tap;
 use super::work::{Cancel, Outbox, Update};
 
-/// Ticks between telemetry messages: some 60 a second, half of what an emulated UART carries.
+/// Ticks between telemetry messages: some 60 messages a second, half of what an emulated UART carries.
 pub const TELEMETRY_TICKS: u16 = 16;
 
-/// Between two pictures for samples while the motors are off and the handle rests, as long as what the readout of late ticks covers. With software
-/// rendering a picture of 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
+/// Time between redraws for samples while the motors are off and the handle rests; equals the span of the readout of loop overruns. With
+/// software rendering a frame of 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
 const CALM: Duration = Duration::from_secs(10);
 
-/// A silent link is noticed within this after the first answer that is missing.
+/// Time after the first missing answer within which a silent link is noticed.
 const NOTICED: Duration = Duration::from_secs(1);
 
-/// Motion of the handle that is worth a picture at once, m: a digit of what is shown.
+/// Motion of the handle that is redrawn at once, m: one digit of the displayed position.
 const MOVED_M: f32 = 1e-4;
 
-/// Longest wait for a connection to end when the program does: longer than a rig is greeted, so that an emulator that has just been
-/// started is ended as well. The window is gone by then.
+/// Longest wait for connections to close at the program's end: longer than the greeting of a rig, so that an emulator that has just been
+/// started is ended as well. The window is closed by then.
 const CLOSING: Duration = Duration::from_secs(40);
 
-/// Something to do over the link.
+/// A command for the link's thread.
 pub enum Command {
-    /// Send and wait for the answer.
+    /// Send a message and wait for the answer.
     Request(Box<ToDevice>),
-    /// Send a scene.
+    /// Upload a scene.
     Upload {
         /// The image.
         baked: Arc<Baked>,
-        /// Of which document.
+        /// The scene's document.
         generation: u64,
-        /// Ends it early.
+        /// Cancels the upload.
         cancel: Cancel,
     },
-    /// Ask for the counters.
+    /// Query the counters.
     Statistics,
 }
 
-/// What the link says.
+/// A report of the link.
 pub enum LinkUpdate {
     /// Connected.
     Connected {
-        /// To send with.
+        /// Sends messages.
         client: Arc<Client>,
         /// The board's parameters.
         parameters: Vec<(ParameterId, f32)>,
-        /// Where guidance hears samples from.
+        /// Input of the guidance thread for samples.
         tap: Tap,
     },
-    /// Not connected, and why.
+    /// The connection failed, and why.
     Failed(String),
-    /// Said unasked.
+    /// An unsolicited event of the board.
     Event(Event),
-    /// A request was carried out, or why not.
+    /// A request was executed or refused.
     Answered {
-        /// What was asked.
+        /// The request.
         message: Box<ToDevice>,
-        /// One line why not.
+        /// One line with the reason of a refusal.
         result: Result<(), String>,
     },
-    /// Not answered because the link is gone, which [`Event::LinkLost`] tells once; or a question of the window's own that nobody waits for.
+    /// No answer because the link is lost, which [`Event::LinkLost`] reports once; or the answer to a query of the window itself that
+    /// nothing waits for.
     Unanswered,
-    /// How much of the scene is there.
+    /// Progress of an upload.
     Uploading(UploadProgress),
-    /// The scene was sent, or why not.
+    /// An upload ended.
     Uploaded {
-        /// Of which document.
+        /// The scene's document.
         generation: u64,
-        /// `false`: the operator ended it. An error is one line why not.
+        /// `false`: the operator cancelled it. An error is one line with the reason.
         result: Result<bool, String>,
     },
     /// The counters.
     Statistics(Statistics),
 }
 
-/// Whether there is a connection.
+/// State of the connection.
 pub enum Link {
-    /// None.
+    /// Not connected.
     None,
-    /// On the way.
+    /// Connecting.
     Connecting {
-        /// Which.
+        /// Id of the connection.
         id: u64,
-        /// To where.
+        /// The rig.
         spec: RigSpec,
-        /// To the thread that connects.
+        /// Sends commands to the thread that connects.
         commands: Sender<Command>,
         /// That thread.
         thread: Option<JoinHandle<()>>,
     },
-    /// There.
+    /// Connected.
     Connected(Box<Connection>),
 }
 
-/// A rig that answers.
+/// A connection to a rig that answers.
 pub struct Connection {
-    /// Which.
+    /// Id of the connection.
     pub id: u64,
-    /// To where.
+    /// The rig.
     pub spec: RigSpec,
-    /// What the board can do.
+    /// Capabilities of the board.
     pub capabilities: Capabilities,
-    /// The state it last told.
+    /// The last state that the board reported.
     pub state: DeviceState,
     /// Document whose scene is on the board.
     pub scene_of: Option<u64>,
-    /// Document whose scene it would not take.
+    /// Document whose scene the board refused.
     pub refused_scene_of: Option<u64>,
-    /// The scene being sent.
+    /// Progress of the upload under way.
     pub upload: Option<UploadProgress>,
-    /// Since when.
+    /// Start of the upload.
     pub upload_since: Instant,
-    /// Counters, asked for now and then.
+    /// Counters, queried at intervals.
     pub statistics: Option<Statistics>,
-    /// To the thread that guides.
+    /// Input of the guidance thread.
     pub tap: Tap,
     upload_cancel: Cancel,
     client: Arc<Client>,
     commands: Sender<Command>,
     thread: Option<JoinHandle<()>>,
-    /// The newest wish for the hand, while an older one is under way.
+    /// The newest script for the simulated hand, waiting while an older one is under way.
     hand_next: Option<HandScript>,
     hand_under_way: bool,
-    /// Likewise for parameters, one a parameter.
+    /// The newest value of each parameter, waiting likewise.
     parameters_next: Vec<(ParameterId, f32)>,
     parameter_under_way: bool,
 }
@@ -175,10 +176,10 @@ pub fn connect(outbox: &Outbox, id: u64, spec: RigSpec) -> Link {
     }
 }
 
-/// Connects, then does what it is told until the other end is dropped.
+/// Connects, then executes commands until the sender is dropped.
 fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
     let say = |update: LinkUpdate| match update {
-        // Worth no picture of its own.
+        // These need no redraw of their own.
         LinkUpdate::Statistics(_) | LinkUpdate::Unanswered => {
             outbox.send_quietly(Update::Link { id, update })
         }
@@ -227,7 +228,7 @@ fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
     }
 }
 
-/// Asks for telemetry and every parameter.
+/// Requests telemetry and reads every parameter.
 fn introduce(client: &Client) -> Result<Vec<(ParameterId, f32)>, RigError> {
     client.request(ToDevice::SetTelemetry {
         every_ticks: TELEMETRY_TICKS,
@@ -253,7 +254,7 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
         } => {
             let mut last = 0;
             let mut progress = |now: UploadProgress| {
-                // A hundred steps are enough to look at.
+                // At most a hundred progress reports.
                 if now.sent.saturating_sub(last) * 100 >= now.total || now.sent == now.total {
                     last = now.sent;
                     say(LinkUpdate::Uploading(now));
@@ -280,7 +281,7 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
     }
 }
 
-/// The link is gone, or going: an answer that does not come in time is followed by the link's end when the board is silent altogether.
+/// Whether the link is lost or about to be: when the board is entirely silent, a late answer is followed by the loss of the link.
 fn is_the_links(client: &Client, error: &RigError) -> bool {
     match error {
         RigError::LinkLost { .. } => true,
@@ -292,7 +293,7 @@ fn is_the_links(client: &Client, error: &RigError) -> bool {
     }
 }
 
-/// Motors may push: every sample is worth a picture.
+/// Whether the motors may exert force, in which case every sample is redrawn.
 fn is_live(state: DeviceState) -> bool {
     matches!(
         state,
@@ -300,10 +301,10 @@ fn is_live(state: DeviceState) -> bool {
     )
 }
 
-/// Passes events on until there are no more.
+/// Forwards events until there are no more.
 ///
-/// While the motors are off and the handle rests nothing in a sample moves on screen but the traces, so the window is woken for one of many:
-/// drawing each would keep a core busy where there is no graphics card.
+/// While the motors are off and the handle rests, samples change nothing on screen but the traces, so only one of many wakes the window:
+/// drawing each would keep a core busy on a computer without a graphics card.
 fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, state: DeviceState) {
     let mut live = is_live(state);
     let mut woken = Instant::now();
@@ -348,7 +349,7 @@ fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, st
 }
 
 impl Connection {
-    /// From what [`LinkUpdate::Connected`] brought.
+    /// The connection of a [`LinkUpdate::Connected`].
     pub fn new(
         id: u64,
         spec: RigSpec,
@@ -379,18 +380,18 @@ impl Connection {
         }
     }
 
-    /// Has a command carried out after those before it.
+    /// Queues a command.
     pub fn command(&self, command: Command) {
-        // The other end lives as long as this one; a lost link answers every command with an error.
+        // The receiver lives as long as this sender; a lost link answers every command with an error.
         let _ = self.commands.send(command);
     }
 
-    /// Has a message sent and its answer waited for.
+    /// Queues a message whose answer is waited for.
     pub fn request(&self, message: ToDevice) {
         self.command(Command::Request(Box::new(message)));
     }
 
-    /// Starts sending a scene.
+    /// Starts the upload of a scene.
     pub fn send_scene(&mut self, baked: Arc<Baked>, generation: u64) {
         let total = baked.image.len();
         self.upload = Some(UploadProgress { sent: 0, total });
@@ -403,12 +404,12 @@ impl Connection {
         });
     }
 
-    /// Ends the sending under way; the scene in use stays.
+    /// Cancels the upload under way; the scene in use stays.
     pub fn cancel_upload(&self) {
         self.upload_cancel.set();
     }
 
-    /// Starts to guide in the scene that is on the board now.
+    /// Starts guidance in the scene that is now on the board.
     pub fn guide(&self, document: &Document, settings: GuideSettings, outbox: &Outbox) {
         let Some(baked) = &document.baked else { return };
         let parts = baked.report.parts.iter().map(|part| part.model_part).collect();
@@ -422,7 +423,7 @@ impl Connection {
         );
     }
 
-    /// Motors off, now: written from a thread of its own, past everything that waits.
+    /// Motors off, now: written from a separate thread, ahead of everything queued.
     pub fn stop(&self, outbox: &Outbox) {
         let (client, outbox, id) = (Arc::clone(&self.client), outbox.clone(), self.id);
         super::work::spawn("mortise-stop", move || {
@@ -437,7 +438,7 @@ impl Connection {
         });
     }
 
-    /// Moves the simulated hand. Only the newest wish waits.
+    /// Moves the simulated hand. Only the newest script waits.
     pub fn set_hand(&mut self, script: HandScript) {
         if self.hand_under_way {
             self.hand_next = Some(script);
@@ -464,7 +465,7 @@ impl Connection {
         }
     }
 
-    /// To be told of every answer, so that what waits can go next.
+    /// Must be called for every answer, so that the next waiting message is sent.
     pub fn answered(&mut self, message: &ToDevice) {
         match message {
             ToDevice::SimulatedHand(_) => {
@@ -484,18 +485,19 @@ impl Connection {
         }
     }
 
-    /// Frames thrown away on this side, and telemetry that came too fast.
+    /// Counts of frames dropped on this side, and of telemetry that came too fast.
     pub fn link_counts(&self) -> mortise_rig::LinkCounts {
         self.client.link_counts()
     }
 }
 
-/// Connections of this program that are being closed.
+/// Connections of this program that are closing.
 static CLOSINGS: AtomicUsize = AtomicUsize::new(0);
-/// Longest wait for them before the next connection.
+/// Longest wait for closing connections before the next connection.
 const CLOSING_WAIT: Duration = Duration::from_secs(5);
 
-/// One connection that is being closed. Until it is, its thread may read from the port, and would take the answers to the next connection's greeting.
+/// One closing connection. Until it is closed, its thread may read from the port and would take the answers to the next connection's
+/// greeting.
 struct Closing;
 
 impl Closing {
@@ -519,8 +521,8 @@ impl Drop for Closing {
 }
 
 impl Link {
-    /// Ends the connection: motors off, threads and emulator ended. Waits for them when `wait` is set, but no longer
-    /// than 40 s, else lets them end by themselves.
+    /// Ends the connection: motors off, threads and emulator ended. With `wait` it waits for them, at most 40 s; without, they end on their
+    /// own.
     pub fn close(self, wait: bool) {
         let (client, commands, thread) = match self {
             Self::None => return,
@@ -534,9 +536,9 @@ impl Link {
         let end = move || {
             let _closing = closing;
             if let Some(client) = &client {
-                // Past whatever the other thread is doing; a lost link stops the board by itself.
+                // Sent independently of the other thread's work; a lost link stops the board by itself.
                 let _ = client.stop();
-                // An upload under way must not be waited for.
+                // Aborts an upload under way instead of waiting for it.
                 client.hang_up();
             }
             drop(commands);

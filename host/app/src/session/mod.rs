@@ -1,7 +1,7 @@
-//! The program's state, apart from how it looks: what is open, which rig, what the board says. No window needed.
+//! The program's state without its presentation: the open document, the connected rig, the board's reports. Needs no window.
 //!
-//! The window draws a [`Session`] and hands it [`Intent`]s; threads beside it ([`work`], [`link`]) send messages that
-//! [`Session::poll`] takes in. [`intent::obstacle`] alone decides what is possible when.
+//! The window draws a [`Session`] and passes [`Intent`]s to it; threads beside it ([`work`], [`link`]) send messages that [`Session::poll`]
+//! takes in. [`intent::obstacle`] alone decides which intents are possible.
 
 pub mod document;
 pub mod guidance;
@@ -42,17 +42,17 @@ use self::tour::Tour;
 use self::verdict::Verdict;
 use self::work::{Cancel, Outbox, Update};
 
-/// The force guidance may be limited to, N: from hardly felt to well below the coupling's.
+/// Range of the guidance force limit, N: from barely perceptible to well below the coupling's limit.
 pub const GUIDE_CAP_N: RangeInclusive<f32> = 0.2..=8.0;
 
 /// Reading or baking under way.
 #[derive(Clone, Debug)]
 pub struct Job {
-    /// What is being done, in words.
+    /// Description of the job.
     pub doing: String,
-    /// 0 to 1 where it is known.
+    /// Progress from 0 to 1, where known.
     pub fraction: Option<f32>,
-    /// Since when.
+    /// Start of the job.
     pub since: Instant,
     generation: u64,
     cancel: Cancel,
@@ -61,49 +61,49 @@ pub struct Job {
 /// A link that was lost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lost {
-    /// To where.
+    /// The rig.
     pub spec: RigSpec,
-    /// Why, in words.
+    /// The reason, as a sentence.
     pub why: String,
 }
 
 /// Everything the window shows.
 pub struct Session {
-    /// What is open.
+    /// The open document.
     pub document: Option<Document>,
     /// Reading or baking under way.
     pub job: Option<Job>,
-    /// Rigs to choose from.
+    /// Rigs that can be chosen.
     pub rigs: Vec<RigEntry>,
-    /// The one chosen.
+    /// The chosen rig.
     pub chosen: RigSpec,
     /// The connection.
     pub link: Link,
-    /// The link was lost, and there is no new one yet.
+    /// Set while the link is lost and not yet replaced.
     pub lost: Option<Lost>,
-    /// How the last insertion ended, until the next one.
+    /// Outcome of the last insertion, until the next one.
     pub verdict: Option<Verdict>,
-    /// Marked part.
+    /// Selected part.
     pub selected: Option<usize>,
     /// The last sample of the loop.
     pub telemetry: Option<Box<Telemetry>>,
-    /// The last seconds of it.
+    /// The samples of the last seconds.
     pub history: History,
     /// The board's parameters, in the order of [`PARAMETERS`].
     pub parameters: Vec<f32>,
     /// How targets are found and sent.
     pub guide: GuideSettings,
-    /// What could be kept, and what is.
+    /// Candidate and active targets.
     pub guidance: List,
     /// Messages.
     pub notes: Notes,
-    /// How contact is found in what is baked next.
+    /// Contact method of the next bake.
     pub method: Method,
-    /// There is no file dialog here: a path is wanted instead.
+    /// Set when this desktop offers no file dialog: the window asks for a path instead.
     pub wants_path: bool,
     tour: Option<Tour>,
-    /// Part in hand and its pose in the handle's frame when it was grabbed.
-    grip: Option<(usize, DAffine3)>,
+    /// Held part, and its pose in the handle's frame when it was grabbed.
+    held: Option<(usize, DAffine3)>,
     outbox: Outbox,
     inbox: Receiver<Update>,
     generation: u64,
@@ -112,7 +112,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Nothing open, nothing connected. `wake` is called from other threads whenever [`Self::poll`] has something to take in.
+    /// A session without document or connection. `wake` is called from other threads whenever [`Self::poll`] has messages to take in.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         let (outbox, inbox) = Outbox::new(wake);
         work::list_rigs(&outbox);
@@ -134,7 +134,7 @@ impl Session {
             method: Method::default(),
             wants_path: false,
             tour: None,
-            grip: None,
+            held: None,
             outbox,
             inbox,
             generation: 0,
@@ -143,7 +143,7 @@ impl Session {
         }
     }
 
-    /// Does what the operator wants, or says why not.
+    /// Executes an intent, or reports why it is not possible.
     pub fn act(&mut self, intent: Intent) {
         if let Some(reason) = obstacle(self, &intent) {
             self.notes.add(Severity::Warning, reason);
@@ -156,7 +156,7 @@ impl Session {
         self.follow();
     }
 
-    /// Takes in what other threads sent. To be called before each picture.
+    /// Takes in the messages of other threads. Call it before each frame.
     pub fn poll(&mut self) {
         while let Ok(update) = self.inbox.try_recv() {
             update::take(self, update);
@@ -215,16 +215,16 @@ impl Session {
                     }
                 }
             }
-            Intent::PinTarget(id, pinned) => self.guide_wish(Wish::Pin(id, pinned)),
-            Intent::SwitchTargetOff(id, off) => self.guide_wish(Wish::SwitchOff(id, off)),
+            Intent::PinTarget(id, pinned) => self.command_guidance(Wish::Pin(id, pinned)),
+            Intent::SwitchTargetOff(id, off) => self.command_guidance(Wish::SwitchOff(id, off)),
             Intent::GuideWhen(when) => {
                 self.guide.when = when;
-                self.guide_wish(Wish::Set(self.guide));
+                self.command_guidance(Wish::Set(self.guide));
             }
             Intent::GuideCap(newton) => {
                 if newton.is_finite() {
                     self.guide.force_cap_n = newton.clamp(*GUIDE_CAP_N.start(), *GUIDE_CAP_N.end());
-                    self.guide_wish(Wish::Set(self.guide));
+                    self.command_guidance(Wish::Set(self.guide));
                 }
             }
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
@@ -232,7 +232,7 @@ impl Session {
         }
     }
 
-    /// Work that follows from the state by itself: the scene goes to the board when both are there, a demonstration goes on.
+    /// Actions that follow from the state: upload once document and board are present; next step of a demonstration.
     fn follow(&mut self) {
         let ready = (self.document.as_ref()).is_some_and(|d| d.baked.is_some());
         if ready
@@ -268,7 +268,7 @@ impl Session {
             connection.scene_of = None;
             connection.refused_scene_of = None;
         }
-        let cancel = self.start_job("Baking the scene".to_owned(), generation);
+        let cancel = self.start_job("Baking the collision model".to_owned(), generation);
         let options = BakeOptions {
             method: self.method,
             image_limit_bytes: limit,
@@ -304,42 +304,42 @@ impl Session {
             _ => None,
         };
         link.close(false);
-        self.forget_board();
+        self.clear_board();
         if let Some(name) = name {
             self.notes
                 .add(Severity::Info, format!("Disconnected from {name}"));
         }
     }
 
-    /// What only a connection knows is gone; parts stay where they were last seen.
-    fn forget_board(&mut self) {
+    /// Clears the state that only a connection provides; parts stay at their last known poses.
+    fn clear_board(&mut self) {
         self.telemetry = None;
         self.let_go();
         self.history.clear();
         self.guidance = List::default();
     }
 
-    /// No part is in hand any more.
+    /// Clears the held part.
     fn let_go(&mut self) {
-        self.grip = None;
+        self.held = None;
         let verdict = self.document.as_mut().and_then(|d| d.watch.let_go());
-        self.tell(verdict);
+        self.report(verdict);
     }
 
-    /// How an insertion ended: a message, and a card until the next one.
-    fn tell(&mut self, verdict: Option<Verdict>) {
+    /// Reports the outcome of an insertion as a message, and as a card until the next one.
+    fn report(&mut self, verdict: Option<Verdict>) {
         if let Some(verdict) = verdict {
             self.notes.add(verdict.severity(), verdict.to_string());
             self.verdict = Some(verdict);
         }
     }
 
-    /// Longest a file is read.
+    /// Longest time that reading a file may take.
     pub fn reading_limit(&self) -> Duration {
         Duration::from_secs(mortise_brep::LoadOptions::default().time_limit_s)
     }
 
-    /// Guides in the scene that is on the board now.
+    /// Starts guidance in the scene that is now on the board.
     fn start_guidance(&mut self) {
         self.guidance = List::default();
         self.guide.sending = self.guides();
@@ -348,12 +348,12 @@ impl Session {
         }
     }
 
-    /// The board guides, by whichever method.
+    /// Whether the board guides, by either method.
     pub fn guides(&self) -> bool {
         self.parameters[ParameterId::Guidance as usize] >= 0.5
     }
 
-    fn guide_wish(&mut self, wish: Wish) {
+    fn command_guidance(&mut self, wish: Wish) {
         let taken = self.connection().is_none_or(|c| c.tap.wish(wish));
         if !taken && self.scene_is_on_board() {
             self.notes.add(Severity::Warning, "Guidance is busy: try again");
@@ -408,7 +408,7 @@ impl Session {
         }
         if id == ParameterId::Guidance {
             self.guide.sending = self.guides();
-            self.guide_wish(Wish::Set(self.guide));
+            self.command_guidance(Wish::Set(self.guide));
         }
     }
 
@@ -420,7 +420,7 @@ impl Session {
         }
     }
 
-    /// The emulated board when it is there, else in-process, with a word about it.
+    /// The emulated board if it is available, else the in-process simulation, with a message.
     fn demo_rig(&mut self) -> RigSpec {
         let emulated = RigSpec::Emulated {
             mode: EmulatedMode::Interactive,
@@ -434,7 +434,7 @@ impl Session {
                 self.notes.add(
                     Severity::Warning,
                     format!(
-                        "The emulated board is not there, so the simulation in this program is used: {}",
+                        "The emulated board is not available, so the simulation in this program is used: {}",
                         why.unwrap_or_else(|| "run `cargo xtask demo`".to_owned())
                     ),
                 );
@@ -454,7 +454,7 @@ impl Session {
         path.parent().map(PathBuf::from)
     }
 
-    /// Moves the simulated hand; does nothing on a rig with a real one.
+    /// Moves the simulated hand; no effect on a rig with a real one.
     pub fn move_hand(&mut self, script: HandScript) {
         self.tour = None;
         if let Some(connection) = self.connection_mut()
@@ -464,7 +464,7 @@ impl Session {
         }
     }
 
-    /// The connection, once it is made.
+    /// The connection, once established.
     pub fn connection(&self) -> Option<&Connection> {
         match &self.link {
             Link::Connected(connection) => Some(connection),
@@ -484,7 +484,7 @@ impl Session {
         self.connection().map(|c| c.state)
     }
 
-    /// Motors may push.
+    /// Whether the motors may exert force.
     pub fn is_armed(&self) -> bool {
         matches!(
             self.device(),
@@ -492,17 +492,17 @@ impl Session {
         )
     }
 
-    /// Reading or baking is under way.
+    /// Whether reading or baking is under way.
     pub fn is_busy(&self) -> bool {
         self.job.is_some()
     }
 
-    /// A demonstration is under way.
+    /// Whether a demonstration is under way.
     pub fn is_touring(&self) -> bool {
         self.tour.is_some()
     }
 
-    /// The open document's scene is the one on the board.
+    /// Whether the open document's scene is the one on the board.
     pub fn scene_is_on_board(&self) -> bool {
         match (&self.document, self.connection()) {
             (Some(document), Some(connection)) => {
@@ -512,7 +512,7 @@ impl Session {
         }
     }
 
-    /// The board did not take it: asked again only when the operator wants it.
+    /// Whether the board refused the scene: it is uploaded again only on the operator's request.
     fn scene_was_refused(&self) -> bool {
         match (&self.document, self.connection()) {
             (Some(document), Some(connection)) => connection.refused_scene_of == Some(document.generation),
@@ -520,7 +520,7 @@ impl Session {
         }
     }
 
-    /// Part in hand.
+    /// Index of the held part.
     pub fn grabbed(&self) -> Option<usize> {
         if self.device() != Some(DeviceState::Active) {
             return None;
@@ -529,15 +529,15 @@ impl Session {
         self.document.as_ref()?.model_part(*part)
     }
 
-    /// Part in hand and where the handle would have it, mm: away from the part itself by what the contacts hold back.
+    /// Held part and the pose that the handle commands, mm: it differs from the part's own pose by the coupling's deflection under contact.
     pub fn ghost(&self) -> Option<(usize, DAffine3)> {
         let part = self.grabbed()?;
-        let (held, grip) = self.grip.as_ref()?;
+        let (held, offset) = self.held.as_ref()?;
         let handle = pose::from_wire(&self.telemetry.as_ref()?.handle);
-        (*held == part).then(|| (part, handle * *grip))
+        (*held == part).then(|| (part, handle * *offset))
     }
 
-    /// Where the handle is, mm.
+    /// Pose of the handle, mm.
     pub fn handle(&self) -> Option<DAffine3> {
         self.telemetry.as_ref().map(|t| pose::from_wire(&t.handle))
     }
@@ -548,9 +548,9 @@ impl Drop for Session {
         if let Some(job) = &self.job {
             job.cancel.set();
         }
-        // Threads that wait to be heard must not be waited for.
+        // Closes the queue: threads blocked on it must not delay the end.
         self.inbox = std::sync::mpsc::sync_channel(1).1;
-        // Motors off and the emulator ended before the program is.
+        // Motors off and emulator ended before the program ends.
         std::mem::replace(&mut self.link, Link::None).close(true);
     }
 }

@@ -1,33 +1,33 @@
-//! Messages in words, newest first, bounded.
+//! Messages to the operator, newest first, bounded.
 
 use std::time::{Duration, Instant};
 
-/// Most messages kept; the oldest goes.
+/// Largest number of messages kept; the oldest are dropped.
 pub const MAX_NOTES: usize = 200;
 
-/// How much a message matters.
+/// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// For the record.
     Info,
-    /// Something worth having happened.
+    /// A success.
     Good,
-    /// Something to know; work goes on.
+    /// A condition to know about; work continues.
     Warning,
-    /// Something was not done, or motors went off.
+    /// An action failed, or motors went off.
     Error,
 }
 
 /// One message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
-    /// Since the program started.
+    /// Time since the program started.
     pub at: Duration,
     /// How much it matters.
     pub severity: Severity,
-    /// A sentence: what, where, what to do.
+    /// A sentence: what happened, where, and what to do.
     pub text: String,
-    /// How often it came in a row.
+    /// Number of consecutive occurrences.
     pub times: u32,
 }
 
@@ -50,7 +50,7 @@ impl Default for Notes {
 }
 
 impl Notes {
-    /// Adds a message; one that repeats the newest is counted instead.
+    /// Adds a message; a repetition of the newest increments its count instead.
     pub fn add(&mut self, severity: Severity, text: impl Into<String>) {
         let (at, text) = (self.start.elapsed(), text.into());
         self.count += 1;
@@ -81,12 +81,12 @@ impl Notes {
         self.newest_first.front()
     }
 
-    /// How many were ever added.
+    /// Number of messages ever added.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Forgets all.
+    /// Removes all messages.
     pub fn clear(&mut self) {
         self.newest_first.clear();
     }

@@ -1,4 +1,4 @@
-//! Poses between the wire (metres, quaternions, f32) and the window (millimetres, affine, f64).
+//! Conversion of poses between the wire (metres, quaternions, f32) and the window (millimetres, affine, f64).
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_protocol::message::WirePose;
@@ -6,7 +6,7 @@ use mortise_protocol::message::WirePose;
 /// Millimetres in a metre.
 pub const MM_PER_M: f64 = 1e3;
 
-/// Frame to world, mm. A quaternion that cannot be normalised counts as no rotation.
+/// Frame to world, mm. A quaternion that cannot be normalised is taken as no rotation.
 pub fn from_wire(pose: &WirePose) -> DAffine3 {
     let [x, y, z, w] = pose.orientation.map(f64::from);
     let q = DQuat::from_xyzw(x, y, z, w);
@@ -18,7 +18,7 @@ pub fn from_wire(pose: &WirePose) -> DAffine3 {
     DAffine3::from_rotation_translation(q, MM_PER_M * DVec3::from(pose.position.map(f64::from)))
 }
 
-/// To the wire. The linear part must be a rotation.
+/// Converts to the wire. The linear part must be a rotation.
 pub fn to_wire(pose: &DAffine3) -> WirePose {
     let q = DQuat::from_mat3(&pose.matrix3).normalize();
     WirePose {
@@ -27,12 +27,12 @@ pub fn to_wire(pose: &DAffine3) -> WirePose {
     }
 }
 
-/// A vector of the wire (m) in mm.
+/// Converts a vector of the wire (m) to mm.
 pub fn point_from_wire(point: [f32; 3]) -> DVec3 {
     MM_PER_M * DVec3::from(point.map(f64::from))
 }
 
-/// Turns about `pivot`, then moves by `shift`, both in the world.
+/// `pose` rotated about `pivot`, then translated by `shift`, both in the world.
 pub fn moved(pose: &DAffine3, pivot: DVec3, turn: DQuat, shift: DVec3) -> DAffine3 {
     let about = DAffine3::from_translation(pivot + shift)
         * DAffine3::from_quat(turn)
@@ -49,7 +49,7 @@ mod tests {
         let q = DQuat::from_xyzw(0.1, -0.2, 0.3, 0.9).normalize();
         let pose = DAffine3::from_rotation_translation(q, DVec3::new(12.5, -400.0, 0.003));
         let back = from_wire(&to_wire(&pose));
-        // f32 has 24 bits: 400 mm to 400·2⁻²⁴ = 2.4e-5 mm, a rotation to 6e-8.
+        // Resolution of f32 with 24 bits: 400·2⁻²⁴ = 2.4e-5 mm at 400 mm, 6e-8 for a rotation.
         assert!((back.translation - pose.translation).length() < 5e-5);
         for i in 0..3 {
             assert!((back.matrix3.col(i) - pose.matrix3.col(i)).length() < 5e-7);

@@ -1,11 +1,11 @@
-//! Time left of something whose progress is known, by what it took so far.
+//! Estimate of the remaining time of a job from its progress so far.
 
 use std::time::Duration;
 
-/// No estimate before this much time and progress: the first steps say little about the rest.
+/// Least time and progress for an estimate: the first steps say little about the rest.
 const LEAST: (Duration, f32) = (Duration::from_millis(800), 0.02);
 
-/// Time left after `elapsed` at `fraction` (0 to 1), if what is left goes on as what is done: `elapsed·(1 − f)/f`.
+/// Remaining time after `elapsed` at `fraction` (0 to 1), assuming a constant rate: `elapsed·(1 − f)/f`.
 pub fn left(elapsed: Duration, fraction: f32) -> Option<Duration> {
     if !(fraction >= LEAST.1 && fraction <= 1.0) || elapsed < LEAST.0 {
         return None;
@@ -14,7 +14,7 @@ pub fn left(elapsed: Duration, fraction: f32) -> Option<Duration> {
     Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 - f) / f).ok()
 }
 
-/// In words, as precise as an estimate is.
+/// The remaining time in words, rounded to the precision of an estimate.
 pub fn words(left: Duration) -> String {
     let seconds = left.as_secs_f64().ceil() as u64;
     match seconds {

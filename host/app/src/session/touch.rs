@@ -1,6 +1,7 @@
-//! What of a part touches: a face, an edge or a corner.
+//! Kind of the touching feature of a part: a face, an edge or a corner.
 //!
-//! The board names the touching face, and the other one where the point lies on an edge. A corner is an edge's end in which a third face meets.
+//! The board reports the touching face, and the second face where the point lies on an edge. A corner is an edge's end in which a third
+//! face meets.
 
 use std::fmt;
 
@@ -10,17 +11,17 @@ use mortise_protocol::image::NO_FACE;
 
 use super::document::Document;
 
-/// A touch no farther from an edge's end than this is at it, mm: twice what the board takes for at an edge.
+/// Largest distance from an edge's end to a touch that counts as at the corner, mm: twice the board's tolerance for edges.
 const AT_CORNER_MM: f64 = 0.02;
 
-/// Part of a shape's boundary.
+/// Feature of a shape's boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Touch {
-    /// Of two dimensions.
+    /// A two-dimensional feature.
     Face,
-    /// Of one.
+    /// A one-dimensional feature.
     Edge,
-    /// Of none.
+    /// A point.
     Corner,
 }
 
@@ -35,7 +36,7 @@ impl fmt::Display for Touch {
 }
 
 impl Touch {
-    /// What of part `part` touches at `point` (world, mm), with these faces told by the board.
+    /// Feature of part `part` that touches at `point` (world, mm), for the faces that the board reported.
     pub fn of(document: &Document, part: usize, faces: [u16; 2], point: DVec3) -> Self {
         let (Some(shape), Some(pose)) = (
             (document.model.parts.get(part)).and_then(|part| document.model.shapes.get(part.shape)),
@@ -58,7 +59,7 @@ impl Touch {
     }
 }
 
-/// Whether at `point` (shape frame, mm) an edge of `faces` ends and a third face meets.
+/// Whether an edge of `faces` ends at `point` (shape frame, mm) and a third face meets it there.
 fn is_corner(shape: &Shape, faces: [u32; 2], point: DVec3) -> bool {
     let ends_here = |polyline: &[DVec3]| {
         let ends = [polyline.first(), polyline.last()];
@@ -77,8 +78,8 @@ mod tests {
 
     use super::*;
 
-    /// All edges of the sample's parts, in the middle and at their ends: of the block's straight ones both ends are corners; a hole's or a peg's rim has
-    /// none, though its seam begins there.
+    /// All edges of the sample's parts, in the middle and at their ends: both ends of the block's straight edges are corners; the rim of a
+    /// hole or a peg has none, although its seam begins there.
     #[test]
     fn corners_are_where_three_faces_meet() {
         let document = Document::sample(0, &AtomicBool::default()).expect("the sample opens");

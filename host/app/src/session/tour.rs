@@ -1,6 +1,6 @@
-//! The insertion that plays by itself: puts the parts back, arms, grabs the peg, moves the simulated hand.
+//! The automatic insertion: resets the parts, arms, grabs the peg, moves the simulated hand.
 //!
-//! A list of waits: each step goes on when the board says it is done. Any refusal, stop or fault ends it.
+//! A sequence of waits: each step continues when the board reports its completion. Any refusal, stop or fault ends it.
 
 use std::time::{Duration, Instant};
 
@@ -12,23 +12,23 @@ use super::intent::Intent;
 use super::notes::Severity;
 use super::{Session, pose};
 
-/// Longest wait for the board in one step; reading, baking and sending take as long as they take.
+/// Longest wait for the board in one step; reading, baking and uploading have no limit here.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Where it is.
+/// The condition that a demonstration waits for, and its next action.
 #[derive(Clone, Debug, PartialEq)]
 enum Step {
-    /// Until the file is read and baked, then connect.
+    /// Wait until the file is read and baked, then connect.
     Connect(RigSpec),
-    /// Until the scene is on the board.
+    /// Wait until the scene is on the board.
     Scene,
-    /// Until the motors are off; then put the parts back.
+    /// Wait until the motors are off, then reset the parts.
     PutBack,
-    /// Until they are back, then arm.
+    /// Wait until they are reset, then arm.
     Arm,
-    /// Until armed; then grab.
+    /// Wait until armed, then grab.
     Grab,
-    /// Until the peg is in hand; then move the hand.
+    /// Wait until the peg is held, then move the hand.
     Play,
 }
 
@@ -41,12 +41,12 @@ pub struct Tour {
 }
 
 impl Tour {
-    /// From the very beginning: a file is being opened, nothing is connected.
+    /// A demonstration from the beginning: a file is being opened, no rig is connected.
     pub fn from_the_start(rig: RigSpec) -> Self {
         Self::at(Step::Connect(rig))
     }
 
-    /// On a rig that is connected.
+    /// A demonstration on a connected rig.
     pub fn from_the_rig() -> Self {
         Self::at(Step::Scene)
     }
@@ -59,20 +59,20 @@ impl Tour {
         }
     }
 
-    /// Whether the board has been asked for longer than [`PATIENCE`].
+    /// Whether the board has not completed the step within [`PATIENCE`].
     fn is_stuck(&self) -> bool {
         !matches!(self.step, Step::Connect(_) | Step::Scene) && self.since.elapsed() > PATIENCE
     }
 }
 
-/// Goes on as far as it can. To be called after every message.
+/// Advances as far as possible. Call it after every message.
 pub fn advance(session: &mut Session) {
     while let Some(tour) = session.tour.clone() {
         if tour.is_stuck() {
             session.tour = None;
             session.notes.add(
                 Severity::Warning,
-                "The demonstration ended: the board did not follow",
+                "The demonstration ended: the board did not respond in time",
             );
             return;
         }
@@ -92,7 +92,7 @@ pub fn advance(session: &mut Session) {
     }
 }
 
-/// One step. `None`: wait; `Some(None)`: done; else where it goes on.
+/// Executes one step. `None`: wait; `Some(None)`: finished; otherwise the next step.
 fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
     let ask = |session: &mut Session, message: ToDevice| {
         if !tour.asked {
@@ -124,10 +124,10 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
                 return None;
             }
             if !session.connection()?.capabilities.simulated {
-                // Motors with a person at them are armed by that person.
+                // On a rig with a real handle, only the person at the handle arms the motors.
                 session.notes.add(
                     Severity::Info,
-                    "The scene is on the board: take the handle, arm, and grab a part",
+                    "The collision model is on the board: take the handle, arm, and grab a part",
                 );
                 return Some(None);
             }
@@ -172,7 +172,7 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
             session.notes.add(
                 Severity::Info,
                 format!(
-                    "The simulated hand puts the peg into the hole: {:.0} mm, {:.2} mm clearance",
+                    "The simulated hand inserts the peg into the hole: {:.0} mm, {:.2} mm clearance",
                     insertion.travel_mm, insertion.clearance_mm
                 ),
             );

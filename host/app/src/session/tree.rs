@@ -2,10 +2,10 @@
 
 use mortise_brep::CadModel;
 
-/// A line of the tree.
+/// A node of the tree.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Branch {
-    /// A subassembly and what is in it.
+    /// A subassembly and its children.
     Assembly {
         /// Its name.
         name: String,
@@ -16,7 +16,7 @@ pub enum Branch {
     Part(usize),
 }
 
-/// The tree of a model's parts. Neighbours with the same path share a subassembly; order is that of the file.
+/// The tree of a model's parts. Neighbours with the same path share a subassembly; the order is the file's.
 pub fn tree(model: &CadModel) -> Vec<Branch> {
     let mut roots = Vec::new();
     for (index, part) in model.parts.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What a message from another thread changes.
+//! Effects of messages from other threads on the session.
 
 use std::sync::Arc;
 
@@ -19,10 +19,10 @@ use super::verdict::Moment;
 use super::work::Update;
 use super::{Intent, Lost, Session, pose};
 
-/// Samples between two questions for the counters: about two seconds.
+/// Samples between two queries of the counters: about two seconds.
 const STATISTICS_EVERY: u32 = 120;
 
-/// Takes one message in. What belongs to a file or a connection that is no more is dropped.
+/// Applies one message. Messages of a file or connection that no longer exists are dropped.
 pub fn take(session: &mut Session, update: Update) {
     match update {
         Update::Imported { generation, result } if is_awaited(session, generation) => {
@@ -103,7 +103,7 @@ fn opened(session: &mut Session, document: Document) {
     session.selected = None;
     session.verdict = None;
     session.document = Some(document);
-    session.forget_board();
+    session.clear_board();
     session.bake();
 }
 
@@ -112,7 +112,7 @@ fn baked_of(session: &mut Session, baked: Arc<Baked>) {
     session.notes.add(
         Severity::Good,
         format!(
-            "Scene baked: {} KiB, {} shapes, cells of {:.3} mm at the finest",
+            "Collision model baked: {} KiB, {} shapes, finest cells {:.3} mm",
             report.image_bytes.div_ceil(1024),
             report.shapes.len(),
             report
@@ -184,7 +184,7 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
             describe(connection.state),
         ),
     );
-    // A restart nobody asked for is news; a board switched on is not.
+    // An unexpected restart is reported; power-up is not.
     let reset = connection.capabilities.reset;
     if !matches!(
         reset,
@@ -207,7 +207,7 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
         session.notes.add(
             Severity::Info,
             format!(
-                "The scene is larger than the {} KiB this board holds: baking it coarser",
+                "The collision model is larger than the {} KiB this board holds: baking a coarser one",
                 capacity / 1024
             ),
         );
@@ -229,7 +229,7 @@ fn event(session: &mut Session, event: Event) {
             if state != DeviceState::Active {
                 session.let_go();
             }
-            // The fault itself was reported in the tick it was seen.
+            // The fault itself was reported in the tick in which it occurred.
             if matches!(state, DeviceState::Fault(_)) {
                 return;
             }
@@ -253,7 +253,7 @@ fn event(session: &mut Session, event: Event) {
                 });
             }
             link.close(false);
-            session.forget_board();
+            session.clear_board();
             session.tour = None;
             session.notes.add(
                 Severity::Error,
@@ -276,8 +276,8 @@ fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
         if let Some(shown) = document.poses.get_mut(part) {
             *shown = object;
         }
-        if session.grip.is_none_or(|(held, _)| held != part) {
-            session.grip = Some((part, pose::from_wire(&telemetry.handle).inverse() * object));
+        if session.held.is_none_or(|(held, _)| held != part) {
+            session.held = Some((part, pose::from_wire(&telemetry.handle).inverse() * object));
             session.verdict = None;
         }
         watch(session, part, &telemetry, &sample);
@@ -292,7 +292,7 @@ fn sample(session: &mut Session, telemetry: Box<Telemetry>) {
     }
 }
 
-/// Whether the part in hand has gone in, or is stuck.
+/// Reports whether the held part is fully inserted or stuck.
 fn watch(session: &mut Session, held: usize, telemetry: &Telemetry, sample: &Sample) {
     let Some(document) = &mut session.document else {
         return;
@@ -303,26 +303,26 @@ fn watch(session: &mut Session, held: usize, telemetry: &Telemetry, sample: &Sam
         contact_n: DVec3::from(telemetry.contact.force.map(f64::from)),
         handle_n: f64::from(sample.handle_n),
     };
-    // Taken out, because what it meets is a question to the rest of the document.
+    // Moved out of the document because `blocker` borrows the rest of it.
     let mut watch = std::mem::take(&mut document.watch);
     let verdict = watch.sample(&document.poses, &moment, |walls| {
         blocker(document, held, telemetry, walls)
     });
     document.watch = watch;
-    session.tell(verdict);
+    session.report(verdict);
 }
 
-/// What the part in hand meets, in words: “rim of plate, hole 2”.
+/// Feature that the held part meets, in words: “rim of plate, hole 2”.
 fn blocker(document: &Document, held: usize, telemetry: &Telemetry, walls: &[Wall]) -> String {
     let Some((pair, part)) = (telemetry.pairs.first())
         .and_then(|pair| document.model_part(pair.static_part).map(|part| (pair, part)))
     else {
-        return "nothing that is seen".to_owned();
+        return "an unknown obstacle".to_owned();
     };
     met(document, held, pair, part, walls)
 }
 
-/// What of `part` the part in hand meets by this pair, in words. Holes are numbered in the order of their faces, where there are several.
+/// Feature of `part` that the held part meets by this pair, in words. Several holes are numbered in the order of their faces.
 fn met(document: &Document, held: usize, pair: &TouchingPair, part: usize, walls: &[Wall]) -> String {
     let faces = [pair.static_face, pair.static_edge_face];
     let touch = Touch::of(document, part, faces, pose::point_from_wire(pair.point));
@@ -361,7 +361,7 @@ fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String
     if let (ToDevice::ResetScene, Some(document)) = (message, &mut session.document) {
         document.reset_poses();
         session.verdict = None;
-        session.guide_wish(Wish::PutBack);
+        session.command_guidance(Wish::PutBack);
     }
 }
 
@@ -373,12 +373,12 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>
     connection.upload = None;
     match result {
         Ok(false) => {
-            // Sent again only when the operator wants it.
+            // Uploaded again only on the operator's request.
             connection.refused_scene_of = Some(generation);
             session.tour = None;
             session.notes.add(
                 Severity::Info,
-                "Sending cancelled: the scene the board had stays in use",
+                "Upload cancelled: the previous collision model stays in use",
             );
         }
         Ok(true) => {
@@ -389,7 +389,9 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>
                     document.reset_poses();
                 }
                 session.start_guidance();
-                session.notes.add(Severity::Good, "The scene is on the board");
+                session
+                    .notes
+                    .add(Severity::Good, "The collision model is on the board");
             }
         }
         Err(why) => {
@@ -397,7 +399,7 @@ fn uploaded(session: &mut Session, generation: u64, result: Result<bool, String>
             session.tour = None;
             session
                 .notes
-                .add(Severity::Error, format!("The scene was not taken: {why}"));
+                .add(Severity::Error, format!("Upload failed: {why}"));
         }
     }
 }
@@ -411,7 +413,7 @@ mod tests {
     use super::*;
     use crate::session::insertion::local_walls;
 
-    /// A top face, then a wall for each of `holes`: the x of its axis and where the mesh of its wall begins and ends.
+    /// A top face, then a wall for each of `holes`: x of its axis, and the z range of its wall's mesh.
     fn plate(holes: &[(f64, f64, f64)]) -> Shape {
         let frame = |x: f64| Frame {
             origin: DVec3::new(x, 0.0, 0.0),
@@ -467,7 +469,7 @@ mod tests {
             parts: vec![part("plate"), part("other plate")],
             ..CadModel::default()
         };
-        // The other plate, in hand, has holes of its own, which do not count.
+        // The held part is the other plate; its own holes must not be counted.
         let walls = local_walls(&model);
         let document = Document::of(model, None, String::new(), 0);
         let pair = TouchingPair {
@@ -492,13 +494,13 @@ mod tests {
         assert_eq!(met_at(two(), [0, 2]), "rim of plate, hole 2");
         assert_eq!(met_at(two(), [2, 0]), "rim of plate, hole 2");
         assert_eq!(met_at(two(), [0, NO_FACE]), "face on face of plate");
-        // A wall in two halves is one hole; two on one axis with a gap between them are two.
+        // A wall in two halves is one hole; two walls on one axis with a gap between them are two.
         let halves = plate(&[(-20.0, 0.0, 8.0), (-20.0, 0.0, 8.0), (20.0, 0.0, 8.0)]);
         assert_eq!(met_at(halves.clone(), [2, NO_FACE]), "wall of plate, hole 1");
         assert_eq!(met_at(halves, [3, NO_FACE]), "wall of plate, hole 2");
         let above = plate(&[(0.0, 0.0, 8.0), (0.0, 20.0, 28.0)]);
         assert_eq!(met_at(above, [2, NO_FACE]), "wall of plate, hole 2");
-        // The only one needs no number.
+        // A single hole needs no number.
         let one = plate(&[(0.0, 0.0, 8.0)]);
         assert_eq!(met_at(one, [1, NO_FACE]), "wall of plate");
     }

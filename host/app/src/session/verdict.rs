@@ -1,7 +1,7 @@
-//! How an insertion ended, in words: it goes in, it is stuck and on what, or it was let go. Pure.
+//! Outcome of an insertion in words: inserted, stuck (and on what), or released on the way. Pure.
 //!
-//! A shaft and a bore are an outer and a wider inner cylinder of two parts, one of them in hand. The depth is the length over which the two
-//! overlap along the bore's axis; all the way in is the shorter of both. Costs one pass over the pairs that the part in hand has.
+//! A shaft and a bore are an outer and a wider inner cylinder of two parts, one of them held. The depth is the length over which the two
+//! overlap along the bore's axis; the full depth is the shorter length of both. Cost: one pass over the pairs of the held part.
 
 use std::fmt;
 
@@ -11,29 +11,29 @@ use mortise_brep::CadModel;
 use super::insertion::{Wall, local_walls};
 use super::notes::Severity;
 
-/// This near the end counts as in, mm: what the coupling's spring lags behind a hand that arrives.
+/// Distance from the end that counts as fully inserted, mm: the lag of the coupling's spring behind a hand that arrives.
 const NEAR_END_MM: f64 = 0.1;
 /// Motion along the axis that counts as progress, mm.
 const PROGRESS_MM: f64 = 0.05;
-/// Without progress for this long near the end: it has arrived, s.
+/// Time without progress near the end after which the part has arrived, s.
 const ARRIVED_S: f64 = 0.4;
-/// Without progress for this long under a push: it is stuck, s.
+/// Time without progress under a push after which the part is stuck, s.
 const STUCK_S: f64 = 1.0;
-/// A push that the contact answers with at least this along the axis, N.
+/// Least axial contact force that counts as a push, N.
 const PUSH_N: f64 = 0.3;
-/// Before the bore by less than this an insertion has begun, mm.
+/// Distance in front of the bore at which an insertion begins, mm.
 const BEGUN_MM: f64 = 1.0;
-/// Axes may lean by this much, rad; beyond, a part is not being inserted.
+/// Largest angle between the axes of an insertion, rad.
 const LEAN: f64 = 0.2;
-/// The bore may be wider by this fraction of its radius.
+/// Largest difference of the radii of bore and shaft, as a fraction of the bore's radius.
 const SLACK: f64 = 0.4;
-/// Most pairs looked at; an assembly with more shafts of one size than this is watched in part.
+/// Largest number of pairs examined; an assembly with more shafts of one size is watched only in part.
 const MAX_PAIRS: usize = 4096;
 
-/// How it ended.
+/// Outcome of an insertion.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
-    /// All the way.
+    /// Fully inserted.
     GoesIn {
         /// Depth, mm.
         depth_mm: f64,
@@ -42,24 +42,24 @@ pub enum Verdict {
         /// Largest force on the handle on the way, N.
         peak_n: f64,
     },
-    /// Pushed, and no further.
+    /// Pushed without progress.
     Stuck {
         /// Depth, mm.
         depth_mm: f64,
-        /// What it meets.
+        /// The feature it meets.
         on: String,
     },
-    /// Let go on the way.
+    /// Released on the way.
     LetGo {
         /// Depth, mm.
         depth_mm: f64,
-        /// Of, mm.
+        /// Full depth, mm.
         full_mm: f64,
     },
 }
 
 impl Verdict {
-    /// How much it matters.
+    /// Severity of the message.
     pub fn severity(&self) -> Severity {
         match self {
             Self::GoesIn { .. } => Severity::Good,
@@ -82,14 +82,14 @@ impl fmt::Display for Verdict {
                 two_digits(*peak_n)
             ),
             Self::Stuck { depth_mm, on } => write!(f, "Stuck at {depth_mm:.1} mm: {on}"),
-            Self::LetGo { depth_mm, full_mm } => write!(f, "Let go at {depth_mm:.1} of {full_mm:.1} mm"),
+            Self::LetGo { depth_mm, full_mm } => write!(f, "Released at {depth_mm:.1} of {full_mm:.1} mm"),
         }
     }
 }
 
-/// A force in two significant digits, the last no finer than 0.01: 12, 3.4, 0.84, 0.04.
+/// A force with two significant digits, but no finer than 0.01: 12, 3.4, 0.84, 0.04.
 fn two_digits(newton: f64) -> String {
-    // What rounds up to the next power of ten has a digit less behind the point.
+    // A value that rounds up to the next power of ten has one decimal fewer.
     let digits = match newton.abs() {
         n if n >= 9.95 => 0,
         n if n >= 0.995 => 1,
@@ -98,12 +98,12 @@ fn two_digits(newton: f64) -> String {
     format!("{newton:.digits$}")
 }
 
-/// One sample of the part in hand.
+/// One sample of the held part.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
     /// Board time, s.
     pub time_s: f64,
-    /// Part in hand.
+    /// Held part.
     pub held: usize,
     /// Force of the contacts on it, N.
     pub contact_n: DVec3,
@@ -111,13 +111,13 @@ pub struct Moment {
     pub handle_n: f64,
 }
 
-/// Where a shaft is in a bore.
+/// Position of a shaft in a bore.
 #[derive(Clone, Copy, Debug)]
 struct Depth {
-    /// Below 0: still this far before it, mm.
+    /// Insertion depth, mm; negative: distance still in front of the bore.
     depth_mm: f64,
     full_mm: f64,
-    /// The way out for the part in hand, unit vector.
+    /// Direction of extraction of the held part, unit vector.
     out: DVec3,
 }
 
@@ -128,11 +128,11 @@ struct Attempt {
     since_s: f64,
     peak_n: f64,
     last: Depth,
-    /// Told at this depth; the next one after it has moved on.
-    told_at_mm: Option<f64>,
+    /// Depth at which an outcome was reported; the next report requires further motion.
+    reported_at_mm: Option<f64>,
 }
 
-/// Watches the part in hand.
+/// Watches the held part.
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
     walls: Vec<Wall>,
@@ -142,7 +142,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// For a model.
+    /// A watch for the parts of a model.
     pub fn of(model: &CadModel) -> Self {
         Self {
             walls: local_walls(model),
@@ -150,7 +150,7 @@ impl Watch {
         }
     }
 
-    /// Takes one sample; `on` says what the part in hand meets.
+    /// Processes one sample; `on` describes the feature that the held part meets.
     pub fn sample(
         &mut self,
         poses: &[DAffine3],
@@ -170,21 +170,21 @@ impl Watch {
                 deepest_mm: now.depth_mm,
                 since_s: moment.time_s,
                 peak_n: 0.0,
-                // A part that is taken in hand where it belongs has not been inserted.
-                told_at_mm: (now.depth_mm > now.full_mm - NEAR_END_MM).then_some(now.depth_mm),
+                // A part grabbed at its full depth has not been inserted.
+                reported_at_mm: (now.depth_mm > now.full_mm - NEAR_END_MM).then_some(now.depth_mm),
                 last: now,
             }),
         };
         attempt.last = now;
         attempt.peak_n = attempt.peak_n.max(moment.handle_n);
         if attempt
-            .told_at_mm
+            .reported_at_mm
             .is_some_and(|at| (now.depth_mm - at).abs() > BEGUN_MM)
         {
             *attempt = Attempt {
                 deepest_mm: now.depth_mm,
                 since_s: moment.time_s,
-                told_at_mm: None,
+                reported_at_mm: None,
                 ..attempt.clone()
             };
         }
@@ -195,7 +195,7 @@ impl Watch {
         let still_s = moment.time_s - attempt.since_s;
         let near_end = now.depth_mm > now.full_mm - NEAR_END_MM;
         let pushed = moment.contact_n.dot(now.out) > PUSH_N;
-        let verdict = if attempt.told_at_mm.is_some() {
+        let verdict = if attempt.reported_at_mm.is_some() {
             None
         } else if near_end && (still_s > ARRIVED_S || now.depth_mm >= now.full_mm) {
             let [shaft, bore] = [pair.0, pair.1].map(|i| self.walls[i].radius);
@@ -213,12 +213,12 @@ impl Watch {
             None
         };
         if verdict.is_some() {
-            attempt.told_at_mm = Some(now.depth_mm);
+            attempt.reported_at_mm = Some(now.depth_mm);
         }
         verdict
     }
 
-    /// No part is in hand any more.
+    /// Ends the watch of the held part.
     pub fn let_go(&mut self) -> Option<Verdict> {
         self.held = None;
         let attempt = self.attempt.take()?;
@@ -226,10 +226,10 @@ impl Watch {
             depth_mm, full_mm, ..
         } = attempt.last;
         let on_the_way = depth_mm > PROGRESS_MM && depth_mm <= full_mm - NEAR_END_MM;
-        (on_the_way && attempt.told_at_mm.is_none()).then_some(Verdict::LetGo { depth_mm, full_mm })
+        (on_the_way && attempt.reported_at_mm.is_none()).then_some(Verdict::LetGo { depth_mm, full_mm })
     }
 
-    /// Shafts and bores that could belong together by their sizes, one of each pair of `held`.
+    /// Pairs of shaft and bore whose sizes match, one of each pair belonging to `held`.
     fn pairs_of(&self, held: usize) -> Vec<(usize, usize)> {
         let all = || self.walls.iter().enumerate();
         let fits = |shaft: &Wall, bore: &Wall| {
@@ -246,7 +246,7 @@ impl Watch {
             .collect()
     }
 
-    /// The pair that is deepest in each other; of equals the one with the least play.
+    /// The pair with the largest depth; among equals the one with the least clearance.
     fn nearest(&self, poses: &[DAffine3], held: usize) -> Option<((usize, usize), Depth)> {
         let mut best: Option<((usize, usize), Depth, f64)> = None;
         for &(i, j) in &self.pairs {
@@ -264,7 +264,7 @@ impl Watch {
     }
 }
 
-/// `None` when the shaft is nowhere near the bore.
+/// Depth of a shaft in a bore; `None` when the shaft is not near the bore.
 fn depth(shaft: &Wall, bore: &Wall, poses: &[DAffine3], held: usize) -> Option<Depth> {
     let [s, b] = [shaft, bore].map(|wall| poses.get(wall.part).map(|pose| wall.moved(pose)));
     let (s, b) = (s?, b?);
@@ -307,7 +307,7 @@ mod tests {
         }
     }
 
-    /// A bore of 40 mm from z = −40, a shaft of 60 mm; `z` is where the shaft's lower end is.
+    /// A bore of 40 mm from z = −40 and a shaft of 60 mm; `z` is the shaft's lower end.
     struct Bench {
         watch: Watch,
         time_s: f64,
@@ -355,19 +355,19 @@ mod tests {
         said.extend(bench.hold(-40.0, 0.0, 2.0));
         let words: Vec<String> = said.iter().map(ToString::to_string).collect();
         assert_eq!(words, ["Goes in: 40.0 mm, clearance 1.000 mm, peak 0.84 N"]);
-        // A spring's lag before the end is the end, once it rests there.
+        // A part that rests within the spring's lag of the end has arrived.
         let mut bench = Bench::new();
         bench.at(0.0, 0.0);
         assert_eq!(bench.hold(-39.93, 0.0, 0.3), []);
         assert_eq!(bench.hold(-39.93, 0.0, 0.3).len(), 1);
-        // Out and in again is said again.
+        // A second insertion is reported again.
         assert_eq!(bench.hold(-20.0, 0.0, 0.2), []);
         assert_eq!(bench.hold(-40.0, 0.0, 0.2).len(), 1);
     }
 
     #[test]
     fn a_small_force_is_told_in_two_digits() {
-        let told = [
+        let expected = [
             (0.0, "0.00"),
             (0.004, "0.00"),
             (0.04, "0.04"),
@@ -381,7 +381,7 @@ mod tests {
             (9.951, "10"),
             (12.4, "12"),
         ];
-        for (newton, words) in told {
+        for (newton, words) in expected {
             assert_eq!(two_digits(newton), words, "{newton}");
         }
     }
@@ -395,12 +395,12 @@ mod tests {
         let words: Vec<String> = said.iter().map(ToString::to_string).collect();
         assert_eq!(words, ["Stuck at 12.3 mm: rim of plate, hole 2"]);
         assert_eq!(bench.hold(-15.0, 1.0, 3.0).len(), 1, "another place");
-        assert_eq!(bench.watch.let_go(), None, "said already");
-        // Without a push it only rests.
+        assert_eq!(bench.watch.let_go(), None, "already reported");
+        // Without a push the part only rests.
         let mut bench = Bench::new();
         assert_eq!(bench.hold(-12.3, 0.0, 5.0), []);
         let said = bench.watch.let_go().map(|v| v.to_string());
-        assert_eq!(said.as_deref(), Some("Let go at 12.3 of 40.0 mm"));
+        assert_eq!(said.as_deref(), Some("Released at 12.3 of 40.0 mm"));
     }
 
     #[test]

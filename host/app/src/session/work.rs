@@ -1,4 +1,4 @@
-//! What runs beside the window: reading, baking, listing rigs. Each job has a thread of its own and reports by message.
+//! Work outside the window's thread: reading, baking, listing rigs. Each job has its own thread and reports by messages.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -15,57 +15,57 @@ use mortise_rig::RigEntry;
 use super::document::Document;
 use super::link::LinkUpdate;
 
-/// Most messages that wait for the window; a sender waits when they are this many.
+/// Capacity of the window's queue; a sender blocks when it is full.
 const MAX_WAITING: usize = 1024;
 
-/// What a job says.
+/// A report of a job.
 pub enum Update {
-    /// A file was read, or not.
+    /// Reading a file ended.
     Imported {
-        /// Which file.
+        /// Id of the file.
         generation: u64,
-        /// The document, or one line why not.
+        /// The document, or one line with the reason of the failure.
         result: Result<Box<Document>, String>,
     },
-    /// How far a bake is.
+    /// Progress of a bake.
     Baking {
-        /// Of which document.
+        /// Id of the document.
         generation: u64,
-        /// What it is doing.
+        /// Description of the current stage.
         doing: String,
-        /// 0 to 1 of all.
+        /// Progress of the whole bake, 0 to 1.
         fraction: f32,
     },
     /// A bake ended.
     Baked {
-        /// Of which document.
+        /// Id of the document.
         generation: u64,
-        /// The image, or one line why not.
+        /// The image, or one line with the reason of the failure.
         result: Result<Arc<Baked>, String>,
     },
-    /// The rigs there are.
+    /// The available rigs.
     Rigs(Vec<RigEntry>),
-    /// From the link.
+    /// A report of the link.
     Link {
-        /// Which connection.
+        /// Id of the connection.
         id: u64,
-        /// What.
+        /// The report.
         update: LinkUpdate,
     },
-    /// What guidance recognised.
+    /// Targets that guidance recognised.
     Guidance {
-        /// Over which connection.
+        /// Id of the connection.
         link: u64,
-        /// What.
+        /// The targets.
         list: List,
     },
     /// A file was chosen in a dialog.
     Chosen(PathBuf),
-    /// There is no file dialog on this computer: ask for a path instead.
+    /// No file dialog is available: the window must ask for a path.
     NoDialog,
 }
 
-/// Where jobs send to. Wakes the window after each message.
+/// Sending end of the window's queue. Wakes the window after each message.
 #[derive(Clone)]
 pub struct Outbox {
     sender: SyncSender<Update>,
@@ -73,30 +73,30 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// The two ends.
+    /// Both ends of a new queue.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> (Self, Receiver<Update>) {
         let (sender, receiver) = sync_channel(MAX_WAITING);
         (Self { sender, wake }, receiver)
     }
 
-    /// Sends; `false` when nobody listens any more.
+    /// Sends a message; `false` when the receiver is gone.
     pub fn send(&self, update: Update) -> bool {
         let sent = self.sender.send(update).is_ok();
         (self.wake)();
         sent
     }
 
-    /// Sends without waking the window: it is taken in with whatever wakes it next. `false` when nobody listens any more.
+    /// Sends a message without waking the window, which takes it in at its next wake-up. `false` when the receiver is gone.
     pub fn send_quietly(&self, update: Update) -> bool {
         match self.sender.try_send(update) {
             Ok(()) => true,
-            // A window that takes nothing in is woken, and waited for.
+            // If the queue is full, the window is woken and waited for.
             Err(TrySendError::Full(update)) => self.send(update),
             Err(TrySendError::Disconnected(_)) => false,
         }
     }
 
-    /// Sends, unless too much waits already; says whether it did.
+    /// Sends a message unless the queue is full; returns whether it did.
     pub fn offer(&self, update: Update) -> bool {
         let sent = self.sender.try_send(update).is_ok();
         if sent {
@@ -106,28 +106,28 @@ impl Outbox {
     }
 }
 
-/// A flag that asks a job to end early.
+/// A flag that requests the early end of a job.
 #[derive(Clone, Debug, Default)]
 pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Asks.
+    /// Requests the end.
     pub fn set(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// For what looks at a flag by itself.
+    /// The flag itself, for code that polls it.
     pub fn flag(&self) -> &AtomicBool {
         &self.0
     }
 
-    /// Whether it was asked.
+    /// Whether the end was requested.
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Reads a file (`None`: the sample). When cancelled the reading process ends and nothing is said.
+/// Reads a file (`None`: the sample). When cancelled, the reading process ends without a report.
 pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64, cancel: Cancel) {
     let outbox = outbox.clone();
     spawn("mortise-import", move || {
@@ -152,7 +152,7 @@ pub fn bake(outbox: &Outbox, model: Arc<CadModel>, generation: u64, options: Bak
             if cancel.is_set() {
                 return ControlFlow::Break(());
             }
-            // At most some thirty a second: a bake may report thousands.
+            // At most some thirty reports a second: a bake may produce thousands.
             if let Ok(mut last) = throttle.try_lock() {
                 let fraction = overall(&progress).max(last.1);
                 if last.0.elapsed().as_millis() > 30 {
@@ -175,7 +175,7 @@ pub fn bake(outbox: &Outbox, model: Arc<CadModel>, generation: u64, options: Bak
     });
 }
 
-/// 0 to 1 over all stages: the pointshell takes a small share, the field nearly all of the rest.
+/// Progress over all stages, 0 to 1: the pointshell has a small share, the field nearly all of the rest.
 fn overall(progress: &Progress<'_>) -> f32 {
     let (index, count) = progress.shape;
     let share = (index as f64 + progress.fraction) / count.max(1) as f64;
@@ -191,11 +191,11 @@ fn doing(progress: &Progress<'_>) -> String {
     match progress.stage {
         Stage::Pointshell => format!("Sampling the surface of {}", progress.part),
         Stage::Field => format!("Measuring distances around {}", progress.part),
-        Stage::Image => "Putting the scene together".to_owned(),
+        Stage::Image => "Assembling the collision model".to_owned(),
     }
 }
 
-/// Looks which rigs there are.
+/// Lists the available rigs.
 pub fn list_rigs(outbox: &Outbox) {
     let outbox = outbox.clone();
     spawn("mortise-rigs", move || {
@@ -203,7 +203,7 @@ pub fn list_rigs(outbox: &Outbox) {
     });
 }
 
-/// Asks for a STEP file with the desktop's own dialog, where it has one.
+/// Opens the desktop's file dialog for a STEP file, where there is one.
 pub fn choose_file(outbox: &Outbox, folder: Option<PathBuf>) {
     let dialog = move || {
         let dialog = rfd::FileDialog::new()
@@ -220,20 +220,20 @@ pub fn choose_file(outbox: &Outbox, folder: Option<PathBuf>) {
         let asked = std::time::Instant::now();
         match dialog().pick_file() {
             Some(path) => outbox.send(Update::Chosen(path)),
-            // Nobody closes a dialog this fast: there is none.
+            // A dialog that closes within 0.5 s was never shown: none is available.
             None if asked.elapsed().as_millis() < 500 => outbox.send(Update::NoDialog),
             None => true,
         };
     };
     if cfg!(target_os = "macos") {
-        // There dialogs belong to the main thread.
+        // On macOS dialogs must run on the main thread.
         ask();
     } else {
         spawn("mortise-dialog", ask);
     }
 }
 
-/// Starts a thread. A computer that cannot even do that gets the work done here, late rather than never.
+/// Starts a thread. If the system cannot start one, the work runs here, later but not lost.
 pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) {
     let work = Arc::new(std::sync::Mutex::new(Some(work)));
     let take = |work: &Arc<std::sync::Mutex<Option<_>>>| work.lock().ok().and_then(|mut w| w.take());

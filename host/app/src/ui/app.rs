@@ -1,4 +1,4 @@
-//! The program's window: ties [`Window`] to eframe, and takes the screenshot automation asks for.
+//! The program's window: runs a [`Window`] under eframe and takes the screenshots that automation requests.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -11,21 +11,21 @@ use super::{Window, fonts, theme};
 use crate::session::{Intent, Session};
 use crate::viewport::surface::Surface;
 
-/// A picture to be taken of the window.
+/// A screenshot of the window.
 #[derive(Clone, Debug)]
 pub struct Screenshot {
     /// PNG file to write.
     pub file: Output,
-    /// After the window appeared.
+    /// Delay after the window appears.
     pub after: Duration,
 }
 
-/// How to start.
+/// Start-up options.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// What to do first.
+    /// Intents handled first.
     pub first: Vec<Intent>,
-    /// Take a picture, then end.
+    /// Screenshot after which the program ends.
     pub screenshot: Option<Screenshot>,
     /// Draw fixed parts as glass from the start.
     pub see_through: bool,
@@ -38,7 +38,7 @@ struct App {
     began: Instant,
     taken: Arc<Mutex<Option<Arc<ColorImage>>>>,
     asked: bool,
-    /// Document the window is named after.
+    /// Id of the document that the window title names.
     named: Option<u64>,
     failed: Arc<Mutex<Option<anyhow::Error>>>,
 }
@@ -55,12 +55,12 @@ pub fn run(options: Options) -> anyhow::Result<()> {
             .with_title("Mortise")
             .with_app_id("mortise")
             .with_inner_size(Vec2::new(1520.0, 940.0))
-            // Small enough for the smallest screen at the largest scale, or the window would be larger than the screen.
+            // Small enough for the smallest screen at the largest scale; a larger minimum would exceed that screen.
             .with_min_inner_size(Vec2::new(240.0, 180.0))
             .with_clamp_size_to_monitor_size(true)
             .with_icon(icon()),
         renderer: eframe::Renderer::Wgpu,
-        // Done by `fonts::install`, which tests use as well.
+        // `fonts::install` does this, also in tests.
         system_font_fallback: false,
         ..Default::default()
     };
@@ -102,7 +102,7 @@ pub fn run(options: Options) -> anyhow::Result<()> {
 
 impl eframe::App for App {
     fn logic(&mut self, _ctx: &egui::Context, _frame: &mut eframe::Frame) {
-        // Also while the window is hidden: the board must not be left without a listener.
+        // Runs while the window is hidden too: the board needs a listener at all times.
         self.window.session.poll();
     }
 

@@ -1,5 +1,5 @@
-//! Whether the desktop is dark or light, on Linux, where the window library is told by none: from the settings portal of freedesktop.org,
-//! `color-scheme` of `org.freedesktop.appearance` (1 dark, 2 light, 0 no preference), read at the start and followed from there.
+//! Dark or light theme on Linux, which the window library cannot determine there. Source: the settings portal of freedesktop.org,
+//! `color-scheme` of `org.freedesktop.appearance` (1 dark, 2 light, 0 no preference), read at the start and followed from then on.
 
 use egui::Theme;
 use zbus::blocking::{Connection, Proxy};
@@ -11,7 +11,7 @@ const SETTINGS: &str = "org.freedesktop.portal.Settings";
 const NAMESPACE: &str = "org.freedesktop.appearance";
 const KEY: &str = "color-scheme";
 
-/// Follows the desktop from a thread of its own: a portal may answer late, or not be there at all, and then the theme stays as it is.
+/// Follows the desktop's theme on a thread of its own. A portal may answer late or be absent; the theme then stays as it is.
 pub fn follow(ctx: &egui::Context) {
     let ctx = ctx.clone();
     let mut show = move |theme| {
@@ -19,19 +19,19 @@ pub fn follow(ctx: &egui::Context) {
         ctx.request_repaint();
     };
     let watch = move || {
-        // Without a bus or a portal there is nobody to follow, which is no fault.
+        // Without a bus or a portal there is no theme to follow, which is not an error.
         let _ = Connection::session().and_then(|bus| watch(&bus, &mut show));
     };
-    // Without the thread the theme stays as it is, too.
+    // If the thread cannot start, the theme stays as it is.
     let _ = std::thread::Builder::new().name("appearance".into()).spawn(watch);
 }
 
-/// Tells `show` the theme there is and each that follows, until the connection ends.
+/// Calls `show` with the current theme and with each later one, until the connection ends.
 fn watch(bus: &Connection, show: &mut dyn FnMut(Theme)) -> zbus::Result<()> {
     let settings = Proxy::new(bus, PORTAL, PATH, SETTINGS)?;
-    // Before the question, so that no change between the two is lost.
+    // Subscribe before reading, so that no change between the two is lost.
     let changes = settings.receive_signal("SettingChanged")?;
-    // Portals before version 2 know `Read` alone, which wraps its answer twice.
+    // Portals before version 2 offer only `Read`, which wraps its answer twice.
     let now: Result<OwnedValue, _> = settings.call("ReadOne", &(NAMESPACE, KEY));
     let now = now.or_else(|_| settings.call("Read", &(NAMESPACE, KEY)))?;
     show(theme(&now));
@@ -45,7 +45,7 @@ fn watch(bus: &Connection, show: &mut dyn FnMut(Theme)) -> zbus::Result<()> {
     Ok(())
 }
 
-/// Dark without a preference, as the program has always been.
+/// The theme for a portal's value; dark without a preference, which is the program's default.
 fn theme(value: &Value<'_>) -> Theme {
     match value {
         Value::Value(inner) => theme(inner),
@@ -75,7 +75,7 @@ mod tests {
         }
     }
 
-    /// A portal of version 1 at the other end of a socket: the theme is read, and follows.
+    /// A version-1 portal at the other end of a socket: the theme is read and followed.
     #[test]
     fn the_theme_is_read_and_followed() {
         let (ours, theirs) = UnixStream::pair().unwrap();

@@ -1,30 +1,30 @@
-//! Which panels are shown: all of them where there is room, one at a time with tabs where there is not. The bar with STOP and the state is
+//! Choice of the panels shown: all of them in a large window, one at a time with tabs in a small one. The bar with STOP and the state is
 //! above either.
 
 use egui::{RichText, Ui, Vec2};
 
 use super::theme;
 
-/// From here on every panel is shown, points.
+/// Smallest window size at which every panel is shown, points.
 const WIDE: Vec2 = Vec2::new(980.0, 560.0);
-/// From here on one panel stands beside the view, points.
+/// Smallest window width at which one panel stands beside the view, points.
 const BESIDE: f32 = 620.0;
 /// Width of that panel, points.
 const BESIDE_WIDTH: f32 = 300.0;
 
-/// How panels are arranged.
+/// Arrangement of the panels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Arrangement {
-    /// All panels about the view.
+    /// All panels around the view.
     Wide,
-    /// The view, and one panel of this width beside it.
+    /// The view, and one panel of this width (points) beside it.
     Beside(f32),
     /// The view or one panel.
     Single,
 }
 
 impl Arrangement {
-    /// For a window of `size` points.
+    /// Arrangement for a window of `size` points.
     pub fn of(size: Vec2) -> Self {
         if size.x >= WIDE.x && size.y >= WIDE.y {
             Self::Wide
@@ -63,7 +63,7 @@ impl Tab {
         }
     }
 
-    /// The tab in force under `arrangement`: beside the view, the view needs none.
+    /// The tab shown under `arrangement`: beside the view, the view itself needs no tab.
     pub fn under(self, arrangement: Arrangement) -> Self {
         match (arrangement, self) {
             (Arrangement::Beside(_), Self::View) => Self::Rig,
@@ -72,7 +72,7 @@ impl Tab {
     }
 }
 
-/// The tabs; changes `chosen`.
+/// Draws the tabs; a click changes `chosen`.
 pub fn tabs(ui: &mut Ui, arrangement: Arrangement, chosen: &mut Tab) {
     let all = [Tab::View, Tab::Rig, Tab::Parts, Tab::Messages, Tab::Plots];
     let first = usize::from(matches!(arrangement, Arrangement::Beside(_)));
@@ -84,7 +84,7 @@ pub fn tabs(ui: &mut Ui, arrangement: Arrangement, chosen: &mut Tab) {
                 .size(12.5)
                 .color(theme::of(ui).text_strong);
             let button = egui::Button::selectable(*chosen == tab, text);
-            // Named apart from the headings of what they show.
+            // The accessible names differ from the headings of the panels.
             let named = format!("Show {}", tab.name());
             if ui.add(button).accessible_name(named).clicked() {
                 *chosen = tab;

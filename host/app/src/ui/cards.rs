@@ -1,4 +1,4 @@
-//! Cards over the view: how far reading or baking is, a lost link, how an insertion ended.
+//! Cards over the view: progress of reading or baking, a lost link, the outcome of an insertion.
 
 use egui::{Align2, Area, Id, Order, Pos2, Rect, RichText, Ui, Vec2};
 
@@ -9,7 +9,7 @@ use crate::session::{Intent, Job, Session, remaining};
 /// Widest card, points.
 const WIDTH: f32 = 380.0;
 
-/// Draws them inside `rect`.
+/// Draws the cards inside `rect`.
 pub fn show(ui: &Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
     if let Some(lost) = &session.lost {
         card(ui, rect, "lost", Align2::CENTER_CENTER, rect.center(), |ui| {
@@ -21,7 +21,7 @@ pub fn show(ui: &Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
             ui.label(RichText::new(what).small().color(ink.text_weak));
             ui.add_space(2.0);
             let again = control::primary(ui, "Reconnect").min_size(Vec2::new(120.0, 30.0));
-            let hint = "Open the same link and greet the board again. Motors stay off until armed";
+            let hint = "Reopen the same link. Motors stay off until armed";
             control::intent_button(ui, session, wanted, again, Intent::Reconnect, hint);
         });
     }
@@ -78,7 +78,7 @@ fn job(ui: &mut Ui, session: &Session, job: &Job, wanted: &mut Vec<Intent>) {
             let left = remaining::left(elapsed, fraction).map(remaining::words);
             (egui::ProgressBar::new(fraction), left)
         }
-        // How far it is the CAD kernel does not tell; how long it may take at the most is known.
+        // The CAD kernel reports no progress; only the time limit is known.
         None => {
             let limit = session.reading_limit();
             let text = format!("{} s, at most {} s", elapsed.as_secs(), limit.as_secs());

@@ -1,4 +1,4 @@
-//! Small building blocks: buttons that know what stands in their way, chips, section headings.
+//! Small building blocks: buttons that show why they are disabled, chips, section headings.
 
 use egui::text::{LayoutJob, TextWrapping};
 use egui::{
@@ -9,7 +9,7 @@ use egui::{
 use super::theme;
 use crate::session::{Intent, Session, obstacle};
 
-/// A button for `intent`: greyed out with the reason as hover text when it is not possible. Wishes are collected in `wanted`.
+/// A button for `intent`, greyed out with the reason as hover text when the intent is not possible. A click adds the intent to `wanted`.
 pub fn intent_button(
     ui: &mut Ui,
     session: &Session,
@@ -30,16 +30,16 @@ pub fn intent_button(
     }
 }
 
-/// A button in the accent colour: the next thing to do.
+/// A button in the accent colour: the suggested next action.
 pub fn primary<'a>(ui: &Ui, text: &'a str) -> Button<'a> {
     let ink = theme::of(ui);
     Button::new(RichText::new(text).color(ink.text_strong)).fill(ink.accent_dim)
 }
 
-/// Narrowest chip, points: a short word stays as easy to find as a long one.
+/// Narrowest chip, points; chips of short words stay as easy to find as those of long ones.
 const CHIP_MIN: f32 = 64.0;
 
-/// A small rounded label with a dot: a state at a glance, never wider than `width` unless that is less than [`CHIP_MIN`].
+/// A small rounded label with a dot that shows a state, never wider than `width` unless that is less than [`CHIP_MIN`].
 pub fn chip(ui: &mut Ui, color: Color32, text: &str, width: f32) -> Response {
     let ink = theme::of(ui).text_strong;
     let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(13.0), ink);
@@ -62,7 +62,7 @@ pub fn chip(ui: &mut Ui, color: Color32, text: &str, width: f32) -> Response {
     response
 }
 
-/// Heading of a section, with room above.
+/// Heading of a section, with space above.
 pub fn section(ui: &mut Ui, text: &str) {
     ui.label(
         RichText::new(text.to_uppercase())
@@ -72,7 +72,7 @@ pub fn section(ui: &mut Ui, text: &str) {
     );
 }
 
-/// A line between sections, with air.
+/// A line between sections, with space around it.
 pub fn divider(ui: &mut Ui) {
     ui.add_space(8.0);
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 1.0), Sense::hover());
@@ -89,7 +89,7 @@ pub fn row(ui: &mut Ui, name: &str, value: impl Into<String>) -> Response {
     rich_row(ui, name, RichText::new(value.into()))
 }
 
-/// The same with a value of its own colour.
+/// A [`row`] whose value has its own colour.
 pub fn rich_row(ui: &mut Ui, name: &str, value: RichText) -> Response {
     ui.scope(|ui| {
         ui.spacing_mut().interact_size.y = 21.0;

@@ -5,7 +5,7 @@ use egui::{Color32, CornerRadius, Id, LayerId, Order, Stroke, Ui};
 use super::{control, header, theme};
 use crate::session::{Intent, Session, obstacle};
 
-/// Shows where a dragged file would go, and opens what was dropped.
+/// Highlights the drop target while a file is dragged over the window, and opens dropped files.
 pub fn show(ui: &Ui, session: &mut Session, wanted: &mut Vec<Intent>) {
     let ctx = ui.ctx();
     let (hovering, dropped) = ctx.input(|i| {
@@ -15,7 +15,7 @@ pub fn show(ui: &Ui, session: &mut Session, wanted: &mut Vec<Intent>) {
         (!i.raw.hovered_files.is_empty(), dropped)
     });
     if hovering {
-        // Below the bar: STOP and the state stay as they are.
+        // Starts below the bar, which leaves STOP and the state visible.
         let mut rect = ctx.content_rect();
         rect.min.y += header::height(rect.width());
         let painter = ctx.layer_painter(LayerId::new(Order::Foreground, Id::unique("drop")));
@@ -37,7 +37,7 @@ pub fn show(ui: &Ui, session: &mut Session, wanted: &mut Vec<Intent>) {
         1 => wanted.extend(dropped.into_iter().map(Intent::Open)),
         n => session.notes.add(
             crate::session::notes::Severity::Warning,
-            format!("{n} files were dropped: one file is one assembly, drop one"),
+            format!("{n} files were dropped: drop one file, which is one assembly"),
         ),
     }
 }

@@ -1,10 +1,10 @@
-//! Fonts of the system for what the built-in ones lack: names of parts come in every script.
+//! System fonts for characters that the built-in fonts lack: part names may be in any script.
 
 use std::sync::Arc;
 
 use egui_system_font_provider::SystemFontProvider;
 
-/// Has egui look for a font of the system whenever a character is in none it has. The fonts are listed on a thread of their own.
+/// Makes egui use a system font for each character missing from the loaded fonts. The fonts are listed on a thread of their own.
 pub fn install(ctx: &egui::Context) {
     ctx.add_font_provider(Arc::new(SystemFontProvider::new()));
 }

@@ -1,4 +1,4 @@
-//! The bar at the top: the program, the file, the state, Arm and STOP.
+//! The bar at the top: program, file, state, Arm and STOP.
 
 use egui::{Align, Layout, RichText, Ui, Vec2};
 use mortise_protocol::message::DeviceState;
@@ -8,14 +8,14 @@ use super::{control, stop, theme};
 use crate::session::link::Link;
 use crate::session::{Intent, Session};
 
-/// Narrower than this, points, the bar has two rows.
+/// Window width below which the bar has two rows, points.
 const ONE_ROW: f32 = 760.0;
-/// The state's label is never wider than this, points.
+/// Largest width of the state's label, points.
 const STATE_WIDTH: f32 = 260.0;
-/// Between two things of the bar, points.
+/// Gap between two items of the bar, points.
 const GAP: f32 = 8.0;
 
-/// What the bar of a window of `width` points looks like.
+/// Layout of the bar for a window of a given width (points).
 struct Shape {
     rows: usize,
     margin: egui::Margin,
@@ -53,7 +53,7 @@ pub fn height(width: f32) -> f32 {
     Shape::of(width).height()
 }
 
-/// Draws it. STOP and the state come first, at the right and as wide as they need; everything else takes what is left.
+/// Draws the bar. STOP and the state are placed first, at the right and as wide as they need; the rest takes the remaining width.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let shape = Shape::of(ui.max_rect().width());
     egui::Panel::top("header")
@@ -87,7 +87,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         });
 }
 
-/// The program and what is open.
+/// The program's mark and the open file.
 fn file(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
     if ui.available_width() > 220.0 {
         let (rect, _) = ui.allocate_exact_size(Vec2::splat(26.0), egui::Sense::hover());
@@ -120,7 +120,7 @@ fn title(ui: &mut Ui, session: &Session) {
         let parts = document.model.parts.len();
         let mut text = format!("{parts} part{}", if parts == 1 { "" } else { "s" });
         if let Some(baked) = &document.baked {
-            text += &format!(", scene {} KiB", baked.image.len().div_ceil(1024));
+            text += &format!(", collision model {} KiB", baked.image.len().div_ceil(1024));
         }
         let text = RichText::new(text).small().color(theme::of(ui).text_weak);
         ui.add(egui::Label::new(text).truncate());
@@ -139,7 +139,7 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Vec2) {
                 wanted,
                 button,
                 Intent::Disarm,
-                "Motors off, the part is let go",
+                "Motors off; the part is released",
             );
         }
         Some(DeviceState::Stopped | DeviceState::Fault(_)) => {
@@ -159,7 +159,7 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Vec2) {
             let button = egui::Button::new(text("Set home"))
                 .fill(ink.accent_dim)
                 .min_size(size);
-            let hint = "Bring the handle to its marked pose first: the board counts from there";
+            let hint = "First bring the handle to its marked pose: the board takes it as the reference";
             control::intent_button(ui, session, wanted, button, Intent::Home, hint);
         }
         _ => {
@@ -170,7 +170,7 @@ fn arm(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Vec2) {
                 wanted,
                 button,
                 Intent::Arm,
-                "Motors on. The handle feels nothing until a part is grabbed",
+                "Motors on. The handle stays free of force until a part is grabbed",
             );
         }
     }
@@ -195,14 +195,14 @@ fn state(ui: &mut Ui, session: &Session, width: f32) {
                 DeviceState::Homing => (ink.warning, "No reference"),
                 DeviceState::Idle => (ink.text_weak, "Idle"),
                 DeviceState::Armed => (ink.good, "Armed"),
-                DeviceState::Active => (ink.held, "In hand"),
+                DeviceState::Active => (ink.held, "Holding"),
                 DeviceState::SoftStop => (ink.warning, "Stopping"),
                 DeviceState::Stopped => (theme::STOP_HOVER, "Stopped"),
                 DeviceState::Fault(_) => (theme::STOP_HOVER, "Fault"),
             };
             let named = session.grabbed().and_then(|part| {
                 let document = session.document.as_ref()?;
-                Some(format!("In hand: {}", document.part_name(part)))
+                Some(format!("Holding: {}", document.part_name(part)))
             });
             (color, named.unwrap_or_else(|| text.to_owned()), describe(device))
         }

@@ -1,4 +1,4 @@
-//! Messages in words, newest first.
+//! The list of messages, newest first.
 
 use egui::{Color32, RichText, ScrollArea, Ui, Vec2};
 
@@ -16,7 +16,7 @@ pub fn color(palette: &theme::Palette, severity: Severity) -> Color32 {
     }
 }
 
-/// Draws them.
+/// Draws the list.
 pub fn show(ui: &mut Ui, session: &mut Session) {
     ui.horizontal(|ui| {
         control::section(ui, "Messages");
@@ -24,7 +24,7 @@ pub fn show(ui: &mut Ui, session: &mut Session) {
             if session.notes.iter().len() > 0 {
                 let button = egui::Button::new(RichText::new("Clear").small().color(theme::of(ui).text_weak))
                     .frame(false);
-                if ui.add(button).on_hover_text("Forget all messages").clicked() {
+                if ui.add(button).on_hover_text("Clear all messages").clicked() {
                     session.notes.clear();
                 }
             }

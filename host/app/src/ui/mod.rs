@@ -1,4 +1,4 @@
-//! The window: draws a [`Session`] and hands it the operator's wishes. Works without a graphics device, so that tests can drive it.
+//! The window: draws a [`Session`] and passes the operator's intents to it. Works without a graphics device, so that tests can drive it.
 
 pub mod app;
 #[cfg(target_os = "linux")]
@@ -27,18 +27,18 @@ use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 use crate::viewport::surface::Surface;
 
-/// Everything between the session and the screen.
+/// State of the window between session and screen.
 pub struct Window {
-    /// What is shown.
+    /// Session shown.
     pub session: Session,
-    /// From where.
+    /// Viewpoint of the 3D view.
     pub view: Viewpoint,
     path: open::PathDialog,
     tab: arrange::Tab,
 }
 
 impl Window {
-    /// Shows `session`.
+    /// A window that shows `session`.
     pub fn new(session: Session) -> Self {
         Self {
             session,
@@ -48,7 +48,7 @@ impl Window {
         }
     }
 
-    /// One picture. `surface` draws the 3D view where there is a graphics device.
+    /// Draws one frame. `surface` draws the 3D view where there is a graphics device.
     pub fn show(&mut self, ui: &mut Ui, surface: Option<&mut Surface>) {
         self.session.poll();
         let mut wanted = Vec::new();
@@ -62,14 +62,14 @@ impl Window {
         }
         drop::show(ui, &mut self.session, &mut wanted);
         self.path.show(ui, &mut self.session, &mut wanted);
-        // STOP first, whatever else was wanted in the same picture.
+        // STOP is handled before the other intents of the same frame.
         wanted.sort_by_key(|intent| *intent != Intent::Stop);
         for intent in wanted {
             self.session.act(intent);
         }
     }
 
-    /// Every panel about the view.
+    /// Draws every panel around the view.
     fn wide(&mut self, ui: &mut Ui, surface: Option<&mut Surface>, wanted: &mut Vec<Intent>) {
         let session = &mut self.session;
         let side = |left, right| {
@@ -106,7 +106,7 @@ impl Window {
         self.picture(ui, surface, wanted);
     }
 
-    /// One panel at a time.
+    /// Draws one panel at a time.
     fn compact(
         &mut self,
         ui: &mut Ui,
@@ -141,7 +141,7 @@ impl Window {
         }
     }
 
-    /// The chosen panel.
+    /// Draws the chosen panel.
     fn panel(&mut self, ui: &mut Ui, wanted: &mut Vec<Intent>) {
         let session = &mut self.session;
         match self.tab {
@@ -153,7 +153,7 @@ impl Window {
         }
     }
 
-    /// The view and what lies over it.
+    /// Draws the view and its overlays.
     fn picture(&mut self, ui: &mut Ui, surface: Option<&mut Surface>, wanted: &mut Vec<Intent>) {
         let session = &mut self.session;
         egui::CentralPanel::default()

@@ -1,4 +1,4 @@
-//! Opening by path where there is no file dialog.
+//! Dialog for opening a file by path, for desktops without a file dialog.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,10 @@ use egui::{Align2, Id, Key, Modal, RichText, TextEdit, Ui, Vec2};
 use super::{control, header, theme};
 use crate::session::{Intent, Session};
 
-/// Between the dialog's edge and what is in it, points.
+/// Margin inside the dialog, points.
 const MARGIN: f32 = 20.0;
 
-/// Asks for a path.
+/// A dialog for a path.
 #[derive(Clone, Debug, Default)]
 pub struct PathDialog {
     text: String,
@@ -18,7 +18,7 @@ pub struct PathDialog {
 }
 
 impl PathDialog {
-    /// Shows it while the session wants a path.
+    /// Draws the dialog while the session waits for a path.
     pub fn show(&mut self, ui: &Ui, session: &mut Session, wanted: &mut Vec<Intent>) {
         let ctx = ui.ctx();
         if !session.wants_path {
@@ -26,7 +26,7 @@ impl PathDialog {
             return;
         }
         let mut done = false;
-        // Below the bar, so that STOP and the state stay in sight.
+        // Placed below the bar, so that STOP and the state stay visible.
         let size = ctx.content_rect().size();
         let below = header::height(size.x) + 4.0;
         let room = egui::Rect::from_min_max(egui::pos2(0.0, below), size.to_pos2());
@@ -39,7 +39,7 @@ impl PathDialog {
             .backdrop_color(egui::Color32::from_black_alpha(90))
             .show(ctx, |ui| {
                 ui.set_width(460.0f32.min(size.x - 60.0).max(120.0));
-                // What does not fit under the bar scrolls: the area would slide over STOP otherwise.
+                // Contents that do not fit under the bar scroll; otherwise the area would cover STOP.
                 let height = (room.height() - 2.0 * MARGIN - 4.0).max(20.0);
                 egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
                 ui.label(
@@ -48,7 +48,7 @@ impl PathDialog {
                         .color(theme::of(ui).text_strong),
                 );
                 ui.label(
-                    RichText::new("This desktop offers no file dialog: give the path, or drop the file onto the window.")
+                    RichText::new("This desktop offers no file dialog: enter the path, or drop the file onto the window.")
                         .color(theme::of(ui).text_weak),
                 );
                 ui.add_space(6.0);
@@ -71,7 +71,7 @@ impl PathDialog {
                         wanted.push(Intent::Open(PathBuf::from(path)));
                         done = true;
                     }
-                    open.on_disabled_hover_text("Give a path first");
+                    open.on_disabled_hover_text("Enter a path first");
                     if ui
                         .add(egui::Button::new("Cancel").min_size(Vec2::new(96.0, 30.0)))
                         .clicked()

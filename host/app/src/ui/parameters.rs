@@ -1,4 +1,4 @@
-//! The board's adjustable numbers as sliders, with unit and range.
+//! The board's adjustable parameters as sliders and lists, with unit and range.
 
 use egui::{ComboBox, RichText, Slider, Ui, Vec2};
 use mortise_bake::Method;
@@ -7,16 +7,16 @@ use mortise_protocol::parameter::{PARAMETERS, Parameter};
 use super::{control, guidance, theme};
 use crate::session::{Intent, Session, obstacle};
 
-/// First word of a name, and the heading of those that begin with it.
+/// First word of the parameters' names in a group, and the group's heading.
 const GROUPS: [(&str, &str); 5] = [
     ("Integrator", "Method"),
-    ("Coupling", "Coupling of hand and part"),
+    ("Coupling", "Coupling of handle and part"),
     ("Contact", "Contact"),
-    ("Object", "Part in hand"),
+    ("Object", "Held part"),
     ("", "Limits"),
 ];
 
-/// Draws them.
+/// Draws the parameters.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     ui.horizontal(|ui| {
         control::section(ui, "Parameters");
@@ -26,7 +26,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 .any(|row| session.parameters[row.id as usize] != row.default);
             if changed {
                 let button = egui::Button::new(RichText::new("Defaults").small());
-                let hint = "Every parameter to its value at start";
+                let hint = "Reset every parameter to its value at start";
                 control::intent_button(ui, session, wanted, button, Intent::ResetParameters, hint);
             }
         });
@@ -55,10 +55,10 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     }
 }
 
-/// How contact is found: bakes the scene again.
+/// Draws the choice of the contact method; a change bakes the collision model again.
 fn method(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let reason = obstacle(session, &Intent::ChooseMethod(session.method));
-    let hover = "Distance field: exact to micrometres.\nOccupancy: the textbook's two bits a voxel, off by up to a voxel.\nThe scene is baked again.";
+    let hover = "Distance field: exact to micrometres.\nOccupancy: the textbook's two bits a voxel, off by up to a voxel.\nA change bakes the collision model again.";
     let names = Method::ALL.map(Method::name);
     let known = Method::ALL.iter().position(|&m| m == session.method).unwrap_or(0);
     if let Some(chosen) = combo(ui, "Contact by", &names, known, hover, reason) {
@@ -66,7 +66,7 @@ fn method(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     }
 }
 
-/// A parameter, whatever it is.
+/// Draws one parameter as a slider or a list.
 pub fn one(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
     if row.choices.is_empty() {
         slider(ui, session, wanted, row);
@@ -75,14 +75,15 @@ pub fn one(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Param
     }
 }
 
-/// A parameter that is a choice.
+/// Draws a parameter whose values are named choices.
 pub fn choice(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
     let known = session.parameters[row.id as usize].round() as usize;
     let reason = obstacle(session, &Intent::SetParameter(row.id, row.default));
+    let names: Vec<&str> = row.choices.iter().map(|&name| label(name)).collect();
     if let Some(chosen) = combo(
         ui,
         &words(row.name),
-        row.choices,
+        &names,
         known,
         row.description.trim(),
         reason,
@@ -91,8 +92,8 @@ pub fn choice(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Pa
     }
 }
 
-/// A list to choose from, greyed out for a `reason`; what was chosen anew.
-fn combo(
+/// A list to choose from, disabled with a `reason`; returns the index of a new choice.
+pub fn combo(
     ui: &mut Ui,
     name: &str,
     names: &[&str],
@@ -117,6 +118,15 @@ fn combo(
     .response
     .on_hover_text(hint);
     (chosen != known).then_some(chosen)
+}
+
+/// Label of a choice in the window, for the parameter table's `name`.
+fn label(name: &str) -> &str {
+    match name {
+        "capped" => "force-limited",
+        "thesis" => "Faas 2010",
+        other => other,
+    }
 }
 
 fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parameter) {
@@ -146,7 +156,7 @@ fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parame
     ui.spacing_mut().slider_width = (wide - 122.0).max(80.0);
     ui.spacing_mut().interact_size = Vec2::new(104.0, 22.0);
     let slider = Slider::new(&mut value, row.min..=row.max)
-        // Ranges over more than two decades are walked by ratio.
+        // Ranges over more than two decades (factor 150) have a logarithmic slider.
         .logarithmic(row.min > 0.0 && row.max / row.min > 150.0)
         .suffix(format!(" {}", row.unit))
         .custom_formatter(|value, _| short(value as f32));
@@ -163,7 +173,7 @@ fn slider(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, row: &Parame
     ui.add_space(5.0);
 }
 
-/// `CouplingAngularDamping` to `Coupling angular damping`.
+/// Words of a parameter's name: `CouplingAngularDamping` becomes `Coupling angular damping`.
 fn words(name: &str) -> String {
     let mut text = String::new();
     for c in name.chars() {
@@ -177,7 +187,7 @@ fn words(name: &str) -> String {
     text
 }
 
-/// Three or four digits that matter, without a tail of zeros.
+/// A number with three or four significant digits, without trailing zeros.
 fn short(value: f32) -> String {
     let magnitude = value.abs();
     let decimals = match magnitude {
@@ -222,6 +232,10 @@ mod tests {
 
     #[test]
     fn every_parameter_has_a_group() {
-        assert_eq!(GROUPS.last().map(|g| g.0), Some(""), "the last takes the rest");
+        assert_eq!(
+            GROUPS.last().map(|g| g.0),
+            Some(""),
+            "the last group takes the remaining parameters"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! The list of parts on the left: the assembly as a tree; a click marks a part, a double click takes it in hand.
+//! The list of parts on the left: the assembly as a tree. A click selects a part, a double click grabs it.
 
 use egui::collapsing_header::CollapsingState;
 use egui::{Color32, CornerRadius, Id, RichText, Role, ScrollArea, Sense, Ui, Vec2, WidgetInfo};
@@ -9,7 +9,7 @@ use crate::session::document::Document;
 use crate::session::tree::Branch;
 use crate::session::{Intent, Session, obstacle};
 
-/// Draws it.
+/// Draws the list.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     ui.take_available_width();
     control::section(ui, "Parts");
@@ -76,7 +76,7 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     let [r, g, b] = color;
     painter.rect_filled(swatch, CornerRadius::same(3), Color32::from_rgb(r, g, b));
     let note = if held {
-        Some(("in hand", theme::of(ui).held))
+        Some(("held", theme::of(ui).held))
     } else if document.baked.is_some() && !document.is_grabbable(part) {
         Some(("fixed", theme::of(ui).text_weak))
     } else {
@@ -109,8 +109,7 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     }
     response.on_hover_ui(|ui| {
         ui.label(name);
-        let hint = obstacle(session, &Intent::Grab(part))
-            .unwrap_or_else(|| "Double click to take it in hand".into());
+        let hint = obstacle(session, &Intent::Grab(part)).unwrap_or_else(|| "Double click to grab".into());
         ui.label(RichText::new(hint).small().color(theme::of(ui).text_weak));
     });
 }
@@ -128,7 +127,7 @@ fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
         .iter()
         .filter(|f| !matches!(f.surface, Surface::Spline))
         .count();
-    control::row(ui, "of closed form", exact.to_string());
+    control::row(ui, "in closed form", exact.to_string());
     control::row(ui, "Volume", format!("{} mm³", grouped(shape.volume_mm3)));
     let closed = if shape.closed {
         "closed".to_owned()
@@ -143,7 +142,7 @@ fn details(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec
 fn grab(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, part: usize) {
     let wide = Vec2::new(0.0, 30.0);
     if session.grabbed() == Some(part) {
-        let button = egui::Button::new("Let go").min_size(wide);
+        let button = egui::Button::new("Release").min_size(wide);
         control::intent_button(
             ui,
             session,
@@ -160,12 +159,12 @@ fn grab(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, part: usize) {
             wanted,
             button,
             Intent::Grab(part),
-            "Couple the handle to this part, where both are",
+            "Couple the handle to this part at their present positions",
         );
     }
 }
 
-/// Digits in groups of three.
+/// A number with its digits in groups of three.
 fn grouped(value: f64) -> String {
     let digits = format!("{:.0}", value.abs());
     let mut text = String::new();

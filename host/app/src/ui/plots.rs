@@ -1,4 +1,4 @@
-//! Live traces of force, torque and the cost of a tick over the last seconds.
+//! Live traces of force, torque and loop time over the last seconds.
 
 use egui::{Color32, RichText, Ui, Vec2b};
 use egui_plot::{HLine, Line, Plot, PlotPoints};
@@ -7,14 +7,14 @@ use super::{rig, theme};
 use crate::session::Session;
 use crate::session::history::{SPAN_S, Sample};
 
-/// Narrowest plot that can be read beside others, points.
+/// Smallest width at which a plot beside others can be read, points.
 const LEAST_WIDTH: f32 = 150.0;
 
 struct Trace {
     name: &'static str,
     color: Color32,
     of: fn(&Sample) -> f32,
-    /// To the unit shown.
+    /// Factor from the sample's unit to the unit shown.
     factor: f32,
 }
 
@@ -28,14 +28,14 @@ impl Trace {
 struct Panel<'a> {
     title: &'static str,
     unit: &'a str,
-    /// The scale goes up to here at least.
+    /// Smallest upper end of the scale.
     least: f64,
     traces: &'a [Trace],
-    /// A line not to be reached, where there is one.
+    /// Upper limit drawn as a line, if there is one.
     budget: Option<f32>,
 }
 
-/// Draws three side by side.
+/// Draws the three plots, side by side where there is space.
 pub fn show(ui: &mut Ui, session: &Session) {
     let (factor, cost_unit) = session.connection().map_or((1.0, ""), rig::cost_scale);
     let budget = (session.connection().map(|c| c.capabilities.cost_budget))
@@ -55,7 +55,7 @@ pub fn show(ui: &mut Ui, session: &Session) {
         trace("contacts", theme::of(ui).contact, |s| s.contact_nm, 1e3),
         trace("handle", theme::of(ui).accent, |s| s.handle_nm, 1e3),
     ];
-    let cost = [trace("tick", theme::of(ui).good, |s| s.cost, factor)];
+    let cost = [trace("loop", theme::of(ui).good, |s| s.cost, factor)];
     let panel = |title, unit, least, traces, budget| Panel {
         title,
         unit,
@@ -66,10 +66,10 @@ pub fn show(ui: &mut Ui, session: &Session) {
     let panels = [
         panel("Force", "N", 1.0, &force[..], None),
         panel("Torque", "mN·m", 10.0, &torque[..], None),
-        panel("Cost of a tick", cost_unit, 10.0, &cost[..], budget),
+        panel("Loop time", cost_unit, 10.0, &cost[..], budget),
     ];
     if ui.available_width() < 3.0 * LEAST_WIDTH {
-        // One above the other where they would be too narrow side by side.
+        // Stacked where they would be too narrow side by side.
         let high = ((ui.available_height() - 12.0) / 3.0).max(20.0);
         for panel in &panels {
             let size = egui::Vec2::new(ui.available_width(), high);
@@ -95,7 +95,7 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
     } = panel;
     let history = &session.history;
     ui.spacing_mut().item_spacing.x = 7.0;
-    // Names give way first; colours and the tooltip still tell.
+    // Narrow plots drop the names first; colours and the tooltip still identify the traces.
     let narrow = ui.available_width() < 270.0;
     ui.horizontal(|ui| {
         ui.label(RichText::new(title).color(theme::of(ui).text_strong));
@@ -124,7 +124,7 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
         .map(|trace| f64::from(history.largest(|sample| trace.value(sample))))
         .fold(0.0, f64::max);
     let mut top = nice_above((1.12 * largest).max(least));
-    // The budget is worth its place once the trace comes near it.
+    // The budget line is shown once the trace exceeds a quarter of it.
     let shown_budget = budget.map(f64::from).filter(|b| largest > 0.25 * b);
     if let Some(budget) = shown_budget {
         top = top.max(1.1 * budget);
@@ -157,7 +157,7 @@ fn plot(ui: &mut Ui, session: &Session, panel: &Panel<'_>) {
         .y_axis_formatter(|mark, _| axis_number(mark.value))
         .show(ui, |plot| {
             plot.set_plot_bounds_x(-SPAN_S..=0.0);
-            // A little below zero, so that a trace at zero and its label are whole.
+            // The scale starts a little below zero, so that a trace at zero and its label are fully visible.
             plot.set_plot_bounds_y(-0.07 * top..=1.05 * top);
             if let Some(budget) = shown_budget {
                 plot.hline(HLine::new("budget", budget).color(theme::STOP).width(1.0));
@@ -176,7 +176,7 @@ fn mark(value: f64, step_size: f64) -> egui_plot::GridMark {
     egui_plot::GridMark { value, step_size }
 }
 
-/// The least of 1, 2, 5 × 10ⁿ that is not below `value`.
+/// The smallest of 1, 2, 5 × 10ⁿ that is not below `value`.
 fn nice_above(value: f64) -> f64 {
     let decade = 10f64.powf(value.max(1e-9).log10().floor());
     [1.0, 2.0, 5.0, 10.0]

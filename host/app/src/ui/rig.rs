@@ -1,4 +1,4 @@
-//! The right side: which rig, what it says of itself, what the hand does, and the parameters.
+//! The right side: choice of the rig, its data, the hand's actions, and the parameters.
 
 use egui::text::LayoutJob;
 use egui::{FontId, Response, RichText, ScrollArea, TextFormat, Ui, Vec2};
@@ -12,7 +12,7 @@ use crate::session::{Intent, Session, obstacle, remaining};
 /// Width of the list of rigs, points.
 const CHOOSER_WIDTH: f32 = 380.0;
 
-/// Draws it.
+/// Draws the panel.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     ScrollArea::vertical()
         .id_salt("rig")
@@ -74,12 +74,12 @@ fn chooser(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             wanted,
             again,
             Intent::RefreshRigs,
-            "Look for rigs again",
+            "Search for rigs again",
         );
     });
 }
 
-/// Two lines: what it is called, and what it is or what keeps it from being used.
+/// An entry of two lines: the rig's name, and its kind or the reason why it cannot be used.
 fn choice(ui: &mut Ui, entry: &RigEntry, chosen: bool) -> Response {
     let (ink, text, color) = match &entry.available {
         Ok(()) => (theme::of(ui).text_strong, &entry.detail, theme::of(ui).text_weak),
@@ -105,7 +105,7 @@ fn connect_button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     match &session.link {
         Link::None => {
             let button = control::primary(ui, "Connect").min_size(wide);
-            let hint = "Open the link and greet the board. Motors stay off until armed";
+            let hint = "Open the link to the board. Motors stay off until armed";
             control::intent_button(ui, session, wanted, button, Intent::Connect, hint);
             let chosen = session.rigs.iter().find(|entry| entry.spec == session.chosen);
             if let Some(Err(hint)) = chosen.map(|entry| &entry.available) {
@@ -122,7 +122,7 @@ fn connect_button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         }
         Link::Connected(_) => {
             let button = egui::Button::new("Disconnect").min_size(wide);
-            let hint = "Motors off, and let the link go";
+            let hint = "Motors off, and close the link";
             control::intent_button(ui, session, wanted, button, Intent::Disconnect, hint);
         }
     }
@@ -145,7 +145,7 @@ fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
     if let Some(statistics) = &connection.statistics {
         let (factor, unit) = cost_scale(connection);
         let peak = format!("{:.1} {unit}", statistics.cost_max as f32 * factor);
-        control::row(ui, "Dearest tick", peak);
+        control::row(ui, "Longest loop time", peak);
     }
     let counts = connection.link_counts();
     if counts.bad_frames > 0 {
@@ -155,20 +155,22 @@ fn facts(ui: &mut Ui, session: &Session, connection: &Connection) {
 
 fn late(ui: &mut Ui, connection: &Connection, late: u32) {
     let hint = match (late, &connection.spec) {
-        (0, _) => "Every tick of the last ten seconds was done within its time",
+        (0, _) => "Every loop of the last ten seconds met its deadline",
         (_, RigSpec::Simulated { .. }) => {
-            "This computer was busy with other things: the simulation is paced by its clock"
+            "This computer was busy with other work: the simulation runs by its clock"
         }
         (_, RigSpec::Emulated { .. }) => {
-            "The emulator runs at about the clock's speed: counted mode tells what the board would do"
+            "The emulator runs at about the clock's speed: use counted mode to measure the board's loop time"
         }
-        (_, RigSpec::Serial { .. }) => "A smaller point budget or a coarser scene makes a tick cheaper",
+        (_, RigSpec::Serial { .. }) => {
+            "A smaller point budget or a coarser collision model shortens the loop"
+        }
     };
     let text = match late {
         0 => RichText::new("none"),
         n => RichText::new(n.to_string()).color(theme::of(ui).warning),
     };
-    control::rich_row(ui, "Late ticks, last 10 s", text).on_hover_text(hint);
+    control::rich_row(ui, "Loop overruns, last 10 s", text).on_hover_text(hint);
 }
 
 fn handle(can: &Capabilities) -> String {
@@ -180,9 +182,9 @@ fn handle(can: &Capabilities) -> String {
     }
 }
 
-/// What costs are multiplied by to be shown, and the unit then.
+/// Factor from the board's cost unit to the displayed one, and the displayed unit.
 ///
-/// An emulator that is not counting runs by the clock of this computer: what it calls instructions is time, and its budget one period.
+/// An emulator that does not count instructions runs by this computer's clock: its "instructions" are time, and its budget is one period.
 pub fn cost_scale(connection: &Connection) -> (f32, &'static str) {
     let can = &connection.capabilities;
     let counting = !matches!(
@@ -210,7 +212,7 @@ fn scene(ui: &mut Ui, session: &Session, connection: &Connection, wanted: &mut V
         let (sent, total) = (upload.sent / 1024, upload.total.div_ceil(1024));
         let text = format!("{sent} of {total} KiB, {}", left.as_deref().unwrap_or("…"));
         ui.add_space(2.0);
-        control::row(ui, "Scene", "being sent");
+        control::row(ui, "Collision model", "uploading");
         ui.horizontal(|ui| {
             let bar = egui::ProgressBar::new(part)
                 .desired_width(ui.available_width() - 74.0)
@@ -219,9 +221,9 @@ fn scene(ui: &mut Ui, session: &Session, connection: &Connection, wanted: &mut V
                 .text(text);
             ui.add(bar);
             let cancel = egui::Button::new("Cancel").min_size(Vec2::new(64.0, 24.0));
-            let hint = "The scene the board has stays in use";
+            let hint = "The model on the board stays in use";
             control::intent_button(ui, session, wanted, cancel, Intent::CancelUpload, hint)
-                .accessible_name("Cancel sending");
+                .accessible_name("Cancel upload");
         });
         return;
     }
@@ -232,12 +234,12 @@ fn scene(ui: &mut Ui, session: &Session, connection: &Connection, wanted: &mut V
     } else {
         "not on the board"
     };
-    control::row(ui, "Scene", state);
+    control::row(ui, "Collision model", state);
     let missing =
         session.document.as_ref().is_some_and(|d| d.baked.is_some()) && !session.scene_is_on_board();
     if missing {
-        let button = egui::Button::new("Send the scene").min_size(Vec2::new(0.0, 28.0));
-        let hint = "The scene in use stays until all of the new one has arrived";
+        let button = egui::Button::new("Upload model").min_size(Vec2::new(0.0, 28.0));
+        let hint = "The current model stays in use until the new one has arrived completely";
         ui.vertical_centered_justified(|ui| {
             control::intent_button(ui, session, wanted, button, Intent::Upload, hint);
         });
@@ -248,17 +250,17 @@ fn hand(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let half = Vec2::new(0.5 * (ui.available_width() - 8.0), 30.0);
     ui.horizontal(|ui| {
         let play = egui::Button::new("Play insertion").min_size(half);
-        let hint = "The simulated hand arms, takes the peg and puts it into the hole";
+        let hint = "The simulated hand arms, grabs the peg and inserts it into the hole";
         control::intent_button(ui, session, wanted, play, Intent::PlayInsertion, hint);
-        let back = egui::Button::new("Put parts back").min_size(half);
-        let hint = "Every part to where the file has it";
+        let back = egui::Button::new("Reset parts").min_size(half);
+        let hint = "Move every part back to its position in the file";
         control::intent_button(ui, session, wanted, back, Intent::ResetScene, hint);
     });
     let simulated = session.connection().is_some_and(|c| c.capabilities.simulated);
     let text = match (simulated, session.grabbed()) {
-        (true, Some(_)) => "Drag the part in the view to move the simulated hand; with Ctrl to turn it.",
-        (true, None) => "The hand is simulated: once a part is in hand, drag it in the view.",
-        (false, _) if session.connection().is_some() => "The handle of the rig is the hand.",
+        (true, Some(_)) => "Drag the part in the view to move the simulated hand; hold Ctrl to turn it.",
+        (true, None) => "The hand is simulated: grab a part, then drag it in the view.",
+        (false, _) if session.connection().is_some() => "Move the rig's handle to move the held part.",
         (false, _) => "Connect a rig to feel the parts, or to watch a simulated hand.",
     };
     ui.label(RichText::new(text).small().color(theme::of(ui).text_weak));

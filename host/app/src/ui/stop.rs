@@ -1,4 +1,4 @@
-//! The STOP button: large, red, always there, always enabled; also Space and Esc.
+//! The STOP button: large, red, always visible and always enabled; Space and Esc do the same.
 
 use egui::{
     Color32, CornerRadius, Event, FontId, Key, Modifiers, Rect, Response, Role, Sense, Stroke, Ui, Vec2,
@@ -8,7 +8,7 @@ use egui::{
 use super::theme;
 use crate::session::{Intent, Session};
 
-/// Draws it. A press counts, not a click: it acts when the button goes down.
+/// Draws the button. It acts when pressed, not when released.
 pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Vec2) -> Response {
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let down = response.is_pointer_button_down_on();
@@ -49,8 +49,8 @@ pub fn button(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, size: Ve
     response.on_hover_text(hint)
 }
 
-/// The events themselves are looked at: a press that is over within one picture counts, and nothing that lies over the button,
-/// such as the backdrop of a dialog, can take it.
+/// Whether a press on `rect` is among the input events. A press and release within one frame counts, and nothing drawn over the button,
+/// such as a dialog's backdrop, can intercept it.
 fn pressed_on(ui: &Ui, rect: Rect) -> bool {
     let is_press = |event: &Event| match event {
         Event::PointerButton { pos, pressed, .. } => *pressed && rect.contains(*pos),
@@ -59,7 +59,7 @@ fn pressed_on(ui: &Ui, rect: Rect) -> bool {
     ui.input(|i| i.events.iter().any(is_press))
 }
 
-/// The click that follows a press is not a second wish; one by keyboard or screen reader has no press.
+/// Whether the click comes from a pointer, whose press has already acted. A click by keyboard or screen reader has no press.
 fn by_pointer(ui: &Ui) -> bool {
     ui.input(|i| {
         let button = |event: &Event| matches!(event, Event::PointerButton { .. });
@@ -67,12 +67,12 @@ fn by_pointer(ui: &Ui) -> bool {
     })
 }
 
-/// Space and Esc, taken before any other control sees them. A text field keeps its Space.
+/// Handles Space and Esc before any other control does. A text field keeps its Space.
 pub fn keys(ctx: &egui::Context, session: &Session, wanted: &mut Vec<Intent>) {
     let typing = ctx.text_edit_focused();
     let connected = session.connection().is_some();
     let pressed = ctx.input_mut(|input| {
-        // Without a rig Esc closes menus as everywhere else.
+        // Without a rig Esc closes menus as usual.
         (connected && input.consume_key(Modifiers::NONE, Key::Escape))
             | (!typing && input.consume_key(Modifiers::NONE, Key::Space))
     });

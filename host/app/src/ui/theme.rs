@@ -1,27 +1,27 @@
-//! Colours, type and spacing, in one place: quiet, one accent; red is kept for STOP and faults, orange for what is in hand or touches.
+//! Colours, type and spacing: restrained, with one accent; red is reserved for STOP and faults, orange for the held part and contact.
 //!
-//! Dark or light as the system has it; [`of`] gives the colours of the theme a [`Ui`] is drawn in.
+//! Dark or light according to the system; [`of`] returns the colours of the theme that a [`Ui`] is drawn in.
 
 use egui::{
     Color32, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Theme,
     ThemePreference, Ui, Vec2, Visuals,
 };
 
-/// STOP, in both themes; what is written on it is white.
+/// STOP, in both themes; its text is white.
 pub const STOP: Color32 = Color32::from_rgb(214, 48, 49);
-/// The same under the pointer, and the mark of a fault.
+/// STOP under the pointer, and the mark of a fault.
 pub const STOP_HOVER: Color32 = Color32::from_rgb(235, 70, 68);
 
 /// The colours of one theme.
 #[derive(Debug)]
 pub struct Palette {
-    /// Behind everything.
+    /// Window background.
     pub ground: Color32,
     /// Panels.
     pub panel: Color32,
     /// Cards on panels.
     pub card: Color32,
-    /// Lines between things.
+    /// Dividing lines.
     pub line: Color32,
     /// Controls at rest.
     pub control: Color32,
@@ -29,25 +29,25 @@ pub struct Palette {
     pub control_hover: Color32,
     /// Text.
     pub text: Color32,
-    /// Text that matters.
+    /// Emphasised text.
     pub text_strong: Color32,
-    /// Text that explains.
+    /// Explanatory text.
     pub text_weak: Color32,
     /// The accent.
     pub accent: Color32,
-    /// The accent behind text.
+    /// The accent as a background of text.
     pub accent_dim: Color32,
-    /// In hand, and touching.
+    /// The held part, and contact.
     pub held: Color32,
-    /// All is well.
+    /// Normal state.
     pub good: Color32,
-    /// Look here.
+    /// Warnings.
     pub warning: Color32,
     /// Text about faults.
     pub fault_text: Color32,
-    /// Forces of contacts, in plots and as arrows.
+    /// Contact forces, in plots and as arrows.
     pub contact: Color32,
-    /// Surfaces that are guided onto each other: far from `contact` for every kind of colour vision, and hatched in the picture.
+    /// Surfaces guided onto each other: distinguishable from `contact` for every kind of colour vision, and hatched in the view.
     pub mates: Color32,
 }
 
@@ -104,7 +104,7 @@ pub fn of(ui: &Ui) -> &'static Palette {
     palette(Theme::from_dark_mode(ui.visuals().dark_mode))
 }
 
-/// Sets everything. The theme follows the system; until that tells one it is dark.
+/// Applies style and colours. The theme follows the system and is dark until the system reports one.
 pub fn apply(ctx: &egui::Context) {
     ctx.options_mut(|options| {
         options.theme_preference = ThemePreference::System;
@@ -198,7 +198,7 @@ pub fn panel(palette: &Palette) -> egui::Frame {
         .inner_margin(Margin::symmetric(14, 12))
 }
 
-/// Frame of a card over the picture.
+/// Frame of a card over the view.
 pub fn card(palette: &Palette) -> egui::Frame {
     egui::Frame::NONE
         .fill(palette.card.gamma_multiply(0.94))
@@ -211,7 +211,7 @@ pub fn card(palette: &Palette) -> egui::Frame {
 mod tests {
     use super::*;
 
-    /// Relative luminance of WCAG 2: sRGB made linear, weighted.
+    /// Relative luminance according to WCAG 2: weighted sum of linear sRGB.
     fn luminance(color: Color32) -> f64 {
         let linear = |c: u8| {
             let c = f64::from(c) / 255.0;
@@ -229,7 +229,7 @@ mod tests {
         (a.max(b) + 0.05) / (a.min(b) + 0.05)
     }
 
-    /// WCAG 2 asks 4.5 of text of this size, 3 of large text: STOP is 21 points.
+    /// WCAG 2 requires 4.5 for text of this size and 3 for large text: STOP is 21 points.
     #[test]
     fn text_can_be_read_in_both_themes() {
         for (name, p) in [("dark", &DARK), ("light", &LIGHT)] {

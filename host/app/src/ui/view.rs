@@ -1,4 +1,4 @@
-//! The middle: the 3D view and what lies over it. Without a graphics device (tests) the scene is not drawn, all else is.
+//! The middle: the 3D view and its overlays. Without a graphics device (tests) the parts are not drawn, the rest is.
 
 use egui::{
     Align2, Color32, CornerRadius, FontId, Pos2, Rect, RichText, Role, Sense, Stroke, Ui, UiBuilder, Vec2,
@@ -17,7 +17,7 @@ use crate::viewport::gesture::{Viewpoint, on_screen};
 use crate::viewport::picture::Ground;
 use crate::viewport::surface::Surface;
 
-/// Draws it.
+/// Draws the view.
 pub fn show(
     ui: &mut Ui,
     session: &mut Session,
@@ -125,7 +125,7 @@ fn dashed(ui: &Ui, rect: Rect) {
         .extend(egui::Shape::dashed_line(&corners, stroke, 7.0, 6.0));
 }
 
-/// Dots where faces touch.
+/// Draws dots at the touching points.
 fn touching(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
     if session.grabbed().is_none() {
         return;
@@ -141,7 +141,7 @@ fn touching(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
     }
 }
 
-/// The world's axes, in the lower left corner.
+/// Draws the world's axes in the lower left corner.
 fn triad(ui: &Ui, rect: Rect, view: &Viewpoint) {
     let origin = rect.left_bottom() + Vec2::new(44.0, -44.0);
     let camera = &view.camera;
@@ -184,7 +184,7 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
                 view.fit(document.extent, rect);
             }
             for named in View::ALL {
-                let hint = format!("Look from: {}", named.name().to_lowercase());
+                let hint = format!("View from: {}", named.name().to_lowercase());
                 if ui.add(flat(named.name())).on_hover_text(hint).clicked() {
                     view.look(named, document.extent, rect);
                 }
@@ -197,7 +197,7 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
                 } else {
                     ink.control.gamma_multiply(0.85)
                 });
-            let hint = "Draw fixed parts as glass, to see what happens inside a hole";
+            let hint = "Draw fixed parts as glass to see inside a hole";
             if ui.add(through).on_hover_text(hint).clicked() {
                 view.see_through = !view.see_through;
             }
@@ -205,7 +205,7 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
     });
 }
 
-/// What the colours of faces mean, under the toolbar, while a part is in hand.
+/// Legend of the face colours, under the toolbar, while a part is held.
 fn legend(ui: &mut Ui, rect: Rect, session: &Session) {
     if session.grabbed().is_none() {
         return;
@@ -213,15 +213,15 @@ fn legend(ui: &mut Ui, rect: Rect, session: &Session) {
     let place = Rect::from_min_size(rect.min + Vec2::new(14.0, 52.0), Vec2::new(240.0, 20.0));
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
         ui.horizontal(|ui| {
-            let touches = "Faces that touch now, in both parts, and edges where it is an edge that touches";
+            let touches = "Faces and edges of both parts that touch now";
             swatch(ui, theme::of(ui).contact, false, "touches", touches);
-            let fits = "Faces that fit: guided onto each other, or kept together by contact (hatched)";
+            let fits = "Faces that fit: guided onto each other, or held together by contact (hatched)";
             swatch(ui, theme::of(ui).mates, true, "fits", fits);
         });
     });
 }
 
-/// A square as faces look, and what it means.
+/// A square in a face colour, and its meaning.
 fn swatch(ui: &mut Ui, color: Color32, hatched: bool, text: &str, hint: &str) {
     let (square, response) = ui.allocate_exact_size(Vec2::splat(12.0), Sense::hover());
     let painter = ui.painter_at(square);
@@ -246,7 +246,7 @@ fn swatch(ui: &mut Ui, color: Color32, hatched: bool, text: &str, hint: &str) {
     ui.add_space(6.0);
 }
 
-/// Force now and which faces touch, in the upper right corner, while a part is in hand.
+/// Present force and touching faces, in the upper right corner, while a part is held.
 fn readout(ui: &Ui, rect: Rect, session: &Session) {
     let (Some(part), Some(telemetry), Some(document)) =
         (session.grabbed(), &session.telemetry, &session.document)
@@ -263,7 +263,7 @@ fn readout(ui: &Ui, rect: Rect, session: &Session) {
         ));
     }
     if telemetry.pairs.is_empty() {
-        lines.push(("touches nothing".to_owned(), theme::of(ui).text_weak, 12.5));
+        lines.push(("no contact".to_owned(), theme::of(ui).text_weak, 12.5));
     }
     for words in describe_flags(telemetry.flags) {
         lines.push((words.to_owned(), theme::of(ui).warning, 12.5));

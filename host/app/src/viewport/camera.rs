@@ -1,4 +1,4 @@
-//! The viewport's camera: where it looks from and how gestures move it. No I/O and no drawing.
+//! The viewport's camera: its pose and its response to gestures. No I/O and no drawing.
 //!
 //! World: millimetres, z up. The camera looks from `target + distance · d(yaw, pitch)` at `target`, with
 //! d = (cos pitch · cos yaw, cos pitch · sin yaw, sin pitch), so that pitch may reach ±90° without a jump: the right-hand axis
@@ -11,15 +11,15 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// Vertical angle of view, rad: narrow enough that round parts look round at the rim of the picture.
 pub const FIELD_OF_VIEW: f64 = 0.55;
-/// Nearest and farthest the camera goes, in radii of the scene.
+/// Smallest and largest distance of the camera, in radii of the scene.
 const REACH: (f64, f64) = (1e-3, 40.0);
 
-/// A sphere about all there is to see.
+/// A bounding sphere of everything visible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// mm.
+    /// Centre, mm.
     pub center: DVec3,
-    /// mm, above 0.
+    /// Radius, mm, above 0.
     pub radius: f64,
 }
 
@@ -48,7 +48,7 @@ impl Extent {
     }
 }
 
-/// A direction to look from that has a name.
+/// A named viewing direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// From front right above.
@@ -62,7 +62,7 @@ pub enum View {
 }
 
 impl View {
-    /// All, in the order they are offered.
+    /// All views, in the order of the toolbar.
     pub const ALL: [Self; 4] = [Self::Iso, Self::Front, Self::Right, Self::Top];
 
     /// Its name.
@@ -85,16 +85,16 @@ impl View {
     }
 }
 
-/// Where the picture is taken from.
+/// Pose of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Looked at, and orbited about, mm.
+    /// Point at the picture's centre, about which the camera orbits, mm.
     pub target: DVec3,
-    /// From the target, mm.
+    /// Distance from the target, mm.
     pub distance: f64,
-    /// About z, rad.
+    /// Angle about z, rad.
     pub yaw: f64,
-    /// Above the xy plane, rad, −π/2 to π/2.
+    /// Angle above the xy plane, rad, −π/2 to π/2.
     pub pitch: f64,
 }
 
@@ -120,30 +120,30 @@ impl Camera {
         DVec3::new(cp * cy, cp * sy, sp)
     }
 
-    /// Unit vector to the right of the picture.
+    /// Unit vector towards the picture's right edge.
     pub fn right(&self) -> DVec3 {
         let (sy, cy) = self.yaw.sin_cos();
         DVec3::new(-sy, cy, 0.0)
     }
 
-    /// Unit vector to the top of the picture.
+    /// Unit vector towards the picture's top edge.
     pub fn up(&self) -> DVec3 {
         self.backward().cross(self.right())
     }
 
-    /// Where it looks from, mm.
+    /// Position of the eye, mm.
     pub fn eye(&self) -> DVec3 {
         self.target + self.distance * self.backward()
     }
 
-    /// Turns to a named direction; target and distance stay.
+    /// Rotates to a named direction; target and distance stay.
     pub fn look(&mut self, view: View) {
         (self.yaw, self.pitch) = view.angles();
     }
 
-    /// Moves so that the whole of `extent` is seen in a picture `aspect` times as wide as high, with a little air.
+    /// Moves so that all of `extent` is visible, with a small margin, in a picture of aspect ratio `aspect` (width over height).
     ///
-    /// A sphere of radius r fills half an angle α when seen from r / sin α.
+    /// A sphere of radius r spans a half angle α when seen from the distance r / sin α.
     pub fn fit(&mut self, extent: Extent, aspect: f64) {
         let vertical = 0.5 * FIELD_OF_VIEW;
         let horizontal = (vertical.tan() * aspect).atan();
@@ -151,19 +151,19 @@ impl Camera {
         self.distance = 1.02 * extent.radius / vertical.min(horizontal).sin();
     }
 
-    /// Orbits about the target. `by` in fractions of the picture's height: a whole height turns half a circle.
+    /// Orbits about the target. `by` is in fractions of the picture's height: a full height turns half a circle.
     pub fn orbit(&mut self, by: DVec2) {
         self.yaw = (self.yaw - PI * by.x).rem_euclid(2.0 * PI);
         self.pitch = (self.pitch + PI * by.y).clamp(-FRAC_PI_2, FRAC_PI_2);
     }
 
-    /// Shifts the picture with the pointer. `by` in fractions of the picture's height, y down; a point at the target's depth follows exactly.
+    /// Pans with the pointer. `by` is in fractions of the picture's height, y down; a point at the target's depth follows exactly.
     pub fn pan(&mut self, by: DVec2) {
         let height = 2.0 * self.distance * (0.5 * FIELD_OF_VIEW).tan();
         self.target += height * (by.y * self.up() - by.x * self.right());
     }
 
-    /// Comes `factor` times as near to `anchor` (below 1: nearer), which keeps its place in the picture.
+    /// Scales the distance to `anchor` by `factor` (below 1: nearer); the anchor keeps its place in the picture.
     ///
     /// Eye and target are scaled about the anchor, so the ray from the eye through it stays the same ray.
     pub fn zoom_at(&mut self, anchor: DVec3, factor: f64, extent: Extent) {
@@ -171,19 +171,19 @@ impl Camera {
             REACH.0 * extent.radius / self.distance,
             REACH.1 * extent.radius / self.distance,
         );
-        // Already beyond one end (the scene changed): that end does not hold it back further.
+        // The camera is already beyond one end of the range (the scene changed): that end does not limit it further.
         let factor = factor.clamp(allowed.0.min(1.0), allowed.1.max(1.0));
         self.target = anchor + factor * (self.target - anchor);
         self.distance *= factor;
     }
 
-    /// World to clip space, depth 0 to 1, planes set close about `extent`.
+    /// World to clip space, depth 0 to 1, clipping planes close to `extent`.
     pub fn view_projection(&self, aspect: f64, extent: Extent) -> DMat4 {
         let (near, far) = self.depth_range(extent);
         perspective(FIELD_OF_VIEW, aspect, near, far) * self.view()
     }
 
-    /// Nearest and farthest depth drawn, mm. Ghosts and arrows reach out of the extent: half as much again on each side.
+    /// Nearest and farthest depth drawn, mm: half the extent's radius more on each side, for ghosts and arrows outside the extent.
     pub fn depth_range(&self, extent: Extent) -> (f64, f64) {
         let depth = (self.eye() - extent.center).dot(self.backward());
         let far = (depth + 1.5 * extent.radius).max(1e-2 * extent.radius);
@@ -202,29 +202,29 @@ impl Camera {
         )
     }
 
-    /// The ray of sight through `ndc`: the eye, and a unit vector.
+    /// The viewing ray through `ndc`: the eye, and a unit vector.
     pub fn ray(&self, ndc: DVec2, aspect: f64) -> (DVec3, DVec3) {
         let t = (0.5 * FIELD_OF_VIEW).tan();
         let direction = ndc.x * t * aspect * self.right() + ndc.y * t * self.up() - self.backward();
         (self.eye(), direction.normalize())
     }
 
-    /// Where the ray through `ndc` meets the plane through `point` across the line of sight, mm.
+    /// Intersection of the ray through `ndc` with the plane through `point` perpendicular to the camera's axis, mm.
     pub fn on_plane_through(&self, point: DVec3, ndc: DVec2, aspect: f64) -> DVec3 {
         let (eye, direction) = self.ray(ndc, aspect);
         let depth = (eye - point).dot(self.backward());
-        // The ray leans at most half the angle of view away from the axis: the divisor is far from 0.
+        // The ray is inclined to the axis by at most half the angle of view: the divisor is far from 0.
         eye + direction * (depth / -direction.dot(self.backward()))
     }
 
-    /// Where `point` is seen: ndc, and whether it is in front of the eye.
+    /// Projection of `point` in ndc; `None` behind the eye.
     pub fn project(&self, point: DVec3, aspect: f64) -> Option<DVec2> {
         let seen = self.view().transform_point3(point);
         let t = (0.5 * FIELD_OF_VIEW).tan();
         (seen.z < 0.0).then(|| DVec2::new(seen.x / (-seen.z * t * aspect), seen.y / (-seen.z * t)))
     }
 
-    /// Part of the way to `goal` (0: here, 1: there), turning the shorter way.
+    /// Interpolation to `goal` (0: here, 1: there), by the shorter rotation.
     pub fn towards(&self, goal: &Self, part: f64) -> Self {
         let turn = (goal.yaw - self.yaw + PI).rem_euclid(2.0 * PI) - PI;
         Self {
@@ -262,7 +262,7 @@ mod tests {
     }
 
     proptest! {
-        /// Errors are roundings: a dozen operations at 2⁻⁵² on lengths up to 1.5e3, seen from 1 mm, leave 1e-9 a margin of 1e2.
+        /// Errors are rounding only: a dozen operations at 2⁻⁵² on lengths up to 1.5e3, seen from 1 mm, are a factor of 1e2 below 1e-9.
         #[test]
         fn what_lies_under_the_cursor_stays_there(camera in cameras(), at in spots(), factor in 0.5..2.0) {
             let extent = Extent { center: DVec3::ZERO, radius: 100.0 };
@@ -278,7 +278,7 @@ mod tests {
             let mut panned = camera;
             panned.pan(by);
             let seen = panned.project(camera.target, 1.6).expect("in front");
-            // A height is 2 ndc; ndc x counts widths.
+            // One picture height is 2 ndc; ndc x is relative to the width.
             let expected = DVec2::new(2.0 * by.x / 1.6, -2.0 * by.y);
             prop_assert!((seen - expected).length() < 1e-9, "{seen} {expected}");
         }

@@ -1,4 +1,4 @@
-//! From the session to the picture: colours, what is in hand, what touches, which way it pushes. Pure.
+//! Builds the picture from the session: colours, the held part, touching features, force arrows. Pure.
 
 use glam::{DAffine3, DVec3};
 use mortise_guide::Standing;
@@ -14,29 +14,30 @@ use crate::session::pose::point_from_wire;
 
 /// Edges of parts, sRGB and opacity.
 const EDGE: [f32; 4] = [0.05, 0.06, 0.08, 0.75];
-/// Edges of parts seen through: light, or they would be lost on the dark ground.
+/// Edges of transparent parts: light, for contrast with the dark ground.
 const EDGE_GLASS: [f32; 4] = [0.66, 0.72, 0.80, 0.55];
-/// Edges of the marked part.
+/// Edges of the selected part.
 const EDGE_MARKED: [f32; 4] = [0.45, 0.72, 1.0, 1.0];
-/// Edges of the part in hand.
+/// Edges of the held part.
 const EDGE_HELD: [f32; 4] = [1.0, 0.80, 0.45, 1.0];
-/// The same three on the light ground, where light lines would be lost.
+/// The same three for the light ground, darker for contrast.
 const EDGE_GLASS_LIGHT: [f32; 4] = [0.22, 0.27, 0.34, 0.60];
 const EDGE_MARKED_LIGHT: [f32; 4] = [0.05, 0.32, 0.72, 1.0];
 const EDGE_HELD_LIGHT: [f32; 4] = [0.55, 0.28, 0.0, 1.0];
-/// Mixed into the part in hand, and how much.
+/// Colour mixed into the held part, and its weight.
 const TINT_HELD: [f32; 4] = [0.96, 0.65, 0.26, 0.55];
-/// The ghost: where the hand would have the part.
+/// Colour of the ghost, which shows the pose that the handle commands for the held part.
 const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
-/// Opacity of fixed parts when they are seen through.
+/// Opacity of fixed parts drawn as glass.
 const SEEN_THROUGH: f32 = 0.26;
-/// Ghosts nearer to their part than this are not told apart by eye, in radii of the scene.
+/// Smallest distance at which a ghost is drawn, in radii of the scene: a nearer one is indistinguishable from its part.
 const GHOST_FROM: f64 = 5e-4;
-/// Longest arrow, in radii of the scene, and the force at which 63 % of it are reached, N: small forces show, large ones stay in the picture.
+/// Longest arrow, in radii of the scene. At the force below, N, an arrow has 63 % of it: small forces are visible, large ones stay in the
+/// picture.
 const LONGEST_RADII: f64 = 0.9;
 const ARROW_FORCE: f64 = 2.5;
 
-/// The picture of `document` as `session` has it.
+/// The picture of `document` in the state of `session`.
 pub fn compose(
     session: &Session,
     document: &Document,
@@ -140,7 +141,7 @@ fn lit_edges(document: &Document, telemetry: &Telemetry, part: usize, in_hand: b
     edges
 }
 
-/// Faces of a part that fit another's and are held there: guided, or kept by contact.
+/// Faces of a part that fit another part's and are held there: guided, or held by contact.
 fn mates(session: &Session, part: usize) -> Vec<u32> {
     let held = session.grabbed();
     let list = (held.is_some() && session.guidance.held == held).then_some(&session.guidance);
@@ -162,7 +163,7 @@ fn mates(session: &Session, part: usize) -> Vec<u32> {
     faces
 }
 
-/// Where the pushes act, mm: the mean of the touching points, weighted by depth.
+/// Point of action of each pair's force, mm: the mean of the touching points, weighted by depth.
 pub fn touching_points(telemetry: &Telemetry) -> Vec<DVec3> {
     telemetry
         .pairs
@@ -178,7 +179,7 @@ fn arrows(document: &Document, telemetry: &Telemetry) -> Vec<Arrow> {
         total = (total.0 + weight * point_from_wire(pair.point), total.1 + weight);
     }
     let force = DVec3::from(telemetry.contact.force.map(f64::from));
-    // Less than a few hundredths of a newton nobody feels.
+    // Below the threshold of perception, a few hundredths of a newton, no arrow is drawn.
     if total.1 <= 0.0 || !force.is_finite() || force.length() < 0.03 {
         return Vec::new();
     }
@@ -192,7 +193,7 @@ fn arrows(document: &Document, telemetry: &Telemetry) -> Vec<Arrow> {
     }]
 }
 
-/// Largest distance between where two poses have the points of a part's bounding sphere, mm.
+/// Largest distance between the points of a part's bounding sphere at two poses, mm.
 fn apart(a: &DAffine3, b: &DAffine3, document: &Document, part: usize) -> f64 {
     let Extent { center, radius } = document
         .extents

@@ -1,4 +1,4 @@
-//! What the pointer does in the view: orbit, pan, zoom to the cursor, pick, and drag the part in hand.
+//! Pointer actions in the view: orbit, pan, zoom to the cursor, pick, and drag the held part.
 
 use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Response, Ui};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
@@ -10,17 +10,17 @@ use crate::session::insertion::hold;
 use crate::session::pose::moved;
 use crate::session::{Intent, Session};
 
-/// Turn of the hand for a drag over the whole height, rad.
+/// Rotation of the hand for a drag over the full height, rad.
 const HAND_TURN: f64 = 1.5;
-/// Zoom for one point of wheel travel.
+/// Zoom per point of wheel travel.
 const ZOOM_PER_POINT: f64 = 0.004;
 
-/// What the pointer drags.
+/// Target of a drag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Drag {
     Orbit,
     Pan,
-    /// The part in hand, held at `anchor`; the handle was at `handle`.
+    /// The held part, dragged at `anchor`; `handle` is the handle's pose at the start.
     Hand {
         anchor: DVec3,
         handle: DAffine3,
@@ -29,12 +29,12 @@ enum Drag {
     },
 }
 
-/// The view's own state.
+/// State of the view.
 #[derive(Clone, Debug, Default)]
 pub struct Viewpoint {
-    /// From where the scene is seen.
+    /// Camera of the view.
     pub camera: Camera,
-    /// Fixed parts are seen through.
+    /// Whether fixed parts are drawn as glass.
     pub see_through: bool,
     goal: Option<Camera>,
     drag: Option<Drag>,
@@ -51,7 +51,7 @@ fn aspect(rect: Rect) -> f64 {
     f64::from((rect.width() / rect.height().max(1.0)).max(0.01))
 }
 
-/// Pixel of a point of the world.
+/// Screen position of a point of the world.
 pub fn on_screen(camera: &Camera, rect: Rect, point: DVec3) -> Option<Pos2> {
     let at = camera.project(point, aspect(rect))?;
     let (x, y) = (0.5 * (at.x + 1.0), 0.5 * (1.0 - at.y));
@@ -59,14 +59,14 @@ pub fn on_screen(camera: &Camera, rect: Rect, point: DVec3) -> Option<Pos2> {
 }
 
 impl Viewpoint {
-    /// Moves smoothly so that all is seen.
+    /// Moves smoothly until everything is visible.
     pub fn fit(&mut self, extent: Extent, rect: Rect) {
         let mut goal = self.goal.unwrap_or(self.camera);
         goal.fit(extent, aspect(rect));
         self.goal = Some(goal);
     }
 
-    /// Turns smoothly to a named direction, and fits.
+    /// Rotates smoothly to a named direction, and fits.
     pub fn look(&mut self, view: View, extent: Extent, rect: Rect) {
         let mut goal = self.camera;
         goal.look(view);
@@ -74,7 +74,7 @@ impl Viewpoint {
         self.goal = Some(goal);
     }
 
-    /// Takes in everything the pointer and keys did over the view.
+    /// Handles all pointer and key input over the view.
     pub fn respond(&mut self, ui: &Ui, response: &Response, session: &mut Session, wanted: &mut Vec<Intent>) {
         let rect = response.rect;
         let Some(document) = &session.document else { return };
@@ -181,7 +181,7 @@ impl Viewpoint {
                     let about_right = DQuat::from_axis_angle(camera.right(), HAND_TURN * by.y);
                     *turn = (about_up * about_right * *turn).normalize();
                 } else {
-                    // A point at the anchor's depth follows the pointer.
+                    // The drag moves a point at the anchor's depth with the pointer.
                     let depth = (camera.eye() - *anchor).dot(camera.backward());
                     let height = 2.0 * depth * (0.5 * super::camera::FIELD_OF_VIEW).tan();
                     *shift += height * (by.x * camera.right() - by.y * camera.up());
@@ -200,7 +200,7 @@ impl Viewpoint {
         }
         let rect = response.rect;
         let factor = (-ZOOM_PER_POINT * f64::from(scroll)).exp() / f64::from(pinch);
-        // Towards what is under the pointer; beside the parts, towards the plane of the target.
+        // Zooms towards the surface under the pointer; beside the parts, towards the plane through the target.
         let anchor = self.pick(document, rect, Some(at)).map_or_else(
             || {
                 self.camera
@@ -212,7 +212,7 @@ impl Viewpoint {
         self.camera.zoom_at(anchor, factor, document.extent);
     }
 
-    /// A tenth of a second to go most of the way.
+    /// Covers most of the way in a tenth of a second.
     fn glide(&mut self, ui: &Ui) {
         let Some(goal) = self.goal else { return };
         let dt = f64::from(ui.input(|i| i.stable_dt)).min(0.1);
@@ -228,7 +228,7 @@ impl Viewpoint {
         ui.ctx().request_repaint();
     }
 
-    /// Whether the part in hand is being dragged.
+    /// Whether the held part is being dragged.
     pub fn drags_hand(&self) -> bool {
         matches!(self.drag, Some(Drag::Hand { .. }))
     }

@@ -1,7 +1,7 @@
-//! From a shape to what the graphics card draws: triangles with exact normals, and edges as segments. Pure.
+//! Conversion of a shape for the graphics card: triangles with exact normals, and edges as segments. Pure.
 //!
-//! The kernel's mesh shares vertices across faces; shading must not. Each face gets vertices of its own, whose normals come from the
-//! face's exact surface where it has a closed form, else from the area-weighted triangles about the vertex.
+//! The kernel's mesh shares vertices across faces; shading must not. Each face gets its own vertices. Their normals come from the face's
+//! exact surface where it has a closed form, else from the area-weighted triangles around the vertex.
 
 use std::collections::HashMap;
 
@@ -13,11 +13,11 @@ use mortise_brep::{Face, Frame, Shape, Surface};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Vertex {
-    /// mm.
+    /// Position, mm.
     pub position: [f32; 3],
     /// Outward unit normal.
     pub normal: [f32; 3],
-    /// sRGB; alpha 0: the part's colour instead.
+    /// sRGB; alpha 0 selects the part's colour.
     pub color: [u8; 4],
     /// Face id.
     pub face: u32,
@@ -27,27 +27,27 @@ pub struct Vertex {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Segment {
-    /// From.
+    /// Start point.
     pub a: [f32; 3],
-    /// To.
+    /// End point.
     pub b: [f32; 3],
-    /// The faces that meet in the edge, smaller id first; one twice where it is a seam.
+    /// The faces that meet in the edge, smaller id first; the same face twice at a seam.
     pub faces: [u32; 2],
 }
 
-/// A shape, ready for the graphics card.
+/// A shape in the graphics card's format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShapeMesh {
     /// Corners.
     pub vertices: Vec<Vertex>,
-    /// Three a triangle.
+    /// Three indices per triangle.
     pub indices: Vec<u32>,
     /// Edges.
     pub segments: Vec<Segment>,
 }
 
 impl ShapeMesh {
-    /// Of `shape`. Triangles that name no vertex or face of the shape are left out.
+    /// The mesh of `shape`. Triangles that name no vertex or face of the shape are skipped.
     pub fn of(shape: &Shape) -> Self {
         let mut mesh = Self::default();
         let mut corner_of: HashMap<(u32, u32), u32> = HashMap::new();
@@ -93,7 +93,7 @@ impl ShapeMesh {
     }
 }
 
-/// Two faces that meet in an edge, in the order in which edges are told apart by them; no face ([`u32::MAX`]) where there is none.
+/// The two faces that meet in an edge, in the order that identifies edges; [`u32::MAX`] for a missing face.
 pub fn meeting(faces: &[u32]) -> [u32; 2] {
     let a = faces.first().copied().unwrap_or(u32::MAX);
     let b = faces.get(1).copied().unwrap_or(a);
@@ -114,7 +114,7 @@ pub fn srgb(linear: [f32; 3]) -> [u8; 4] {
     [encode(linear[0]), encode(linear[1]), encode(linear[2]), 255]
 }
 
-/// How a colour of a file is shown: files like pure red and green, eyes do not. An eighth of the way to a middle grey.
+/// Displayed colour for a file's colour, moved an eighth of the way to a middle grey: pure red and green, common in files, are glaring.
 pub fn shown(linear: [f32; 3]) -> [u8; 4] {
     let [r, g, b, a] = srgb(linear);
     let soften = |c: u8| ((7 * u32::from(c) + 128) / 8) as u8;
@@ -126,7 +126,7 @@ fn points_of(shape: &Shape, corners: &[u32; 3]) -> Option<[DVec3; 3]> {
     Some([at(corners[0])?, at(corners[1])?, at(corners[2])?])
 }
 
-/// Outward unit normal of `face` at `point`; `None` for a spline, and where the surface has none (apex, centre).
+/// Outward unit normal of `face` at `point`; `None` for a spline, and where the surface has no normal (apex, centre).
 fn normal(face: &Face, point: DVec3) -> Option<DVec3> {
     let natural = match face.surface {
         Surface::Plane { frame } => frame.z,
@@ -134,7 +134,7 @@ fn normal(face: &Face, point: DVec3) -> Option<DVec3> {
         Surface::Cone {
             frame, half_angle, ..
         } => {
-            // Below the apex the radius is negative and the axis lies on the other side of the wall.
+            // Below the apex the radius is negative and the axis is on the other side of the wall.
             let outward = radial(&frame, point)?;
             half_angle.cos() * outward - half_angle.sin() * frame.z
         }
@@ -152,7 +152,7 @@ fn normal(face: &Face, point: DVec3) -> Option<DVec3> {
 fn radial(frame: &Frame, point: DVec3) -> Option<DVec3> {
     let from = point - frame.origin;
     let across = from - from.dot(frame.z) * frame.z;
-    // Closer to the axis than 1e-9 mm the direction is noise.
+    // Within 1e-9 mm of the axis the direction is noise.
     (across.length() > 1e-9).then(|| across.normalize())
 }
 
@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(
             mesh.indices.len(),
             6,
-            "the triangle with a vertex that is not there is left out"
+            "the triangle with an invalid vertex is skipped"
         );
         assert!(
             mesh.vertices
@@ -226,7 +226,7 @@ mod tests {
                 .all(|v| v.normal == [0.0, 0.0, 1.0])
         );
         for v in mesh.vertices.iter().filter(|v| v.face == 1) {
-            // The wall of a hole: towards the axis.
+            // The wall of a hole has normals towards the axis.
             let expected = [-v.position[0], -v.position[1], 0.0];
             let error = (0..3)
                 .map(|i| (v.normal[i] - expected[i]).abs())

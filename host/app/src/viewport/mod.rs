@@ -1,4 +1,4 @@
-//! The 3D view: camera, picking and meshes are pure; one file draws with wgpu, one ties it to the window.
+//! The 3D view. Camera, picking and meshes are pure; one file draws with wgpu, another connects the view to the window.
 
 pub mod camera;
 pub mod compose;

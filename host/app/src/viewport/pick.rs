@@ -1,6 +1,6 @@
-//! What lies under the pointer: a ray against every triangle of the parts whose bounding sphere it meets. Pure.
+//! Picking: intersects a ray with every triangle of the parts whose bounding sphere it meets. Pure.
 //!
-//! Möller & Trumbore (1997). Linear in the triangles of the parts hit: used at a click or a wheel's turn, not every frame.
+//! Möller & Trumbore (1997). Cost: linear in the triangles of the parts met; runs on a click or a wheel step, not every frame.
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Mesh};
@@ -12,15 +12,15 @@ use super::camera::Extent;
 pub struct Pick {
     /// Index of the part.
     pub part: usize,
-    /// Its face.
+    /// Face of the part.
     pub face: u32,
-    /// Where, world, mm.
+    /// The point, world, mm.
     pub point: DVec3,
-    /// From the ray's start, mm.
+    /// Distance from the ray's start, mm.
     pub distance: f64,
 }
 
-/// Nearest part along the ray from `origin` in the unit direction `direction`, with each part at `poses` (shape to world).
+/// The nearest part along the ray from `origin` in the unit direction `direction`, with each part at `poses` (shape to world).
 ///
 /// `extents` are the shapes' bounding spheres in their own frames.
 pub fn pick(
@@ -35,7 +35,7 @@ pub fn pick(
         let (Some(shape), Some(extent)) = (model.shapes.get(part.shape), extents.get(part.shape)) else {
             continue;
         };
-        // Placements are rigid, so lengths along the ray are the same in the shape's frame.
+        // Placements are rigid, so lengths along the ray are equal in the shape's frame.
         let inverse = pose.inverse();
         let from = inverse.transform_point3(origin);
         let along = inverse.transform_vector3(direction);
@@ -78,7 +78,7 @@ fn nearest_triangle(mesh: &Mesh, from: DVec3, along: DVec3) -> Option<(u32, f64)
     nearest
 }
 
-/// Distance along the ray to the triangle, from either side.
+/// Distance along the ray to the triangle, from either side; `None` for a miss.
 fn ray_triangle(from: DVec3, along: DVec3, a: DVec3, b: DVec3, c: DVec3) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
     let p = along.cross(ac);

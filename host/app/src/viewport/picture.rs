@@ -1,12 +1,12 @@
-//! What is to be seen, as plain values: which parts, where, in which colours. Pure; the renderer draws it as it is.
+//! Contents of a picture as plain values: parts, poses, colours. Pure; the renderer draws it unchanged.
 
 use glam::{DAffine3, DVec3};
 
 use super::camera::{Camera, Extent};
 
-/// Faces of one part that can be lit up at once; more than the wire carries pairs of one part worth telling apart.
+/// Largest number of highlighted faces of one part; the wire carries fewer pairs of one part that are worth distinguishing.
 pub const MAX_LIT: usize = 8;
-/// Edges of one part that can be lit up at once.
+/// Largest number of highlighted edges of one part.
 pub const MAX_LIT_EDGES: usize = 8;
 
 /// A part, or a ghost of one.
@@ -18,15 +18,15 @@ pub struct Item {
     pub pose: DAffine3,
     /// sRGB, 0..1.
     pub color: [f32; 3],
-    /// 1: solid; below: seen through.
+    /// 1: opaque; below: transparent.
     pub opacity: f32,
-    /// Mixed into the colour: sRGB and how much.
+    /// Colour mixed in: sRGB and its weight.
     pub tint: [f32; 4],
-    /// Of the edges: sRGB and opacity; 0: none drawn.
+    /// sRGB and opacity of the edges; 0: none drawn.
     pub line: [f32; 4],
     /// Faces that touch, at most [`MAX_LIT`].
     pub lit: Vec<u32>,
-    /// Edges that touch, by the two faces that meet there, smaller id first; at most [`MAX_LIT_EDGES`].
+    /// Edges that touch, each by the two faces that meet there, smaller id first; at most [`MAX_LIT_EDGES`].
     pub lit_edges: Vec<[u32; 2]>,
     /// Faces that are guided onto another part's, at most [`MAX_LIT`].
     pub mates: Vec<u32>,
@@ -35,9 +35,9 @@ pub struct Item {
 /// A force, drawn as an arrow over everything.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrow {
-    /// Where its tip ends or its tail starts, world, mm.
+    /// Start point, world, mm.
     pub tail: DVec3,
-    /// From tail to tip, mm.
+    /// Vector from tail to tip, mm.
     pub vector: DVec3,
     /// Thickness of the shaft, mm.
     pub thickness: f64,
@@ -45,18 +45,18 @@ pub struct Arrow {
     pub color: [f32; 4],
 }
 
-/// What is behind the parts.
+/// Background of the parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ground {
-    /// Of the dark theme.
+    /// Background of the dark theme.
     #[default]
     Dark,
-    /// Of the light theme.
+    /// Background of the light theme.
     Light,
 }
 
 impl Ground {
-    /// At the top and at the bottom, sRGB.
+    /// sRGB at the top and at the bottom.
     pub fn sky(self) -> [[f32; 4]; 2] {
         match self {
             Self::Dark => [[0.135, 0.150, 0.180, 1.0], [0.075, 0.082, 0.098, 1.0]],
@@ -65,14 +65,14 @@ impl Ground {
     }
 }
 
-/// One picture.
+/// Description of one picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// From where.
+    /// Camera.
     pub camera: Camera,
-    /// About all of it: sets the depth range.
+    /// Bounding sphere of the contents: determines the depth range.
     pub extent: Extent,
-    /// Behind them.
+    /// Background.
     pub ground: Ground,
     /// Parts and ghosts.
     pub items: Vec<Item>,
@@ -82,8 +82,8 @@ pub struct Picture {
     pub line_width: f32,
 }
 
-/// Where an arrow's shaft and head stand: poses of the unit cylinder and the unit cone (diameter 1, along +z from 0 to 1).
-/// `None` when it is too short to see.
+/// Poses of an arrow's shaft and head: the unit cylinder and the unit cone (diameter 1, along +z from 0 to 1). `None` when it is too short
+/// to be visible.
 pub fn arrow_poses(arrow: &Arrow) -> Option<[DAffine3; 2]> {
     let length = arrow.vector.length();
     if !(length > 1e-9 && length.is_finite()) {

@@ -1,4 +1,4 @@
-//! How the graphics card is told to draw: formats, bindings, one pipeline for each kind of thing.
+//! Configuration of the graphics card: formats, bindings, and one pipeline per kind of object.
 
 use std::num::NonZeroU64;
 
@@ -6,22 +6,22 @@ use eframe::wgpu;
 
 use super::mesh::{Segment, Vertex};
 
-/// Format the window shows textures in: sRGB values, stored as they are.
+/// Texture format that the window displays: sRGB values, stored unconverted.
 pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-/// Depth.
+/// Format of the depth buffer.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Samples a pixel.
+/// Samples per pixel.
 pub const SAMPLES: u32 = 4;
 
-/// One pipeline for each kind of thing.
+/// One pipeline per kind of object.
 pub struct Pipelines {
     /// Background.
     pub sky: wgpu::RenderPipeline,
     /// Opaque parts.
     pub solid: wgpu::RenderPipeline,
-    /// Parts seen through: blended, not hiding what is behind.
+    /// Transparent parts: blended, without hiding what is behind them.
     pub ghost: wgpu::RenderPipeline,
-    /// Arrows: over everything.
+    /// Arrows, drawn over everything.
     pub arrow: wgpu::RenderPipeline,
     /// Edges.
     pub lines: wgpu::RenderPipeline,
@@ -40,7 +40,7 @@ struct Kind<'a> {
 }
 
 impl Pipelines {
-    /// Compiles them. `globals` and `draw` are the sizes of the shader's two uniform structs, bytes.
+    /// Compiles the pipelines. `globals` and `draw` are the sizes of the shader's two uniform structs, bytes.
     pub fn new(device: &wgpu::Device, globals: u64, draw: u64) -> Self {
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("viewport"),
@@ -115,7 +115,7 @@ impl Pipelines {
         }
     }
 
-    /// Binds the buffer of what is the same for the whole picture.
+    /// Binds the buffer of the values that are constant over the picture.
     pub fn globals_group(&self, device: &wgpu::Device, buffer: &wgpu::Buffer) -> wgpu::BindGroup {
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("globals"),
@@ -127,7 +127,7 @@ impl Pipelines {
         })
     }
 
-    /// Binds the buffer of what each item has of its own; `size` bytes of it are seen at a time.
+    /// Binds the buffer of the values of each item; `size` bytes of it are visible per draw call.
     pub fn draws_group(&self, device: &wgpu::Device, buffer: &wgpu::Buffer, size: u64) -> wgpu::BindGroup {
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("draws"),

@@ -1,7 +1,7 @@
-//! Draws a [`Picture`] with wgpu into a texture of its own: colour with four samples, depth, and the resolved picture.
+//! Draws a [`Picture`] with wgpu into its own texture: colour with four samples, depth, and the resolved picture.
 //!
-//! Knows nothing of the window: a test draws with it on a software device. Cost: one draw call an item and one for its edges;
-//! matrices are multiplied in double precision, so that a micrometre gap stays visible half a metre from the origin.
+//! Independent of the window: a test uses it on a software device. Cost: per item one draw call for the faces and one for the edges.
+//! Matrices are multiplied in double precision, so that a micrometre gap stays visible half a metre from the origin.
 
 use bytemuck::{Pod, Zeroable};
 use eframe::wgpu;
@@ -13,12 +13,12 @@ use super::picture::{Item, MAX_LIT, MAX_LIT_EDGES, Picture, arrow_poses};
 use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
 use super::solids;
 
-/// Room for one item's numbers; a multiple of every device's alignment for uniform buffers.
+/// Bytes reserved for one item's values; a multiple of every device's alignment for uniform buffers.
 const DRAW_STRIDE: u64 = 512;
 const _: () = assert!(size_of::<Draw>() as u64 <= DRAW_STRIDE);
-/// Lines are brought this fraction of their distance nearer, so that faces do not swallow them.
+/// Fraction of their distance by which lines are drawn nearer, so that faces do not cover them.
 const LINE_LIFT: f64 = 6e-4;
-/// What no edge has: an edge without faces has twice the last number.
+/// A value that matches no edge: an edge without faces has [`u32::MAX`] twice.
 const NO_EDGE: [u32; 2] = [u32::MAX, 0];
 
 #[repr(C)]
@@ -77,7 +77,7 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// On a device. Compiles the shaders.
+    /// Creates the renderer on a device and compiles the shaders.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Self {
         let pipelines = Pipelines::new(device, size_of::<Globals>() as u64, size_of::<Draw>() as u64);
         let globals = device.create_buffer(&wgpu::BufferDescriptor {
@@ -103,17 +103,17 @@ impl Renderer {
         }
     }
 
-    /// Replaces the shapes items name.
+    /// Replaces the shapes that items refer to.
     pub fn set_shapes(&mut self, shapes: &[ShapeMesh]) {
         self.shapes = shapes.iter().map(|mesh| load(&self.device, mesh)).collect();
     }
 
-    /// Texture the picture is drawn into, once there is one.
+    /// Texture of the picture; `None` before the first [`Self::resize`].
     pub fn texture(&self) -> Option<(&wgpu::Texture, &wgpu::TextureView)> {
         self.targets.as_ref().map(|t| (&t.picture, &t.view))
     }
 
-    /// Makes the texture `size` pixels large; says whether it is a new one.
+    /// Sets the texture's size, pixels; returns whether the texture is new.
     pub fn resize(&mut self, size: [u32; 2]) -> bool {
         let limit = self.device.limits().max_texture_dimension_2d;
         let size = size.map(|n| n.clamp(1, limit));
@@ -124,7 +124,7 @@ impl Renderer {
         true
     }
 
-    /// Draws. Does nothing before [`Self::resize`].
+    /// Draws a picture. No effect before [`Self::resize`].
     pub fn render(&mut self, picture: &Picture) {
         let Some(size) = self.targets.as_ref().map(|t| t.size) else {
             return;
@@ -252,7 +252,7 @@ fn draw_of(item: &Item, to_clip: DMat4) -> Draw {
     }
 }
 
-/// The first of them, and `none` for the rest.
+/// The first `N` values, padded with `none`.
 fn slots<T: Copy, const N: usize>(all: &[T], none: T) -> [T; N] {
     std::array::from_fn(|i| all.get(i).copied().unwrap_or(none))
 }
@@ -273,7 +273,7 @@ fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
 
 fn load(device: &wgpu::Device, mesh: &ShapeMesh) -> Loaded {
     let buffer = |label, contents: &[u8], usage| {
-        // A buffer must not be empty; its count says that nothing of it is drawn.
+        // A buffer must not be empty; the count of 0 keeps its contents from being drawn.
         let contents: &[u8] = if contents.is_empty() { &[0; 32] } else { contents };
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some(label),

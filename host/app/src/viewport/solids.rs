@@ -1,4 +1,4 @@
-//! Meshes that come from no file: the arrow's cylinder and cone, diameter 1, along +z from 0 to 1.
+//! Built-in meshes: the arrow's cylinder and cone, diameter 1, along +z from 0 to 1.
 
 use std::f32::consts::TAU;
 
@@ -16,10 +16,10 @@ pub fn cone() -> ShapeMesh {
     revolved(0.0)
 }
 
-/// A frustum of radius 0.5 below and `top` above, with its bottom (and its top when it has one).
+/// A frustum with radius 0.5 at the bottom and `top` at the top, with its end faces; a cone (`top` 0) has only the bottom.
 fn revolved(top: f32) -> ShapeMesh {
     let mut mesh = ShapeMesh::default();
-    // The wall leans in by 0.5 − top over a height of 1.
+    // The wall is inclined inward by 0.5 − top over a height of 1.
     let lean = 0.5 - top;
     let scale = 1.0 / (1.0 + lean * lean).sqrt();
     let ring = |mesh: &mut ShapeMesh, radius: f32, z: f32, normal: &dyn Fn(f32, f32) -> [f32; 3]| -> u32 {
@@ -67,7 +67,7 @@ mod tests {
                 let v = |k: usize| mesh.vertices[t[k] as usize];
                 let p = |k: usize| Vec3::from(v(k).position);
                 let area = (p(1) - p(0)).cross(p(2) - p(0));
-                // Degenerate ones (the cone's tip, the fans' first) have no area to judge.
+                // Degenerate triangles (the cone's tip, the first of each fan) have no area to check.
                 assert!(area.length() < 1e-9 || area.dot(Vec3::from(v(0).normal)) > 0.0);
             }
         }

@@ -10,7 +10,7 @@ use super::mesh::ShapeMesh;
 use super::picture::Picture;
 use super::renderer::Renderer;
 
-/// Draws pictures into a texture the window shows; nothing is drawn anew while nothing changes.
+/// Draws pictures into a texture that the window displays; an unchanged picture is not drawn again.
 pub struct Surface {
     state: RenderState,
     renderer: Renderer,
@@ -20,7 +20,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// On the window's own device.
+    /// A surface on the window's device.
     pub fn new(state: &RenderState) -> Self {
         Self {
             renderer: Renderer::new(&state.device, &state.queue),
@@ -31,7 +31,7 @@ impl Surface {
         }
     }
 
-    /// The picture, `size` pixels large.
+    /// The texture of the picture, `size` pixels large.
     pub fn show(
         &mut self,
         meshes: &Arc<Vec<ShapeMesh>>,

@@ -1,5 +1,5 @@
-//! What tests of the window share: a window without a display, and what an operator does first.
-// Each test program uses a part of it.
+//! Shared helpers of the window tests: a window without a display, and an operator's first steps.
+// Each test program uses only some of them.
 #![allow(dead_code)]
 
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use mortise::ui::{Window, theme};
 use mortise_protocol::message::DeviceState;
 use mortise_rig::RigSpec;
 
-/// A bound for what should take seconds: only a hang reaches it.
+/// Time limit for operations that take seconds: only a hang reaches it.
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// A window with nothing open.
@@ -21,7 +21,7 @@ pub fn harness() -> Harness<'static, Window> {
     harness_with(theme::apply)
 }
 
-/// The same, set up by `setup`.
+/// A window whose egui context `setup` has configured.
 pub fn harness_with(setup: impl FnOnce(&egui::Context) + 'static) -> Harness<'static, Window> {
     Harness::builder()
         .with_size(egui::vec2(1500.0, 940.0))
@@ -33,7 +33,7 @@ pub fn harness_with(setup: impl FnOnce(&egui::Context) + 'static) -> Harness<'st
         )
 }
 
-/// Draws pictures until `done`.
+/// Draws frames until `done`.
 pub fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Session) -> bool) {
     let begun = Instant::now();
     loop {
@@ -55,7 +55,7 @@ pub fn until(harness: &mut Harness<'_, Window>, what: &str, done: impl Fn(&Sessi
     }
 }
 
-/// Clicks what a screen reader calls so.
+/// Clicks the control with this accessible name.
 pub fn click(harness: &mut Harness<'_, Window>, label: &str) {
     harness.get_by_label(label).click();
     harness.step();
@@ -71,7 +71,7 @@ pub fn open_sample(harness: &mut Harness<'_, Window>) {
     });
 }
 
-/// Chooses the simulation, connects, and waits until the scene is there.
+/// Chooses the simulation, connects, and waits until the collision model is on the board.
 pub fn connect(harness: &mut Harness<'_, Window>) {
     until(harness, "rigs are listed", |s| !s.rigs.is_empty());
     let simulation = RigSpec::Simulated { realtime: true };
@@ -84,7 +84,7 @@ pub fn connect(harness: &mut Harness<'_, Window>) {
     until(harness, "the scene is on the board", Session::scene_is_on_board);
 }
 
-/// The gravest message so far.
+/// The highest severity of all messages so far.
 pub fn worst(session: &Session) -> Severity {
     session
         .notes
@@ -94,7 +94,7 @@ pub fn worst(session: &Session) -> Severity {
         .unwrap_or(Severity::Info)
 }
 
-/// Motors on.
+/// Switches the motors on.
 pub fn arm(harness: &mut Harness<'_, Window>) {
     click(harness, "Arm");
     until(harness, "armed", |s| s.device() == Some(DeviceState::Armed));

@@ -1,4 +1,4 @@
-//! Shapes made by hand: exact surfaces with a coarse tessellation, so that facets alone would give the wrong answers.
+//! Hand-made shapes: exact surfaces with a coarse tessellation, so that facets alone would give wrong results.
 #![allow(dead_code)]
 
 use std::f64::consts::{PI, TAU};
@@ -36,11 +36,10 @@ fn face(surface: Surface, reversed: bool) -> Face {
     }
 }
 
-/// A point of a profile to be turned about z: radius, height, and the face of the segment that starts here.
+/// A point of a profile to be revolved about z: radius, height, and the face of the segment that starts here.
 pub type ProfilePoint = (f64, f64, u32);
 
-/// Turns a profile, which runs so that the solid lies on its left in the (r, z) half-plane, about z in `n` steps.
-/// `closed`: the last point joins the first.
+/// Revolves a profile about z in `n` steps; the solid lies on the profile's left in the (r, z) half-plane. `closed`: the last point joins the first.
 pub fn revolve(profile: &[ProfilePoint], closed: bool, surfaces: &[(Surface, bool)], n: usize) -> Shape {
     let mut mesh = Mesh::default();
     let mut rings: Vec<Vec<u32>> = Vec::new();
@@ -110,7 +109,7 @@ pub fn revolve(profile: &[ProfilePoint], closed: bool, surfaces: &[(Surface, boo
     })
 }
 
-/// Mesh volume and closedness, in place of the CAD kernel's.
+/// Adds mesh volume and closedness, as the CAD kernel would.
 pub fn finish(mut shape: Shape) -> Shape {
     let mut uses = std::collections::HashMap::new();
     for t in &shape.mesh.triangles {
@@ -261,7 +260,7 @@ pub fn block_with_hole(half: [f64; 2], height: f64, radius: f64, n: usize) -> Sh
             add([hole(1, i + 1), corner(1, q), corner(1, q + 1)], 1);
             add([hole(0, i + 1), corner(0, q + 1), corner(0, q)], 0);
         }
-        // The hole's wall looks towards the axis.
+        // The hole's wall faces the axis.
         add([hole(0, i), hole(1, i), hole(1, i + 1)], 6);
         add([hole(0, i), hole(1, i + 1), hole(0, i + 1)], 6);
     }
@@ -350,7 +349,7 @@ pub fn block_with_hole(half: [f64; 2], height: f64, radius: f64, n: usize) -> Sh
     })
 }
 
-/// The same shape in another place.
+/// The same shape, moved by `to`.
 pub fn moved(shape: &Shape, to: DAffine3) -> Shape {
     let mut shape = shape.clone();
     let rotation: DMat3 = to.matrix3;
@@ -432,7 +431,7 @@ pub fn block_distance(half: [f64; 2], height: f64, radius: f64, p: DVec3) -> f64
         return -(-outer).min(rho - radius);
     }
     if in_hole {
-        // Outside the solid: the wall, or above and below it the rim.
+        // Outside the solid: nearest is the wall, or above and below it the rim.
         let dz = (p.z - height).max(-p.z).max(0.0);
         return (radius - rho).hypot(dz);
     }
@@ -460,7 +459,7 @@ impl AlignedBytes {
     }
 }
 
-/// `outer` with the room that `void` takes left empty.
+/// `outer` with a cavity of the shape `void`.
 pub fn with_void(outer: &Shape, void: &Shape) -> Shape {
     let mut shape = outer.clone();
     let vertices = shape.mesh.vertices.len() as u32;

@@ -1,42 +1,42 @@
-//! Is the text sound where shapes depend on it?
+//! Checks that the text is valid in all entities on which shapes depend.
 //!
-//! An entity *matters* when a shape, a placement or the product structure reaches it by references. Faults in
-//! entities that matter are errors, since the kernel would drop a solid or crash on them; the same faults in
-//! styles, notes and the like are warnings. Cost: a few passes over the entities.
+//! An entity *matters* when a shape, a placement or the product structure reaches it through references. Faults in entities that matter are errors,
+//! because the kernel would drop a solid or crash on them; the same faults in styles, notes and the like are warnings. Cost: a few passes over the
+//! entities.
 
 use super::{Exchange, Part21Error, reference, references, schema};
 
-/// Solids by the kinds the kernel turns into a solid each.
+/// Types of solids, each of which the kernel turns into a solid.
 pub const SOLIDS: &[&str] = &[
     "MANIFOLD_SOLID_BREP",
     "BREP_WITH_VOIDS",
     "FACETED_BREP",
     "FACETED_BREP_AND_BREP_WITH_VOIDS",
 ];
-/// Surface models: what a file without solids may hold.
+/// Types of surface models, which a file without solids may contain.
 pub const SURFACES: &[&str] = &["SHELL_BASED_SURFACE_MODEL", "FACE_BASED_SURFACE_MODEL"];
 
-/// Largest coordinate or radius, in the file's unit: a thousand kilometres in millimetres, where a double still tells 0.1 µm apart.
+/// Largest coordinate or radius, in the file's unit: a thousand kilometres in millimetres, where a double still resolves 0.1 µm.
 pub const LARGEST_LENGTH: f64 = 1e9;
-/// Largest number of another kind, such as a knot or a vector's length: its square and cube are still finite.
+/// Largest number of any other kind, such as a knot or a vector's length: its square and cube are still finite.
 const LARGEST_NUMBER: f64 = 1e30;
 
-/// What a sound text holds.
+/// Content of a valid text.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Content {
     /// Solids that belong to a shape representation, by entity.
     pub solids: Vec<usize>,
     /// Surface models that belong to a shape representation, by entity.
     pub surfaces: Vec<usize>,
-    /// What was noticed, in words.
+    /// Irregularities, as text.
     pub warnings: Vec<String>,
 }
 
 /// Checks the text and lists its solids.
 ///
 /// # Errors
-/// [`Part21Error::Invalid`] for a dangling, cyclic or mistyped reference, a number that is no finite double or beyond all sizes, a
-/// radius that is not positive, or an assembly that contains itself.
+/// [`Part21Error::Invalid`] for a dangling, cyclic or mistyped reference, a number that is not a finite double or exceeds the largest size, a radius
+/// that is not positive, or an assembly that contains itself.
 pub fn check(file: &Exchange) -> Result<Content, Part21Error> {
     let matters = reachable(file, |kinds| kinds.iter().any(|kind| is_root(kind)));
     let mut warnings = Vec::new();
@@ -74,7 +74,7 @@ pub fn check(file: &Exchange) -> Result<Content, Part21Error> {
     })
 }
 
-/// Types from which shapes, placements and product structure hang.
+/// Types at the roots of shapes, placements and product structure.
 fn is_root(kind: &str) -> bool {
     SOLIDS.contains(&kind)
         || SURFACES.contains(&kind)
@@ -109,7 +109,7 @@ fn bad_numbers(file: &Exchange, matters: &[bool], warnings: &mut Vec<String>) ->
             continue;
         };
         let what = format!(
-            "{} has the number {number}, which is no finite value",
+            "{} has the number {number}, which is not a finite value",
             file.label(*entity as usize)
         );
         if counts {
@@ -120,7 +120,7 @@ fn bad_numbers(file: &Exchange, matters: &[bool], warnings: &mut Vec<String>) ->
     Ok(())
 }
 
-/// The kernel computes for minutes, and then nothing of use, with lengths that are no lengths.
+/// Rejects absurdly large lengths: the kernel would compute for minutes and return nothing useful.
 fn large_numbers(file: &Exchange, matters: &[bool]) -> Result<(), Part21Error> {
     for &(entity, number) in &file.large_numbers {
         let entity = entity as usize;
@@ -162,13 +162,13 @@ fn dangling(file: &Exchange, matters: &[bool], warnings: &mut Vec<String>) -> Re
     }
     if let Some(first) = first {
         warnings.push(format!(
-            "{harmless} references outside the shapes lead nowhere: {first}"
+            "{harmless} dangling references outside the shapes: {first}"
         ));
     }
     Ok(())
 }
 
-/// Depth-first search that keeps its own stack: a text may chain a million entities.
+/// Depth-first search with an explicit stack: a text may chain a million entities.
 fn cycles(file: &Exchange, matters: &[bool]) -> Result<(), Part21Error> {
     const NEW: u8 = 0;
     const OPEN: u8 = 1;
@@ -211,7 +211,7 @@ fn cycles(file: &Exchange, matters: &[bool]) -> Result<(), Part21Error> {
 
 fn radii(file: &Exchange, matters: &[bool]) -> Result<(), Part21Error> {
     for entity in (0..file.entities.len()).filter(|&e| matters[e]) {
-        // Zero is left to the kernel: some writers close a cone or a loop with a circle of no size.
+        // Zero is accepted here: some writers close a cone or a loop with a circle of radius zero.
         if !matches!(
             file.kind(entity),
             "CYLINDRICAL_SURFACE" | "SPHERICAL_SURFACE" | "CIRCLE" | "CONICAL_SURFACE"
@@ -237,7 +237,7 @@ fn radii(file: &Exchange, matters: &[bool]) -> Result<(), Part21Error> {
     Ok(())
 }
 
-/// A product that contains itself through its components would unfold without end.
+/// Rejects a product that contains itself through its components, which would unfold without end.
 fn assembly_cycles(file: &Exchange) -> Result<(), Part21Error> {
     use std::collections::HashMap;
     let mut children: HashMap<u64, Vec<(u64, usize)>> = HashMap::new();
@@ -251,7 +251,7 @@ fn assembly_cycles(file: &Exchange) -> Result<(), Part21Error> {
             children.entry(parent).or_default().push((child, entity));
         }
     }
-    // Kahn: products without parents are taken away until none is left; what stays is in or below a cycle.
+    // Kahn's algorithm: products without parents are removed until none is left; the remaining ones are in or below a cycle.
     let mut parents: HashMap<u64, usize> = HashMap::new();
     children
         .values()
@@ -282,13 +282,13 @@ fn assembly_cycles(file: &Exchange) -> Result<(), Part21Error> {
     }
 }
 
-/// How many faces the shells of a solid or surface model list, or `None` when that is not told directly.
+/// Number of faces in the shells of a solid or surface model, or `None` when it does not list them directly.
 pub fn faces_listed(file: &Exchange, entity: usize) -> Option<usize> {
     let mut shells = file.references_of(entity).to_vec();
     let (mut faces, mut looked_at) = (0, 0);
     while let Some(shell) = shells.pop().and_then(|id| file.find(id)) {
         looked_at += 1;
-        // A solid has a handful of shells; anything beyond is no tree of shells.
+        // A solid has a handful of shells; a larger number is not a tree of shells.
         if looked_at > 10_000 {
             return None;
         }

@@ -1,7 +1,7 @@
-//! Other files that a text refers to for the shape of a product (ISO 10303-214, external references).
+//! References from a text to other files that contain the shape of a product (ISO 10303-214, external references).
 //!
-//! A `DOCUMENT_FILE` stands for the file; `APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT` names it; `APPLIED_DOCUMENT_REFERENCE` ties it to a
-//! product definition, or the definition lists it itself (`PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS`).
+//! A `DOCUMENT_FILE` represents the file; `APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT` names it; `APPLIED_DOCUMENT_REFERENCE` assigns it to a product
+//! definition, or the definition lists it itself (`PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS`).
 
 use super::structure::{argument, is_definition, of_kind};
 use super::{Exchange, references, text};
@@ -12,7 +12,7 @@ use std::collections::HashMap;
 pub struct Document {
     /// Product definition, by entity.
     pub definition: usize,
-    /// Name of the file as it is written.
+    /// Name of the file, as written.
     pub name: String,
     /// Line of the reference.
     pub line: u32,
@@ -50,7 +50,7 @@ pub fn documents(file: &Exchange) -> Vec<Document> {
         }
     }
     for definition in of_kind(file, "PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS") {
-        // A document managed as a product of its own has no shape; the product that refers to it has.
+        // A document managed as a product of its own has no shape; the product that refers to it has one.
         let managed = of_kind(file, "DOCUMENT_PRODUCT_EQUIVALENCE")
             .any(|e| argument(file, e, 3) == argument(file, definition, 2));
         if !managed {
@@ -63,7 +63,7 @@ pub fn documents(file: &Exchange) -> Vec<Document> {
     found
 }
 
-/// What the file's entity refers to no more once its documents are known: the kernel would open the files named by itself, wherever they are.
+/// Removes the external references once the documents are known: the kernel would open the named files by itself, in any folder.
 pub fn forget(file: &mut Exchange) {
     for entity in 0..file.entities.len() {
         match file.kind(entity) {
@@ -81,11 +81,11 @@ pub fn forget(file: &mut Exchange) {
     }
 }
 
-/// Name of each `DOCUMENT_FILE`: of all texts that may be it the first that names a STEP file, else the first.
+/// Name of each `DOCUMENT_FILE`: the first candidate text that names a STEP file, else the first candidate.
 fn names(file: &Exchange) -> HashMap<usize, String> {
     let decoded = |entity: usize, index: usize| {
         let argument = *file.arguments(entity).get(index)?;
-        // An external source wraps the text in the name of its type.
+        // An external source wraps the text in its type name.
         let start = argument.iter().position(|&byte| byte == b'\'')?;
         let end = argument.iter().rposition(|&byte| byte == b'\'')?;
         text::decode(argument.get(start..=end)?).map(|name| name.trim().to_owned())
@@ -118,13 +118,13 @@ fn names(file: &Exchange) -> HashMap<usize, String> {
         .collect()
 }
 
-/// Whether a name is that of a STEP file.
+/// Whether a name has the extension of a STEP file.
 pub fn is_step(name: &str) -> bool {
     let kind = name.rsplit_once('.').map(|(_, kind)| kind.to_ascii_lowercase());
     matches!(kind.as_deref(), Some("step" | "stp" | "p21"))
 }
 
-/// `DOCUMENT_FILE`s behind a document: itself, or those of the product it is managed as.
+/// `DOCUMENT_FILE`s of a document: itself, or those of the product as which it is managed.
 fn files(file: &Exchange, document: usize) -> Vec<usize> {
     if file.kind(document) == "DOCUMENT_FILE" {
         return vec![document];
@@ -140,7 +140,7 @@ fn files(file: &Exchange, document: usize) -> Vec<usize> {
         .collect()
 }
 
-/// Product definitions that an item of a reference stands for.
+/// Product definitions that an item of a reference represents.
 fn definitions(file: &Exchange, item: usize) -> Vec<usize> {
     let kind = file.kind(item);
     if is_definition(kind) {

@@ -1,4 +1,4 @@
-//! Bytes to entities: one pass, no recursion, no look-behind.
+//! Lexer, from bytes to entities: one pass, no recursion, no backtracking.
 
 use super::check::LARGEST_LENGTH;
 use super::{Entity, Exchange, Part21Error};
@@ -9,7 +9,7 @@ const MAX_DEPTH: usize = 1000;
 /// Scans a STEP text.
 ///
 /// # Errors
-/// When it is no STEP text, is cut off, or breaks the grammar of ISO 10303-21 clause 6.
+/// When the text is not STEP, is truncated, or violates the grammar of ISO 10303-21 clause 6.
 pub fn parse(text: &[u8]) -> Result<Exchange, Part21Error> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let mut lexer = Lexer {
@@ -22,7 +22,7 @@ pub fn parse(text: &[u8]) -> Result<Exchange, Part21Error> {
     Ok(lexer.out)
 }
 
-/// What a list's last token was.
+/// Kind of the last token of a list.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Last {
     /// `(`, `)` or a comma.
@@ -62,7 +62,7 @@ impl Lexer<'_> {
                 "DATA" => {
                     self.space()?;
                     if self.peek() == Some(b'(') {
-                        // Edition 2 names its data sections; the names say nothing about shapes.
+                        // Edition 2 names its data sections; the names do not concern shapes.
                         let mut skipped = Vec::new();
                         self.group(&mut skipped, u32::MAX)?;
                     }
@@ -79,7 +79,7 @@ impl Lexer<'_> {
                 }
                 "END-ISO-10303-21" if sections > 0 => {
                     return match self.expect(b';', "after END-ISO-10303-21") {
-                        // Nothing can be missing any more but this one character.
+                        // Only this one character can still be missing.
                         Err(Part21Error::Truncated { .. }) | Ok(()) => Ok(()),
                         Err(other) => Err(other),
                     };
@@ -88,7 +88,11 @@ impl Lexer<'_> {
                 _ if self.at >= self.text.len() || is_prefix_of_end(&section, self.rest_is_empty()) => {
                     return Err(self.truncated("END-ISO-10303-21 is missing"));
                 }
-                _ => return Err(self.invalid(format!("{} where a section is due", self.excerpt(&section)))),
+                _ => {
+                    return Err(
+                        self.invalid(format!("{} where a section is expected", self.excerpt(&section)))
+                    );
+                }
             }
         }
     }
@@ -140,7 +144,9 @@ impl Lexer<'_> {
                         _ if self.at >= self.text.len() => {
                             Err(self.truncated("the DATA section has no ENDSEC"))
                         }
-                        _ => Err(self.invalid(format!("{} where an entity is due", self.excerpt(&word)))),
+                        _ => {
+                            Err(self.invalid(format!("{} where an entity is expected", self.excerpt(&word))))
+                        }
                     };
                 }
             }
@@ -192,13 +198,13 @@ impl Lexer<'_> {
         Ok(())
     }
 
-    /// A parenthesised list to its closing parenthesis. `entity` is [`u32::MAX`] outside DATA.
+    /// Reads a parenthesised list up to its closing parenthesis. `entity` is [`u32::MAX`] outside DATA.
     fn group(&mut self, out: &mut Vec<u8>, entity: u32) -> Result<(), Part21Error> {
         if self.peek() != Some(b'(') {
-            return Err(self.unexpected("where ( is due"));
+            return Err(self.unexpected("where ( is expected"));
         }
         let mut depth = 0;
-        // Space is left out of what is kept: two values without a comma between them would read as one.
+        // Spaces are not kept: two values without a comma between them would read as one.
         let mut last = Last::Mark;
         loop {
             self.space()?;
@@ -207,7 +213,7 @@ impl Lexer<'_> {
             };
             let separates = matches!(byte, b',' | b')') || (last == Last::Keyword && byte == b'(');
             if last != Last::Mark && !separates {
-                return Err(self.unexpected("where a comma or ) is due"));
+                return Err(self.unexpected("where a comma or ) is expected"));
             }
             last = match byte {
                 b'(' | b')' | b',' => Last::Mark,
@@ -271,10 +277,10 @@ impl Lexer<'_> {
             if value.abs() > LARGEST_LENGTH {
                 self.out.large_numbers.push((entity, value));
             }
-            // Upper case: the kernel (7.6) takes 6.1e-17, which some writers give for 6.1E-17, for 6.1.
+            // Upper case: the kernel (7.6) reads 6.1e-17, which some writers write for 6.1E-17, as 6.1.
             out.extend(number.iter().map(u8::to_ascii_uppercase));
         } else {
-            // The check refuses it where it counts; elsewhere the kernel, which crashes on some, gets "not given".
+            // The check rejects it in entities that matter; elsewhere the kernel, which crashes on some such numbers, gets "not given".
             out.push(b'$');
             self.out
                 .bad_numbers
@@ -295,12 +301,12 @@ impl Lexer<'_> {
             self.at += 1;
         }
         match self.at == start {
-            true => Err(self.unexpected("where an entity number is due")),
+            true => Err(self.unexpected("where an entity number is expected")),
             false => Ok(id),
         }
     }
 
-    /// A string with its quotes; line breaks within it do not count (clause 6.4.3).
+    /// Reads a string with its quotes; line breaks within it are ignored (clause 6.4.3).
     fn string(&mut self, out: &mut Vec<u8>) -> Result<(), Part21Error> {
         let line = self.line;
         out.push(b'\'');
@@ -329,7 +335,7 @@ impl Lexer<'_> {
         }
     }
 
-    /// An enumeration or binary up to and with its closing mark.
+    /// Reads an enumeration or binary up to and including its closing mark.
     fn until(&mut self, end: u8, out: &mut Vec<u8>) -> Result<(), Part21Error> {
         out.push(end);
         self.at += 1;
@@ -347,7 +353,7 @@ impl Lexer<'_> {
         Err(self.truncated("an entity is not closed"))
     }
 
-    /// Letters, digits, `_`, and `-` (for the file's end mark), in upper case.
+    /// Reads letters, digits, `_`, and `-` (for the file's end mark); returns them in upper case.
     fn keyword(&mut self) -> String {
         let start = self.at;
         while self
@@ -405,7 +411,7 @@ impl Lexer<'_> {
                 Ok(())
             }
             None => Err(self.truncated(format!("{} is missing {place}", char::from(byte)))),
-            Some(_) => Err(self.unexpected(&format!("where {} is due {place}", char::from(byte)))),
+            Some(_) => Err(self.unexpected(&format!("where {} is expected {place}", char::from(byte)))),
         }
     }
 
@@ -427,7 +433,7 @@ impl Lexer<'_> {
         }
     }
 
-    /// A word for a message, or what stands there when it is no word.
+    /// A word for a message, or the character there when it is not a word.
     fn excerpt(&self, word: &str) -> String {
         let rest = self.text[self.at..]
             .iter()
@@ -457,7 +463,7 @@ impl Lexer<'_> {
     }
 }
 
-/// The end mark itself may be cut.
+/// Whether `word` is a prefix of the end mark, which may itself be truncated.
 fn is_prefix_of_end(word: &str, at_end: bool) -> bool {
     at_end && "END-ISO-10303-21".starts_with(word)
 }
@@ -521,7 +527,7 @@ mod tests {
         ] {
             let error = parse(text(list).as_bytes()).unwrap_err();
             assert!(
-                matches!(&error, Part21Error::Invalid { line: 2, what } if what.contains("where a comma or ) is due")),
+                matches!(&error, Part21Error::Invalid { line: 2, what } if what.contains("where a comma or ) is expected")),
                 "{list}: {error:?}"
             );
         }

@@ -1,11 +1,11 @@
-//! Texts of several files joined into one: entities renumbered, and a product that another file describes replaced by it.
+//! Joins the texts of several files into one: renumbers entities, and replaces a product that another file describes by that file's product.
 
 use super::structure::{Structure, argument};
 use super::{Entity, Exchange, reference};
 use std::ops::Range;
 
 impl Exchange {
-    /// Appends all entities of `other`, a file of the name `name`; returns by how much their indices grow. `None` when no numbers are left.
+    /// Appends all entities of `other`, a file with the name `name`; returns the offset of their indices. `None` when no numbers are left.
     pub fn append(&mut self, other: &Exchange, name: &str) -> Option<usize> {
         let offset = self.entities.len();
         let base = self.largest.checked_add(1)?;
@@ -33,9 +33,9 @@ impl Exchange {
         Some(offset)
     }
 
-    /// Puts the product `real`, a product definition and its representation, wherever the product definition `stub` is placed. `structure` is that of the
-    /// text that holds `stub`, whose entities are `text`. Placements start from the identity ([`super::from_identity`]), which is the same in the unit of
-    /// `real`.
+    /// Replaces the product definition `stub` in all its placements by the product `real`, a product definition and its representation. `structure`
+    /// is that of the text that contains `stub`, whose entities are `text`. Placements start from the identity ([`super::from_identity`]), which is
+    /// the same in the unit of `real`.
     pub fn substitute(
         &mut self,
         stub: usize,
@@ -70,14 +70,14 @@ impl Exchange {
             }
         }
         for &[definition, _, entity] in &structure.representations {
-            // Without its shape the stub is no product of its own.
+            // Without its shape the stub is no longer a separate product.
             if definition + offset == stub {
                 self.replace(entity + offset, "DESCRIPTIVE_REPRESENTATION_ITEM('','')".into());
             }
         }
     }
 
-    /// Refers to `to` wherever `entity` refers to `from`.
+    /// Replaces all references of `entity` to `from` by `to`.
     pub(super) fn exchange(&mut self, entity: usize, from: usize, to: usize) {
         let [from, to] = [from, to].map(|index| self.entities[index].id);
         let mut body = Vec::new();
@@ -96,7 +96,7 @@ impl Exchange {
     }
 }
 
-/// Copies a body with each reference replaced by what `of` says; `$` where it says nothing.
+/// Copies a body with each reference replaced by the result of `of`, or by `$` for `None`.
 fn with_references(body: &[u8], of: impl Fn(u64) -> Option<u64>, out: &mut Vec<u8>) {
     let (mut at, mut quoted) = (0, false);
     while let Some(&byte) = body.get(at) {

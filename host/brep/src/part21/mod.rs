@@ -1,10 +1,9 @@
 //! The text of a STEP file (ISO 10303-21, "Part 21"), before the CAD kernel sees it.
 //!
-//! The kernel is lenient where it must not be: it drops a solid that refers to nothing, crashes on a number
-//! that is none, and reads nothing at all from some legal texts. So the text is scanned here first: errors are
-//! named with their line ([`check`], [`schema`]), and the kernel gets a plain rendering ([`render`]) without comments, one
-//! entity a line, entities numbered 1, 2, …, and products and occurrences named by tokens whose text is decoded
-//! here ([`text`]).
+//! The kernel is lenient in the wrong places: it drops a solid that refers to nothing, crashes on malformed numbers, and reads nothing at all from
+//! some valid texts. So the text is scanned here first: errors are reported with their line ([`check`], [`schema`]), and the kernel gets a plain
+//! rendering ([`render`]) without comments, one entity per line, entities numbered 1, 2, …, and with tokens as names of products and occurrences; the
+//! text of these names is decoded here ([`text`]).
 
 pub mod check;
 pub mod documents;
@@ -24,7 +23,7 @@ pub use placements::from_identity;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// A text error: line and what is wrong.
+/// A text error: its line and description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Part21Error {
     /// The text does not begin with `ISO-10303-21;`.
@@ -36,11 +35,11 @@ pub enum Part21Error {
         /// What is missing.
         missing: String,
     },
-    /// Anything else.
+    /// Any other error.
     Invalid {
         /// Line, from 1.
         line: u32,
-        /// What is wrong.
+        /// Description of the error.
         what: String,
     },
 }
@@ -48,21 +47,21 @@ pub enum Part21Error {
 /// One entity instance: `#id = body;`.
 #[derive(Clone, Debug)]
 pub struct Entity {
-    /// Its number, unique in the [`Exchange`].
+    /// Number, unique in the [`Exchange`].
     pub id: u64,
-    /// Its number as the file says it.
+    /// Number as written in the file.
     pub written: u64,
     /// 0, or 1 + the index of its file in [`Exchange::files`].
     pub file: u32,
-    /// Its line in the file.
+    /// Line in the file.
     pub line: u32,
-    /// Its body in [`Exchange::bodies`].
+    /// Range of its body in [`Exchange::bodies`].
     pub body: Range<usize>,
-    /// Its references in [`Exchange::references`].
+    /// Range of its references in [`Exchange::references`].
     pub references: Range<usize>,
 }
 
-/// The DATA of a STEP file, scanned.
+/// The scanned DATA of a STEP file.
 #[derive(Clone, Debug, Default)]
 pub struct Exchange {
     /// Text between `HEADER;` and its `ENDSEC;`, without comments.
@@ -77,7 +76,7 @@ pub struct Exchange {
     pub largest: u64,
     /// Index in `entities` by number.
     pub index: HashMap<u64, u32>,
-    /// Entities with a number that is no finite double, and the number.
+    /// Entities with a number that is not a finite double, and the number.
     pub bad_numbers: Vec<(u32, String)>,
     /// Entities with a number beyond [`check::LARGEST_LENGTH`], and the number.
     pub large_numbers: Vec<(u32, f64)>,
@@ -85,7 +84,7 @@ pub struct Exchange {
     pub files: Vec<String>,
     /// Signed scale of occurrences that mirror (negative) or scale; see [`operators`].
     pub scales: HashMap<usize, f64>,
-    /// What was left out, in words.
+    /// Skipped content, as text.
     pub warnings: Vec<String>,
 }
 
@@ -95,7 +94,7 @@ impl Exchange {
         &self.bodies[self.entities[entity].body.clone()]
     }
 
-    /// Numbers an entity refers to.
+    /// Numbers of the entities that an entity refers to.
     pub fn references_of(&self, entity: usize) -> &[u64] {
         &self.references[self.entities[entity].references.clone()]
     }
@@ -140,7 +139,7 @@ impl Exchange {
             .map(arguments)
     }
 
-    /// "#12 CYLINDRICAL_SURFACE": an entity for a message.
+    /// "#12 CYLINDRICAL_SURFACE": label of an entity for a message.
     pub fn label(&self, entity: usize) -> String {
         let Entity { written, file, .. } = &self.entities[entity];
         let label = format!("#{written} {}", self.kinds(entity).join("+"));
@@ -195,12 +194,12 @@ enum Cut {
     AfterGroup,
 }
 
-/// Cuts at depth 0 and outside strings.
+/// Splits the text at depth 0 and outside strings.
 fn split(text: &[u8], cut: Cut) -> Vec<&[u8]> {
     let (mut parts, mut start, mut depth, mut quoted) = (Vec::new(), 0, 0usize, false);
     for (i, &byte) in text.iter().enumerate() {
         match byte {
-            // A doubled quote closes and opens again, which comes to the same.
+            // A doubled quote closes and reopens the string, which has the same result.
             b'\'' => quoted = !quoted,
             _ if quoted => {}
             b'(' => depth += 1,

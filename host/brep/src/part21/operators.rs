@@ -1,15 +1,14 @@
 //! Placements by CARTESIAN_TRANSFORMATION_OPERATOR_3D, which may mirror and scale.
 //!
-//! The kernel takes only the rigid part of an operator, silently, and crashes on its short spelling. So an operator
-//! that places a product is split here: x ↦ o + s·M·x with M orthogonal becomes a rigid motion (R, o), which the
-//! kernel gets as an axis placement, and a signed scale k (R = M, k = s; or R = −M, k = −s when M mirrors), which
-//! travels in the occurrence's token ([`Exchange::scales`]). Mapped items beside such an operator become
-//! occurrences, since only those have names.
+//! The kernel silently uses only the rigid part of an operator, and crashes on its short form. So an operator that places a product is split here: x
+//! ↦ o + s·M·x with M orthogonal becomes a rigid motion (R, o), which the kernel gets as an axis placement, and a signed scale k (R = M, k = s; or R
+//! = −M, k = −s when M mirrors), which is part of the occurrence's token ([`Exchange::scales`]). Other mapped items of a representation with such an
+//! operator become occurrences, because only those have names.
 
 use super::{Exchange, Part21Error, reference, references, units};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// How far from 1 a scale may be without being one.
+/// Largest deviation from 1 of a scale that counts as rigid.
 const RIGID: f64 = 1e-9;
 
 /// x ↦ o + k·R·x.
@@ -20,10 +19,10 @@ struct Operator {
     scale: f64,
 }
 
-/// Splits all operators that place products, and spells the others as the kernel expects.
+/// Splits all operators that place products, and rewrites the others in the form that the kernel expects.
 ///
 /// # Errors
-/// [`Part21Error::Invalid`] for an operator whose parts are missing, or which places what is no product.
+/// [`Part21Error::Invalid`] for an operator with missing parts, or one that places something other than a product.
 pub fn split(file: &mut Exchange) -> Result<(), Part21Error> {
     let operators: Vec<usize> = (0..file.entities.len())
         .filter(|&e| file.kinds(e).contains(&"CARTESIAN_TRANSFORMATION_OPERATOR_3D"))
@@ -46,7 +45,7 @@ fn relationships(file: &mut Exchange) -> Result<(), Part21Error> {
             let arguments = file.arguments(placed);
             let relation = file.find(reference(arguments.first()?)?)?;
             let with = file.arguments_as(relation, "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")?;
-            // A simple instance carries the relationship's own four arguments first.
+            // A simple instance begins with the relationship's own four arguments.
             let operator = file.find(reference(with.last()?)?)?;
             let shape = file.find(reference(arguments.get(1)?)?)?;
             let occurrence = file.find(reference(file.arguments(shape).get(2)?)?)?;
@@ -90,7 +89,7 @@ fn mapped_items(file: &mut Exchange) -> Result<(), Part21Error> {
         for (item, target) in items.into_iter().zip(targets) {
             occurrence(file, representation, item, target).unwrap_or_else(|| {
                 let what = format!(
-                    "{} places something that is no product by an operator",
+                    "{} places something other than a product by an operator",
                     file.label(item)
                 );
                 Err(Part21Error::Invalid {
@@ -103,7 +102,7 @@ fn mapped_items(file: &mut Exchange) -> Result<(), Part21Error> {
     Ok(())
 }
 
-/// Turns a mapped item into an occurrence; `None` when there is no product on one side.
+/// Turns a mapped item into an occurrence; `None` when one of the sides has no product.
 fn occurrence(
     file: &mut Exchange,
     parent: usize,
@@ -119,7 +118,7 @@ fn occurrence(
             Ok(placement) => placement,
             Err(error) => return Some(Err(error)),
         };
-        // What is mapped starts from an axis A of its own: o + k·R·A⁻¹x, and with A⁻¹ = (Q, t) that is (R, o)·(Q, k·t) of k·x.
+        // The mapped item is given relative to its own axis A: o + k·R·A⁻¹x, and with A⁻¹ = (Q, t) this is (R, o)·(Q, k·t) applied to k·x.
         let mut own = file.read_axis(from)?.inverse();
         let mm = [child, parent].map(|of| units::millimetres(file, of).unwrap_or(1.0));
         own.translation *= scale * mm[0] / mm[1];
@@ -147,12 +146,12 @@ fn occurrence(
     if let Some(use_of) = file.find(use_of) {
         file.scale(use_of, scale);
     }
-    // The item itself must not be drawn a second time; a point is an item that draws nothing.
+    // The item itself must not be drawn a second time; a point draws nothing.
     file.replace(item, "CARTESIAN_POINT('',(0.,0.,0.))".into());
     Some(Ok(()))
 }
 
-/// The short spelling has six arguments, the kernel wants the two of FUNCTIONALLY_DEFINED_TRANSFORMATION as well.
+/// Expands the short form with six arguments: the kernel also expects the two of FUNCTIONALLY_DEFINED_TRANSFORMATION.
 fn spell_out(file: &mut Exchange, entity: usize) {
     let arguments = file.arguments(entity);
     if file.kind(entity) == "CARTESIAN_TRANSFORMATION_OPERATOR_3D" && arguments.len() == 6 {
@@ -185,8 +184,8 @@ fn is_operator(file: &Exchange, entity: usize) -> bool {
         .contains(&"CARTESIAN_TRANSFORMATION_OPERATOR_3D")
 }
 
-/// Reads an operator as ISO 10303-42 does (function base_axis): the third axis leads, the first is made orthogonal to
-/// it, the second only says on which side it lies.
+/// Reads an operator as ISO 10303-42 does (function base_axis): the third axis is primary, the first is made orthogonal to it, the second only
+/// determines the handedness.
 fn parsed(file: &Exchange, entity: usize) -> Result<Operator, Part21Error> {
     let read = || {
         let own = |kind| file.arguments_as(entity, kind).unwrap_or_default();
@@ -198,7 +197,7 @@ fn parsed(file: &Exchange, entity: usize) -> Result<Operator, Part21Error> {
             _ => {
                 let mut all = file.arguments(entity);
                 let third = all.pop()?;
-                // Before the four of its own stand one inherited argument, or three.
+                // The operator's own four arguments are preceded by one inherited argument, or by three.
                 (all.split_off(all.len().checked_sub(4)?), vec![third])
             }
         };
@@ -226,7 +225,7 @@ fn parsed(file: &Exchange, entity: usize) -> Result<Operator, Part21Error> {
     };
     read().ok_or_else(|| Part21Error::Invalid {
         line: file.entities[entity].line,
-        what: format!("{} is no transformation", file.label(entity)),
+        what: format!("{} is not a valid transformation", file.label(entity)),
     })
 }
 
@@ -241,9 +240,9 @@ fn argument(file: &Exchange, entity: usize, number: usize) -> Option<usize> {
 }
 
 impl Exchange {
-    /// Adds an entity and returns its number, which is beyond all others.
+    /// Adds an entity and returns its number, which is greater than all others.
     pub fn push(&mut self, body: String) -> u64 {
-        // 2⁶⁴ − 1 as a number in the file would repeat here; the entity pushed then hides the file's last.
+        // If the file contains the number 2⁶⁴ − 1, it would repeat here; the pushed entity then hides the file's last.
         let id = self.largest.saturating_add(1);
         self.largest = id;
         let line = self.entities.last().map_or(0, |e| e.line);
@@ -260,7 +259,7 @@ impl Exchange {
         id
     }
 
-    /// Gives an entity another body; references are needed for checks only, which are over.
+    /// Replaces the body of an entity. Its references stay unchanged: only the checks need them, and these are finished.
     pub fn replace(&mut self, entity: usize, body: String) {
         let start = self.bodies.len();
         self.bodies.extend_from_slice(body.as_bytes());

@@ -1,17 +1,17 @@
-//! Placements of one axis onto another, as the kernel understands them.
+//! Placements of one axis onto another, in a form that the kernel handles correctly.
 //!
-//! A placed representation lies so that its own axis comes onto the axis it is given: by given · own⁻¹ (ISO 10303-43, item_defined_transformation
-//! and mapped_item). The kernel computes own⁻¹ · given, which is the same only where one of the two is the identity, and turns an axis without a
-//! reference direction its own way. So such placements are given anew here: from the identity, onto the axis that given · own⁻¹ makes of it.
-//! An identity is one in every unit, so what is placed can then be put in the place of another, whatever its unit.
+//! A placed representation is moved so that its own axis coincides with the given axis: by given · own⁻¹ (ISO 10303-43, item_defined_transformation
+//! and mapped_item). The kernel computes own⁻¹ · given, which is the same only if one of the two is the identity, and it completes an axis without a
+//! reference direction in its own way. So such placements are rewritten here: from the identity, onto the axis given · own⁻¹. The identity is the
+//! same in every unit, so the placed representation can then be substituted by another, in any unit.
 
 use super::structure::{Structure, argument, of_kind};
 use super::{Exchange, reference, references, units};
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
 
-/// Rewrites every placement whose own axis is not the identity, or whose given axis has no reference direction. What cannot be told is left as it is.
-/// Cost: one pass, and the items of each representation once.
+/// Rewrites every placement whose own axis is not the identity, or whose given axis has no reference direction. Placements that cannot be determined
+/// are left unchanged. Cost: one pass, plus the items of each representation once.
 pub fn from_identity(file: &mut Exchange) {
     let structure = Structure::of(file);
     let relations: Vec<usize> = (0..file.entities.len())
@@ -70,7 +70,7 @@ impl Items {
 }
 
 impl Exchange {
-    /// The representations of a relationship: the first is placed in the second.
+    /// The two representations of a relationship: the first is placed in the second.
     fn related_representations(&self, relation: usize) -> Option<[usize; 2]> {
         let ends = ["REPRESENTATION_RELATIONSHIP", "SHAPE_REPRESENTATION_RELATIONSHIP"]
             .iter()
@@ -85,8 +85,8 @@ impl Exchange {
         self.find(reference(with.last()?)?)
     }
 
-    /// Gives `relation` a transformation of its own, in which the axis of what is placed is the identity. With `placed_last` the representation
-    /// that is placed is the second.
+    /// Gives `relation` its own transformation, in which the axis of the placed representation is the identity. With `placed_last` the second
+    /// representation is the placed one.
     fn relation_from_identity(
         &mut self,
         relation: usize,
@@ -102,7 +102,7 @@ impl Exchange {
             argument(self, transformation, 2)?,
             argument(self, transformation, 3)?,
         ];
-        // Some writers list the axes the wrong way round; the items of the representations decide.
+        // Some writers list the axes in the wrong order; the items of the representations decide.
         let mut within = |of: usize, axis: usize| items.has(self, of, axis);
         let in_place = within(one, axes[0]) || within(two, axes[1]);
         if !in_place && within(two, axes[0]) && within(one, axes[1]) {
@@ -124,7 +124,7 @@ impl Exchange {
         Some(())
     }
 
-    /// Gives the mapped item `item` of the representation `around` a map of its own, whose axis is the identity.
+    /// Gives the mapped item `item` of the surrounding representation `around` its own map, whose axis is the identity.
     fn item_from_identity(&mut self, around: usize, item: usize) -> Option<()> {
         let map = argument(self, item, 1)?;
         let (own, mapped) = (argument(self, map, 0)?, argument(self, map, 1)?);
@@ -139,8 +139,8 @@ impl Exchange {
         Some(())
     }
 
-    /// The motion, in the unit of the representation around, of what lies with the axis `own` on the axis `given`; both with their representations.
-    /// `None` when the kernel finds it as well, or an axis cannot be told.
+    /// The motion, in the unit of the surrounding representation, that takes the axis `own` onto the axis `given`; both with their representations.
+    /// `None` when the kernel computes the same motion, or an axis cannot be read.
     fn motion(&self, own: (usize, usize), given: (usize, usize)) -> Option<DAffine3> {
         let (placed, own) = (own.0, self.read_axis(own.1)?);
         let directed = self.arguments(given.1).get(3) != Some(&&b"$"[..]);
@@ -187,7 +187,7 @@ impl Exchange {
         Some(DVec3::new(numbers.next()??, numbers.next()??, numbers.next()??))
     }
 
-    /// Adds the axis placement that `motion` makes of the identity; returns its number.
+    /// Adds the axis placement to which `motion` takes the identity; returns its number.
     pub(super) fn write_axis(&mut self, motion: DAffine3) -> u64 {
         let triple = |v: DVec3| format!("({:?},{:?},{:?})", v.x, v.y, v.z).to_uppercase();
         let origin = self.push(format!("CARTESIAN_POINT('',{})", triple(motion.translation)));

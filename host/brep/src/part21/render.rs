@@ -1,10 +1,9 @@
-//! The text for the kernel, and the names it must not touch.
+//! The text for the kernel, and the tokens that protect names from it.
 
 use super::{Exchange, text};
 
-/// Writes the file anew: entities numbered from 1 in file order (so any 64-bit number is safe), one a line,
-/// without comments, strings in ASCII, names of products and occurrences replaced by tokens. [`name`] turns a
-/// token back. Cost: one pass.
+/// Renders the file: entities numbered from 1 in file order (so any 64-bit number is safe), one per line, without comments, strings in ASCII, names
+/// of products and occurrences replaced by tokens. [`name`] decodes a token. Cost: one pass.
 pub fn render(file: &Exchange) -> Vec<u8> {
     let mut out = Vec::with_capacity(file.bodies.len() + file.header.len() + 16 * file.entities.len());
     out.extend_from_slice(b"ISO-10303-21;\nHEADER;\n");
@@ -15,7 +14,7 @@ pub fn render(file: &Exchange) -> Vec<u8> {
         let body = file.body(entity);
         match named(file, entity) {
             Some(name) => {
-                // The name is a slice of the body: everything else stays.
+                // The name is a slice of the body; the rest is unchanged.
                 let start = name.as_ptr() as usize - body.as_ptr() as usize;
                 renumbered(file, &body[..start], &mut out);
                 out.extend_from_slice(format!("'{}'", token(file, entity)).as_bytes());
@@ -29,7 +28,7 @@ pub fn render(file: &Exchange) -> Vec<u8> {
     out
 }
 
-/// What the token in a name stands for: the entity; `None` when the text is no token.
+/// Entity of the token in a name; `None` when the text is not a token.
 pub fn entity_of(token: &str) -> Option<usize> {
     let number = token.strip_prefix("mortise-")?;
     number
@@ -39,7 +38,7 @@ pub fn entity_of(token: &str) -> Option<usize> {
         .ok()
 }
 
-/// Name of the product or occurrence that a token stands for, or the text itself when it is none.
+/// Name of the product or occurrence of a token, or the text itself when it is not a token.
 pub fn name(file: &Exchange, token: &str) -> String {
     match entity_of(token).filter(|&entity| entity < file.entities.len()) {
         Some(entity) => named(file, entity)
@@ -51,7 +50,7 @@ pub fn name(file: &Exchange, token: &str) -> String {
     }
 }
 
-/// Identifier of the product that a token stands for.
+/// Identifier of the product of a token.
 pub fn product_id(file: &Exchange, token: &str) -> Option<String> {
     let entity = entity_of(token).filter(|&entity| entity < file.entities.len())?;
     let id = text::decode(file.arguments(entity).first()?)?;
@@ -85,7 +84,7 @@ fn renumbered(file: &Exchange, body: &[u8], out: &mut Vec<u8>) {
             b'#' if !quoted => {
                 let digits = body[i..].iter().take_while(|b| b.is_ascii_digit()).count();
                 let id = super::reference(&body[i - 1..i + digits]).and_then(|id| file.find(id));
-                // A reference that leads nowhere (outside the shapes, else the check refused it) becomes "not given".
+                // A dangling reference (outside the shapes; otherwise the check rejects it) becomes "not given".
                 match id {
                     Some(entity) => out.extend_from_slice(format!("#{}", entity + 1).as_bytes()),
                     None => out.push(b'$'),

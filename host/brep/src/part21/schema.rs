@@ -1,11 +1,11 @@
-//! The few rules of ISO 10303-42 without which the kernel crashes instead of complaining: how many arguments an
-//! entity of geometry or topology has, and of which family each reference is.
+//! The few rules of ISO 10303-42 whose violation crashes the kernel instead of causing an error: the number of arguments of an entity of geometry or
+//! topology, and the family of each reference.
 //!
-//! Only certain faults are reported: where a family has types not listed here, they are left to the kernel.
+//! Only certain faults are reported: if a family has types not listed here, they are left to the kernel.
 
 use super::{Exchange, Part21Error, reference};
 
-/// What a type is, as far as references tell it apart.
+/// Family of a type, as far as references distinguish it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Family {
     Point,
@@ -28,11 +28,11 @@ enum Family {
 /// One argument.
 #[derive(Clone, Copy, Debug)]
 enum Argument {
-    /// Text, number, flag: not looked at.
+    /// Text, number, flag: not checked.
     Any,
     /// A reference to one of the family.
     One(Family),
-    /// The same, or `$`, or `*`.
+    /// The same, `$` or `*`.
     Maybe(Family),
     /// A list of references to the family.
     List(Family),
@@ -82,7 +82,7 @@ const RULES: &[(&str, &[Argument])] = &[
     ("BREP_WITH_VOIDS", &[Any, One(Shell), List(Shell)]),
 ];
 
-/// Family of a simple type; `None` when this module does not know it.
+/// Family of a simple type; `None` when it is not listed here.
 fn family(kind: &str) -> Option<Family> {
     Some(match kind {
         "CARTESIAN_POINT" => Point,
@@ -141,7 +141,7 @@ fn family(kind: &str) -> Option<Family> {
     })
 }
 
-/// The kernel knows no other types of the family than those listed here.
+/// Whether the types listed here are the only ones of the family that the kernel knows.
 fn is_closed(family: Family) -> bool {
     matches!(
         family,
@@ -212,7 +212,7 @@ fn fault(file: &Exchange, given: &[u8], rule: Argument) -> Option<String> {
         // A dangling reference is reported by another check.
         let target = file.find(target)?;
         let found = match family(file.kind(target)) {
-            // A misspelt type, unless it is a complex entity, whose types are not looked at here.
+            // A misspelt type, unless the entity is complex: types of complex entities are not checked here.
             None if is_closed(want) && !file.kind(target).is_empty() => Family::Other,
             found => found?,
         };
@@ -223,7 +223,7 @@ fn fault(file: &Exchange, given: &[u8], rule: Argument) -> Option<String> {
         Maybe(_) if given == b"$" || given == b"*" => None,
         One(want) | Maybe(want) => wrong(given, want),
         List(want) => match given.strip_prefix(b"(").and_then(|g| g.strip_suffix(b")")) {
-            None => Some("has no list where one is due".into()),
+            None => Some("has no list where one is required".into()),
             Some(b"") => None,
             Some(list) => list.split(|&b| b == b',').find_map(|item| wrong(item, want)),
         },

@@ -1,28 +1,28 @@
-//! Products, their occurrences in each other, and the representations that hold their shapes.
+//! Products, their occurrences in each other, and the representations that contain their shapes.
 
 use super::check::{SOLIDS, SURFACES};
 use super::{Exchange, reference, references};
 use std::collections::{HashMap, HashSet};
 
-/// Which product is placed in which, and where their shapes are. All numbers are indices of entities.
+/// Placements of products in each other, and the representations of their shapes. All numbers are indices of entities.
 #[derive(Clone, Debug, Default)]
 pub struct Structure {
     /// Product definitions in file order.
     pub definitions: Vec<usize>,
-    /// Occurrence, product around it, product placed.
+    /// Occurrence, parent product, placed product.
     pub occurrences: Vec<[usize; 3]>,
     /// Product definition and its representation, by `SHAPE_DEFINITION_REPRESENTATION` (third).
     pub representations: Vec<[usize; 3]>,
-    /// Representations that stand for the same shape.
+    /// Pairs of representations of the same shape.
     same: Vec<[usize; 2]>,
-    /// A representation and one that is placed in it.
+    /// A representation and another one placed in it.
     placed: Vec<[usize; 2]>,
-    /// Solids and surface models of a representation.
+    /// Number of solids and surface models of a representation.
     solids: HashMap<usize, u64>,
 }
 
 impl Structure {
-    /// Reads it from a text. What does not hold together is left out: the checks refuse it, or the kernel.
+    /// Reads the structure of a text. Inconsistent entities are skipped: the checks or the kernel reject them.
     pub fn of(file: &Exchange) -> Self {
         let mut found = Self::default();
         let related: HashSet<usize> = of_kind(file, "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION")
@@ -91,7 +91,7 @@ impl Structure {
         }
     }
 
-    /// Product definitions that are placed in no other.
+    /// Product definitions that are not placed in any other.
     pub fn roots(&self) -> Vec<usize> {
         let placed: HashSet<usize> = self.occurrences.iter().map(|&[_, _, child]| child).collect();
         let mut roots = self.definitions.clone();
@@ -130,14 +130,14 @@ impl Structure {
         false
     }
 
-    /// How many parts the assembly unfolds to: solids, surface models and empty products, each as often as it is placed.
-    /// [`u64::MAX`] stands for that many or more. Cost: one pass over the structure, however often parts are placed.
+    /// Number of parts after unfolding the assembly: solids, surface models and empty products, each counted once per placement. [`u64::MAX`] stands
+    /// for that many or more. Cost: one pass over the structure, regardless of the number of placements.
     pub fn unfolded(&self) -> u64 {
         let mut below: HashMap<usize, Vec<usize>> = HashMap::new();
         let mut placed = HashSet::new();
         let occurrences = self.occurrences.iter().map(|&[_, parent, child]| [parent, child]);
         let shapes = self.representations.iter().map(|&[owner, of, _]| [owner, of]);
-        // Of two that are the same, either may hold the solids: each counts for the other, once.
+        // Of two representations of the same shape, either may contain the solids: each counts for the other, once.
         let same = self.same.iter().flat_map(|&[a, b]| [[a, b], [b, a]]);
         let edges = occurrences.chain(shapes).chain(self.placed.iter().copied());
         for [from, to] in edges {
@@ -156,7 +156,7 @@ impl Structure {
         total
     }
 
-    /// Depth first with a stack of its own; an edge back to what is being counted adds nothing.
+    /// Depth-first count with an explicit stack; an edge back to a node in progress adds nothing.
     fn count(&self, start: usize, below: &HashMap<usize, Vec<usize>>, parts: &mut HashMap<usize, u64>) {
         let mut stack = vec![(start, 0, 0u64)];
         let mut open = HashSet::from([start]);
@@ -198,7 +198,7 @@ pub fn of_kind<'a>(file: &'a Exchange, kind: &'a str) -> impl Iterator<Item = us
     (0..file.entities.len()).filter(move |&entity| file.kind(entity) == kind)
 }
 
-/// What the argument number `index` of a simple entity refers to.
+/// Entity to which argument number `index` of a simple entity refers.
 pub fn argument(file: &Exchange, entity: usize, index: usize) -> Option<usize> {
     file.find(reference(file.arguments(entity).get(index)?)?)
 }
@@ -212,7 +212,7 @@ mod tests {
         Structure::of(&super::super::parse(text.as_bytes()).unwrap())
     }
 
-    /// Twice each level: 2ⁿ.
+    /// Each level contains the next one twice: 2ⁿ parts.
     fn nested(levels: usize) -> String {
         let mut data = String::from(
             "#1=PRODUCT_DEFINITION('','',$,$);#2=PRODUCT_DEFINITION_SHAPE('','',#1);#3=SHAPE_DEFINITION_REPRESENTATION(#2,#4);\

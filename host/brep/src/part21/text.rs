@@ -1,11 +1,10 @@
-//! Strings of ISO 10303-21 clause 6.4.3 to Unicode.
+//! Conversion of strings of ISO 10303-21 clause 6.4.3 to Unicode.
 
-/// Decodes a string argument `'…'`; `None` when the argument is no string.
+/// Decodes a string argument `'…'`; `None` when the argument is not a string.
 ///
-/// `''` is one quote, `\\` one backslash; `\S\x` is x with its eighth bit set in the page that `\Pn\` chose
-/// (page A, ISO 8859-1, is the only one that writers use: others are read as that one), `\X\hh` one character of
-/// ISO 8859-1, `\X2\…\X0\` UTF-16, `\X4\…\X0\` UTF-32. Bytes beyond ASCII, which many systems write raw, are
-/// UTF-8 if they are valid as such, else ISO 8859-1. A damaged directive is kept as it stands.
+/// `''` is one quote, `\\` one backslash; `\S\x` is x with its eighth bit set in the page chosen by `\Pn\` (writers use only page A, ISO 8859-1;
+/// others are read as that one), `\X\hh` one character of ISO 8859-1, `\X2\…\X0\` UTF-16, `\X4\…\X0\` UTF-32. Bytes beyond ASCII, which many systems
+/// write raw, are read as UTF-8 if valid, else as ISO 8859-1. A damaged directive is left as written.
 pub fn decode(argument: &[u8]) -> Option<String> {
     let inner = argument.strip_prefix(b"'")?.strip_suffix(b"'")?;
     let mut out = String::with_capacity(inner.len());
@@ -83,7 +82,7 @@ fn directive(text: &[u8], out: &mut String) -> Option<usize> {
 }
 
 fn hex(digits: &[u8]) -> Option<u32> {
-    // from_str_radix would take a sign.
+    // from_str_radix would accept a sign.
     if !digits.iter().all(u8::is_ascii_hexdigit) {
         return None;
     }

@@ -1,11 +1,11 @@
-//! The length unit of a STEP file, by name. Conversion to millimetres is the kernel's work.
+//! The length unit of a STEP file, by name. The kernel converts to millimetres.
 
 use super::{Exchange, Part21Error, reference, references, text};
 
 /// Names of the length units that the file's representation contexts use, each once, in file order.
 ///
 /// # Errors
-/// [`Part21Error::Invalid`] for a unit whose size the file does not give: the kernel would take it for another.
+/// [`Part21Error::Invalid`] for a unit whose size the file does not give: the kernel would assume another.
 pub fn length_units(file: &Exchange) -> Result<Vec<String>, Part21Error> {
     let mut names = Vec::new();
     for entity in 0..file.entities.len() {
@@ -33,7 +33,7 @@ pub fn length_units(file: &Exchange) -> Result<Vec<String>, Part21Error> {
 
 fn length_unit(file: &Exchange, unit: usize) -> Option<String> {
     if let Some(arguments) = file.arguments_as(unit, "CONVERSION_BASED_UNIT") {
-        // The factor is what counts; the name is for people.
+        // The factor determines the size; the name is for people.
         let measure = file.find(reference(arguments.get(1)?)?)?;
         let (factor, base) = factor(file, measure)?;
         si_unit(file, base)?;
@@ -63,7 +63,7 @@ fn factor(file: &Exchange, measure: usize) -> Option<(f64, usize)> {
     (value > 0.0 && value.is_finite()).then_some((value, file.find(reference(arguments[1])?)?))
 }
 
-/// Millimetres in one length unit of a representation's context.
+/// Millimetres per length unit of a representation's context.
 pub fn millimetres(file: &Exchange, representation: usize) -> Option<f64> {
     let context = file.find(reference(file.arguments(representation).get(2)?)?)?;
     let units = file.arguments_as(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT")?;

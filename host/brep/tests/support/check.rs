@@ -1,4 +1,4 @@
-//! What must hold of every model, whatever file it came from.
+//! Checks that must hold for every model of any file.
 
 use glam::DVec3;
 use mortise_brep::{CadModel, Curve, Face, Frame, Shape, Surface};
@@ -173,7 +173,7 @@ fn on_surface(shape: &Shape, tolerance: f64, name: &str) {
     }
 }
 
-/// Triangles look outward, face by face: their area-weighted normals agree with the face's.
+/// Checks that triangles point outward, face by face: their area-weighted normals agree with the face's.
 fn orientation(shape: &Shape, name: &str) {
     let mut along = vec![0.0; shape.faces.len()];
     let mut area = vec![0.0; shape.faces.len()];
@@ -187,7 +187,7 @@ fn orientation(shape: &Shape, name: &str) {
         area[face as usize] += normal.length();
     }
     for (face, (along, area)) in along.iter().zip(&area).enumerate() {
-        // Chords of 0.2 rad turn a triangle by at most 0.1 rad against its surface in each direction.
+        // Chords of 0.2 rad tilt a triangle by at most 0.1 rad from its surface in each direction.
         assert!(
             *along >= 0.97 * area,
             "{name}: face {face} {:?}: {along} of {area}",

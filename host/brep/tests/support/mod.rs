@@ -1,4 +1,4 @@
-//! What the tests share: where the sample files are, and a writer of small STEP texts.
+//! Common code of the tests: the location of the sample files, and a writer of small STEP texts.
 
 #![allow(dead_code, reason = "each test binary uses its own part of this")]
 
@@ -7,7 +7,7 @@ pub mod check;
 use glam::{DAffine3, DVec3};
 use std::path::{Path, PathBuf};
 
-/// The shared test parts, when this machine has them.
+/// The shared test parts, if this machine has them.
 pub fn shared() -> Option<PathBuf> {
     let path = match std::env::var_os("MORTISE_SHARED") {
         Some(path) => PathBuf::from(path),
@@ -40,7 +40,7 @@ pub struct StepText {
 }
 
 impl StepText {
-    /// A text whose lengths are in `unit`: the body of a length unit entity, in which `#SI` stands for the metre.
+    /// A text with lengths in `unit`: the body of a length unit entity, in which `#SI` stands for the metre.
     pub fn new(unit: &str) -> Self {
         let mut text = Self {
             data: String::new(),
@@ -57,7 +57,7 @@ impl StepText {
         let metre = self.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.))");
         let unit = unit.replace("#SI", &format!("#{metre}"));
         let length = match unit.split_once(';') {
-            // A conversion: the measure first, then the unit with #MEASURE for it.
+            // A conversion: first the measure, then the unit with #MEASURE for it.
             Some((measure, unit)) => {
                 let measure = self.add(measure);
                 self.add(&unit.replace("#MEASURE", &format!("#{measure}")))
@@ -94,7 +94,7 @@ impl StepText {
     }
 
     fn triple(v: DVec3) -> String {
-        // {:?} of a double always has a point or an exponent and comes back to the bit.
+        // {:?} of a double always has a point or an exponent, and parses back to the same bits.
         format!("({:?},{:?},{:?})", v.x, v.y, v.z).to_uppercase()
     }
 
@@ -115,14 +115,14 @@ impl StepText {
         self.axis(DVec3::ZERO, DVec3::Z, DVec3::X)
     }
 
-    /// A box from the origin to `size`. `outward` false makes its faces look inward.
+    /// A box from the origin to `size`. With `outward` false its faces point inward.
     pub fn solid_box(&mut self, name: &str, size: DVec3, outward: bool) -> u64 {
         let faces = self.box_faces(size, outward);
         let shell = self.add(&format!("CLOSED_SHELL('',{})", list(&faces)));
         self.add(&format!("MANIFOLD_SOLID_BREP('{name}',#{shell})"))
     }
 
-    /// The faces of a box, the bottom (z = 0) first, and no shell.
+    /// The faces of a box, the bottom (z = 0) first, without a shell.
     pub fn box_faces(&mut self, size: DVec3, outward: bool) -> Vec<u64> {
         let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) * size;
         let vertices: Vec<u64> = (0..8)
@@ -205,7 +205,7 @@ impl StepText {
         self.add(&format!("{kind}('',({}),#{context})", items.join(",")))
     }
 
-    /// A product whose shape is a representation. `name` is written as it stands, escapes and all.
+    /// A product whose shape is a representation. `name` is written unchanged, including escapes.
     pub fn product(&mut self, name: &str, representation: u64) -> Product {
         let application = self.application;
         let context = self.add(&format!("PRODUCT_CONTEXT('',#{application},'mechanical')"));
@@ -233,13 +233,13 @@ impl StepText {
         self.product(name, representation)
     }
 
-    /// A product without a shape of its own, for components.
+    /// A product without its own shape, for components.
     pub fn assembly(&mut self, name: &str) -> Product {
         let representation = self.representation("SHAPE_REPRESENTATION", &[]);
         self.product(name, representation)
     }
 
-    /// Puts `child` into `parent` with a rigid motion.
+    /// Places `child` in `parent` with a rigid motion.
     pub fn component(&mut self, name: &str, parent: Product, child: Product, motion: DAffine3) {
         let occurrence = self.add(&format!(
             "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
@@ -252,18 +252,18 @@ impl StepText {
         self.related(shape, parent, child, transformation);
     }
 
-    /// Puts `child` into `parent` so that the axis `from` of the child lies on `to` of the parent.
+    /// Places `child` in `parent` so that the axis `from` of the child coincides with `to` of the parent.
     pub fn component_by_axes(&mut self, name: &str, parent: Product, child: Product, axes: [DAffine3; 2]) {
         let axes = axes.map(|motion| self.axis_of(motion));
         self.component_by_entities(name, parent, child, axes);
     }
 
-    /// The axis that `motion` makes of the origin's.
+    /// The axis placement to which `motion` takes the identity.
     pub fn axis_of(&mut self, motion: DAffine3) -> u64 {
         self.axis(motion.translation, motion.matrix3.z_axis, motion.matrix3.x_axis)
     }
 
-    /// The same by axes that are written already.
+    /// The same for axes that are already written.
     pub fn component_by_entities(&mut self, name: &str, parent: Product, child: Product, axes: [u64; 2]) {
         let occurrence = self.add(&format!(
             "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
@@ -275,7 +275,7 @@ impl StepText {
         self.related(shape, parent, child, transformation);
     }
 
-    /// Puts `child` into `parent` with the two representations, and their axes, listed the other way round.
+    /// Places `child` in `parent` with the two representations, and their axes, listed in reverse order.
     pub fn component_reversed(&mut self, name: &str, parent: Product, child: Product, [from, to]: [u64; 2]) {
         let occurrence = self.add(&format!(
             "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
@@ -286,12 +286,12 @@ impl StepText {
         self.related(shape, child, parent, transformation);
     }
 
-    /// A length unit of its own for what is written from here on: the body of a length unit entity, in which `#SI` stands for the metre.
+    /// Starts a new length unit for all following entities: the body of a length unit entity, in which `#SI` stands for the metre.
     pub fn change_unit(&mut self, unit: &str) {
         self.context = self.context_in(unit);
     }
 
-    /// Says that the shape of `product` is in the file `name`, as CATIA writes it.
+    /// States that the shape of `product` is in the file `name`, in the form that CATIA writes.
     pub fn in_file(&mut self, product: Product, name: &str) {
         let kind = self.add("DOCUMENT_TYPE('geometry')");
         let document = self.add(&format!("DOCUMENT_FILE('{name}','','',#{kind},'',$)"));
@@ -307,7 +307,7 @@ impl StepText {
         ));
     }
 
-    /// Puts `child` into `parent` with a transformation operator.
+    /// Places `child` in `parent` with a transformation operator.
     pub fn component_by_operator(&mut self, name: &str, parent: Product, child: Product, operator: u64) {
         let occurrence = self.add(&format!(
             "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{name}','{name}','',#{},#{},$)",
@@ -334,7 +334,7 @@ impl StepText {
         self.mapped_from(child, origin, target)
     }
 
-    /// The same, with the axis of `child` that comes to lie on `target`.
+    /// The same, with the axis `origin` of `child` that is placed on `target`.
     pub fn mapped_from(&mut self, child: Product, origin: u64, target: u64) -> u64 {
         let map = self.add(&format!(
             "REPRESENTATION_MAP(#{origin},#{})",
@@ -375,7 +375,7 @@ pub fn list(entities: &[u64]) -> String {
     )
 }
 
-/// Writes the text to a file that lives as long as what is returned.
+/// Writes the text to a temporary file, which exists as long as the returned path.
 pub fn file(text: &str) -> tempfile::TempPath {
     let file = tempfile::Builder::new()
         .suffix(".step")

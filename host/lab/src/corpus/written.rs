@@ -20,7 +20,7 @@ pub(crate) const WRITTEN: &[(&str, Written)] = &[
     ("08_hard/broken_empty.step", Refused("the file is empty")),
     (
         "08_hard/broken_huge_number.step",
-        Refused("1.E400, which is no finite value"),
+        Refused("1.E400, which is not a finite value"),
     ),
     (
         "08_hard/broken_missing_ref.step",

@@ -283,8 +283,8 @@ mod tests {
         for held in found.iter().filter(|held| held.case == CASES[0].name) {
             // 60 refreshes: two standard deviations of the share at p = 0.5 are about a tenth.
             assert!((held.in_force - held.formula).abs() < 0.1, "{held}");
-            // A lapse fades: no step that is felt, by a factor of a thousand.
-            assert!(held.step_n < 1e-5, "{held}");
+            // A lapse fades: 0.03 µN with up to half of the messages lost.
+            assert!(held.step_n < 1e-7, "{held}");
             // The hand does not wait for it: 3 N by 0.015 N a tick.
             assert!((held.engaged_ms - 200.0).abs() < 2.0, "{held}");
             // Though the pull's energy at the object is from nowhere, as the observer there sees.

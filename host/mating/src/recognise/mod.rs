@@ -1,12 +1,14 @@
-//! From touching faces to constraints worth keeping.
+//! Recognition of constraints from touching faces.
 //!
-//! Given which faces touch and where the parts are, the recogniser keeps a list of targets: concentric, coplanar, conical,
-//! spherical, annular. A pair of merged surfaces that mate becomes a candidate when its faces touch and it is near: diameters,
-//! distance and angle within the thresholds. All that are near are solved together; one that contradicts those before it waits,
-//! and names them. Looser thresholds to leave than to enter, and some updates of patience, keep the list from flickering. The
-//! operator may pin an entry (it stays while it can be kept) or switch it off.
+//! From the touching faces and the parts' poses the recogniser maintains a list of targets: concentric, coplanar, conical,
+//! spherical, annular. A pair of mating merged surfaces becomes a candidate when its faces touch and it is near: diameters,
+//! distance and angle within the thresholds. All near candidates are solved together; one that contradicts earlier ones
+//! waits and names them. Thresholds are looser for leaving than for entering, and a target is retained for some updates
+//! without touch, so that the list does not flicker. The operator may pin an entry (it stays while it can be satisfied) or
+//! switch it off.
 //!
-//! The list after an update is a function of the list before, the observation and the operator's choices: no clock, no chance.
+//! The list after an update is a function of the previous list, the observation and the operator's choices: it depends on
+//! no clock and no random numbers.
 
 mod solve;
 mod target;
@@ -17,34 +19,34 @@ use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
 
 pub use solve::{Freedom, Solution};
-pub use target::{Misfit, Target, TargetId, TargetKind};
+pub use target::{Misfit, Target, TargetId};
 
 use crate::merge::{MergedSurface, merge};
 use crate::tolerances::Tolerances;
 use solve::solve;
 
-/// How near a target must be, and for how long it is remembered.
+/// Engagement thresholds of a target, and its retention time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
-    /// Largest d at which a target is taken up, beyond the play that the fit has anyway, mm.
+    /// Largest d at which a target engages, beyond the play of the fit, mm.
     pub distance_mm: f64,
-    /// Largest θ at which it is taken up, radians.
+    /// Largest θ at which a target engages, radians.
     pub angle_rad: f64,
     /// Largest difference of diameters, mm.
     pub diameter_mm: f64,
-    /// The same as a share of the larger diameter, where that is more.
+    /// Largest difference as a share of the larger diameter, where that is more.
     pub diameter_share: f64,
-    /// Largest diameter of what goes in beyond that of its hole, mm: a press fit is felt, a wrong part is not pulled in.
+    /// Largest interference of diameters, mm: a press fit is felt, a wrong part is not pulled in.
     pub interference_mm: f64,
-    /// A target taken up is let go when d or θ is this many times larger.
+    /// An active target is released when d or θ exceeds its threshold by this factor.
     pub release: f64,
-    /// Updates without touch after which it is let go.
+    /// Number of updates without touch after which an active target is released.
     pub patience: u32,
 }
 
 impl Default for Thresholds {
-    /// As far as a hand is off when it tries a fit: 3 mm and 6°; the loosest fit of the thesis is 2.5 mm on the diameter, of
-    /// its large parts a peg of 650 mm in a hole of 700 mm.
+    /// Typical alignment errors of a hand that tries a fit: 3 mm and 6°. The loosest fit of the thesis is 2.5 mm on the
+    /// diameter; of its large parts, a peg of 650 mm in a hole of 700 mm.
     fn default() -> Self {
         Self {
             distance_mm: 3.0,
@@ -71,23 +73,23 @@ pub struct TouchingFaces {
     pub depth_mm: f64,
 }
 
-/// What is known at one time.
+/// Input of one update.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
-    /// The part in the hand.
+    /// The held part.
     pub moving_part: usize,
-    /// Where each part is, in the order of [`CadModel::parts`].
+    /// Pose of each part, in the order of [`CadModel::parts`].
     pub poses: &'a [DAffine3],
-    /// Faces that touch, or are near enough to count.
+    /// Faces that touch, or are near enough to count as touching.
     pub touching: &'a [TouchingFaces],
 }
 
-/// What holds of an entry.
+/// State of an entry.
 #[derive(Clone, Debug, PartialEq)]
 pub enum State {
-    /// Kept.
+    /// Engaged and satisfiable.
     Active,
-    /// Touches, but is too far off to be taken up.
+    /// Touches, but its alignment error is too large for it to engage.
     Far,
     /// Contradicts these targets, which came first.
     Conflict(Vec<TargetId>),
@@ -95,32 +97,32 @@ pub enum State {
     Off,
 }
 
-/// One line of the list.
+/// An entry of the list.
 #[derive(Clone, Debug)]
 pub struct Entry {
     /// The constraint.
     pub target: Target,
-    /// Whether it is kept, and why not.
+    /// Whether it is active, and if not, why.
     pub state: State,
-    /// How far it is from being kept now.
+    /// Present alignment error.
     pub misfit: Misfit,
-    /// Largest depth at which its faces touch, mm; 0 when they do not now.
+    /// Largest depth at which its faces touch, mm; 0 without contact.
     pub depth_mm: f64,
-    /// The operator wants it to stay.
+    /// Whether the operator pinned it.
     pub pinned: bool,
-    /// The operator does not want it.
+    /// Whether the operator switched it off.
     pub off: bool,
-    /// Updates since its faces touched.
+    /// Number of updates since its faces last touched.
     idle: u32,
 }
 
-/// The list of targets. See the [module's page](self).
+/// The list of targets. See the [module's documentation](self).
 pub struct Recogniser<'a> {
     model: &'a CadModel,
     surfaces: Vec<ShapeSurfaces>,
     thresholds: Thresholds,
     entries: BTreeMap<TargetId, Entry>,
-    /// What the operator wants, also of targets that are not in the list now.
+    /// The operator's choices, also for targets that are not in the list now.
     choices: BTreeMap<TargetId, Choice>,
     freedom: Freedom,
 }
@@ -133,16 +135,16 @@ struct Choice {
 
 struct ShapeSurfaces {
     merged: Vec<MergedSurface>,
-    /// Of each merged surface, the middle of its mesh.
+    /// Middle of the mesh of each merged surface.
     middles: Vec<DVec3>,
-    /// Of each face, its merged surface.
+    /// Merged surface of each face.
     of_face: Vec<Option<usize>>,
     /// Half the diagonal of the mesh's box, mm.
     size: f64,
 }
 
 impl<'a> Recogniser<'a> {
-    /// With an empty list.
+    /// A recogniser with an empty list.
     pub fn new(model: &'a CadModel, tolerances: &Tolerances, thresholds: Thresholds) -> Self {
         Self {
             model,
@@ -158,7 +160,7 @@ impl<'a> Recogniser<'a> {
         }
     }
 
-    /// Brings the list up to date. Touching faces with numbers that do not exist are passed over.
+    /// Updates the list. Touching faces with invalid numbers are ignored.
     pub fn update(&mut self, seen: &Observation<'_>) {
         for entry in self.entries.values_mut() {
             entry.idle = entry.idle.saturating_add(1);
@@ -198,7 +200,7 @@ impl<'a> Recogniser<'a> {
         self.entries.values()
     }
 
-    /// Targets that are kept.
+    /// The active targets.
     pub fn active(&self) -> impl Iterator<Item = &Target> {
         self.entries
             .values()
@@ -206,17 +208,18 @@ impl<'a> Recogniser<'a> {
             .map(|e| &e.target)
     }
 
-    /// Motion that the targets kept leave to the moving part.
+    /// Motion that the active targets leave to the moving part.
     pub fn freedom(&self) -> &Freedom {
         &self.freedom
     }
 
-    /// Keeps an entry in the list and before others, or no longer; from the next update on. `false`: there is none.
+    /// Pins an entry, which keeps it in the list and gives it priority, or unpins it; from the next update on. `false`: no
+    /// such entry.
     pub fn pin(&mut self, id: TargetId, pinned: bool) -> bool {
         self.choose(id, |choice| choice.pinned = pinned)
     }
 
-    /// Switches an entry off or on again, from the next update on. `false`: there is none.
+    /// Switches an entry off or on again, from the next update on. `false`: no such entry.
     pub fn switch_off(&mut self, id: TargetId, off: bool) -> bool {
         self.choose(id, |choice| choice.off = off)
     }
@@ -231,15 +234,15 @@ impl<'a> Recogniser<'a> {
         true
     }
 
-    /// Empties the list, as when the part is let go. What the operator pinned or switched off is so again when it comes back.
+    /// Empties the list, as on release of the part. The operator's choices apply again when a target returns.
     pub fn clear(&mut self) {
         self.entries.clear();
         self.freedom = Freedom::default();
     }
 
-    /// Every target a part could keep with any other, near or not: surfaces that mate, of sizes that agree.
+    /// Every target that a part could satisfy with any other, near or not: mating surfaces of matching sizes.
     ///
-    /// Cost: one comparison of two surfaces for each of the part's and each of all others.
+    /// Cost: one comparison per pair of a surface of the part and a surface of another part.
     pub fn possible(&self, moving_part: usize) -> Vec<Target> {
         let surfaces_of = |part: usize| self.surfaces.get(self.model.parts.get(part)?.shape);
         let Some(a) = surfaces_of(moving_part) else {
@@ -262,12 +265,12 @@ impl<'a> Recogniser<'a> {
         out
     }
 
-    /// How near a target must be.
+    /// The thresholds.
     pub fn thresholds(&self) -> &Thresholds {
         &self.thresholds
     }
 
-    /// The target two touching faces could keep, when their sizes agree.
+    /// The target of two touching faces, if their sizes match.
     fn candidate(&self, moving_part: usize, touch: &TouchingFaces) -> Option<Target> {
         let surface_of = |part: usize, face: u32| {
             let surfaces = self.surfaces.get(self.model.parts.get(part)?.shape)?;
@@ -292,8 +295,8 @@ impl<'a> Recogniser<'a> {
         (sizes.contains(&(2.0 * target.play_mm)) && id.moving_part != id.fixed_part).then_some(target)
     }
 
-    /// Takes targets up one by one, as long as they can be kept together: pinned ones first, then those kept before, then the
-    /// nearest to being kept.
+    /// Activates targets one by one while they can be satisfied together: pinned ones first, then those active before, then
+    /// the ones with the smallest alignment error.
     fn decide(&mut self, seen: &Observation<'_>) {
         let limits = self.thresholds;
         let Some(pose) = seen.poses.get(seen.moving_part) else {
@@ -368,7 +371,7 @@ impl<'a> Recogniser<'a> {
     }
 }
 
-/// Whether a target is kept: within its play, and what a fit of 1 µm over the part allows.
+/// Whether a target is satisfied: within its play plus the effect of a fit error of 1 µm over the part.
 fn keeps(target: &Target, misfit: &Misfit, size: f64) -> bool {
     const FIT_MM: f64 = 1e-3;
     let play = target.play_mm.max(0.0) + FIT_MM;

@@ -1,45 +1,47 @@
-//! All targets at once: can they be kept together, and what motion do they leave?
+//! Joint solution of all targets: whether they can be satisfied together, and the motion that they leave.
 //!
-//! Each target gives rows of a 6-column Jacobian: a displacement along e at point p of the moving part is
-//! e·v + ((p − c) × e)·ω, a turn about e is e·ω, about the reference point c; lengths divide ω by the part's size L so that both
-//! compare. Gauss–Newton with the pseudo-inverse (singular value decomposition) moves the part to the least-squares pose. Where
-//! a misfit stays beyond its play, the targets contradict each other. The null space at that pose is the freedom that is left,
-//! split into pure slides and turns.
+//! Each target gives rows of a 6-column Jacobian: a displacement along e at point p of the moving part is e·v + ((p − c) ×
+//! e)·ω, a rotation about e is e·ω, about the reference point c; ω is scaled by the part's size L, so that both are
+//! lengths. Gauss–Newton with the pseudo-inverse (singular value decomposition) moves the part to the least-squares pose.
+//! Where an alignment error beyond the play remains, the targets contradict each other. The null space at that pose is the
+//! remaining freedom, split into pure slides and rotations.
 //!
-//! Cost: a decomposition of a 6-column matrix with at most five rows a target, a few times.
+//! Cost: a few decompositions of a 6-column matrix with at most five rows per target.
 
 use std::fmt;
 
 use glam::{DAffine3, DQuat, DVec3};
+use mortise_protocol::message::ConstraintKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::target::{Misfit, Target, TargetKind, placed};
+use super::target::{Misfit, Target, placed};
 use crate::contact::Axis;
 
-/// Singular values below this share of the largest are none: 1 mm over a part of 1 m.
+/// Singular values below this fraction of the largest count as zero: 1 mm over a part of 1 m.
 const RANK: f64 = 1e-3;
-/// Gauss–Newton converges quadratically; targets that are still far apart after this contradict.
+/// Largest number of iterations. Gauss–Newton converges quadratically; targets still far apart after these contradict each
+/// other.
 const STEPS: usize = 12;
 
-/// Outcome of solving targets together.
+/// Result of solving targets together.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// Where the moving part keeps all targets as well as it can.
+    /// Pose of the moving part with the smallest error over all targets.
     pub pose: DAffine3,
-    /// What is left of each target's misfit there.
+    /// Residual alignment error of each target at that pose.
     pub misfits: Vec<Misfit>,
-    /// Independent conditions, 0 to 6.
+    /// Number of independent conditions, 0 to 6.
     pub rank: usize,
-    /// Motion that is left.
+    /// Remaining motion.
     pub freedom: Freedom,
 }
 
-/// Motion that targets leave, in the assembly's frame.
+/// Motion that the targets leave, in the assembly's frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Freedom {
     /// Directions of free slides, orthonormal.
     pub slides: Vec<DVec3>,
-    /// Axes of free turns.
+    /// Axes of free rotations.
     pub turns: Vec<Axis>,
 }
 
@@ -49,7 +51,7 @@ impl Freedom {
         self.slides.len() + self.turns.len()
     }
 
-    /// The lower pair with this freedom, or a count.
+    /// Name of the lower pair with this freedom, or a count.
     pub fn name(&self) -> &'static str {
         match (self.slides.len(), self.turns.len()) {
             (0, 0) => "fixed",
@@ -79,10 +81,10 @@ impl fmt::Display for Freedom {
     }
 }
 
-/// A target with where its fixed part is.
+/// A target with the placement of its fixed part.
 pub(crate) type Placed<'a> = (&'a Target, DAffine3);
 
-/// Moves the part from `pose` until it keeps all `targets`. `size` is the part's, mm.
+/// Moves the part from `pose` until it satisfies all `targets`. `size` is the part's, mm.
 pub(crate) fn solve(targets: &[Placed<'_>], pose: &DAffine3, size: f64) -> Solution {
     let mut pose = *pose;
     for _ in 0..STEPS {
@@ -117,13 +119,13 @@ pub(crate) fn solve(targets: &[Placed<'_>], pose: &DAffine3, size: f64) -> Solut
     }
 }
 
-/// Middle of the targets on the moving part.
+/// Mean position of the targets on the moving part.
 fn reference(targets: &[Placed<'_>], pose: &DAffine3) -> DVec3 {
     let sum: DVec3 = targets.iter().map(|(t, _)| placed(&t.moving, pose).origin).sum();
     sum / targets.len().max(1) as f64
 }
 
-/// Jacobian, and the motion each row asks for, mm.
+/// The Jacobian, and the motion required by each row, mm.
 fn rows(targets: &[Placed<'_>], pose: &DAffine3, center: DVec3, size: f64) -> (DMatrix<f64>, DVector<f64>) {
     let (mut rows, mut asked): (Vec<[f64; 6]>, Vec<f64>) = (Vec::new(), Vec::new());
     for (target, fixed) in targets {
@@ -138,30 +140,30 @@ fn rows(targets: &[Placed<'_>], pose: &DAffine3, center: DVec3, size: f64) -> (D
             [x, z.cross(x)]
         };
         let turned = match target.kind {
-            TargetKind::Concentric => {
+            ConstraintKind::Concentric => {
                 across(b.direction).into_iter().for_each(&mut slide);
                 Some(b.direction * a.direction.dot(b.direction).signum())
             }
-            TargetKind::Coplanar => {
+            ConstraintKind::Coplanar => {
                 slide(b.direction);
                 Some(-b.direction)
             }
-            TargetKind::Conical => {
+            ConstraintKind::Conical => {
                 DVec3::AXES.into_iter().for_each(&mut slide);
                 Some(b.direction)
             }
-            TargetKind::Spherical => {
+            ConstraintKind::Spherical => {
                 DVec3::AXES.into_iter().for_each(&mut slide);
                 None
             }
-            TargetKind::Annular => {
+            ConstraintKind::Annular | ConstraintKind::AnnularBore => {
                 across(target.bore(&a, &b)).into_iter().for_each(&mut slide);
                 None
             }
         };
         if let Some(goal) = turned {
             let sine = a.direction.cross(goal);
-            // The whole angle, so that a quarter turn is not taken for a small one.
+            // atan2 of the full angle, so that a quarter turn is not mistaken for a small one.
             let angle = sine.length().atan2(a.direction.dot(goal));
             let by = sine.normalize_or_zero() * angle;
             for e in across(goal) {
@@ -174,9 +176,9 @@ fn rows(targets: &[Placed<'_>], pose: &DAffine3, center: DVec3, size: f64) -> (D
     (jacobian, DVector::from_vec(asked))
 }
 
-/// Rank and null space, as slides and turns.
+/// Rank and null space, as slides and rotations.
 fn freedom(jacobian: DMatrix<f64>, center: DVec3, size: f64) -> (usize, Freedom) {
-    // Six rows at least, so that the decomposition has all six right singular vectors.
+    // At least six rows, so that the decomposition has all six right singular vectors.
     let count = jacobian.nrows().max(6);
     let svd = jacobian.resize(count, 6, 0.0).svd(false, true);
     let Some(v_t) = svd.v_t else {
@@ -189,7 +191,7 @@ fn freedom(jacobian: DMatrix<f64>, center: DVec3, size: f64) -> (usize, Freedom)
         return (rank, Freedom::default());
     }
     let basis = DMatrix::from_fn(6, null.len(), |i, j| v_t[(null[j], i)]);
-    // Combinations whose turning part vanishes are slides; the others, turns.
+    // Combinations without rotation are slides; the others are rotations.
     let turning = basis
         .rows(3, 3)
         .clone_owned()
@@ -209,7 +211,7 @@ fn freedom(jacobian: DMatrix<f64>, center: DVec3, size: f64) -> (usize, Freedom)
     }
     for k in (0..null.len()).filter(turns) {
         let (v, w) = motion(k);
-        // A turn may be mixed with slides that are free anyway.
+        // Removes the component along free slides from a rotation.
         let v = freedom.slides.iter().fold(v, |v, s| v - *s * v.dot(*s));
         let Some(direction) = w.try_normalize() else {
             continue;

@@ -1,77 +1,50 @@
-//! A constraint that two merged surfaces could keep, with its geometry in both parts' frames.
+//! A constraint that two merged surfaces could satisfy, with its geometry in both parts' frames.
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::Surface;
+use mortise_protocol::message::ConstraintKind;
 
 use crate::contact::Axis;
 use crate::merge::{MergedSurface, Side};
 
-/// What a target asks for. The letters are those of the notation page: d is a distance, θ an angle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum TargetKind {
-    /// Shaft in bore: axes coincide. Leaves a slide and a turn.
-    Concentric,
-    /// Planes meet face to face. Leaves two slides and a turn.
-    Coplanar,
-    /// Taper in taper: axes coincide, and so do circles of one radius. Leaves a turn.
-    Conical,
-    /// Ball in socket: centres coincide. Leaves three turns.
-    Spherical,
-    /// Ball in bore: the centre is on the axis. Leaves a slide and three turns.
-    Annular,
-}
-
-impl TargetKind {
-    /// In a word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Concentric => "concentric",
-            Self::Coplanar => "coplanar",
-            Self::Conical => "conical",
-            Self::Spherical => "spherical",
-            Self::Annular => "annular",
-        }
-    }
-}
-
-/// Two merged surfaces: of the moving part, of a fixed part. Indices into [`crate::merge`] of the parts' shapes.
+/// Two merged surfaces, one of the moving part and one of a fixed part. Indices into [`crate::merge`] of the parts' shapes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TargetId {
     /// The moving part, an index into [`mortise_brep::CadModel::parts`].
     pub moving_part: usize,
-    /// Its surface.
+    /// Surface of the moving part.
     pub moving_surface: usize,
     /// The other part.
     pub fixed_part: usize,
-    /// Its surface.
+    /// Surface of the other part.
     pub fixed_surface: usize,
 }
 
-/// A constraint two surfaces could keep.
+/// A constraint that two surfaces could satisfy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
-    /// Which surfaces.
+    /// The surfaces.
     pub id: TargetId,
-    /// What is asked.
-    pub kind: TargetKind,
-    /// Axis, outward normal, centre (any direction), or axis of a cone the way it widens: in the moving part's frame. Its origin is in the middle of
-    /// the moving surface where the surface leaves a choice.
+    /// The kind of constraint.
+    pub kind: ConstraintKind,
+    /// Axis, outward normal, centre (with arbitrary direction), or axis of a cone in the direction of its widening: in the
+    /// moving part's frame. Where the surface does not determine the origin, it is in the middle of the moving surface.
     pub moving: Axis,
-    /// The same of the fixed surface, in the fixed part's frame.
+    /// The corresponding axis of the fixed surface, in the fixed part's frame.
     pub fixed: Axis,
-    /// Radius of the hole less that of what goes in, mm: the play to either side. 0 of planes and cones.
+    /// Radius of the hole minus that of the inner surface, mm: the play to either side. 0 for planes and cones.
     pub play_mm: f64,
-    /// Radius of what goes in, mm; 0 of planes and cones.
+    /// Radius of the inner surface, mm; 0 for planes and cones.
     pub radius_mm: f64,
-    /// Of a ball in a bore: the ball is the moving part's.
-    pub ball_moves: bool,
-    /// Face ids on both sides: contact between these is what the target explains.
+    /// Whether the inner surface (shaft, cone, ball) belongs to the moving part; `false` for planes.
+    pub inner_moves: bool,
+    /// Face ids of the moving part: the target accounts for contact between these faces and `fixed_faces`.
     pub moving_faces: Vec<u32>,
-    /// Of the fixed part.
+    /// Face ids of the fixed part.
     pub fixed_faces: Vec<u32>,
 }
 
-/// How far a target is from being kept.
+/// Alignment error of a target. The letters are those of the notation page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
     /// d, mm.
@@ -81,8 +54,8 @@ pub struct Misfit {
 }
 
 impl Target {
-    /// The target two surfaces could keep; `None` when they do not mate: of kinds that do not go together, or not an inside
-    /// with an outside. `middle` is a point in the middle of the moving surface, in its part's frame.
+    /// The target of two surfaces; `None` when they do not mate, because their kinds do not match or they are not an inside
+    /// and an outside. `middle` is a point in the middle of the moving surface, in its part's frame.
     pub(crate) fn between(
         id: TargetId,
         moving: &MergedSurface,
@@ -103,10 +76,15 @@ impl Target {
         let (kind, a, b, radii) = match (moving.surface, fixed.surface) {
             (Surface::Plane { frame: f }, Surface::Plane { frame: g }) => {
                 let foot = middle - f.z * (middle - f.origin).dot(f.z);
-                (TargetKind::Coplanar, at(foot, f.z), at(g.origin, g.z), [0.0; 2])
+                (
+                    ConstraintKind::Coplanar,
+                    at(foot, f.z),
+                    at(g.origin, g.z),
+                    [0.0; 2],
+                )
             }
             (Surface::Cylinder { frame: f, radius: r }, Surface::Cylinder { frame: g, radius: s }) => (
-                TargetKind::Concentric,
+                ConstraintKind::Concentric,
                 on(f.origin, f.z),
                 at(g.origin, g.z),
                 [r, s],
@@ -123,36 +101,46 @@ impl Target {
                     half_angle: y,
                 },
             ) => {
-                // Both along the way they widen, where the radius is that in the middle of the moving cone: there they are
-                // compared, not at the apex, which may be far away.
+                // Both axes point in the direction of widening, at the radius in the middle of the moving cone: the cones
+                // are compared there and not at the apex, which may be far away.
                 let here = r + (middle - f.origin).dot(f.z) * x.tan();
                 let beside = |origin: DVec3, z: DVec3, radius: f64, angle: f64| {
                     at(origin + z * ((here - radius) / angle.tan()), z * angle.signum())
                 };
                 let same = (x.abs() - y.abs()).abs() < 1e-2;
                 (
-                    same.then_some(TargetKind::Conical)?,
+                    same.then_some(ConstraintKind::Conical)?,
                     beside(f.origin, f.z, r, x),
                     beside(g.origin, g.z, s, y),
                     [0.0; 2],
                 )
             }
             (Surface::Sphere { frame: f, radius: r }, Surface::Sphere { frame: g, radius: s }) => (
-                TargetKind::Spherical,
+                ConstraintKind::Spherical,
                 at(f.origin, f.z),
                 at(g.origin, g.z),
                 [r, s],
             ),
-            // Of either part.
+            // The sphere may belong to either part.
             (Surface::Sphere { frame: f, radius: r }, Surface::Cylinder { frame: g, radius: s })
                 if in_bore > 0.0 =>
             {
-                (TargetKind::Annular, at(f.origin, f.z), at(g.origin, g.z), [r, s])
+                (
+                    ConstraintKind::Annular,
+                    at(f.origin, f.z),
+                    at(g.origin, g.z),
+                    [r, s],
+                )
             }
             (Surface::Cylinder { frame: f, radius: r }, Surface::Sphere { frame: g, radius: s })
                 if in_bore < 0.0 =>
             {
-                (TargetKind::Annular, on(f.origin, f.z), at(g.origin, g.z), [r, s])
+                (
+                    ConstraintKind::AnnularBore,
+                    on(f.origin, f.z),
+                    at(g.origin, g.z),
+                    [r, s],
+                )
             }
             _ => return None,
         };
@@ -163,24 +151,26 @@ impl Target {
             fixed: b,
             play_mm: in_bore * (radii[1] - radii[0]),
             radius_mm: radii[0].min(radii[1]),
-            ball_moves: in_bore > 0.0,
+            inner_moves: in_bore > 0.0,
             moving_faces: moving.faces.clone(),
             fixed_faces: fixed.faces.clone(),
         })
     }
 
-    /// (d, θ) at the given places of both parts.
+    /// (d, θ) at the given placements of both parts.
     pub fn misfit(&self, moving: &DAffine3, fixed: &DAffine3) -> Misfit {
         let (a, b) = (placed(&self.moving, moving), placed(&self.fixed, fixed));
         let between = a.origin - b.origin;
         let lines = a.direction.cross(b.direction).length();
         let cos = a.direction.dot(b.direction);
         let (distance_mm, angle_rad) = match self.kind {
-            TargetKind::Concentric => (between.reject_from(b.direction).length(), lines.atan2(cos.abs())),
-            TargetKind::Coplanar => (between.dot(b.direction).abs(), lines.atan2(-cos)),
-            TargetKind::Conical => (between.length(), lines.atan2(cos)),
-            TargetKind::Spherical => (between.length(), 0.0),
-            TargetKind::Annular => (between.reject_from(self.bore(&a, &b)).length(), 0.0),
+            ConstraintKind::Concentric => (between.reject_from(b.direction).length(), lines.atan2(cos.abs())),
+            ConstraintKind::Coplanar => (between.dot(b.direction).abs(), lines.atan2(-cos)),
+            ConstraintKind::Conical => (between.length(), lines.atan2(cos)),
+            ConstraintKind::Spherical => (between.length(), 0.0),
+            ConstraintKind::Annular | ConstraintKind::AnnularBore => {
+                (between.reject_from(self.bore(&a, &b)).length(), 0.0)
+            }
         };
         Misfit {
             distance_mm,
@@ -190,11 +180,14 @@ impl Target {
 
     /// Direction of the bore of an annular target.
     pub(crate) fn bore(&self, a: &Axis, b: &Axis) -> DVec3 {
-        if self.ball_moves { b.direction } else { a.direction }
+        match self.kind {
+            ConstraintKind::AnnularBore => a.direction,
+            _ => b.direction,
+        }
     }
 }
 
-/// An axis where its part is.
+/// An axis transformed by its part's placement.
 pub(crate) fn placed(axis: &Axis, at: &DAffine3) -> Axis {
     Axis {
         origin: at.transform_point3(axis.origin),

@@ -1,4 +1,4 @@
-//! Open shapes of one surface, cut into faces as wanted.
+//! Open shapes of one surface, cut into a given number of faces.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ const WORLD: Frame = Frame {
     z: DVec3::Z,
 };
 
-/// Two parts, the second moved.
+/// A model of two parts, the second moved by `place`.
 pub fn model(shapes: [Shape; 2], place: DAffine3) -> CadModel {
     let part = |shape: usize, placement: DAffine3| Part {
         name: ["first", "second"][shape].into(),
@@ -39,7 +39,7 @@ fn face(surface: Surface, reversed: bool) -> Face {
     }
 }
 
-/// Joins the faces of `edge`, and lists it in them.
+/// Adds `edge` to the shape and to the faces that it joins.
 fn add_edge(shape: &mut Shape, edge: Edge) {
     let id = shape.edges.len() as u32;
     for &f in &edge.faces {
@@ -120,7 +120,7 @@ pub fn wall(radius: f64, height: f64, sectors: u32, rows: u32, bore: bool) -> Sh
     shape
 }
 
-/// A plane ring in z = 0, a disc when `inner` is 0, looking up or down.
+/// A plane ring in z = 0 (a disc when `inner` is 0) that faces up or down.
 pub fn ring(inner: f64, outer: f64, steps: u32, up: bool) -> Shape {
     let mut shape = Shape {
         faces: vec![face(Surface::Plane { frame: WORLD }, !up)],

@@ -1,39 +1,40 @@
-//! What a described rig can do at its home pose: how finely it senses, how hard it pushes.
+//! Capabilities of a described rig at its home pose: resolution of its sensors, and force.
 
-use mortise_firmware::kinematics::Model;
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::rig::{Rig, RigFault};
 use serde::Serialize;
 
-/// Directions in which forces are tried: corners, edges and faces of a cube.
+/// Number of steps per axis of the grid of force directions: corners, edges and faces of a cube.
 const DIRECTIONS: i8 = 3;
 
 /// Figures of a description.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Abilities {
-    /// Its name.
+    /// Name of the rig.
     pub name: String,
-    /// Motors.
+    /// Number of motors.
     pub joints: usize,
-    /// Whether the handle's orientation is sensed.
+    /// Whether the handle's orientation is measured.
     pub senses_orientation: bool,
-    /// Where the handle is at home, world, mm.
+    /// Position of the handle at home, world, mm.
     pub home_mm: [f64; 3],
     /// Largest step of the handle for one count of any encoder, mm.
     pub resolution_mm: f64,
-    /// Force the motors can hold in the direction they are weakest in, of those the handle can move in, N. Below the ceiling.
+    /// Force that the motors can hold in their weakest direction among those in which the handle can move, N. Limited by the hardware
+    /// limit.
     pub force_weakest_n: f64,
-    /// In the direction they are strongest in, N.
+    /// Force in their strongest direction, N.
     pub force_strongest_n: f64,
-    /// Coulomb friction felt at the handle, at most, N.
+    /// Coulomb friction at the handle, at most, N.
     pub friction_n: f64,
     /// Isotropy of the Jacobian, 0 (singular) to 1.
     pub isotropy: f64,
-    /// Most counts of any encoder in a tick.
+    /// Largest number of counts of any encoder in a tick.
     pub counts_per_tick: f64,
 }
 
-/// Computes them. Cost: a posture and 26 directions.
+/// Computes the figures. Cost: one posture and 26 directions.
 ///
 /// # Errors
 /// See [`Model::new`].
@@ -65,8 +66,8 @@ pub fn abilities(rig: &Rig) -> Result<Abilities, RigFault> {
         found.counts_per_tick = found.counts_per_tick.max(f64::from(joint.counts_per_tick()));
     }
     for direction in directions() {
-        // Only what the handle can be moved in: the part of the direction in J's column space is what counts, and for one or two joints most directions have
-        // little of it. Columns are orthogonalised for that.
+        // Only the component within J's column space counts, in which the handle can move; for one or two joints most directions have
+        // little of it. The columns are orthogonalised to project onto it.
         let Some(direction) = within(&posture.jacobian, rig.joints.len(), direction) else {
             continue;
         };
@@ -90,7 +91,7 @@ fn directions() -> impl Iterator<Item = glam::Vec3> {
     })
 }
 
-/// `direction` within the span of the first `joints` columns, as a unit vector; `None` when it has none there.
+/// `direction` projected onto the span of the first `joints` columns, as a unit vector; `None` when the projection vanishes.
 fn within(jacobian: &glam::Mat3, joints: usize, direction: glam::Vec3) -> Option<glam::Vec3> {
     let mut basis: Vec<glam::Vec3> = Vec::new();
     for number in 0..joints {

@@ -1,4 +1,4 @@
-//! The file's tables, in its own units.
+//! The tables of a description file, in the file's units.
 
 use std::f32::consts::PI;
 
@@ -102,7 +102,7 @@ struct WristTable {
     home_deg: [f64; 3],
 }
 
-/// Reads the text; the error is TOML's own with line and column, or says what is wrong with the name.
+/// Parses the text. The error is TOML's own with line and column, or concerns the name.
 pub(super) fn read(text: &str) -> Result<Rig, String> {
     let file: File = toml::from_str(text).map_err(|error| error.to_string().trim().to_owned())?;
     let name = heapless::String::try_from(file.name.as_str())
@@ -180,7 +180,7 @@ pub(super) fn read(text: &str) -> Result<Rig, String> {
     })
 }
 
-/// Writes what [`read`] reads.
+/// Writes a text that [`read`] reads.
 pub(super) fn write(rig: &Rig) -> String {
     let length = |m: f32| significant(m / MM);
     let angle = |rad: f32| significant(rad / DEG);
@@ -250,6 +250,6 @@ pub(super) fn write(rig: &Rig) -> String {
             home_deg: wrist.home.map(angle),
         }),
     };
-    // Plain tables of plain values: TOML has a form for each.
+    // Plain tables of plain values always have a TOML form.
     toml::to_string(&file).unwrap_or_default()
 }

@@ -1,20 +1,20 @@
-//! A rig's description as a file: read, checked, written, and what follows from it.
+//! A rig's description as a file: read, checked and written, with the capabilities that follow from it.
 //!
-//! The file is TOML with millimetres and degrees (`docs/rigs.md`); the wire form has SI units. What is wrong is said with its key, its value, its
-//! range, and what to do; a file that passes here passes on the board, because both ask the same code.
+//! The file is TOML with millimetres and degrees (`docs/rigs.md`); the wire form has SI units. Errors name the key, its value, its range,
+//! and the remedy. A file that passes here passes on the board too, because both run the same code.
 
 mod abilities;
 mod file;
 
 use std::path::{Path, PathBuf};
 
-use mortise_firmware::kinematics::Model;
+use mortise_mechanism::kinematics::Model;
 use mortise_protocol::rig::{Rig, RigFault, RigKey};
 
 use crate::words::Words;
 pub use abilities::{Abilities, abilities};
 
-/// Why a file is no description of a rig.
+/// Reasons why a file is no valid description of a rig.
 #[derive(Debug, thiserror::Error)]
 pub enum DescriptionError {
     /// The file could not be read.
@@ -22,23 +22,23 @@ pub enum DescriptionError {
     Unreadable {
         /// File.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// It is not written as a description is.
+    /// The text is no description.
     #[error("{name}: {what}")]
     Written {
         /// File.
         name: String,
-        /// Line and key, and what is expected.
+        /// Line and key, and what was expected there.
         what: String,
     },
-    /// A number is out of its range, or what is described cannot work.
+    /// A number is out of its range, or the described mechanism cannot work.
     #[error("{name}: {}", .fault.words())]
     Fault {
         /// File.
         name: String,
-        /// Which.
+        /// The fault.
         fault: RigFault,
     },
 }
@@ -55,7 +55,7 @@ pub fn load_rig(path: &Path) -> Result<Rig, DescriptionError> {
     parse_rig(&text, &path.display().to_string())
 }
 
-/// Reads a description's text; `name` is for messages.
+/// Parses a description's text; `name` is used in messages.
 ///
 /// # Errors
 /// `Written`, `Fault`.
@@ -71,7 +71,7 @@ pub fn parse_rig(text: &str, name: &str) -> Result<Rig, DescriptionError> {
     Ok(rig)
 }
 
-/// The description as a file's text, numbers to six digits.
+/// The text of a description file, numbers with six digits.
 pub fn write_rig(rig: &Rig) -> String {
     file::write(rig)
 }
@@ -91,13 +91,13 @@ impl Words for RigFault {
                 "this kind of kinematics has {needed} joints with motors: write as many [[joint]] tables, in the order of docs/rigs.md"
             ),
             Self::Range { joint: number } => {
-                format!("{}: range_deg ends before it begins: write the smaller angle first", joint(number))
+                format!("{}: the end of range_deg is below its start: write the smaller angle first", joint(number))
             }
             Self::Home { joint: number } => {
-                format!("{}: home_deg lies outside range_deg: correct either", joint(number))
+                format!("{}: home_deg lies outside range_deg: correct one of them", joint(number))
             }
             Self::Counts { joint: number } => format!(
-                "{}: at rate_limit_deg_per_s its encoder moves more counts in a millisecond than can be told apart: lower the limit or the counts",
+                "{}: at rate_limit_deg_per_s its encoder moves more counts in a millisecond than a 16-bit counter can resolve: lower the limit or the counts",
                 joint(number)
             ),
             Self::WristAxes => {
@@ -107,7 +107,7 @@ impl Words for RigFault {
                 "in the home pose the links do not reach each other: check the lengths in [kinematics] and each home_deg".into()
             }
             Self::Singular => {
-                "the home pose is nearly singular, in some direction the motors hardly push the handle: choose each home_deg nearer to the middle of the workspace".into()
+                "the home pose is nearly singular: in some direction the motors can hardly push the handle; choose each home_deg nearer to the middle of the workspace".into()
             }
             Self::Workspace => {
                 "in the home pose the handle is outside ceilings.workspace_mm: check mount.origin_mm, or allow more".into()
@@ -116,7 +116,7 @@ impl Words for RigFault {
     }
 }
 
-/// The key with the table it is in.
+/// The key with the table it belongs to.
 fn place(key: RigKey, number: u8) -> String {
     let name = key.row().key;
     match name.split_once('.') {
@@ -145,7 +145,7 @@ fn ordinal(number: u8) -> &'static str {
         .unwrap_or("last")
 }
 
-/// The start of a table's description, as a part of a sentence.
+/// The first clause of a table's description, for use within a sentence.
 fn meaning(description: &str) -> String {
     let text = description.trim().trim_end_matches('.');
     let mut letters = text.chars();
@@ -156,7 +156,7 @@ fn meaning(description: &str) -> String {
     first + letters.as_str()
 }
 
-/// Six significant digits: what single precision and a change of unit leave.
+/// Rounds to six significant digits, the precision that remains after single precision and a change of unit.
 fn significant(value: f32) -> f64 {
     let text = format!("{:.5e}", f64::from(value));
     text.parse().unwrap_or(f64::from(value))

@@ -1,4 +1,4 @@
-//! The examples in the repository, round trips, and what is said of what is wrong.
+//! The repository's examples, round trips, and the messages about invalid descriptions.
 
 use super::*;
 
@@ -26,7 +26,7 @@ fn every_example_reads_can_work_and_comes_back_as_written() {
             found.force_strongest_n <= f64::from(rig.ceilings.force),
             "{found:?}"
         );
-        // Six digits of the file's units are within 2⁻¹⁷ of the value; written again they are the same text.
+        // Six digits in the file's units are within 2⁻¹⁷ of the value; writing them again gives the same text.
         let written = write_rig(&rig);
         let again = parse_rig(&written, name).unwrap_or_else(|error| panic!("{written}\n{error}"));
         assert_eq!(write_rig(&again), written);
@@ -38,7 +38,7 @@ fn every_example_reads_can_work_and_comes_back_as_written() {
     }
 }
 
-/// The examples are complete: a rig builder finds each key of each table in one of them.
+/// The examples are complete: each key of each table appears in at least one of them.
 #[test]
 fn every_key_is_in_an_example_and_in_the_page() {
     let page = include_str!("../../../../docs/rigs.md");
@@ -105,7 +105,7 @@ fn nothing_that_is_read_makes_it_panic() {
                 bytes[place] = random.u8(b' '..b'~');
             }
             if let Ok(rig) = parse_rig(&String::from_utf8_lossy(&bytes), name) {
-                // What is accepted can be built and asked.
+                // Every accepted description yields capabilities.
                 assert!(abilities(&rig).is_ok());
             }
         }

@@ -1,25 +1,25 @@
-//! What goes wrong at the inputs of a simulated board: encoders, drivers, stop input, supply.
+//! Faults at the inputs of a simulated board: encoders, drivers, stop input, supply.
 //!
-//! Not part of the line: the board is told beforehand ([`ToDevice::SimulatedInputs`]) and does it by itself, tick for tick alike in-process and
-//! emulated.
+//! They are not part of the line: the board gets them beforehand ([`ToDevice::SimulatedInputs`]) and applies them itself, tick for tick
+//! identically in-process and emulated.
 
 use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{self, InputFaultKind, ToDevice};
 use serde::Deserialize;
 
-/// One thing that goes wrong, as a scenario says it.
+/// One input fault, as a scenario describes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputFault {
-    /// What.
+    /// Kind.
     pub what: InputFaultName,
-    /// Which encoder or motor: 0 to 2 are the handle's position, 3 to 5 its rotation.
+    /// Encoder or motor: 0 to 2 are the handle's position, 3 to 5 its rotation.
     pub axis: Option<u8>,
-    /// By how many counts an encoder is off.
+    /// Error of an encoder, counts.
     pub counts: Option<i32>,
-    /// When it begins, ms after the hand began.
+    /// Start, ms after the hand's start.
     pub at_ms: u32,
-    /// How long it lasts, ms.
+    /// Duration, ms.
     #[serde(default = "once")]
     pub for_ms: u32,
 }
@@ -28,33 +28,33 @@ fn once() -> u32 {
     1
 }
 
-/// What can go wrong.
+/// Kinds of input faults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InputFaultName {
-    /// An encoder's counter is off by `counts` from here on.
+    /// An encoder's counter is off by `counts` from the start on.
     EncoderGlitch,
-    /// An encoder's counter stands still.
+    /// An encoder's counter stays constant.
     EncoderStuck,
-    /// The position reads as not a number.
+    /// The position reads as NaN.
     NotANumber,
-    /// A motor driver reports a fault without saying which.
+    /// A motor driver reports a fault without its cause.
     Driver,
-    /// A motor driver reports too much current.
+    /// A motor driver reports overcurrent.
     OverCurrent,
-    /// A motor driver reports too much heat.
+    /// A motor driver reports overtemperature.
     OverTemperature,
     /// The stop input is open.
     StopOpen,
-    /// The supply is too low.
+    /// The supply voltage is too low.
     SupplyLow,
 }
 
 impl InputFault {
-    /// As the board is told. Ticks are milliseconds.
+    /// The wire form. Ticks are milliseconds.
     ///
     /// # Errors
-    /// An axis or count that is missing, or there without need: in words.
+    /// A missing or superfluous axis or count, as a sentence.
     fn wire(&self) -> Result<message::InputFault, String> {
         use InputFaultName as N;
         let name = self.what;
@@ -89,10 +89,10 @@ impl InputFault {
     }
 }
 
-/// The message that tells the board of all of them; none at all ends what was told before.
+/// The message with all faults; an empty list clears the earlier ones.
 ///
 /// # Errors
-/// Too many, or one that is not possible: in words.
+/// Too many faults, or an invalid one, as a sentence.
 pub(super) fn message(faults: &[InputFault]) -> Result<ToDevice, String> {
     let all: Result<Vec<_>, _> = faults.iter().map(InputFault::wire).collect();
     let all = all.map_err(|what| format!("inputs: {what}"))?;

@@ -1,14 +1,15 @@
-//! A link that fails on purpose: frames lost, damaged, repeated, out of order or late; pauses, cuts and floods. Between client and board,
-//! whichever rig it is.
+//! A link with deliberate faults: frames lost, damaged, repeated, reordered or late; pauses, cuts and floods. It sits between client and
+//! any board.
 //!
-//! A [`FaultLine`] sits in the byte stream and works on whole frames, each direction on a thread of its own. It does nothing until
-//! [`FaultLine::begin`], so that a scene gets onto the board first, and nothing any more after [`FaultLine::end`].
+//! A [`FaultLine`] sits in the byte stream and works on whole frames, with one thread per direction. It does nothing until
+//! [`FaultLine::begin`], so that a scene can be uploaded first, and nothing after [`FaultLine::end`].
 //!
-//! **Time** is the wall clock's; of a board in lockstep it is the ticks that were released, so that equal seeds give equal runs there. Then the
-//! messages that are the clock (`Lockstep`, `Run`, `Ran`) pass unharmed, and a frame that waits is handed on with the next of them: late to the
-//! end of a batch of ticks. By the wall clock, a frame from the board that waits may be [`crate::READ_WAIT`] later still, if nothing else comes.
+//! **Time** is the wall clock's. For a board in lockstep it is the number of released ticks, so that equal seeds give equal runs. In that
+//! case the messages that make up the clock (`Lockstep`, `Run`, `Ran`) pass unharmed, and a waiting frame is delivered with the next of
+//! them: late by up to one batch of ticks. By the wall clock, a waiting frame from the board may be up to [`crate::READ_WAIT`] later still,
+//! if no other frame comes.
 //!
-//! What the board says is **overheard** before it is harmed: who measures sees every sample, whatever the client gets.
+//! Messages of the board are **overheard** before they are harmed: a measurement sees every sample, whatever the client receives.
 
 mod inputs;
 mod pump;
@@ -27,39 +28,39 @@ use crate::transport::Transport;
 pub use inputs::{InputFault, InputFaultName};
 use pump::{Pump, from_board, to_board};
 
-/// What goes wrong. The default is nothing. Shares are of frames, 0 to 1, and hold in both directions.
+/// The faults of a line. The default has none. Shares are fractions of frames, 0 to 1, in both directions.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Faults {
-    /// Equal seeds, equal faults.
+    /// Seed; equal seeds give equal faults.
     pub seed: u64,
-    /// Share that is lost.
+    /// Share of frames lost.
     pub drop: f64,
-    /// Share in which up to three bits are flipped.
+    /// Share of frames in which up to three bits are flipped.
     pub corrupt: f64,
-    /// Share that comes twice.
+    /// Share of frames delivered twice.
     pub repeat: f64,
-    /// Share that comes after the next one (50 ms later when none comes).
+    /// Share of frames delivered after the next one (or 50 ms later when none comes).
     pub reorder: f64,
-    /// Every frame is late by as much, drawn evenly between both, ms.
+    /// Range of the delay of every frame, uniformly distributed, ms.
     pub delay_ms: [u32; 2],
-    /// Pauses: what is under way comes when they end, all at once.
+    /// Pauses: frames under way are delivered together at the end.
     pub stall: Vec<Window>,
-    /// Cuts: what is under way is lost.
+    /// Cuts: frames under way are lost.
     pub disconnect: Vec<Window>,
-    /// Frames in a second that nobody sent: to the board noise or heartbeats, from it noise.
+    /// Spurious frames per second: to the board noise or heartbeats, from it noise.
     pub flood_per_s: u32,
-    /// What goes wrong at the board's inputs, where they are simulated.
+    /// Faults at the board's inputs, where they are simulated.
     pub inputs: Vec<InputFault>,
 }
 
-/// A time, counted from [`FaultLine::begin`].
+/// A time window, counted from [`FaultLine::begin`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Window {
-    /// When it begins, ms.
+    /// Start, ms.
     pub at_ms: u64,
-    /// How long it lasts, ms.
+    /// Duration, ms.
     pub for_ms: u64,
 }
 
@@ -70,10 +71,10 @@ impl Window {
 }
 
 impl Faults {
-    /// What is wrong with the numbers, in words.
+    /// Checks the numbers; the error is a sentence.
     ///
     /// # Errors
-    /// A share that is none, or a delay that ends before it begins.
+    /// A share outside 0 to 1, or a delay whose end is below its start.
     pub fn check(&self) -> Result<(), String> {
         for (name, share) in [
             ("drop", self.drop),
@@ -82,19 +83,21 @@ impl Faults {
             ("reorder", self.reorder),
         ] {
             if !(0.0..=1.0).contains(&share) {
-                return Err(format!("{name} = {share} is no share: 0 to 1"));
+                return Err(format!(
+                    "{name} = {share} is not a share: write a number from 0 to 1"
+                ));
             }
         }
         let [from, to] = self.delay_ms;
         if from > to {
             return Err(format!(
-                "delay_ms: from {from} to {to} is none; the smaller comes first"
+                "delay_ms: {from} to {to} is not a range; write the smaller number first"
             ));
         }
         inputs::message(&self.inputs).map(|_| ())
     }
 
-    /// The message that lets the simulated board's inputs fail; sent when their time is to begin. The line does not send it.
+    /// The message that makes the simulated board's inputs fail; to be sent at the start of their time. The line does not send it.
     ///
     /// # Errors
     /// As [`Faults::check`].
@@ -111,27 +114,27 @@ impl Faults {
     }
 }
 
-/// What was done to the frames, both directions together.
+/// Number of frames affected, both directions together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultCounts {
-    /// Frames that could be harmed.
+    /// Frames that were subject to faults.
     pub frames: u64,
-    /// Lost, by chance or in a cut.
+    /// Frames lost, at random or in a cut.
     pub lost: u64,
-    /// Damaged.
+    /// Frames damaged.
     pub corrupted: u64,
     /// Sent twice.
     pub repeated: u64,
-    /// Let pass by another.
+    /// Frames overtaken by another.
     pub reordered: u64,
-    /// Handed on later than they came.
+    /// Frames delivered late.
     pub late: u64,
-    /// Made up.
+    /// Spurious frames.
     pub flooded: u64,
 }
 
 impl FaultCounts {
-    /// What came after `before`.
+    /// Difference to the earlier counts `before`.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             frames: self.frames - before.frames,
@@ -145,17 +148,17 @@ impl FaultCounts {
     }
 }
 
-/// Handle of the faults in a link. Clones are the same line.
+/// Handle of the faults in a link. Clones refer to the same line.
 #[derive(Clone, Debug, Default)]
 pub struct FaultLine(Arc<Shared>);
 
 #[derive(Debug, Default)]
 struct Shared {
     faults: Mutex<Faults>,
-    /// Odd while faults act.
+    /// Odd while faults are active.
     epoch: AtomicU32,
     lockstep: AtomicBool,
-    /// Ticks released so far.
+    /// Number of ticks released so far.
     released: AtomicU64,
     closing: AtomicBool,
     overheard: Mutex<Vec<FromDevice>>,
@@ -169,7 +172,7 @@ struct Shared {
 }
 
 impl FaultLine {
-    /// Puts the line into a byte stream. A line is for one stream.
+    /// Inserts the line into a byte stream. A line serves one stream.
     ///
     /// # Errors
     /// `Thread`.
@@ -193,7 +196,7 @@ impl FaultLine {
             "mortise-faults-from",
             Box::new(move || {
                 let mut reader = reader;
-                // A board's stream has a wait of its own.
+                // The board's stream has its own wait.
                 pump.run(&mut |out, _| reader.read(out));
             }),
         )?;
@@ -208,20 +211,20 @@ impl FaultLine {
         })
     }
 
-    /// From the next frame on, in each direction, `faults` act; their time begins.
+    /// Activates `faults` from the next frame on in each direction; their time begins.
     pub fn begin(&self, faults: &Faults) {
         self.end();
         *self.0.faults.lock().unwrap_or_else(PoisonError::into_inner) = faults.clone();
         self.0.epoch.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// From the next frame on none do. What was held back is handed on first.
+    /// Deactivates all faults from the next frame on. Held-back frames are delivered first.
     pub fn end(&self) {
         let epoch = self.0.epoch.load(Ordering::SeqCst);
         self.0.epoch.store(epoch.next_multiple_of(2), Ordering::SeqCst);
     }
 
-    /// What was done since the line was made.
+    /// Counts since the line was made.
     pub fn counts(&self) -> FaultCounts {
         let of = |count: &AtomicU64| count.load(Ordering::Relaxed);
         let line = &*self.0;
@@ -236,13 +239,13 @@ impl FaultLine {
         }
     }
 
-    /// Telemetry and faults that the board told since [`FaultLine::begin`] or since asked last, harmed or not.
+    /// Telemetry and faults that the board reported since [`FaultLine::begin`] or the last call, harmed or not.
     pub fn overheard(&self) -> Vec<FromDevice> {
         std::mem::take(&mut self.0.overheard.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// Ends the threads, then lets go of what the stream kept alive.
+/// Ends the threads, then drops what the stream kept alive.
 struct Running {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
@@ -253,13 +256,13 @@ impl Drop for Running {
     fn drop(&mut self) {
         self.shared.closing.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // A panic there has shown as a lost link.
+            // A panic there has been reported as a lost link.
             let _ = thread.join();
         }
     }
 }
 
-/// A read that brought nothing, or the end of the stream.
+/// Number of bytes read, 0 when none came; `None` at the end of the stream.
 fn read_some(result: io::Result<usize>) -> Option<usize> {
     match result {
         Ok(0) => None,

@@ -1,4 +1,4 @@
-//! One direction of a faulty link: takes frames, harms them, hands them on.
+//! One direction of a faulty link: takes frames, harms them, delivers them.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -16,24 +16,24 @@ use serde::de::DeserializeOwned;
 use super::{Faults, Shared, read_some};
 use crate::transport::write_whole;
 
-/// A frame that lets others pass waits no longer than this, ms.
+/// Longest wait of a frame that is to be overtaken, ms.
 const REORDER_MS: u64 = 50;
-/// Frames made up at once, at most.
+/// Largest number of spurious frames at once.
 const FLOOD_AT_ONCE: f64 = 1000.0;
-/// Wait for input while something is held back, by the wall clock.
+/// Wait for input while frames are held back, by the wall clock.
 const SOON: Duration = Duration::from_millis(1);
 /// Milliseconds in a tick.
 const TICK_MS: u64 = 1000 / TICK_HZ as u64;
 
-/// What a frame is to the line.
+/// Meaning of a frame for the line.
 pub(super) enum Kind {
-    /// So many ticks run behind this one.
+    /// A run of this many ticks follows the frame.
     Run(u32),
-    /// The board has run what was released.
+    /// The board has finished the released run.
     Ran,
     /// Lockstep begins or ends.
     Lockstep(bool),
-    /// Worth overhearing.
+    /// A message to be overheard.
     Telling(Box<FromDevice>),
     /// Anything else.
     Other,
@@ -45,7 +45,7 @@ fn message<M: DeserializeOwned>(frame: &[u8]) -> Option<M> {
     read.ok().map(|(_, message)| message)
 }
 
-/// Of a frame to the board.
+/// Kind of a frame to the board.
 pub(super) fn to_board(frame: &[u8]) -> Kind {
     match message::<ToDevice>(frame) {
         Some(ToDevice::Run { ticks }) => Kind::Run(ticks),
@@ -54,7 +54,7 @@ pub(super) fn to_board(frame: &[u8]) -> Kind {
     }
 }
 
-/// Of a frame from the board.
+/// Kind of a frame from the board.
 pub(super) fn from_board(frame: &[u8]) -> Kind {
     match message::<FromDevice>(frame) {
         Some(FromDevice::Ran { .. }) => Kind::Ran,
@@ -69,23 +69,23 @@ pub(super) struct Pump {
     shared: Arc<Shared>,
     to: Box<dyn Write + Send>,
     kind: fn(&[u8]) -> Kind,
-    /// 0 to the board, 1 from it.
+    /// 0: to the board, 1: from it.
     direction: u64,
     random: Rng,
     faults: Faults,
     epoch: u32,
     started: Instant,
     ticks: u64,
-    /// Time at which faults began, ms.
+    /// Start of the faults, ms.
     begun: u64,
-    /// Bytes of a frame whose end has not come.
+    /// Bytes of an incomplete frame.
     part: Vec<u8>,
-    /// Frames by when they are due and in which order they came.
+    /// Waiting frames by delivery time and order of arrival.
     waiting: BTreeMap<(u64, u64), Vec<u8>>,
     order: u64,
-    /// A frame that lets the next one pass, and since when.
+    /// A frame that the next one will overtake, and its time of arrival.
     held: Option<(u64, Vec<u8>)>,
-    /// Frames of a flood that are owed, and up to when they are counted.
+    /// Spurious frames still to be sent, and the time up to which they are counted.
     owed: f64,
     owed_until: u64,
 }
@@ -121,7 +121,7 @@ impl Pump {
         }
     }
 
-    /// Until the stream ends on either side.
+    /// Runs until the stream ends on either side.
     pub(super) fn run(mut self, read: &mut Read<'_>) {
         let mut bytes = [0u8; 4096];
         while !self.shared.closing.load(Ordering::Relaxed) {
@@ -139,7 +139,7 @@ impl Pump {
     fn take(&mut self, bytes: &[u8]) -> io::Result<()> {
         for &byte in bytes {
             self.part.push(byte);
-            // What is too long to be a frame is none of ours to judge.
+            // Data too long to be a frame passes unharmed.
             if byte == 0 || self.part.len() > 2 * MAX_FRAME {
                 let frame = std::mem::take(&mut self.part);
                 self.frame(frame)?;
@@ -161,7 +161,7 @@ impl Pump {
         self.epoch % 2 == 1
     }
 
-    /// Since faults began, ms.
+    /// Time since the faults began, ms.
     fn now(&self) -> u64 {
         self.clock().saturating_sub(self.begun)
     }
@@ -174,7 +174,7 @@ impl Pump {
         }
     }
 
-    /// Notices that faults began or ended.
+    /// Detects that faults began or ended.
     fn follow(&mut self) -> io::Result<()> {
         let epoch = self.shared.epoch.load(Ordering::SeqCst);
         if epoch == self.epoch {
@@ -209,7 +209,7 @@ impl Pump {
                 write_whole(&mut *self.to, &frame)
             }
             Kind::Ran => {
-                // A client waits for one run's end before it asks for the next.
+                // A client waits for one run's end before it requests the next.
                 self.ticks = self.shared.released.load(Ordering::SeqCst);
                 self.flood()?;
                 self.release(false)?;
@@ -239,7 +239,7 @@ impl Pump {
         let shared = self.shared.clone();
         count(&shared.frames);
         let now = self.now();
-        // Each is drawn whatever comes of the others: one share changed leaves the others' draws as they are.
+        // Every decision is drawn regardless of the others, so that changing one share leaves the other draws unchanged.
         let [lost, damaged, twice, passed] = [
             self.faults.drop,
             self.faults.corrupt,
@@ -275,7 +275,7 @@ impl Pump {
         }
     }
 
-    /// Up to three bits, the delimiter spared: joined to the next frame it would take that one with it.
+    /// Flips up to three bits but leaves the delimiter: without it the next frame would be lost too.
     fn damage(&mut self, frame: &mut [u8]) {
         let Some(body) = frame.len().checked_sub(1).filter(|&body| body > 0) else {
             return;
@@ -290,7 +290,7 @@ impl Pump {
         self.waiting.insert((due, self.order), frame);
     }
 
-    /// Hands on what is due, or everything.
+    /// Delivers the frames that are due, or all.
     fn release(&mut self, all: bool) -> io::Result<()> {
         let now = self.now();
         if let Some((since, _)) = &self.held
@@ -313,7 +313,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Makes up what a flood owes by now.
+    /// Sends the spurious frames due by now.
     fn flood(&mut self) -> io::Result<()> {
         if self.faults.flood_per_s == 0 {
             return Ok(());
@@ -327,7 +327,7 @@ impl Pump {
             count(&self.shared.flooded);
             let mut room = [0u8; MAX_FRAME];
             let made_up = if self.direction == 0 && self.random.bool() {
-                // No client awaits an answer to number 0 but once in 65,536 messages.
+                // Number 0 is awaited by the client only once in 65,536 messages.
                 encode(0, &ToDevice::Heartbeat, &mut room).unwrap_or(&[0])
             } else {
                 let length = self.random.usize(1..64);

@@ -1,4 +1,4 @@
-//! A scene image without parts, of any size; and boards that misbehave.
+//! A scene image without parts, of any size; and faulty boards.
 #![allow(dead_code)]
 
 use std::collections::VecDeque;
@@ -11,7 +11,7 @@ use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{FromDevice, ToDevice};
 use mortise_rig::{Patience, PipeReader, PipeWriter, Transport, pipe};
 
-/// Impatient, for boards that never answer.
+/// Short waiting times, for boards that never answer.
 pub fn short() -> Patience {
     Patience {
         greeting: Duration::from_millis(600),
@@ -20,7 +20,7 @@ pub fn short() -> Patience {
     }
 }
 
-/// A sound scene image without parts: a header and `filling` bytes of blob that depend on `seed`.
+/// A valid scene image without parts: a header and `filling` bytes of blob that depend on `seed`.
 pub fn image(filling: usize, seed: u8) -> Vec<u8> {
     let head = size_of::<Header>();
     let length = head + filling.next_multiple_of(4);
@@ -80,7 +80,7 @@ pub fn wire() -> (Transport, FarEnd) {
 }
 
 impl FarEnd {
-    /// The next message from the host; `None` when it is gone.
+    /// The next message from the host; `None` when the host is gone.
     pub fn next(&mut self) -> Option<(u16, ToDevice)> {
         let mut byte = [0];
         loop {
@@ -100,16 +100,16 @@ impl FarEnd {
     pub fn say(&mut self, message: &FromDevice) {
         let mut frame = [0; MAX_FRAME];
         let bytes = encode(0, message, &mut frame).expect("fits");
-        // The host may have gone already.
+        // The host may be gone already.
         let _ = self.to_host.write_all(bytes);
     }
 }
 
-/// Bytes through here are now and then lost or changed.
+/// A reader that now and then loses or changes a byte.
 pub struct Faulty<T> {
     pub inner: T,
     pub random: Random,
-    /// One byte in so many is hit.
+    /// Mean number of bytes per harmed byte.
     pub one_in: u64,
 }
 
@@ -136,7 +136,7 @@ impl<T: Read> Read for Faulty<T> {
         for &byte in &out[..count] {
             match self.random.next() {
                 dice if dice % self.one_in != 0 => kept.push_back(byte),
-                // Lost.
+                // The byte is lost.
                 dice if dice & (1 << 40) != 0 => {}
                 dice => kept.push_back(byte ^ (1 << ((dice >> 41) % 8))),
             }

@@ -1,11 +1,11 @@
 //! Energy that the rounding of readings makes, held against theory.
 
 use glam::DVec3;
-use mortise_firmware::encoder::VELOCITY_FILTER_S;
-use mortise_firmware::simulated::RESOLUTION;
 use mortise_haptics::Settings;
+use mortise_mechanism::velocity::low_pass::VELOCITY_FILTER_S;
 use mortise_protocol::message::WirePose;
 use mortise_rig::RigSpec;
+use mortise_simulation::simulated::RESOLUTION;
 
 use crate::hand::{REACH_TICKS, REST_TICKS, reach, script};
 use crate::measure::energy;

@@ -44,7 +44,9 @@ const LAW: &[&str] = &[
 /// The closed loop: control plane, rig, recognition and guidance besides.
 const LOOP: &[&str] = &[
     "protocol/src",
+    "firmware/mechanism/src",
     "firmware/app/src",
+    "firmware/simulation/src",
     "firmware/boards/mps2-an500/src",
     "host/rig/src",
     "host/mating/src",

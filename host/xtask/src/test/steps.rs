@@ -15,7 +15,13 @@ const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// What property tests draw their cases from, unless the environment says otherwise: a commit passes or fails here as it does everywhere. Plain
 /// `cargo test` draws anew each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
-const BOARD_SIDE: [&str; 3] = ["mortise-protocol", "mortise-haptics", "mortise-firmware"];
+const BOARD_SIDE: [&str; 5] = [
+    "mortise-protocol",
+    "mortise-haptics",
+    "mortise-mechanism",
+    "mortise-firmware",
+    "mortise-simulation",
+];
 
 pub fn format(bench: &mut Bench) -> Result<String> {
     shell::run(shell::cargo(&bench.root).args(["fmt", "--all", "--check"]))?;

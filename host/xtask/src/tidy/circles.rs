@@ -17,7 +17,7 @@ use crate::rust_source::{Word, words};
 const NOT_YET: &[&str] = &[
     "firmware/app",
     "firmware/boards",
-    "firmware/haptics",
+    "firmware/mechanism",
     "host/app",
     "host/bake",
     "host/brep",

@@ -31,17 +31,47 @@ const KERNEL_MARKS: &[&str] = &[concat!(".hx", "x"), concat!("cx", "x::")];
 const LAYERS: &[(&str, &[&str])] = &[
     (
         "firmware/boards",
-        &["mortise-firmware", "mortise-haptics", "mortise-protocol"],
+        &[
+            "mortise-firmware",
+            "mortise-mechanism",
+            "mortise-simulation",
+            "mortise-haptics",
+            "mortise-protocol",
+        ],
     ),
-    ("firmware/app", &["mortise-haptics", "mortise-protocol"]),
+    (
+        "firmware/app",
+        &[
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+            // By its tests alone: the simulation depends on the application.
+            "mortise-simulation",
+        ],
+    ),
+    (
+        "firmware/simulation",
+        &[
+            "mortise-firmware",
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+        ],
+    ),
     (
         "firmware/orders",
-        &["mortise-firmware", "mortise-haptics", "mortise-protocol"],
+        &[
+            "mortise-firmware",
+            "mortise-mechanism",
+            "mortise-haptics",
+            "mortise-protocol",
+        ],
     ),
+    ("firmware/mechanism", &["mortise-haptics", "mortise-protocol"]),
     ("firmware/haptics", &["mortise-protocol"]),
     ("firmware", &["mortise-haptics", "mortise-protocol"]),
     ("protocol", &[]),
-    ("host/mating", &["mortise-brep"]),
+    ("host/mating", &["mortise-brep", "mortise-protocol"]),
     (
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],
@@ -54,8 +84,10 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-firmware",
             "mortise-guide",
             "mortise-haptics",
+            "mortise-mechanism",
             "mortise-protocol",
             "mortise-rig",
+            "mortise-simulation",
         ],
     ),
     // Experiments are a program of their own.

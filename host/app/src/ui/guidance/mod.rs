@@ -1,8 +1,8 @@
-//! What could fit and what guides: the list of targets, with a choice for each and for all.
+//! The list of targets, candidate and active, with choices for each target and for all.
 
 mod words;
 
-use egui::{ComboBox, CornerRadius, Frame, Layout, Margin, RichText, Slider, Stroke, Ui, Vec2};
+use egui::{CornerRadius, Frame, Layout, Margin, RichText, Slider, Stroke, Ui, Vec2};
 use mortise_guide::{Row, Standing, When};
 use mortise_protocol::parameter::PARAMETERS;
 
@@ -10,22 +10,17 @@ use super::{control, parameters, theme};
 use crate::session::document::Document;
 use crate::session::{GUIDE_CAP_N, Intent, Session};
 
-/// First word of the parameters that are shown here and not among the others.
+/// First word of the parameters shown in this section and not among the others.
 pub const WORD: &str = "Guidance";
 
-/// Draws it.
+/// Draws the section.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     control::section(ui, "Guidance");
     ui.add_space(2.0);
-    ui.horizontal(|ui| {
-        // Both lists beside each other.
-        ui.spacing_mut().item_spacing.x = 4.0;
-        ui.spacing_mut().combo_width = 80.0;
-        for row in PARAMETERS.iter().filter(|row| row.name == WORD) {
-            parameters::choice(ui, session, wanted, row);
-        }
-        when(ui, session, wanted);
-    });
+    for row in PARAMETERS.iter().filter(|row| row.name == WORD) {
+        parameters::choice(ui, session, wanted, row);
+    }
+    when(ui, session, wanted);
     for row in PARAMETERS
         .iter()
         .filter(|row| row.name.starts_with(WORD) && row.name != WORD)
@@ -39,15 +34,15 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     else {
         explain(
             ui,
-            "While a part is in hand, this lists what it touches and could fit. Nothing needs to be set.",
+            "While a part is held, this lists the surfaces it could fit. Nothing needs to be set.",
         );
         return;
     };
     let free = words::freedom(&list.freedom);
-    control::row(ui, "Still free", free)
-        .on_hover_text("Motion that all targets taken up together leave to the part in hand");
+    control::row(ui, "Remaining motion", free)
+        .on_hover_text("Motion that all active targets together leave to the held part");
     if list.rows.is_empty() {
-        explain(ui, "It touches nothing that could fit.");
+        explain(ui, "It touches no surface that it could fit.");
     }
     for row in &list.rows {
         line(ui, session, document, row, wanted);
@@ -59,29 +54,26 @@ fn explain(ui: &mut Ui, text: &str) {
 }
 
 fn when(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
-    let known = session.guide.when;
-    let mut chosen = known;
-    let list = ComboBox::from_id_salt("guide when")
-        .selected_text(known.name())
-        .show_ui(ui, |ui| {
-            for when in When::ALL {
-                ui.selectable_value(&mut chosen, when, when.name());
-            }
-        });
-    let response = list.response.accessible_name("Guide when");
-    let hint = "When touching: a fit is taken up once its faces touch.\nWhen near: once surfaces that fit stand before each other";
-    response.on_hover_text(hint);
-    if chosen != known {
-        wanted.push(Intent::GuideWhen(chosen));
+    let known = When::ALL
+        .iter()
+        .position(|&w| w == session.guide.when)
+        .unwrap_or(0);
+    let names = When::ALL.map(|when| match when {
+        When::Touching => "on contact",
+        When::Near => "when near",
+    });
+    let hint = "On contact: guidance engages once the faces of a fit touch.\nWhen near: once surfaces that fit face each other, at most 2 mm apart";
+    if let Some(chosen) = parameters::combo(ui, "Engage", &names, known, hint, None) {
+        wanted.push(Intent::GuideWhen(When::ALL[chosen]));
     }
 }
 
 fn cap(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let mut newton = session.guide.force_cap_n;
     ui.horizontal(|ui| {
-        let hint = "Guidance never pulls harder: push harder than this, and the part leaves its axis";
+        let hint = "Upper limit of the guidance force: push harder than this, and the part leaves its axis";
         let label = ui.label(
-            RichText::new("Pulls up to")
+            RichText::new("Max guidance force")
                 .small()
                 .color(theme::of(ui).text_weak),
         );
@@ -124,7 +116,7 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, row: &Row, wanted: 
             ui.spacing_mut().interact_size.y = 0.0;
             let standing = words::standing(document, &session.guidance, row, session.guides());
             ui.add(small(standing, color).wrap());
-            ui.add(small(format!("· {}", words::misfit(row)), theme::of(ui).text_weak).wrap());
+            ui.add(small(format!("· {}", words::alignment(row)), theme::of(ui).text_weak).wrap());
         });
     });
     inside.response.on_hover_ui(|ui| {
@@ -134,7 +126,7 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, row: &Row, wanted: 
     });
 }
 
-/// What it is, and two switches.
+/// The target's title and its two switches.
 fn choices(ui: &mut Ui, session: &Session, row: &Row, title: &str, wanted: &mut Vec<Intent>) {
     let (id, off) = (row.target.id, row.standing == Standing::Off);
     let switch = |text: &str, on: bool| {
@@ -145,18 +137,24 @@ fn choices(ui: &mut Ui, session: &Session, row: &Row, title: &str, wanted: &mut 
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
             let (name, hint) = match off {
-                true => ("Switch on", "Let it guide again"),
-                false => ("Switch off", "It is not to guide, now or when it comes back"),
+                true => ("Switch on", "Let this target guide again"),
+                false => (
+                    "Switch off",
+                    "Keep this target from guiding, also when the part returns to it",
+                ),
             };
-            let wish = Intent::SwitchTargetOff(id, !off);
-            control::intent_button(ui, session, wanted, switch("Off", off), wish, hint)
+            let input = Intent::SwitchTargetOff(id, !off);
+            control::intent_button(ui, session, wanted, switch("Off", off), input, hint)
                 .accessible_name(format!("{name} {title}"));
             let (name, hint) = match row.pinned {
-                true => ("Unpin", "Treat it like any other"),
-                false => ("Pin", "Keep it in the list, and before what contradicts it"),
+                true => ("Unpin", "Treat it like any other target"),
+                false => (
+                    "Pin",
+                    "Keep it in the list, with priority over targets that contradict it",
+                ),
             };
-            let wish = Intent::PinTarget(id, !row.pinned);
-            control::intent_button(ui, session, wanted, switch("Pin", row.pinned), wish, hint)
+            let input = Intent::PinTarget(id, !row.pinned);
+            control::intent_button(ui, session, wanted, switch("Pin", row.pinned), input, hint)
                 .accessible_name(format!("{name} {title}"));
             ui.with_layout(Layout::left_to_right(egui::Align::Center), |ui| {
                 let ink = if off {

@@ -1,8 +1,9 @@
-//! Targets in words: what goes where, how far it is off, what holds of it, and which motion is left.
+//! Targets in words: the surfaces, the alignment error, the status, and the remaining motion.
 
 use glam::DVec3;
 use mortise_guide::{List, MAX_SENT, Row, Standing};
-use mortise_mating::recognise::{Freedom, Target, TargetId, TargetKind};
+use mortise_mating::recognise::{Freedom, Target, TargetId};
+use mortise_protocol::message::ConstraintKind;
 
 use crate::session::document::Document;
 
@@ -14,8 +15,8 @@ pub fn title(document: &Document, target: &Target) -> String {
     );
     let kind = target.kind.name();
     let between = match target.kind {
-        TargetKind::Coplanar => "on",
-        _ if target.ball_moves => "in",
+        ConstraintKind::Coplanar => "on",
+        _ if target.inner_moves => "in",
         _ => "over",
     };
     let mut text = format!("{kind}: {moving} {between} {fixed}");
@@ -23,19 +24,19 @@ pub fn title(document: &Document, target: &Target) -> String {
     text
 }
 
-/// Surfaces with their sizes, and by how much these differ.
+/// Surfaces with their diameters and the difference between these.
 pub fn surfaces(target: &Target) -> String {
     let (inner, outer) = match target.kind {
-        TargetKind::Concentric => ("shaft", "hole"),
-        TargetKind::Spherical => ("ball", "socket"),
-        TargetKind::Annular => ("ball", "bore"),
-        TargetKind::Conical => {
-            return match target.ball_moves {
+        ConstraintKind::Concentric => ("shaft", "hole"),
+        ConstraintKind::Spherical => ("ball", "socket"),
+        ConstraintKind::Annular | ConstraintKind::AnnularBore => ("ball", "bore"),
+        ConstraintKind::Conical => {
+            return match target.inner_moves {
                 true => "cone in tapered hole".to_owned(),
                 false => "tapered hole over cone".to_owned(),
             };
         }
-        TargetKind::Coplanar => return "flat face on flat face".to_owned(),
+        ConstraintKind::Coplanar => return "flat face on flat face".to_owned(),
     };
     let what_goes_in = 2.0 * (target.radius_mm - target.play_mm.min(0.0));
     let inner = format!("{inner} Ø {what_goes_in:.3}");
@@ -43,46 +44,46 @@ pub fn surfaces(target: &Target) -> String {
     let difference = match 2.0 * target.play_mm {
         play if play.abs() < 5e-4 => "same size".to_owned(),
         play if play > 0.0 => format!("{play:.3} mm clearance"),
-        play => format!("{:.3} mm too thick", -play),
+        play => format!("{:.3} mm interference", -play),
     };
-    match target.ball_moves {
+    match target.inner_moves {
         true => format!("{inner} in {outer}: {difference}"),
         false => format!("{outer} over {inner}: {difference}"),
     }
 }
 
-/// How far it is from being kept, and how far in.
-pub fn misfit(row: &Row) -> String {
+/// Alignment error of a row, and how far the surfaces are inserted.
+pub fn alignment(row: &Row) -> String {
     let (d, degrees) = (row.misfit.distance_mm, row.misfit.angle_rad.to_degrees());
     let mut text = match row.target.kind {
-        TargetKind::Concentric => format!("axis off by {d:.3} mm, {degrees:.2}°"),
-        TargetKind::Coplanar => format!("gap {d:.3} mm, {degrees:.2}°"),
-        TargetKind::Conical => format!("off by {d:.3} mm, {degrees:.2}°"),
-        TargetKind::Spherical => format!("centres {d:.3} mm apart"),
-        TargetKind::Annular => format!("centre {d:.3} mm off the axis"),
+        ConstraintKind::Concentric => format!("axis off by {d:.3} mm, {degrees:.2}°"),
+        ConstraintKind::Coplanar => format!("gap {d:.3} mm, {degrees:.2}°"),
+        ConstraintKind::Conical => format!("off by {d:.3} mm, {degrees:.2}°"),
+        ConstraintKind::Spherical => format!("centres {d:.3} mm apart"),
+        ConstraintKind::Annular | ConstraintKind::AnnularBore => format!("centre {d:.3} mm off the axis"),
     };
     match row.inside_mm {
-        Some(inside) if inside > 0.0 => text += &format!(", {inside:.1} mm in"),
-        Some(inside) => text += &format!(", {:.1} mm before it", -inside),
+        Some(inside) if inside > 0.0 => text += &format!(", {inside:.1} mm inserted"),
+        Some(inside) => text += &format!(", {:.1} mm before entry", -inside),
         None => {}
     }
     text
 }
 
-/// What holds of a row.
+/// Status of a row.
 pub fn standing(document: &Document, list: &List, row: &Row, guides: bool) -> String {
     let mut text = match &row.standing {
-        Standing::Candidate => "candidate: still too far off".to_owned(),
+        Standing::Candidate => "Candidate: out of range".to_owned(),
         Standing::Conflict(with) => {
             let names: Vec<String> = with.iter().map(|id| named(document, list, *id)).collect();
-            format!("contradicts {}", names.join(" and "))
+            format!("Contradicts {}", names.join(" and "))
         }
-        Standing::Off => "switched off".to_owned(),
-        Standing::ByContact => "fits: kept by contact".to_owned(),
-        Standing::Waiting if guides => format!("fits: waits, {MAX_SENT} guide already"),
-        Standing::Waiting => "fits: guidance is off".to_owned(),
-        Standing::Sent => "guides".to_owned(),
-        Standing::Refused(why) => format!("fits, but the board refused: {why}"),
+        Standing::Off => "Switched off".to_owned(),
+        Standing::ByContact => "Fits: held by contact".to_owned(),
+        Standing::Waiting if guides => format!("Queued: {MAX_SENT} already guide"),
+        Standing::Waiting => "Fits: guidance is off".to_owned(),
+        Standing::Sent => "Guides".to_owned(),
+        Standing::Refused(why) => format!("Fits, but the board refused: {why}"),
     };
     if row.pinned {
         text += ", pinned";
@@ -112,13 +113,13 @@ pub fn faces(document: &Document, target: &Target) -> String {
     )
 }
 
-/// Motion that is left.
+/// Remaining motion.
 pub fn freedom(freedom: &Freedom) -> String {
     let slide = freedom.slides.first().copied();
     let turn = freedom.turns.first().map(|axis| axis.direction);
     match (freedom.slides.len(), freedom.turns.len()) {
-        (3, 3) => "everything".to_owned(),
-        (0, 0) => "nothing".to_owned(),
+        (3, 3) => "unconstrained".to_owned(),
+        (0, 0) => "none".to_owned(),
         (1, 1) if slide.zip(turn).is_some_and(|(s, t)| s.cross(t).length() < 1e-6) => {
             format!("slides and turns about one axis{}", along(slide))
         }
@@ -134,7 +135,7 @@ pub fn freedom(freedom: &Freedom) -> String {
     }
 }
 
-/// A target that another contradicts: as short as it can be told from the rest.
+/// Short name of a contradicting target, unique in the list.
 fn named(document: &Document, list: &List, id: TargetId) -> String {
     let target = list.rows.iter().map(|row| &row.target).find(|t| t.id == id);
     match target {
@@ -147,7 +148,7 @@ fn named(document: &Document, list: &List, id: TargetId) -> String {
     }
 }
 
-/// Which of the assembly's axes a direction is, if one.
+/// Name of the assembly's axis along a direction, if it is along one.
 fn along(direction: Option<DVec3>) -> String {
     letter(direction).map_or_else(String::new, |name| format!(" ({name})"))
 }
@@ -179,7 +180,7 @@ mod tests {
         }
     }
 
-    fn row(kind: TargetKind, radius_mm: f64, play_mm: f64, ball_moves: bool) -> Row {
+    fn row(kind: ConstraintKind, radius_mm: f64, play_mm: f64, inner_moves: bool) -> Row {
         Row {
             target: Target {
                 id: TargetId {
@@ -193,7 +194,7 @@ mod tests {
                 fixed: axis(DVec3::Z),
                 play_mm,
                 radius_mm,
-                ball_moves,
+                inner_moves,
                 moving_faces: vec![3],
                 fixed_faces: (0..9).collect(),
             },
@@ -226,21 +227,21 @@ mod tests {
 
     #[test]
     fn sizes_are_those_of_both_surfaces_whichever_moves() {
-        let peg = row(TargetKind::Concentric, 8.875, 0.5, true).target;
+        let peg = row(ConstraintKind::Concentric, 8.875, 0.5, true).target;
         assert_eq!(
             surfaces(&peg),
             "shaft Ø 17.750 in hole Ø 18.750: 1.000 mm clearance"
         );
-        let ring = row(TargetKind::Concentric, 8.875, 0.5, false).target;
+        let ring = row(ConstraintKind::Concentric, 8.875, 0.5, false).target;
         assert_eq!(
             surfaces(&ring),
             "hole Ø 18.750 over shaft Ø 17.750: 1.000 mm clearance"
         );
-        // The smaller radius is then the hole's.
-        let press = row(TargetKind::Concentric, 9.0, -0.01, true).target;
+        // With interference `radius_mm` is the hole's, which is smaller than the shaft's.
+        let press = row(ConstraintKind::Concentric, 9.0, -0.01, true).target;
         assert_eq!(
             surfaces(&press),
-            "shaft Ø 18.020 in hole Ø 18.000: 0.020 mm too thick"
+            "shaft Ø 18.020 in hole Ø 18.000: 0.020 mm interference"
         );
         assert_eq!(title(&document(), &peg), "Concentric: peg in block");
         assert_eq!(title(&document(), &ring), "Concentric: peg over block");
@@ -248,8 +249,11 @@ mod tests {
 
     #[test]
     fn a_row_says_how_far_off_and_which_faces() {
-        let row = row(TargetKind::Concentric, 8.875, 0.5, true);
-        assert_eq!(misfit(&row), "axis off by 0.250 mm, 0.50°, 0.4 mm before it");
+        let row = row(ConstraintKind::Concentric, 8.875, 0.5, true);
+        assert_eq!(
+            alignment(&row),
+            "axis off by 0.250 mm, 0.50°, 0.4 mm before entry"
+        );
         assert_eq!(
             faces(&document(), &row.target),
             "peg: face 3\nblock: faces 0, 1, 2, 3, 4, 5 and 3 more"
@@ -258,8 +262,8 @@ mod tests {
 
     #[test]
     fn a_conflict_names_what_came_first() {
-        let (document, first) = (document(), row(TargetKind::Concentric, 6.0, 0.1, true));
-        let mut other = row(TargetKind::Concentric, 4.0, 0.1, true);
+        let (document, first) = (document(), row(ConstraintKind::Concentric, 6.0, 0.1, true));
+        let mut other = row(ConstraintKind::Concentric, 4.0, 0.1, true);
         other.standing = Standing::Conflict(vec![first.target.id]);
         other.pinned = true;
         let mut list = List {
@@ -268,29 +272,29 @@ mod tests {
         };
         assert_eq!(
             standing(&document, &list, &other, true),
-            "contradicts “Concentric: peg in block”, Ø 12.000, pinned"
+            "Contradicts “Concentric: peg in block”, Ø 12.000, pinned"
         );
         list.rows.clear();
         let text = standing(&document, &list, &other, true);
-        assert_eq!(text, "contradicts another target, pinned");
+        assert_eq!(text, "Contradicts another target, pinned");
     }
 
     #[test]
     fn what_is_left_reads_as_motion() {
-        let told = |slides: &[DVec3], turns: &[DVec3]| {
+        let words = |slides: &[DVec3], turns: &[DVec3]| {
             freedom(&Freedom {
                 slides: slides.to_vec(),
                 turns: turns.iter().map(|&t| axis(t)).collect(),
             })
         };
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-        assert_eq!(told(&[z], &[-z]), "slides and turns about one axis (z)");
-        assert_eq!(told(&[x], &[z]), "1 slide and 1 turn");
-        assert_eq!(told(&[x, y], &[z]), "slides and turns on a plane (across z)");
+        assert_eq!(words(&[z], &[-z]), "slides and turns about one axis (z)");
+        assert_eq!(words(&[x], &[z]), "1 slide and 1 turn");
+        assert_eq!(words(&[x, y], &[z]), "slides and turns on a plane (across z)");
         let lean = DVec3::new(1.0, 1.0, 0.0);
-        assert_eq!(told(&[], &[lean]), "turns about one axis");
-        assert_eq!(told(&[], &[x, y, z]), "turns every way about a point");
-        assert_eq!(told(&[], &[]), "nothing");
-        assert_eq!(told(&[x, y, z], &[x, y, z]), "everything");
+        assert_eq!(words(&[], &[lean]), "turns about one axis");
+        assert_eq!(words(&[], &[x, y, z]), "turns every way about a point");
+        assert_eq!(words(&[], &[]), "none");
+        assert_eq!(words(&[x, y, z], &[x, y, z]), "unconstrained");
     }
 }

@@ -1,0 +1,386 @@
+//! Contacts of one tick: a bounded store that keeps the deepest contacts and the ones with the longest lever arms.
+
+use glam::Vec3;
+
+use crate::collision::node_cursor::NodeCursor;
+use crate::math::symmetric6::dot;
+
+/// Capacity for contacts per tick.
+pub(crate) const MAX_CONTACTS: usize = 256;
+
+/// A point near the other part or inside it, linearised about the tick's start.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contact {
+    /// Jacobian row of the gap's rate for the scaled twist (v, ω·L): (n, (r × n)/L), n the world normal that pushes the object away.
+    pub row: [f32; 6],
+    /// Lever arm from the object's centre of mass to the point, world axes, m.
+    pub arm: Vec3,
+    /// Signed distance at the tick's start, m.
+    pub gap: f32,
+    /// Gap less the part of it that a rotation of the object closes at this lever arm, m: the smaller, the sooner a rotation makes the point touch.
+    pub reach_gap: f32,
+    /// Rate of the gap in the last solution, m/s; not updated while the contact is free.
+    pub rate: f32,
+    /// Branch of the force law that the last solution assumed.
+    pub phase: Phase,
+    /// Whether a target guides its faces.
+    pub guided: bool,
+    /// Face of the held part.
+    pub moving_face: u16,
+    /// Face of the other part.
+    pub static_face: u16,
+    /// The held part's second face where the point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
+    pub moving_edge_face: u16,
+    /// The other part's second face, likewise.
+    pub static_edge_face: u16,
+    /// Leaf in which it was found; identifies the other part.
+    pub leaf: NodeCursor,
+}
+
+impl Contact {
+    /// Empty contact. All zero, so that a fresh store lies in zeroed memory rather than being copied from flash.
+    const NONE: Self = Self {
+        row: [0.0; 6],
+        arm: Vec3::ZERO,
+        gap: 0.0,
+        reach_gap: 0.0,
+        rate: 0.0,
+        phase: Phase::Free,
+        guided: false,
+        moving_face: 0,
+        static_face: 0,
+        moving_edge_face: 0,
+        static_edge_face: 0,
+        leaf: NodeCursor::FIRST,
+    };
+}
+
+/// Branch of a contact's piecewise linear force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Phase {
+    /// No force.
+    Free,
+    /// Without damping: λ = −k·(gap + h·rate).
+    Parting,
+    /// With damping: λ = −k·(gap + (h + τ)·rate).
+    Closing,
+}
+
+/// Contacts kept for their depth; as many are kept for their lever arm.
+const HALF: usize = MAX_CONTACTS / 2;
+
+/// Store of at most [`MAX_CONTACTS`] contacts. Of all offered, half are the deepest; the other half are those of the rest that a rotation would bring
+/// to touch first.
+///
+/// The deepest alone would all lie on the side to which a part leans; with no contacts on the other side it would rock. Among equals the first
+/// offered stay. A contact is filled in place: it is too large to pass by value in the innermost loop.
+#[derive(Clone, Debug)]
+pub(crate) struct Contacts {
+    /// Contacts of this tick and the last one, alternating, filled up to their lengths. After an overflow the first half holds the deepest.
+    lists: [[Contact; MAX_CONTACTS]; 2],
+    /// Index of this tick's list: 0 or 1.
+    current: usize,
+    /// Length of this tick's list.
+    len: usize,
+    /// Heap over the first half after an overflow: the least deep on top.
+    by_gap: Heap,
+    /// Heap over the second half after an overflow: the largest reach gap on top.
+    by_reach: Heap,
+    /// Whether the list overflowed.
+    dropped: bool,
+    /// Number of dropped contacts that touch.
+    lost: u32,
+    /// Square of the longest arm, m².
+    farthest2: f32,
+    /// Number of the last tick's contacts that can be carried over.
+    carried_len: usize,
+}
+
+/// Heap of the indices of half a list, the largest key on top. Keys are stored side by side, not a contact's size apart.
+#[derive(Clone, Debug)]
+struct Heap {
+    keys: [f32; HALF],
+    places: [u8; HALF],
+}
+
+// Every index into the list must fit a byte.
+const _: () = assert!(MAX_CONTACTS <= 256);
+
+impl Heap {
+    const fn new() -> Self {
+        Self {
+            keys: [0.0; HALF],
+            places: [0; HALF],
+        }
+    }
+
+    /// Builds the heap over the `keys` of one half, in the list's order.
+    #[cold]
+    fn build(&mut self, keys: impl Iterator<Item = f32>) {
+        for (i, key) in keys.enumerate().take(HALF) {
+            self.keys[i] = key;
+            self.places[i] = i as u8;
+        }
+        for i in (0..HALF / 2).rev() {
+            self.sift_down(i);
+        }
+    }
+
+    fn largest(&self) -> f32 {
+        self.keys[0]
+    }
+
+    /// Replaces the key on top with one that is not larger. Returns the index of its contact.
+    fn replace_largest(&mut self, key: f32) -> usize {
+        let place = self.places[0];
+        self.keys[0] = key;
+        self.sift_down(0);
+        usize::from(place)
+    }
+
+    /// Moves the entry at `i` below all entries with larger keys: at most 7 steps.
+    fn sift_down(&mut self, mut i: usize) {
+        let (key, place) = (self.keys[i], self.places[i]);
+        loop {
+            let left = 2 * i + 1;
+            if left >= HALF {
+                break;
+            }
+            let right = left + 1;
+            let child = if right < HALF && self.keys[right] > self.keys[left] {
+                right
+            } else {
+                left
+            };
+            if self.keys[child] <= key {
+                break;
+            }
+            (self.keys[i], self.places[i]) = (self.keys[child], self.places[child]);
+            i = child;
+        }
+        (self.keys[i], self.places[i]) = (key, place);
+    }
+}
+
+impl Contacts {
+    pub const fn new() -> Self {
+        Self {
+            lists: [[Contact::NONE; MAX_CONTACTS]; 2],
+            current: 0,
+            len: 0,
+            by_gap: Heap::new(),
+            by_reach: Heap::new(),
+            dropped: false,
+            lost: 0,
+            farthest2: 0.0,
+            carried_len: 0,
+        }
+    }
+
+    /// Empties the store.
+    pub fn clear(&mut self) {
+        self.len = 0;
+        self.dropped = false;
+        self.lost = 0;
+        self.farthest2 = 0.0;
+        self.carried_len = 0;
+    }
+
+    /// Empties the store for the next tick. With `keep_previous` the contacts it held can be restored by [`Self::carry`].
+    pub fn begin(&mut self, keep_previous: bool) {
+        self.carried_len = if keep_previous { self.len } else { 0 };
+        self.current = 1 - self.current;
+        self.len = 0;
+        self.dropped = false;
+        self.lost = 0;
+        self.farthest2 = 0.0;
+    }
+
+    /// Carries over contacts that pushed in the last tick and whose leaf was not visited: the object's `motion` since (scaled as the rows) updates
+    /// the gap, the normal stays.
+    pub fn carry(&mut self, motion: &[f32; 6], unvisited: impl Fn(NodeCursor) -> bool) {
+        for i in 0..self.carried_len {
+            let old = self.lists[1 - self.current][i];
+            let gap = old.gap + dot(&old.row, motion);
+            if old.phase != Phase::Free
+                && unvisited(old.leaf)
+                && let Some(new) = self.offer(gap, old.reach_gap, old.arm.length_squared())
+            {
+                *new = Contact {
+                    gap,
+                    rate: 0.0,
+                    phase: Phase::Free,
+                    ..old
+                };
+            }
+        }
+    }
+
+    fn list(&self) -> &[Contact; MAX_CONTACTS] {
+        &self.lists[self.current]
+    }
+
+    pub fn as_slice(&self) -> &[Contact] {
+        self.list().get(..self.len).unwrap_or(&[])
+    }
+
+    pub fn as_mut_slice(&mut self) -> &mut [Contact] {
+        self.lists[self.current].get_mut(..self.len).unwrap_or(&mut [])
+    }
+
+    /// Contacts with a force in the last solution.
+    pub fn pushing(&self) -> usize {
+        self.as_slice().iter().filter(|c| c.phase != Phase::Free).count()
+    }
+
+    /// Whether any contact was dropped since [`Self::clear`].
+    pub fn dropped(&self) -> bool {
+        self.dropped
+    }
+
+    /// Number of contacts that touch and were dropped since [`Self::clear`].
+    pub fn lost(&self) -> u32 {
+        self.lost
+    }
+
+    /// The longest lever arm of all contacts accepted, m.
+    pub fn farthest(&self) -> f32 {
+        libm::sqrtf(self.farthest2)
+    }
+
+    /// Slot for a contact with a lever arm of √`arm2`, which the caller fills in; `None` if the contact is not kept. Once the list is full the cost
+    /// is two comparisons, and at most twice 7 heap steps when the contact displaces others.
+    #[inline]
+    pub fn offer(&mut self, gap: f32, reach_gap: f32, arm2: f32) -> Option<&mut Contact> {
+        let place = if self.len < MAX_CONTACTS {
+            self.len += 1;
+            self.len - 1
+        } else {
+            self.displace(gap, reach_gap)?
+        };
+        if arm2 > self.farthest2 {
+            self.farthest2 = arm2;
+        }
+        let contact = &mut self.lists[self.current][place];
+        contact.gap = gap;
+        contact.reach_gap = reach_gap;
+        Some(contact)
+    }
+
+    /// Index for a new contact once the list is full. Out of line: the loop over points is faster for it.
+    #[inline(never)]
+    fn displace(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
+        let list = &mut self.lists[self.current];
+        if !self.dropped {
+            self.dropped = true;
+            list.select_nth_unstable_by(HALF, |a, b| a.gap.total_cmp(&b.gap));
+            self.by_gap.build(list[..HALF].iter().map(|c| c.gap));
+            self.by_reach.build(list[HALF..].iter().map(|c| c.reach_gap));
+        }
+        if gap >= self.by_gap.largest() {
+            return self.displace_in_second_half(gap, reach_gap);
+        }
+        let place = self.by_gap.replace_largest(gap);
+        let displaced = self.lists[self.current][place];
+        if let Some(second) = self.displace_in_second_half(displaced.gap, displaced.reach_gap) {
+            self.lists[self.current][second] = displaced;
+        }
+        Some(place)
+    }
+
+    /// Index in the second half, unless all contacts there would touch sooner. Counts the dropped contact if it touches.
+    fn displace_in_second_half(&mut self, gap: f32, reach_gap: f32) -> Option<usize> {
+        let sooner = reach_gap < self.by_reach.largest();
+        let place = sooner.then(|| HALF + self.by_reach.replace_largest(reach_gap));
+        let left_out = place.map_or(gap, |place| self.lists[self.current][place].gap);
+        self.lost += u32::from(left_out < 0.0);
+        place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keeps_the_deepest_and_then_the_soonest_in_reach() {
+        // A full-period generator modulo 2048 offers each gap once, in a scrambled order; reach gaps fall as gaps rise.
+        let mut contacts = Contacts::new();
+        let mut x = 1u32;
+        for _ in 0..2048 {
+            x = (x * 1021 + 7) % 2048;
+            if let Some(c) = contacts.offer(x as f32, -(x as f32), 0.0) {
+                c.moving_face = x as u16;
+            }
+        }
+        assert!(contacts.dropped());
+        // No gap is negative.
+        assert_eq!(contacts.lost(), 0);
+        let mut kept = [false; 2048];
+        for c in contacts.as_slice() {
+            assert_eq!(
+                (c.gap, c.reach_gap),
+                (f32::from(c.moving_face), -f32::from(c.moving_face))
+            );
+            kept[c.gap as usize] = true;
+        }
+        for (gap, kept) in kept.iter().enumerate() {
+            assert_eq!(*kept, !(HALF..2048 - HALF).contains(&gap), "{gap}");
+        }
+        contacts.clear();
+        assert!(!contacts.dropped() && contacts.as_slice().is_empty());
+    }
+
+    #[test]
+    fn drops_nothing_up_to_capacity() {
+        let mut contacts = Contacts::new();
+        for i in 0..MAX_CONTACTS {
+            // The deeper half comes last, so every one of it displaces another.
+            assert!(contacts.offer(-(i as f32), 0.0, 0.0).is_some());
+        }
+        assert!(!contacts.dropped());
+        let sum: f32 = contacts.as_slice().iter().map(|c| c.gap).sum();
+        assert_eq!(sum, -((MAX_CONTACTS * (MAX_CONTACTS - 1) / 2) as f32));
+    }
+
+    #[test]
+    fn counts_dropped_contacts_that_touch() {
+        let mut contacts = Contacts::new();
+        let mut x = 1u32;
+        let touching = 700;
+        for _ in 0..2048 {
+            x = (x * 1021 + 7) % 2048;
+            // The deepest have the shortest lever arms.
+            let gap = x as f32 - touching as f32;
+            let _ = contacts.offer(gap, 0.5 * gap, 0.0);
+        }
+        let kept = contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
+        assert_eq!(contacts.lost() + kept, touching);
+        contacts.begin(false);
+        assert_eq!(contacts.lost(), 0);
+    }
+
+    #[test]
+    fn carries_contacts_of_unvisited_leaves() {
+        let mut contacts = Contacts::new();
+        for i in 0..10 {
+            let c = contacts.offer(-1e-6, 0.0, 0.0).unwrap();
+            c.row = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+            c.phase = Phase::Parting;
+            c.moving_face = i;
+        }
+        contacts.begin(true);
+        assert!(contacts.as_slice().is_empty());
+        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |_| false);
+        assert!(contacts.as_slice().is_empty());
+        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |leaf| leaf == NodeCursor::FIRST);
+        assert_eq!(contacts.as_slice().len(), 10);
+        for (i, c) in contacts.as_slice().iter().enumerate() {
+            assert_eq!((usize::from(c.moving_face), c.phase), (i, Phase::Free));
+            assert_eq!(c.gap, -1e-6 + 1e-6);
+        }
+        contacts.begin(false);
+        contacts.carry(&[0.0, 0.0, 1e-6, 0.0, 0.0, 0.0], |_| true);
+        assert!(contacts.as_slice().is_empty());
+    }
+}

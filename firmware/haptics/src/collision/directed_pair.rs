@@ -1,0 +1,138 @@
+//! Directed pair: the tree of one part against the field of the other, with the transforms between their frames.
+
+use glam::{Mat3, Vec3};
+use mortise_protocol::image::{FaceRecord, Field, NodeRecord, Place, PointRecord, Shape};
+
+use crate::collision::exact_surface::exact;
+use crate::collision::node_key::Keys;
+use crate::collision::rules::ExcludedPairs;
+use crate::math::pose::Pose;
+
+/// Rounding error of a position in a field, relative to the lengths summed: eight roundings of 2⁻²⁴ at most.
+const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
+
+/// Tree of one part, field of the other, and the transforms between their frames.
+pub(crate) struct DirectedPair<'i> {
+    pub index: u16,
+    pub backward: bool,
+    /// Whether a target guides the held part towards this part.
+    pub guided: bool,
+    /// Face pairs that contact exclusions keep apart.
+    pub excluded: ExcludedPairs,
+    pub nodes: &'i [NodeRecord],
+    /// Keys of the nodes in the coherence tables.
+    pub keys: Keys,
+    pub points: &'i [PointRecord],
+    pub field: Field<'i>,
+    /// Exact surfaces of the field's shape.
+    pub faces: &'i [FaceRecord],
+    /// Tree frame to field frame.
+    pub to_field: Affine,
+    /// Tree frame to lever arm (from the held part's centre of mass, world axes).
+    pub to_arm: Affine,
+    /// Field gradient to the direction, in the world, that pushes the held part away.
+    pub to_push: Mat3,
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Affine {
+    linear: Mat3,
+    offset: Vec3,
+}
+
+impl Affine {
+    #[inline]
+    pub fn apply(&self, p: [f32; 3]) -> Vec3 {
+        self.linear * Vec3::from_array(p) + self.offset
+    }
+
+    /// Rotates a direction.
+    #[inline]
+    pub fn turn(&self, direction: Vec3) -> Vec3 {
+        self.linear * direction
+    }
+}
+
+impl<'i> DirectedPair<'i> {
+    /// Whether the method does not use this direction: points of the other part against a voxmap of the held part.
+    pub fn unused(&self) -> bool {
+        self.backward && self.field.is_occupancy()
+    }
+
+    /// Position of a point of the tree in cells from the corner of the field's grid.
+    pub fn in_cells(&self, point: &PointRecord) -> [f32; 3] {
+        let in_field = self.to_field.apply(point.position);
+        self.field.in_cells(in_field.to_array())
+    }
+
+    /// The one face named by every cell within `clearance_m` of any of these points of the tree, if there is only one; at most `reads` reads, counted
+    /// as in [`Field::all_at`].
+    pub fn only_face_near<'p>(
+        &self,
+        points: impl Iterator<Item = &'p PointRecord>,
+        clearance_m: f32,
+        mut reads: u32,
+    ) -> Option<u16> {
+        let mut face = None;
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for point in points {
+            let in_field = self.to_field.apply(point.position);
+            if face.is_none() {
+                let Place::Cell(cell) = self.field.place(in_field.to_array()) else {
+                    return None;
+                };
+                face = Some(cell.face()?);
+            }
+            (low, high) = (low.min(in_field), high.max(in_field));
+        }
+        let extent = self.field.extent_m() + self.to_field.offset.abs().element_sum();
+        let clearance = Vec3::splat(clearance_m + ROUNDING * extent);
+        let [low, high] = [low - clearance, high + clearance].map(|p| self.field.in_cells(p.to_array()));
+        face.filter(|face| self.field.all_at(low, high, &mut reads, *face))
+    }
+
+    /// Signed distance from `p` (tree frame, m) to the field's shape, or a bound; from exact surfaces where they are known.
+    #[inline(always)]
+    pub fn distance(&self, p: [f32; 3]) -> f32 {
+        let in_field = self.to_field.apply(p);
+        match self.field.place(in_field.to_array()) {
+            Place::Cell(cell) => match exact(self.faces, self.field.nearby(&cell), in_field) {
+                Some((distance, _)) => distance,
+                None => self.field.distance(&cell),
+            },
+            Place::Far { inside: false, bound } => bound,
+            Place::Far { inside: true, bound } => -bound,
+        }
+    }
+
+    /// Directed pair `index` (odd: backward) of a held part and another one, each with its placement; `center` is the held part's centre of mass in
+    /// the world.
+    pub fn new(index: u16, held: (&Shape<'i>, Pose), other: (&Shape<'i>, Pose), center: Vec3) -> Self {
+        let backward = !index.is_multiple_of(2);
+        let ((tree, tree_pose), (field, field_pose)) = if backward { (other, held) } else { (held, other) };
+        let back = field_pose.rotation().transpose();
+        let apart = tree_pose.position - field_pose.position;
+        let rotation = tree_pose.rotation();
+        let to_field = Affine {
+            linear: back * rotation,
+            offset: back * apart,
+        };
+        Self {
+            index,
+            backward,
+            guided: false,
+            excluded: ExcludedPairs::new(),
+            nodes: tree.nodes,
+            keys: Keys::new(index, tree.nodes.len()),
+            points: tree.points,
+            field: field.field,
+            faces: field.faces,
+            to_field,
+            to_arm: Affine {
+                linear: rotation,
+                offset: tree_pose.position - center,
+            },
+            to_push: field_pose.rotation() * if backward { -1.0 } else { 1.0 },
+        }
+    }
+}

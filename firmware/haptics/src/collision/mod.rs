@@ -1,0 +1,30 @@
+//! Contact search: the sphere tree of one part against the distance field of another, in both directions.
+//!
+//! | file | what |
+//! |---|---|
+//! | `search`, `leaf` | traversal of all trees within a work budget; the points of one leaf |
+//! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
+//! | `exact_surface`, `facing` | distance to exact surfaces; normals that rule out a contact |
+//! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
+//! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
+//! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
+//! | `contact`, `face_pairs` | bounded store of contacts; touching face pairs |
+//! | `placement`, `node_cursor` | placement of a part; position of the search in all trees |
+
+pub(crate) mod ancestors;
+pub(crate) mod coherence;
+pub(crate) mod contact;
+pub(crate) mod cost;
+pub(crate) mod decimation;
+pub(crate) mod directed_pair;
+pub(crate) mod exact_surface;
+mod exclusion;
+mod face_cache;
+pub(crate) mod face_pairs;
+mod facing;
+mod leaf;
+pub(crate) mod node_cursor;
+pub(crate) mod node_key;
+pub(crate) mod placement;
+pub(crate) mod rules;
+pub(crate) mod search;

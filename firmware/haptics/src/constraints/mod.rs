@@ -1,0 +1,6 @@
+//! Constraint targets: alignment errors, saturating springs, engagement, and the gaps between guided faces.
+
+mod alignment;
+mod fit;
+pub(crate) mod saturating_spring;
+pub(crate) mod targets;

@@ -1,0 +1,227 @@
+//! The step with whatever is within reach: search for contacts, solve, and what the next tick needs to know of both.
+
+use mortise_protocol::image::SceneImage;
+
+use crate::baseline::explicit;
+use crate::collision::cost::{SPRING, solve_cost};
+use crate::collision::decimation::Searched;
+use crate::collision::node_cursor::NodeCursor;
+use crate::collision::placement::Placed;
+use crate::collision::rules::FacePairRules;
+use crate::collision::search::Search;
+use crate::dynamics::body::Grabbed;
+use crate::dynamics::contact_force::{ContactForce, Stiffness};
+use crate::dynamics::step::{MAX_SOLVES, Solution, Step, Terms};
+use crate::hand::ContactMemory;
+use crate::io::{Flags, Work};
+use crate::math::scalar::{larger, smaller};
+use crate::motion::{point_speed, slow_down};
+use crate::settings::{Integrator, Settings};
+use crate::state::Resolution;
+/// How fast the number of points that share the total stiffness may fall, a tick: stiffness of points still touching then rises
+/// slowly, and little energy is made of it.
+const SHARING_DECAY: f32 = 0.95;
+/// So many solves with contacts every step may take, whatever the search took; most do with fewer.
+const LEAST_SOLVES: u8 = 4;
+/// The diagonal of a cell, cells.
+const DIAGONAL_CELLS: f32 = 1.733;
+
+/// What a tick is computed from and does not change.
+#[derive(Clone, Copy)]
+pub(crate) struct Given<'a, 'i> {
+    pub scene: &'a SceneImage<'i>,
+    pub parts: &'a [Placed],
+    pub resolution: Resolution,
+    pub settings: &'a Settings,
+}
+
+/// How far the object may move in a tick.
+pub(crate) struct Reach {
+    /// Nothing beyond this is evaluated, so no point may move farther, m.
+    pub margin: f32,
+    /// The motion so far and that without contacts, of one period, scaled as the step's unknowns.
+    pub motions: [[f32; 6]; 2],
+    /// The free motion was held to the speed limit.
+    pub slowed: bool,
+}
+
+/// What the constraints in force mean for contact.
+pub(crate) struct Constraints<'a> {
+    pub rules: &'a dyn FacePairRules,
+    /// Share of the contact stiffness left between guided faces.
+    pub guided_share: f32,
+    /// Number of saturating springs among the force terms.
+    pub springs: usize,
+}
+
+/// A step, its force terms, and the solution without contacts.
+type Motion<'a, 't> = (&'a Step, Terms<'a, 't>, &'a Solution);
+
+impl Given<'_, '_> {
+    /// No point of the object may be faster, m/s. The textbook methods see no farther than the next voxel, so half a cell a tick (eq. 5 of Faas
+    /// 2010) bounds the explicit step, and half a voxel any step where there are voxmaps.
+    pub fn fastest(&self) -> f32 {
+        let cell = match self.settings.integrator {
+            Integrator::Implicit => self.resolution.voxel_m,
+            Integrator::Explicit => self.resolution.cell_m,
+        };
+        if cell > 0.0 {
+            smaller(
+                0.5 * cell / self.settings.period_s,
+                self.settings.object.speed_max_m_per_s,
+            )
+        } else {
+            self.settings.object.speed_max_m_per_s
+        }
+    }
+
+    /// Points that come this near are wanted, m: for the step, or for braking.
+    pub fn slack(&self) -> f32 {
+        match self.settings.integrator {
+            Integrator::Implicit => self.settings.contact.margin_m,
+            Integrator::Explicit => larger(self.settings.contact.margin_m, self.resolution.cell_m),
+        }
+    }
+
+    /// Points that come this near are braked, m; 0 for no braking.
+    fn braking_m(&self) -> f32 {
+        match self.settings.integrator {
+            Integrator::Implicit => 0.0,
+            Integrator::Explicit => self.resolution.cell_m,
+        }
+    }
+
+    /// How far from contact braking begins, m: within a cell of the surface, or in the layer of voxels round it, at most a diagonal away.
+    pub fn braking_margin(&self) -> f32 {
+        match self.settings.integrator {
+            Integrator::Implicit => 0.0,
+            Integrator::Explicit => DIAGONAL_CELLS * self.resolution.cell_m,
+        }
+    }
+}
+
+/// The step with whatever is within `reach` of the `grabbed` part.
+pub(crate) fn contact_step(
+    given: &Given<'_, '_>,
+    memory: &mut ContactMemory,
+    grabbed: &Grabbed,
+    (step, terms, free): Motion<'_, '_>,
+    reach: &Reach,
+    constraints: &Constraints<'_>,
+    work: &mut Work,
+) -> Solution {
+    let budget = given.settings.contact.point_budget;
+    let used = search(given, memory, grabbed, (step, free), reach, constraints, work);
+    let left = budget.saturating_sub(used);
+    let solves = most_solves(left, work.candidates, constraints.springs);
+    let motion = (step, terms, free);
+    let solution = solve(given, memory, grabbed, motion, constraints.guided_share, solves);
+    memory.pushing = memory.contacts.pushing() as u16;
+    work.contacts = memory.pushing;
+    work.solves = solution.solves;
+    work.flags.insert_if(!solution.settled, Flags::UNSETTLED);
+    solution
+}
+
+/// Fills the contacts in `memory`; field queries that it took.
+fn search(
+    given: &Given<'_, '_>,
+    memory: &mut ContactMemory,
+    grabbed: &Grabbed,
+    (step, free): (&Step, &Solution),
+    reach: &Reach,
+    constraints: &Constraints<'_>,
+    work: &mut Work,
+) -> u32 {
+    let settings = given.settings;
+    let (rules, springs) = (constraints.rules, constraints.springs);
+    let budget = settings.contact.point_budget;
+    let reserved = solve_cost(springs) * u32::from(free.solves + LEAST_SOLVES) + SPRING * springs as u32;
+    let held_shape = given.scene.shape_of_part(usize::from(grabbed.part));
+    let shrunk_m = memory.shrink(settings, &held_shape.field);
+    let search = Search {
+        scene: given.scene,
+        parts: given.parts,
+        held: grabbed.part,
+        held_shape,
+        shrunk_m,
+        pose: grabbed.pose(),
+        center: grabbed.center,
+        margin: reach.margin,
+        way: settings.period_s * point_speed(grabbed.twist, grabbed.body.reach),
+        slack: given.slack(),
+        motions: reach.motions,
+        swing: reach.margin / (grabbed.body.reach * grabbed.body.reach),
+        inverse_length: 1.0 / step.length,
+        busy: memory.busy,
+        decimation: memory.decimation.level(),
+        budget,
+        // Reserve at least half of the budget for contact search, however many targets are active.
+        reserved: reserved.min(budget / 2),
+        carried: if memory.busy { u32::from(memory.pushing) } else { 0 },
+        braking_m: given.braking_m(),
+        rules,
+    };
+    let start = memory.resume;
+    let (stopped, used) = search.run(start, &mut memory.coherence, &mut memory.contacts, work);
+    work.flags
+        .insert_if(search.decimation > 0, Flags::BUDGET_EXCEEDED);
+    memory.resume = stopped.unwrap_or(NodeCursor::FIRST);
+    memory.busy = used.all > budget / 2;
+    let touching = memory.contacts.as_slice().iter().filter(|c| c.gap < 0.0).count() as u32;
+    memory.decimation.update(&Searched {
+        start,
+        stopped,
+        used,
+        budget,
+        touching,
+        lost: memory.contacts.lost(),
+    });
+    memory.sharing = larger(larger(touching as f32, 1.0), memory.sharing * SHARING_DECAY);
+    work.flags
+        .insert_if(memory.contacts.dropped(), Flags::CONTACTS_DROPPED);
+    used.all
+}
+
+/// The step with the contacts in `memory`, by the integrator that is set.
+fn solve(
+    given: &Given<'_, '_>,
+    memory: &mut ContactMemory,
+    grabbed: &Grabbed,
+    (step, terms, free): Motion<'_, '_>,
+    guided_share: f32,
+    solves: u8,
+) -> Solution {
+    let contact = &given.settings.contact;
+    let farthest = memory.contacts.farthest();
+    let contacts = memory.contacts.as_mut_slice();
+    match given.settings.integrator {
+        Integrator::Explicit => {
+            let k = explicit::shared_stiffness(contact, memory.sharing);
+            let (reach, fastest) = (grabbed.body.reach, given.fastest());
+            explicit::with_contacts(step, terms, contacts, k, given.braking_m(), |mut twist| {
+                slow_down(&mut twist, reach, fastest);
+                twist
+            })
+        }
+        Integrator::Implicit => {
+            let point = contact.shared_stiffness(memory.sharing);
+            let k = Stiffness {
+                point,
+                guided: point * guided_share,
+            };
+            let scale = (farthest, step.length);
+            let mut force = ContactForce::new(contacts, k, step.period_s, contact.damping_s, scale);
+            step.with_contacts(free, terms, &mut force, solves)
+        }
+    }
+}
+
+/// How many solves there may be with contacts, when so many look-ups are `left`: past the third, a solve takes three eighths of one for each
+/// candidate too.
+fn most_solves(left: u32, candidates: u16, springs: usize) -> u8 {
+    let more = left / (solve_cost(springs) + 3 * u32::from(candidates) / 8);
+    u32::from(LEAST_SOLVES)
+        .saturating_add(more)
+        .min(u32::from(MAX_SOLVES)) as u8
+}

@@ -1,0 +1,5 @@
+//! Probe: gap and contacts at one pose, without motion or budget. For measurement, not for the tick.
+
+pub(crate) mod nearest;
+mod nearest_voxel;
+pub(crate) mod prober;

@@ -1,0 +1,468 @@
+//! Smallest gap or largest depth of two parts: branch and bound over the trees and fields of the contact search.
+//!
+//! A sphere whose lower bound exceeds the smallest gap found so far is skipped. One traversal in each direction takes all points whose distance a
+//! field query settles by an analytic face, and offers overlapping points as contacts. Until it has found a point in the band, leaves beyond the band
+//! are deferred, for their bounds are loose and seldom needed afterwards. A last traversal in each direction takes the deferred leaves, and measures
+//! against all faces the remaining points that could still be nearest. When the band held no point, it first descends by the nearer child, for an
+//! initial gap to compare with.
+
+use glam::Vec3;
+use mortise_protocol::image::{
+    Cell, EDGE_ERROR_CELLS, NO_FACE, Nearby, NodeRecord, Place, PointRecord, Shape,
+};
+
+use crate::collision::directed_pair::DirectedPair;
+use crate::collision::exact_surface::{OnFace, agreeing, closed_form, exact, on_face, unsigned_distance};
+use crate::collision::search::Traversal;
+use crate::io::Work;
+
+/// Diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
+const DIAGONAL_CELLS: f32 = 1.733;
+
+/// The smallest gap between two parts, or the largest depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// Signed distance, m: positive for a gap, negative for a depth. By the analytic faces when `exact`, else by the field or the voxmap's tangent
+    /// planes.
+    pub distance_m: f32,
+    /// Smallest distance by the field itself among the points queried, m: the distance that the tick uses. Infinite when no point lay where the field
+    /// stores distances.
+    pub field_distance_m: f32,
+    /// Whether the distance is one to an analytic face or edge, within single precision.
+    pub exact: bool,
+    /// Whether the point lies where the field stores distances, or past a tangent plane. When neither this nor `exact`, the distance is only a bound:
+    /// the gap or depth is at least this large.
+    pub in_band: bool,
+    /// Lever arm from the moving part's centre of mass to the point, axes of the fixed part, m.
+    pub arm: Vec3,
+    /// Face of the moving part, [`mortise_protocol::image::NO_FACE`] when unknown.
+    pub moving_face: u16,
+    /// Face of the fixed part, [`mortise_protocol::image::NO_FACE`] when unknown.
+    pub fixed_face: u16,
+}
+
+/// Result so far, over both directions.
+pub(crate) struct Progress {
+    /// The nearest point.
+    pub best: Nearest,
+    /// Work done.
+    pub work: Work,
+}
+
+impl Progress {
+    /// Distance beyond which a point is neither nearest nor overlapping, m.
+    #[inline]
+    fn limit(&self) -> f32 {
+        if self.best.distance_m > 0.0 {
+            self.best.distance_m
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Search in one direction.
+pub(crate) struct NearestSearch<'s, 'i> {
+    pair: &'s DirectedPair<'i>,
+    /// The shape whose field is queried.
+    shape: &'s Shape<'i>,
+    /// Largest distance that the field stores, m.
+    band: f32,
+    /// Largest interpolated distance without clamped samples, m.
+    resolved: f32,
+    /// Largest overestimate by interpolation, m.
+    edge_error: f32,
+    /// Whether all faces of the shape have a closed form, so that points the field does not settle can be measured.
+    measurable: bool,
+    /// Lower bound of the distances of points not settled, m.
+    open_bound: f32,
+    /// Leaves beyond the band are deferred before this node.
+    deferred_end: u32,
+    /// Lower bound of the distances in deferred leaves, m.
+    deferred_bound: f32,
+}
+
+/// A leaf to be evaluated.
+struct PendingLeaf<'i> {
+    node: u32,
+    points: &'i [PointRecord],
+    /// Lower bound of its points' distances, m.
+    bound: f32,
+    /// Whether its centre lies beyond the band: its points are unlikely to be nearest.
+    beyond: bool,
+}
+
+/// Result of one field query for a point.
+struct PointSample {
+    /// Distance to the face where `settled`, else interpolated or a bound, m.
+    distance: f32,
+    /// Lower bound of the distance, m.
+    lower: f32,
+    /// Distance that the tick uses, m; infinite where nothing is stored.
+    rendered: f32,
+    /// Whether the tick may make it push.
+    overlaps: bool,
+    inside: bool,
+    /// Nearest face, if known.
+    face: u16,
+    in_band: bool,
+    /// Whether an edge itself is nearest: then the surfaces give only a bound.
+    edge_nearest: bool,
+    /// Whether `distance` is that to an analytic face.
+    settled: bool,
+}
+
+impl PointSample {
+    /// A point neither inside nor in the band.
+    const NOTHING: Self = Self {
+        distance: f32::INFINITY,
+        lower: f32::INFINITY,
+        rendered: f32::INFINITY,
+        overlaps: false,
+        inside: false,
+        face: NO_FACE,
+        in_band: false,
+        edge_nearest: false,
+        settled: false,
+    };
+}
+
+impl<'s, 'i> NearestSearch<'s, 'i> {
+    /// Search that has not begun.
+    pub fn new(pair: &'s DirectedPair<'i>, shape: &'s Shape<'i>) -> Self {
+        let record = shape.field.record();
+        Self {
+            pair,
+            shape,
+            band: record.band,
+            resolved: record.band - DIAGONAL_CELLS * record.cell,
+            edge_error: EDGE_ERROR_CELLS * record.cell,
+            measurable: closed_form(shape),
+            open_bound: f32::INFINITY,
+            deferred_end: 0,
+            deferred_bound: f32::INFINITY,
+        }
+    }
+
+    /// Evaluates all leaves that could hold the nearest point or an overlapping one, as far as a field query settles their points. Overlapping points
+    /// go to `contacts`. Leaves beyond the band are deferred until a point in the band is found.
+    pub fn traverse(&mut self, progress: &mut Progress, contacts: &mut Traversal<'_, '_, '_>) {
+        self.leaves(progress, u32::MAX, |search, progress, leaf| {
+            if progress.best.distance_m > search.band {
+                search.deferred_end = leaf.node + 1;
+                if leaf.beyond {
+                    search.deferred_bound = search.deferred_bound.min(leaf.bound);
+                    return;
+                }
+            }
+            for point in leaf.points {
+                let sample = search.sample(point);
+                if sample.overlaps {
+                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
+                }
+                if !search.settle(&sample, point, progress) {
+                    search.open_bound = search.open_bound.min(sample.lower);
+                }
+            }
+            progress.work.points += leaf.points.len() as u32;
+        });
+    }
+
+    /// Evaluates what [`Self::traverse`] left open: deferred leaves, and points to be measured.
+    pub fn finish(&mut self, progress: &mut Progress, contacts: &mut Traversal<'_, '_, '_>) {
+        let needed = |lower: f32, limit: f32| lower < f32::INFINITY && lower <= limit;
+        if needed(self.deferred_bound, progress.limit()) && progress.best.distance_m > self.band {
+            self.descend(progress);
+        }
+        let measure = needed(self.open_bound, progress.best.distance_m);
+        let end = match (measure, needed(self.deferred_bound, progress.limit())) {
+            (true, _) => u32::MAX,
+            (false, true) => self.deferred_end,
+            (false, false) => return,
+        };
+        self.leaves(progress, end, |search, progress, leaf| {
+            let deferred = leaf.beyond && leaf.node < search.deferred_end;
+            if !deferred && !measure {
+                return;
+            }
+            for point in leaf.points {
+                let sample = search.sample(point);
+                if deferred && sample.overlaps {
+                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
+                }
+                if deferred || !sample.settled {
+                    search.measure(&sample, point, progress);
+                }
+            }
+            progress.work.points += leaf.points.len() as u32;
+        });
+    }
+
+    /// Descends by the nearer child to one leaf, and measures the point of it that seems nearest. Terminates because every step goes forward.
+    fn descend(&mut self, progress: &mut Progress) {
+        let nodes = self.pair.nodes;
+        let mut index = 0;
+        while let Some(node) = nodes.get(index) {
+            let end = node.skip as usize;
+            if end == index + 1 {
+                let mut nearest = None;
+                for point in node.points(self.pair.points) {
+                    progress.work.points += 1;
+                    let sample = self.sample(point);
+                    if (nearest.as_ref())
+                        .is_none_or(|(other, _): &(PointSample, _)| sample.distance < other.distance)
+                    {
+                        nearest = Some((sample, point));
+                    }
+                }
+                if let Some((sample, point)) = nearest {
+                    self.measure(&sample, point, progress);
+                }
+                return;
+            }
+            let mut child = index + 1;
+            let mut nearest = (f32::INFINITY, child);
+            while child < end
+                && let Some(node) = nodes.get(child)
+            {
+                let (bound, _) = self.bound(node, progress);
+                if bound < nearest.0 {
+                    nearest = (bound, child);
+                }
+                child = node.skip as usize;
+            }
+            index = nearest.1;
+        }
+    }
+
+    /// Passes to `visit` every leaf before node `end` that may hold an overlapping point or one nearer than the nearest so far.
+    #[inline]
+    fn leaves(
+        &mut self,
+        progress: &mut Progress,
+        end: u32,
+        mut visit: impl FnMut(&mut Self, &mut Progress, PendingLeaf<'i>),
+    ) {
+        let nodes = self.pair.nodes.get(..end as usize).unwrap_or(self.pair.nodes);
+        let mut index = 0;
+        while let Some(node) = nodes.get(index) {
+            let (bound, beyond) = self.bound(node, progress);
+            if bound > progress.limit() {
+                index = node.skip as usize;
+                continue;
+            }
+            if node.skip as usize == index + 1 {
+                let points = node.points(self.pair.points);
+                visit(
+                    self,
+                    progress,
+                    PendingLeaf {
+                        node: index as u32,
+                        points,
+                        bound,
+                        beyond,
+                    },
+                );
+            }
+            index += 1;
+        }
+    }
+
+    /// Lower bound of the signed distance of any point below a node, m; and whether its centre lies beyond the band.
+    #[inline(always)]
+    fn bound(&self, node: &NodeRecord, progress: &mut Progress) -> (f32, bool) {
+        progress.work.nodes += 1;
+        let center = self.pair.to_field.apply(node.center);
+        let distance = self.pair.field.bound(center.to_array());
+        // Inside, a clamped distance and a bound beyond the band say how deep at least, not at most.
+        if distance < -self.resolved {
+            return (f32::NEG_INFINITY, false);
+        }
+        // No sample exceeds the band, so this distance is not interpolated.
+        let beyond = distance > self.band + self.edge_error;
+        let error = if beyond { 0.0 } else { self.edge_error };
+        (distance - (node.radius + error), beyond)
+    }
+
+    #[inline(always)]
+    fn in_field(&self, point: &PointRecord) -> Vec3 {
+        self.pair.to_field.apply(point.position)
+    }
+
+    /// Queries the field at a point.
+    #[inline(always)]
+    fn sample(&self, point: &PointRecord) -> PointSample {
+        let p = self.in_field(point);
+        match self.pair.field.place(p.to_array()) {
+            Place::Cell(cell) => {
+                let nearby = self.pair.field.nearby(&cell);
+                let exact = exact(self.shape.faces, nearby, p);
+                if let Some((distance, face)) = exact
+                    && distance.abs() <= self.resolved
+                    && match nearby {
+                        Nearby::Convex(_) => distance <= 0.0,
+                        Nearby::Reentrant(_) => distance >= 0.0,
+                        _ => true,
+                    }
+                {
+                    return PointSample {
+                        distance,
+                        lower: distance,
+                        rendered: distance,
+                        overlaps: distance < 0.0,
+                        inside: distance < 0.0,
+                        face,
+                        in_band: true,
+                        edge_nearest: false,
+                        settled: true,
+                    };
+                }
+                self.interpolated(&cell, nearby, exact)
+            }
+            Place::Far { inside, bound } => {
+                // Inside a bound says how deep at least, not at most.
+                PointSample {
+                    distance: if inside { -bound } else { bound },
+                    lower: if inside { f32::NEG_INFINITY } else { bound },
+                    overlaps: inside,
+                    inside,
+                    ..PointSample::NOTHING
+                }
+            }
+        }
+    }
+
+    /// Distance where the cell's faces do not settle it; `exact` is what they give.
+    fn interpolated(&self, cell: &Cell<'_>, nearby: Nearby, exact: Option<(f32, u16)>) -> PointSample {
+        let interpolated = self.pair.field.distance(cell);
+        let mut sample = PointSample {
+            distance: interpolated,
+            lower: interpolated - self.edge_error,
+            rendered: interpolated,
+            face: nearby.face(),
+            ..PointSample::NOTHING
+        };
+        if let Some((distance, face)) = exact {
+            sample.rendered = distance;
+            sample.edge_nearest = match nearby {
+                Nearby::Convex(_) => distance > 0.0,
+                Nearby::Reentrant(_) => distance < 0.0,
+                _ => false,
+            };
+            if !sample.edge_nearest {
+                (sample.distance, sample.lower, sample.face) = (distance, distance, face);
+            } else if distance > sample.lower && distance > 0.0 {
+                // Outside a convex edge the surfaces give a lower bound.
+                sample.lower = distance;
+            }
+        }
+        sample.overlaps = sample.rendered < 0.0;
+        sample.inside = sample.distance < 0.0;
+        sample.in_band = sample.face != NO_FACE && sample.distance.abs() <= self.resolved;
+        if sample.distance < -self.resolved {
+            sample.lower = f32::NEG_INFINITY;
+        }
+        sample
+    }
+
+    /// Surface that pushes a settled point.
+    fn found(&self, sample: &PointSample, point: &PointRecord) -> Option<OnFace> {
+        if !sample.settled {
+            return None;
+        }
+        let found = on_face(self.shape.faces, sample.face, self.in_field(point))?;
+        Some(OnFace {
+            distance: sample.distance,
+            ..found
+        })
+    }
+
+    /// Uses a point if its sample settles it. Returns whether the point needs no measuring.
+    #[inline(always)]
+    fn settle(&self, sample: &PointSample, point: &PointRecord, progress: &mut Progress) -> bool {
+        if sample.rendered < progress.best.field_distance_m {
+            progress.best.field_distance_m = sample.rendered;
+        }
+        if sample.lower > progress.best.distance_m {
+            return true;
+        }
+        let exact = self.at_face(sample, point);
+        if exact.is_none() && self.measurable {
+            return false;
+        }
+        self.update_best(sample, exact, point, progress);
+        true
+    }
+
+    /// Uses a point by its most accurate distance.
+    fn measure(&self, sample: &PointSample, point: &PointRecord, progress: &mut Progress) {
+        if !self.settle(sample, point, progress) {
+            let exact = self.measured(sample, point, progress.best.distance_m);
+            self.update_best(sample, exact, point, progress);
+        }
+    }
+
+    fn update_best(
+        &self,
+        sample: &PointSample,
+        exact: Option<f32>,
+        point: &PointRecord,
+        progress: &mut Progress,
+    ) {
+        let distance_m = exact.unwrap_or(sample.distance);
+        if distance_m < progress.best.distance_m {
+            let (moving_face, fixed_face) = if self.pair.backward {
+                (sample.face, point.face)
+            } else {
+                (point.face, sample.face)
+            };
+            progress.best = Nearest {
+                distance_m,
+                field_distance_m: progress.best.field_distance_m,
+                exact: exact.is_some(),
+                in_band: sample.in_band,
+                arm: self.pair.to_arm.apply(point.position),
+                moving_face,
+                fixed_face,
+            };
+        }
+    }
+
+    /// Distance to the nearest face's surface, where that is the distance of the point.
+    #[inline(always)]
+    fn at_face(&self, sample: &PointSample, point: &PointRecord) -> Option<f32> {
+        if sample.settled {
+            return Some(sample.distance);
+        }
+        if sample.in_band && !sample.edge_nearest {
+            return agreeing(self.shape, sample.face, self.in_field(point), sample.distance);
+        }
+        None
+    }
+
+    /// Distance by all faces, if available and consistent with the field; `best` or more where it is at least `best`.
+    fn measured(&self, sample: &PointSample, point: &PointRecord, best: f32) -> Option<f32> {
+        let field = sample.distance;
+        // Outside, a distance of at least the smallest so far need not be exact.
+        let outside = if sample.in_band {
+            field >= 0.0
+        } else {
+            !sample.inside
+        };
+        let enough = if outside { best } else { f32::INFINITY };
+        let edge = point.edge_face != NO_FACE;
+        let distance = unsigned_distance(self.shape, self.in_field(point), edge, enough)?;
+        if outside && distance >= enough {
+            return Some(distance);
+        }
+        if sample.in_band {
+            // Next to an edge the field determines the sign only where it is certain.
+            let signed = if field < 0.0 { -distance } else { distance };
+            ((signed - field).abs() <= self.edge_error).then_some(signed)
+        } else if sample.inside {
+            (distance >= -field - self.edge_error).then_some(-distance)
+        } else {
+            (distance >= field - self.edge_error).then_some(distance)
+        }
+    }
+}

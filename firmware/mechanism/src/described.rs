@@ -1,0 +1,102 @@
+//! The mechanism of a rig's description between encoder counts and motor currents, the same on a real board and in simulation.
+
+use mortise_protocol::limits::MAX_JOINTS;
+use mortise_protocol::rig::{Rig, RigFault};
+
+use crate::encoder_watch::{EncoderWatch, probed};
+use crate::interface::{Drive, Sensed};
+use crate::joints::{ENCODERS, Joints};
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub struct DescribedMechanism {
+    joints: Joints,
+    watch: EncoderWatch<ENCODERS>,
+    /// A part is felt.
+    felt: bool,
+    /// Currents without the encoders' probes, A.
+    driven: [f32; MAX_JOINTS],
+    referenced: bool,
+}
+
+impl DescribedMechanism {
+    /// In its home pose with all counts 0, motors off, no part felt. `referenced`: that it stands there is known, and not only assumed.
+    ///
+    /// # Errors
+    /// See [`crate::kinematics::Model::new`].
+    pub fn new(rig: &Rig, referenced: bool) -> Result<Self, RigFault> {
+        Ok(Self {
+            joints: Joints::new(rig)?,
+            watch: EncoderWatch::new(),
+            felt: false,
+            driven: [0.0; MAX_JOINTS],
+            referenced,
+        })
+    }
+
+    /// Kinematics, scales and limits.
+    pub fn joints(&self) -> &Joints {
+        &self.joints
+    }
+
+    /// Takes the counts of one tick: pose, velocity, and what is wrong with the encoders. The reference is lost with the first jump and in an
+    /// impossible posture.
+    pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Sensed {
+        let reading = self.joints.read(counts);
+        let encoder_stuck = if self.felt {
+            self.watch
+                .update(&self.joints.axis_ticks(&reading.moved, &self.driven))
+        } else {
+            self.watch.rest();
+            None
+        };
+        self.referenced &= reading.jump.is_none() && !reading.impossible;
+        Sensed {
+            handle: reading.handle,
+            twist: reading.twist,
+            encoder_jump: reading.jump,
+            impossible_posture: reading.impossible,
+            encoder_stuck,
+            referenced: self.referenced,
+            ..Sensed::AT_REST
+        }
+    }
+
+    /// Currents for the motors (A, signed in the motor's sense) in the posture of the last reading, with the encoders' probes while a part is felt;
+    /// none with the motors off. See [`Joints::currents`].
+    pub fn currents(&mut self, drive: Drive) -> [f32; MAX_JOINTS] {
+        self.driven = match drive {
+            Drive::Off => [0.0; MAX_JOINTS],
+            Drive::Wrench(wrench) => self.joints.currents(wrench.force),
+        };
+        let mut currents = self.driven;
+        if drive == Drive::Off || !self.felt {
+            return currents;
+        }
+        for (joint, current) in currents.iter_mut().enumerate() {
+            if let Some(amplitude) = self.joints.probe(joint) {
+                *current = probed(*current, amplitude, self.watch.share(joint));
+            }
+        }
+        currents
+    }
+
+    /// See [`crate::interface::Mechanism::watch_encoders`].
+    pub fn watch_encoders(&mut self, felt: bool) {
+        self.felt = felt;
+    }
+
+    /// The mechanism rests where these counts say, and is known to: the next reading is compared with them.
+    pub fn reference(&mut self, counts: &[i32; ENCODERS]) {
+        self.watch.rest();
+        self.joints.start_at(counts);
+        self.referenced = true;
+    }
+
+    /// As at start, in the home pose, and known to be there.
+    pub fn reset(&mut self) {
+        self.reference(&[0; ENCODERS]);
+        self.felt = false;
+        self.driven = [0.0; MAX_JOINTS];
+    }
+}

@@ -1,0 +1,130 @@
+//! What the control plane reads of a mechanism and sets on it, once in each tick.
+//!
+//! A board implements [`Mechanism`] with its encoders, motors and stop input; a simulation with a model of them.
+
+use mortise_haptics::{Pose, Twist, Wrench};
+use mortise_protocol::message::{HandScript, InputFault};
+
+/// Ticks in a second.
+pub const TICK_HZ: u16 = 1000;
+/// Seconds in a tick.
+pub const TICK_S: f32 = 0.001;
+
+/// What the mechanism's sensors say in one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensed {
+    /// Handle in the world.
+    pub handle: Pose,
+    /// Handle's velocity at its origin, world axes, as the board estimates it.
+    pub twist: Twist,
+    /// The stop input is open (pressed, or its wire broken).
+    pub stop_open: bool,
+    /// The supply is below what motors and sensors need.
+    pub supply_low: bool,
+    /// A motor driver reports a fault.
+    pub driver_fault: Option<DriverFault>,
+    /// Encoder axis whose reading jumped further than the mechanism can move in a tick.
+    pub encoder_jump: Option<u8>,
+    /// The encoders say where the links cannot be.
+    pub impossible_posture: bool,
+    /// Encoder axis that does not follow its motor, see [`crate::encoder_watch`].
+    pub encoder_stuck: Option<u8>,
+    /// The encoders know where the handle is: absolute ones always do, counting ones since [`Mechanism::home`] and until they jump.
+    pub referenced: bool,
+}
+
+impl Sensed {
+    /// At the world's origin, at rest, nothing wrong.
+    pub const AT_REST: Self = Self {
+        handle: Pose::IDENTITY,
+        twist: Twist::ZERO,
+        stop_open: false,
+        supply_low: false,
+        driver_fault: None,
+        encoder_jump: None,
+        impossible_posture: false,
+        encoder_stuck: None,
+        referenced: true,
+    };
+}
+
+/// What a motor driver reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriverFault {
+    /// Motor axis.
+    pub axis: u8,
+    /// As far as the driver tells.
+    pub kind: DriverFaultKind,
+}
+
+/// Kinds of driver faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriverFaultKind {
+    /// One line for everything.
+    Any,
+    /// Too much current.
+    OverCurrent,
+    /// Too much heat.
+    OverTemperature,
+}
+
+/// What the motors are to do until the next tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drive {
+    /// Enable output inactive, no current: the handle hangs free.
+    Off,
+    /// Enable output active, currents so that this wrench acts on the handle at its origin, world axes.
+    Wrench(Wrench),
+}
+
+/// Encoders, motors, stop input: read once and driven once in each tick, from the control plane only.
+///
+/// Both calls are part of the 1 ms tick: bounded time, no blocking, no panics. After [`Drive::Off`] the enable output must be inactive
+/// when `drive` returns. A board that cannot produce every component of a wrench (its identity says which) drops the others.
+pub trait Mechanism {
+    /// It is what the description kept in flash says; else it is compiled in, and no description is taken.
+    const DESCRIBED: bool = false;
+
+    /// Reads the sensors.
+    fn sense(&mut self) -> Sensed;
+
+    /// Sets the motors. Applied at once; holds until the next call.
+    fn drive(&mut self, drive: Drive);
+
+    /// A part is felt from here on, or is not. Only while one is felt the mechanism may probe its encoders ([`crate::encoder_watch`]). Called in each tick
+    /// before [`Self::drive`].
+    fn watch_encoders(&mut self, _felt: bool) {}
+
+    /// Counts of the encoders at the handle, at most: m and rad. Readings are within half of this; 0: not known.
+    fn count(&self) -> [f32; 2] {
+        [0.0; 2]
+    }
+
+    /// The handle stands in its reference pose: counting encoders start from here. Called with the motors off only.
+    fn home(&mut self) {}
+
+    /// The controls of a simulated mechanism; `None` for a real one.
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        None
+    }
+}
+
+/// Controls that only a simulated mechanism has. Its time may wait for the host (lockstep). What a simulation does not model does nothing.
+pub trait Simulation {
+    /// Wrench (world, at the handle's origin) of the simulated hand in the last tick; `None` without such a hand.
+    fn hand(&self) -> Option<Wrench> {
+        None
+    }
+
+    /// Gives the simulated hand a script whose time starts now; `None` lets go.
+    fn set_hand(&mut self, _script: Option<&HandScript>) {}
+
+    /// Lets the inputs fail as the script says, from the next reading on.
+    fn set_input_faults(&mut self, _faults: &[InputFault]) {}
+
+    /// Puts the mechanism where it was at start, at rest, without a hand, so that a scenario starts from known bits; returns the handle's pose
+    /// there, or `None` where the mechanism stays as it is.
+    fn reset(&mut self) -> Option<Pose> {
+        None
+    }
+}

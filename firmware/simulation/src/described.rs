@@ -1,0 +1,360 @@
+//! A simulated mechanism of the links, encoders, motors and friction a rig's description tells of, moved by a scripted hand.
+//!
+//! In joint space, with M = diag(I) + m·JᵀJ (joint inertias and the handle's mass),
+//!
+//! ```text
+//! M·dθ̇/dt = τ_motor + Jᵀ·F_hand − diag(c)·θ̇ − f_c∘sign(θ̇),   F_hand = k·(x_wish − x) + b·(v_wish − v) + push
+//! ```
+//!
+//! Integrated like the free handle ([`crate::simulated`]) with [`SUBSTEPS`] backward-Euler steps a tick: one 3×3 system with springs, dampers and
+//! viscous friction implicit and J frozen over the step. Dry friction is then, of all impulses within ±h·f_c at the joints, the one that leaves the
+//! least energy (the principle of maximum dissipation), so that a joint stands exactly where no more than its own friction is asked of it. Joints end
+//! at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's orientation through the same equation.
+//! Sensing and currents are [`DescribedMechanism`], the code of a real rig.
+
+use glam::{Mat3, Vec3};
+use mortise_haptics::{Pose, Wrench, rotation};
+use mortise_mechanism::joints::{ENCODERS, Joints};
+use mortise_mechanism::kinematics::Posture;
+use mortise_protocol::limits::MAX_JOINTS;
+use mortise_protocol::message::{HandScript, InputFault};
+use mortise_protocol::rig::{Rig, RigFault};
+
+use crate::hand::{Grip, Hand, Wish};
+use crate::input_faults::{AXES, InputScript, Wiring};
+use crate::simulated::SUBSTEPS;
+use mortise_mechanism::described::DescribedMechanism;
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_S};
+
+/// Inertia of the handle about a wrist axis, kg·m², and its bearings' friction, N·m·s/rad.
+const WRIST_INERTIA: f32 = 1e-5;
+const WRIST_VISCOUS: f32 = 1e-3;
+/// Isotropy at which a linkage is at its stop.
+const STOP: f32 = 0.03;
+/// No joint turns faster, rad/s: keeps a step below a turn whatever the hand does.
+const RATE_MAX: f32 = 2_000.0;
+/// Rounds over the joints in which friction is found. Each takes energy out, so that few are a matter of accuracy alone.
+const FRICTION_ROUNDS: usize = 12;
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub struct Described {
+    /// Faults put in by tests.
+    pub wiring: Wiring,
+    script: InputScript,
+    links: Links,
+    mechanism: DescribedMechanism,
+    counts: [i32; ENCODERS],
+    offsets: [i32; ENCODERS],
+    hand: Option<Hand>,
+    hand_wrench: Wrench,
+    /// What the motors are given, with the encoders' probes.
+    currents: [f32; MAX_JOINTS],
+}
+
+/// The true mechanism.
+#[derive(Clone, Debug)]
+struct Links {
+    inertia: Vec3,
+    viscous: Vec3,
+    coulomb: Vec3,
+    mass: f32,
+    range: [[f32; 2]; MAX_JOINTS],
+    start: [f32; ENCODERS],
+    angles: [f32; MAX_JOINTS],
+    wrist: [f32; 3],
+    rates: Vec3,
+    wrist_rates: Vec3,
+    posture: Posture,
+}
+
+impl Described {
+    /// In its home pose, at rest, nobody holding it, motors off.
+    ///
+    /// # Errors
+    /// See [`mortise_mechanism::kinematics::Model::new`].
+    pub fn new(rig: &Rig) -> Result<Self, RigFault> {
+        let mechanism = DescribedMechanism::new(rig, true)?;
+        let of = |number: usize, value: fn(&mortise_protocol::rig::Joint) -> f32, else_: f32| {
+            rig.joints.get(number).map_or(else_, value)
+        };
+        // A joint that is not there has an inertia and nothing that moves it.
+        let each = |value: fn(&mortise_protocol::rig::Joint) -> f32, else_: f32| {
+            Vec3::new(of(0, value, else_), of(1, value, else_), of(2, value, else_))
+        };
+        let mut range = [[0.0; 2]; MAX_JOINTS];
+        let mut start = [0.0; ENCODERS];
+        for (number, joint) in rig.joints.iter().enumerate() {
+            range[number] = joint.range;
+            start[number] = joint.home;
+        }
+        let wrist = rig.wrist.map_or([0.0; 3], |wrist| wrist.home);
+        start[MAX_JOINTS..].copy_from_slice(&wrist);
+        let posture = *mechanism.joints().posture();
+        Ok(Self {
+            wiring: Wiring::SOUND,
+            script: InputScript::new(),
+            links: Links {
+                inertia: each(|joint| joint.inertia, 1.0),
+                viscous: each(|joint| joint.viscous, 0.0),
+                coulomb: each(|joint| joint.coulomb, 0.0),
+                mass: rig.handle_mass,
+                range,
+                start,
+                angles: [start[0], start[1], start[2]],
+                wrist,
+                rates: Vec3::ZERO,
+                wrist_rates: Vec3::ZERO,
+                posture,
+            },
+            mechanism,
+            counts: [0; ENCODERS],
+            offsets: [0; ENCODERS],
+            hand: None,
+            hand_wrench: Wrench::ZERO,
+            currents: [0.0; MAX_JOINTS],
+        })
+    }
+
+    /// Where the handle truly is, for tests: encoders round it.
+    pub fn true_pose(&self) -> Pose {
+        self.links.pose()
+    }
+
+    /// Kinetic energy of links and handle, J, for tests.
+    pub fn kinetic_energy(&self) -> f32 {
+        self.links.kinetic_energy()
+    }
+
+    /// What the motors are given, A, with the encoders' probes.
+    pub fn currents(&self) -> [f32; MAX_JOINTS] {
+        self.currents
+    }
+
+    fn advance(&mut self) {
+        let held = self.hand.as_mut().map(|hand| (hand.grip, hand.advance()));
+        let joints = self.mechanism.joints();
+        let motors = joints.torques(&self.currents);
+        let mut sum = Wrench::ZERO;
+        for _ in 0..SUBSTEPS {
+            let hand = self.links.step(motors, held.as_ref(), joints);
+            sum = sum + hand;
+        }
+        let share = 1.0 / SUBSTEPS as f32;
+        self.hand_wrench = Wrench {
+            force: sum.force * share,
+            torque: sum.torque * share,
+        };
+    }
+
+    /// The encoders' counts through `wiring`.
+    fn count(&mut self, wiring: &Wiring) {
+        for encoder in 0..ENCODERS {
+            // As many encoders as the free handle has axes.
+            self.offsets[encoder] = self.offsets[encoder].saturating_add(wiring.glitch[encoder]);
+            if !wiring.stuck[encoder] {
+                let angle = self.links.angle(encoder);
+                self.counts[encoder] = (self.mechanism.joints())
+                    .count(encoder, angle)
+                    .saturating_add(self.offsets[encoder]);
+            }
+        }
+    }
+}
+
+const _: () = assert!(AXES == ENCODERS);
+
+impl Links {
+    fn angle(&self, encoder: usize) -> f32 {
+        if encoder < MAX_JOINTS {
+            self.angles[encoder]
+        } else {
+            self.wrist[encoder - MAX_JOINTS]
+        }
+    }
+
+    fn pose(&self) -> Pose {
+        Pose::new(self.posture.position, self.posture.orientation)
+    }
+
+    fn mass_matrix(&self) -> Mat3 {
+        Mat3::from_diagonal(self.inertia)
+            + self.posture.jacobian.transpose() * self.posture.jacobian * self.mass
+    }
+
+    fn kinetic_energy(&self) -> f32 {
+        0.5 * self.rates.dot(self.mass_matrix() * self.rates)
+    }
+
+    /// One backward-Euler step; returns the hand's wrench in it.
+    fn step(&mut self, motors: Vec3, held: Option<&(Grip, Wish)>, joints: &Joints) -> Wrench {
+        const H: f32 = TICK_S / SUBSTEPS as f32;
+        // Nobody holding is a grip of no stiffness.
+        let (grip, wish) = held.copied().unwrap_or((Grip::NONE, Wish::at(self.pose())));
+        let jacobian = self.posture.jacobian;
+        let back = jacobian.transpose();
+        let pull = (wish.pose.position - self.posture.position) * grip.stiffness
+            + wish.twist.linear * grip.damping
+            + wish.push;
+        let yields = grip.damping + H * grip.stiffness;
+        let system = self.mass_matrix() + (Mat3::from_diagonal(self.viscous) + back * jacobian * yields) * H;
+        let momentum = self.mass_matrix() * self.rates + (motors + back * pull) * H;
+        self.rates = solve(system, momentum - friction(system, momentum, self.coulomb * H));
+
+        let axes = self.posture.wrist_axes;
+        let turn = rotation::log_continuous(
+            wish.pose.orientation * self.posture.orientation.conjugate(),
+            Vec3::ZERO,
+        );
+        let carried = self.posture.joint_axes * self.rates;
+        let twist = turn * grip.angular_stiffness + (wish.twist.angular - carried) * grip.angular_damping;
+        let angular_yields = grip.angular_damping + H * grip.angular_stiffness;
+        let has_wrist = joints.model().has_wrist();
+        if has_wrist {
+            let across = axes.transpose() * axes;
+            let inertia = across * WRIST_INERTIA;
+            let system =
+                inertia + (Mat3::from_diagonal(Vec3::splat(WRIST_VISCOUS)) + across * angular_yields) * H;
+            self.wrist_rates = solve(system, inertia * self.wrist_rates + axes.transpose() * twist * H);
+        }
+        let before = self.kinetic_energy();
+        self.move_on(H, joints);
+        // The inertia moves along with the angles; the forces that keep the energy of it are left out above, and stand here.
+        let after = self.kinetic_energy();
+        if after > before {
+            self.rates *= libm::sqrtf(before / after);
+        }
+        Wrench {
+            force: pull - jacobian * self.rates * yields,
+            torque: if has_wrist {
+                twist - axes * self.wrist_rates * angular_yields
+            } else {
+                Vec3::ZERO
+            },
+        }
+    }
+
+    /// Angles after `h` at the present rates, or at a stop.
+    fn move_on(&mut self, h: f32, joints: &Joints) {
+        let model = joints.model();
+        let mut angles = self.angles;
+        let mut rates = self.rates.to_array();
+        for joint in 0..model.joints() {
+            let [from, to] = self.range[joint];
+            let reached = angles[joint] + h * rates[joint];
+            angles[joint] = reached.clamp(from, to);
+            if reached != angles[joint] {
+                rates[joint] = 0.0;
+            }
+        }
+        let mut wrist = self.wrist;
+        for (angle, rate) in wrist.iter_mut().zip(self.wrist_rates.to_array()) {
+            *angle += h * rate;
+        }
+        match model.posture(angles, wrist) {
+            // Out of a narrow posture is always allowed.
+            Some(posture) if posture.isotropy > STOP || posture.isotropy >= self.posture.isotropy => {
+                self.rates = Vec3::from_array(rates);
+                (self.angles, self.wrist, self.posture) = (angles, wrist, posture);
+            }
+            _ => {
+                self.rates = Vec3::ZERO;
+                self.wrist_rates = Vec3::ZERO;
+            }
+        }
+    }
+}
+
+/// Impulse f of dry friction, |fᵢ| ≤ `most`ᵢ, that leaves the least of ½·(p − f)ᵀA⁻¹(p − f): coordinate after coordinate (projected Gauss–Seidel).
+/// All of the momentum p, exactly, where friction can hold it.
+fn friction(system: Mat3, momentum: Vec3, most: Vec3) -> Vec3 {
+    if momentum.abs().cmple(most).all() {
+        return momentum;
+    }
+    let inverse = system.inverse();
+    let mut friction = Vec3::ZERO;
+    for _ in 0..FRICTION_ROUNDS {
+        for joint in 0..MAX_JOINTS {
+            let rate = inverse.row(joint).dot(momentum - friction);
+            let wanted = friction[joint] + rate / inverse.col(joint)[joint];
+            friction[joint] = wanted.clamp(-most[joint], most[joint]);
+        }
+    }
+    friction
+}
+
+/// x of A·x = b, each part within ±[`RATE_MAX`]; zero where there is none.
+fn solve(system: Mat3, momentum: Vec3) -> Vec3 {
+    let found = system.inverse() * momentum;
+    if found.is_finite() {
+        found.clamp(Vec3::splat(-RATE_MAX), Vec3::splat(RATE_MAX))
+    } else {
+        Vec3::ZERO
+    }
+}
+
+impl Mechanism for Described {
+    fn sense(&mut self) -> Sensed {
+        self.advance();
+        let wiring = self.script.advance(self.wiring);
+        self.wiring.glitch = [0; AXES];
+        self.count(&wiring);
+        wiring.through(self.mechanism.read(&self.counts))
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.currents = self.mechanism.currents(drive);
+    }
+
+    fn watch_encoders(&mut self, felt: bool) {
+        self.mechanism.watch_encoders(felt);
+    }
+
+    fn count(&self) -> [f32; 2] {
+        self.mechanism.joints().count_at_handle()
+    }
+
+    /// The simulated operator knows exactly where the joints are.
+    fn home(&mut self) {
+        self.offsets = [0; ENCODERS];
+        for encoder in 0..ENCODERS {
+            self.counts[encoder] = self.mechanism.joints().count(encoder, self.links.angle(encoder));
+        }
+        self.mechanism.reference(&self.counts);
+    }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        Some(self)
+    }
+}
+
+impl Simulation for Described {
+    fn hand(&self) -> Option<Wrench> {
+        Some(self.hand_wrench)
+    }
+
+    fn set_hand(&mut self, script: Option<&HandScript>) {
+        self.hand = script.and_then(Hand::new);
+    }
+
+    fn set_input_faults(&mut self, faults: &[InputFault]) {
+        self.script.start(faults);
+    }
+
+    fn reset(&mut self) -> Option<Pose> {
+        let start = self.links.start;
+        self.links.angles = [start[0], start[1], start[2]];
+        self.links.wrist = [start[3], start[4], start[5]];
+        self.links.rates = Vec3::ZERO;
+        self.links.wrist_rates = Vec3::ZERO;
+        self.mechanism.reset();
+        self.links.posture = *self.mechanism.joints().posture();
+        self.script = InputScript::new();
+        self.counts = [0; ENCODERS];
+        self.offsets = [0; ENCODERS];
+        self.hand = None;
+        self.hand_wrench = Wrench::ZERO;
+        self.currents = [0.0; MAX_JOINTS];
+        Some(self.links.pose())
+    }
+}

@@ -1,0 +1,140 @@
+//! What goes wrong at the inputs of the simulated mechanism: put there by a test, or by a host's script.
+//!
+//! A script ([`InputFault`]s with their times) works wherever the simulated mechanism does: in-process and on the emulated board, tick for tick
+//! alike.
+
+use heapless::Vec;
+pub use mortise_firmware::scripts::AXES;
+use mortise_mechanism::interface::{DriverFault, DriverFaultKind, Sensed};
+use mortise_protocol::limits::MAX_INPUT_FAULTS;
+use mortise_protocol::message::{InputFault, InputFaultKind};
+
+/// State of the simulated wiring in one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wiring {
+    /// The stop input is open.
+    pub stop_open: bool,
+    /// The supply is too low.
+    pub supply_low: bool,
+    /// A motor driver reports a fault.
+    pub driver_fault: Option<DriverFault>,
+    /// Counts by which an axis's counter is off from the next reading on; taken once. Of a rotation the reading after that finds back.
+    pub glitch: [i32; AXES],
+    /// Axes whose counters stand still.
+    pub stuck: [bool; AXES],
+    /// The position reads as not a number.
+    pub not_a_number: bool,
+}
+
+impl Wiring {
+    /// Nothing wrong.
+    pub const SOUND: Self = Self {
+        stop_open: false,
+        supply_low: false,
+        driver_fault: None,
+        glitch: [0; AXES],
+        stuck: [false; AXES],
+        not_a_number: false,
+    };
+
+    /// What is sensed through it, of what the mechanism would tell.
+    pub fn through(&self, mut sensed: Sensed) -> Sensed {
+        if self.not_a_number {
+            sensed.handle.position.x = f32::NAN;
+        }
+        Sensed {
+            stop_open: self.stop_open,
+            supply_low: self.supply_low,
+            driver_fault: self.driver_fault,
+            ..sensed
+        }
+    }
+
+    fn apply(&mut self, kind: InputFaultKind, first: bool) {
+        let driver = |axis, kind| Some(DriverFault { axis, kind });
+        match kind {
+            InputFaultKind::EncoderGlitch { axis, counts } => {
+                if let (true, Some(glitch)) = (first, self.glitch.get_mut(usize::from(axis))) {
+                    *glitch = glitch.saturating_add(counts);
+                }
+            }
+            InputFaultKind::EncoderStuck { axis } => {
+                if let Some(stuck) = self.stuck.get_mut(usize::from(axis)) {
+                    *stuck = true;
+                }
+            }
+            InputFaultKind::NotANumber => self.not_a_number = true,
+            InputFaultKind::Driver { axis } => self.driver_fault = driver(axis, DriverFaultKind::Any),
+            InputFaultKind::OverCurrent { axis } => {
+                self.driver_fault = driver(axis, DriverFaultKind::OverCurrent);
+            }
+            InputFaultKind::OverTemperature { axis } => {
+                self.driver_fault = driver(axis, DriverFaultKind::OverTemperature);
+            }
+            InputFaultKind::StopOpen => self.stop_open = true,
+            InputFaultKind::SupplyLow => self.supply_low = true,
+        }
+    }
+}
+
+/// A script of faults whose time goes on with each reading.
+#[derive(Clone, Debug, Default)]
+pub struct InputScript {
+    faults: Vec<InputFault, MAX_INPUT_FAULTS>,
+    tick: u32,
+}
+
+impl InputScript {
+    /// Nothing goes wrong.
+    pub const fn new() -> Self {
+        Self {
+            faults: Vec::new(),
+            tick: 0,
+        }
+    }
+
+    /// Takes a script whose time starts now; what is too long is cut, which the protocol's bound rules out.
+    pub fn start(&mut self, faults: &[InputFault]) {
+        self.tick = 0;
+        self.faults.clear();
+        self.faults.extend(faults.iter().copied().take(MAX_INPUT_FAULTS));
+    }
+
+    /// The wiring of the next tick: `wiring` and what the script adds.
+    pub fn advance(&mut self, mut wiring: Wiring) -> Wiring {
+        for fault in &self.faults {
+            if self.tick >= fault.tick && self.tick - fault.tick < fault.ticks.max(1) {
+                wiring.apply(fault.kind, self.tick == fault.tick);
+            }
+        }
+        self.tick = self.tick.saturating_add(1);
+        wiring
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_fault_lasts_as_told_and_a_glitch_comes_once() {
+        let mut script = InputScript::new();
+        script.start(&[
+            InputFault {
+                tick: 2,
+                ticks: 3,
+                kind: InputFaultKind::StopOpen,
+            },
+            InputFault {
+                tick: 3,
+                ticks: 9,
+                kind: InputFaultKind::EncoderGlitch { axis: 4, counts: -7 },
+            },
+        ]);
+        for tick in 0..20 {
+            let wiring = script.advance(Wiring::SOUND);
+            assert_eq!(wiring.stop_open, (2..5).contains(&tick), "{tick}");
+            assert_eq!(wiring.glitch[4], if tick == 3 { -7 } else { 0 }, "{tick}");
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The mechanism a simulated board has: the one its kept description tells of, or a free handle with six motors.
+
+use mortise_protocol::rig::Rig;
+
+use crate::described::Described;
+use crate::simulated::Simulated;
+use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation};
+
+/// See the module.
+#[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one is made, in a static; there is nothing to allocate from"
+)]
+pub enum SimulatedRig {
+    /// No description.
+    Free(Simulated),
+    /// As described.
+    Described(Described),
+}
+
+impl SimulatedRig {
+    /// The mechanism of `rig`; a free handle without one, or for one that cannot be built (which is never kept).
+    pub fn of(rig: Option<&Rig>) -> Self {
+        match rig.map(Described::new) {
+            Some(Ok(described)) => Self::Described(described),
+            _ => Self::Free(Simulated::new()),
+        }
+    }
+}
+
+macro_rules! each {
+    ($self:expr, $mechanism:ident => $call:expr) => {
+        match $self {
+            SimulatedRig::Free($mechanism) => $call,
+            SimulatedRig::Described($mechanism) => $call,
+        }
+    };
+}
+
+impl Mechanism for SimulatedRig {
+    const DESCRIBED: bool = true;
+
+    fn sense(&mut self) -> Sensed {
+        each!(self, mechanism => mechanism.sense())
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        each!(self, mechanism => mechanism.drive(drive));
+    }
+
+    fn watch_encoders(&mut self, felt: bool) {
+        each!(self, mechanism => mechanism.watch_encoders(felt));
+    }
+
+    fn count(&self) -> [f32; 2] {
+        each!(self, mechanism => mechanism.count())
+    }
+
+    fn home(&mut self) {
+        each!(self, mechanism => mechanism.home());
+    }
+
+    fn simulation(&mut self) -> Option<&mut dyn Simulation> {
+        each!(self, mechanism => mechanism.simulation())
+    }
+}
