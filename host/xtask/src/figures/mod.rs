@@ -23,51 +23,45 @@ use self::claims::Claims;
 use self::measure::{By, measure};
 pub use self::row::{Row, count};
 use self::write::{page_is_quick, write_page};
+use crate::arguments::Figures;
 use crate::program::Programs;
-use crate::setup::{self, Consent, Group};
+use crate::setup::{self, Group};
 use crate::{firmware, shell};
 
 /// `cargo xtask figures [NAME] [--quick] [--claim]`, `--check`, `--renew [NAME]...` or `--record NAME...`.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
+pub fn command(arguments: &Figures) -> Result<ExitCode> {
     let root = shell::root()?;
-    let mut arguments = arguments.to_vec();
-    let consent = Consent::take(&mut arguments);
-    let (options, names): (Vec<String>, Vec<String>) = arguments
-        .into_iter()
-        .partition(|argument| argument.starts_with('-'));
-    let options: Vec<&str> = options.iter().map(String::as_str).collect();
-    let name = match (options.as_slice(), names.as_slice()) {
-        (["--check"], []) | (["--renew"], _) => None,
-        (["--record"], [_, ..]) => {
-            renew::record_all(&root, &names)?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        ([] | ["--quick"] | ["--claim"] | ["--quick", "--claim"] | ["--claim", "--quick"], [name]) => {
-            Some(name)
-        }
+    let names = &arguments.names;
+    if arguments.record {
+        renew::record_all(&root, names)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let table = match names.as_slice() {
+        _ if arguments.check || arguments.renew => None,
+        [name] => Some(name),
         _ => bail!(
-            "say which figures, for example `cargo xtask figures end-to-end`, or `--check` or `--renew` alone; see `cargo xtask figures --help`"
+            "say which figures, for example `cargo xtask figures end-to-end`, or `--check` or `--renew`"
         ),
     };
-    if !setup::ensure(&[Group::Build, Group::Board], consent)? {
+    if !setup::ensure(&[Group::Build, Group::Board], arguments.installing.into())? {
         return Ok(ExitCode::FAILURE);
     }
     firmware::build(&root, firmware::EMULATED)?;
-    let program = Programs::build(&root)?.lab;
-    let all_hold = match name {
+    let lab = Programs::build(&root)?.lab;
+    let all_hold = match table {
         Some(name) => {
-            let by = if options.contains(&"--claim") {
+            let by = if arguments.claim {
                 By::Measured
             } else {
                 By::Completed
             };
-            write_page(&root, &program, name, options.contains(&"--quick"), by)?
+            write_page(&root, &lab, name, arguments.quick, by)?
         }
-        None if options == ["--check"] => {
-            println!("{}", check(&root, &program)?);
+        None if arguments.check => {
+            println!("{}", check(&root, &lab)?);
             true
         }
-        None => renew::run(&root, &program, &names)?,
+        None => renew::run(&root, &lab, names)?,
     };
     Ok(if all_hold {
         ExitCode::SUCCESS

@@ -11,11 +11,12 @@ mod window;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 
 use self::bench::Bench;
 use self::report::{Counts, Report};
-use crate::setup::{self, Consent, Group};
+use crate::arguments::Test;
+use crate::setup::{self, Group};
 use crate::shell;
 
 /// One thing that is checked.
@@ -46,17 +47,15 @@ const STEPS: &[Step] = &[
 ];
 
 /// Runs the steps.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
-    let mut arguments = arguments.to_vec();
-    let consent = Consent::take(&mut arguments);
-    let chosen = choose(&arguments)?;
-    let Some(chosen) = chosen else {
+pub fn command(arguments: &Test) -> Result<ExitCode> {
+    if arguments.list {
         for step in STEPS {
             println!("{:<12} {}", step.name, step.what);
         }
         return Ok(ExitCode::SUCCESS);
-    };
-    if !setup::ensure(&Group::ALL, consent)? {
+    }
+    let chosen = choose(arguments)?;
+    if !setup::ensure(&Group::ALL, arguments.installing.into())? {
         return Ok(ExitCode::FAILURE);
     }
     let mut bench = Bench {
@@ -94,69 +93,49 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     })
 }
 
-/// Steps that the arguments ask for; `None` for `--list`.
-fn choose(arguments: &[String]) -> Result<Option<Vec<&'static Step>>> {
+/// Steps that the arguments ask for.
+fn choose(arguments: &Test) -> Result<Vec<&'static Step>> {
     let position = |name: &str| {
         STEPS.iter().position(|step| step.name == name).with_context(|| {
             let names: Vec<&str> = STEPS.iter().map(|step| step.name).collect();
             format!("there is no step `{name}`; there are: {}", names.join(" "))
         })
     };
-    let mut words = arguments.iter();
-    let mut chosen: Vec<&Step> = STEPS.iter().collect();
-    while let Some(word) = words.next() {
-        let (option, value) = match word.split_once('=') {
-            Some((option, value)) => (option, Some(value)),
-            None => (word.as_str(), None),
-        };
-        let mut value = || {
-            value
-                .or_else(|| words.next().map(String::as_str))
-                .with_context(|| format!("`{option}` needs a step"))
-        };
-        match option {
-            "--list" => return Ok(None),
-            "--from" => chosen = STEPS[position(value()?)?..].iter().collect(),
-            "--only" => {
-                let mut positions = value()?.split(',').map(position).collect::<Result<Vec<_>>>()?;
-                positions.sort_unstable();
-                positions.dedup();
-                chosen = positions.into_iter().map(|index| &STEPS[index]).collect();
-            }
-            _ => bail!("`test` does not know `{word}`; see `cargo xtask test --help`"),
-        }
+    if let Some(from) = &arguments.from {
+        return Ok(STEPS[position(from)?..].iter().collect());
     }
-    Ok(Some(chosen))
+    if arguments.only.is_empty() {
+        return Ok(STEPS.iter().collect());
+    }
+    let only = arguments.only.iter().map(|name| position(name));
+    let mut positions = only.collect::<Result<Vec<_>>>()?;
+    positions.sort_unstable();
+    positions.dedup();
+    Ok(positions.into_iter().map(|index| &STEPS[index]).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn names(arguments: &[&str]) -> Result<Vec<&'static str>> {
-        let arguments: Vec<String> = arguments.iter().map(|word| (*word).to_owned()).collect();
-        Ok(choose(&arguments)?
-            .unwrap_or_default()
-            .into_iter()
-            .map(|step| step.name)
-            .collect())
+    fn names(only: &[&str], from: Option<&str>) -> Result<Vec<&'static str>> {
+        let arguments = Test {
+            only: only.iter().map(|&name| name.to_owned()).collect(),
+            from: from.map(str::to_owned),
+            ..Test::default()
+        };
+        Ok(choose(&arguments)?.into_iter().map(|step| step.name).collect())
     }
 
     #[test]
     fn steps_are_chosen_in_their_own_order() {
-        assert_eq!(names(&[]).unwrap().len(), STEPS.len());
+        assert_eq!(names(&[], None).unwrap().len(), STEPS.len());
         assert_eq!(
-            names(&["--only", "unit,format,unit"]).unwrap(),
+            names(&["unit", "format", "unit"], None).unwrap(),
             ["format", "unit"]
         );
-        assert_eq!(names(&["--from=figures"]).unwrap(), ["figures", "window"]);
-        assert!(
-            names(&["--only", "units"])
-                .unwrap_err()
-                .to_string()
-                .contains("there are: format")
-        );
-        assert!(names(&["--from"]).is_err());
-        assert!(names(&["--fast"]).is_err());
+        assert_eq!(names(&[], Some("figures")).unwrap(), ["figures", "window"]);
+        let unknown = names(&["units"], None).unwrap_err().to_string();
+        assert!(unknown.contains("there are: format"), "{unknown}");
     }
 }

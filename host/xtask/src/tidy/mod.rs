@@ -12,7 +12,7 @@ mod unsafety;
 use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 
 pub use self::finding::{Finding, report};
 pub use self::layers::target_directory;
@@ -21,10 +21,7 @@ use crate::program::Programs;
 use crate::{figures, shell};
 
 /// `cargo xtask tidy`.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
-    if let Some(unknown) = arguments.first() {
-        bail!("`tidy` does not know `{unknown}`; see `cargo xtask tidy --help`");
-    }
+pub fn command() -> Result<ExitCode> {
     let root = shell::root()?;
     let mut findings = check(&root)?;
     match Programs::built(&target_directory(&root)?.join("release")) {
