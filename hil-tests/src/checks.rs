@@ -12,9 +12,7 @@ use mortise_rig::{Client, Event, RigError, begin_message, chunk_message};
 
 use crate::described::descriptions_are_kept_and_driven;
 use crate::image;
-
-/// What a check saw, or what was wrong.
-pub type Verdict = Result<String, String>;
+use crate::verdict::Verdict;
 
 /// A check by its name.
 pub type Check = (&'static str, fn(Client) -> Verdict);

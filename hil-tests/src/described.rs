@@ -4,7 +4,7 @@ use mortise_protocol::message::{HandScript, Keyframe, Refusal, ToDevice, WirePos
 use mortise_protocol::rig::Rig;
 use mortise_rig::{Client, Event, RigError, RigSpec, parse_rig};
 
-use crate::checks::Verdict;
+use crate::verdict::Verdict;
 
 const EXAMPLES: [(&str, &str); 4] = [
     ("hapkit", include_str!("../../firmware/rigs/hapkit.toml")),

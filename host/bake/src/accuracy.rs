@@ -14,7 +14,7 @@
 use mortise_brep::Surface;
 
 use crate::distance::ExactSurface;
-use crate::field::{FieldOptions, SampleFormat};
+use crate::format::{FieldOptions, SampleFormat};
 use crate::surface::{parameters, principal_curvatures};
 
 /// Distance from the surface, in cells, up to which the bounds hold: touching parts are nearer than that.

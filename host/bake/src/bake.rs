@@ -11,14 +11,16 @@ use rayon::prelude::*;
 use crate::classic::classic_pointshell;
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
-use crate::field::{BakedField, FieldOptions, bake_field};
+use crate::field::{BakedField, bake_field};
+use crate::format::FieldOptions;
 use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::partners::Partners;
-use crate::pointshell::{Pointshell, PointshellOptions, sample_pointshell};
+use crate::pointshell::sample_pointshell;
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
 use crate::scene::Scene;
+use crate::shell::{Pointshell, PointshellOptions};
 use crate::tree::node_count;
 
 /// A scene image and what is in it.

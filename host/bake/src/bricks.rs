@@ -5,7 +5,7 @@ use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby};
 
 use crate::distance::{ExactSurface, Scratch};
-use crate::field::{FieldOptions, SampleFormat, brick_bytes};
+use crate::format::{FieldOptions, SampleFormat, brick_bytes};
 use crate::grid::Grid;
 use crate::nearby::{CellNearby, ExactSample};
 

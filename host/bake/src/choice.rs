@@ -10,8 +10,8 @@ use crate::accuracy::{
     REACH_CELLS, face_bend, interpolation_error, is_resolvable, largest_cell, rounding_error, step_error,
 };
 use crate::distance::ExactSurface;
-use crate::field::SampleFormat;
-use crate::planner::ShapePlan;
+use crate::format::SampleFormat;
+use crate::plan::ShapePlan;
 use crate::scene::longest_side;
 
 /// Factor by which errors may be larger on faces that fit nothing.

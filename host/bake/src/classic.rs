@@ -18,7 +18,7 @@ use crate::error::BakeError;
 use crate::field::positions;
 use crate::grid::Grid;
 use crate::occupancy::{place, voxels};
-use crate::pointshell::{Pointshell, ShellPoint};
+use crate::shell::{Pointshell, ShellPoint};
 
 /// Integer coordinates of a voxel, from the grid's origin.
 type Place = [i64; 3];

@@ -19,7 +19,7 @@ use mortise_brep::{Shape, Surface};
 use crate::piece::OnPiece;
 use crate::surface::project;
 use crate::topology::{NONE, Topology};
-use crate::triangles::{OnTriangle, TriangleFeature, TriangleTree};
+use crate::triangles::{NearTriangle, TriangleFeature, TriangleTree};
 use crate::winding::WindingTree;
 
 /// Distances that differ by less than this are equal, mm: rounding of a few operations on metre-sized coordinates.
@@ -61,13 +61,6 @@ pub(crate) struct Scratch {
     near: Vec<NearTriangle>,
     faces: Vec<u32>,
     pieces: Vec<u32>,
-}
-
-pub(crate) struct NearTriangle {
-    pub triangle: u32,
-    pub face: u32,
-    pub on: OnTriangle,
-    pub distance: f64,
 }
 
 #[derive(Clone, Copy)]

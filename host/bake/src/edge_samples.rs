@@ -14,9 +14,9 @@ use glam::DVec3;
 use mortise_brep::Surface;
 
 use crate::partners::{Partners, face_range};
-use crate::piece::{Piece, PieceCurve};
-use crate::pointshell::{PointshellOptions, ShellPoint};
+use crate::piece::{Link, Piece, PieceCurve};
 use crate::ring_samples::sample_ring;
+use crate::shell::{PointshellOptions, ShellPoint};
 
 /// Most points on one chain.
 const MAX_POINTS: f64 = 4000.0;
@@ -84,9 +84,6 @@ fn is_corner(surface: &ExactSurface, vertex: u32) -> bool {
         .get(&vertex)
         .is_some_and(|p| p.len() > 2)
 }
-
-/// A piece and whether the chain runs along it from `ends[0]` to `ends[1]`.
-pub(crate) type Link = (u32, bool);
 
 /// Joins pieces end to end. A chain stops where the group forks.
 fn chains(pieces: &[Piece], group: &[u32]) -> Vec<Vec<Link>> {

@@ -7,7 +7,7 @@ use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
 use crate::partners::Partners;
-use crate::pointshell::{PointshellOptions, ShellPoint};
+use crate::shell::{PointshellOptions, ShellPoint};
 use crate::surface::{angle_range, at_parameters, natural_normal, parameters, principal_curvatures};
 
 /// Most rows of a lattice, and most points of a row: a face that would need more is sampled more sparsely.

@@ -7,78 +7,15 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use mortise_protocol::image::{
-    BRICK_CELLS, BrickRecord, FORMAT_I8, FORMAT_I16, FieldRecord, GridEntry, SAMPLES_PER_BRICK,
-};
+use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::bounds::{Class, classify};
 use crate::bricks::{Brick, bake_brick};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
+use crate::format::FieldOptions;
 use crate::grid::Grid;
-
-/// Number format of samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SampleFormat {
-    /// One byte, half the size of int16: steps of a 34th of a cell at a band of two cells, a 46th at one.
-    Int8,
-    /// Two bytes: steps of an 8700th of a cell at a band of two cells.
-    #[default]
-    Int16,
-}
-
-impl SampleFormat {
-    /// Largest sample.
-    pub fn max(self) -> f64 {
-        match self {
-            Self::Int8 => 127.0,
-            Self::Int16 => 32767.0,
-        }
-    }
-
-    /// Code of the format in a [`FieldRecord`].
-    pub fn code(self) -> u16 {
-        match self {
-            Self::Int8 => FORMAT_I8,
-            Self::Int16 => FORMAT_I16,
-        }
-    }
-
-    /// Bytes of one sample.
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::Int8 => 1,
-            Self::Int16 => 2,
-        }
-    }
-}
-
-/// How to sample a field.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldOptions {
-    /// Cell edge, mm.
-    pub cell_mm: f64,
-    /// Every point within this many cells of the surface lies in a stored brick, and interpolation there uses no clamped sample.
-    pub band_cells: f64,
-    /// Number format.
-    pub format: SampleFormat,
-}
-
-impl FieldOptions {
-    /// Sample units per cell: a whole number, so that planes and repeated features at whole-cell offsets give equal bricks.
-    pub(crate) fn units_per_cell(&self) -> f64 {
-        (self.format.max() / self.range_cells()).floor().max(1.0)
-    }
-
-    /// Distance up to which samples are exact, in cells: the corners of a cell that the band touches are at most the cell's diagonal farther.
-    /// Clamping samples beyond it makes more bricks equal.
-    fn range_cells(&self) -> f64 {
-        self.band_cells + 3f64.sqrt()
-    }
-}
 
 /// A standalone field: record offsets count from its own arrays.
 #[derive(Clone, Debug)]
@@ -349,9 +286,4 @@ pub(crate) fn append_aligned(blob: &mut Vec<u8>, bytes: &[u8]) -> u32 {
     let at = blob.len() as u32;
     blob.extend_from_slice(bytes);
     at
-}
-
-/// Bytes of samples in one brick.
-pub(crate) fn brick_bytes(format: SampleFormat) -> usize {
-    SAMPLES_PER_BRICK * format.bytes()
 }

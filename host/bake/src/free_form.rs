@@ -4,8 +4,8 @@ use glam::DVec3;
 use mortise_brep::{Shape, Surface};
 use rayon::prelude::*;
 
-use crate::distance::NearTriangle;
 use crate::patch::{OnPatch, Patch};
+use crate::triangles::NearTriangle;
 
 /// Most start points of one query on one face.
 const MAX_STARTS: usize = 8;

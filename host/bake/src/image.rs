@@ -10,8 +10,8 @@ use mortise_protocol::image::{
 
 use crate::field::BakedField;
 use crate::grid::bounding_box;
-use crate::pointshell::Pointshell;
 use crate::report::ByteCount;
+use crate::shell::Pointshell;
 use crate::tree::{build_tree, round_up};
 
 /// Placement of a part in the scene.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::BakeError;
-use crate::field::SampleFormat;
+use crate::format::SampleFormat;
 
 /// What to bake and how finely.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,9 +7,9 @@
 
 use mortise_brep::Surface;
 
+use crate::area_curvatures::area_curvatures;
 use crate::distance::ExactSurface;
 use crate::fits::room;
-use crate::spline_samples::area_curvatures;
 use crate::surface::{parameters, principal_curvatures};
 
 /// Partners of a shape.

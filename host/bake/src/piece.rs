@@ -5,6 +5,9 @@
 
 use glam::DVec3;
 
+/// A piece and whether the chain runs along it from `ends[0]` to `ends[1]`.
+pub(crate) type Link = (u32, bool);
+
 /// One mesh side of the boundary between faces, with its exact curve.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {

@@ -19,100 +19,15 @@
 //! the edge and the partner's face it passes under. So edges are never sampled more sparsely than `max_spacing_mm`, and two strips of flat narrower
 //! than that can miss each other when they cross.
 
-use glam::DVec3;
 use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
 use crate::grid::bounding_box;
 use crate::partners::Partners;
-
-/// Density of a pointshell.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PointshellOptions {
-    /// Bound on how much deeper a contact can be than its deepest sample, mm.
-    pub epsilon_mm: f64,
-    /// The same bound inside faces that are not convex in both directions, where only another convex face can touch, mm.
-    pub crossing_epsilon_mm: f64,
-    /// Smallest spacing, mm: where the bound would require less, the error is that of this spacing, s²·κ/8 in each direction.
-    pub least_spacing_mm: f64,
-    /// Largest spacing along edges, mm; also inside faces when the partners are unknown.
-    pub max_spacing_mm: f64,
-    /// Partners of the shape.
-    pub partners: Partners,
-}
+use crate::shell::{Pointshell, PointshellOptions, ShellPoint};
 
 /// Fewest points of a useful shell: with fewer, the shape is sampled without relying on partners.
 const FEWEST: usize = 8;
-
-impl PointshellOptions {
-    /// Samples everywhere, for any partners; no two neighbours are farther apart than `max_spacing_mm`.
-    pub fn everywhere(epsilon_mm: f64, max_spacing_mm: f64) -> Self {
-        Self {
-            epsilon_mm,
-            crossing_epsilon_mm: epsilon_mm,
-            least_spacing_mm: 0.0,
-            max_spacing_mm,
-            partners: Partners::Unknown,
-        }
-    }
-
-    /// Spacing with chord error ε at `curvature` (1/mm), mm, for any partners.
-    pub(crate) fn spacing(&self, curvature: f64) -> f64 {
-        (8.0 * self.epsilon_mm / curvature.abs().max(1e-12))
-            .sqrt()
-            .max(self.least_spacing_mm)
-            .min(self.max_spacing_mm)
-    }
-
-    /// Spacings inside a face of principal curvatures `own` (convex positive), mm; `None` where no partner needs a sample.
-    pub(crate) fn face_spacings(&self, own: [f64; 2]) -> Option<[f64; 2]> {
-        if self.partners == Partners::Unknown {
-            return Some(own.map(|k| self.spacing(k)));
-        }
-        let sharper = own[0].max(own[1]);
-        if sharper <= 0.0 {
-            return None;
-        }
-        let other = self.partners.no_sharper_than(sharper);
-        let relative = own.map(|k| k + other);
-        let epsilon = if own[0].min(own[1]) > 0.0 {
-            self.epsilon_mm
-        } else {
-            self.crossing_epsilon_mm
-        };
-        // Curvatures equal and opposite within rounding are a fit, which rims and edges find.
-        (relative[0].min(relative[1]) > 1e-9 * sharper)
-            .then(|| relative.map(|k| (4.0 * epsilon / k).sqrt().max(self.least_spacing_mm)))
-    }
-}
-
-/// A sample of the exact surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShellPoint {
-    /// Position, mm, shape frame.
-    pub position: DVec3,
-    /// Outward unit normal; on an edge or corner the mean of its faces' normals.
-    pub normal: DVec3,
-    /// Face it lies on.
-    pub face: u16,
-    /// Second face of an edge or corner, else [`NO_FACE`].
-    pub edge_face: u16,
-}
-
-/// Points of a shape, ordered: faces, then edges, then corners.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pointshell {
-    /// The points.
-    pub points: Vec<ShellPoint>,
-    /// Distance of each point from the surface, mm, outside positive; empty where all lie on it.
-    pub offsets: Vec<f64>,
-    /// Number of points inside faces.
-    pub face_points: usize,
-    /// Number of points along edges.
-    pub edge_points: usize,
-    /// Number of points at corners.
-    pub corner_points: usize,
-}
 
 /// Samples `surface`. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: proportional to area over spacing².
 pub fn sample_pointshell(surface: &ExactSurface, options: &PointshellOptions) -> Pointshell {

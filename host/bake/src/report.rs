@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::field::SampleFormat;
+use crate::format::SampleFormat;
 use crate::options::Method;
 
 /// Bytes by kind.

@@ -13,9 +13,8 @@ use mortise_brep::Surface;
 use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
-use crate::edge_samples::Link;
-use crate::piece::{Piece, PieceCurve};
-use crate::pointshell::{PointshellOptions, ShellPoint};
+use crate::piece::{Link, Piece, PieceCurve};
+use crate::shell::{PointshellOptions, ShellPoint};
 use crate::surface::natural_normal;
 
 /// Distance of the ring from the rim, in error bounds.

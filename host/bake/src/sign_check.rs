@@ -29,10 +29,11 @@ use serde::Serialize;
 
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
-use crate::field::{FieldOptions, SampleFormat, bake_field};
+use crate::field::bake_field;
+use crate::format::{FieldOptions, SampleFormat};
 use crate::grid::bounding_box;
 use crate::image::{ImageBuilder, PartPlacement};
-use crate::pointshell::Pointshell;
+use crate::shell::Pointshell;
 
 /// Customary accuracy of STEP, mm: the uncertainty in the file itself about where its faces meet.
 const MODEL_MM: f64 = 1e-3;

@@ -138,6 +138,14 @@ pub(crate) fn nearest_on_triangle([a, b, c]: [DVec3; 3], p: DVec3) -> OnTriangle
     }
 }
 
+/// A triangle near a query, and its nearest point.
+pub(crate) struct NearTriangle {
+    pub triangle: u32,
+    pub face: u32,
+    pub on: OnTriangle,
+    pub distance: f64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

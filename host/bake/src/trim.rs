@@ -7,9 +7,10 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use crate::distance::{ExactSurface, NearTriangle, SAME_MM};
+use crate::distance::{ExactSurface, SAME_MM};
 use crate::piece::Piece;
 use crate::topology::NONE;
+use crate::triangles::NearTriangle;
 use crate::triangles::nearest_on_triangle;
 
 impl ExactSurface {

@@ -25,6 +25,7 @@ pub mod motion;
 pub mod pareto;
 pub mod peer;
 pub mod rate;
+mod row;
 pub mod scene_p;
 pub mod stability;
 pub mod study;

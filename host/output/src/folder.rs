@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{Existing, Output, OutputError};
+use crate::error::OutputError;
+use crate::output::{Existing, Output};
 
 /// A folder for several files; each is written as an [`Output`].
 #[derive(Clone, Debug)]

@@ -5,18 +5,17 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result};
 
+use crate::arguments::Demo;
 use crate::setup::{self, Consent, Group};
 use crate::{firmware, program, shell};
 
 /// Builds what is needed and runs `mortise demo` with the caller's arguments.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
+pub fn command(arguments: &Demo) -> Result<ExitCode> {
     let root = shell::root()?;
-    let mut arguments = arguments.to_vec();
-    let consent = Consent::take(&mut arguments);
-    let mut headless = arguments.iter().any(|argument| argument == "--headless");
+    let consent = Consent::from(arguments.installing);
+    let mut headless = arguments.headless;
     if !headless && !display_is_there() {
         eprintln!("There is no display here: running with --headless, and building without the window.");
-        arguments.push("--headless".to_owned());
         headless = true;
     }
     let needed: &[Group] = if headless {
@@ -27,26 +26,26 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     if !setup::ensure(needed, consent)? {
         return Ok(ExitCode::FAILURE);
     }
-    let asked_rig = rig_of(&arguments);
-    if asked_rig.as_deref().is_none_or(|rig| rig == "emulated") {
-        let there = setup::ensure(&[Group::Board], consent)?;
-        if there {
+    let mut rig = arguments.rig.clone();
+    if rig.as_deref().is_none_or(|rig| rig == "emulated") {
+        if setup::ensure(&[Group::Board], consent)? {
             firmware::build(&root, firmware::EMULATED)?;
-        }
-        match (there, asked_rig) {
-            (false, Some(_)) => {
-                eprintln!("The emulated board was asked for and cannot run without what is missing.");
-                return Ok(ExitCode::FAILURE);
-            }
-            (false, None) => {
-                eprintln!("Without the emulated board: running in this process.");
-                arguments.extend(["--rig".to_owned(), "sim".to_owned()]);
-            }
-            (true, Some(_)) => {}
-            (true, None) => arguments.extend(["--rig".to_owned(), "emulated".to_owned()]),
+            rig = Some("emulated".to_owned());
+        } else if rig.is_some() {
+            eprintln!("The emulated board was asked for and cannot run without what is missing.");
+            return Ok(ExitCode::FAILURE);
+        } else {
+            eprintln!("Without the emulated board: running in this process.");
+            rig = Some("sim".to_owned());
         }
     }
-    run(&program::build_mortise(&root, !headless)?, &arguments)
+    let mut words: Vec<String> = arguments.file.iter().cloned().collect();
+    for (given, option) in [(headless, "--headless"), (arguments.json, "--json")] {
+        words.extend(given.then(|| option.to_owned()));
+    }
+    words.extend(rig.into_iter().flat_map(|rig| ["--rig".to_owned(), rig]));
+    words.extend(arguments.further.iter().cloned());
+    run(&program::build_mortise(&root, !headless)?, &words)
 }
 
 fn run(program: &Path, arguments: &[String]) -> Result<ExitCode> {
@@ -61,20 +60,6 @@ fn run(program: &Path, arguments: &[String]) -> Result<ExitCode> {
         .code()
         .and_then(|code| u8::try_from(code).ok())
         .map_or(ExitCode::FAILURE, ExitCode::from))
-}
-
-/// Value of `--rig VALUE` or `--rig=VALUE`.
-fn rig_of(arguments: &[String]) -> Option<String> {
-    let mut words = arguments.iter();
-    while let Some(word) = words.next() {
-        if word == "--rig" {
-            return words.next().cloned();
-        }
-        if let Some(value) = word.strip_prefix("--rig=") {
-            return Some(value.to_owned());
-        }
-    }
-    None
 }
 
 /// True if a window can be opened: macOS and Windows always say so, Linux by its variables.
@@ -121,17 +106,6 @@ fn local_display_number(display: &str) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_rig_is_read_in_both_spellings() {
-        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
-        assert_eq!(
-            rig_of(&words("--headless --rig sim --json")).as_deref(),
-            Some("sim")
-        );
-        assert_eq!(rig_of(&words("--rig=COM3")).as_deref(), Some("COM3"));
-        assert_eq!(rig_of(&words("--headless")), None);
-    }
 
     #[cfg(target_os = "linux")]
     #[test]

@@ -1,8 +1,9 @@
 //! Loadable segments of a 32-bit little-endian ELF file, which is what boards run.
-//!
-//! Source: *Tool Interface Standard, Executable and Linking Format* 1.2, figures 1-3 and 2-1.
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
+use object::LittleEndian;
+use object::elf::{FileHeader32, PT_LOAD};
+use object::read::elf::{FileHeader as _, ProgramHeader as _};
 
 /// One `PT_LOAD` program header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,59 +18,26 @@ pub struct Segment {
     pub bytes: u32,
 }
 
-const PROGRAM_HEADERS_AT: usize = 0x1c;
-const PROGRAM_HEADER_BYTES_AT: usize = 0x2a;
-const PROGRAM_HEADER_COUNT_AT: usize = 0x2c;
-const TYPE_LOAD: u32 = 1;
-
 /// Segments that take memory, in the file's order.
 ///
 /// # Errors
 /// When `file` is not a 32-bit little-endian ELF file, or ends early.
 pub fn segments(file: &[u8]) -> Result<Vec<Segment>> {
-    // Magic, class 1 (32 bit), data 1 (little-endian).
-    if !file.starts_with(b"\x7fELF\x01\x01") {
-        bail!("not a 32-bit little-endian ELF file");
-    }
-    let table = word(file, PROGRAM_HEADERS_AT)? as usize;
-    let stride = usize::from(half(file, PROGRAM_HEADER_BYTES_AT)?);
-    let count = usize::from(half(file, PROGRAM_HEADER_COUNT_AT)?);
-    let mut found = Vec::new();
-    for index in 0..count {
-        let at = table.saturating_add(index * stride);
-        if word(file, at)? == TYPE_LOAD {
-            let segment = Segment {
-                address: word(file, at.saturating_add(8))?,
-                stored_at: word(file, at.saturating_add(12))?,
-                stored_bytes: word(file, at.saturating_add(16))?,
-                bytes: word(file, at.saturating_add(20))?,
-            };
-            if segment.bytes > 0 {
-                found.push(segment);
-            }
-        }
-    }
-    Ok(found)
-}
-
-fn word(file: &[u8], at: usize) -> Result<u32> {
-    match file
-        .get(at..at.saturating_add(4))
-        .and_then(|bytes| bytes.try_into().ok())
-    {
-        Some(bytes) => Ok(u32::from_le_bytes(bytes)),
-        None => bail!("the ELF file ends before byte {at}"),
-    }
-}
-
-fn half(file: &[u8], at: usize) -> Result<u16> {
-    match file
-        .get(at..at.saturating_add(2))
-        .and_then(|bytes| bytes.try_into().ok())
-    {
-        Some(bytes) => Ok(u16::from_le_bytes(bytes)),
-        None => bail!("the ELF file ends before byte {at}"),
-    }
+    let header = FileHeader32::<LittleEndian>::parse(file).context("not a 32-bit ELF file")?;
+    let endian = header.endian().context("not a little-endian ELF file")?;
+    let headers = header
+        .program_headers(endian, file)
+        .context("the ELF file ends before its program headers")?;
+    let segments = headers.iter().filter(|header| header.p_type(endian) == PT_LOAD);
+    Ok(segments
+        .map(|header| Segment {
+            address: header.p_vaddr(endian),
+            stored_at: header.p_paddr(endian),
+            stored_bytes: header.p_filesz(endian),
+            bytes: header.p_memsz(endian),
+        })
+        .filter(|segment| segment.bytes > 0)
+        .collect())
 }
 
 #[cfg(test)]
@@ -79,7 +47,8 @@ mod tests {
     /// An ELF header of 52 bytes, then program headers of 32 bytes each.
     fn file_with(headers: &[[u32; 8]]) -> Vec<u8> {
         let mut file = vec![0; 52];
-        file[..6].copy_from_slice(b"\x7fELF\x01\x01");
+        // Magic, 32 bit, little-endian, version 1.
+        file[..7].copy_from_slice(b"\x7fELF\x01\x01\x01");
         file[0x1c..0x20].copy_from_slice(&52_u32.to_le_bytes());
         file[0x2a..0x2c].copy_from_slice(&32_u16.to_le_bytes());
         file[0x2c..0x2e].copy_from_slice(&(headers.len() as u16).to_le_bytes());
@@ -119,8 +88,7 @@ mod tests {
     #[test]
     fn files_cut_at_any_byte_are_refused() {
         let file = file_with(&[[1, 0x1000, 0x0800_0000, 0x0800_0000, 100, 100, 5, 4]]);
-        // The last two words of the header are not read.
-        for length in 0..file.len() - 8 {
+        for length in 0..file.len() {
             assert!(segments(&file[..length]).is_err(), "{length} bytes");
         }
         assert!(segments(b"\x7fELF\x02\x01 a 64-bit file").is_err());

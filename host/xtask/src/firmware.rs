@@ -5,8 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 
+use crate::arguments::Firmware;
 use crate::memory_map::{self, Region};
-use crate::setup::{self, BOARD_TARGET, Consent, Group};
+use crate::setup::{self, BOARD_TARGET, Group};
 use crate::{elf, program, shell};
 
 /// The board that QEMU emulates.
@@ -87,19 +88,14 @@ pub fn build(root: &Path, board: &str) -> Result<PathBuf> {
 }
 
 /// `cargo xtask firmware [BOARD]`.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
+pub fn command(arguments: &Firmware) -> Result<ExitCode> {
     let root = shell::root()?;
-    let mut arguments = arguments.to_vec();
-    let consent = Consent::take(&mut arguments);
-    if let Some(option) = arguments.iter().find(|argument| argument.starts_with('-')) {
-        bail!("`firmware` does not know `{option}`; see `cargo xtask firmware --help`");
-    }
-    let chosen = if arguments.is_empty() {
+    let chosen = if arguments.boards.is_empty() {
         boards(&root)?
     } else {
-        arguments
+        arguments.boards.clone()
     };
-    if !setup::ensure(&[Group::Board], consent)? {
+    if !setup::ensure(&[Group::Board], arguments.installing.into())? {
         return Ok(ExitCode::FAILURE);
     }
     for board in &chosen {

@@ -11,6 +11,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use tinyjson::JsonValue;
 
+use crate::arguments::Fuzz;
 use crate::{program, shell};
 
 /// What is fuzzed, and files there are that serve as a start.
@@ -112,26 +113,17 @@ impl Fuzzed {
 }
 
 /// `cargo xtask fuzz [--minutes N] [--json] [TARGET]`.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
-    let (mut minutes, mut json, mut only) = (1.0f64, false, None);
-    let mut words = arguments.iter();
-    while let Some(word) = words.next() {
-        match word.as_str() {
-            "--minutes" => {
-                let value = words.next().context("`--minutes` needs a number")?;
-                minutes = value
-                    .parse()
-                    .ok()
-                    .filter(|m| (0.0..=1e4).contains(m))
-                    .with_context(|| format!("`{value}` is no number of minutes"))?;
-            }
-            "--json" => json = true,
-            name if TARGETS.iter().any(|target| target.name == name) => only = Some(name.to_owned()),
-            unknown => {
-                let names: Vec<&str> = TARGETS.iter().map(|target| target.name).collect();
-                bail!("there is no target `{unknown}`; there are: {}", names.join(" "));
-            }
-        }
+pub fn command(arguments: &Fuzz) -> Result<ExitCode> {
+    let (minutes, json, only) = (arguments.minutes, arguments.json, &arguments.target);
+    if !(0.0..=1e4).contains(&minutes) {
+        bail!("`{minutes}` is no number of minutes: 0 to 10,000");
+    }
+    if let Some(unknown) = only
+        .as_ref()
+        .filter(|name| !TARGETS.iter().any(|target| target.name == **name))
+    {
+        let names: Vec<&str> = TARGETS.iter().map(|target| target.name).collect();
+        bail!("there is no target `{unknown}`; there are: {}", names.join(" "));
     }
     let each = Duration::from_secs_f64((60.0 * minutes).max(1.0));
     let mut code = ExitCode::SUCCESS;

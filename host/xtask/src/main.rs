@@ -4,6 +4,7 @@
 //! directory, and speaks on standard error, so that standard output carries only what a program
 //! started by it (`mortise demo --json`) prints.
 
+mod arguments;
 mod demo;
 mod elf;
 mod figures;
@@ -11,19 +12,21 @@ mod firmware;
 mod fuzz;
 mod memory_map;
 mod program;
+mod rust_source;
 mod setup;
 mod shell;
 mod test;
 mod tidy;
-mod usage;
 
 use std::process::ExitCode;
 
 use anyhow::Result;
+use clap::Parser as _;
+
+use arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    match run(&arguments) {
+    match run(&Arguments::parse().command) {
         Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error:#}");
@@ -32,38 +35,14 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: &[String]) -> Result<ExitCode> {
-    let (command, rest) = match arguments.split_first() {
-        None => {
-            eprint!("{}", usage::overview());
-            return Ok(ExitCode::from(2));
-        }
-        Some((first, _)) if matches!(first.as_str(), "help" | "--help" | "-h") => {
-            print!("{}", usage::overview());
-            return Ok(ExitCode::SUCCESS);
-        }
-        Some((first, rest)) => (first.as_str(), rest),
-    };
-    // `demo` hands unknown arguments on to the program, but `--help` before any of them is ours.
-    if rest
-        .first()
-        .is_some_and(|argument| argument == "--help" || argument == "-h")
-        && let Some(text) = usage::of(command)
-    {
-        print!("{text}");
-        return Ok(ExitCode::SUCCESS);
-    }
+fn run(command: &Command) -> Result<ExitCode> {
     match command {
-        "setup" => setup::command(rest),
-        "demo" => demo::command(rest),
-        "test" => test::command(rest),
-        "figures" => figures::command(rest),
-        "fuzz" => fuzz::command(rest),
-        "firmware" => firmware::command(rest),
-        "tidy" => tidy::command(rest),
-        unknown => {
-            eprintln!("error: there is no command `{unknown}`\n\n{}", usage::overview());
-            Ok(ExitCode::from(2))
-        }
+        Command::Setup(arguments) => setup::command(*arguments),
+        Command::Demo(arguments) => demo::command(arguments),
+        Command::Test(arguments) => test::command(arguments),
+        Command::Figures(arguments) => figures::command(arguments),
+        Command::Fuzz(arguments) => fuzz::command(arguments),
+        Command::Firmware(arguments) => firmware::command(arguments),
+        Command::Tidy => tidy::command(),
     }
 }

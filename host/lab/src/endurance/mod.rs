@@ -24,7 +24,7 @@ use mortise_scenario::ScenarioError;
 use serde::Serialize;
 
 use crate::LabError;
-use crate::figures::Row;
+use crate::row::Row;
 use scenes::Scenes;
 
 /// Virtual time of a turn, s.

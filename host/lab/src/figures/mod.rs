@@ -6,15 +6,14 @@ mod contact;
 mod end_to_end;
 mod link;
 mod parts;
+mod plan;
 pub mod promises;
-mod row;
 pub mod stability;
 
-use std::path::Path;
-
 pub use self::claims::{Claims, Count};
-pub use self::row::{Row, Value, Verdict};
+pub use self::plan::Plan;
 use crate::LabError;
+pub use crate::row::{Row, Value, Verdict};
 
 /// Measures the rows of a table.
 type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
@@ -31,17 +30,6 @@ const TABLES: &[(&str, Measure)] = &[
 /// Names of the tables there are.
 pub fn names() -> Vec<&'static str> {
     TABLES.iter().map(|(name, _)| *name).collect()
-}
-
-/// How a table is measured.
-#[derive(Clone, Copy, Debug)]
-pub struct Plan<'a> {
-    /// The shorter form: what takes minutes is done on fewer cases; each row's text says so.
-    pub quick: bool,
-    /// The program `mortise`, for rows that measure a command of its.
-    pub program: &'a Path,
-    /// The thesis pair with 1 mm clearance.
-    pub pair: &'a Path,
 }
 
 /// Measures the table `name`, each row judged by its claim of `claims`; each row goes to `out` as soon as it is known. The last row counts those
@@ -75,4 +63,22 @@ fn measure(name: &str, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), 
         known: names().join(", "),
     })?;
     measure(plan, out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kept_claims_are_positive_numbers_of_known_tables() {
+        let claims = Claims::kept().expect("reads");
+        for (table, rows) in &claims.tables {
+            let name = table.strip_suffix(claims::OTHER_FORM).unwrap_or(table);
+            assert!(names().contains(&name), "{table}");
+            for (key, claim) in rows {
+                assert!(claim.is_finite() && *claim >= 0.0, "{table}: {key}: {claim}");
+                assert_eq!(&Row::noted(key, "").key(), key, "{table}");
+            }
+        }
+    }
 }

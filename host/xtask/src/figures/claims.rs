@@ -12,7 +12,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use tinyjson::JsonValue;
 
-use super::Row;
+use super::row::Row;
 
 /// Where claims are kept, from the root.
 pub const FILE: &str = "docs/figures/claims.json";

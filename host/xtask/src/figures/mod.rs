@@ -6,128 +6,68 @@
 
 pub mod artefacts;
 mod claims;
+mod measure;
 mod page;
 mod quoted;
 mod renew;
 mod row;
 mod sources;
+mod write;
 
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 
-use self::artefacts::{ARTEFACTS, Artefact, Made};
 use self::claims::Claims;
+use self::measure::{By, measure};
 pub use self::row::{Row, count};
+use self::write::{page_is_quick, write_page};
+use crate::arguments::Figures;
 use crate::program::Programs;
-use crate::setup::{self, Consent, Group};
+use crate::setup::{self, Group};
 use crate::{firmware, shell};
 
-/// What one run of `mortise-lab figures` gave.
-#[derive(Debug)]
-pub struct Measured {
-    /// The rows, in the program's order.
-    pub rows: Vec<Row>,
-    /// True if the program ended with success.
-    pub success: bool,
-}
-
-/// What `mortise-lab figures` judges rows by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum By {
-    /// The claims it was built with; a row without one makes the last row fail.
-    Kept,
-    /// The same, and where there is none, what it measures.
-    Completed,
-    /// What it measures.
-    Measured,
-}
-
-impl By {
-    fn option(self) -> &'static str {
-        match self {
-            Self::Kept => "kept",
-            Self::Completed => "completed",
-            Self::Measured => "measured",
-        }
-    }
-}
-
 /// `cargo xtask figures [NAME] [--quick] [--claim]`, `--check`, `--renew [NAME]...` or `--record NAME...`.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
+pub fn command(arguments: &Figures) -> Result<ExitCode> {
     let root = shell::root()?;
-    let mut arguments = arguments.to_vec();
-    let consent = Consent::take(&mut arguments);
-    let (options, names): (Vec<String>, Vec<String>) = arguments
-        .into_iter()
-        .partition(|argument| argument.starts_with('-'));
-    let options: Vec<&str> = options.iter().map(String::as_str).collect();
-    let name = match (options.as_slice(), names.as_slice()) {
-        (["--check"], []) | (["--renew"], _) => None,
-        (["--record"], [_, ..]) => {
-            renew::record_all(&root, &names)?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        ([] | ["--quick"] | ["--claim"] | ["--quick", "--claim"] | ["--claim", "--quick"], [name]) => {
-            Some(name)
-        }
+    let names = &arguments.names;
+    if arguments.record {
+        renew::record_all(&root, names)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let table = match names.as_slice() {
+        _ if arguments.check || arguments.renew => None,
+        [name] => Some(name),
         _ => bail!(
-            "say which figures, for example `cargo xtask figures end-to-end`, or `--check` or `--renew` alone; see `cargo xtask figures --help`"
+            "say which figures, for example `cargo xtask figures end-to-end`, or `--check` or `--renew`"
         ),
     };
-    if !setup::ensure(&[Group::Build, Group::Board], consent)? {
+    if !setup::ensure(&[Group::Build, Group::Board], arguments.installing.into())? {
         return Ok(ExitCode::FAILURE);
     }
     firmware::build(&root, firmware::EMULATED)?;
-    let program = Programs::build(&root)?.lab;
-    let all_hold = match name {
+    let lab = Programs::build(&root)?.lab;
+    let all_hold = match table {
         Some(name) => {
-            let by = if options.contains(&"--claim") {
+            let by = if arguments.claim {
                 By::Measured
             } else {
                 By::Completed
             };
-            write_page(&root, &program, name, options.contains(&"--quick"), by)?
+            write_page(&root, &lab, name, arguments.quick, by)?
         }
-        None if options == ["--check"] => {
-            println!("{}", check(&root, &program)?);
+        None if arguments.check => {
+            println!("{}", check(&root, &lab)?);
             true
         }
-        None => renew::run(&root, &program, &names)?,
+        None => renew::run(&root, &lab, names)?,
     };
     Ok(if all_hold {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
     })
-}
-
-/// Whether the page of a table is made from the shorter form; `None` when there is no such table.
-fn page_is_quick(name: &str) -> Option<bool> {
-    let of = |artefact: &Artefact| match artefact.made {
-        Made::Page { quick } if artefact.name == name => Some(quick),
-        _ => None,
-    };
-    ARTEFACTS.iter().find_map(of)
-}
-
-/// Measures a table, keeps the claims of new rows and writes the page; true if every bound holds.
-fn write_page(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<bool> {
-    let Some(of_page) = page_is_quick(name).map(|page| page == quick) else {
-        bail!("there is no table `{name}`; `mortise-lab figures --help` names them");
-    };
-    let measured = measure(root, program, name, quick, by)?;
-    let mut claims = Claims::read(root)?;
-    for key in claims.take(name, of_page, &measured.rows) {
-        eprintln!("{}: dropped, no row: {name}: {key}", claims::FILE);
-    }
-    claims.write(root)?;
-    let file = root.join(artefacts::FOLDER).join(format!("{name}.md"));
-    std::fs::write(&file, page::text(name, quick, &measured.rows))
-        .with_context(|| format!("writing {}", file.display()))?;
-    eprintln!("written: docs/figures/{name}.md");
-    Ok(measured.success && !measured.rows.iter().any(Row::fails))
 }
 
 /// The step of `cargo xtask test`: [`check`], once figures have been renewed for the first time; until then, whether the bounds of `end-to-end` hold.
@@ -217,39 +157,4 @@ fn page_of(root: &Path, table: &str) -> Result<Vec<Row>> {
     let page = std::fs::read_to_string(root.join(&file))
         .with_context(|| format!("reading {file}; `--renew` writes it"))?;
     Ok(quoted::page_rows(&page))
-}
-
-/// Runs `mortise-lab figures NAME --json` and prints each row as it comes.
-///
-/// # Errors
-/// When the program cannot be started or prints no rows, or something that is not a row.
-pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<Measured> {
-    let mut command = Command::new(program);
-    command
-        .current_dir(root)
-        .args(["figures", name, "--json", "--claims", by.option()]);
-    if quick {
-        command.arg("--quick");
-    }
-    let mut rows = Vec::new();
-    let mut foreign = Vec::new();
-    let run = shell::run_lines(&mut command, |line| match Row::parse(line) {
-        Ok(row) => {
-            println!("  {}", row.line());
-            rows.push(row);
-        }
-        Err(_) if line.trim().is_empty() => {}
-        Err(error) => foreign.push(format!("{error:#}: {line}")),
-    });
-    if let Some(first) = foreign.first() {
-        bail!("`mortise-lab figures {name} --json` printed what is not a row ({first})");
-    }
-    if rows.is_empty() {
-        run?;
-        bail!("`mortise-lab figures {name} --json` printed no row");
-    }
-    Ok(Measured {
-        rows,
-        success: run.is_ok(),
-    })
 }

@@ -2,7 +2,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use super::{Row, count};
+use super::row::{Row, count};
 
 /// A sweep that belongs to a table: the experiment of `mortise-lab` that makes it, and the charts it leaves in `docs/figures`, drawn from one table
 /// of the experiment's name, or each from one of its own.

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use super::Row;
+use super::row::Row;
 
 const README: &str = "README.md";
 const PAGE: &str = "the page of figures";

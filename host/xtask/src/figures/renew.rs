@@ -7,7 +7,8 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use super::artefacts::{ARTEFACTS, Artefact, FOLDER, Made, Manifest, stale};
-use super::{By, write_page};
+use super::measure::By;
+use super::write::write_page;
 use crate::shell;
 
 /// Makes all stale artefacts of `names`, or of all where there are none; true if every bound of the tables among them holds. The manifest is written

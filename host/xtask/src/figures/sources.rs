@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use crate::rust_source::words;
+
 /// Hash of all files at and below `places`, paths from `root`; files of tests are left out.
 ///
 /// # Errors
@@ -86,129 +88,32 @@ impl Fnv {
 
 /// The tokens of a Rust source, separated by single spaces where it had any space between two words, without items under `#[cfg(test)]`.
 fn tokens(source: &str) -> String {
-    without_tests(&words(source)).join(" ")
-}
-
-/// Words, literals and single signs, without comments.
-fn words(source: &str) -> Vec<String> {
-    let letters: Vec<char> = source.chars().collect();
-    let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
-    let mut found = Vec::new();
-    let mut at = 0;
-    while at < letters.len() {
-        let rest = &letters[at..];
-        let length = match rest[0] {
-            letter if letter.is_whitespace() => {
-                at += 1;
-                continue;
-            }
-            '/' if rest.starts_with(&['/', '/']) => {
-                at += rest
-                    .iter()
-                    .position(|&letter| letter == '\n')
-                    .unwrap_or(rest.len());
-                continue;
-            }
-            '/' if rest.starts_with(&['/', '*']) => {
-                at += block_comment(rest);
-                continue;
-            }
-            '"' => quoted(rest),
-            'r' | 'b' | 'c' if raw(rest).is_some() => raw(rest).unwrap_or(1),
-            '\'' => quote(rest),
-            letter if is_word(letter) => rest
-                .iter()
-                .position(|&letter| !is_word(letter))
-                .unwrap_or(rest.len()),
-            _ => 1,
-        };
-        found.push(rest[..length].iter().collect());
-        at += length;
-    }
-    found
-}
-
-/// Length of a comment, others within it included.
-fn block_comment(rest: &[char]) -> usize {
-    let (mut depth, mut at) = (0usize, 0);
-    while at < rest.len() {
-        if rest[at..].starts_with(&['/', '*']) {
-            depth += 1;
-            at += 2;
-        } else if rest[at..].starts_with(&['*', '/']) {
-            depth -= 1;
-            at += 2;
-            if depth == 0 {
-                break;
-            }
-        } else {
-            at += 1;
-        }
-    }
-    at
-}
-
-/// Length of a string in quotes.
-fn quoted(rest: &[char]) -> usize {
-    let mut at = 1;
-    while at < rest.len() && rest[at] != '"' {
-        at += if rest[at] == '\\' { 2 } else { 1 };
-    }
-    (at + 1).min(rest.len())
-}
-
-/// Length of a raw string, `r"…"` or `r#"…"#`, bytes too.
-fn raw(rest: &[char]) -> Option<usize> {
-    let start = rest
-        .iter()
-        .position(|&letter| letter == 'r')
-        .filter(|&at| at <= 1)?
-        + 1;
-    let hashes = rest[start..].iter().take_while(|&&letter| letter == '#').count();
-    if rest.get(start + hashes) != Some(&'"') {
-        return None;
-    }
-    let mut end = vec!['"'];
-    end.resize(hashes + 1, '#');
-    let text = &rest[start + hashes + 1..];
-    let length = text.windows(end.len()).position(|window| window == end)?;
-    Some(start + hashes + 1 + length + end.len())
-}
-
-/// Length of a character in quotes, or of the quote of a lifetime.
-fn quote(rest: &[char]) -> usize {
-    if rest.get(1) == Some(&'\\') {
-        let end = rest.iter().skip(3).position(|&letter| letter == '\'');
-        end.map_or(1, |end| end + 4)
-    } else if rest.get(2) == Some(&'\'') {
-        3
-    } else {
-        1
-    }
+    let words: Vec<&str> = words(source).iter().map(|word| word.text).collect();
+    without_tests(&words).join(" ")
 }
 
 /// Drops what follows `#[cfg(test)]`: attributes, and an item to its `;` or closing brace.
-fn without_tests(words: &[String]) -> Vec<&str> {
+fn without_tests<'s>(words: &[&'s str]) -> Vec<&'s str> {
     const TEST: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut kept = Vec::new();
     let mut at = 0;
     while at < words.len() {
         let starts =
-            words.len() - at >= TEST.len() && words[at..].iter().zip(TEST).all(|(word, test)| word == test);
+            words.len() - at >= TEST.len() && words[at..].iter().zip(TEST).all(|(word, test)| *word == test);
         if starts {
             at = end_of_item(words, at + TEST.len());
         } else {
-            kept.push(words[at].as_str());
+            kept.push(words[at]);
             at += 1;
         }
     }
     kept
 }
 
-fn end_of_item(words: &[String], mut at: usize) -> usize {
+fn end_of_item(words: &[&str], mut at: usize) -> usize {
     let mut depth = 0usize;
     while at < words.len() {
-        match words[at].as_str() {
+        match words[at] {
             "{" | "(" | "[" => depth += 1,
             ")" | "]" => depth = depth.saturating_sub(1),
             "}" => {

@@ -20,6 +20,7 @@ use anyhow::{Result, bail};
 use self::machine::Machine;
 pub use self::packages::Group;
 pub use self::rust::BOARD_TARGET;
+use crate::arguments::Installing;
 use crate::shell;
 
 /// What is asked of the user before something is installed.
@@ -33,18 +34,12 @@ pub enum Consent {
     Refused,
 }
 
-impl Consent {
-    /// Takes `--yes` and `--no-install` out of `arguments`; the second one wins, and `CI=true` says yes as well.
-    pub fn take(arguments: &mut Vec<String>) -> Self {
-        let mut given = |names: &[&str]| {
-            let before = arguments.len();
-            arguments.retain(|argument| !names.contains(&argument.as_str()));
-            arguments.len() < before
-        };
-        let (yes, refused) = (given(&["--yes", "-y"]), given(&["--no-install"]));
-        if refused {
+impl From<Installing> for Consent {
+    /// `--no-install` wins over `--yes`, which CI=true says as well.
+    fn from(installing: Installing) -> Self {
+        if installing.no_install {
             Self::Refused
-        } else if yes || shell::is_ci() {
+        } else if installing.yes || shell::is_ci() {
             Self::Given
         } else {
             Self::Ask
@@ -85,13 +80,8 @@ impl Missing {
 }
 
 /// `cargo xtask setup`: everything that any command needs.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
-    let mut arguments = arguments.to_vec();
-    let consent = Consent::take(&mut arguments);
-    if let Some(unknown) = arguments.first() {
-        bail!("`setup` does not know `{unknown}`; see `cargo xtask setup --help`");
-    }
-    let done = ensure(&Group::ALL, consent)?;
+pub fn command(installing: Installing) -> Result<ExitCode> {
+    let done = ensure(&Group::ALL, installing.into())?;
     if done {
         eprintln!("Nothing is missing.");
     }
@@ -185,12 +175,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn yes_is_taken_out_of_the_arguments() {
-        let mut arguments = vec!["--headless".to_owned(), "--yes".to_owned(), "--json".to_owned()];
-        assert_eq!(Consent::take(&mut arguments), Consent::Given);
-        assert_eq!(arguments, ["--headless", "--json"]);
-        let mut arguments = vec!["--yes".to_owned(), "--no-install".to_owned()];
-        assert_eq!(Consent::take(&mut arguments), Consent::Refused);
-        assert!(arguments.is_empty());
+    fn a_refusal_wins() {
+        let consent = |yes, no_install| Consent::from(Installing { yes, no_install });
+        assert_eq!(consent(true, false), Consent::Given);
+        assert_eq!(consent(true, true), Consent::Refused);
+        assert_eq!(consent(false, true), Consent::Refused);
     }
 }

@@ -3,19 +3,20 @@
 //! Host crates are checked, tested and run in one profile, `release`, so that nothing large is
 //! compiled twice and what is tested is what a user runs.
 
+mod bench;
 mod report;
 mod steps;
 mod window;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 
+use self::bench::Bench;
 use self::report::{Counts, Report};
-use crate::program::Programs;
-use crate::setup::{self, Consent, Group};
+use crate::arguments::Test;
+use crate::setup::{self, Group};
 use crate::shell;
 
 /// One thing that is checked.
@@ -25,19 +26,10 @@ struct Step {
     run: fn(&mut Bench) -> Result<String>,
 }
 
-/// What steps share.
-struct Bench {
-    root: PathBuf,
-    /// The programs, once the step `build` made them.
-    programs: Option<Programs>,
-    /// Tests counted in the step that runs.
-    counts: Counts,
-}
-
 #[rustfmt::skip]
 const STEPS: &[Step] = &[
     Step { name: "format", what: "rustfmt leaves every source as it is", run: steps::format },
-    Step { name: "tidy", what: "paths named in docs exist, files are short, layers hold", run: steps::tidy },
+    Step { name: "tidy", what: "paths named in docs exist, files are short, layers hold, no modules need each other", run: steps::tidy },
     Step { name: "dependencies", what: "licences, sources, advisories and versions of all that is built on", run: steps::dependencies },
     Step { name: "lint", what: "clippy finds nothing in host crates and their tests", run: steps::lint },
     Step { name: "no-std", what: "board-side crates compile for the microcontroller", run: steps::no_std },
@@ -55,17 +47,15 @@ const STEPS: &[Step] = &[
 ];
 
 /// Runs the steps.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
-    let mut arguments = arguments.to_vec();
-    let consent = Consent::take(&mut arguments);
-    let chosen = choose(&arguments)?;
-    let Some(chosen) = chosen else {
+pub fn command(arguments: &Test) -> Result<ExitCode> {
+    if arguments.list {
         for step in STEPS {
             println!("{:<12} {}", step.name, step.what);
         }
         return Ok(ExitCode::SUCCESS);
-    };
-    if !setup::ensure(&Group::ALL, consent)? {
+    }
+    let chosen = choose(arguments)?;
+    if !setup::ensure(&Group::ALL, arguments.installing.into())? {
         return Ok(ExitCode::FAILURE);
     }
     let mut bench = Bench {
@@ -103,69 +93,49 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     })
 }
 
-/// Steps that the arguments ask for; `None` for `--list`.
-fn choose(arguments: &[String]) -> Result<Option<Vec<&'static Step>>> {
+/// Steps that the arguments ask for.
+fn choose(arguments: &Test) -> Result<Vec<&'static Step>> {
     let position = |name: &str| {
         STEPS.iter().position(|step| step.name == name).with_context(|| {
             let names: Vec<&str> = STEPS.iter().map(|step| step.name).collect();
             format!("there is no step `{name}`; there are: {}", names.join(" "))
         })
     };
-    let mut words = arguments.iter();
-    let mut chosen: Vec<&Step> = STEPS.iter().collect();
-    while let Some(word) = words.next() {
-        let (option, value) = match word.split_once('=') {
-            Some((option, value)) => (option, Some(value)),
-            None => (word.as_str(), None),
-        };
-        let mut value = || {
-            value
-                .or_else(|| words.next().map(String::as_str))
-                .with_context(|| format!("`{option}` needs a step"))
-        };
-        match option {
-            "--list" => return Ok(None),
-            "--from" => chosen = STEPS[position(value()?)?..].iter().collect(),
-            "--only" => {
-                let mut positions = value()?.split(',').map(position).collect::<Result<Vec<_>>>()?;
-                positions.sort_unstable();
-                positions.dedup();
-                chosen = positions.into_iter().map(|index| &STEPS[index]).collect();
-            }
-            _ => bail!("`test` does not know `{word}`; see `cargo xtask test --help`"),
-        }
+    if let Some(from) = &arguments.from {
+        return Ok(STEPS[position(from)?..].iter().collect());
     }
-    Ok(Some(chosen))
+    if arguments.only.is_empty() {
+        return Ok(STEPS.iter().collect());
+    }
+    let only = arguments.only.iter().map(|name| position(name));
+    let mut positions = only.collect::<Result<Vec<_>>>()?;
+    positions.sort_unstable();
+    positions.dedup();
+    Ok(positions.into_iter().map(|index| &STEPS[index]).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn names(arguments: &[&str]) -> Result<Vec<&'static str>> {
-        let arguments: Vec<String> = arguments.iter().map(|word| (*word).to_owned()).collect();
-        Ok(choose(&arguments)?
-            .unwrap_or_default()
-            .into_iter()
-            .map(|step| step.name)
-            .collect())
+    fn names(only: &[&str], from: Option<&str>) -> Result<Vec<&'static str>> {
+        let arguments = Test {
+            only: only.iter().map(|&name| name.to_owned()).collect(),
+            from: from.map(str::to_owned),
+            ..Test::default()
+        };
+        Ok(choose(&arguments)?.into_iter().map(|step| step.name).collect())
     }
 
     #[test]
     fn steps_are_chosen_in_their_own_order() {
-        assert_eq!(names(&[]).unwrap().len(), STEPS.len());
+        assert_eq!(names(&[], None).unwrap().len(), STEPS.len());
         assert_eq!(
-            names(&["--only", "unit,format,unit"]).unwrap(),
+            names(&["unit", "format", "unit"], None).unwrap(),
             ["format", "unit"]
         );
-        assert_eq!(names(&["--from=figures"]).unwrap(), ["figures", "window"]);
-        assert!(
-            names(&["--only", "units"])
-                .unwrap_err()
-                .to_string()
-                .contains("there are: format")
-        );
-        assert!(names(&["--from"]).is_err());
-        assert!(names(&["--fast"]).is_err());
+        assert_eq!(names(&[], Some("figures")).unwrap(), ["figures", "window"]);
+        let unknown = names(&["units"], None).unwrap_err().to_string();
+        assert!(unknown.contains("there are: format"), "{unknown}");
     }
 }

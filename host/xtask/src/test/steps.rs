@@ -6,9 +6,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
-use super::Bench;
-use crate::program::Programs;
-use crate::{figures, firmware as boards, fuzz, program, setup, shell, tidy};
+use super::bench::Bench;
+use crate::{figures, firmware as boards, fuzz, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
 const HIL_BENCH: &str = "bench";
@@ -116,12 +115,9 @@ pub fn firmware(bench: &mut Bench) -> Result<String> {
     Ok(format!("{} boards", names.len()))
 }
 
-/// All targets of all packages at once, so that the tests that follow find the same features and
-/// compile nothing again.
+/// See [`Bench::build`].
 pub fn build(bench: &mut Bench) -> Result<String> {
-    let mut command = shell::cargo(&bench.root);
-    command.args(["build", "--release", "--workspace", "--all-targets"]);
-    bench.programs = Some(Programs::pick(&program::build(&mut command)?)?);
+    bench.build()?;
     Ok(String::new())
 }
 
@@ -207,19 +203,6 @@ pub fn docs(bench: &mut Bench) -> Result<String> {
 pub fn figures(bench: &mut Bench) -> Result<String> {
     let lab = bench.programs()?.lab;
     figures::step(&bench.root, &lab)
-}
-
-impl Bench {
-    /// The programs: from the step `build`, or built now when that step was not asked for.
-    pub fn programs(&mut self) -> Result<Programs> {
-        match &self.programs {
-            Some(programs) => Ok(programs.clone()),
-            None => {
-                build(self)?;
-                self.programs.clone().context("the step `build` left no program")
-            }
-        }
-    }
 }
 
 /// The system tests run on. Asked for, because a board's own configuration may name another.

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use super::Bench;
+use super::bench::Bench;
 use crate::shell;
 
 /// Time for the window to appear and be drawn; software rendering of the first frame takes seconds.

@@ -5,8 +5,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
+use crate::arguments;
 use crate::program::{LAB, Programs};
-use crate::usage;
 
 /// Help texts, each asked for once.
 pub struct Helps<'a> {
@@ -37,10 +37,8 @@ impl<'a> Helps<'a> {
             return Ok(text.clone());
         }
         let text = if chain[0] == "xtask" {
-            match chain.get(1) {
-                None => usage::overview(),
-                Some(name) => usage::of(name).with_context(|| format!("`cargo xtask {name}` has no help"))?,
-            }
+            let name = chain.get(1).map(String::as_str);
+            arguments::help(name).with_context(|| format!("`{}` has no help", shown(chain)))?
         } else {
             let path = if chain[0] == LAB {
                 &self.programs.lab
@@ -151,8 +149,8 @@ mod tests {
                 "mortise inspect" => INSPECT.to_owned(),
                 "mortise-lab" => EXPERIMENTS.to_owned(),
                 "mortise-lab figures" => "Options:\n      --quick\n      --json\n".to_owned(),
-                "xtask" => usage::overview(),
-                other => usage::of(other.trim_start_matches("xtask ")).unwrap(),
+                "xtask" => arguments::help(None).unwrap(),
+                other => arguments::help(other.strip_prefix("xtask ")).unwrap(),
             })
         })
         .unwrap()

@@ -4,7 +4,8 @@ use std::path::{Component, Path, PathBuf};
 
 use anyhow::Result;
 
-use super::{Finding, tree};
+use super::finding::Finding;
+use super::tree;
 
 /// Pages whose words are about what is, not about what was.
 pub fn pages(files: &[PathBuf]) -> Vec<&PathBuf> {

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use tinyjson::JsonValue;
 
-use super::{Finding, tree};
+use super::finding::Finding;
+use super::tree;
 use crate::shell;
 
 type Object = HashMap<String, JsonValue>;

@@ -1,48 +1,27 @@
-//! Checks that keep the repository true: what docs name exists, files stay short, layers hold, no figure is stale.
+//! Checks that keep the repository true: what docs name exists, files stay short, layers hold, no modules need each other, no figure is stale.
 
+mod circles;
 mod commands;
 mod docs;
+mod finding;
 mod layers;
 mod sources;
 mod tree;
 mod unsafety;
 
-use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 
+pub use self::finding::{Finding, report};
 pub use self::layers::target_directory;
 
 use crate::program::Programs;
 use crate::{figures, shell};
 
-/// Something that is not as it must be.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// File, from the root.
-    pub file: PathBuf,
-    /// Line, counted from one; 0 when it concerns the whole file.
-    pub line: usize,
-    /// What is wrong and what would be right.
-    pub what: String,
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.line {
-            0 => write!(formatter, "{}: {}", self.file.display(), self.what),
-            line => write!(formatter, "{}:{line}: {}", self.file.display(), self.what),
-        }
-    }
-}
-
 /// `cargo xtask tidy`.
-pub fn command(arguments: &[String]) -> Result<ExitCode> {
-    if let Some(unknown) = arguments.first() {
-        bail!("`tidy` does not know `{unknown}`; see `cargo xtask tidy --help`");
-    }
+pub fn command() -> Result<ExitCode> {
     let root = shell::root()?;
     let mut findings = check(&root)?;
     match Programs::built(&target_directory(&root)?.join("release")) {
@@ -58,7 +37,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, what figures were made from.
+/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, import circles, what figures were made from.
 ///
 /// # Errors
 /// When a file cannot be read, or cargo cannot describe the workspace.
@@ -71,6 +50,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     }
     findings.extend(docs::check_paths(root, &files)?);
     findings.extend(layers::check(root, &files)?);
+    findings.extend(circles::check(root, &files)?);
     let stale = figures::artefacts::complaints(root)?;
     findings.extend(
         stale
@@ -100,19 +80,4 @@ pub fn check_commands(root: &Path, programs: &Programs) -> Result<Vec<Finding>> 
         }
     }
     Ok(findings)
-}
-
-/// Prints findings.
-///
-/// # Errors
-/// When there is one.
-pub fn report(findings: &[Finding]) -> Result<()> {
-    for finding in findings {
-        eprintln!("{finding}");
-    }
-    if findings.is_empty() {
-        Ok(())
-    } else {
-        bail!("tidy: {} found", findings.len())
-    }
 }

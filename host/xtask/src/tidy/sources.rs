@@ -4,7 +4,8 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::{Finding, tree};
+use super::finding::Finding;
+use super::tree;
 
 /// A file longer than this holds more than one idea.
 const MAX_LINES: usize = 600;

@@ -5,7 +5,8 @@
 
 use std::path::Path;
 
-use super::{Finding, tree};
+use super::finding::Finding;
+use super::tree;
 
 /// Lines a statement may have before the one with the keyword.
 const STATEMENT_LINES: usize = 4;

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use mortise_bake::Grabbable;
 use mortise_scenario::probe::{NamedPose, ProbeRow, ProbeScene};
 
-use super::{CELL_MM, TIGHT_MM};
+use super::limits::{CELL_MM, TIGHT_MM};
 use crate::LabError;
 use crate::figures::Row;
 use crate::fit::Fit;

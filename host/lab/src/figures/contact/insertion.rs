@@ -1,6 +1,6 @@
 //! What goes into what, in the closed loop.
 
-use super::{CELL_MM, TIGHT_MM};
+use super::limits::{CELL_MM, TIGHT_MM};
 use crate::LabError;
 use crate::clearance::{CLEARANCES_MM, Trial, smallest, trial};
 use crate::figures::{Plan, Row};

@@ -3,15 +3,11 @@
 mod accuracy;
 mod baking;
 mod insertion;
+mod limits;
 mod ticks;
 
 use super::{Plan, Row};
 use crate::LabError;
-
-/// Cells of the accuracy that is claimed, mm.
-const CELL_MM: f64 = 0.5;
-/// The tightest fit asked for, mm.
-const TIGHT_MM: f64 = 0.02;
 
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {

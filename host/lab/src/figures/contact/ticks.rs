@@ -3,7 +3,7 @@
 use mortise_bake::SampleFormat;
 use mortise_rig::{EmulatedMode, RigSpec};
 
-use super::{CELL_MM, TIGHT_MM};
+use super::limits::{CELL_MM, TIGHT_MM};
 use crate::LabError;
 use crate::clearance::trial;
 use crate::figures::{Plan, Row};

@@ -1,7 +1,7 @@
 //! A measured figure, its bound, and the verdict.
 //!
 //! A row's author states the *requirement*: the limits the value must never leave, however wide. Beside it stands the *claim*, the figure that is
-//! stated for the row ([`super::Claims`]). The bound is the nearer of the two on each side: the requirement, and the claim times the row's spread,
+//! stated for the row ([`crate::figures::Claims`]). The bound is the nearer of the two on each side: the requirement, and the claim times the row's spread,
 //! 1.1 for what comes out the same on every machine (ticks, instructions, bytes, forces, lengths, virtual time) and 1.5 for what does not (time of
 //! the wall clock, memory of a process). So a bound far from what is claimed cannot be written. Exact bounds and words need no claim.
 

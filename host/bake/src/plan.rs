@@ -1,0 +1,87 @@
+//! A request for a scene image, and the plan that answers it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::cost::TickCost;
+use crate::format::SampleFormat;
+use crate::options::Grabbable;
+use crate::report::BakeReport;
+
+/// Request for a scene image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Request {
+    /// Largest error of gaps and depths where parts fit into one another, mm; elsewhere [`crate::choice::ELSEWHERE`] times that.
+    pub accuracy_mm: f64,
+    /// Largest size of the image in bytes.
+    pub flash_bytes: u64,
+    /// Most instructions of the worst-case tick; `None`: no limit.
+    pub tick_instructions: Option<u64>,
+    /// Parts that may be grabbed.
+    pub grabbable: Grabbable,
+}
+
+/// Model chosen for a shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShapePlan {
+    /// First part with this shape.
+    pub name: String,
+    /// Cell edge, mm.
+    pub cell_mm: f64,
+    /// Number format.
+    pub format: SampleFormat,
+    /// Depth and height to which the surface's neighbourhood is stored, cells.
+    pub band_cells: f64,
+    /// Error bound of the shell, mm.
+    pub epsilon_mm: f64,
+    /// Error bound of the shell where convex faces touch each other away from every edge, mm: larger only where the requested tick requires it.
+    pub crossing_epsilon_mm: f64,
+    /// Largest error of the field where the shape fits another, mm.
+    pub field_error_in_fits_mm: f64,
+    /// Largest error of the shell there, mm.
+    pub shell_error_in_fits_mm: f64,
+    /// Largest combined error of field and shell elsewhere, mm; within a cell of sharp edges the field's error is up to half a cell.
+    pub error_elsewhere_mm: f64,
+    /// Faces that fit another part's.
+    pub faces_that_fit: Vec<u32>,
+    /// Faces too sharply curved to resolve: the field's error there is that at sharp edges.
+    pub faces_taken_as_edges: Vec<u32>,
+    /// Unreachable faces.
+    pub faces_left_out: Vec<u32>,
+    /// Reason why the cell cannot be larger.
+    pub why: String,
+}
+
+/// Cost of holding a part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartTick {
+    /// The part.
+    pub name: String,
+    /// Its worst-case tick.
+    pub cost: TickCost,
+}
+
+/// Model chosen for an accuracy.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Accuracy of the plan, mm.
+    pub accuracy_mm: f64,
+    /// In the image's order.
+    pub shapes: Vec<ShapePlan>,
+    /// Parts that may be grabbed, the costliest first.
+    pub ticks: Vec<PartTick>,
+    /// Bytes by part and kind.
+    pub report: BakeReport,
+}
+
+/// Result of a request.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// Whether the request is met: if not, this is the finest plan that fits, or, if nothing fits, the last one tried.
+    pub met: bool,
+    /// Whether it fits flash and tick.
+    pub fits: bool,
+    /// The plan.
+    pub plan: Plan,
+    /// Image of the plan.
+    pub image: Vec<u8>,
+}
