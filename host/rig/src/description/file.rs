@@ -6,7 +6,7 @@ use mortise_protocol::limits::MAX_NAME;
 use mortise_protocol::rig::{Joint, Kinematics, Mount, Rig, RigCeilings, Wrist};
 use serde::{Deserialize, Serialize};
 
-use super::significant;
+use super::digits::significant;
 
 const MM: f32 = 1e-3;
 const DEG: f32 = PI / 180.0;

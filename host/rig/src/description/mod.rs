@@ -4,6 +4,7 @@
 //! and the remedy. A file that passes here passes on the board too, because both run the same code.
 
 mod abilities;
+mod digits;
 mod file;
 
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ use mortise_protocol::rig::{Rig, RigFault, RigKey};
 
 use crate::words::Words;
 pub use abilities::{Abilities, abilities};
+use digits::significant;
 
 /// Reasons why a file is no valid description of a rig.
 #[derive(Debug, thiserror::Error)]
@@ -154,12 +156,6 @@ fn meaning(description: &str) -> String {
         .map(|letter| letter.to_lowercase().to_string())
         .unwrap_or_default();
     first + letters.as_str()
-}
-
-/// Rounds to six significant digits, the precision that remains after single precision and a change of unit.
-fn significant(value: f32) -> f64 {
-    let text = format!("{:.5e}", f64::from(value));
-    text.parse().unwrap_or(f64::from(value))
 }
 
 #[cfg(test)]

@@ -13,106 +13,22 @@
 
 mod inputs;
 mod pump;
+mod settings;
+mod shared;
 
-use std::io;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, PoisonError};
 use std::thread::JoinHandle;
 
-use mortise_protocol::message::{FromDevice, ToDevice};
-use serde::Deserialize;
+use mortise_protocol::message::FromDevice;
 
 use crate::error::RigError;
 use crate::pipe::pipe;
 use crate::transport::Transport;
 pub use inputs::{InputFault, InputFaultName};
 use pump::{Pump, from_board, to_board};
-
-/// The faults of a line. The default has none. Shares are fractions of frames, 0 to 1, in both directions.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Faults {
-    /// Seed; equal seeds give equal faults.
-    pub seed: u64,
-    /// Share of frames lost.
-    pub drop: f64,
-    /// Share of frames in which up to three bits are flipped.
-    pub corrupt: f64,
-    /// Share of frames delivered twice.
-    pub repeat: f64,
-    /// Share of frames delivered after the next one (or 50 ms later when none comes).
-    pub reorder: f64,
-    /// Range of the delay of every frame, uniformly distributed, ms.
-    pub delay_ms: [u32; 2],
-    /// Pauses: frames under way are delivered together at the end.
-    pub stall: Vec<Window>,
-    /// Cuts: frames under way are lost.
-    pub disconnect: Vec<Window>,
-    /// Spurious frames per second: to the board noise or heartbeats, from it noise.
-    pub flood_per_s: u32,
-    /// Faults at the board's inputs, where they are simulated.
-    pub inputs: Vec<InputFault>,
-}
-
-/// A time window, counted from [`FaultLine::begin`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Window {
-    /// Start, ms.
-    pub at_ms: u64,
-    /// Duration, ms.
-    pub for_ms: u64,
-}
-
-impl Window {
-    fn holds(&self, now_ms: u64) -> bool {
-        now_ms >= self.at_ms && now_ms - self.at_ms < self.for_ms
-    }
-}
-
-impl Faults {
-    /// Checks the numbers; the error is a sentence.
-    ///
-    /// # Errors
-    /// A share outside 0 to 1, or a delay whose end is below its start.
-    pub fn check(&self) -> Result<(), String> {
-        for (name, share) in [
-            ("drop", self.drop),
-            ("corrupt", self.corrupt),
-            ("repeat", self.repeat),
-            ("reorder", self.reorder),
-        ] {
-            if !(0.0..=1.0).contains(&share) {
-                return Err(format!(
-                    "{name} = {share} is not a share: write a number from 0 to 1"
-                ));
-            }
-        }
-        let [from, to] = self.delay_ms;
-        if from > to {
-            return Err(format!(
-                "delay_ms: {from} to {to} is not a range; write the smaller number first"
-            ));
-        }
-        inputs::message(&self.inputs).map(|_| ())
-    }
-
-    /// The message that makes the simulated board's inputs fail; to be sent at the start of their time. The line does not send it.
-    ///
-    /// # Errors
-    /// As [`Faults::check`].
-    pub fn input_message(&self) -> Result<ToDevice, String> {
-        inputs::message(&self.inputs)
-    }
-
-    fn stalled(&self, now_ms: u64) -> bool {
-        self.stall.iter().any(|window| window.holds(now_ms))
-    }
-
-    fn is_cut(&self, now_ms: u64) -> bool {
-        self.disconnect.iter().any(|window| window.holds(now_ms))
-    }
-}
+pub use settings::{Faults, Window};
+use shared::Shared;
 
 /// Number of frames affected, both directions together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -151,25 +67,6 @@ impl FaultCounts {
 /// Handle of the faults in a link. Clones refer to the same line.
 #[derive(Clone, Debug, Default)]
 pub struct FaultLine(Arc<Shared>);
-
-#[derive(Debug, Default)]
-struct Shared {
-    faults: Mutex<Faults>,
-    /// Odd while faults are active.
-    epoch: AtomicU32,
-    lockstep: AtomicBool,
-    /// Number of ticks released so far.
-    released: AtomicU64,
-    closing: AtomicBool,
-    overheard: Mutex<Vec<FromDevice>>,
-    frames: AtomicU64,
-    lost: AtomicU64,
-    corrupted: AtomicU64,
-    repeated: AtomicU64,
-    reordered: AtomicU64,
-    late: AtomicU64,
-    flooded: AtomicU64,
-}
 
 impl FaultLine {
     /// Inserts the line into a byte stream. A line serves one stream.
@@ -259,15 +156,5 @@ impl Drop for Running {
             // A panic there has been reported as a lost link.
             let _ = thread.join();
         }
-    }
-}
-
-/// Number of bytes read, 0 when none came; `None` at the end of the stream.
-fn read_some(result: io::Result<usize>) -> Option<usize> {
-    match result {
-        Ok(0) => None,
-        Ok(count) => Some(count),
-        Err(error) if crate::transport::is_quiet(&error) => Some(0),
-        Err(_) => None,
     }
 }

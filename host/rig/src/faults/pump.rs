@@ -13,7 +13,8 @@ use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{FromDevice, ToDevice};
 use serde::de::DeserializeOwned;
 
-use super::{Faults, Shared, read_some};
+use super::settings::Faults;
+use super::shared::{Shared, read_some};
 use crate::transport::write_whole;
 
 /// Longest wait of a frame that is to be overtaken, ms.

@@ -20,7 +20,6 @@ const NOT_YET: &[&str] = &[
     "firmware/mechanism",
     "host/app",
     "host/brep",
-    "host/rig",
 ];
 
 /// Deepest chain of re-exports that is followed.
