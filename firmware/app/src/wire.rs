@@ -1,4 +1,4 @@
-//! Between the force law's types and the message table's.
+//! Conversions between the force law's types and those of the message table.
 
 use glam::{Quat, Vec3};
 use heapless::Vec;
@@ -35,7 +35,7 @@ pub fn wrench_to_wire(wrench: &Wrench) -> WireWrench {
     }
 }
 
-/// How targets stand, for the wire.
+/// The targets' state, for the wire.
 pub fn guidance_to_wire(state: &GuidanceState) -> Guidance {
     Guidance {
         active: state.active,
@@ -82,7 +82,7 @@ pub const FLAGS_ON_WIRE: [(Flags, u16); Flags::NAMES.len()] = [
     (Flags::SOFTENED, flag::SOFTENED),
 ];
 
-/// What the force law says was out of the ordinary, in the wire's bits.
+/// The force law's flags as the wire's bits.
 pub fn flags_to_wire(flags: Flags) -> u16 {
     let mut wire = 0;
     for (ours, theirs) in FLAGS_ON_WIRE {
@@ -97,7 +97,7 @@ pub fn flags_to_wire(flags: Flags) -> u16 {
 mod tests {
     use super::*;
 
-    /// Whatever the force law flags reaches the host as one bit that nothing else sets.
+    /// Every flag of the force law maps to one bit that no other flag sets.
     #[test]
     fn each_flag_has_a_bit_of_its_own() {
         let mut taken = 0u16;
