@@ -1,4 +1,4 @@
-//! What a board must give the application: a mechanism, flash for scenes, a clock for tick costs, a way out for bytes.
+//! What a board must provide to the application: a mechanism, flash for scenes, a clock that measures tick costs, an output for bytes.
 //!
 //! The application ([`crate::control`], [`crate::link`]) is the same on every board and in the simulated rig on a PC; a board crate wires
 //! pins, clocks and interrupts to these traits and nothing more.
@@ -9,29 +9,29 @@ pub use mortise_mechanism::interface::{
 };
 use mortise_protocol::message::{CostUnit, ResetReason};
 
-/// Counts what a tick costs and whether one came too late.
+/// Clock that measures the cost of a tick and detects late ticks.
 pub trait Clock {
-    /// A tick begins. Returns how many deadlines passed since the last one began: a tick that was not done when the next was due counts one,
-    /// each further tick that could not run another.
+    /// Marks the start of a tick. Returns the deadlines missed since the last start: one for a tick that was still running when the next was due, and
+    /// one for each further tick that could not run for that reason.
     fn begin(&mut self) -> u32;
 
     /// Cost since the moment this tick was due, in [`Identity::cost_unit`]; includes the interrupt's latency where the board can tell.
     fn cost(&mut self) -> u32;
 }
 
-/// Flash could not be erased or written, or was asked for something outside a slot.
+/// Flash could not be erased or written, or the request lay outside a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashError;
 
 /// Scene slots in flash.
 pub const SLOTS: usize = 2;
-/// Slots of the rig's description, one [`Flash::erase_size`] each. A board whose mechanism is compiled in has none: its flash gives no memory for
-/// them.
+/// Slots of the rig's description, one [`Flash::erase_size`] each. A board whose mechanism is compiled in has none: its flash returns empty memory
+/// for them.
 pub const RIG_SLOTS: [usize; 2] = [SLOTS, SLOTS + 1];
-/// Smallest piece that can be written, bytes: one flash word of an STM32H7. A piece is written at most once between two erasures.
+/// Smallest unit of a write, bytes: one flash word of an STM32H7. A word is written at most once between two erasures.
 pub const WRITE_SIZE: usize = 32;
 
-/// One flash word, aligned as scenes need it.
+/// One flash word, with the alignment that scenes require.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub struct FlashWord(pub [u8; WRITE_SIZE]);
@@ -67,34 +67,35 @@ pub unsafe trait Flash<'s> {
     fn write(&mut self, slot: usize, offset: usize, word: &[u8; WRITE_SIZE]) -> Result<(), FlashError>;
 }
 
-/// Where frames go: a bounded buffer that hardware empties.
+/// Output of frames: a bounded buffer that hardware empties.
 pub trait Outbound {
-    /// Bytes that [`Self::write`] takes now.
+    /// Bytes that [`Self::write`] can accept now.
     fn room(&self) -> usize;
 
-    /// Takes one frame whole. Never called with more than `room()` bytes.
+    /// Queues one whole frame. Never called with more than `room()` bytes.
     fn write(&mut self, frame: &[u8]);
 }
 
-/// What a board says about itself.
+/// The board's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Identity {
-    /// Its name, at most [`mortise_protocol::limits::MAX_NAME`] characters; what is longer is cut.
+    /// Its name, at most [`mortise_protocol::limits::MAX_NAME`] characters; a longer name is truncated.
     pub board: &'static str,
     /// Handle axes it can drive with force.
     pub force_axes: u8,
     /// Handle axes it can drive with torque.
     pub torque_axes: u8,
-    /// What [`Clock::cost`] counts in.
+    /// Unit of [`Clock::cost`].
     pub cost_unit: CostUnit,
-    /// Costs in a tick's period; 0 when there is no deadline.
+    /// A tick's period in that unit; 0 when there is no deadline.
     pub cost_budget: u32,
-    /// Why it started.
+    /// Reason for the last reset.
     pub reset: ResetReason,
-    /// Missed ticks in a row, motors live, that are a fault; 0: they are only counted, because the mechanism stands still meanwhile.
+    /// Consecutive missed ticks, motors live, that are a fault; 0: overruns are only counted, because the mechanism stands still meanwhile.
     pub overrun_ticks: u8,
-    /// What this rig's motors and links bear, whatever the parameters say.
+    /// Limits of this rig's motors and links, whatever the parameters say.
     pub ceilings: Ceilings,
-    /// Differs at every start, by the chip's random numbers where it has any: names of sessions are made from it. Nothing else may depend on it.
+    /// Differs at every start, from the chip's random number generator where it has one: session names are derived from it. Nothing else may depend
+    /// on it.
     pub entropy: u64,
 }

@@ -1,4 +1,4 @@
-//! What passes between the two planes: bounded single-producer queues, an emergency stop counter, and nothing else.
+//! All communication between the two planes: bounded single-producer queues and a few shared atomics, among them the emergency stop counter.
 //!
 //! The link plane sends finished [`Command`]s; the control plane takes them at the start of a tick, in order, and answers each
 //! with a [`Reply`]. Neither ever waits for the other.
@@ -17,29 +17,29 @@ use mortise_protocol::parameter::ParameterId;
 
 use crate::parameters::ControlSettings;
 
-/// Commands that may wait (the queue's length is one more than it holds).
+/// Capacity of the command queue (its length is one more than it holds).
 pub const COMMANDS: usize = 8;
-/// Events that may wait.
+/// Capacity of the event queue.
 pub const EVENTS: usize = 32;
-/// Telemetry samples that may wait.
+/// Capacity of the telemetry queue.
 pub const SAMPLES: usize = 8;
-/// Most events one command or one tick can cause: a command is taken, and a tick run in lockstep, only when so many fit.
+/// Most events one command or one tick can cause: a command is taken, and a lockstep tick run, only when the event queue has that much space left.
 pub const EVENTS_AT_ONCE: usize = 8;
 
 /// Link plane to control plane.
 #[derive(Clone, Debug)]
 pub struct Command<'s> {
-    /// Sequence number of the message it came in; its reply carries it.
+    /// Sequence number of the message that carried the command; its reply carries it too.
     pub seq: u16,
-    /// [`Shared::epoch`] when its message came: an older command must not undo a newer stop or fault.
+    /// [`Shared::epoch`] when the message arrived: an older command must not undo a newer stop or fault.
     pub epoch: Epoch,
-    /// [`Shared::sessions`] when it was made: what an earlier host asked for is dropped, unanswered, but for what is valid in every session.
+    /// [`Shared::sessions`] when the command was made: commands of an earlier session are dropped unanswered, except those valid in every session.
     pub session: u32,
     /// What to do.
     pub kind: CommandKind<'s>,
 }
 
-/// What had turned the motors off for good so far: changes with every stop and every fault.
+/// Stops and faults so far that turned the motors off until cleared: changes with each of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Epoch {
     /// [`Shared::stops`].
@@ -48,22 +48,22 @@ pub struct Epoch {
     pub halts: u32,
 }
 
-/// What a command asks for. Everything in it has been checked as far as the link plane can.
+/// What a command requests. The link plane has checked all of it that it can.
 #[derive(Clone, Debug)]
 #[expect(
     clippy::large_enum_variant,
     reason = "nothing to allocate from; eight of the largest are 5 kB"
 )]
 pub enum CommandKind<'s> {
-    /// See [`mortise_protocol::message::ToDevice::Arm`]. Carries the number of the scene whose checksum was found right after the message came: the
+    /// See [`mortise_protocol::message::ToDevice::Arm`]. Carries the number of the scene whose checksum was verified after the message arrived: the
     /// control plane arms that scene and no other.
     Arm(u32),
     /// See [`mortise_protocol::message::ToDevice::Disarm`].
     Disarm,
     /// See [`mortise_protocol::message::ToDevice::ClearFault`].
     ClearFault,
-    /// Take these settings. Valid in every session, so that the link plane's copy of the parameters, from which the next settings are made, cannot
-    /// differ from what is in force.
+    /// Use these settings. Valid in every session, so that the link plane's copy of the parameters, from which the next settings are made, cannot
+    /// differ from those in force.
     Settings(ControlSettings),
     /// Reply with the parameter in force.
     Parameter(ParameterId),
@@ -71,7 +71,7 @@ pub enum CommandKind<'s> {
     Grab(u16),
     /// Let go.
     Release,
-    /// Parts back to their places, hash and mechanism to their start.
+    /// Reset the parts to their places, and the hash and the mechanism to their initial state.
     ResetScene,
     /// Set, refresh or replace a constraint target.
     SetTarget(ConstraintTarget),
@@ -79,38 +79,38 @@ pub enum CommandKind<'s> {
     ClearTarget(u16),
     /// Use this scene, all checks passed. Answered by [`Event::SceneTaken`]; valid in every session.
     UseScene {
-        /// The scene.
+        /// The checked image.
         image: SceneImage<'s>,
-        /// Names it to [`CommandKind::Arm`].
+        /// Identifies the scene in [`CommandKind::Arm`].
         number: u32,
     },
-    /// The scene did not pass its check when read again: a fault. Not answered; valid in every session.
+    /// The scene failed its check when read again: a fault. Not answered; valid in every session.
     SceneDamaged,
-    /// Telemetry every so many ticks; 0: none.
+    /// Telemetry period in ticks; 0: none.
     Telemetry(u16),
     /// Reply with statistics.
     Statistics {
-        /// And start counting anew.
+        /// Reset the counters afterwards.
         reset: bool,
     },
-    /// The handle stands in its reference pose.
+    /// The handle is in its reference pose.
     Home,
-    /// Script for the simulated hand.
+    /// Script for the operator model.
     Hand(HandScript),
-    /// What goes wrong at the simulated inputs.
+    /// Faults to inject at the simulated inputs.
     InputFaults(Vec<InputFault, MAX_INPUT_FAULTS>),
     /// Lockstep on or off.
     Lockstep(bool),
-    /// Release ticks; replied to by [`Reply::Ran`] after the last.
+    /// Release this many lockstep ticks; answered by [`Reply::Ran`] after the last.
     Run(u32),
-    /// May the board restart now?
+    /// Ask whether the board may restart now.
     Restart,
 }
 
 /// Control plane to link plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// A command is done.
+    /// A command was processed.
     Reply {
         /// [`Command::seq`].
         seq: u16,
@@ -119,20 +119,20 @@ pub enum Event {
         /// Outcome.
         reply: Reply,
     },
-    /// The scene of [`CommandKind::UseScene`] is in use and the one before it dropped; or not.
+    /// The scene of [`CommandKind::UseScene`] is in use and the previous one dropped; or the reason why not.
     SceneTaken(Result<(), Refusal>),
     /// The state changed.
     State {
-        /// When.
+        /// Tick of the change.
         tick: u32,
-        /// To what.
+        /// The new state.
         state: DeviceState,
     },
-    /// Something went wrong.
+    /// A fault occurred.
     Fault {
-        /// When.
+        /// Tick of the fault.
         tick: u32,
-        /// What.
+        /// The fault.
         fault: Fault,
     },
 }
@@ -144,23 +144,23 @@ pub enum Reply {
     Done,
     /// Not carried out.
     Refused(Refusal),
-    /// To [`CommandKind::Parameter`].
+    /// Answer to [`CommandKind::Parameter`].
     Parameter {
-        /// Which.
+        /// Which parameter.
         id: ParameterId,
-        /// In its unit.
+        /// Value in its unit.
         value: f32,
     },
-    /// To [`CommandKind::Statistics`].
+    /// Answer to [`CommandKind::Statistics`].
     Statistics {
-        /// The link's own counters are still 0.
+        /// The counters; the link's own are still 0.
         statistics: Statistics,
-        /// Counting starts anew.
+        /// The counters were reset.
         reset: bool,
     },
-    /// To [`CommandKind::Restart`]: no motor is driven from here on until a new session begins.
+    /// Answer to [`CommandKind::Restart`]: no motor is driven from here on until a new session begins.
     MayRestart,
-    /// To [`CommandKind::Run`].
+    /// Answer to [`CommandKind::Run`].
     Ran {
         /// Ticks since start.
         tick: u32,
@@ -169,18 +169,18 @@ pub enum Reply {
     },
 }
 
-/// Words both planes see at once.
+/// Atomics shared by both planes.
 #[derive(Debug)]
 pub struct Shared {
-    /// Stops asked for. Counted by the link, looked at in every tick before anything else.
+    /// Stops requested. Incremented by the link, read in every tick before anything else.
     stops: AtomicU32,
-    /// Stops and faults so far. Counted by the control plane.
+    /// Stops and faults so far. Incremented by the control plane.
     halts: AtomicU32,
-    /// `Arm` commands dealt with. Counted by the control plane.
+    /// `Arm` commands processed. Incremented by the control plane.
     arms: AtomicU32,
-    /// Hosts that greeted.
+    /// Sessions begun by a host's `Hello`.
     sessions: AtomicU32,
-    /// Sound frames heard.
+    /// Valid frames received.
     heard: AtomicU32,
     /// Telemetry samples dropped.
     dropped: AtomicU32,
@@ -191,27 +191,27 @@ pub struct Shared {
 }
 
 impl Shared {
-    /// Stops asked for so far.
+    /// Stops requested so far.
     pub fn stops(&self) -> u32 {
         self.stops.load(Ordering::Acquire)
     }
 
-    /// Motors off at the next tick (or its next poll in lockstep), whatever waits in the queue. Safe from any context.
+    /// Turns the motors off at the next tick (or its next poll in lockstep), regardless of queued commands. Safe from any context.
     pub fn stop(&self) {
         self.stops.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Times the motors went off, or began to fade, by a stop or a fault.
+    /// Stops and faults so far: times the motors were turned off, or began to fade, for one of these reasons.
     pub fn halts(&self) -> u32 {
         self.halts.load(Ordering::Acquire)
     }
 
-    /// From the control plane, with every such change of state.
+    /// Counts a stop or a fault. Called by the control plane with every such change of state.
     pub(crate) fn halt(&self) {
         self.halts.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// What has turned the motors off so far.
+    /// The current count of stops and halts, as a stamp for commands.
     pub fn epoch(&self) -> Epoch {
         Epoch {
             stops: self.stops(),
@@ -219,12 +219,12 @@ impl Shared {
         }
     }
 
-    /// `Arm` commands dealt with so far, whatever came of them.
+    /// `Arm` commands processed so far, whatever their outcome.
     pub fn arms(&self) -> u32 {
         self.arms.load(Ordering::Acquire)
     }
 
-    /// From the control plane, behind each of them.
+    /// Counts an `Arm` command. Called by the control plane after it was processed.
     pub(crate) fn count_arm(&self) {
         self.arms.fetch_add(1, Ordering::AcqRel);
     }
@@ -234,17 +234,17 @@ impl Shared {
         self.sessions.load(Ordering::Acquire)
     }
 
-    /// A host greeted: what an earlier one left running (armed, telemetry, lockstep) ends.
+    /// Begins a session: whatever an earlier one left active (armed, telemetry, lockstep) ends.
     pub fn begin_session(&self) {
         self.sessions.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Frames heard so far.
+    /// Valid frames received so far.
     pub fn heard(&self) -> u32 {
         self.heard.load(Ordering::Relaxed)
     }
 
-    /// A sound frame came.
+    /// Counts a valid frame.
     pub fn hear(&self) {
         self.heard.fetch_add(1, Ordering::Relaxed);
     }
@@ -254,19 +254,19 @@ impl Shared {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Whether motors may be driven now: ahead of the events that tell of it.
+    /// Whether motors may be driven now; changes before the events that report it.
     pub fn live(&self) -> bool {
         self.live.load(Ordering::Acquire)
     }
 
-    /// From the control plane, with every change of state.
+    /// Called by the control plane with every change of state.
     pub(crate) fn set_live(&self, live: bool) {
         self.live.store(live, Ordering::SeqCst);
     }
 
-    /// From the control plane, before motors are driven: `false` when flash may be written.
+    /// Claims the motors for the control plane before they are driven: `false` when flash may be written.
     ///
-    /// Each plane first says what it wants and then looks at the other's word (Dekker's way, sequentially consistent), so both cannot get theirs.
+    /// Each plane first stores its claim and then loads the other's (Dekker's algorithm, sequentially consistent), so both cannot succeed.
     pub(crate) fn claim_motors(&self) -> bool {
         self.live.store(true, Ordering::SeqCst);
         let free = !self.storing.load(Ordering::SeqCst);
@@ -276,7 +276,7 @@ impl Shared {
         free
     }
 
-    /// From the link plane, before flash is written: `false` when motors may be driven. Holds until [`Self::release_flash`].
+    /// Claims the flash for the link plane before it is written: `false` when motors may be driven. Holds until [`Self::release_flash`].
     pub(crate) fn claim_flash(&self) -> bool {
         self.storing.store(true, Ordering::SeqCst);
         let free = !self.live.load(Ordering::SeqCst);
@@ -291,19 +291,19 @@ impl Shared {
         self.storing.load(Ordering::Acquire)
     }
 
-    /// From the link plane: flash is not written any more.
+    /// Releases the link plane's claim of the flash.
     pub(crate) fn release_flash(&self) {
         self.storing.store(false, Ordering::SeqCst);
     }
 
-    /// A sample found no room.
+    /// Counts a telemetry sample dropped because the queue was full.
     pub fn drop_sample(&self) {
         self.dropped.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// The memory of both planes: the queues between them, and the force law's state, which is too large to be moved about on a board's
-/// stack. `'s`: how long the scene's flash lives.
+/// The memory of both planes: the queues between them, and the force law's state, which is too large to be moved on a board's stack. `'s`: lifetime
+/// of the scene's flash.
 #[derive(Debug)]
 pub struct Channels<'s> {
     law: LawState,
@@ -340,7 +340,7 @@ impl<'s> Channels<'s> {
         }
     }
 
-    /// Both ends; each may go to its own interrupt priority or thread.
+    /// Both ends; each may be moved to its own interrupt priority or thread.
     pub fn split(&mut self) -> (LinkEnds<'_, 's>, ControlEnds<'_, 's>) {
         let (commands_in, commands_out) = self.commands.split();
         let (events_in, events_out) = self.events.split();

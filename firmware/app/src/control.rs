@@ -1,12 +1,12 @@
-//! The control plane: one call each millisecond, and everything the motors do.
+//! The control plane: one call each millisecond, and the only code that drives the motors.
 //!
-//! Contract of [`ControlPlane::tick`]: bounded work (commands, look-ups, contacts all have limits), no waiting, no panics. The order
-//! in a tick is stop, session, commands, sensors, safety, force law, limits, motors, bookkeeping. A tick that starts late is counted; so many
-//! in a row as the board says ([`Identity::overrun_ticks`]) are a fault.
+//! Contract of [`ControlPlane::tick`]: bounded work (commands, field queries, contacts all have limits), no waiting, no panics. The order in a tick
+//! is stop, session, commands, sensors, safety, force law, limits, motors, bookkeeping. Late ticks are counted; [`Identity::overrun_ticks`] of them
+//! in a row are a fault.
 //!
-//! In **lockstep** (simulated mechanisms only) a tick runs only when released by `Run`, and commands behind a `Run` wait until its ticks are
-//! done: what came before `Run` in the stream has taken effect before its first tick, whatever the timing of bytes and interrupts. That makes
-//! the in-process rig and the emulated board compute the same bits. The host's silence is not counted there, since time waits for the host.
+//! In **lockstep** (simulated mechanisms only) a tick runs only when released by `Run`, and commands behind a `Run` wait until its ticks are done:
+//! all messages before `Run` in the stream have taken effect before its first tick, independent of the timing of bytes and interrupts. The in-process
+//! rig and the emulated board therefore compute the same bits. The host timeout is not applied there, since time waits for the host.
 
 mod fingerprint;
 mod report;
@@ -24,16 +24,16 @@ use crate::parameters::{ControlSettings, Parameters};
 use crate::safety::{Action, AfterSoftStop, Event as SafetyEvent, Motors, Safety};
 use crate::statistics::{StateHash, count_tick};
 
-/// Ticks in which what the coupling can hold grows from nothing to its settings after arming or grabbing; what it cannot hold slips in the hand.
+/// Ticks in which the coupling's force limit rises from zero to its setting after arming or grabbing; beyond the limit the part slips in the handle.
 ///
-/// It is the grip that is weak, not the wrench that is scaled on its way to the motors: what the object is given the hand must give. Scaled behind
-/// the coupling, an object set in motion during the ramp returned kinetic energy that nobody had put in, all of ½·m·v².
+/// The ramp limits the coupling itself rather than scaling the wrench on its way to the motors, so that all work done on the object comes from the
+/// operator. Scaled behind the coupling, an object set in motion during the ramp returned kinetic energy that was unaccounted for, all of ½·m·v².
 pub const RAMP_TICKS: u16 = 200;
-/// Ticks in which a soft stop takes the last wrench to zero.
+/// Ticks in which a soft stop fades the last wrench to zero.
 pub const FADE_TICKS: u16 = 50;
 /// Ticks of a soft stop: the fade, then damping alone, then motors off.
 pub const SOFT_STOP_TICKS: u16 = 100;
-/// Damping of a soft stop, N·s/m. On a handle of 0.15 kg a tick takes b·h/m = 1.3 % of the speed: far from the 200 % where it would ring.
+/// Damping of a soft stop, N·s/m. On a handle of 0.15 kg a tick takes b·h/m = 1.3 % of the speed, far below the 200 % at which it would oscillate.
 const SOFT_STOP_DAMPING: f32 = 2.0;
 /// Damping of a soft stop, N·m·s/rad; for a handle of 10⁻⁴ kg·m² 2 % a tick.
 const SOFT_STOP_ANGULAR_DAMPING: f32 = 0.002;
@@ -61,16 +61,16 @@ pub struct ControlPlane<'c, 's, M, C> {
     safety: Safety,
     settings: ControlSettings,
     scene: Option<SceneImage<'s>>,
-    /// Names the scene, see [`CommandKind::Arm`].
+    /// Identifies the scene, see [`CommandKind::Arm`].
     scene_number: u32,
     sensed: Sensed,
-    /// A reading of this tick was not finite and was replaced.
+    /// A reading of this tick was not finite and was replaced by the last valid one.
     replaced: bool,
     output: Option<Output>,
     commanded: Wrench,
-    /// Ticks since the grip began to ramp up.
+    /// Ticks since the coupling's limit began to rise.
     ramp: u16,
-    /// Ticks since the soft stop began, and the wrench it began with.
+    /// Ticks since the soft stop began, and the wrench at its start.
     fade: (u16, Wrench),
     tick: u32,
     lockstep: bool,
@@ -94,7 +94,7 @@ pub struct ControlPlane<'c, 's, M, C> {
 }
 
 impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
-    /// Booting, motors off. The scene comes as the link plane's first command.
+    /// A booting plane, motors off. The scene arrives as the link plane's first command.
     pub fn new(
         ends: ControlEnds<'c, 's>,
         mut mechanism: M,
@@ -159,16 +159,16 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.hash.value()
     }
 
-    /// The mechanism, for a test that presses its stop input.
+    /// The mechanism, so that a test can press its stop input.
     pub fn mechanism_mut(&mut self) -> &mut M {
         &mut self.mechanism
     }
 
-    /// One millisecond. Call from the timer, at the highest priority.
+    /// Runs one tick (1 ms). Called from the timer at the highest priority.
     pub fn tick(&mut self) -> Ticked {
         let missed = self.clock.begin();
         self.take_stop_and_session();
-        // The first tick reads the sensors and belongs to no host.
+        // The first tick reads the sensors and belongs to no session.
         if self.safety != Safety::Boot {
             self.take_commands();
             if self.lockstep && (self.credit == 0 || !self.lockstep_has_room()) {
@@ -220,7 +220,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
     }
 
     fn take_commands(&mut self) {
-        // No more than the queue held when the tick began.
+        // Takes at most the commands that were queued when the tick began.
         for _ in 0..self.ends.commands.len() {
             let full = self.ends.events.capacity() - self.ends.events.len() < EVENTS_AT_ONCE;
             if self.credit > 0 || full {
@@ -332,7 +332,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         );
     }
 
-    /// Drives the motors if everything that must be so is so now; `number` is of the scene whose checksum was found right.
+    /// Drives the motors if all conditions hold now; `number` identifies the scene whose checksum was verified.
     fn arm(&mut self, number: u32) -> Result<(), Refusal> {
         if self.restarting {
             return Err(Refusal::Busy);
@@ -430,7 +430,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         Ok(())
     }
 
-    /// Computes this tick's wrench and drives the motors with it.
+    /// Computes this tick's wrench and applies it to the motors.
     fn render(&mut self) {
         self.output = None;
         let motors = self.safety.motors();
@@ -462,7 +462,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             }
             self.output = Some(output);
         }
-        // The state may have changed just now.
+        // The state may have changed earlier in this tick.
         let wanted = match (self.safety.motors(), &self.output) {
             (Motors::Off, _) => None,
             (Motors::Fading, _) => Some(self.fading()),
@@ -492,7 +492,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         fade + damping
     }
 
-    /// The last thing before the motors.
+    /// The wrench after the last limit before the motors.
     fn restrained(&self, wrench: Wrench) -> Wrench {
         let bounds = self
             .ceilings
@@ -500,7 +500,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         restrain(wrench, self.sensed.handle.position, &self.sensed.twist, &bounds)
     }
 
-    /// Asks the state machine; a refusal changes nothing.
+    /// Passes a request to the state machine; a refused one changes nothing.
     fn request(&mut self, event: SafetyEvent) -> Result<(), Refusal> {
         match self.safety.step(event) {
             (_, Action::Refuse(reason)) => Err(reason),
@@ -542,23 +542,23 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.fade = (0, self.commanded);
             }
             Action::Off => {
-                // At once, not at the next tick: in lockstep that may be far away.
+                // Off at once, not at the next tick: in lockstep that may be far away.
                 self.mechanism.drive(Drive::Off);
                 self.commanded = Wrench::ZERO;
                 self.ends.law.release();
                 self.ends.law.restart_slew();
             }
         }
-        // Behind the motors: what may be done only without them waits for this.
+        // After the motors are switched: work that requires them off waits for this flag.
         self.ends.shared.set_live(next.live());
-        // Nobody is to arm in the tick that cleared a fault of the encoders.
+        // Home now, so that arming is impossible in the tick that clears an encoder fault.
         if self.safety == Safety::Idle && !self.sensed.referenced {
             self.apply(SafetyEvent::ReferenceLost);
         }
     }
 }
 
-/// `law` with a coupling that holds `share` of its force and torque.
+/// `law` with the coupling's force and torque limits scaled by `share`.
 fn loosened(law: &haptics::Settings, share: f32) -> haptics::Settings {
     let mut law = *law;
     law.coupling.force_max_n *= share;
@@ -574,10 +574,10 @@ fn scaled(wrench: Wrench, factor: f32) -> Wrench {
 }
 
 impl ControlSettings {
-    /// The defaults of every parameter on a rig with these ceilings.
+    /// The defaults of every parameter on a rig with these hardware limits.
     pub fn at_start(ceilings: Ceilings) -> Self {
         let parameters = Parameters::within(ceilings);
-        // The defaults pass their own checks (tested), so the second arm is never taken; with its speed limit of 0 nothing could stay armed.
+        // The defaults pass their own checks (tested), so the fallback is never used; with its speed limit of 0 nothing could stay armed.
         parameters.settings().unwrap_or_else(|_| Self {
             law: haptics::Settings::default(),
             speed_limit_m_per_s: 0.0,

@@ -1,4 +1,4 @@
-//! Both planes put together: what a board's start-up code and the simulated rig do.
+//! Starts both planes: the entry point for a board's start-up code and for the simulated rig.
 //!
 //! ```
 //! use mortise_firmware::board::{Clock, Identity, Outbound};
@@ -41,7 +41,7 @@ use crate::control::ControlPlane;
 use crate::link::LinkPlane;
 use crate::parameters::ControlSettings;
 
-/// Both planes, motors off. The link plane reads flash here: about 10 instructions a byte of scene.
+/// Both planes, motors off. The link plane reads flash here: about 10 instructions per byte of scene.
 pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
     channels: &'c mut Channels<'s>,
     flash: F,

@@ -1,9 +1,9 @@
-//! The application every board shares: all that lies between bytes on the link and the motors, without any hardware.
+//! The application that every board shares: everything between bytes on the link and the motors, free of hardware access.
 //!
 //! Two planes. The **control plane** ([`control`]) is one call each millisecond at the highest priority: sensors, safety state machine, force law,
-//! motors. The **link plane** ([`link`]) decodes and checks messages at low priority, keeps scenes in flash ([`store`]) and hands finished values
-//! over through bounded queues ([`channel`]). [`device::start`] puts them together; the same code runs on each board and, on one thread, in the
-//! simulated rig of the host. What lies between encoder counts and motor currents is [`mortise_mechanism`].
+//! motors. The **link plane** ([`link`]) decodes and checks messages at low priority, keeps scenes in flash ([`store`]) and passes finished values on
+//! through bounded queues ([`channel`]). [`device::start`] creates both; the same code runs on each board and, on one thread, in the simulated rig of
+//! the host. Conversion between encoder counts and motor currents is in [`mortise_mechanism`].
 //!
 //! | module | what |
 //! |---|---|

@@ -1,11 +1,11 @@
-//! The link plane: bytes in, frames out, everything checked before the control plane hears of it.
+//! The link plane: receives bytes, sends frames, and checks everything before the control plane receives it.
 //!
-//! Runs at low priority, never waits for the control plane and holds bounded memory: input is always taken, and what the board's queue cannot hold
-//! is refused as [`Refusal::Busy`]. A command is acknowledged when the control plane has carried it out. `Stop` does not queue and needs no room for
-//! its answer: it is counted in [`crate::channel::Shared`] and seen by the next tick before anything else.
+//! Runs at low priority, never waits for the control plane and uses bounded memory: input is always read, and a command that does not fit into the
+//! board's queue is refused as [`Refusal::Busy`]. A command is acknowledged when the control plane has carried it out. `Stop` is not queued and needs
+//! no space for its answer: it is counted in [`crate::channel::Shared`] and read by the next tick before anything else.
 //!
-//! Work between two looks at the input is bounded while motors may be driven: the checksum of a scene is computed, and flash erased, only when they
-//! are off and no command is on its way that could drive them.
+//! Work between two reads of the input is bounded while motors may be driven: the checksum of a scene is computed, and flash erased, only when they
+//! are off and no command is pending that could drive them.
 
 mod answers;
 mod fingerprint;
@@ -30,7 +30,7 @@ use crate::store::rig::Kept;
 use answers::{Answer, Answers};
 use freshness::Freshness;
 
-/// Room an [`Outbound`] must have when empty: telemetry leaves one frame's room for answers.
+/// Space an empty [`Outbound`] must have: telemetry leaves space for one frame of answers.
 pub const OUTBOUND_MIN: usize = 2 * MAX_FRAME;
 
 /// Everything the low-priority task owns. About 2 kB.
@@ -49,12 +49,12 @@ pub struct LinkPlane<'c, 's, F> {
     session: u32,
     freshness: Freshness,
     answers: Answers,
-    /// When the message that is being handled came.
+    /// [`Shared::epoch`] when the message being handled arrived.
     epoch: Epoch,
-    /// `Arm` commands given to the control plane.
+    /// `Arm` commands passed to the control plane.
     arms: u32,
     state: DeviceState,
-    /// Sequence number of the commit that waits for the control plane, and the session it belongs to.
+    /// Sequence number of the commit that awaits the control plane, and the session it belongs to.
     commit: Option<(u16, u32)>,
     restarting: bool,
     frames: u32,
@@ -65,7 +65,7 @@ pub struct LinkPlane<'c, 's, F> {
 }
 
 impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
-    /// Looks for a scene in flash and hands it to the control plane.
+    /// A link plane with the scene found in flash, which is passed to the control plane.
     pub fn new(
         ends: LinkEnds<'c, 's>,
         flash: F,
@@ -109,7 +109,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         plane
     }
 
-    /// Takes all of `bytes`; answers go into `out` as far as it has room, and wait in a bounded queue for more.
+    /// Consumes all of `bytes`; answers are written to `out` as far as there is space, the rest wait in a bounded queue.
     pub fn receive(&mut self, bytes: &[u8], out: &mut impl Outbound) {
         for &byte in bytes {
             match self.decoder.push_stamped(byte) {
@@ -132,7 +132,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         }
     }
 
-    /// Sends answers that wait, as far as there is room; returns how many.
+    /// Sends waiting answers as far as there is space; returns how many.
     fn answer(&mut self, out: &mut impl Outbound) -> usize {
         let mut sent = 0;
         while out.room() >= MAX_FRAME
@@ -157,7 +157,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         sent
     }
 
-    /// Passes on what the control plane has to say, as far as there is room; returns how much that was.
+    /// Forwards events and telemetry of the control plane as far as there is space; returns how many.
     pub fn poll(&mut self, out: &mut impl Outbound) -> usize {
         let mut passed = self.answer(out);
         for _ in 0..EVENTS {
@@ -185,30 +185,30 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         passed
     }
 
-    /// Sends bytes of log when a host listens and there is room; returns how many were taken.
+    /// Sends log bytes when a session is open and there is space; returns how many were taken.
     pub fn log(&mut self, bytes: &[u8], out: &mut impl Outbound) -> usize {
         if bytes.is_empty() || !self.greeted || out.room() < OUTBOUND_MIN {
             return 0;
         }
         let piece = &bytes[..bytes.len().min(MAX_LOG)];
-        // Never longer than the vector.
+        // The piece never exceeds the vector's capacity.
         if let Ok(piece) = heapless::Vec::from_slice(piece) {
             self.send(&FromDevice::Log(piece), out);
         }
         piece.len()
     }
 
-    /// A restart was granted and acknowledged: the board restarts once its output is empty.
+    /// Whether a restart was granted and acknowledged: the board then restarts once its output is empty.
     pub fn restart_requested(&self) -> bool {
         self.restarting
     }
 
-    /// Notes the deepest stack the board has seen, bytes.
+    /// Records the largest stack use that the board has measured, bytes.
     pub fn note_stack(&mut self, bytes: u32) {
         self.stack_max = self.stack_max.max(bytes);
     }
 
-    /// Names the session that the last greeting began: what the stamps of its commands carry.
+    /// The session begun by the last `Hello`, as its commands' stamps carry it.
     pub fn session(&self) -> u32 {
         self.freshness.session()
     }
@@ -218,14 +218,14 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         &self.store
     }
 
-    /// The flash, as it is: what a power cut leaves.
+    /// The flash in its current state, as a power cut would leave it.
     pub fn into_flash(self) -> F {
         self.store.into_flash()
     }
 
     fn send(&mut self, message: &FromDevice, out: &mut impl Outbound) {
         let mut frame = [0u8; MAX_FRAME];
-        // Every message of the table fits (tested); one that did not would be missing from the sequence, which the host notices.
+        // Every message of the table fits (tested); a missing one would leave a gap in the sequence, which the host detects.
         if let Ok(frame) = encode(self.sequence, message, &mut frame) {
             out.write(frame);
         }
@@ -238,7 +238,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             stamp,
             message,
         } = frame;
-        // STOP is for everyone, greeted or not, and whether its answer has a place or not.
+        // STOP is accepted from any host, with or without a session, and whether or not its answer can be queued.
         if message == ToDevice::Stop {
             self.ends.shared.stop();
             self.answers.push(Answer::Ack { seq });
@@ -268,12 +268,12 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         }
         let answer = done.unwrap_or_else(|reason| Some(Answer::Refused { seq, reason }));
         if let Some(answer) = answer {
-            // There was a place.
+            // Space was checked above.
             self.answers.push(answer);
         }
     }
 
-    /// A new host: nothing an earlier one left under way goes on.
+    /// Begins a session: nothing an earlier one started continues.
     fn greet(&mut self, version: Version) {
         self.greeted = version.schema == Version::own().schema;
         self.store.abort();
@@ -281,19 +281,19 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             self.ends.shared.release_flash();
         }
         self.ends.shared.begin_session();
-        // What waits in the queue belongs to the old session and will be dropped.
+        // Commands in the queue belong to the old session and will be dropped.
         self.session = self.ends.shared.sessions();
         self.freshness.begin(self.session);
-        // Their numbers would be taken for the new host's.
+        // Their sequence numbers could match messages of the new host.
         self.answers.clear();
         self.answers.push(Answer::Hello);
     }
 
-    /// `Ok(None)`: the control plane will reply.
+    /// Carries out one message. `Ok(None)`: the control plane will reply.
     fn carry_out(&mut self, seq: u16, message: ToDevice) -> Result<Option<Answer>, Refusal> {
         let ack = Ok(Some(Answer::Ack { seq }));
         let kind = match message {
-            // Handled before.
+            // Handled by the caller.
             ToDevice::Hello(_) | ToDevice::Stop | ToDevice::Heartbeat => return ack,
             ToDevice::GetCapabilities => return Ok(Some(Answer::Capabilities)),
             ToDevice::GetRig => return Ok(Some(Answer::Rig)),
@@ -347,11 +347,11 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                 let parameters = self.parameters.with(id, value)?;
                 let settings = parameters.settings()?;
                 self.enqueue(seq, CommandKind::Settings(settings))?;
-                // Will be in force, whatever happens until then.
+                // These will be in force: the command is valid in every session.
                 self.parameters = parameters;
                 return Ok(None);
             }
-            // The control plane says what is in force.
+            // The control plane holds the values in force.
             ToDevice::GetParameter(id) => CommandKind::Parameter(id),
             ToDevice::SetTarget(target) => CommandKind::SetTarget(target),
             ToDevice::ClearTarget { id } => CommandKind::ClearTarget(id),
@@ -379,8 +379,8 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         Ok(None)
     }
 
-    /// Keeps the motors off while flash is written, which may stall the processor: until the store has nothing under way any more. Refused when they
-    /// are driven, or a command waits that could drive them.
+    /// Keeps the motors off while flash is written, which may stall the processor, until the store has finished. Refused when they are driven, or a
+    /// pending command could drive them.
     fn claim_flash(&self) -> Result<(), Refusal> {
         if self.arms == self.ends.shared.arms() && self.ends.shared.claim_flash() {
             Ok(())
@@ -389,17 +389,17 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         }
     }
 
-    /// What keeps a message that wants the motors off from being carried out.
+    /// The refusal for a message that requires the motors off.
     fn refused_by_motors(&self) -> Refusal {
         match self.state {
             DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop => Refusal::State(self.state),
-            // The change of state is on its way here.
+            // The change of state has not arrived here yet.
             _ => Refusal::Busy,
         }
     }
 
-    /// Number of the scene in use, whose checksum has just been found right. Reads all of it: about 10 instructions a byte, spent only while no motor
-    /// is driven nor can be before this returns.
+    /// Number of the scene in use, after verifying its checksum. Reads all of it, about 10 instructions per byte, only while no motor is driven and
+    /// none can be before this returns.
     fn checked_scene(&mut self) -> Result<u32, Refusal> {
         if self.store.busy() || self.restarting || self.arms != self.ends.shared.arms() {
             return Err(Refusal::Busy);
@@ -407,7 +407,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         if self.ends.shared.live() {
             return Err(self.refused_by_motors());
         }
-        // A simulated mechanism is a free handle without a description; what a real one is, nobody knows.
+        // A simulated mechanism without a description is a free handle; a real one without a description is unknown.
         let known = match self.rig {
             Kept::Rig(_) => true,
             Kept::Nothing => self.simulated || !self.described,
@@ -461,7 +461,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
                     Err(reason) => FromDevice::Refused { seq, reason },
                 })
             }
-            // What an earlier host asked for.
+            // Answer to an earlier host.
             Event::Reply { session, .. } if session != self.session => None,
             Event::Reply { seq, reply, .. } => Some(self.translate(seq, reply)),
         }
@@ -490,7 +490,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
         }
     }
 
-    /// Adds the link's own counters.
+    /// `statistics` with the link's own counters added.
     fn complete(&self, statistics: Statistics) -> Statistics {
         Statistics {
             frames: self.frames,
@@ -505,7 +505,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
     fn capabilities(&self) -> Capabilities {
         let mut board: String<MAX_NAME> = String::new();
         for character in self.identity.board.chars() {
-            // A name that is too long is cut.
+            // A name that is too long is truncated.
             if board.push(character).is_err() {
                 break;
             }

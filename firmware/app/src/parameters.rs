@@ -1,4 +1,4 @@
-//! The parameters' values, and the settings the tick uses, made from them at low priority.
+//! The parameters' values, and the tick's settings, which are derived from them at low priority.
 
 use mortise_haptics::{GuidanceMethod, Integrator, Settings};
 use mortise_mechanism::ceilings::Ceilings;
@@ -7,22 +7,22 @@ use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
 use crate::board::{TICK_HZ, TICK_S};
 
-/// What the control plane needs, finished: swapped in between two ticks.
+/// Complete settings of the control plane, replaced as a whole between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControlSettings {
-    /// Of the force law.
+    /// Settings of the force law.
     pub law: Settings,
-    /// Handle speed that is a fault, m/s.
+    /// Handle speed above which a fault is raised, m/s.
     pub speed_limit_m_per_s: f32,
-    /// Handle rotation that is a fault, rad/s.
+    /// Handle rotation above which a fault is raised, rad/s.
     pub angular_speed_limit_rad_per_s: f32,
-    /// Most power into the handle, W.
+    /// Power limit into the handle, W.
     pub power_limit_w: f32,
-    /// Distance of the handle from the world's origin that is a fault, m.
+    /// Distance of the handle from the world's origin above which a fault is raised, m.
     pub workspace_m: f32,
-    /// Ticks without a word from the host, motors live, that are a fault.
+    /// Ticks without a frame from the host, motors live, after which a fault is raised.
     pub host_timeout_ticks: u32,
-    /// The values all this was made from: what a host reads back.
+    /// The values these settings were derived from, which a host reads back.
     pub parameters: Parameters,
 }
 
@@ -34,14 +34,14 @@ pub struct Parameters {
 }
 
 impl Default for Parameters {
-    /// On a rig that bears all a board accepts.
+    /// The defaults on a rig with the largest limits a board accepts.
     fn default() -> Self {
         Self::within(Ceilings::LARGEST)
     }
 }
 
 impl Parameters {
-    /// The defaults, none above its ceiling on this rig.
+    /// The defaults, none above this rig's hardware limit.
     pub fn within(ceilings: Ceilings) -> Self {
         let mut values = [0.0; PARAMETERS.len()];
         for (value, row) in values.iter_mut().zip(PARAMETERS) {
@@ -55,7 +55,8 @@ impl Parameters {
         self.values[id as usize]
     }
 
-    /// This set with one value changed; refused outside its range, above the rig's ceiling or when it is not a number, with the range that holds here.
+    /// This set with one value changed. A value outside its range, above the rig's hardware limit or not a number is refused with the range valid
+    /// here.
     pub fn with(mut self, id: ParameterId, value: f32) -> Result<Self, Refusal> {
         let (min, max) = (id.row().min, self.ceilings.most(id));
         // A comparison with NaN is false, so NaN is refused too.
@@ -66,7 +67,7 @@ impl Parameters {
         Ok(self)
     }
 
-    /// The settings these values stand for; what no parameter names keeps the force law's default.
+    /// The settings for these values; fields without a parameter keep the force law's default.
     pub fn settings(&self) -> Result<ControlSettings, Refusal> {
         use ParameterId as P;
         let mut law = Settings::default();

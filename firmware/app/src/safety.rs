@@ -5,28 +5,28 @@
 
 use mortise_protocol::message::{DeviceState, Fault, Refusal};
 
-/// The state. [`DeviceState`] is what the host sees of it.
+/// The safety state. The host sees it as [`DeviceState`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Safety {
-    /// Starting: sensors not read yet.
+    /// Starting: sensors not yet read.
     Boot,
     /// Motors off; the encoders have no reference.
     Homing,
-    /// Motors off, waiting.
+    /// Motors off, ready to arm.
     Idle,
     /// Motors on, nothing grabbed: zero wrench.
     Armed,
-    /// A part is grabbed and felt.
+    /// A part is grabbed and rendered.
     Active,
     /// Wrench fading out under damping.
     SoftStop(AfterSoftStop),
     /// Motors off until cleared.
     Stopped,
-    /// Motors off until the cause is gone and cleared.
+    /// Motors off until the cause is gone and the fault is cleared.
     Fault(Fault),
 }
 
-/// Where a soft stop ends.
+/// State that follows a soft stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AfterSoftStop {
     /// Disarmed by the host.
@@ -35,7 +35,7 @@ pub enum AfterSoftStop {
     Fault(Fault),
 }
 
-/// What the motors may do.
+/// What the motors may render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motors {
     /// Enable output inactive.
@@ -44,46 +44,46 @@ pub enum Motors {
     Zero,
     /// Driven with the force law's wrench.
     Rendered,
-    /// Driven with the last wrench fading out, and damping.
+    /// Driven with the fading last wrench and damping.
     Fading,
 }
 
-/// What happened.
+/// Input of the state machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The first sensor readings are in.
     Ready,
-    /// The encoders know where the handle is.
+    /// The encoders have a reference.
     Referenced,
-    /// They no longer do.
+    /// The encoders have lost their reference.
     ReferenceLost,
-    /// The host asks to arm.
+    /// The host requests arming.
     Arm {
-        /// There is a scene to feel, and its checksum was found right.
+        /// There is a scene, and its checksum was verified.
         scene: bool,
-        /// The encoders know where the handle is.
+        /// The encoders have a reference.
         referenced: bool,
     },
-    /// The host asks to disarm.
+    /// The host requests disarming.
     Disarm,
-    /// The host asks to stop.
+    /// The host requests a stop.
     Stop,
-    /// The host asks to leave Stopped or Fault; whether what the sensors showed has gone.
+    /// The host requests to leave Stopped or Fault.
     Clear {
         /// No cause of a fault is present in this tick.
         cause_gone: bool,
     },
-    /// The host asks to grab a part that can be grabbed.
+    /// The host requests to grab a part that can be grabbed.
     Grab,
-    /// The host asks to let go.
+    /// The host requests release of the part.
     Release,
-    /// Something is wrong.
+    /// A fault was detected.
     Fault(Fault),
-    /// The fade is over.
+    /// The fade has ended.
     SoftStopOver,
 }
 
-/// What a plane must do on entering the new state.
+/// Action of a plane on entering the new state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action {
     /// Nothing.
@@ -98,11 +98,11 @@ pub enum Action {
     Fade,
     /// Motors off now; uncouple the part.
     Off,
-    /// The request is not possible here.
+    /// The request is not allowed in this state.
     Refuse(Refusal),
 }
 
-/// Whether the motors still know where they are when this fault is seen: then a damped fade is kinder than letting go at once.
+/// Whether the motors' position is still known under this fault: a damped fade is then gentler than switching off at once.
 pub const fn fades(fault: Fault) -> bool {
     matches!(
         fault,
@@ -111,7 +111,7 @@ pub const fn fades(fault: Fault) -> bool {
 }
 
 impl Safety {
-    /// What the host is told.
+    /// The state as reported to the host.
     pub const fn reported(self) -> DeviceState {
         match self {
             Self::Boot => DeviceState::Boot,
@@ -140,7 +140,7 @@ impl Safety {
         !matches!(self.motors(), Motors::Off)
     }
 
-    /// The next state and what to do on the way. Total: every event has a meaning in every state.
+    /// The next state and the action on the way. Total: defined for every event in every state.
     pub const fn step(self, event: Event) -> (Self, Action) {
         use Safety::*;
         match (self, event) {
@@ -155,7 +155,7 @@ impl Safety {
             (SoftStop(AfterSoftStop::Fault(_)), Event::Fault(fault)) if fades(fault) => (self, Action::None),
             (_, Event::Fault(fault)) => (Fault(fault), Action::Off),
 
-            // A fault stays a fault under STOP: its cause still has to be looked at.
+            // A fault stays a fault under STOP: its cause must still be inspected.
             (Fault(_), Event::Stop) => (self, Action::Off),
             (SoftStop(AfterSoftStop::Fault(fault)), Event::Stop) => (Fault(fault), Action::Off),
             (_, Event::Stop) => (Stopped, Action::Off),
@@ -165,7 +165,7 @@ impl Safety {
 
             (Homing, Event::Referenced) => (Idle, Action::None),
             (_, Event::Referenced) => (self, Action::None),
-            // While motors are driven this comes with a fault, and is asked again on the way to Idle.
+            // While motors are driven a lost reference comes with a fault, and is checked again on the way to Idle.
             (Idle, Event::ReferenceLost) => (Homing, Action::None),
             (_, Event::ReferenceLost) => (self, Action::None),
 
@@ -208,7 +208,7 @@ mod tests {
 
     use super::*;
 
-    /// A fault that fades and one that does not; together they stand for all, see `every_fault_is_of_one_kind`.
+    /// One fault that fades and one that does not; together they represent all, see `every_fault_is_of_one_kind`.
     const FADING: Fault = Fault::HostSilent { silent_ms: 500 };
     const SUDDEN: Fault = Fault::StopInput;
 
@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    /// One cell of the table: where the event leads, or that it is refused, or that nothing happens.
+    /// One cell of the table: the next state, a refusal, or no effect.
     fn cell(state: Safety, event: Event) -> String {
         match state.step(event) {
             (_, Action::Refuse(_)) => "refused".to_string(),
@@ -327,7 +327,7 @@ mod tests {
                 if state.live() && !next.live() {
                     assert_eq!(action, Action::Off, "{state:?}, {what}");
                 }
-                // A rendered wrench never just stops being computed: it is uncoupled, faded or off.
+                // Rendering never ends without an action: uncouple, fade or off.
                 if state == Safety::Active && next != state {
                     assert!(
                         matches!(action, Action::Uncouple | Action::Fade | Action::Off),
@@ -350,7 +350,7 @@ mod tests {
     #[test]
     fn every_fault_is_of_one_kind() {
         for fault in Fault::every(1) {
-            // A new fault must be decided on here.
+            // Exhaustive, so that a new fault requires a decision here.
             let fading = match fault {
                 Fault::HostSilent { .. } | Fault::SceneDamaged | Fault::Workspace => true,
                 Fault::StopInput

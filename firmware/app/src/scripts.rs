@@ -1,4 +1,4 @@
-//! Which scripts a simulated mechanism can follow: checked by the link plane, before the control plane takes one.
+//! Checks whether a simulated mechanism can follow a script; made by the link plane before the control plane takes one.
 
 use mortise_protocol::message::{HandScript, InputFault, InputFaultKind, Refusal};
 
@@ -8,14 +8,14 @@ use crate::wire::pose_from_wire;
 /// Encoder axes: position x, y, z, rotation about x, y, z.
 pub const AXES: usize = 6;
 
-/// Stiffest hand accepted, N/m and N·m/rad: beyond it an f32 no longer resolves the spring's work.
+/// Largest stiffness of the operator model, N/m and N·m/rad: beyond it an f32 no longer resolves the spring's work.
 pub const STIFFNESS_MAX: f32 = 1e6;
-/// Hardest push accepted, N.
+/// Largest push accepted, N.
 pub const PUSH_MAX: f32 = 1e3;
 /// Largest tremor accepted, m.
 pub const TREMOR_MAX: f32 = 0.1;
 
-/// Whether a script can be followed: numbers finite and possible, at least one keyframe, times ascending.
+/// Checks that a script can be followed: numbers finite and in range, at least one keyframe, ascending times.
 pub fn check_script(script: &HandScript) -> Result<(), Refusal> {
     let in_range = |value: f32, max: f32| (0.0..=max).contains(&value);
     let springs = [
@@ -38,7 +38,7 @@ pub fn check_script(script: &HandScript) -> Result<(), Refusal> {
     }
 }
 
-/// Whether a list of faults can be carried out: axes are of this mechanism.
+/// Checks that a list of faults can be injected: their axes exist in this mechanism.
 pub fn check_input_faults(faults: &[InputFault]) -> Result<(), Refusal> {
     let possible = |fault: &InputFault| match fault.kind {
         InputFaultKind::EncoderGlitch { axis, .. }

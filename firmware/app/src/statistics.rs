@@ -4,9 +4,9 @@ use glam::{Quat, Vec3};
 use mortise_haptics::{Pose, Twist, Wrench};
 use mortise_protocol::message::Statistics;
 
-/// FNV-1a with 64 bits, taking a 32-bit word where the original takes an octet: four times fewer multiplications in the tick.
+/// 64-bit FNV-1a over 32-bit words where the original takes octets: a quarter of the multiplications in the tick.
 ///
-/// Two runs that agree in the hash agreed in every bit of every word (up to chance of 2⁻⁶⁴), −0 and NaN patterns included.
+/// Two runs with equal hashes agree in every bit of every word (up to a chance of 2⁻⁶⁴), −0 and NaN patterns included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StateHash(u64);
 
@@ -45,7 +45,7 @@ impl StateHash {
         }
     }
 
-    /// One tick: handle, object where one is grabbed (pose, then twist: linear, angular), commanded wrench (force, torque).
+    /// Adds one tick: handle, object if one is grabbed (pose, then twist: linear, angular), commanded wrench (force, torque).
     pub fn tick(&mut self, handle: &Pose, object: Option<&(Pose, Twist)>, wrench: &Wrench) {
         self.pose(handle);
         if let Some((pose, twist)) = object {
@@ -58,7 +58,7 @@ impl StateHash {
     }
 }
 
-/// Adds up what one tick cost and did; totals saturate instead of wrapping.
+/// Adds one tick's cost and work; totals saturate instead of wrapping.
 pub fn count_tick(statistics: &mut Statistics, cost: u32, points: u32, wrench: &Wrench) {
     statistics.ticks = statistics.ticks.saturating_add(1);
     statistics.cost_max = statistics.cost_max.max(cost);

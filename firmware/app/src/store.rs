@@ -1,12 +1,12 @@
-//! The scene store (and, in [`rig`], the rig's description): two slots in flash, the newest sound one in use, the other free for an upload.
+//! The scene store (and, in [`rig`], the rig's description): two slots in flash, the newest valid one in use, the other free for an upload.
 //!
 //! ```text
 //! slot: | record, 32 bytes | image ... |
 //! record: magic "MSCENE01" | sequence u32 | length u32 | image CRC-32 u32 | layout u32 | zero u32 | record CRC-32 u32   (little-endian)
 //! ```
 //!
-//! The record is one flash word and written last: before it is whole, the slot holds no scene. Beginning an upload erases the free
-//! slot's record first. Cut off at any moment, the scene in use is untouched in its own slot and found again at the next start.
+//! The record is one flash word and written last: until it is complete, the slot holds no scene. Beginning an upload erases the free slot's record
+//! first. After an interruption at any moment, the scene in use is untouched in its own slot and found again at the next start.
 
 pub mod rig;
 
@@ -24,7 +24,7 @@ pub const RECORD_MAGIC: [u8; 8] = *b"MSCENE01";
 /// Bytes before the image: the record, one flash word.
 pub const IMAGE_OFFSET: usize = WRITE_SIZE;
 
-/// What a commit record says.
+/// Content of a commit record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Record {
     sequence: u32,
@@ -62,8 +62,8 @@ impl Record {
     }
 }
 
-/// The record that makes `image`, written after it, a stored scene: what a slot holds in its first [`IMAGE_OFFSET`] bytes. For tools that fill
-/// flash without a running board; newer scenes have larger sequence numbers.
+/// The commit record for `image`: the first [`IMAGE_OFFSET`] bytes of a slot, written after the image, which make it a stored scene. For tools that
+/// fill flash without a running board; newer scenes have larger sequence numbers.
 pub fn commit_record(sequence: u32, image: &[u8]) -> [u8; WRITE_SIZE] {
     Record {
         sequence,
@@ -80,27 +80,27 @@ pub fn commit_record(sequence: u32, image: &[u8]) -> [u8; WRITE_SIZE] {
 pub struct Stored<'s> {
     /// The image, read in place.
     pub image: SceneImage<'s>,
-    /// CRC-32 over the whole image: names the scene to the host.
+    /// CRC-32 over the whole image: identifies the scene to the host.
     pub crc: u32,
-    /// Of the image, bytes.
+    /// Length of the image, bytes.
     length: usize,
     slot: usize,
-    /// Of its commit record: differs from that of the scene before.
+    /// Sequence number of its commit record: differs from that of the previous scene.
     pub sequence: u32,
 }
 
-/// An upload under way.
+/// An upload in progress.
 #[derive(Clone, Copy, Debug)]
 struct Upload {
     slot: usize,
     length: u32,
     crc: u32,
     received: u32,
-    /// Offset and length of the last chunk, to know it again.
+    /// Offset and length of the last chunk, to recognise a repetition.
     last: (u32, u32),
     /// Bytes of the slot erased so far.
     erased: usize,
-    /// Bytes of a flash word not yet full.
+    /// Bytes of an incomplete flash word.
     word: [u8; WRITE_SIZE],
     filled: usize,
 }
@@ -110,7 +110,7 @@ pub struct Store<'s, F> {
     flash: F,
     current: Option<Stored<'s>>,
     upload: Option<Upload>,
-    /// A committed scene that the control plane has not taken over yet; both slots are in use until it has.
+    /// A committed scene that the control plane does not use yet; until it does, both slots are occupied.
     next: Option<Stored<'s>>,
 }
 
@@ -138,8 +138,8 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         self.current.as_ref()
     }
 
-    /// Whether there is a scene in use and the flash still holds it. Reads all of it, from the flash anew: what a reference showed before a compiler
-    /// may take for unchanged.
+    /// Whether there is a scene in use and the flash still holds it. Reads all of it from the flash anew: the compiler may assume that memory behind
+    /// an earlier reference has not changed.
     pub fn is_sound(&self) -> bool {
         self.current.is_some_and(|scene| {
             let bytes = self.memory(scene.slot).get(IMAGE_OFFSET..);
@@ -157,12 +157,12 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
             .min(u32::MAX as usize) as u32
     }
 
-    /// An upload is under way or waits for the control plane.
+    /// Whether an upload is in progress or awaits the control plane.
     pub fn busy(&self) -> bool {
         self.upload.is_some() || self.next.is_some()
     }
 
-    /// Starts an upload into the free slot; one under way is forgotten.
+    /// Starts an upload into the free slot; one in progress is discarded.
     pub fn begin(&mut self, length: u32, crc: u32, layout: u32) -> Result<(), Refusal> {
         if self.next.is_some() {
             return Err(Refusal::Busy);
@@ -202,7 +202,7 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         Ok(())
     }
 
-    /// Stores the next bytes. A chunk that came before is acknowledged again without effect.
+    /// Stores the next bytes. A repetition of the last chunk is acknowledged again without effect.
     pub fn chunk(&mut self, offset: u32, data: &[u8]) -> Result<(), Refusal> {
         let upload = self.upload.as_mut().ok_or(Refusal::NoUpload)?;
         // A chunk is at most MAX_CHUNK bytes.
@@ -236,9 +236,9 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         Ok(())
     }
 
-    /// Checks what came and writes the record. The new scene is for the control plane; [`Self::taken_over`] puts it in use.
+    /// Checks the uploaded image and writes the record. The result is for the control plane; [`Self::taken_over`] makes it the scene in use.
     ///
-    /// Whatever the outcome the upload is over, except that an incomplete one goes on.
+    /// Ends the upload whatever the outcome, except that an incomplete one continues.
     pub fn commit(&mut self) -> Result<Stored<'s>, Refusal> {
         let mut upload = self.upload.ok_or(Refusal::NoUpload)?;
         if upload.received != upload.length {
@@ -276,20 +276,20 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         self.flash
             .write(upload.slot, 0, &record.to_bytes())
             .map_err(|_| Refusal::Flash)?;
-        // As the next start would read it.
+        // Read back as the next start would.
         let stored = self.read(upload.slot).map_err(|_| Refusal::Flash)?;
         self.next = Some(stored);
         Ok(stored)
     }
 
-    /// The control plane uses the committed scene: the old one's slot is free.
+    /// Notes that the control plane uses the committed scene: the old one's slot is free.
     pub fn taken_over(&mut self) {
         if let Some(next) = self.next.take() {
             self.current = Some(next);
         }
     }
 
-    /// The control plane did not take the committed scene over: it is forgotten, in flash too, and the one in use stays.
+    /// Notes that the control plane refused the committed scene: it is discarded, in flash too, and the scene in use stays.
     pub fn not_taken_over(&mut self) -> Result<(), Refusal> {
         match self.next.take() {
             None => Ok(()),
@@ -297,7 +297,7 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         }
     }
 
-    /// Forgets an upload under way; `false` when there was none.
+    /// Discards an upload in progress; `false` when there was none.
     pub fn abort(&mut self) -> bool {
         self.upload.take().is_some()
     }
@@ -307,10 +307,10 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         rig::kept(&self.flash)
     }
 
-    /// Keeps a description that was checked.
+    /// Stores a description that was checked.
     ///
     /// # Errors
-    /// `Flash`; the one before stays.
+    /// `Flash`; the previous description stays.
     pub fn keep_rig(&mut self, rig: &Rig) -> Result<(), Refusal> {
         rig::keep(&mut self.flash, rig)
     }
@@ -320,7 +320,7 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         self.flash
     }
 
-    /// Adds what is in use and under way to `hasher`.
+    /// Adds the scene in use and the upload in progress to `hasher`.
     pub(crate) fn fingerprint(&self, hasher: &mut impl Hasher) {
         self.current
             .map(|scene| (scene.slot, scene.sequence))
@@ -332,8 +332,8 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
     }
 
     fn memory(&self, slot: usize) -> &'s [u8] {
-        // SAFETY: `slot` is 0 or 1. The slot of `current` or `next` is never erased or written: `begin` takes the other slot and refuses while
-        // both are in use, and `taken_over` frees the old one only after the control plane has dropped it. Other results do not outlive a call.
+        // SAFETY: `slot` is 0 or 1. The slot of `current` or `next` is never erased or written: `begin` takes the other slot and refuses while both
+        // are in use, and `taken_over` frees the old one only after the control plane has dropped it. Other results do not outlive a call.
         unsafe { self.flash.slot(slot) }
     }
 
@@ -357,7 +357,7 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
     }
 }
 
-/// Why a slot's content is not in use.
+/// Reason why a slot's content is not used.
 enum ReadError {
     NoRecord,
     Damaged,
@@ -365,7 +365,7 @@ enum ReadError {
     TooManyParts,
 }
 
-/// Opens an image and checks what this firmware can hold.
+/// Opens an image and checks that this firmware supports it.
 fn check(bytes: &[u8]) -> Result<SceneImage<'_>, ReadError> {
     let image = SceneImage::open(bytes).map_err(ReadError::Image)?;
     if image.parts().len() > MAX_PARTS {
@@ -374,7 +374,7 @@ fn check(bytes: &[u8]) -> Result<SceneImage<'_>, ReadError> {
     Ok(image)
 }
 
-/// Sequence numbers wrap; half the range is newer.
+/// Whether `a` is newer than `b`: sequence numbers wrap, and half their range counts as newer.
 fn newer(a: u32, b: u32) -> bool {
     a.wrapping_sub(b) as i32 > 0
 }

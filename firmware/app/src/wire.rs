@@ -1,4 +1,4 @@
-//! Between the force law's types and the message table's.
+//! Conversions between the force law's types and those of the message table.
 
 use glam::{Quat, Vec3};
 use heapless::Vec;
@@ -35,7 +35,7 @@ pub fn wrench_to_wire(wrench: &Wrench) -> WireWrench {
     }
 }
 
-/// How targets stand, for the wire.
+/// The targets' state, for the wire.
 pub fn guidance_to_wire(state: &GuidanceState) -> Guidance {
     Guidance {
         active: state.active,

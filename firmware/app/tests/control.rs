@@ -1,4 +1,4 @@
-//! The control plane: what each fault does to the motors and how soon, the ramp, the soft stop, lockstep.
+//! The control plane: effect of each fault on the motors and its latency, the ramp, the soft stop, lockstep.
 
 mod support;
 
@@ -35,10 +35,10 @@ fn wrench(drive: Drive) -> Wrench {
     }
 }
 
-/// Moves the handle away from the part and waits until the coupling pulls with all it has.
+/// Moves the handle away from the part and waits until the coupling pulls with its largest force.
 fn pulled() -> Bench {
     let mut bench = active();
-    // Before the grip is firm the part would slip in the hand instead.
+    // Before the ramp ends the part would slip in the handle instead.
     bench.ticks(u32::from(RAMP_TICKS));
     bench.strings.pull(|s| s.handle.position.x = 0.004);
     bench.ticks(20);
@@ -92,7 +92,7 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
             assert_eq!(bench.strings.last(), Drive::Off, "{name}");
             assert_eq!(bench.state(), DeviceState::Fault(fault), "{name}");
             assert_eq!(bench.fault_heard(), Some(fault), "{name}");
-            // Arming is refused with the reason; clearing while the cause lasts as well where the sensors still show it.
+            // Arming is refused with the reason; so is clearing while the sensors still show the cause.
             let state = Refusal::State(DeviceState::Fault(fault));
             assert_eq!(bench.request(&ToDevice::Arm), Err(state), "{name}");
             let lasts = !matches!(
@@ -125,7 +125,7 @@ fn faults_of_the_sensors_turn_the_motors_off_in_the_same_tick() {
     }
 }
 
-/// Without a jump no axis is at fault, and none is named.
+/// Without a jump no axis is faulty, and none is named.
 #[test]
 fn a_lost_reference_is_reported_as_itself() {
     let mut bench = active();
@@ -156,7 +156,7 @@ fn a_lost_reference_ends_in_homing_and_is_found_by_the_operator_alone() {
     assert_eq!(bench.state(), DeviceState::Fault(Fault::EncoderJump { axis: 1 }));
     bench.strings.pull(|s| s.encoder_jump = None);
     bench.tick();
-    // In one tick: cleared, and nobody slips in between.
+    // Cleared in one tick, without an opportunity to arm in between.
     let clear = bench.send(&ToDevice::ClearFault);
     let arm = bench.send(&ToDevice::Arm);
     bench.ticks(3);
@@ -210,7 +210,7 @@ fn beyond_the_workspace_the_handle_is_braked_and_never_pushed_out() {
     }
     assert_eq!(bench.state(), DeviceState::Fault(Fault::Workspace));
     assert_eq!(bench.fault_heard(), Some(Fault::Workspace));
-    // Braking a handle on its way in would push it out: not beyond the edge.
+    // Braking an inward-moving handle would push it outwards, which is not allowed beyond the edge.
     bench.request(&ToDevice::ClearFault).unwrap();
     bench.strings.pull(|s| s.handle.position = Vec3::ZERO);
     bench.tick();
@@ -287,7 +287,7 @@ fn commands_older_than_a_stop_do_not_undo_it() {
     let mut bench = armed();
     bench.request(&ToDevice::Stop).unwrap();
     bench.tick();
-    // On their way when the second stop comes.
+    // In flight when the second stop arrives.
     bench.send(&ToDevice::ClearFault);
     bench.send(&ToDevice::Arm);
     bench.send(&ToDevice::Stop);
@@ -311,7 +311,7 @@ fn a_silent_host_ends_in_a_soft_stop_and_a_fault() {
         ticks += 1;
         assert!(ticks < 200);
     }
-    // 100 ticks of patience; the one that answered counts from its own message.
+    // A timeout of 100 ticks, counted from the last message.
     assert!((99..=102).contains(&ticks), "{ticks}");
     assert_eq!(bench.state(), DeviceState::SoftStop);
     assert!(matches!(bench.fault_heard(), Some(Fault::HostSilent { silent_ms }) if silent_ms > 99));
@@ -345,7 +345,7 @@ fn a_soft_stop_fades_within_its_time_and_never_grows() {
     let mut last = before;
     for tick in 1..SOFT_STOP_TICKS {
         let now = wrench(bench.strings.last()).force.length();
-        // At rest there is no damping: the fade alone.
+        // At rest there is no damping, only the fade.
         assert!(now <= last, "tick {tick}: {now} after {last}");
         if tick >= FADE_TICKS {
             assert_eq!(now, 0.0, "tick {tick}");
@@ -374,7 +374,7 @@ fn a_soft_stop_brakes_and_stays_below_its_limits() {
 #[test]
 fn the_wrench_ramps_up_from_zero() {
     let mut bench = active();
-    // The hand is off at once with 0.8 m/s: the part, 0.1 kg, is brought to that by a grip that is still growing, ∫F dt = m·v.
+    // The hand moves at 0.8 m/s from the start: the part, 0.1 kg, is accelerated to that speed by a coupling whose limit still rises, ∫F dt = m·v.
     let (speed, limit) = (0.8, ParameterId::CouplingForce.row().default);
     let mut forces = Vec::new();
     for i in 0..RAMP_TICKS {
@@ -387,10 +387,10 @@ fn the_wrench_ramps_up_from_zero() {
     }
     let below = |(i, &force): (usize, &f32)| force <= limit * (i + 2) as f32 / f32::from(RAMP_TICKS) + 1e-3;
     assert!(forces.iter().enumerate().all(below), "{forces:?}");
-    // F grows by 50 N/s: 0.08 N s are given after 57 ms, at 2.8 N.
+    // F rises by 50 N/s: 0.08 N s are reached after 57 ms, at 2.8 N.
     let peak = forces.iter().copied().fold(0.0, f32::max);
     assert!((2.5..3.1).contains(&peak), "{peak}");
-    // The grip slipped for good: nothing pulls the part after the hand once it is as fast.
+    // The slip is permanent: nothing pulls the part after the hand once both have the same speed.
     assert!(forces[120..].iter().all(|&force| force < 0.05), "{forces:?}");
 }
 
@@ -450,7 +450,7 @@ fn lockstep_runs_what_is_released_and_nothing_else() {
         matches!(order[..], [FromDevice::Ran { .. }, FromDevice::State { .. }]),
         "{order:?}"
     );
-    // No silence is counted while time stands still.
+    // The host timeout is suspended while time stands still.
     bench.send(&ToDevice::Run { ticks: 5000 });
     bench.ticks(5000);
     assert_eq!(bench.state(), DeviceState::Armed);
@@ -458,7 +458,7 @@ fn lockstep_runs_what_is_released_and_nothing_else() {
     bench.send(&ToDevice::Stop);
     assert_eq!(bench.tick(), Ticked::Waiting);
     assert_eq!(bench.strings.last(), Drive::Off);
-    // A new host ends lockstep, in the middle of a run too.
+    // A new session ends lockstep, even in the middle of a run.
     bench.send(&ToDevice::Run { ticks: u32::MAX });
     bench.ticks(3);
     bench.forget();
@@ -475,7 +475,7 @@ fn lockstep_waits_for_telemetry_instead_of_dropping_it() {
     bench.send(&ToDevice::Run { ticks: 100 });
     let mut waited = 0;
     for _ in 0..200 {
-        // The link gets its turn only every twentieth time.
+        // The link plane runs only every twentieth time.
         for _ in 0..20 {
             if bench.control.tick() == Ticked::Waiting {
                 waited += 1;

@@ -1,4 +1,4 @@
-//! Motors come alive by fresh commands alone, for a scene whose checksum is right, and STOP needs no room anywhere.
+//! Motors are driven by fresh commands alone, for a scene whose checksum is right, and STOP needs no space in any queue.
 
 mod support;
 
@@ -34,7 +34,7 @@ fn stop_behind_200_commands_with_the_output_full_acts_in_one_tick() {
     assert_eq!(bench.state(), DeviceState::Stopped);
 }
 
-/// Clear and arm in one write reach the board before the link plane hears that it stopped.
+/// Clear and arm in one write reach the board before the link plane receives the stop.
 #[test]
 fn a_damaged_scene_is_not_armed_by_clear_and_arm_in_one_write() {
     let flash = TestFlash::leaked();
@@ -51,7 +51,7 @@ fn a_damaged_scene_is_not_armed_by_clear_and_arm_in_one_write() {
     assert_eq!(bench.strings.last(), Drive::Off);
 }
 
-/// A parameter set just before another host greets is in force, and that is what it reads.
+/// A parameter set just before another host's `Hello` is in force, and that host reads it.
 #[test]
 fn what_is_read_behind_a_greeting_is_in_force() {
     let mut bench = Bench::ready();

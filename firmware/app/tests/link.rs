@@ -1,4 +1,4 @@
-//! The link plane: who may say what when, every refusal, and that nothing that comes in can upset it.
+//! The link plane: which messages are accepted when, every refusal, and robustness against any input.
 
 mod support;
 
@@ -86,7 +86,7 @@ fn nothing_but_hello_and_stop_before_hello() {
     assert_eq!(bench.request(&ToDevice::Heartbeat), Ok(()));
 }
 
-/// What a message was refused with, for each reason of the table: the match below makes a new reason a compile error here.
+/// The refusal of each kind in the table: the match below makes a new reason a compile error here.
 #[test]
 fn every_reason_of_the_table_is_given_where_it_belongs() {
     let reasons = [
@@ -165,7 +165,7 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
                 crc: 0,
                 layout: LAYOUT_VERSION,
             }),
-            // Needs more flash than the bench has: `store.rs` meets it.
+            // Needs more flash than the bench has: tested in `store.rs`.
             Refusal::TooManyParts { .. } => Err(reason),
             Refusal::SceneIncomplete { .. } => {
                 let mut bench = Bench::ready();
@@ -240,7 +240,7 @@ fn every_reason_of_the_table_is_given_where_it_belongs() {
             }
             Refusal::Undecodable => {
                 let mut bench = Bench::ready();
-                // Sound, but of no message: variant 255.
+                // A valid frame without a message: variant 255.
                 let mut frame = [0; MAX_FRAME];
                 let bytes = encode(77, &(255u8, 1u8), &mut frame).unwrap().to_vec();
                 bench.forget();
@@ -319,7 +319,7 @@ fn a_full_queue_refuses_and_a_stop_gets_through() {
     assert_eq!(bench.strings.last(), Drive::Off);
 }
 
-/// A host that does not read loses answers, never the board's attention.
+/// A host that does not read loses answers, and cannot block the board.
 #[test]
 fn a_full_wire_is_read_from_all_the_same() {
     let mut bench = Bench::ready();
@@ -354,7 +354,7 @@ fn a_new_session_ends_what_the_old_one_left_running() {
     bench.request(&ToDevice::Arm).unwrap();
     bench.request(&ToDevice::SetTelemetry { every_ticks: 1 }).unwrap();
     bench.send(&ToDevice::Grab { part: 1 });
-    // The host is gone; another one greets before the grab is looked at.
+    // The host has disconnected; another one greets before the grab is processed.
     bench.send(&ToDevice::Hello(Version::own()));
     bench.tick();
     assert_eq!(bench.state(), DeviceState::SoftStop);
@@ -393,7 +393,7 @@ fn telemetry_comes_at_the_rate_asked_for_and_what_does_not_fit_is_counted() {
     };
     assert!((19..=20).contains(&count(&bench)), "{}", count(&bench));
     bench.forget();
-    // Nobody listens for 200 ticks: eight samples wait, the others are counted.
+    // Without a reader for 200 ticks eight samples wait, and the others are counted.
     for _ in 0..200 {
         bench.control.tick();
     }
@@ -534,7 +534,7 @@ fn the_largest_messages_fit() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Garbage, whatever it is, drives no motor and does not keep the next good frame out.
+    /// Arbitrary garbage drives no motor and does not block the next valid frame.
     #[test]
     fn garbage_does_nothing(pieces in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..400), 1..20)) {
         let mut bench = Bench::ready();
@@ -548,7 +548,7 @@ proptest! {
         prop_assert_eq!(bench.strings.last(), Drive::Off);
     }
 
-    /// Any order of sound messages keeps the rule: motors driven only in a live state.
+    /// Any order of valid messages satisfies the rule: motors driven only in a live state.
     #[test]
     fn any_order_of_messages_keeps_motors_and_state_together(choices in prop::collection::vec((0u8..16, 0u32..150), 1..40)) {
         let mut bench = Bench::ready();

@@ -1,4 +1,4 @@
-//! A reset puts everything back, to the bit.
+//! A reset restores the initial state, to the bit.
 
 mod support;
 

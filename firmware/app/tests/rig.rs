@@ -1,4 +1,4 @@
-//! The rig's description on its way into flash and back: whole or not at all, checked, and known when it is damaged.
+//! The rig's description on its way into flash and back: complete or absent, checked, and reported when damaged.
 
 mod support;
 
@@ -58,7 +58,7 @@ fn a_cell_that_fails_is_found_wherever_it_is() {
     for offset in 0..WRITE_SIZE + length {
         flash.damage(RIG_SLOTS[0], offset);
         let found = kept(&flash);
-        // In the record: as if never sent. Behind it: known as damaged.
+        // In the record: as if never sent. Behind it: reported as damaged.
         let expected = if offset < WRITE_SIZE {
             Kept::Nothing
         } else {
@@ -158,7 +158,7 @@ fn a_real_board_arms_only_with_a_description_in_use() {
     bench.upload(&two_parts(1)).unwrap();
     assert_eq!(bench.request(&ToDevice::Arm), Err(Refusal::RigDamaged));
     bench.request(&ToDevice::SetRig(arm())).unwrap();
-    // It is driven with from the next start on: until then nothing is.
+    // It takes effect at the next start: until then nothing is driven.
     assert_eq!(bench.request(&ToDevice::Arm), Err(Refusal::RigDamaged));
     let mut bench = Real::new(flash.clone());
     bench.greet();
@@ -171,7 +171,7 @@ fn a_real_board_arms_only_with_a_description_in_use() {
     bench.request(&ToDevice::Stop).unwrap();
     bench.tick();
     bench.request(&ToDevice::SetRig(paddle())).unwrap();
-    // A mechanism that is simulated has one without a description.
+    // A simulated mechanism does not need a description.
     let mut bench: Bench = Bench::ready();
     bench.request(&ToDevice::Arm).unwrap();
 }

@@ -1,4 +1,4 @@
-//! The scene store loses nothing: power may go at every write.
+//! The scene store loses no data when power fails at any write.
 
 mod support;
 
@@ -65,7 +65,7 @@ fn power_lost_at_any_operation_leaves_the_old_scene_or_the_whole_new_one() {
         flash.fuse.set(Some(cut));
         let mut store = Store::open(flash.clone());
         let result = store_whole(&mut store, &new, 512);
-        // The last operation is the record: half a record is none.
+        // The last operation is the record: half a record is invalid.
         assert_eq!(result, Err(Refusal::Flash), "cut {cut}");
         assert_eq!(
             current(&store),
@@ -157,7 +157,7 @@ fn what_cannot_be_a_scene_is_refused_with_the_reason() {
         "more than was announced"
     );
 
-    // Damaged on the way, but announced as it should be.
+    // Damaged in transit, but announced correctly.
     let mut damaged = image.clone();
     damaged[700] ^= 1;
     store.begin(length, crc, LAYOUT_VERSION).unwrap();
@@ -208,7 +208,7 @@ fn a_slot_filled_by_a_tool_is_a_scene() {
 
 #[test]
 fn more_parts_than_the_board_holds_are_refused() {
-    // 257 parts need more than the test flash has, so the check is met with a flash in RAM.
+    // 257 parts need more flash than the tests' flash has, so this check uses a flash in RAM.
     use mortise_firmware::board::ERASED;
     use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
     // A sector for each scene, and one for each of the rig's descriptions.
@@ -261,7 +261,7 @@ fn an_upload_never_touches_the_slot_in_use_until_the_control_plane_has_let_go() 
         store.begin(new.len() as u32, CRC.checksum(&new), LAYOUT_VERSION),
         Err(Refusal::Busy)
     );
-    // The control plane says no: the old scene stays, now and after a restart.
+    // The control plane refuses: the old scene stays, now and after a restart.
     store.not_taken_over().unwrap();
     assert_eq!(current(&store), Some(CRC.checksum(&old)));
     assert_eq!(current(&Store::open(flash)), Some(CRC.checksum(&old)));

@@ -1,9 +1,9 @@
-//! The scene store's reachable states, all of them: every order of its operations, the power going at any flash operation, and a restart at any moment.
+//! All reachable states of the scene store: every order of its operations, power loss at any flash operation, and a restart at any moment.
 //!
-//! A state is the flash's content with what the store says of itself. From each new one every operation is tried, until no new state comes, for up to
-//! `COMMITS` commits (their sequence numbers make the states endless otherwise), with one loss of power on the way to a state and a second one tried in
-//! each. Beside the store runs a model of a few lines: the scene in use, and
-//! the scenes a restart may find. The flash checks by itself that no word is written twice without erasing.
+//! A state is the flash's content with the store's own state. From each new one every operation is tried, until no new state appears, for up to
+//! `COMMITS` commits (their sequence numbers make the number of states infinite otherwise), with one loss of power on the way to a state and a second
+//! one tried in each. A model of a few lines runs beside the store: the scene in use, and the scenes a restart may find. The flash itself checks that
+//! no word is written twice without erasing.
 
 mod support;
 
@@ -17,15 +17,15 @@ use support::image::two_parts;
 
 /// Scenes committed one after another.
 const COMMITS: u8 = 2;
-/// Flash operations after which the power may go during one operation of the store; no operation has more.
+/// Flash operations after which power may fail during one operation of the store; no operation has more.
 const FUSES: u32 = 20;
-/// A chunk, so that an image of 1.3 kB takes three.
+/// Size of a chunk, so that an image of 1.3 kB takes three.
 const CHUNK: usize = 512;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Operation {
     Begin,
-    /// With a checksum that is not the image's.
+    /// Begin with a checksum that is not the image's.
     BeginWrong,
     Chunk,
     Commit,
@@ -46,14 +46,14 @@ const OPERATIONS: [Operation; 8] = [
     Operation::Restart,
 ];
 
-/// One step on the way to a state: an operation, and the flash operation at which the power goes. After that comes a restart.
+/// One step on the way to a state: an operation, and the flash operation at which power fails, followed by a restart.
 type Step = (Operation, Option<u32>);
 
-/// The store, and what must be true of it.
+/// The store, and the model of its expected state.
 struct Run {
     store: Store<'static, TestFlash>,
     flash: TestFlash,
-    /// Of the image that is uploaded next; each commit makes a new one.
+    /// Tag of the image that is uploaded next; each commit makes a new one.
     tag: u8,
     sent: usize,
     wrong: bool,
@@ -61,7 +61,7 @@ struct Run {
     in_use: Option<u32>,
     /// CRC of the committed scene that the control plane has not taken over.
     waiting: Option<u32>,
-    /// What a restart now may find.
+    /// Scenes that a restart now may find.
     kept: HashSet<Option<u32>>,
 }
 
@@ -86,7 +86,7 @@ impl Run {
         CRC.checksum(&two_parts(self.tag))
     }
 
-    /// True if the power held.
+    /// Performs one step; returns whether the power held.
     fn perform(&mut self, (operation, fuse): Step) -> bool {
         self.flash.fuse.set(fuse);
         let image = two_parts(self.tag);
@@ -96,7 +96,7 @@ impl Run {
                 let crc = CRC.checksum(&image) ^ u32::from(wrong);
                 if self.store.begin(image.len() as u32, crc, LAYOUT_VERSION).is_ok() {
                     (self.sent, self.wrong) = (0, wrong);
-                    // What waited in the free slot is erased.
+                    // The image waiting in the free slot is erased.
                     self.kept = HashSet::from([self.in_use]);
                 }
             }
@@ -138,7 +138,7 @@ impl Run {
         let powered = self.flash.fuse.get() != Some(0);
         if !powered {
             self.flash.fuse.set(None);
-            // An operation cut short has taken effect or not.
+            // An interrupted operation has taken effect or not.
             if matches!(operation, Operation::Begin | Operation::BeginWrong) {
                 self.kept.insert(self.in_use);
             }
@@ -162,7 +162,7 @@ impl Run {
         self.sent = 0;
     }
 
-    /// What holds in every state.
+    /// Checks the invariants of every state.
     fn check(&self) {
         assert_eq!(self.store.current().map(|scene| scene.crc), self.in_use);
         assert_eq!(self.store.is_sound(), self.in_use.is_some());
@@ -174,7 +174,7 @@ impl Run {
         );
     }
 
-    /// Names the state. Equal numbers stand for equal states but for a chance of 2⁻⁶⁴ a pair.
+    /// Identifies the state. Equal numbers stand for equal states except for a chance of 2⁻⁶⁴ per pair.
     fn fingerprint(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         for slot in 0..2 {
@@ -225,12 +225,12 @@ fn every_reachable_state_keeps_a_whole_scene() {
                 let goes_on = run.tag <= COMMITS && (powered || !cut);
                 if goes_on && known.insert(run.fingerprint()) {
                     let mut path = path.clone();
-                    // A fuse that outlasted the operation is none.
+                    // A fuse that outlasted the operation has no effect.
                     path.push((operation, fuse.filter(|_| !powered)));
                     open.push_back(path);
                 }
                 if powered && fuse.is_some() {
-                    // The operation was over before the fuse: so it is with every longer one.
+                    // The operation ended before the fuse, as it would with every longer one.
                     break;
                 }
             }

@@ -1,4 +1,4 @@
-//! Scenes over the link: cut off, committed, while motors are live, damaged in flash.
+//! Scenes over the link: interrupted, committed, while motors are live, damaged in flash.
 
 mod support;
 
@@ -23,7 +23,7 @@ fn an_upload_cut_at_any_chunk_leaves_the_old_scene_after_a_restart() {
         for i in 0..sent {
             bench.chunk(&new, i * 512).unwrap();
         }
-        // The cable is pulled; another board starts with this flash.
+        // The cable is unplugged; another board starts with this flash.
         let mut bench: Bench = Bench::new(flash);
         bench.greet();
         assert_eq!(
@@ -71,7 +71,7 @@ fn no_flash_while_motors_are_live_and_no_motors_while_flash_is_written() {
     bench.request(&ToDevice::SceneAbort).unwrap();
     bench.request(&ToDevice::Arm).unwrap();
 
-    // Live, but the link plane has not been told yet.
+    // Live, but the link plane has not received the state change yet.
     let mut bench = Bench::ready();
     bench.send(&ToDevice::Arm);
     bench.control.tick();
@@ -90,7 +90,7 @@ fn no_flash_while_motors_are_live_and_no_motors_while_flash_is_written() {
         })
     ));
 
-    // Statistics and parameters on their way do not count.
+    // Pending requests for statistics and parameters do not count.
     let mut bench = Bench::ready();
     bench.send(&ToDevice::GetStatistics { reset: false });
     let image = two_parts(3);
@@ -101,7 +101,7 @@ fn no_flash_while_motors_are_live_and_no_motors_while_flash_is_written() {
     });
     assert!(bench.heard.contains(&FromDevice::Ack { seq }));
 
-    // An Arm that the control plane has not seen yet counts as live.
+    // An Arm that the control plane has not processed yet counts as live.
     let mut bench = Bench::ready();
     bench.send(&ToDevice::Arm);
     bench.send(&ToDevice::SceneBegin {

@@ -1,4 +1,4 @@
-//! The step with whatever is within reach: search for contacts, solve, and what the next tick needs to know of both.
+//! The step with all contacts within reach: search for contacts, solution, and the results that the next tick needs from both.
 
 use mortise_protocol::image::SceneImage;
 
@@ -18,13 +18,13 @@ use crate::math::scalar::{larger, smaller};
 use crate::motion::{point_speed, slow_down};
 use crate::settings::{Integrator, Settings};
 use crate::state::Resolution;
-/// How fast the number of points that share the total stiffness may fall, a tick: stiffness of points still touching then rises
-/// slowly, and little energy is made of it.
+/// Largest decay per tick of the number of points that share the total stiffness: the stiffness of points still touching then rises slowly, and
+/// generates little energy.
 const SHARING_DECAY: f32 = 0.95;
-/// The diagonal of a cell, cells.
+/// Diagonal of a cell, in cells.
 const DIAGONAL_CELLS: f32 = 1.733;
 
-/// What a tick is computed from and does not change.
+/// Inputs of a tick, which it does not change.
 #[derive(Clone, Copy)]
 pub(crate) struct Given<'a, 'i> {
     pub scene: &'a SceneImage<'i>,
@@ -35,15 +35,15 @@ pub(crate) struct Given<'a, 'i> {
 
 /// How far the object may move in a tick.
 pub(crate) struct Reach {
-    /// Nothing beyond this is evaluated, so no point may move farther, m.
+    /// Distance up to which points are evaluated, and therefore the bound of any point's motion, m.
     pub margin: f32,
-    /// The motion so far and that without contacts, of one period, scaled as the step's unknowns.
+    /// The motion so far and the motion without contacts, over one period, scaled as the step's unknowns.
     pub motions: [[f32; 6]; 2],
-    /// The free motion was held to the speed limit.
+    /// The free motion was limited to the speed limit.
     pub slowed: bool,
 }
 
-/// What the constraints in force mean for contact.
+/// Effect of the active constraints on contact.
 pub(crate) struct Constraints<'a> {
     pub rules: &'a dyn FacePairRules,
     /// Share of the contact stiffness left between guided faces.
@@ -56,8 +56,8 @@ pub(crate) struct Constraints<'a> {
 type Motion<'a, 't> = (&'a Step, Terms<'a, 't>, &'a Solution);
 
 impl Given<'_, '_> {
-    /// No point of the object may be faster, m/s. The textbook methods see no farther than the next voxel, so half a cell a tick (eq. 5 of Faas
-    /// 2010) bounds the explicit step, and half a voxel any step where there are voxmaps.
+    /// Speed limit of any point of the object, m/s. The textbook methods look no farther than the next voxel, so half a cell a tick (eq. 5 of Faas
+    /// 2010) bounds the explicit step, and half a voxel any step with voxmaps.
     pub fn fastest(&self) -> f32 {
         let cell = match self.settings.integrator {
             Integrator::Implicit => self.resolution.voxel_m,
@@ -73,7 +73,7 @@ impl Given<'_, '_> {
         }
     }
 
-    /// Points that come this near are wanted, m: for the step, or for braking.
+    /// Distance within which points are searched for, m: for the step, or for braking.
     pub fn slack(&self) -> f32 {
         match self.settings.integrator {
             Integrator::Implicit => self.settings.contact.margin_m,
@@ -81,7 +81,7 @@ impl Given<'_, '_> {
         }
     }
 
-    /// Points that come this near are braked, m; 0 for no braking.
+    /// Distance within which points are braked, m; 0 for no braking.
     fn braking_m(&self) -> f32 {
         match self.settings.integrator {
             Integrator::Implicit => 0.0,
@@ -89,7 +89,7 @@ impl Given<'_, '_> {
         }
     }
 
-    /// How far from contact braking begins, m: within a cell of the surface, or in the layer of voxels round it, at most a diagonal away.
+    /// Distance from contact at which braking begins, m: within a cell of the surface, or in the layer of voxels round it, at most a diagonal away.
     pub fn braking_margin(&self) -> f32 {
         match self.settings.integrator {
             Integrator::Implicit => 0.0,
@@ -98,7 +98,7 @@ impl Given<'_, '_> {
     }
 }
 
-/// The step with whatever is within `reach` of the `grabbed` part.
+/// The step of the `grabbed` part with the contacts within `reach`.
 pub(crate) fn contact_step(
     given: &Given<'_, '_>,
     memory: &mut ContactMemory,
@@ -121,7 +121,7 @@ pub(crate) fn contact_step(
     solution
 }
 
-/// Fills the contacts in `memory`; field queries that it took.
+/// Fills the contacts in `memory`; returns the field queries used.
 fn search(
     given: &Given<'_, '_>,
     memory: &mut ContactMemory,
@@ -179,7 +179,7 @@ fn search(
     used.all
 }
 
-/// The step with the contacts in `memory`, by the integrator that is set.
+/// The step with the contacts in `memory`, by the integrator in the settings.
 fn solve(
     given: &Given<'_, '_>,
     memory: &mut ContactMemory,
@@ -213,7 +213,7 @@ fn solve(
     }
 }
 
-/// Most solves with contacts when so many field queries are `left`.
+/// Largest number of solves with contacts when `left` field queries remain.
 fn most_solves(left: u32, candidates: u16, springs: usize) -> u8 {
     let more = left / further_solve_cost(springs, candidates);
     u32::from(LEAST_SOLVES)

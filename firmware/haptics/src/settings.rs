@@ -1,8 +1,8 @@
 //! Settings of the force law: each with its meaning, unit, default and range, in one place.
 //!
-//! Made and checked at low priority, handed to the tick as finished values. A default that a host can change comes from the parameter table of
-//! the protocol ([`mortise_protocol::parameter`]). The defaults suit a hand-held part and a handle of about 0.15 kg: an object of 0.1 kg on a coupling of
-//! 1 kN/m is critically damped at b = 2·√(k·m) = 20 N s/m. A range is where the law was tried, not where it would break.
+//! Made and checked at low priority, passed to the tick as finished values. A default that a host can change comes from the parameter table of the
+//! protocol ([`mortise_protocol::parameter`]). The defaults suit a hand-held part and a handle of about 0.15 kg: an object of 0.1 kg on a coupling of
+//! 1 kN/m is critically damped at b = 2·√(k·m) = 20 N s/m. Ranges cover the values tested, not the limits of stability.
 
 use core::fmt;
 
@@ -13,7 +13,7 @@ const fn host(parameter: ParameterId) -> f32 {
     parameter.row().default
 }
 
-/// Declares a group of settings: `field: type = default, min => max;`, the range left out where any value is accepted.
+/// Declares a group of settings: `field: type = default, min => max;`, without the range where any value is accepted.
 macro_rules! group {
     ($(#[$about:meta])* $group:ident: $path:literal {
         $($(#[$doc:meta])* $field:ident: $type:ty = $default:expr $(, $min:expr => $max:expr)?;)+
@@ -48,7 +48,7 @@ macro_rules! group {
     };
 }
 
-/// All of them.
+/// All settings of the force law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Between handle and object.

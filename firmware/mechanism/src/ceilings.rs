@@ -1,24 +1,25 @@
-//! Limits that cannot be talked around: the rig's compiled ceilings, and what is cut from a wrench after the force law.
+//! Hardware limits: the rig's compiled limits, and their enforcement on a wrench after the force law.
 //!
 //! Every adjustable limit has a range of its own ([`mortise_protocol::parameter`]). A rig whose motors or links bear less states that here, in its
-//! firmware: no message reaches these numbers. A parameter beyond its ceiling is refused with the range that holds on this board, and
-//! [`restrain`] cuts the wrench once more after everything else, so that an error in the force law or in the settings ends there.
+//! firmware: no message can change these numbers. A parameter beyond its hardware limit is refused with the range that holds on this board, and
+//! [`restrain`] limits the wrench once more after everything else, so that an error in the force law or in the settings has no effect beyond these
+//! limits.
 
 use glam::Vec3;
 use mortise_haptics::{Twist, Wrench};
 use mortise_protocol::parameter::ParameterId;
 use mortise_protocol::rig::Rig;
 
-/// The most this rig allows.
+/// Hardware limits of one rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ceilings {
     /// Force at the handle, N.
     pub force_n: f32,
     /// Torque at the handle, N·m.
     pub torque_nm: f32,
-    /// Change of force, N/s.
+    /// Rate of change of force, N/s.
     pub force_slew_n_per_s: f32,
-    /// Change of torque, N·m/s.
+    /// Rate of change of torque, N·m/s.
     pub torque_slew_nm_per_s: f32,
     /// Mechanical power into the handle, W.
     pub power_w: f32,
@@ -43,7 +44,7 @@ impl Ceilings {
         workspace_m: ParameterId::WorkspaceRadius.row().max,
     };
 
-    /// Those of a described rig, none above the firmware's own.
+    /// The limits of a described rig, none above the firmware's own.
     pub fn of(rig: &Rig) -> Self {
         let own = rig.ceilings;
         Self {
@@ -55,7 +56,7 @@ impl Ceilings {
         }
     }
 
-    /// The largest value of a parameter on this rig: its own range's end, or less.
+    /// The largest value of a parameter on this rig: the lower of its range's end and the hardware limit.
     pub fn most(&self, id: ParameterId) -> f32 {
         let ceiling = match id {
             ParameterId::ForceLimit => self.force_n,
@@ -68,7 +69,7 @@ impl Ceilings {
             ParameterId::WorkspaceRadius => self.workspace_m,
             _ => f32::INFINITY,
         };
-        // A ceiling that is not a number leaves the range's smallest value. `min` would let the larger one through.
+        // A limit that is not a number yields the range's smallest value; `min` would return the larger one.
         if ceiling >= id.row().min {
             ceiling.min(id.row().max)
         } else {
@@ -76,7 +77,7 @@ impl Ceilings {
         }
     }
 
-    /// Limits of one tick: the adjustable ones, none above its ceiling.
+    /// Limits for one tick: the adjustable ones, none above its hardware limit.
     pub fn with(&self, power_w: f32, workspace_m: f32) -> Bounds {
         Bounds {
             force_n: self.most(ParameterId::ForceLimit),
@@ -87,7 +88,7 @@ impl Ceilings {
     }
 }
 
-/// See [`Ceilings::with`].
+/// Limits for one tick, see [`Ceilings::with`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     force_n: f32,
@@ -96,31 +97,31 @@ pub struct Bounds {
     workspace_m: f32,
 }
 
-/// The handle is outside the workspace.
+/// Whether the handle is outside the workspace.
 pub fn is_outside(handle: Vec3, radius_m: f32) -> bool {
     handle.length_squared() > radius_m * radius_m
 }
 
-/// What may reach the motors of `wrench` (world, at the handle's origin), with the handle at `handle` moving with `twist`:
+/// The part of `wrench` (world, at the handle's origin) that may reach the motors, with the handle at `handle` moving with `twist`:
 ///
-/// 1. force and torque are cut to their ceilings;
+/// 1. force and torque are limited to their hardware limits;
 /// 2. outside the workspace no part of the force points outwards: F − max(0, F·r̂)·r̂;
-/// 3. power into the handle, P = F·v + τ·ω, is at most the limit: what gives more is scaled by limit/P. A wrench that brakes is never weakened;
-/// 4. what is not finite becomes zero.
+/// 3. power into the handle, P = F·v + τ·ω, is at most the limit: a wrench above it is scaled by limit/P. A braking wrench is never weakened;
+/// 4. a wrench that is not finite becomes zero.
 ///
-/// The power comes last of the three, because cutting a torque that takes power would let a force give more; one factor for both undoes nothing
-/// before it. Cost: about 60 operations.
+/// The power limit is applied last of the three, because cutting a torque that absorbs power could raise the total; its single factor violates
+/// neither of the limits before it. Cost: about 60 operations.
 pub fn restrain(wrench: Wrench, handle: Vec3, twist: &Twist, bounds: &Bounds) -> Wrench {
     let mut force = wrench.force.clamp_length_max(bounds.force_n);
     let mut torque = wrench.torque.clamp_length_max(bounds.torque_nm);
     if is_outside(handle, bounds.workspace_m) {
-        // Scaled first: the square of a large component is infinite.
+        // Scaled first, because the square of a large component overflows.
         let scaled = handle / handle.abs().max_element();
         let outwards = scaled / libm::sqrtf(scaled.length_squared());
         force -= outwards * force.dot(outwards).max(0.0);
     }
     let power = force.dot(twist.linear) + torque.dot(twist.angular);
-    // Infinite products may cancel to no number, which is not within the limit either; the share is then none, and the wrench becomes zero.
+    // Infinite products may cancel to NaN, which does not compare as within the limit; the share is then zero, and so is the wrench.
     let within = power <= bounds.power_w;
     if !within {
         let share = bounds.power_w / power;
@@ -151,7 +152,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
 
-        /// Whatever comes in. One part in 10⁶ for the roundings of scaling, projecting and measuring again.
+        /// For any input. One part in 10⁶ for the roundings of scaling, projecting and measuring again.
         #[test]
         fn nothing_beyond_a_bound_gets_through(
             force in vector(), torque in vector(), linear in vector(), angular in vector(), handle in vector(),
@@ -164,7 +165,7 @@ mod tests {
             prop_assert!(out.torque.length() <= 0.3 * 1.000_001);
             let power = out.force.dot(linear) + out.torque.dot(angular);
             if linear.is_finite() && angular.is_finite() && linear.length() < 100.0 && angular.length() < 100.0 {
-                // Products under 8 N · 52 m/s and 0.3 N·m · 52 rad/s, each rounded to 2⁻²⁴ of itself, a dozen of them.
+                // A dozen products under 8 N · 52 m/s and 0.3 N·m · 52 rad/s, each with a relative rounding of 2⁻²⁴.
                 prop_assert!(power <= 5.0 + 5e-4, "{power} W");
             }
             if handle.is_finite() && handle.length() > 0.5 && handle.length() < 100.0 {
@@ -172,7 +173,7 @@ mod tests {
             }
         }
 
-        /// What is within every bound is left as it is, to the bit.
+        /// A wrench within every bound is unchanged to the bit.
         #[test]
         fn what_is_allowed_is_not_touched(
             force in prop::array::uniform3(-2.0f32..2.0), linear in prop::array::uniform3(-0.5f32..0.5),
@@ -196,7 +197,7 @@ mod tests {
             force: Vec3::new(10.0, 0.0, 0.0),
             torque: Vec3::ZERO,
         };
-        // 20 W wanted, 5 W allowed.
+        // 20 W requested, 5 W allowed.
         assert_eq!(
             restrain(pushing, Vec3::ZERO, &twist, &bounds).force,
             Vec3::new(2.5, 0.0, 0.0)

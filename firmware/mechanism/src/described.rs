@@ -7,12 +7,12 @@ use crate::encoder_watch::{EncoderWatch, probed};
 use crate::interface::{Drive, Sensed};
 use crate::joints::{ENCODERS, Joints};
 
-/// See the module.
+/// A described mechanism: joints, encoder watch and drive state; see the module.
 #[derive(Clone, Debug)]
 pub struct DescribedMechanism {
     joints: Joints,
     watch: EncoderWatch<ENCODERS>,
-    /// A part is felt.
+    /// A grabbed part is rendered.
     felt: bool,
     /// Currents without the encoders' probes, A.
     driven: [f32; MAX_JOINTS],
@@ -20,7 +20,7 @@ pub struct DescribedMechanism {
 }
 
 impl DescribedMechanism {
-    /// In its home pose with all counts 0, motors off, no part felt. `referenced`: that it stands there is known, and not only assumed.
+    /// The mechanism in its home pose with all counts 0, motors off, no part rendered. `referenced`: the home pose is known rather than assumed.
     ///
     /// # Errors
     /// See [`crate::kinematics::Model::new`].
@@ -39,8 +39,7 @@ impl DescribedMechanism {
         &self.joints
     }
 
-    /// Takes the counts of one tick: pose, velocity, and what is wrong with the encoders. The reference is lost with the first jump and in an
-    /// impossible posture.
+    /// Processes the counts of one tick: pose, velocity and encoder faults. The reference is lost with the first jump and in an impossible posture.
     pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Sensed {
         let reading = self.joints.read(counts);
         let encoder_stuck = if self.felt {
@@ -62,8 +61,8 @@ impl DescribedMechanism {
         }
     }
 
-    /// Currents for the motors (A, signed in the motor's sense) in the posture of the last reading, with the encoders' probes while a part is felt;
-    /// none with the motors off. See [`Joints::currents`].
+    /// Currents for the motors (A, signed in the motor's sense) in the posture of the last reading, with the encoders' probes while a part is
+    /// rendered; zero with the motors off. See [`Joints::currents`].
     pub fn currents(&mut self, drive: Drive) -> [f32; MAX_JOINTS] {
         self.driven = match drive {
             Drive::Off => [0.0; MAX_JOINTS],
@@ -86,14 +85,14 @@ impl DescribedMechanism {
         self.felt = felt;
     }
 
-    /// The mechanism rests where these counts say, and is known to: the next reading is compared with them.
+    /// Sets the reference: the mechanism rests at these counts, with which the next reading is compared.
     pub fn reference(&mut self, counts: &[i32; ENCODERS]) {
         self.watch.rest();
         self.joints.start_at(counts);
         self.referenced = true;
     }
 
-    /// As at start, in the home pose, and known to be there.
+    /// Returns to the initial state: in the home pose, which is known.
     pub fn reset(&mut self) {
         self.reference(&[0; ENCODERS]);
         self.felt = false;

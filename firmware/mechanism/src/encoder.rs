@@ -1,4 +1,4 @@
-//! What every board does with encoder counts: make a short counter endless, tell motion from a jump.
+//! Processing of encoder counts common to every board: extends a short counter, and distinguishes motion from a jump.
 
 /// Counts from one reading to the next, of a counter that wraps at 32 bits.
 #[derive(Clone, Copy, Debug)]
@@ -10,19 +10,19 @@ pub struct Counter {
 /// Motion of one axis in one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// Counts moved; 0 when it jumped.
+    /// Counts moved; 0 after a jump.
     pub counts: i32,
-    /// It moved further than the mechanism can in a tick: a glitch, a loose connector, or a hit.
+    /// The axis moved further than the mechanism can in a tick: a glitch, a loose connector, or an impact.
     pub jumped: bool,
 }
 
 impl Counter {
-    /// `farthest`: counts the axis can move in a tick at the most.
+    /// `farthest`: most counts the axis can move in a tick.
     pub const fn new(farthest: u32) -> Self {
         Self { last: None, farthest }
     }
 
-    /// The next reading. The first one sets the start; after a jump counting goes on from where it landed.
+    /// Processes the next reading. The first one sets the start; after a jump counting continues from the new reading.
     pub fn update(&mut self, reading: i32) -> Step {
         let counts = self.last.map_or(0, |last| reading.wrapping_sub(last));
         self.last = Some(reading);
@@ -34,7 +34,7 @@ impl Counter {
     }
 }
 
-/// Follows a hardware counter that wraps at 2¹⁶.
+/// Extension of a hardware counter that wraps at 2¹⁶.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Follower {
     last: u16,
@@ -47,12 +47,12 @@ impl Follower {
         Self { last: raw, count: 0 }
     }
 
-    /// The last reading counts as 0 from here on.
+    /// Makes the last reading the new zero.
     pub const fn restart(&mut self) {
         self.count = 0;
     }
 
-    /// Takes the next reading, gives counts since start. Right as long as the counter moves less than 2¹⁵ counts between two calls
+    /// Processes the next reading and returns the counts since start. Correct as long as the counter moves less than 2¹⁵ counts between two calls
     /// ([`mortise_protocol::rig::MAX_COUNTS_PER_TICK`]).
     pub const fn follow(&mut self, raw: u16) -> i32 {
         let moved = raw.wrapping_sub(self.last).cast_signed();

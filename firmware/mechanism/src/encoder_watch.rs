@@ -1,67 +1,70 @@
-//! Tells an encoder that is dead from a hand that holds still.
+//! Detection of dead encoders, which must be distinguished from a hand that holds still.
 //!
-//! Counts that do not change prove nothing: a hand that rests on a part, or a mouse that is not moved, gives none for minutes. A sound encoder follows
-//! its own motor, though. While a part is felt, an axis that has shown no sign of life for [`STILL_TICKS`] and either pushes or has reason to have moved
-//! is **probed**: its motor's effort goes linearly towards zero (of an axis that does not push, to alternate sides) and back, until the encoder answers.
-//! An encoder that stays silent through the whole probe is dead.
+//! Unchanging counts are no evidence: a hand resting on a part, or a mouse at rest, produces none for minutes. A sound encoder, however, follows its
+//! own motor. While a part is rendered, an axis without a sign of life for [`STILL_TICKS`] that either pushes or has reason to have moved is
+//! **probed**: its motor's effort ramps linearly towards zero (for an axis that does not push, to alternate sides) and back, until the encoder
+//! answers. An encoder that stays silent through the whole probe is dead.
 //!
-//! There *and back*: a hand whose force changes at the rate of a single ramp, d = s, would cancel it within the dry friction, and the joint would stand.
-//! On one of two ramps of opposite slopes ±s the sum changes by (|d| + s)·T ≥ s·T, the amplitude, whatever the steady rate d.
+//! The probe ramps there *and back*: a hand whose force changes at the rate of a single ramp, d = s, would cancel it within the dry friction, and the
+//! joint would not move. On one of two ramps of opposite slopes ±s the sum changes by (|d| + s)·T ≥ s·T, the amplitude, for any steady rate d.
 //!
-//! The probe ends with the answer, so what the hand feels is set by the encoder and not by the probe's amplitude: [`ALIVE_COUNTS`] counts of motion, at
-//! most every [`STILL_TICKS`], by a change of force of k·2.5 counts and twice the dry friction, k the hand's stiffness. The full amplitude is reached
-//! only where nothing moves, that is before a fault. It is chosen so that a hand of [`STIFFEST_HAND`] still answers.
+//! The probe ends with the answer, so the encoder rather than the probe's amplitude determines what the operator feels: [`ALIVE_COUNTS`] counts of
+//! motion, at most every [`STILL_TICKS`], by a change of force of k·2.5 counts plus twice the dry friction, with k the hand's stiffness. The full
+//! amplitude is reached only where nothing moves, that is before a fault. It is chosen so that the handle still answers in a hand of
+//! [`STIFFEST_HAND`].
 //!
-//! *Sign of life*: the counts since the last one span [`ALIVE_COUNTS`]. One count is none: an encoder with one of its two channels broken counts one up
-//! and one down as it turns. *Reason to have moved*: any axis of the mechanism went [`FAR_COUNTS`] since this one last answered a probe. A mechanism at
-//! rest that does not push is therefore left alone, once every axis has answered: one that was dead before the part was grabbed is found so.
+//! *Sign of life*: the counts since the last one span [`ALIVE_COUNTS`]. A single count is not sufficient: an encoder with one of its two channels
+//! broken counts one up and one down as it turns. *Reason to have moved*: any axis of the mechanism moved by [`FAR_COUNTS`] since this one last
+//! answered a probe. A mechanism at rest that does not push is therefore not probed once every axis has answered; this first round finds an encoder
+//! that was dead before the part was grabbed.
 //!
-//! What a probe itself moves is no reason to move, or probes ask for probes without end: friction leaves a handle anywhere within f/k of its rest, and
-//! each probe may take it to the other side. A rig states how far its handle swings ([`EncoderWatch::swinging`]). While an axis may still
-//! swing, only a larger displacement counts as motion, and what remains of the swing afterwards does not.
+//! Motion caused by a probe is no reason to have moved, or probes would trigger further probes without end: friction leaves a handle anywhere within
+//! f/k of its rest, and each probe may move it to the other side. A rig states how far its handle swings ([`EncoderWatch::swinging`]). While an axis
+//! may still swing, only a larger displacement counts as motion, and the remainder of the swing afterwards does not.
 //!
-//! From the last sign of life to the verdict: [`STILL_TICKS`] + 2·[`RAMP_TICKS`] + [`LISTEN_TICKS`] = [`VERDICT_TICKS`] at the most, since an earlier probe
-//! is over by then: it returns twice as fast as it rose. Cost: some 20 integer operations an axis and tick. No allocation, total.
+//! From the last sign of life to the verdict: at most [`STILL_TICKS`] + 2·[`RAMP_TICKS`] + [`LISTEN_TICKS`] = [`VERDICT_TICKS`], since an earlier
+//! probe has ended by then: it returns twice as fast as it rose. Cost: some 20 integer operations per axis and tick. No allocation, total.
 
 /// Ticks without a sign of life after which a probe may begin.
 pub const STILL_TICKS: u16 = 70;
-/// Ticks in which a probe reaches its amplitude, and in which it goes back.
+/// Ticks in which a probe rises to its amplitude, and in which it returns.
 pub const RAMP_TICKS: u16 = 50;
-/// Ticks after a probe in which an answer still counts: time for a handle to follow. A hand of 400 N/m and 4 N·s/m follows with 10 ms.
+/// Ticks after a probe in which an answer is still accepted: time for a handle to follow. In a hand of 400 N/m and 4 N·s/m it follows with a time
+/// constant of 10 ms.
 pub const LISTEN_TICKS: u16 = 20;
 /// Ticks from the last sign of life of an encoder that is probed at once to the verdict.
 pub const VERDICT_TICKS: u16 = STILL_TICKS + 2 * RAMP_TICKS + LISTEN_TICKS;
-/// Counts from one side to the other that are a sign of life.
+/// Counts between the extremes of a motion that is a sign of life.
 pub const ALIVE_COUNTS: i32 = 2;
-/// Counts any axis goes, after which every other has a reason to have moved.
+/// Motion of any axis, in counts, that gives every other axis a reason to have moved.
 pub const FAR_COUNTS: i32 = 4;
-/// Share of what a motor can give from which on its axis is always watched.
+/// Share of a motor's largest effort from which its axis is always watched.
 pub const LOADED: f32 = 0.05;
-/// Stiffest hand whose free handle a probe moves, N/m: more than twice the stiffest grip of a tensed arm.
+/// Stiffest hand in which a probe moves a free handle, N/m: more than twice the stiffest grip of a tensed arm.
 pub const STIFFEST_HAND: f32 = 10_000.0;
-/// Likewise about an axis, N·m/rad.
+/// The same about an axis, N·m/rad.
 pub const STIFFEST_WRIST: f32 = 25.0;
 
-/// Amplitude of a probe: moves `stiffness` (of the hand, at this axis) by what is a sign of life and half a count more, against `friction`, which may
-/// have to be turned round from one side to the other. All in one system of units, force or torque.
+/// Amplitude of a probe: moves the axis against the hand's `stiffness` by a sign of life plus half a count, and against `friction`, which may have to
+/// be reversed from one side to the other. All in one system of units, force or torque.
 pub const fn amplitude(stiffness: f32, count: f32, friction: f32) -> f32 {
     2.0 * friction + stiffness * (ALIVE_COUNTS as f32 + 0.5) * count
 }
 
-/// `effort` of a motor with a probe of `amplitude` in it, `share` from [`EncoderWatch::share`]: never more than the larger of the two.
+/// `effort` of a motor with a probe of `amplitude` added, `share` from [`EncoderWatch::share`]: never more than the larger of the two.
 pub fn probed(effort: f32, amplitude: f32, share: f32) -> f32 {
     let most = effort.abs().max(amplitude);
     (effort + share * amplitude).clamp(-most, most)
 }
 
-/// One axis in one tick.
+/// One axis in one tick, input of the watch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisTick {
     /// Counts since the last tick.
     pub moved: i32,
-    /// What its motor was driven with, as a share of what it can, signed; without the probe.
+    /// Effort of its motor as a share of its largest, signed; without the probe.
     pub effort: f32,
-    /// A probe would move it: it has a motor that is stronger than its friction, and is not at a stop.
+    /// Whether a probe would move it: it has a motor stronger than its friction, and is not at a stop.
     pub able: bool,
 }
 
@@ -69,21 +72,21 @@ pub struct AxisTick {
 #[derive(Clone, Copy, Debug)]
 pub struct EncoderWatch<const N: usize> {
     axes: [Axis; N],
-    /// As [`FAR_COUNTS`], of an axis that may still swing from a probe.
+    /// Like [`FAR_COUNTS`], for an axis that may still swing from a probe.
     swing_counts: i32,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Axis {
-    /// Counts since the last sign of life, and the range they spanned.
+    /// Counts since the last sign of life, and their range.
     place: i32,
     low: i32,
     high: i32,
-    /// Ticks since then.
+    /// Ticks since the last sign of life.
     still: u16,
-    /// Counts since the axis last went far, without what a probe left behind.
+    /// Counts since the axis last moved far, without displacement left by a probe.
     travel: i32,
-    /// It had a reason to move since it last answered a probe.
+    /// Whether it had a reason to move since it last answered a probe.
     owes_answer: bool,
     probe: Probe,
 }
@@ -92,11 +95,11 @@ struct Axis {
 #[derive(Clone, Copy, Debug)]
 struct Probe {
     phase: Phase,
-    /// In parts of [`RAMP_TICKS`].
+    /// Level of the probe, in units of 1/[`RAMP_TICKS`].
     level: u16,
-    /// Towards larger efforts, else smaller ones.
+    /// Direction: towards larger efforts, else smaller ones.
     up: bool,
-    /// Ticks since it was over.
+    /// Ticks since the probe ended.
     listened: u16,
     /// Ticks for which the axis may still swing.
     swings: u16,
@@ -106,13 +109,13 @@ struct Probe {
 enum Phase {
     /// No probe.
     Rest,
-    /// Away.
+    /// Rising to the amplitude.
     Rise,
-    /// And back.
+    /// Returning to zero.
     Fall,
-    /// Over, without an answer so far.
+    /// Ended, without an answer so far.
     Listen,
-    /// Answered: back to zero.
+    /// Answered: returning to zero.
     Return,
 }
 
@@ -123,12 +126,12 @@ impl<const N: usize> Default for EncoderWatch<N> {
 }
 
 impl<const N: usize> EncoderWatch<N> {
-    /// Nothing seen yet; every encoder has to answer once.
+    /// Initial state, in which every encoder has to answer once.
     pub const fn new() -> Self {
         Self::swinging(FAR_COUNTS)
     }
 
-    /// Likewise, of axes that a probe may swing by less than `counts` with a hand at rest: less is then no reason to move.
+    /// The same, for axes that a probe may swing by less than `counts` in a hand at rest: smaller motion is no reason to move.
     pub const fn swinging(counts: i32) -> Self {
         Self {
             axes: [Axis::NEW; N],
@@ -136,7 +139,7 @@ impl<const N: usize> EncoderWatch<N> {
         }
     }
 
-    /// One reading while a part is felt; the first axis that is dead. When no part is felt call [`Self::rest`] instead.
+    /// Processes one reading while a part is rendered; returns the first dead axis. When no part is rendered call [`Self::rest`] instead.
     pub fn update(&mut self, ticks: &[AxisTick; N]) -> Option<u8> {
         let mut far = false;
         for (axis, tick) in self.axes.iter_mut().zip(ticks) {
@@ -152,12 +155,12 @@ impl<const N: usize> EncoderWatch<N> {
         dead
     }
 
-    /// No part is felt: no probes.
+    /// Ends all probes: no part is rendered.
     pub fn rest(&mut self) {
         self.axes = [Axis::NEW; N];
     }
 
-    /// Share of the probe's amplitude to add to an axis, −1 to 1; 0 for an axis that is not there.
+    /// Share of the probe's amplitude to add to an axis, −1 to 1; 0 for an axis that does not exist.
     pub fn share(&self, axis: usize) -> f32 {
         self.axes.get(axis).map_or(0.0, |axis| axis.probe.share())
     }
@@ -205,7 +208,7 @@ impl Axis {
         alive
     }
 
-    /// Whether it is dead.
+    /// Processes one tick; returns whether the encoder is dead.
     fn update(&mut self, tick: &AxisTick) -> bool {
         let alive = self.shows_life(tick.moved);
         if alive || !tick.able {
@@ -231,7 +234,7 @@ impl Axis {
 }
 
 impl Probe {
-    /// Towards zero effort; from none to the side that was not the last.
+    /// Starts a probe towards zero effort, or without effort to the side opposite to the last.
     fn begin(&mut self, effort: f32) {
         if self.phase == Phase::Rest {
             self.up = if effort == 0.0 { !self.up } else { effort < 0.0 };
@@ -239,7 +242,7 @@ impl Probe {
         }
     }
 
-    /// It waits for an answer.
+    /// Whether it awaits an answer.
     fn asks(&self) -> bool {
         matches!(self.phase, Phase::Rise | Phase::Fall | Phase::Listen)
     }
@@ -287,7 +290,7 @@ impl Probe {
     }
 }
 
-// An earlier probe is back before the next may begin.
+// An earlier probe has returned before the next may begin.
 const _: () = assert!(RAMP_TICKS / 2 < STILL_TICKS && VERDICT_TICKS < 200);
 
 #[cfg(test)]
@@ -339,7 +342,7 @@ mod tests {
         let mut probes = 0;
         for _ in 0..10_000 {
             let was = watch.share(0);
-            // The encoder answers in the middle of a probe, and comes back with it.
+            // The encoder answers in the middle of a probe, and returns with it.
             let answer = if was.abs() == 0.2 { ALIVE_COUNTS } else { 0 };
             assert_eq!(watch.update(&[tick(answer, 0.0)]), None);
             probes += u32::from(was == 0.0 && watch.share(0) != 0.0);
@@ -362,7 +365,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever an encoder did before: once it stands still, pushing, the verdict comes in time; a probe never adds to a push.
+        /// For any history: once an encoder stands still while pushing, the verdict comes in time; a probe never adds to a push.
         #[test]
         fn a_dead_encoder_is_found_in_time_after_any_history(
             history in prop::collection::vec((-4i32..=4, -1.0f32..1.0, prop::bool::weighted(0.9)), 0..600),
@@ -377,7 +380,7 @@ mod tests {
             prop_assert_eq!(found.last(), Some(&Some(0)), "not found in time");
         }
 
-        /// Never more than the motor was to give, or the amplitude where that is more; towards zero never through it by more than the amplitude.
+        /// Never exceeds the motor's effort, or the amplitude where that is larger; towards zero it never overshoots by more than the amplitude.
         #[test]
         fn a_probe_never_adds_to_a_push(effort in -20.0f32..20.0, amplitude in 0.0f32..2.0, share in -1.0f32..1.0) {
             let out = probed(effort, amplitude, share);

@@ -1,4 +1,4 @@
-//! What the control plane reads of a mechanism and sets on it, once in each tick.
+//! Interface between the control plane and a mechanism: one reading and one drive command per tick.
 //!
 //! A board implements [`Mechanism`] with its encoders, motors and stop input; a simulation with a model of them.
 
@@ -10,7 +10,7 @@ pub const TICK_HZ: u16 = 1000;
 /// Seconds in a tick.
 pub const TICK_S: f32 = 0.001;
 
-/// What the mechanism's sensors say in one tick.
+/// Sensor readings of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensed {
     /// Handle in the world.
@@ -25,16 +25,16 @@ pub struct Sensed {
     pub driver_fault: Option<DriverFault>,
     /// Encoder axis whose reading jumped further than the mechanism can move in a tick.
     pub encoder_jump: Option<u8>,
-    /// The encoders say where the links cannot be.
+    /// The encoder readings correspond to no posture of the links.
     pub impossible_posture: bool,
     /// Encoder axis that does not follow its motor, see [`crate::encoder_watch`].
     pub encoder_stuck: Option<u8>,
-    /// The encoders know where the handle is: absolute ones always do, counting ones since [`Mechanism::home`] and until they jump.
+    /// The encoders have a reference: absolute ones always, incremental ones from [`Mechanism::home`] until they jump.
     pub referenced: bool,
 }
 
 impl Sensed {
-    /// At the world's origin, at rest, nothing wrong.
+    /// At the world's origin, at rest, no fault.
     pub const AT_REST: Self = Self {
         handle: Pose::IDENTITY,
         twist: Twist::ZERO,
@@ -48,32 +48,32 @@ impl Sensed {
     };
 }
 
-/// What a motor driver reports.
+/// Fault reported by a motor driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriverFault {
     /// Motor axis.
     pub axis: u8,
-    /// As far as the driver tells.
+    /// As far as the driver distinguishes.
     pub kind: DriverFaultKind,
 }
 
 /// Kinds of driver faults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriverFaultKind {
-    /// One line for everything.
+    /// A single line for all causes.
     Any,
-    /// Too much current.
+    /// Overcurrent.
     OverCurrent,
-    /// Too much heat.
+    /// Overtemperature.
     OverTemperature,
 }
 
-/// What the motors are to do until the next tick.
+/// Command to the motors until the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
-    /// Enable output inactive, no current: the handle hangs free.
+    /// Enable output inactive, no current: the handle moves freely.
     Off,
-    /// Enable output active, currents so that this wrench acts on the handle at its origin, world axes.
+    /// Enable output active, currents such that this wrench acts on the handle at its origin, world axes.
     Wrench(Wrench),
 }
 
@@ -82,7 +82,7 @@ pub enum Drive {
 /// Both calls are part of the 1 ms tick: bounded time, no blocking, no panics. After [`Drive::Off`] the enable output must be inactive
 /// when `drive` returns. A board that cannot produce every component of a wrench (its identity says which) drops the others.
 pub trait Mechanism {
-    /// It is what the description kept in flash says; else it is compiled in, and no description is taken.
+    /// Whether the description kept in flash defines the mechanism; else it is compiled in, and no description is accepted.
     const DESCRIBED: bool = false;
 
     /// Reads the sensors.
@@ -91,16 +91,16 @@ pub trait Mechanism {
     /// Sets the motors. Applied at once; holds until the next call.
     fn drive(&mut self, drive: Drive);
 
-    /// A part is felt from here on, or is not. Only while one is felt the mechanism may probe its encoders ([`crate::encoder_watch`]). Called in each tick
-    /// before [`Self::drive`].
+    /// Whether a part is rendered from here on. The mechanism may probe its encoders ([`crate::encoder_watch`]) only while one is. Called in each
+    /// tick before [`Self::drive`].
     fn watch_encoders(&mut self, _felt: bool) {}
 
-    /// Counts of the encoders at the handle, at most: m and rad. Readings are within half of this; 0: not known.
+    /// Upper bound of an encoder count at the handle: m and rad. Readings are within half of this; 0: unknown.
     fn count(&self) -> [f32; 2] {
         [0.0; 2]
     }
 
-    /// The handle stands in its reference pose: counting encoders start from here. Called with the motors off only.
+    /// Sets the reference: the handle is in its reference pose, and incremental encoders count from here. Called with the motors off only.
     fn home(&mut self) {}
 
     /// The controls of a simulated mechanism; `None` for a real one.
@@ -109,21 +109,21 @@ pub trait Mechanism {
     }
 }
 
-/// Controls that only a simulated mechanism has. Its time may wait for the host (lockstep). What a simulation does not model does nothing.
+/// Controls that only a simulated mechanism has. Its time may wait for the host (lockstep). A control that a simulation does not model has no effect.
 pub trait Simulation {
-    /// Wrench (world, at the handle's origin) of the simulated hand in the last tick; `None` without such a hand.
+    /// Wrench (world, at the handle's origin) of the operator model in the last tick; `None` without one.
     fn hand(&self) -> Option<Wrench> {
         None
     }
 
-    /// Gives the simulated hand a script whose time starts now; `None` lets go.
+    /// Starts a script of the operator model, whose time begins now; `None` releases the handle.
     fn set_hand(&mut self, _script: Option<&HandScript>) {}
 
-    /// Lets the inputs fail as the script says, from the next reading on.
+    /// Starts a script of input faults, effective from the next reading on.
     fn set_input_faults(&mut self, _faults: &[InputFault]) {}
 
-    /// Puts the mechanism where it was at start, at rest, without a hand, so that a scenario starts from known bits; returns the handle's pose
-    /// there, or `None` where the mechanism stays as it is.
+    /// Resets the mechanism to its initial state, at rest and without an operator, so that a scenario starts from known bits; returns the handle's
+    /// pose there, or `None` where the mechanism stays as it is.
     fn reset(&mut self) -> Option<Pose> {
         None
     }

@@ -1,4 +1,4 @@
-//! Encoder counts to handle pose and velocity, and force to motor currents: what a described rig does in each tick, simulated or real.
+//! Encoder counts to handle pose and velocity, and force to motor currents, for a described rig in each tick, simulated or real.
 
 use glam::Vec3;
 use mortise_haptics::{Pose, Twist};
@@ -11,21 +11,21 @@ use crate::interface::TICK_S;
 use crate::kinematics::{Model, Posture};
 use crate::velocity::{Estimator, InUse};
 
-/// Encoders of a description: joints, then wrist axes. Those that are not there count nothing.
+/// Encoders of a description: joints, then wrist axes. Counts of absent ones stay 0.
 pub const ENCODERS: usize = MAX_JOINTS + 3;
-/// Rate of a wrist axis beyond which a reading is taken for a jump, rad/s: above any speed limit that can be set.
+/// Rate of a wrist axis above which a reading is treated as a jump, rad/s: above any speed limit that can be set.
 const WRIST_RATE: f32 = 200.0;
-/// Stiffest hand whose handle a probe moves, N/m: a tensed arm. Less than a free handle's ([`crate::encoder_watch::STIFFEST_HAND`]), because a joint's
-/// counts are ten times as coarse and take ten times the force.
+/// Stiffest hand in which a probe moves the handle, N/m: a tensed arm. Less than that of a free handle ([`crate::encoder_watch::STIFFEST_HAND`]),
+/// because a joint's counts are ten times as coarse and require ten times the force.
 const STIFFEST_HAND: f32 = 5_000.0;
-/// Most of a motor's current that a probe of its encoder takes.
+/// Largest share of a motor's current for a probe of its encoder.
 const PROBE_SHARE: f32 = 0.5;
-/// Softest hand that must still answer a probe, N/m; where that takes more the joint's encoder is not judged.
+/// Softest hand in which the joint must still answer a probe, N/m; where that needs more current, the joint's encoder is not judged.
 const LEAST_STIFFEST_HAND: f32 = 1_000.0;
-/// Counts from the end of its range within which a joint is taken to be at its stop.
+/// Distance from the end of its range, in counts, within which a joint is considered to be at its stop.
 const STOP_COUNTS: f32 = 4.0;
 
-/// Everything between counts and the handle.
+/// Conversion between encoder counts and the handle.
 #[derive(Clone, Debug)]
 pub struct Joints {
     model: Model,
@@ -44,23 +44,23 @@ pub struct Joints {
     angles: [f32; MAX_JOINTS],
 }
 
-/// What the encoders say in one tick.
+/// Encoder readings of one tick, converted.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
     /// Handle in the world.
     pub handle: Pose,
     /// Its velocity.
     pub twist: Twist,
-    /// First encoder that moved further than it can.
+    /// First encoder that moved further than is possible in a tick.
     pub jump: Option<u8>,
-    /// The links cannot be where the encoders say.
+    /// The readings correspond to no posture of the links.
     pub impossible: bool,
     /// Counts each encoder moved.
     pub moved: [i32; ENCODERS],
 }
 
 impl Joints {
-    /// In the home pose, at rest, all counts 0.
+    /// The joints in the home pose, at rest, all counts 0.
     ///
     /// # Errors
     /// See [`Model::new`].
@@ -76,7 +76,7 @@ impl Joints {
         for (number, joint) in rig.joints.iter().enumerate() {
             home[number] = joint.home;
             radians_per_count[number] = joint.radians_per_count();
-            // At least one count: a slow joint with a coarse encoder still counts. The cast saturates.
+            // At least one count, so that a slow joint with a coarse encoder still counts. The cast saturates.
             farthest[number] = (joint.counts_per_tick() + 1.0) as u32;
             torque_per_ampere[number] = joint.torque_per_ampere();
             current_limit[number] = joint.current_limit;
@@ -111,12 +111,12 @@ impl Joints {
         Ok(joints)
     }
 
-    /// The mechanism stands in its home pose: counters start at 0.
+    /// Restarts in the home pose, all counts 0.
     pub fn start(&mut self) {
         self.start_at(&[0; ENCODERS]);
     }
 
-    /// The mechanism rests where these counts say: the next reading is compared with them. Where it cannot be, the last posture stays.
+    /// Restarts at rest at these counts, with which the next reading is compared. If they correspond to no posture, the last posture stays.
     pub fn start_at(&mut self, counts: &[i32; ENCODERS]) {
         self.counters = self.farthest.map(Counter::new);
         self.velocities = [InUse::AT_REST; ENCODERS];
@@ -146,7 +146,7 @@ impl Joints {
         self.home[encoder] + count as f32 * self.radians_per_count[encoder]
     }
 
-    /// The count nearest to an angle; 0 for an encoder that is not there.
+    /// The count nearest to an angle; 0 for an absent encoder.
     pub fn count(&self, encoder: usize, angle: f32) -> i32 {
         let scale = self.radians_per_count[encoder];
         if scale == 0.0 {
@@ -156,7 +156,8 @@ impl Joints {
         (if count < 0.0 { count - 0.5 } else { count + 0.5 }) as i32
     }
 
-    /// A count of every encoder together, at the handle in the posture of the last reading: the most along a world axis, m, and about one, rad.
+    /// Effect of one count of every encoder together, at the handle in the posture of the last reading: the largest along a world axis, m, and about
+    /// one, rad.
     pub fn count_at_handle(&self) -> [f32; 2] {
         let [a, b, c, d, e, f] = self.radians_per_count.map(f32::abs);
         let (joints, wrist) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
@@ -166,7 +167,7 @@ impl Joints {
         [moved.max_element(), turned.max_element()]
     }
 
-    /// Takes the counts of one tick. Where the links cannot be so, the last posture stays.
+    /// Processes the counts of one tick. If they correspond to no posture of the links, the last posture stays.
     pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Reading {
         let mut jump = None;
         let mut rates = [0.0; ENCODERS];
@@ -202,8 +203,8 @@ impl Joints {
     /// Currents (A, signed in the motor's sense) that push the handle with `force` (N, world) in the posture of the last reading: τ = Jᵀ·F, i =
     /// τ/(gear·k).
     ///
-    /// The force is cut to the rig's ceiling, fades near singular postures ([`Posture::share`]), and when a motor would exceed its limit all are
-    /// scaled by one factor: it gets weaker but keeps its direction. A force that is no number gives no current.
+    /// The force is limited to the rig's hardware limit, fades near singular postures ([`Posture::share`]), and when a motor would exceed its limit
+    /// all are scaled by one factor: the force weakens but keeps its direction. A force that is not a number gives no current.
     pub fn currents(&self, force: Vec3) -> [f32; MAX_JOINTS] {
         let given = force.clamp_length_max(self.force_ceiling) * self.posture.share();
         let torques = self.posture.torques(given);
@@ -230,10 +231,10 @@ impl Joints {
         }))
     }
 
-    /// Amplitude of the probe of a joint's encoder, A; `None` for an encoder that is not judged: it has no motor, stands at a stop or near a singular
+    /// Amplitude of the probe of a joint's encoder, A; `None` for an encoder that is not judged: it has no motor, is at a stop or near a singular
     /// posture, or its motor is too weak for its friction and resolution.
     ///
-    /// A hand of stiffness k at the handle is one of k·|J_j|² at joint j while the others stand.
+    /// A hand of stiffness k at the handle corresponds to a stiffness k·|J_j|² at joint j while the others are fixed.
     pub fn probe(&self, encoder: usize) -> Option<f32> {
         if encoder >= self.model.joints() || self.posture.share() < 1.0 {
             return None;
@@ -253,7 +254,7 @@ impl Joints {
         (for_hand(LEAST_STIFFEST_HAND) <= most).then(|| for_hand(STIFFEST_HAND).min(most))
     }
 
-    /// What each encoder did in a tick in which `moved` was read under `currents`.
+    /// The watch's input for each encoder: motion `moved` read under `currents`.
     pub fn axis_ticks(&self, moved: &[i32; ENCODERS], currents: &[f32; MAX_JOINTS]) -> [AxisTick; ENCODERS] {
         core::array::from_fn(|encoder| AxisTick {
             moved: moved[encoder],

@@ -1,12 +1,12 @@
-//! The mechanism: all that lies between encoder counts and motor currents, without any hardware. Every board uses it, real or simulated.
+//! The mechanism: conversion between encoder counts and motor currents, free of hardware access. Every board uses it, real or simulated.
 //!
 //! | module | what |
 //! |---|---|
-//! | [`interface`] | what the control plane reads of a mechanism and sets on it, once in each tick |
+//! | [`interface`] | sensor readings and drive commands that the control plane exchanges with a mechanism in each tick |
 //! | [`kinematics`], [`joints`] | of a described rig: angles to pose and force to torques; counts to angles and torques to currents |
-//! | [`described`] | all of it for a described rig: counts to what is sensed, wrench to currents |
+//! | [`described`] | the whole chain for a described rig: counts to sensor readings, wrench to currents |
 //! | [`encoder`], [`velocity`], [`encoder_watch`] | encoder counts to motion; motion to speed; dead encoders |
-//! | [`ceilings`] | the rig's limits, and what they leave of a wrench |
+//! | [`ceilings`] | the hardware limits, and their enforcement on a wrench |
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,5 +1,6 @@
-//! What reaches the motors, over a grid of every kind of number there is: 0 with both signs, ordinary, at a limit, the least and the largest finite
-//! ones, infinite, none. All 18.9 million combinations of force, speed, torque, angular speed and place; bounds are checked in double precision.
+//! The wrench passed to the motors, over a grid of every class of number: 0 with both signs, ordinary, at a limit, the smallest and the largest
+//! finite ones, infinite, NaN. All 18.9 million combinations of force, speed, torque, angular speed and place; bounds are checked in double
+//! precision.
 
 use glam::Vec3;
 use mortise_haptics::{Twist, Wrench};

@@ -1,4 +1,4 @@
-//! Both velocity estimators on the same motions and in the same sampled loop: noise, delay, and the stiffest wall each bears.
+//! Both velocity estimators on the same motions and in the same sampled loop: noise, delay, and the stiffest wall at which each is stable.
 //!
 //! `cargo test -p mortise-mechanism --test velocity -- --ignored --nocapture` prints the whole table.
 
@@ -44,7 +44,7 @@ impl Bits {
     }
 }
 
-/// Noise at rest on the edge of a count: each reading is one of two counts by chance. rms, counts a tick.
+/// Noise at rest on the edge of a count: each reading is randomly one of two counts. rms, counts a tick.
 fn noise_at_rest<E: Estimator>() -> f64 {
     let mut bits = Bits(20_261_123);
     let found = estimates::<E>((0..40_000).map(|_| f64::from(u8::from(bits.next()))));
@@ -60,7 +60,7 @@ fn noise_in_motion<E: Estimator>() -> f64 {
     }))
 }
 
-/// Gain and delay (s) of the estimate of a motion of `amplitude` counts at `hz`: its part at that frequency.
+/// Gain and delay (s) of the estimate of a motion of `amplitude` counts at `hz`: its component at that frequency.
 fn response<E: Estimator>(amplitude: f64, hz: f64) -> (f64, f64) {
     let step = TAU * hz * PERIOD;
     let (settle, ticks) = (2_000u32, 20_000u32);
@@ -87,7 +87,7 @@ struct Wall {
     damping: f64,
     /// Encoder's step, m.
     step: f64,
-    /// Ticks from reading to force, beyond none.
+    /// Delay from reading to force, ticks.
     delay: usize,
     /// Hand on the handle: stiffness N/m, damping N·s/m.
     hand: [f64; 2],
@@ -118,7 +118,7 @@ impl<E: Estimator> Loop<E> {
         }
     }
 
-    /// One tick and the period after it, about the place where the press and the wall balance; gives the wall's force.
+    /// One tick and the period after it, about the equilibrium of the press and the wall; returns the wall's force.
     fn tick(&mut self) -> f64 {
         let Wall {
             stiffness,
@@ -149,8 +149,8 @@ impl<E: Estimator> Loop<E> {
     }
 }
 
-/// Flicked by 20 counts or 2 mm/s, the handle comes to rest within 4 s: what is left of the trembling is below two counts, which the encoder does not
-/// tell from rest.
+/// Displaced by 20 counts or set off at 2 mm/s, the handle comes to rest within 4 s: the remaining trembling is below two counts, which the encoder
+/// cannot distinguish from rest.
 fn dies_out<E: Estimator>(wall: Wall) -> bool {
     let mut tried = Loop::<E>::new(wall);
     let frequency = (wall.stiffness / MASS).sqrt();
@@ -169,7 +169,7 @@ fn dies_out<E: Estimator>(wall: Wall) -> bool {
     last < 2.0 * wall.step
 }
 
-/// Largest K at which the flick dies out, N/m, within 1 %, at most 40 kN/m; the wall's damping is `damping(K)`.
+/// Largest K at which the disturbance dies out, N/m, within 1 %, at most 40 kN/m; the wall's damping is `damping(K)`.
 fn stiffness_limit<E: Estimator>(damping: impl Fn(f64) -> f64, wall: Wall) -> f64 {
     const LEAST: f64 = 100.0;
     const MOST: f64 = 40_000.0;
@@ -256,7 +256,7 @@ fn delay_of_slow_motion_is_the_closed_form() {
     assert!((0.5 * PERIOD..1.0 * PERIOD).contains(&delay), "{delay}");
 }
 
-/// A step of speed to v: the low-pass has v·(1 − ρᵏ) after k ticks; the window leaves behind what no chord within a count reaches.
+/// A step of speed to v: the low-pass has v·(1 − ρᵏ) after k ticks; the window excludes samples that no chord reaches within a count.
 #[test]
 fn a_step_of_speed_is_the_closed_form() {
     let found = estimates::<LowPass>((0..20).map(|tick| 30.0 * f64::from(tick)));
@@ -276,8 +276,8 @@ fn noise_in_motion_is_as_measured() {
     assert_near(noise_in_motion::<AdaptiveWindow<6>>(), 0.0682, 0.02, "6 ticks");
 }
 
-/// The stiffest coupling on which a bare handle comes to rest: the low-pass bears delay better than 16 ticks do, 6 ticks bear it as well and more
-/// without.
+/// The stiffest coupling on which a bare handle comes to rest: with delay the low-pass allows more than 16 ticks do; 6 ticks allow as much with delay
+/// and more without.
 #[test]
 fn the_stiffest_wall_is_as_measured() {
     assert_near(bare_limit::<LowPass>(0), 17.3, 0.05, "low-pass");

@@ -1,16 +1,16 @@
-//! A simulated mechanism of the links, encoders, motors and friction a rig's description tells of, moved by a scripted hand.
+//! Simulated mechanism with the links, encoders, motors and friction of a rig's description, moved by the operator model.
 //!
 //! In joint space, with M = diag(I) + m·JᵀJ (joint inertias and the handle's mass),
 //!
 //! ```text
-//! M·dθ̇/dt = τ_motor + Jᵀ·F_hand − diag(c)·θ̇ − f_c∘sign(θ̇),   F_hand = k·(x_wish − x) + b·(v_wish − v) + push
+//! M·dθ̇/dt = τ_motor + Jᵀ·F_hand − diag(c)·θ̇ − f_c∘sign(θ̇),   F_hand = k·(x_d − x) + b·(v_d − v) + push
 //! ```
 //!
 //! Integrated like the free handle ([`crate::simulated`]) with [`SUBSTEPS`] backward-Euler steps a tick: one 3×3 system with springs, dampers and
-//! viscous friction implicit and J frozen over the step. Dry friction is then, of all impulses within ±h·f_c at the joints, the one that leaves the
-//! least energy (the principle of maximum dissipation), so that a joint stands exactly where no more than its own friction is asked of it. Joints end
-//! at stops that give nothing back; a linkage stops before it stretches out. A wrist is moved by the hand's orientation through the same equation.
-//! Sensing and currents are [`DescribedMechanism`], the code of a real rig.
+//! viscous friction implicit and J frozen over the step. Dry friction is then the impulse, of all those within ±h·f_c at the joints, that leaves the
+//! least energy (the principle of maximum dissipation), so that a joint sticks exactly where its own friction can hold the load. Joints end at stops
+//! without rebound; a linkage stops before it is fully extended. A wrist is moved by the hand's orientation through the same equation. Sensing and
+//! currents are [`DescribedMechanism`], the code of a real rig.
 
 use glam::{Mat3, Vec3};
 use mortise_haptics::{Pose, Wrench, rotation};
@@ -31,15 +31,15 @@ const WRIST_INERTIA: f32 = 1e-5;
 const WRIST_VISCOUS: f32 = 1e-3;
 /// Isotropy at which a linkage is at its stop.
 const STOP: f32 = 0.03;
-/// No joint turns faster, rad/s: keeps a step below a turn whatever the hand does.
+/// Limit of any joint's rate, rad/s: keeps a step below a turn for any hand.
 const RATE_MAX: f32 = 2_000.0;
-/// Rounds over the joints in which friction is found. Each takes energy out, so that few are a matter of accuracy alone.
+/// Iterations over the joints in the friction solver. Each dissipates energy, so their number affects accuracy alone.
 const FRICTION_ROUNDS: usize = 12;
 
-/// See the module.
+/// The simulated mechanism of a description; see the module.
 #[derive(Clone, Debug)]
 pub struct Described {
-    /// Faults put in by tests.
+    /// Faults injected by tests.
     pub wiring: Wiring,
     script: InputScript,
     links: Links,
@@ -48,11 +48,11 @@ pub struct Described {
     offsets: [i32; ENCODERS],
     hand: Option<Hand>,
     hand_wrench: Wrench,
-    /// What the motors are given, with the encoders' probes.
+    /// Motor currents, with the encoders' probes.
     currents: [f32; MAX_JOINTS],
 }
 
-/// The true mechanism.
+/// True state of the mechanism.
 #[derive(Clone, Debug)]
 struct Links {
     inertia: Vec3,
@@ -69,7 +69,7 @@ struct Links {
 }
 
 impl Described {
-    /// In its home pose, at rest, nobody holding it, motors off.
+    /// In its home pose, at rest, without an operator, motors off.
     ///
     /// # Errors
     /// See [`mortise_mechanism::kinematics::Model::new`].
@@ -78,7 +78,7 @@ impl Described {
         let of = |number: usize, value: fn(&mortise_protocol::rig::Joint) -> f32, else_: f32| {
             rig.joints.get(number).map_or(else_, value)
         };
-        // A joint that is not there has an inertia and nothing that moves it.
+        // An absent joint has an inertia and no force on it.
         let each = |value: fn(&mortise_protocol::rig::Joint) -> f32, else_: f32| {
             Vec3::new(of(0, value, else_), of(1, value, else_), of(2, value, else_))
         };
@@ -116,7 +116,7 @@ impl Described {
         })
     }
 
-    /// Where the handle truly is, for tests: encoders round it.
+    /// True pose of the handle before the encoders round it, for tests.
     pub fn true_pose(&self) -> Pose {
         self.links.pose()
     }
@@ -126,7 +126,7 @@ impl Described {
         self.links.kinetic_energy()
     }
 
-    /// What the motors are given, A, with the encoders' probes.
+    /// Motor currents, A, with the encoders' probes.
     pub fn currents(&self) -> [f32; MAX_JOINTS] {
         self.currents
     }
@@ -147,7 +147,7 @@ impl Described {
         };
     }
 
-    /// The encoders' counts through `wiring`.
+    /// The encoders' counts as seen through `wiring`.
     fn count(&mut self, wiring: &Wiring) {
         for encoder in 0..ENCODERS {
             // As many encoders as the free handle has axes.
@@ -189,7 +189,7 @@ impl Links {
     /// One backward-Euler step; returns the hand's wrench in it.
     fn step(&mut self, motors: Vec3, held: Option<&(Grip, Wish)>, joints: &Joints) -> Wrench {
         const H: f32 = TICK_S / SUBSTEPS as f32;
-        // Nobody holding is a grip of no stiffness.
+        // Without an operator the stiffness is zero.
         let (grip, wish) = held.copied().unwrap_or((Grip::NONE, Wish::at(self.pose())));
         let jacobian = self.posture.jacobian;
         let back = jacobian.transpose();
@@ -219,7 +219,7 @@ impl Links {
         }
         let before = self.kinetic_energy();
         self.move_on(H, joints);
-        // The inertia moves along with the angles; the forces that keep the energy of it are left out above, and stand here.
+        // The inertia changes with the angles; the forces that conserve its energy are neglected above and replaced here.
         let after = self.kinetic_energy();
         if after > before {
             self.rates *= libm::sqrtf(before / after);
@@ -234,7 +234,7 @@ impl Links {
         }
     }
 
-    /// Angles after `h` at the present rates, or at a stop.
+    /// Advances the angles by `h` at the present rates, up to a stop.
     fn move_on(&mut self, h: f32, joints: &Joints) {
         let model = joints.model();
         let mut angles = self.angles;
@@ -252,7 +252,7 @@ impl Links {
             *angle += h * rate;
         }
         match model.posture(angles, wrist) {
-            // Out of a narrow posture is always allowed.
+            // Motion towards a wider posture is always allowed.
             Some(posture) if posture.isotropy > STOP || posture.isotropy >= self.posture.isotropy => {
                 self.rates = Vec3::from_array(rates);
                 (self.angles, self.wrist, self.posture) = (angles, wrist, posture);
@@ -265,8 +265,8 @@ impl Links {
     }
 }
 
-/// Impulse f of dry friction, |fᵢ| ≤ `most`ᵢ, that leaves the least of ½·(p − f)ᵀA⁻¹(p − f): coordinate after coordinate (projected Gauss–Seidel).
-/// All of the momentum p, exactly, where friction can hold it.
+/// Impulse f of dry friction, |fᵢ| ≤ `most`ᵢ, that minimises ½·(p − f)ᵀA⁻¹(p − f): coordinate by coordinate (projected Gauss–Seidel). Exactly the
+/// whole momentum p where friction can hold it.
 fn friction(system: Mat3, momentum: Vec3, most: Vec3) -> Vec3 {
     if momentum.abs().cmple(most).all() {
         return momentum;
@@ -283,7 +283,7 @@ fn friction(system: Mat3, momentum: Vec3, most: Vec3) -> Vec3 {
     friction
 }
 
-/// x of A·x = b, each part within ±[`RATE_MAX`]; zero where there is none.
+/// x of A·x = b, each component within ±[`RATE_MAX`]; zero where there is no solution.
 fn solve(system: Mat3, momentum: Vec3) -> Vec3 {
     let found = system.inverse() * momentum;
     if found.is_finite() {
@@ -314,7 +314,7 @@ impl Mechanism for Described {
         self.mechanism.joints().count_at_handle()
     }
 
-    /// The simulated operator knows exactly where the joints are.
+    /// The operator model knows the joints' exact positions.
     fn home(&mut self) {
         self.offsets = [0; ENCODERS];
         for encoder in 0..ENCODERS {

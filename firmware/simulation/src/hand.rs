@@ -1,8 +1,8 @@
-//! The simulated hand: where it wants the handle, and how hard it pulls.
+//! The operator model: desired motion of the handle, and the stiffness with which a simulated hand holds it.
 //!
-//! A [`HandScript`] gives keyframes; between two of them position and push go linearly and the orientation along the shortest arc at constant
-//! rate. Tremor moves the wanted position by ±`tremor` along each axis at `tremor_hz`, a third of a turn apart, which is a small circle about
-//! (1, 1, 1). All in single precision with no library call in the tick, so that every rig computes the same bits.
+//! A [`HandScript`] gives keyframes; between two of them position and push are interpolated linearly and the orientation along the shortest arc at
+//! constant rate. Tremor moves the desired position by ±`tremor` along each axis at `tremor_hz`, a third of a turn apart, which is a small circle
+//! about (1, 1, 1). All in single precision with no library call in the tick, so that every rig computes the same bits.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -13,18 +13,18 @@ use mortise_mechanism::interface::{TICK_HZ, TICK_S};
 use mortise_protocol::limits::MAX_KEYFRAMES;
 use mortise_protocol::message::HandScript;
 
-/// What the hand wants in one tick.
+/// Desired motion of the hand in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wish {
-    /// Where the handle should be.
+    /// Desired pose of the handle.
     pub pose: Pose,
-    /// How fast that moves.
+    /// Velocity of that pose.
     pub twist: Twist,
     /// Added to the spring's force, N.
     pub push: Vec3,
 }
 
-/// Spring and damper between wish and handle.
+/// Spring and damper between desired pose and handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// N/m.
@@ -38,7 +38,7 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// Nobody holds the handle.
+    /// No hand on the handle.
     pub const NONE: Self = Self {
         stiffness: 0.0,
         damping: 0.0,
@@ -48,7 +48,7 @@ impl Grip {
 }
 
 impl Wish {
-    /// To stay there.
+    /// The desire to stay at `pose`.
     pub const fn at(pose: Pose) -> Self {
         Self {
             pose,
@@ -67,13 +67,13 @@ struct Frame {
     turn: Vec3,
 }
 
-/// A hand at work.
+/// The operator model while it follows a script.
 #[derive(Clone, Debug)]
 pub struct Hand {
     /// Its springs.
     pub grip: Grip,
     tremor: f32,
-    /// Turns of the tremor in a tick, and so far, in 2⁻³² turns: exact and endless.
+    /// Turns of the tremor in a tick, and so far, in 2⁻³² turns: exact, and wraps without error.
     phase_step: u32,
     phase: u32,
     tick: u32,
@@ -83,7 +83,7 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// Takes a script whose time starts now; `None` when [`check_script`] would refuse it.
+    /// Starts a script whose time begins now; `None` when [`check_script`] would refuse it.
     pub fn new(script: &HandScript) -> Option<Self> {
         check_script(script).ok()?;
         let mut frames = Vec::new();
@@ -119,7 +119,7 @@ impl Hand {
         })
     }
 
-    /// The wish of the next tick.
+    /// Advances to the next tick and returns its desired motion.
     pub fn advance(&mut self) -> Wish {
         let (mut pose, push) = self.scripted();
         let third = u32::MAX / 3;
@@ -141,7 +141,7 @@ impl Hand {
     }
 
     fn scripted(&mut self) -> (Pose, Vec3) {
-        // Time only goes forward: at most one step in a tick, since key ticks ascend by whole ticks.
+        // Advances at most one segment per tick, since the keys' times ascend by whole ticks.
         while self.segment + 1 < self.frames.len() && self.frames[self.segment + 1].tick <= self.tick {
             self.segment += 1;
         }
@@ -167,8 +167,8 @@ pub(crate) fn small_turn(from: Pose, to: Pose) -> Vec3 {
     if q.w < 0.0 { -v } else { v }
 }
 
-/// Sine of `phase`·2⁻³² turns, error below 2·10⁻⁴ (largest at a quarter turn): a tremor asks no more, and a library sine would work in
-/// double precision, which a Cortex-M7 built for single precision does in software.
+/// Sine of `phase`·2⁻³² turns, error below 2·10⁻⁴ (largest at a quarter turn): sufficient for a tremor, and a library sine would work in double
+/// precision, which a Cortex-M7 built for single precision does in software.
 fn sine_of_turn(phase: u32) -> f32 {
     // Signed turns·4 in −2..2, folded to −1..1.
     let x = phase as i32 as f32 * (1.0 / 1_073_741_824.0);
@@ -218,7 +218,7 @@ mod tests {
         for i in 0..10_000u32 {
             let phase = i * 429_496;
             let angle = f64::from(phase) / 4_294_967_296.0 * core::f64::consts::TAU;
-            // First term left out: (π/2)⁹/9! = 1.6·10⁻⁴.
+            // First neglected term: (π/2)⁹/9! = 1.6·10⁻⁴.
             assert!(
                 (f64::from(sine_of_turn(phase)) - libm::sin(angle)).abs() < 2e-4,
                 "{i}"
@@ -265,7 +265,7 @@ mod tests {
             largest = largest.max(hand.advance().pose.position.abs());
         }
         for peak in largest.to_array() {
-            // 100 samples a turn: the crest lies at most 1.8° from one.
+            // 100 samples per turn: the nearest is at most 1.8° from the crest.
             assert!((0.999e-4..1.001e-4).contains(&peak), "{largest}");
         }
     }

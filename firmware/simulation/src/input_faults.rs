@@ -1,7 +1,6 @@
-//! What goes wrong at the inputs of the simulated mechanism: put there by a test, or by a host's script.
+//! Faults at the inputs of the simulated mechanism, injected by a test or by a host's script.
 //!
-//! A script ([`InputFault`]s with their times) works wherever the simulated mechanism does: in-process and on the emulated board, tick for tick
-//! alike.
+//! A script ([`InputFault`]s with their times) works with every simulated mechanism, in-process and on the emulated board, identically tick for tick.
 
 use heapless::Vec;
 pub use mortise_firmware::scripts::AXES;
@@ -18,16 +17,16 @@ pub struct Wiring {
     pub supply_low: bool,
     /// A motor driver reports a fault.
     pub driver_fault: Option<DriverFault>,
-    /// Counts by which an axis's counter is off from the next reading on; taken once. Of a rotation the reading after that finds back.
+    /// Counts by which an axis's counter is offset from the next reading on; applied once. For a rotation the following reading corrects it.
     pub glitch: [i32; AXES],
-    /// Axes whose counters stand still.
+    /// Axes whose counters are frozen.
     pub stuck: [bool; AXES],
     /// The position reads as not a number.
     pub not_a_number: bool,
 }
 
 impl Wiring {
-    /// Nothing wrong.
+    /// No fault.
     pub const SOUND: Self = Self {
         stop_open: false,
         supply_low: false,
@@ -37,7 +36,7 @@ impl Wiring {
         not_a_number: false,
     };
 
-    /// What is sensed through it, of what the mechanism would tell.
+    /// The readings that result when the true readings `sensed` pass through this wiring.
     pub fn through(&self, mut sensed: Sensed) -> Sensed {
         if self.not_a_number {
             sensed.handle.position.x = f32::NAN;
@@ -77,7 +76,7 @@ impl Wiring {
     }
 }
 
-/// A script of faults whose time goes on with each reading.
+/// A script of faults whose time advances with each reading.
 #[derive(Clone, Debug, Default)]
 pub struct InputScript {
     faults: Vec<InputFault, MAX_INPUT_FAULTS>,
@@ -85,7 +84,7 @@ pub struct InputScript {
 }
 
 impl InputScript {
-    /// Nothing goes wrong.
+    /// An empty script.
     pub const fn new() -> Self {
         Self {
             faults: Vec::new(),
@@ -93,14 +92,14 @@ impl InputScript {
         }
     }
 
-    /// Takes a script whose time starts now; what is too long is cut, which the protocol's bound rules out.
+    /// Starts a script whose time begins now; faults beyond the capacity are dropped, which the protocol's bound rules out.
     pub fn start(&mut self, faults: &[InputFault]) {
         self.tick = 0;
         self.faults.clear();
         self.faults.extend(faults.iter().copied().take(MAX_INPUT_FAULTS));
     }
 
-    /// The wiring of the next tick: `wiring` and what the script adds.
+    /// The wiring of the next tick: `wiring` plus the script's faults.
     pub fn advance(&mut self, mut wiring: Wiring) -> Wiring {
         for fault in &self.faults {
             if self.tick >= fault.tick && self.tick - fault.tick < fault.ticks.max(1) {

@@ -1,4 +1,4 @@
-//! What only simulation needs: a mechanism and an operator in place of real ones, inputs that fail on purpose, flash in RAM. Used by the in-process
+//! Code that only simulation needs: a mechanism and an operator in place of real ones, injected input faults, flash in RAM. Used by the in-process
 //! rig of the host, by the emulated board, and by tests; no real board contains any of it.
 //!
 //! | module | what |
@@ -6,7 +6,7 @@
 //! | [`simulated`], [`described`] | a free handle with six motors; the mechanism of a rig's description |
 //! | [`simulated_rig`] | whichever of the two a simulated board has |
 //! | [`hand`] | operator model: a scripted hand |
-//! | [`input_faults`] | what goes wrong at the inputs |
+//! | [`input_faults`] | faults at the inputs |
 //! | [`ram_flash`] | flash in RAM |
 #![no_std]
 

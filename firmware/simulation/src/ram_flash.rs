@@ -1,4 +1,4 @@
-//! Flash in RAM with a flash's manners: bytes are erased in sectors to `0xff`, and a flash word is written once between two erasures.
+//! Flash in RAM with the semantics of flash: bytes are erased in sectors to `0xff`, and a flash word is written once between two erasures.
 //!
 //! Used by the simulated rig (heap), the emulated board (external RAM that survives a reset) and the tests.
 
@@ -7,10 +7,10 @@ use core::ptr::NonNull;
 
 use mortise_firmware::board::{ERASED, Flash, FlashError, FlashWord, RIG_SLOTS, SLOTS, WRITE_SIZE};
 
-/// Bytes erased at once, as on an STM32H743.
+/// Bytes in an erasable sector, as on an STM32H743.
 pub const ERASE_SIZE: usize = 128 * 1024;
 
-/// Two scene slots in RAM, and behind them two sectors for the rig's description.
+/// Two scene slots in RAM, followed by two sectors for the rig's description.
 #[derive(Debug)]
 pub struct RamFlash<'s> {
     memory: NonNull<FlashWord>,
@@ -23,7 +23,7 @@ pub struct RamFlash<'s> {
 unsafe impl Send for RamFlash<'_> {}
 
 impl<'s> RamFlash<'s> {
-    /// All slots in `memory`: two sectors at its end for the rig, half of the rest for each scene, rounded down to whole sectors. What is there is
+    /// All slots in `memory`: two sectors at its end for the rig, half of the rest for each scene, rounded down to whole sectors. Existing content is
     /// kept: it may be from before a reset.
     pub fn new(memory: &'s mut [FlashWord]) -> Self {
         let slot = (size_of_val(memory) / SLOTS).saturating_sub(ERASE_SIZE);
@@ -43,7 +43,7 @@ impl<'s> RamFlash<'s> {
         Ok(unsafe { self.memory.add((start + offset) / WRITE_SIZE) })
     }
 
-    /// First byte and length of a slot. Scenes first; a rig's slots are there when scenes' are, because `new` takes both from the same halves.
+    /// First byte and length of a slot. Scenes first; the rig's slots exist when the scenes' do, because `new` takes both from the same halves.
     fn place(&self, slot: usize) -> (usize, usize) {
         if slot < SLOTS {
             (slot * self.capacity, self.capacity)
@@ -69,7 +69,7 @@ unsafe impl<'s> Flash<'s> for RamFlash<'s> {
     // SAFETY: the trait's contract is the caller's: the slot is not written while the slice lives.
     unsafe fn slot(&self, slot: usize) -> &'s [u8] {
         let (start, length) = self.place(slot);
-        // SAFETY: within the memory, initialised; the caller uses it for nothing while the slot changes.
+        // SAFETY: within the memory, initialised; the caller does not use it while the slot changes.
         unsafe { core::slice::from_raw_parts(self.memory.cast::<u8>().add(start).as_ptr(), length) }
     }
 
@@ -87,7 +87,7 @@ unsafe impl<'s> Flash<'s> for RamFlash<'s> {
 
     fn write(&mut self, slot: usize, offset: usize, word: &[u8; WRITE_SIZE]) -> Result<(), FlashError> {
         let place = self.word(slot, offset)?;
-        // SAFETY: inside the memory, and nobody else writes it.
+        // SAFETY: inside the memory, and there is no other writer.
         unsafe {
             if place.read().0 != ERASED.0 {
                 return Err(FlashError);

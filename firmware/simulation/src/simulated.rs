@@ -1,9 +1,9 @@
-//! The simulated mechanism: a handle with mass and friction, encoders with a resolution, motors that saturate, and a scripted hand.
+//! The simulated mechanism: a handle with mass and friction, encoders of finite resolution, motors that saturate, and the operator model.
 //!
-//! Per axis m·dv/dt = F_motor + F_hand − c·v − f_c·sign(v), F_hand = k·(x_wish − x) + b·(v_wish − v) + push, and the same in rotation about the
+//! Per axis m·dv/dt = F_motor + F_hand − c·v − f_c·sign(v), F_hand = k·(x_d − x) + b·(v_d − v) + push, and the same in rotation about the
 //! handle's origin with an isotropic inertia. Integrated with [`SUBSTEPS`] backward-Euler steps a tick: springs and viscous damping are implicit,
-//! Coulomb friction is solved exactly (it takes speed away until there is none), so any script is stable. Single precision and a
-//! fixed order of operations: a PC and a Cortex-M7 compute the same bits.
+//! Coulomb friction is solved exactly (it reduces the speed until it is zero), so any script is stable. Single precision and a fixed order of
+//! operations: a PC and a Cortex-M7 compute the same bits.
 
 use glam::{Quat, Vec3};
 use mortise_haptics::{Pose, Twist, Wrench, rotation};
@@ -32,47 +32,47 @@ pub const ANGULAR_VISCOUS: f32 = 0.002;
 pub const COULOMB: f32 = 0.01;
 /// Coulomb friction in rotation, N·m.
 pub const ANGULAR_COULOMB: f32 = 1e-4;
-/// Position's resolution, m.
+/// Resolution of the position, m.
 pub const RESOLUTION: f32 = 5e-6;
-/// Angle's resolution, rad: 16 bits a turn.
+/// Resolution of the angle, rad: 16 bits a turn.
 pub const ANGULAR_RESOLUTION: f32 = core::f32::consts::TAU / 65_536.0;
-/// Motors saturate at this force along each axis, N.
+/// Force along each axis at which the motors saturate, N.
 pub const MOTOR_FORCE: f32 = 12.0;
-/// Motors saturate at this torque about each axis, N·m.
+/// Torque about each axis at which the motors saturate, N·m.
 pub const MOTOR_TORQUE: f32 = 0.6;
-/// Speed beyond which a reading is taken for a jump, m/s and rad/s: above any speed limit that can be set.
+/// Speed above which a reading is treated as a jump, m/s and rad/s: above any speed limit that can be set.
 const JUMP_SPEED: f32 = 20.0;
 const JUMP_ANGULAR_SPEED: f32 = 200.0;
 
 /// Amplitude of the encoders' probe, N: 0.145.
 const PROBE_FORCE: f32 = amplitude(STIFFEST_HAND, RESOLUTION, COULOMB);
-/// Likewise about an axis, N·m: 0.006.
+/// The same about an axis, N·m: 0.006.
 const PROBE_TORQUE: f32 = amplitude(STIFFEST_WRIST, ANGULAR_RESOLUTION, ANGULAR_COULOMB);
 
-/// Counts that a probe swings the handle by in a hand at rest, at the most. Friction leaves the handle within [`COULOMB`]/k of where the hand wants it, so
-/// a probe may take it by 2·[`COULOMB`]/k from one side to the other: 50 µm or 10 counts in a hand of 400 N/m, 27 in one of 150 N/m; what it swings
-/// beyond its answer is about 4 counts at 400 N/m. Hands from 50 to 5,000 N/m are tried in `tests/encoder_watch.rs`.
+/// Upper bound of the counts by which a probe swings the handle in a hand at rest. Friction leaves the handle within [`COULOMB`]/k of the desired
+/// position, so a probe may move it by 2·[`COULOMB`]/k from one side to the other: 50 µm or 10 counts in a hand of 400 N/m, 27 in one of 150 N/m; the
+/// swing beyond its answer is about 4 counts at 400 N/m. `tests/encoder_watch.rs` tests hands from 50 to 5,000 N/m.
 const SWING_COUNTS: i32 = 32;
 
-/// See the module.
+/// A free handle with six motors; see the module.
 #[derive(Clone, Debug)]
 pub struct Simulated {
-    /// Faults put in by tests.
+    /// Faults injected by tests.
     pub wiring: Wiring,
     script: InputScript,
     body: Body,
     encoders: Encoders,
     hand: Option<Hand>,
     hand_wrench: Wrench,
-    /// What the motors were driven with, and what they do with the probe in it.
+    /// Commanded wrench of the motors, and the actual one including the probe.
     driven: Wrench,
     motors: Wrench,
-    /// A part is felt, and since then.
+    /// Whether a part is rendered, and the encoder watch, which runs while it is.
     felt: bool,
     watch: EncoderWatch<AXES>,
 }
 
-/// The true handle.
+/// True state of the handle.
 #[derive(Clone, Copy, Debug)]
 struct Body {
     pose: Pose,
@@ -82,14 +82,14 @@ struct Body {
 #[derive(Clone, Copy, Debug)]
 struct Encoders {
     position: [Counter; 3],
-    /// Of the last reading.
+    /// Counts of the last reading.
     counts: [i32; 3],
     offset: [i32; 3],
-    /// Nothing jumped since the counters were set.
+    /// No axis jumped since the counters were set.
     referenced: bool,
     linear: [InUse; 3],
     angular: [InUse; 3],
-    /// Orientation as counted: follows the true one in whole counts about its own axes.
+    /// Counted orientation: follows the true one in whole counts about its own axes.
     orientation: Quat,
 }
 
@@ -100,7 +100,7 @@ impl Default for Simulated {
 }
 
 impl Simulated {
-    /// At the world's origin, at rest, nobody holding it, motors off.
+    /// At the world's origin, at rest, without an operator, motors off.
     pub const fn new() -> Self {
         Self {
             wiring: Wiring::SOUND,
@@ -119,12 +119,12 @@ impl Simulated {
         }
     }
 
-    /// Where the handle truly is, for tests: encoders round it.
+    /// True pose of the handle before the encoders round it, for tests.
     pub fn true_pose(&self) -> Pose {
         self.body.pose
     }
 
-    /// What the motors do, after saturation and with the encoders' probe; zero when off.
+    /// Actual wrench of the motors, after saturation and with the encoders' probe; zero when off.
     pub fn motors(&self) -> Wrench {
         self.motors
     }
@@ -163,7 +163,7 @@ impl Body {
     /// One backward-Euler step; returns the hand's wrench in it.
     fn step(&mut self, motors: &Wrench, held: Option<&(Grip, Wish)>) -> Wrench {
         const H: f32 = TICK_S / SUBSTEPS as f32;
-        // Nobody holding is a grip of no stiffness.
+        // Without an operator the stiffness is zero.
         let (grip, wish) = held.copied().unwrap_or((Grip::NONE, Wish::at(self.pose)));
 
         let apart = wish.pose.position - self.pose.position;
@@ -259,7 +259,7 @@ impl Encoders {
             let count = if wiring.stuck[axis] {
                 self.counts[axis]
             } else {
-                // A float too large for the counter saturates.
+                // A float beyond the counter's range saturates.
                 (rounded(x / RESOLUTION) as i32).saturating_add(self.offset[axis])
             };
             self.counts[axis] = count;
@@ -282,7 +282,7 @@ impl Encoders {
             let whole = rounded(angle / ANGULAR_RESOLUTION) + wiring.glitch[3 + axis] as f32;
             let counts = if wiring.stuck[3 + axis] { 0.0 } else { whole };
             moved[axis] = counts * ANGULAR_RESOLUTION;
-            // A float too large saturates.
+            // A float beyond the range saturates.
             steps[3 + axis] = counts as i32;
             if moved[axis].abs() > JUMP_ANGULAR_SPEED * TICK_S && jump.is_none() {
                 jump = Some(3 + axis as u8);
@@ -308,7 +308,7 @@ impl Encoders {
     }
 }
 
-/// What the encoders say in one tick.
+/// Encoder readings of one tick.
 struct Reading {
     handle: Pose,
     twist: Twist,
@@ -317,7 +317,7 @@ struct Reading {
     steps: [i32; AXES],
 }
 
-/// To the nearest whole number, halves away from zero, without a library call; larger than 2²³ comes out as it is.
+/// The nearest integer, halves away from zero, without a library call; values above 2²³ are returned unchanged.
 fn rounded(x: f32) -> f32 {
     if x.abs() >= 8_388_608.0 || x.is_nan() {
         return x;
@@ -370,7 +370,7 @@ impl Mechanism for Simulated {
         [RESOLUTION, ANGULAR_RESOLUTION]
     }
 
-    /// The simulated operator knows exactly where the handle is.
+    /// The operator model knows the handle's exact position.
     fn home(&mut self) {
         self.encoders = Encoders {
             orientation: self.body.pose.orientation,

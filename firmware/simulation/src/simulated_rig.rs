@@ -1,4 +1,4 @@
-//! The mechanism a simulated board has: the one its kept description tells of, or a free handle with six motors.
+//! The mechanism of a simulated board: the one described in its flash, or a free handle with six motors.
 
 use mortise_protocol::rig::Rig;
 
@@ -6,16 +6,16 @@ use crate::described::Described;
 use crate::simulated::Simulated;
 use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation};
 
-/// See the module.
+/// Either of the two mechanisms; see the module.
 #[derive(Clone, Debug)]
 #[expect(
     clippy::large_enum_variant,
     reason = "one is made, in a static; there is nothing to allocate from"
 )]
 pub enum SimulatedRig {
-    /// No description.
+    /// Without a description.
     Free(Simulated),
-    /// As described.
+    /// By a description.
     Described(Described),
 }
 

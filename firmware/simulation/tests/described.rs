@@ -1,4 +1,5 @@
-//! Described mechanisms with a simulated hand: they sense what is there, stay finite and passive, stop at their ranges, and push as they should.
+//! Described mechanisms with the operator model: readings are true, they stay finite and passive, stop at their ranges, and exert the commanded
+//! force.
 
 #[path = "../../app/tests/support/rigs.rs"]
 mod rigs;
@@ -51,7 +52,7 @@ fn vector(size: f32) -> impl Strategy<Value = Vec3> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Any hand however hard, any force however silly: finite readings near the true pose, and no joint beyond its range.
+    /// For any hand stiffness and any force: finite readings near the true pose, and no joint beyond its range.
     #[test]
     fn stays_finite_and_senses_what_is_there(
         rig in any_rig(),
@@ -104,7 +105,7 @@ proptest! {
         prop_assert!(last < 1e-7, "{last} J left");
     }
 
-    /// Motors against a hand that holds still: in balance the hand feels the force, less what friction holds.
+    /// Motors against a hand that holds still: in balance the hand carries the force, less what friction holds.
     #[test]
     fn the_hand_feels_the_force(rig in any_rig(), force in vector(1.5)) {
         let mut mechanism = Described::new(&rig).unwrap();
@@ -119,7 +120,7 @@ proptest! {
         for (angle, joint) in angles.iter_mut().zip(&rig.joints) { *angle = joint.home; }
         let posture = model.posture(angles, [0.0; 3]).unwrap();
         let felt = mechanism.hand().unwrap().force;
-        // In joint space: Jᵀ(F + F_hand) within friction, plus what 1.5 mm of yielding turns J (relative 3 %).
+        // In joint space: Jᵀ(F + F_hand) within friction, plus the rotation of J over 1.5 mm of yielding (relative 3 %).
         for (joint, rest) in posture.torques(force + felt).iter().enumerate().take(rig.joints.len()) {
             let slack = rig.joints[joint].coulomb + 0.05 * force.length() * 0.25;
             prop_assert!(rest.abs() <= slack * 1.05 + 1e-4, "joint {joint}: {rest} N·m");
@@ -159,7 +160,7 @@ fn a_wrist_follows_the_hand_and_is_sensed() {
     let away = (wish * sensed.handle.orientation.conjugate())
         .to_scaled_axis()
         .length();
-    // No Coulomb friction at the wrist: what is left is half a count of each encoder, and the arm's own, held by its friction.
+    // No Coulomb friction at the wrist: the remainder is half a count of each encoder, and the arm's own error, held by its friction.
     assert!(away < 0.01, "{away} rad");
     assert!(sensed.twist.angular.length() < 0.01 / TICK_S);
 }

@@ -1,4 +1,4 @@
-//! Dead encoders against still hands, in closed loop: a wall of springs on what the encoders say, the simulated mechanisms, random hands.
+//! Dead encoders and still hands, in closed loop: a spring wall on the encoder readings, the simulated mechanisms, random hands.
 
 #[path = "../../app/tests/support/rigs.rs"]
 mod rigs;
@@ -14,7 +14,7 @@ use mortise_simulation::simulated::Simulated;
 use proptest::prelude::*;
 use rigs::{arm, paddle, pantograph};
 
-/// A mechanism of either kind whose encoders can be stopped.
+/// Either kind of mechanism, with encoders that can be frozen.
 trait Rig: Mechanism + Simulation {
     fn freeze(&mut self, axis: usize);
     fn truth(&self) -> Pose;
@@ -87,7 +87,7 @@ fn hand(grip: Grip, frames: &[(u32, Pose, Vec3)]) -> HandScript {
     }
 }
 
-/// Spring and damper to `anchor`, on what is sensed, at most `most` newtons: what a coupling to a part at rest does.
+/// Spring and damper to `anchor` from the sensed pose, at most `most` newtons: the effect of a coupling to a part at rest.
 fn held(sensed: &Sensed, anchor: Pose, most: f32) -> Drive {
     let apart = anchor.position - sensed.handle.position;
     let turn = (anchor.orientation * sensed.handle.orientation.conjugate()).to_scaled_axis();
@@ -97,7 +97,7 @@ fn held(sensed: &Sensed, anchor: Pose, most: f32) -> Drive {
     })
 }
 
-/// Ticks of `ticks` in which an encoder is taken for dead, while `push` newtons press the handle into the spring.
+/// Number of ticks, out of `ticks`, in which an encoder is reported dead, while `push` newtons press the handle into the spring.
 fn press(mut rig: impl Rig, grip: Grip, push: Vec3, ticks: u32, mut each: impl FnMut(Pose)) -> u32 {
     let home = rig.truth();
     rig.set_hand(Some(&hand(grip, &[(0, home, Vec3::ZERO), (500, home, push)])));
@@ -112,7 +112,7 @@ fn press(mut rig: impl Rig, grip: Grip, push: Vec3, ticks: u32, mut each: impl F
     dead
 }
 
-/// Ten newtons for a minute, nothing moving but what the probe moves. It took 500 ms with the rule that stillness under load is death.
+/// Ten newtons for a minute, nothing moving except by the probe. A rule that took stillness under load for a dead encoder failed after 500 ms.
 #[test]
 fn a_still_hand_that_presses_for_a_minute_is_no_dead_encoder() {
     let mut way = Vec::new();
@@ -140,7 +140,8 @@ fn a_still_hand_that_presses_for_a_minute_is_no_dead_encoder() {
         middle * 1e6,
         fast * 1e6
     );
-    // Two counts there, two back on the other side of zero, and what the handle drifts: 21 µm seen, under 5 counts of 5 µm. Lines below what is felt.
+    // Two counts there, two back on the other side of zero, and the handle's drift: 21 µm measured, under 5 counts of 5 µm. Spectral lines below the
+    // threshold of perception.
     assert!(
         slow < 1e-6 && middle < 0.3e-6 && fast < 0.01e-6,
         "{slow} {middle} {fast}"
@@ -148,7 +149,7 @@ fn a_still_hand_that_presses_for_a_minute_is_no_dead_encoder() {
     assert!((high - low) < 25e-6, "{} m", high - low);
 }
 
-/// A free handle that is moved and then held at rest: what its probes give to the hand over any interval, and that they end.
+/// A free handle that is moved and then held at rest: the energy its probes give to the hand over any interval, and that they end.
 #[test]
 fn probes_give_a_resting_hand_less_than_ten_microjoules() {
     for stiffness in [50.0, 100.0, 200.0, 400.0, 1_000.0, 5_000.0] {
@@ -189,7 +190,7 @@ fn probes_give_a_resting_hand_less_than_ten_microjoules() {
     }
 }
 
-/// Amplitude of the line at `hz` over whole seconds.
+/// Amplitude of the spectral line at `hz` over whole seconds.
 fn amplitude(way: &[f32], hz: u32) -> f64 {
     let (mut re, mut im) = (0.0, 0.0);
     for (tick, z) in way.iter().enumerate() {
@@ -216,7 +217,7 @@ fn a_still_hand_on_a_described_rig_is_no_dead_encoder() {
     }
 }
 
-/// A joint pressed against its end stop by the hand does not follow its motor, and is sound.
+/// A joint that the hand presses against its end stop does not follow its motor, and is sound.
 #[test]
 fn a_joint_at_its_stop_is_not_judged() {
     let rig = paddle();
@@ -231,7 +232,7 @@ fn a_joint_at_its_stop_is_not_judged() {
     }
 }
 
-/// Ticks from the freeze of `axis` to the verdict; the hand goes through `places` (m, rad) in steps of 250 ms, held by a spring to the first.
+/// Ticks from the freeze of `axis` to the verdict; the hand visits `places` (m, rad) in steps of 250 ms, held by a spring to the first.
 fn frozen(
     mut rig: impl Rig,
     grip: Grip,
@@ -272,7 +273,7 @@ fn places() -> impl Strategy<Value = Vec<(Vec3, Vec3)>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, rng_seed: proptest::test_runner::RngSeed::Fixed(11), ..Default::default() })]
 
-    /// Any hand, any motion, any axis, in contact or free: the axis that stands still is named, in time. In contact at 8 N, free at 0 N.
+    /// Any hand, any motion, any axis, in contact or free: the frozen axis is named, in time. In contact at 8 N, free at 0 N.
     #[test]
     fn an_encoder_frozen_under_motion_is_found(
         grip in any_grip(), places in places(), axis in 0usize..6, at in 500u32..2_000, most in prop::sample::select(&[0.0f32, 1.0, 8.0][..]),
@@ -282,14 +283,14 @@ proptest! {
         prop_assert!(in_time, "{found:?}");
     }
 
-    /// Likewise the joints of an arm and a pantograph, away from stops and singular postures, where they are not judged.
+    /// The same for the joints of an arm and a pantograph, away from stops and singular postures, where they are not judged.
     ///
-    /// In a pantograph the other joint may be named, but only one that has itself been silent since before the freeze, so that its verdict comes sooner
-    /// than a frozen one's can (one of the kept cases, by 4 ms; none of 200 random ones). Both joints are then probed at once, and counts cannot tell
-    /// which silence is a defect: with J₀ and J₁ the ways the handle goes for a radian of each joint and c the cosine between them, a hand of
-    /// stiffness k answers torques τ by δq = (JᵀJ)⁻¹·τ/k. Two probes as strong as each other, with equal levers L, move a joint by τ/(k·L²·(1 + c)) where
-    /// they work against each other: by as little as half of what the amplitude is for, which a hand that moves on may cancel. The motors are off in
-    /// time all the same.
+    /// In a pantograph the other joint may be named, but only one that has itself been silent since before the freeze, so that its verdict comes
+    /// sooner than a frozen one's can (one of the kept cases, by 4 ms; none of 200 random ones). Both joints are then probed at once, and counts
+    /// cannot show which silence is a defect: with J₀ and J₁ the handle's displacements per radian of each joint and c the cosine between them, a
+    /// hand of stiffness k answers torques τ by δq = (JᵀJ)⁻¹·τ/k. Two equally strong probes with equal levers L move a joint by τ/(k·L²·(1 + c))
+    /// where they oppose each other: by as little as half of the motion the amplitude is designed for, which a moving hand may cancel. The motors are
+    /// off in time all the same.
     #[test]
     fn a_joint_encoder_frozen_under_motion_is_found(
         grip in any_grip(), places in places(), axis in 0usize..3, at in 500u32..2_000, push in 0.0f32..4.0,
@@ -318,7 +319,7 @@ proptest! {
     }
 }
 
-/// Hands that move slowly and tremble below the encoders' resolution can cancel a probe within a joint's dry friction, rarely. Fixed cases.
+/// Hands that move slowly and tremble below the encoders' resolution can rarely cancel a probe within a joint's dry friction. Fixed cases.
 #[test]
 fn a_moving_hand_on_a_described_rig_is_hardly_ever_taken_for_a_dead_encoder() {
     let mut seed = 12_345u64;
@@ -372,7 +373,7 @@ fn a_moving_hand_on_a_described_rig_is_hardly_ever_taken_for_a_dead_encoder() {
         alarms[0],
         alarms[1]
     );
-    // 609 of 4,000 with a single ramp in the place of one there and back.
+    // 609 of 4,000 with a single ramp instead of one there and back.
     let seconds = 2 * 2 * cases;
     assert!(
         (alarms[0] + alarms[1]) * 1_000 <= seconds,

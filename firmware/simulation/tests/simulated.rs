@@ -1,4 +1,4 @@
-//! The simulated mechanism against closed forms, and against anything a script may ask.
+//! The simulated mechanism against closed forms, and under any script.
 
 use glam::{Quat, Vec3};
 use mortise_firmware::board::{Drive, Mechanism, Simulation};
@@ -51,7 +51,7 @@ fn a_constant_force_ends_in_the_speed_that_friction_allows() {
         sensed.twist.linear.x
     );
     let travelled = rig.true_pose().position.x;
-    // x = v·(t − m/c); one step of backward Euler late at the most.
+    // x = v·(t − m/c); at most one step of backward Euler late.
     let exact = expected * (2.001 - MASS / VISCOUS);
     assert!(
         (travelled - exact).abs() < 0.5 * 0.001,
@@ -143,8 +143,8 @@ fn encoders_round_to_their_resolution_and_never_drift() {
         assert!(error < 0.5 * RESOLUTION + 1e-8, "tick {tick}: {error}");
         let turn = (truth.orientation * sensed.handle.orientation.conjugate()).xyz() * 2.0;
         let error = turn.abs().max_element();
-        // Half a count about each counted axis; counting takes 2·sin(φ/2) for the turn φ of a tick, and makes it good in the next; quaternions
-        // round to 6·10⁻⁸ a component.
+        // Half a count about each counted axis; counting uses 2·sin(φ/2) for the rotation φ of a tick, and corrects the error in the next;
+        // quaternions round to 6·10⁻⁸ a component.
         let chord = (moved + ANGULAR_RESOLUTION).powi(3) / 24.0;
         assert!(
             error < 0.5 * ANGULAR_RESOLUTION + 1.1 * chord + 1e-6,
@@ -166,7 +166,7 @@ fn a_glitch_is_told_as_a_jump_once() {
 }
 
 proptest! {
-    /// No script and no wrench makes a number that is not finite, and a handle left alone comes to rest.
+    /// Every script and wrench yields finite numbers, and a released handle comes to rest.
     #[test]
     fn stays_finite_and_comes_to_rest(
         stiffness in 0.0f32..1e6, damping in 0.0f32..1e6, angular_stiffness in 0.0f32..1e6, angular_damping in 0.0f32..1e6,

@@ -1,4 +1,4 @@
-//! What decides how the control plane goes on, for the enumeration of message orders.
+//! Fingerprint of the control plane's state, for the enumeration of message orders.
 
 use core::hash::{Hash, Hasher};
 use core::mem::discriminant;
@@ -10,7 +10,7 @@ use crate::board::{Clock, Mechanism};
 use crate::safety::{AfterSoftStop, Safety};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
-    /// Adds the plane's state to `hasher`, as far as it decides when motors are driven: without the force law's state, without counters of what was.
+    /// Adds to `hasher` the state that decides when motors are driven: without the force law's state and without event counters.
     pub fn fingerprint(&self, hasher: &mut impl Hasher) {
         let shared = self.ends.shared;
         discriminant(&self.safety).hash(hasher);

@@ -1,4 +1,4 @@
-//! What the control plane tells the link plane: replies, state changes, faults, statistics, telemetry.
+//! Reports from the control plane to the link plane: replies, state changes, faults, statistics, telemetry.
 
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{Flags, Statistics, Telemetry};
@@ -15,11 +15,11 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     }
 
     pub(super) fn send(&mut self, event: Event) {
-        // Commands are taken only when there is room, and `report` looks first.
+        // Commands are taken only when there is space, and `report` checks first.
         let _ = self.ends.events.enqueue(event);
     }
 
-    /// Tells the link of a fault and a changed state, when there is room; else at the next tick.
+    /// Reports a fault and a changed state to the link plane when the queue has space, else at the next tick.
     pub(super) fn report(&mut self) {
         if let Some((tick, fault)) = self.unreported_fault
             && self.ends.events.ready()
@@ -104,7 +104,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             dropped: self.ends.shared.dropped(),
             guidance: output.map(|o| guidance_to_wire(&o.guidance)).unwrap_or_default(),
             pairs: output.map(|o| pairs_to_wire(&o.pairs)).unwrap_or_default(),
-            // Last, so that it covers what comes before it.
+            // Measured last, so that it covers all work before it.
             cost: self.clock.cost(),
         }
     }

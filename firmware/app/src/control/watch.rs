@@ -1,4 +1,4 @@
-//! What the sensors say, and what in it is a fault.
+//! Sensor readings, and the faults found in them.
 
 use mortise_mechanism::ceilings::is_outside;
 use mortise_protocol::message::Fault;
@@ -8,7 +8,7 @@ use crate::board::{Clock, DriverFaultKind, Mechanism};
 use crate::safety::{Event as SafetyEvent, Motors, Safety};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
-    /// Reads the sensors; numbers that are not finite keep their last value, and [`Self::watch`] sees it.
+    /// Reads the sensors; values that are not finite are replaced by the last valid ones, and [`Self::watch`] reports a fault.
     pub(super) fn sense(&mut self) {
         let last = self.sensed;
         self.sensed = self.mechanism.sense();
@@ -19,9 +19,9 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         }
     }
 
-    /// What in the last readings forbids motors for as long as it lasts.
+    /// The fault, if any, in the last readings that forbids driving the motors while it persists.
     pub(super) fn persistent_cause(&self) -> Option<Fault> {
-        // First: a falling supply may open the stop input and trip the drivers too.
+        // First, because a falling supply may also open the stop input and trip the drivers.
         if self.sensed.supply_low {
             return Some(Fault::SupplyLow);
         }
@@ -39,7 +39,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         self.replaced.then_some(Fault::BadReading)
     }
 
-    /// Looks for faults, worst first, and runs the safety state machine.
+    /// Checks for faults, most severe first, and steps the safety state machine.
     pub(super) fn watch(&mut self, missed: u32) {
         self.missed_total = self.missed_total.saturating_add(missed);
         self.statistics.missed_ticks = self.statistics.missed_ticks.saturating_add(missed);
@@ -62,7 +62,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         }
     }
 
-    /// What is a fault only while motors are driven.
+    /// The fault, if any, among those that are faults only while motors are driven.
     fn live_cause(&self) -> Option<Fault> {
         if !self.safety.live() {
             return None;
@@ -94,7 +94,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         if overrun > 0 && self.missed_in_row >= overrun {
             return Some(Fault::TickOverrun);
         }
-        // A host that disarmed may leave before the fade is over.
+        // Not while fading: a host that disarmed may disconnect before the fade is over.
         let silent =
             self.silent_ticks > self.settings.host_timeout_ticks && self.safety.motors() != Motors::Fading;
         silent.then_some(Fault::HostSilent {

@@ -1,15 +1,15 @@
-//! Answers of the link plane itself that wait for room on the wire.
+//! Queue of the link plane's own answers, which wait for space on the wire.
 //!
-//! Input is read whether or not there is room for output, so that STOP is found behind anything. A message is carried out only when its answer has
-//! a place here; one that has none is thrown away and counted, as if the line had lost it. STOP is carried out without one.
+//! Input is read whether or not there is space for output, so that STOP is found behind any other message. A message is carried out only when its
+//! answer has a place in this queue; otherwise it is discarded and counted, as if the line had lost it. STOP is carried out even without one.
 
 use heapless::Deque;
 use mortise_protocol::message::Refusal;
 
-/// Answers that may wait. A host of ours has at most five messages of this kind under way: four chunks of a scene and a heartbeat.
+/// Capacity of the queue. Mortise's host has at most five messages of this kind in flight: four chunks of a scene and a heartbeat.
 pub const ANSWERS: usize = 16;
 
-/// An answer; what it tells is looked up when it is sent.
+/// One answer; its content is read when it is sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Answer {
     /// This build's version.
@@ -18,21 +18,21 @@ pub(super) enum Answer {
     Capabilities,
     /// The description of the rig.
     Rig,
-    /// Done.
+    /// The message was carried out.
     Ack {
-        /// Of the message.
+        /// Sequence number of the message.
         seq: u16,
     },
-    /// Not done.
+    /// The message was refused.
     Refused {
-        /// Of the message.
+        /// Sequence number of the message.
         seq: u16,
-        /// Why.
+        /// The reason.
         reason: Refusal,
     },
 }
 
-/// First in, first out.
+/// First-in, first-out queue of answers.
 #[derive(Debug, Default)]
 pub(super) struct Answers(Deque<Answer, ANSWERS>);
 
@@ -41,27 +41,27 @@ impl Answers {
         Self(Deque::new())
     }
 
-    /// There is a place for one more.
+    /// Whether there is space for one more.
     pub fn has_place(&self) -> bool {
         !self.0.is_full()
     }
 
-    /// Adds one; `false` when there is no place.
+    /// Adds one; `false` when the queue is full.
     pub fn push(&mut self, answer: Answer) -> bool {
         self.0.push_back(answer).is_ok()
     }
 
-    /// The oldest.
+    /// Removes and returns the oldest.
     pub fn pop(&mut self) -> Option<Answer> {
         self.0.pop_front()
     }
 
-    /// How many wait.
+    /// Answers waiting.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Forgets all of them.
+    /// Discards all of them.
     pub fn clear(&mut self) {
         self.0.clear();
     }

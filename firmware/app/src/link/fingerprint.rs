@@ -1,4 +1,4 @@
-//! What decides how the link plane goes on, for the enumeration of message orders: equal fingerprints, equal behaviour.
+//! Fingerprint of the link plane's state, for the enumeration of message orders: equal fingerprints imply equal behaviour.
 
 use core::mem::discriminant;
 
@@ -12,8 +12,8 @@ use crate::board::Flash;
 use crate::parameters::Parameters;
 
 impl<'s, F: Flash<'s>> LinkPlane<'_, 's, F> {
-    /// Adds the plane's state to `hasher`, as far as it decides what the plane does: without counters of what was, and without the content of the
-    /// queues, of which only the length is seen.
+    /// Adds to `hasher` the state that decides the plane's behaviour: without event counters, and without the content of the queues, of which only
+    /// the length is included.
     pub fn fingerprint(&self, hasher: &mut impl Hasher) {
         let shared = self.ends.shared;
         (self.greeted, discriminant(&self.state), self.restarting).hash(hasher);
@@ -29,17 +29,17 @@ impl<'s, F: Flash<'s>> LinkPlane<'_, 's, F> {
         }
     }
 
-    /// Commands that wait for the control plane.
+    /// Commands queued for the control plane.
     pub fn waiting(&self) -> usize {
         self.ends.commands.len()
     }
 
-    /// The parameters as they will be when every waiting command is carried out.
+    /// The parameters as they will be after every queued command.
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }
 
-    /// Whether a command with this stamp would be taken as new.
+    /// Whether a command with this stamp would be accepted as new.
     pub fn is_fresh(&self, stamp: Stamp) -> bool {
         let mut freshness = self.freshness;
         freshness.take(Some(stamp)).is_ok()

@@ -1,14 +1,14 @@
-//! Whether a command is new: it names this session, and its count is above that of every such command before.
+//! Check that a command is new: it names this session, and its count exceeds that of every earlier such command.
 //!
-//! A frame that was repeated, held back on its way, or sent by a host whose session is over is refused so, whatever its order among others.
+//! This refuses a frame that was repeated, delayed, or sent by a host whose session is over, whatever its order among others.
 
 use mortise_protocol::frame::Stamp;
 use mortise_protocol::message::Refusal;
 
-/// Names the session and remembers the newest count.
+/// The session's name and the highest count accepted.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Freshness {
-    /// Of this start.
+    /// Derived from this start's entropy.
     base: u32,
     session: u32,
     newest: Option<u32>,
@@ -24,7 +24,7 @@ impl Freshness {
         }
     }
 
-    /// Session `number` begins. 2³² sessions of one start differ; those of two starts as their entropy does.
+    /// Begins session `number`. The 2³² sessions of one start have different names; those of two starts differ as their entropy does.
     pub const fn begin(&mut self, number: u32) {
         self.session = self.base.wrapping_add(number);
         self.newest = None;
@@ -35,7 +35,7 @@ impl Freshness {
         self.session
     }
 
-    /// Takes a command's stamp; the command is carried out only when this is `Ok`.
+    /// Checks a command's stamp and records its count; the command is carried out only when this is `Ok`.
     pub fn take(&mut self, stamp: Option<Stamp>) -> Result<(), Refusal> {
         let stamp = stamp.ok_or(Refusal::Outdated)?;
         if stamp.session != self.session || self.newest.is_some_and(|newest| stamp.count <= newest) {

@@ -1,13 +1,13 @@
-//! The rig's description in flash: two slots of one erasable piece each, the newest sound one kept.
+//! The rig's description in flash: two slots of one erasable piece each, the newest valid one in use.
 //!
 //! ```text
 //! slot: | record, 32 bytes | description, postcard |
 //! record: magic "MRIG0001" | sequence u32 | length u32 | CRC-32 of the description u32 | layout u32 | zero u32 | record CRC-32 u32   (little-endian)
 //! ```
 //!
-//! As with scenes the record is one flash word and written last, into the slot that is not in use: cut off at any moment, the description before is
-//! found again. A whole record over bytes that are not what it says, or of another release's layout, is **damaged**: which mechanism this board
-//! drives is then unknown, and the board does not arm until a description is sent.
+//! As with scenes the record is one flash word and written last, into the slot that is not in use: after an interruption at any moment, the previous
+//! description is found again. A complete record whose description does not match it, or has another release's layout, is **damaged**: the mechanism
+//! this board drives is then unknown, and the board does not arm until a description is uploaded.
 
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_MESSAGE;
@@ -19,23 +19,23 @@ use crate::board::{Flash, RIG_SLOTS, WRITE_SIZE};
 
 const MAGIC: [u8; 8] = *b"MRIG0001";
 
-/// What the flash holds.
+/// Content of the flash.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
     reason = "no heap on the board, and one of these at start"
 )]
 pub enum Kept {
-    /// None was ever sent.
+    /// No description was ever stored.
     Nothing,
-    /// This one.
+    /// A valid description.
     Rig(Rig),
-    /// One that cannot be read any more, or was kept by another release.
+    /// A description that is unreadable or was stored by another release.
     Damaged,
 }
 
 impl Kept {
-    /// The description, where there is a sound one.
+    /// The description, if there is a valid one.
     pub fn rig(&self) -> Option<&Rig> {
         match self {
             Self::Rig(rig) => Some(rig),
@@ -44,7 +44,7 @@ impl Kept {
     }
 }
 
-/// A record that is whole, and where.
+/// A complete record and its slot.
 #[derive(Clone, Copy)]
 struct Record {
     slot: usize,
@@ -54,7 +54,7 @@ struct Record {
     layout: u32,
 }
 
-/// What `flash` holds. Reads at most a kilobyte.
+/// Reads what `flash` holds; at most a kilobyte.
 pub fn kept<'s, F: Flash<'s>>(flash: &F) -> Kept {
     let Some(record) = newest(flash) else {
         return Kept::Nothing;
@@ -72,7 +72,7 @@ pub fn kept<'s, F: Flash<'s>>(flash: &F) -> Kept {
 /// Writes `rig`, already checked, into the slot that is not in use.
 ///
 /// # Errors
-/// `Flash`; the description kept before stays.
+/// `Flash`; the previous description stays.
 pub fn keep<'s, F: Flash<'s>>(flash: &mut F, rig: &Rig) -> Result<(), Refusal> {
     let before = newest(flash);
     let slot = match before {
@@ -80,7 +80,7 @@ pub fn keep<'s, F: Flash<'s>>(flash: &mut F, rig: &Rig) -> Result<(), Refusal> {
         _ => RIG_SLOTS[0],
     };
     let mut buffer = [0u8; MAX_MESSAGE];
-    // It came in a message, so it fits.
+    // It arrived in a message, so it fits.
     let bytes = postcard::to_slice(rig, &mut buffer).map_err(|_| Refusal::Flash)?;
     let length = bytes.len();
     let crc = CRC.checksum(bytes);
@@ -102,7 +102,7 @@ pub fn keep<'s, F: Flash<'s>>(flash: &mut F, rig: &Rig) -> Result<(), Refusal> {
     let crc = CRC.checksum(&record[..28]);
     record[28..].copy_from_slice(&crc.to_le_bytes());
     flash.write(slot, 0, &record).map_err(|_| Refusal::Flash)?;
-    // As the next start would read it.
+    // Read back as the next start would.
     match kept(flash) {
         Kept::Rig(found) if found == *rig => Ok(()),
         _ => Err(Refusal::Flash),

@@ -7,7 +7,7 @@ use mortise_firmware::board::{ERASED, Flash, FlashError, FlashWord, RIG_SLOTS, S
 
 pub const SECTOR: usize = 512;
 pub const SLOT: usize = 16 * SECTOR;
-/// Scenes' slots, then the rig's, as large: only their first sector is used.
+/// The scenes' slots, then the rig's, of equal size: only their first sector is used.
 const ALL: usize = SLOTS + RIG_SLOTS.len();
 const WORDS: usize = ALL * SLOT / WRITE_SIZE;
 
@@ -19,10 +19,10 @@ impl Memory {
     }
 }
 
-/// Operations left until the power goes; `None`: it stays.
+/// Operations left until power fails; `None`: it never fails.
 pub type Fuse = Rc<Cell<Option<u32>>>;
 
-/// A handle on leaked memory: cloning it is taking the chip out and putting it into the next board.
+/// A handle on leaked memory: cloning it corresponds to moving the chip to another board.
 #[derive(Clone)]
 pub struct TestFlash {
     memory: Rc<Cell<&'static Memory>>,
@@ -40,15 +40,15 @@ impl TestFlash {
         }
     }
 
-    /// Changes a byte as a failing cell would. Nothing may be reading the slot.
+    /// Changes a byte as a failing cell would. No reference into the slot may be in use.
     pub fn damage(&self, slot: usize, offset: usize) {
         let word = self.word(slot, offset / WRITE_SIZE * WRITE_SIZE);
         // SAFETY: inside the memory; the tests are single-threaded.
         unsafe { (*word).0[offset % WRITE_SIZE] ^= 0x10 };
     }
 
-    /// The same under whoever is reading: the chip is exchanged for one with the same content but for that byte. References handed out before go on
-    /// seeing the old one, since memory behind a shared reference must not change; who asks the flash again sees the damage.
+    /// The same while references are in use: the chip is replaced by one with the same content except for that byte. References handed out before
+    /// still point to the old one, since memory behind a shared reference must not change; a new read of the flash sees the damage.
     pub fn damage_in_use(&self, slot: usize, offset: usize) {
         // SAFETY: whole and initialised; only read here.
         let content = unsafe { *self.memory.get().0.get() };
@@ -56,7 +56,7 @@ impl TestFlash {
         self.damage(slot, offset);
     }
 
-    /// The same chip as new. Nothing may be reading it.
+    /// Erases the whole chip. No reference into it may be in use.
     pub fn erase_all(&self) {
         // SAFETY: the tests are single-threaded, and no reference into the memory is in use.
         unsafe { *self.memory.get().0.get() = [ERASED; WORDS] };
@@ -64,7 +64,7 @@ impl TestFlash {
         self.operations.set(0);
     }
 
-    /// A copy of a slot as it is now.
+    /// A copy of a slot's current content.
     pub fn content(&self, slot: usize) -> Vec<u8> {
         // SAFETY: SLOT bytes from the slot's first word; nothing writes meanwhile, the tests are single-threaded.
         unsafe { std::slice::from_raw_parts(self.word(slot, 0).cast::<u8>(), SLOT) }.to_vec()
@@ -77,7 +77,7 @@ impl TestFlash {
         unsafe { self.memory.get().0.get().cast::<FlashWord>().add(index) }
     }
 
-    /// How much of the next operation happens: all, half (power goes), none.
+    /// Fate of the next operation: complete, half (power fails), or none.
     fn power(&self) -> Power {
         self.operations.set(self.operations.get() + 1);
         match self.fuse.get() {

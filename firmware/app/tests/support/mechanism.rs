@@ -1,4 +1,4 @@
-//! A mechanism on strings: the test says what it senses and sees what it was told to do.
+//! A scripted mechanism: the test sets its readings and inspects its commands.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,7 +13,7 @@ pub struct Pulled {
     pub sensed: Sensed,
     /// Every drive command so far.
     pub drives: Vec<Drive>,
-    /// How often it was told that it stands in its reference pose.
+    /// Number of calls of `home`.
     pub homed: u32,
 }
 

@@ -1,4 +1,4 @@
-//! A board made of memory: flash that can lose power, a mechanism that does as told, a wire that can be read.
+//! A board in memory: flash that can lose power, a scripted mechanism, a wire that can be read.
 #![allow(dead_code, reason = "each test file uses its share")]
 
 pub mod flash;
@@ -32,7 +32,7 @@ pub const IDENTITY: Identity = Identity {
     entropy: 1,
 };
 
-/// A wire with room for a few frames.
+/// A wire with space for a few frames.
 #[derive(Default)]
 pub struct Wire {
     pub bytes: Vec<u8>,
@@ -50,7 +50,7 @@ impl Outbound for Wire {
     }
 }
 
-/// Says what the test wants.
+/// A clock that returns the test's values.
 #[derive(Clone, Default)]
 pub struct TestClock(pub std::rc::Rc<std::cell::Cell<(u32, u32)>>);
 
@@ -81,7 +81,7 @@ pub struct Bench<const SIMULATED: bool = true, const DESCRIBED: bool = true> {
 }
 
 impl Bench {
-    /// Started, greeted, with a scene of a fixed part 0 and a grabbable part 1.
+    /// Started, in a session, with a scene of a fixed part 0 and a grabbable part 1.
     pub fn ready() -> Self {
         let mut bench = Self::new(TestFlash::leaked());
         bench.greet();
@@ -91,7 +91,7 @@ impl Bench {
 }
 
 impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
-    /// Powered on; nothing said yet. Memory is leaked: a bench lives as long as its test.
+    /// Powered on, before any message. Memory is leaked: a bench lives as long as its test.
     pub fn new(flash: TestFlash) -> Self {
         let channels = Box::leak(Box::new(Channels::new()));
         let strings = Strings::default();
@@ -140,13 +140,13 @@ impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
             .to_vec()
     }
 
-    /// Bytes as they are.
+    /// Sends raw bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
         self.link.receive(bytes, &mut self.wire);
         self.listen();
     }
 
-    /// Takes in what is on the wire.
+    /// Decodes the frames on the wire.
     pub fn listen(&mut self) {
         for byte in std::mem::take(&mut self.wire.bytes) {
             match self.decoder.push::<FromDevice>(byte) {
@@ -157,7 +157,7 @@ impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
         }
     }
 
-    /// One call of the control plane, and what comes of it.
+    /// One call of the control plane, and delivery of its events.
     pub fn tick(&mut self) -> Ticked {
         let ticked = self.control.tick();
         self.link.poll(&mut self.wire);
@@ -171,7 +171,7 @@ impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
         }
     }
 
-    /// Sends and waits for the answer; everything else heard stays in `heard`.
+    /// Sends a message and waits for its answer; all other messages received stay in `heard`.
     pub fn ask(&mut self, message: &ToDevice) -> FromDevice {
         let seq = self.send(message);
         for _ in 0..50 {
@@ -193,7 +193,7 @@ impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
         panic!("no answer to {message:?}");
     }
 
-    /// Sends; `Ok` when acknowledged.
+    /// Sends a message; `Ok` when acknowledged.
     pub fn request(&mut self, message: &ToDevice) -> Result<(), Refusal> {
         match self.ask(message) {
             FromDevice::Ack { .. } => Ok(()),
@@ -250,7 +250,7 @@ impl<const SIMULATED: bool, const DESCRIBED: bool> Bench<SIMULATED, DESCRIBED> {
         }
     }
 
-    /// Forgets what was heard so far.
+    /// Clears the messages received so far.
     pub fn forget(&mut self) {
         self.heard.clear();
     }

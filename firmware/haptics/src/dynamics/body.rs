@@ -1,4 +1,4 @@
-//! The held part as a rigid body: what the step needs of its shape.
+//! The held part as a rigid body: its mass properties for the step.
 
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::image::Shape;
@@ -8,7 +8,7 @@ use crate::math::rotation;
 use crate::math::vector::cut;
 use crate::settings::ObjectSettings;
 
-/// Added to every reach: a part that is a mere point must not be divided by.
+/// Added to every reach to avoid division by zero for a part that is a single point.
 const LEAST_REACH_M: f32 = 1e-6;
 
 /// Mass properties of a shape, without mass.
@@ -20,12 +20,12 @@ pub(crate) struct Body {
     gyration2: Mat3,
     /// At least the largest eigenvalue of `gyration2`, m².
     gyration2_largest: f32,
-    /// No point of the shape lies farther from its centre of mass, m.
+    /// Radius about the centre of mass that contains every point of the shape, m.
     pub reach: f32,
 }
 
 impl Body {
-    /// From a shape's record. A shape without volume or with an impossible inertia (a leaky mesh) is taken as a ball of its size.
+    /// From a shape's record. A shape without volume or with an impossible inertia (a leaky mesh) is treated as a ball of its size.
     pub fn of(shape: &Shape<'_>) -> Self {
         let record = shape.record;
         let center_of_mass = Vec3::from_array(record.center_of_mass);
@@ -46,7 +46,7 @@ impl Body {
         let possible = record.volume > 0.0
             && positive_definite(inertia)
             && largest.is_finite()
-            // Nothing within `reach` of the centre can have more.
+            // No mass within `reach` of the centre can have more.
             && largest <= 4.0 * reach * reach;
         if possible {
             Self {
@@ -91,12 +91,12 @@ fn positive_definite(m: Mat3) -> bool {
     m.x_axis.x > 0.0 && minor > 0.0 && m.determinant() > 0.0
 }
 
-/// The part in hand.
+/// The grabbed part.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Grabbed {
     /// Its index.
     pub part: u16,
-    /// Placement in the handle's frame (G): handle ∘ G is where the coupling pulls the part to.
+    /// Placement in the handle's frame (G): handle ∘ G is the pose towards which the coupling pulls the part.
     pub offset: Pose,
     /// World position of the centre of mass, m.
     pub center: Vec3,
@@ -121,17 +121,17 @@ impl Grabbed {
         }
     }
 
-    /// Energy of its motion, J, without that of its turning.
+    /// Translational kinetic energy, J.
     pub fn moving_energy(&self, mass_kg: f32) -> f32 {
         0.5 * mass_kg * self.twist.linear.length_squared()
     }
 
-    /// Energy of its turning, J.
+    /// Rotational kinetic energy, J.
     pub fn turning_energy(&self, mass_kg: f32, gyration2: Mat3) -> f32 {
         0.5 * mass_kg * self.twist.angular.dot(gyration2 * self.twist.angular)
     }
 
-    /// Moves with `twist` for `period_s`.
+    /// Moves the part with `twist` for `period_s`.
     pub fn advance(&mut self, twist: Twist, period_s: f32) {
         self.twist = twist;
         self.center += twist.linear * period_s;

@@ -4,8 +4,8 @@
 //!
 //! λ = k·max(0, −(φ + h·s + τ·min(0, s)))
 //!
-//! continuous, falling in s, never pulling: minus the gradient of a convex function of V'. The majoriser takes the branch of each contact (its *phase*)
-//! from the last iterate (primal active set).
+//! continuous, decreasing in s, never pulling: minus the gradient of a convex function of V'. The majoriser takes the branch of each contact (its
+//! *phase*) from the last iterate (primal active set).
 //!
 //! Cost on a Cortex-M7 (counted as in [`crate::tick()`]): about 300 instructions for a contact in all passes over it together.
 
@@ -18,27 +18,27 @@ use crate::dynamics::system::System;
 use crate::math::pose::Wrench;
 use crate::math::symmetric6::{Symmetric6, add_scaled, dot};
 
-/// A point that the last solution lets push or pull by less than this where it should not, N, does not ask for another solve: at 200 kN/m
-/// it is 2.5 nm, the rounding of a position of 40 mm.
+/// Force, N, by which a point may push or pull on the wrong branch at the last solution without causing another solve: at 200 kN/m it is 2.5 nm, the
+/// rounding of a position of 40 mm.
 pub(crate) const FORCE_BAND_N: f32 = 0.5e-3;
 /// Rates within this of zero do not change between parting and closing, m/s: k·τ times this is 0.1 mN at 200 kN/m and 0.5 ms.
 pub(crate) const RATE_BAND_M_PER_S: f32 = 1e-6;
-/// Nor do rates that the rounding of the object's pose makes: a quaternion tells no turn finer than this, rad, which at the end of an arm a is a
-/// gap's change by a·2⁻²³ from one tick to the next. Of a peg that slides along a wall every second point would change in every tick else, and ask
-/// for two more solves.
+/// Rotation below which rates do not change the phase either, rad: the rounding of the object's pose. A quaternion resolves no finer rotation, which
+/// at the end of an arm a changes a gap by a·2⁻²³ from one tick to the next. Otherwise every second point of a peg that slides along a wall would
+/// change in every tick and require two more solves.
 pub(crate) const TURN_ROUNDING: f32 = 1.0 / (1 << 23) as f32;
-/// Where nothing touches yet, those points are first taken to touch that would go so far as this share of what would go deepest: that stops the
-/// object before the others do.
+/// Where nothing touches yet, the points first assumed to touch are those whose depth reaches this share of the deepest: they stop the object before
+/// the others touch.
 const LANDING_SHARE: f32 = 0.8;
-/// What has not settled so after this many solves need not ever: from then on only [`RATE_BAND_M_PER_S`] counts.
+/// Solves after which only [`RATE_BAND_M_PER_S`] applies, since a contact that has not settled by then at the finer bands may never do so.
 const ROUGH_SOLVES: u8 = 4;
 
 /// Stiffness of contacts, N/m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stiffness {
-    /// Of a point.
+    /// Stiffness of one point.
     pub point: f32,
-    /// Of a point between guided faces.
+    /// Stiffness of one point between guided faces.
     pub guided: f32,
 }
 
@@ -58,20 +58,21 @@ pub(crate) struct ContactForce<'a> {
     damping_s: f32,
     /// L, m.
     length: f32,
-    /// No contact's arm is longer, m.
+    /// Upper bound of every contact's arm, m.
     farthest: f32,
-    /// Σ h·k·(h + τ)·J Jᵀ of those that touch.
+    /// Σ h·k·(h + τ)·J Jᵀ over touching contacts.
     stiffness: Symmetric6,
-    /// Σ −h·k·φ·J of those that touch.
+    /// Σ −h·k·φ·J over touching contacts.
     push: [f32; 6],
     /// The last iterate.
     last: [f32; 6],
-    /// No rate has changed by more since all were evaluated, m/s.
+    /// Upper bound of the change of any rate since all were evaluated, m/s.
     way: f32,
 }
 
 impl<'a> ContactForce<'a> {
-    /// Of `contacts` with stiffness `k` and approach damping `damping_s` (τ), no arm longer than `farthest` (m), in a step of scale `length`.
+    /// The force of `contacts` with stiffness `k` and approach damping `damping_s` (τ), no arm longer than `farthest` (m), in a step of scale
+    /// `length`.
     pub fn new(
         contacts: &'a mut [Contact],
         k: Stiffness,
@@ -97,7 +98,7 @@ impl<'a> ContactForce<'a> {
         self.contacts
     }
 
-    /// Phases at the twist `x` of the tick's start; whether any contact touches.
+    /// Sets the phases at the twist `x` of the tick's start; returns whether any contact touches.
     pub fn begin(&mut self, x: &[f32; 6]) -> bool {
         let (h, band) = (self.period_s, self.band());
         let closing_s = self.closing_s();
@@ -105,7 +106,7 @@ impl<'a> ContactForce<'a> {
         let (mut landing, mut deepest) = (true, 0.0);
         for c in self.contacts.iter_mut() {
             c.rate = dot(&c.row, x);
-            // Most points are free and stay so: a gap that closing in full would leave open needs no closer look.
+            // Most points are free and remain so: a gap that stays open even when it closes in full needs no further evaluation.
             let end = c.gap + closing_s * c.rate;
             if c.gap >= 0.0 && end >= 0.0 {
                 continue;
@@ -139,12 +140,12 @@ impl<'a> ContactForce<'a> {
         changed
     }
 
-    /// Phases at the iterate `x`, after so many `solves`; whether none changed.
+    /// Sets the phases at the iterate `x`, after `solves` solves; returns whether none changed.
     pub fn linearise(&mut self, x: &[f32; 6], solves: u8) -> bool {
         let (h, damping_s, band) = (self.period_s, self.damping_s, self.band());
         let closing_s = self.closing_s();
         let lever = self.farthest / self.length;
-        // No rate changes by more than the unknowns' change times this: the length of a row, n and (r × n)/L.
+        // Upper bound of a rate's change per change of the unknowns: the length of a row, n and (r × n)/L.
         let row_length = above_root(1.0 + lever * lever);
         let moved: [f32; 6] = array::from_fn(|i| x[i] - self.last[i]);
         self.last = *x;
@@ -206,13 +207,13 @@ impl<'a> ContactForce<'a> {
         FORCE_BAND_N / self.k.point
     }
 
-    /// A ten-thousandth more than the force law's own, so that rounding (some 10⁻⁷ of the gap) cannot decide otherwise than it does.
+    /// `closing_s` enlarged by a ten-thousandth, so that rounding (some 10⁻⁷ of the gap) cannot make this test contradict the force law.
     fn closing_s(&self) -> f32 {
         1.0001 * (self.period_s + self.damping_s)
     }
 }
 
-/// Time by which a contact's rate counts in its force, s.
+/// Time that multiplies a contact's rate in its force, s.
 #[inline(always)]
 fn reach(phase: Phase, period_s: f32, damping_s: f32) -> f32 {
     match phase {
@@ -255,7 +256,7 @@ pub(crate) fn force(c: &Contact, k: f32, period_s: f32, damping_s: f32) -> f32 {
     if force > 0.0 { force } else { 0.0 }
 }
 
-/// Whether a contact that pushes goes on to, on its branch: what [`next_phase`] says too, sooner.
+/// Whether a pushing contact continues to push, on its branch: agrees with [`next_phase`] and is faster.
 #[inline(always)]
 fn stays(c: &Contact, h: f32, damping_s: f32, band: f32, rate_band: f32) -> bool {
     let end = c.gap + h * c.rate;
@@ -296,7 +297,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The short cut is no other rule: it holds exactly where the branch of a contact that pushes does not change.
+        /// The shortcut is equivalent: it holds exactly where the branch of a pushing contact does not change.
         #[test]
         fn stays_where_the_phase_does(
             gap in -20e-6f32..20e-6,

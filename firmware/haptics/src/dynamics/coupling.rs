@@ -1,11 +1,11 @@
 //! Virtual coupling between handle and object, eqs. 1–2 of Faas 2010.
 //!
-//! F = k_T·d − b_T·v and τ = k_R·θ − b_R·ω on the object: d and θ lead from the object to where the handle holds it (handle ∘ G), v and ω
-//! are the object's motion relative to that place. Both act at the held part's centre of mass, so translation and rotation do not mix.
-//! Both are taken at the tick's end, the hand carried on at its measured twist: in free motion the object does not lag and the coupling is silent,
-//! and the half period by which a sampled spring comes late, which makes energy (b > k·h/2 of Colgate and Schenkel), is made up for.
-//! Beyond its largest force or torque the coupling slips: its stiffness and damping are scaled down together, which keeps the implicit step's matrix
-//! positive definite and the force's direction.
+//! F = k_T·d − b_T·v and τ = k_R·θ − b_R·ω on the object: d and θ lead from the object to its place in the handle (handle ∘ G), v and ω are the
+//! object's motion relative to that place. Both act at the held part's centre of mass, so translation and rotation are decoupled. Both are evaluated
+//! at the tick's end, with the handle extrapolated at its measured twist: in free motion the object does not lag and the coupling exerts no force,
+//! and the half-period delay of a sampled spring, which generates energy (b > k·h/2 of Colgate and Schenkel), is compensated. Beyond its largest
+//! force or torque the coupling slips: its stiffness and damping are scaled down together, which keeps the implicit step's matrix positive definite
+//! and the force's direction.
 
 use core::mem;
 
@@ -23,17 +23,17 @@ use crate::settings::CouplingSettings;
 /// The coupling at the tick's start, world axes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coupling {
-    /// d: from the object's centre of mass to its place in the hand, m.
+    /// d: from the object's centre of mass to its place in the handle, m.
     pub stretch: Vec3,
-    /// θ: rotation vector from the object to its place in the hand, rad.
+    /// θ: rotation vector from the object to its place in the handle, rad.
     pub angle: Vec3,
-    /// Motion of the place in the hand, at the held centre of mass.
+    /// Motion of that place, at the held centre of mass.
     pub target: Twist,
     /// From the handle's origin to the held centre of mass, m.
     lever: Vec3,
 }
 
-/// Fractions (0 to 1) of stiffness and damping left once the coupling slips.
+/// Fractions (0 to 1) of stiffness and damping that remain when the coupling slips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Slip {
     pub translation: f32,
@@ -48,7 +48,7 @@ impl Slip {
 }
 
 impl Coupling {
-    /// Stretched so far, with the hand at rest.
+    /// A coupling with this stretch, handle at rest.
     #[cfg(test)]
     pub fn stretched(stretch: Vec3, angle: Vec3) -> Self {
         Self {
@@ -72,9 +72,9 @@ impl Coupling {
         }
     }
 
-    /// Where the handle must hold the object (G) for the coupling to be stretched and turned no farther than its springs may pull; `None`: it is not.
+    /// The grip offset (G) at which the coupling's springs stay within their limits; `None` when they already do.
     pub fn slipped(&self, handle: Pose, grabbed: &Grabbed, settings: &CouplingSettings) -> Option<Pose> {
-        // A spring of no stiffness may be as long as it likes: x/0 is infinite, and 0/0 compares false.
+        // A spring of zero stiffness may have any length: x/0 is infinite, and 0/0 compares false.
         let (stretch, pulled) = cut(self.stretch, settings.force_max_n / settings.k_t_n_per_m);
         let (angle, turned) = cut(self.angle, settings.torque_max_nm / settings.k_r);
         if !(pulled || turned) {
@@ -100,7 +100,7 @@ impl Coupling {
         }
     }
 
-    /// How far the coupling slips under `pull`.
+    /// Slip of the coupling under `pull`.
     pub fn slip(pull: Wrench, settings: &CouplingSettings) -> Slip {
         Slip {
             translation: fraction(pull.force, settings.force_max_n),
@@ -108,14 +108,15 @@ impl Coupling {
         }
     }
 
-    /// What the handle feels at its origin when the object is pulled with `wrench`: the reaction, applied where the hand holds the part.
+    /// Wrench on the handle at its origin when the object is pulled with `wrench`: the reaction, applied where the handle holds the part.
     pub fn reaction(&self, wrench: Wrench) -> Wrench {
         (-wrench).moved_by(-self.lever)
     }
 }
 
-/// The coupling at the tick's start, slipping in the hand where it is stretched beyond `limits`. A firm grip that closes on a part at once
-/// gives it the hand's motion, or the damper would be felt; one that slips takes it along from rest, since ½·m·v² is the hand's to give.
+/// The coupling at the tick's start, slipping in the handle where it is stretched beyond `limits`. At full limits the part receives the handle's
+/// motion at the grab, or the damper would be felt; under reduced limits it starts from rest, since its kinetic energy ½·m·v² must come from the
+/// operator.
 pub(crate) fn take_hold(
     mut grabbed: Grabbed,
     handle: Pose,
@@ -137,7 +138,7 @@ pub(crate) fn take_hold(
     (grabbed, coupling)
 }
 
-/// `pull` cut to what the coupling can transmit.
+/// `pull` limited to the force and torque that the coupling can transmit.
 pub(crate) fn slipping(pull: Wrench, settings: &CouplingSettings, flags: &mut Flags) -> Wrench {
     let slip = Coupling::slip(pull, settings);
     flags.insert_if(slip.translation < 1.0, Flags::COUPLING_FORCE);
@@ -148,7 +149,7 @@ pub(crate) fn slipping(pull: Wrench, settings: &CouplingSettings, flags: &mut Fl
     }
 }
 
-/// A slip that changes by less than this is settled.
+/// Change of slip below which it is settled.
 const SLIP_BAND: f32 = 1e-3;
 
 /// The coupling as a force term: K = B + h·K_spring and w = K_spring·d + (B + h·K_spring)·V_hand, both scaled by the slip.
@@ -181,7 +182,7 @@ impl<'a> CouplingForce<'a> {
 }
 
 impl ForceTerm for CouplingForce<'_> {
-    /// Without slip: most ticks need no other.
+    /// Without slip, which is the final state in most ticks.
     fn begin(&mut self, _: &[f32; 6]) {
         self.slip = Slip::NONE;
     }
@@ -237,7 +238,7 @@ impl ForceTerm for CouplingForce<'_> {
 pub(crate) fn potential(coupling: &Coupling, settings: &CouplingSettings) -> f32 {
     let spring = |k: f32, stretch: Vec3, most: f32| {
         let squared = stretch.length_squared();
-        // The root, dear without an instruction of its own, only where it slips.
+        // The square root is expensive without a hardware instruction, so it is computed only where the spring slips.
         if k * k * squared > most * most {
             most * (length(stretch) - 0.5 * most / k)
         } else {
@@ -278,7 +279,7 @@ mod tests {
             let (h, length) = (1e-3, 0.02);
             let mut force = CouplingForce::new(&coupling, &settings, h, length);
             contract::majorises(&mut force, &Iterate { x: &x, contact: None }, &v, h, length)?;
-            // Without dampers all of it is conservative.
+            // Without dampers the whole wrench is conservative.
             (settings.b_t, settings.b_r) = (0.0, 0.0);
             let mut force = CouplingForce::new(&coupling, &settings, h, length);
             contract::conserves(&mut force, &x, (along, 2e-2), h, h, length)?;

@@ -1,12 +1,12 @@
-//! What a force on the held object is to the implicit step: the one interface through which coupling, constraints, contact and friction enter it.
+//! Force terms: the one interface through which coupling, constraints, contact and friction act on the held object in the implicit step.
 //!
 //! A term gives a wrench w(x) that depends on the twist x at the step's end. Where it is not linear in x, it is replaced at each iterate by its
 //! *majoriser*: the spring and damper that give the same wrench there (the secant), so that each solve is one positive definite 6×6 system,
 //!
 //! (M + Σ h·Kᵢ)·x = M·V + Σ h·wᵢ,
 //!
-//! with Kᵢ and wᵢ those of the majorisers. The iteration ends when no term's majoriser changes by more than the step resolves. With Kᵢ positive
-//! semi-definite, whatever its values, the step is stable.
+//! with Kᵢ and wᵢ those of the majorisers. The iteration ends when no term's majoriser changes by more than the step resolves. With every Kᵢ positive
+//! semi-definite the step is stable.
 //!
 //! To add a force, implement [`ForceTerm`] in a file of its own, give it a settings group, and name it in the list of terms in `tick.rs`.
 
@@ -18,7 +18,7 @@ use crate::math::pose::Wrench;
 pub(crate) struct Iterate<'a> {
     /// Scaled twist at the step's end.
     pub x: &'a [f32; 6],
-    /// Contacts with their forces there; none in the step without contacts.
+    /// Contacts with their forces at that twist; `None` in the step without contacts.
     pub contact: Option<&'a ContactForce<'a>>,
 }
 
@@ -29,7 +29,7 @@ pub(crate) trait ForceTerm {
         self.linearise(&Iterate { x, contact: None });
     }
 
-    /// Takes the majoriser at an iterate; whether it is that of the last one, to within what the step resolves.
+    /// Computes the majoriser at an iterate; returns whether it equals the last one to within the step's resolution.
     fn linearise(&mut self, at: &Iterate<'_>) -> bool;
 
     /// Adds h·K and h·w of the majoriser.
@@ -43,19 +43,19 @@ pub(crate) trait ForceTerm {
     fn energy_j(&self, x: &[f32; 6]) -> f32;
 }
 
-/// What every term promises, for the tests of each.
+/// Properties that every term guarantees, for the tests of each.
 #[cfg(test)]
 pub(crate) mod contract {
     use super::*;
     use crate::math::symmetric6::{Symmetric6, dot};
     use proptest::prelude::*;
 
-    /// A scaled twist of a hand's speed.
+    /// A scaled twist of typical hand speed.
     pub fn twists() -> impl Strategy<Value = [f32; 6]> {
         prop::array::uniform6(-0.3f32..0.3)
     }
 
-    /// Linearised at `x`, the majoriser gives the wrench there, and takes energy from every motion `v`.
+    /// Linearised at `x`, the majoriser gives the wrench there and removes energy from every motion `v`.
     pub fn majorises(
         term: &mut dyn ForceTerm,
         at: &Iterate<'_>,
@@ -94,7 +94,7 @@ pub(crate) mod contract {
         Ok(())
     }
 
-    /// The energy falls by the wrench's work: over a small change of the end's twist that acts for `ahead_s`.
+    /// The energy falls by the work of the wrench, over a small change of the final twist that acts for `ahead_s`.
     pub fn conserves(
         term: &mut dyn ForceTerm,
         x: &[f32; 6],

@@ -4,14 +4,13 @@
 //!
 //! f = −μ(s)·λ·u/√(s² + ε²),   μ(s) = μ_k + (μ_s − μ_k)·exp(−(s/s_S)²)
 //!
-//! with μ_s the static and μ_k the kinetic coefficient, s_S the Stribeck speed and ε the creep speed: at rest the contact is a viscous damper μ_s·λ/ε,
-//! so a part that the law holds still creeps by a fraction of ε. Each solve takes the damper c = μ(s)·λ/√(s² + ε²) of the last iterate, with the
-//! normal force found there; as c is never negative, whatever it is, friction takes energy and the step stays stable. Off while both coefficients
-//! are 0.
+//! with μ_s the static and μ_k the kinetic coefficient, s_S the Stribeck speed and ε the creep speed: at rest the contact is a viscous damper
+//! μ_s·λ/ε, so a part held by the law still creeps by a fraction of ε. Each solve uses the damper c = μ(s)·λ/√(s² + ε²) of the last iterate, with the
+//! normal force found there; since c is never negative, friction always dissipates and the step stays stable. Off while both coefficients are 0.
 //!
 //! Source: law and transition after Armstrong-Hélouvry, Dupont & Canudas de Wit, *A survey of models, analysis tools and compensation methods for the
 //! control of machines with friction*, Automatica 30(7), 1994; the regularisation is the usual one. Cost on a Cortex-M7: none when off, else about
-//! 400 instructions a contact that pushes and solve.
+//! 400 instructions per pushing contact and solve.
 
 use glam::Vec3;
 
@@ -21,7 +20,7 @@ use crate::math::pose::Wrench;
 use crate::math::symmetric6::Symmetric6;
 use crate::settings::FrictionSettings;
 
-/// A force that changes by less than this from iterate to iterate is settled, N.
+/// Change of force between iterates below which it is settled, N.
 const FRICTION_BAND_N: f32 = 0.02;
 
 /// Friction at all contacts of a step.
@@ -30,7 +29,7 @@ pub(crate) struct Friction<'a> {
     period_s: f32,
     /// L, m.
     length: f32,
-    /// Σ c·(PᵀP − JᵀJ): P takes the scaled twist to the point's velocity, J to its normal part; N s/m.
+    /// Σ c·(PᵀP − JᵀJ): P maps the scaled twist to the point's velocity, J to its normal part; N s/m.
     damping: Symmetric6,
 }
 

@@ -1,14 +1,14 @@
-//! Limits on the handle's wrench, the last thing before the mechanism.
+//! Limits on the handle's wrench, applied last before the mechanism.
 
 use crate::io::Flags;
 use crate::math::pose::Wrench;
 use crate::math::vector::cut;
 use crate::settings::LimitSettings;
 
-/// The wrench that may reach the mechanism: `wanted` cut to the limits, changed from `previous` no faster than the slew limits allow.
+/// The wrench passed to the mechanism: `wanted` limited in magnitude, and changed from `previous` no faster than the slew limits allow.
 ///
-/// The limits are applied once more after the slew: they may have been lowered since `previous` was allowed. A non-finite result
-/// becomes zero and is flagged.
+/// The magnitude limits are applied once more after the slew: they may have been lowered since `previous` was computed. A non-finite result becomes
+/// zero and is flagged.
 pub(crate) fn limit(
     wanted: Wrench,
     previous: Wrench,
@@ -20,7 +20,7 @@ pub(crate) fn limit(
     let (torque, cut_torque) = cut(wanted.torque, settings.torque_nm);
     let (force_step, slow_force) = cut(force - previous.force, settings.force_slew_n_per_s * period_s);
     let (torque_step, slow_torque) = cut(torque - previous.torque, settings.torque_slew_nm_per_s * period_s);
-    // Where nothing was cut the value itself is used: previous + (wanted − previous) may differ by a rounding.
+    // Without slew limiting the value itself is used: previous + (wanted − previous) may differ by a rounding.
     let force = if slow_force {
         previous.force + force_step
     } else {

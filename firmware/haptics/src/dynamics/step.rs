@@ -1,16 +1,15 @@
 //! One implicit (backward Euler) step of the held object.
 //!
-//! M·(V' − V)/h = w_coupling(V') + Σ λ_i(V')·J_iᵀ, with V' the twist at the step's end, after Otaduy & Lin 2006. Every term on the right
-//! is taken at the step's end, which is why contact may be as stiff as it likes. Contact i has gap φ and row J = (n, r × n); with
-//! rate s = J·V' its force is
+//! M·(V' − V)/h = w_coupling(V') + Σ λ_i(V')·J_iᵀ, with V' the twist at the step's end, after Otaduy & Lin 2006. Every term on the right is evaluated
+//! at the step's end, so contact stiffness is not limited by stability. Contact i has gap φ and row J = (n, r × n); with rate s = J·V' its force is
 //!
 //! λ = k·max(0, −(φ + h·s + τ·min(0, s)))
 //!
-//! continuous, falling in s, never pulling. The sum of all is the gradient of a convex function, and V' its one minimum. It is found by Newton
-//! steps on the set of touching points (primal active set): solve with the set assumed, look at the rates, change the set, solve again.
-//! Unknowns are scaled to (v, ω·L), L the radius of gyration, so that single precision serves both.
+//! continuous, decreasing in s, never pulling. The sum of all is minus the gradient of a convex function, so V' is the unique minimum of the step's
+//! convex objective. It is found by Newton steps on the set of touching points (primal active set): solve with an assumed set, evaluate the rates,
+//! update the set, solve again. Unknowns are scaled to (v, ω·L), L the radius of gyration, so that single precision suffices for both.
 //!
-//! The gyroscopic torque is left out: it does no work, and the object's rotation is led by the hand within a few ticks.
+//! The gyroscopic torque is neglected: it does no work, and the object's rotation follows the handle within a few ticks.
 //!
 //! Cost on a Cortex-M7 (counted as in [`crate::tick()`]): 150 instructions to set a system up, 150 to solve it, and about 300 for a contact in all
 //! passes over it together.
@@ -47,13 +46,13 @@ pub(crate) struct Solution {
     pub twist: Twist,
     /// Sum of contact forces on the object at its centre of mass.
     pub contact: Wrench,
-    /// Solves it took.
+    /// Number of solves.
     pub solves: u8,
-    /// Whether the set of touching points had come to rest.
+    /// Whether the set of touching points had converged.
     pub settled: bool,
 }
 
-/// The force terms of a step, contact apart, in the order in which they enter the sums.
+/// The force terms of a step without contact, in the order in which they enter the sums.
 pub(crate) type Terms<'a, 't> = &'a mut [&'t mut dyn ForceTerm];
 
 impl Step {
@@ -78,8 +77,8 @@ impl Step {
         }
     }
 
-    /// The step with contacts, starting from the motion so far, or from the `free` solution when that touches nothing. What has not settled after
-    /// `max_solves` is taken as it is.
+    /// The step with contacts, starting from the motion so far, or from the `free` solution when that touches nothing. Phases that have not settled
+    /// after `max_solves` are used as they are.
     ///
     /// On return each contact's rate and phase are those of the solution.
     pub fn with_contacts(
@@ -90,13 +89,13 @@ impl Step {
         max_solves: u8,
     ) -> Solution {
         if contact.contacts().is_empty() {
-            // The bits that the loop below would give.
+            // Identical to the bits that the loop below would produce.
             return Solution {
                 twist: self.unscale(&self.scale(free.twist)),
                 ..*free
             };
         }
-        // Where the object rests or slides, its motion up to now already gives the points that touch.
+        // Where the object rests or slides, its previous motion already identifies the points that touch.
         let mut x = self.scale(self.twist);
         let touching = contact.begin(&x);
         if !touching {
@@ -121,7 +120,7 @@ impl Step {
         }
     }
 
-    /// Inertia and all terms but contact: (M + Σ h·Kᵢ)·V' = M·V + Σ h·wᵢ.
+    /// System of inertia and all terms except contact: (M + Σ h·Kᵢ)·V' = M·V + Σ h·wᵢ.
     fn system(&self, terms: Terms<'_, '_>) -> System {
         let mut system = self.inertia();
         for term in terms.iter() {
@@ -165,7 +164,7 @@ impl Step {
     }
 }
 
-/// Linearises every term at `x`; whether all of them had settled.
+/// Linearises every term at `x`; returns whether all had settled.
 fn linearise(terms: Terms<'_, '_>, x: &[f32; 6], contact: Option<&ContactForce<'_>>) -> bool {
     let at = Iterate { x, contact };
     let mut settled = true;
@@ -186,7 +185,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// What has settled solves the step by the force law itself, but for what each contact may be off by: the bands of rate and force. Long pegs
+        /// A settled solution solves the step by the force law itself, within the tolerance of each contact: the bands of rate and force. Long pegs
         /// that lie on a wall and hardly move.
         #[test]
         fn solves_the_step_within_the_bands(

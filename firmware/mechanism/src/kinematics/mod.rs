@@ -1,12 +1,12 @@
 //! Kinematics of the mechanisms a rig's description can name: joint angles to handle pose and Jacobians, and force to joint torques.
 //!
-//! A [`Model`] is made of a [`Rig`] once; [`Model::posture`] is asked each tick. The handle's velocity is v = J·θ̇, a force F on the handle takes the
-//! torques τ = Jᵀ·F (virtual work: τ·θ̇ = F·v), so that torques need no inverse and no iteration.
+//! A [`Model`] is built from a [`Rig`] once; [`Model::posture`] is called each tick. The handle's velocity is v = J·θ̇, and a force F on the handle
+//! requires the torques τ = Jᵀ·F (virtual work: τ·θ̇ = F·v), so that torques need no inverse and no iteration.
 //!
-//! **Singular postures.** Where J loses rank the motors cannot push the handle in some direction, and where a closed linkage stretches out J grows
-//! without bound and so would τ. Both show in one number, the isotropy of J (Kim & Khosla 1991): geometric over arithmetic mean of the eigenvalues of
-//! JᵀJ, 1 where all directions are alike, 0 in a singular posture. Force is given whole above [`WHOLE`], not at all below [`NONE`], and in proportion
-//! between.
+//! **Singular postures.** Where J loses rank the motors cannot push the handle in some direction, and where a closed linkage is fully extended J
+//! grows without bound and so would τ. One number indicates both, the isotropy of J (Kim & Khosla 1991): geometric over arithmetic mean of the
+//! eigenvalues of JᵀJ, 1 where all directions are alike, 0 in a singular posture. Force is applied in full above [`WHOLE`], not at all below
+//! [`NONE`], and in proportion between.
 //!
 //! Metres, radians, newtons; positions and Jacobians in the world. Cost: at most three sine–cosine pairs, three roots and 150 operations a posture.
 
@@ -19,12 +19,12 @@ use mortise_haptics::rotation;
 use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::rig::{Kinematics, Rig, RigFault, Wrist};
 
-/// Isotropy from which force is given whole.
+/// Isotropy from which force is applied in full.
 pub const WHOLE: f32 = 0.3;
-/// Isotropy below which none is given.
+/// Isotropy below which no force is applied.
 pub const NONE: f32 = 0.1;
 
-/// A mechanism ready to be asked.
+/// Kinematic model of a mechanism.
 #[derive(Clone, Copy, Debug)]
 pub struct Model {
     kinematics: Kinematics,
@@ -34,15 +34,15 @@ pub struct Model {
     wrist: Option<Wrist>,
 }
 
-/// Where a mechanism's own joints put the handle, in its own frame.
+/// Handle pose and derivatives from a mechanism's own joints, in its own frame.
 #[derive(Clone, Copy, Debug)]
 struct Placed {
     position: Vec3,
-    /// ∂p/∂θ, columns by joint; joints that are not there have none.
+    /// ∂p/∂θ, columns by joint; zero for absent joints.
     linear: Mat3,
-    /// The link that carries the wrist.
+    /// Orientation of the link that carries the wrist.
     link: Quat,
-    /// Its angular velocity for each joint's rate.
+    /// Angular velocity of that link for each joint's rate.
     angular: Mat3,
 }
 
@@ -53,13 +53,13 @@ pub struct Posture {
     pub position: Vec3,
     /// Handle's orientation, world; the identity where none is sensed.
     pub orientation: Quat,
-    /// J = ∂p/∂θ, m/rad, world; columns by joint, zero for joints that are not there.
+    /// J = ∂p/∂θ, m/rad, world; columns by joint, zero for absent joints.
     pub jacobian: Mat3,
     /// Angular velocity of the handle for each joint's rate, world; zero where no orientation is sensed.
     pub joint_axes: Mat3,
     /// Angular velocity of the handle for each wrist axis' rate, world: unit vectors, or zero without a wrist.
     pub wrist_axes: Mat3,
-    /// Isotropy of J over the joints there are, 0 to 1.
+    /// Isotropy of J over the existing joints, 0 to 1.
     pub isotropy: f32,
 }
 
@@ -67,7 +67,7 @@ impl Model {
     /// The model of a description.
     ///
     /// # Errors
-    /// What [`Rig::check`] finds; `Linkage`, `Singular`, `Workspace` when the home pose is none that can be worked in.
+    /// The errors of [`Rig::check`]; `Linkage`, `Singular`, `Workspace` when the home pose is not usable.
     pub fn new(rig: &Rig) -> Result<Self, RigFault> {
         rig.check()?;
         let turn = Vec3::from_array(rig.mount.turn).clamp_length_max(rotation::EXP_MAX);
@@ -93,7 +93,7 @@ impl Model {
         Ok(model)
     }
 
-    /// Joints there are.
+    /// Number of joints.
     pub fn joints(&self) -> usize {
         self.joints
     }
@@ -103,7 +103,7 @@ impl Model {
         self.wrist.is_some()
     }
 
-    /// The posture at these joint angles and, where there is a wrist, these angles of it, rad. `None` where the links do not reach each other.
+    /// The posture at these joint angles and, where there is a wrist, these wrist angles, rad. `None` where the links cannot be connected.
     pub fn posture(&self, angles: [f32; MAX_JOINTS], wrist: [f32; 3]) -> Option<Posture> {
         let placed = match self.kinematics {
             Kinematics::Paddle { radius } => paddle::place(radius, angles),
@@ -149,7 +149,7 @@ impl Model {
 }
 
 impl Posture {
-    /// Share of a force that is given here: 1 in ordinary postures, 0 near singular ones.
+    /// Share of a force that is applied here: 1 in ordinary postures, 0 near singular ones.
     pub fn share(&self) -> f32 {
         // NaN compares false and gives 0.
         if self.isotropy >= WHOLE {
@@ -190,7 +190,7 @@ fn isotropy(jacobian: &Mat3, joints: usize) -> f32 {
             3.0 * libm::cbrtf(volume * volume) / trace
         }
     };
-    // The means' inequality up to rounding.
+    // Exceeds the inequality of the means only by rounding.
     if found.is_finite() {
         found.clamp(0.0, 1.0)
     } else {

@@ -6,16 +6,16 @@
 //! e = (E₂ − E₁)/D,  D = |E₂ − E₁|,  a = (d₁² − d₂² + D²)/(2D),  h² = d₁² − a²,  p = E₁ + a·e + h·e⊥
 //! ```
 //!
-//! with e⊥ to the left of e. Their lengths stay: u·∂p/∂θ = u·∂E/∂θ with u = p − E for each side, two equations for each column of J:
-//! ∂p/∂θ₁ = (u₁·t₁)/(u₁ × u₂)·(u₂y, −u₂x), ∂p/∂θ₂ = (u₂·t₂)/(u₁ × u₂)·(−u₁y, u₁x), t = ∂E/∂θ. u₁ × u₂ vanishes where the distal links lie in one
-//! line.
+//! with e⊥ to the left of e. The distal links have constant length: u·∂p/∂θ = u·∂E/∂θ with u = p − E for each side, two equations for each column of
+//! J: ∂p/∂θ₁ = (u₁·t₁)/(u₁ × u₂)·(u₂y, −u₂x), ∂p/∂θ₂ = (u₂·t₂)/(u₁ × u₂)·(−u₁y, u₁x), t = ∂E/∂θ. u₁ × u₂ vanishes where the distal links are
+//! collinear.
 
 use glam::{Mat3, Quat, Vec2, Vec3};
 use mortise_protocol::limits::MAX_JOINTS;
 
 use super::Placed;
 
-/// Distal links count as in one line when the handle is nearer to the line of the elbows than this share of a link: 0.06°.
+/// The distal links are treated as collinear when the handle is nearer to the line of the elbows than this share of a link: 0.06°.
 const FLAT: f32 = 1e-3;
 
 pub(super) fn place(

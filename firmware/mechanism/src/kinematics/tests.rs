@@ -1,4 +1,4 @@
-//! Against closed forms in double precision, central differences of the model itself, and virtual work.
+//! Kinematics against closed forms in double precision, central differences of the model itself, and virtual work.
 
 use glam::{DVec2, DVec3};
 use mortise_protocol::rig::{Joint, Mount, RigCeilings};
@@ -63,7 +63,7 @@ fn rig(kinematics: Kinematics, home: [f32; 3], turn: [f32; 3]) -> Rig {
     }
 }
 
-/// Any mechanism in a posture it can work in: model and angles.
+/// Any mechanism in a usable posture: model and angles.
 fn worked() -> impl Strategy<Value = (Model, [f32; 3], [f32; 3])> {
     let part = |from: f32, to: f32| from..to;
     let arm = (part(-1.2, 1.2), part(-0.3, 0.5), part(0.9, 1.9)).prop_map(|(a, b, c)| (ARM, [a, b, c]));
@@ -160,7 +160,7 @@ proptest! {
         prop_assert!((joints - handle).abs() < 1e-6 * (1.0 + force.length() * rates.length() * 3.0), "{joints} W against {handle} W");
     }
 
-    /// Isotropy is what the singular values say: of JᵀJ by its characteristic polynomial in double precision.
+    /// Isotropy agrees with the eigenvalues of JᵀJ, from its characteristic polynomial in double precision.
     #[test]
     fn orientation_is_a_rotation_and_isotropy_a_share((model, q, w) in worked()) {
         let posture = model.posture(q, w).unwrap();
@@ -169,8 +169,7 @@ proptest! {
         prop_assert_eq!(posture.share(), 1.0);
     }
 
-    /// Wherever the links go, whatever the angles: a force within the limit asks for torques within a bound, because what is given fades before J
-    /// grows.
+    /// At any angles a force within the limit requires torques within a bound, because the applied share fades before J grows.
     #[test]
     fn no_posture_asks_for_endless_torque(kind in 0..3usize, a in -6.3f32..6.3, b in -6.3f32..6.3, c in -6.3f32..6.3, force in vector(20.0)) {
         let (kinematics, home) = [(ARM, [0.0, 0.0, 1.5]), (LINKAGE, [2.3, 0.8, 0.0]), (PADDLE, [0.0; 3])][kind];

@@ -9,7 +9,7 @@
 use super::Estimator;
 use crate::interface::TICK_HZ;
 
-/// Ticks of the longest window, unless said otherwise.
+/// Ticks of the longest window, by default.
 pub const WINDOW: usize = 16;
 
 /// First-order adaptive window of at most `N` ticks, one axis.
@@ -28,7 +28,7 @@ impl<const N: usize> AdaptiveWindow<N> {
         self.history[(self.latest + N + 1 - ticks) % N]
     }
 
-    /// Takes the counts moved in this tick; gives the rate in counts per tick.
+    /// Processes the counts moved in this tick; returns the rate in counts per tick.
     fn rate(&mut self, moved: i32) -> f32 {
         self.latest = (self.latest + 1) % N;
         self.history[self.latest] = self.count;
@@ -38,7 +38,7 @@ impl<const N: usize> AdaptiveWindow<N> {
         for ticks in 2..=N {
             let chord = count.wrapping_sub(self.ago(ticks));
             let within = (1..ticks).all(|between| {
-                // |measured − chord| ≤ 1 count, multiplied by `ticks` to stay with integers. A jump can make the products large, not wrong.
+                // |measured − chord| ≤ 1 count, multiplied by `ticks` to stay with integers. After a jump the products are large but correct.
                 let behind = i64::from(count.wrapping_sub(self.ago(between))) * ticks as i64;
                 (behind - i64::from(chord) * between as i64).abs() <= ticks as i64
             });
@@ -111,7 +111,7 @@ mod tests {
             prop_assert!((f64::from(rate) - speed).abs() < 2.0 / WINDOW as f64, "{rate} {speed}");
         }
 
-        /// Finite whatever comes.
+        /// Finite for any input.
         #[test]
         fn any_counts_give_a_finite_speed(moves in prop::collection::vec(any::<i32>(), 1..100)) {
             let mut estimator = AdaptiveWindow::<WINDOW>::AT_REST;

@@ -1,6 +1,6 @@
-//! Velocity of an axis from the counts its encoder moves.
+//! Velocity of an axis from its encoder's counts.
 //!
-//! Two estimators behind one interface, [`Estimator`]; [`InUse`] is the one that drives motors, on every board, real or simulated. With Δ the
+//! Two estimators behind one interface, [`Estimator`]; [`InUse`] is the one used to drive motors, on every board, real or simulated. With Δ the
 //! encoder's step (a count) and h the tick:
 //!
 //! | | [`LowPass`] of τ = 3 ms | [`AdaptiveWindow`] of n = 16 ticks | n = 6 |
@@ -13,10 +13,11 @@
 //! | stiffest coupling on which a bare handle comes to rest, kN/m | 17.3 | 19.3 | 23.3 |
 //! | likewise, force a tick late | 5.9 | 3.7 | 5.8 |
 //!
-//! `tests/velocity.rs` measures all of it (2026-11-23; handle of 0.15 kg and 1 N·s/m, 5 µm a count, coupling of 20 N·s/m, no dry friction). The window
-//! of 16 ticks is the quietest, and large motions stay bounded up to more than twice the stiffness of the low-pass; but it reports a motion of few counts
-//! 8 ms late, so that with a delayed force the handle goes on trembling by some counts, and a wall damped by 40 N·s/m never rests. The low-pass
-//! is in use: it has no such trembling. A window of 6 ticks bears a third more without delay and as much with it.
+//! `tests/velocity.rs` measures all of it (2026-11-23; handle of 0.15 kg and 1 N·s/m, 5 µm a count, coupling of 20 N·s/m, no dry friction). The
+//! window of 16 ticks has the least noise, and is stable for large motions up to more than twice the stiffness of the low-pass; but it reports a
+//! motion of few counts 8 ms late, so that with a delayed force the handle keeps trembling by several counts, and at a wall damped by 40 N·s/m it
+//! never comes to rest. The low-pass is in use: it has no such limit cycle. A window of 6 ticks allows a third more stiffness without delay and as
+//! much with it.
 
 pub mod adaptive_window;
 pub mod low_pass;
@@ -24,14 +25,15 @@ pub mod low_pass;
 pub use adaptive_window::AdaptiveWindow;
 pub use low_pass::LowPass;
 
-/// Estimates the speed of one axis, one call a tick.
+/// Estimator of the speed of one axis, called once per tick.
 pub trait Estimator {
-    /// At rest.
+    /// Initial state, at rest.
     const AT_REST: Self;
 
-    /// Takes the counts moved in this tick and what a count is (m, rad); gives the speed (m/s, rad/s). Finite for any counts while `per_count` is.
+    /// Takes the counts moved in this tick and the size of a count (m, rad); returns the speed (m/s, rad/s). Finite for any counts while `per_count`
+    /// is.
     fn update(&mut self, moved: i32, per_count: f32) -> f32;
 }
 
-/// The estimator that drives motors.
+/// The estimator used to drive motors.
 pub type InUse = LowPass;
