@@ -9,7 +9,7 @@ use mortise_lab::experiment::{Experiment, Form, files};
 use mortise_lab::experiments::ALL;
 use mortise_output::{Existing, Folder, lines};
 
-/// An experiment, how it is run, and where its files go.
+/// The chosen experiment, its form, and its output folder.
 pub struct Chosen {
     experiment: &'static dyn Experiment,
     quick: bool,
@@ -23,7 +23,7 @@ impl Chosen {
     /// Runs it.
     pub fn run(&self) -> anyhow::Result<ExitCode> {
         let only = self.only.as_deref();
-        // Before the first trial: a sweep of half an hour must not end in nothing.
+        // Before the first trial, so that a sweep of half an hour does not end in an unwritable folder.
         let folder = |path| {
             Folder::new(
                 path,
