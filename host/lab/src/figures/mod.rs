@@ -1,4 +1,4 @@
-//! Figures: the tables the product is measured by, every row measured when it is asked for.
+//! Figures: the tables by which the product is measured; each row is measured on request.
 
 mod claims;
 mod constraints;
@@ -19,7 +19,7 @@ use crate::LabError;
 /// Measures the rows of a table.
 type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
 
-/// Every table: its name, and what measures it.
+/// Every table: its name, and the function that measures it.
 const TABLES: &[(&str, Measure)] = &[
     ("end-to-end", end_to_end::measure),
     ("contact", contact::measure),
@@ -28,7 +28,7 @@ const TABLES: &[(&str, Measure)] = &[
     ("promises", promises::measure),
 ];
 
-/// Names of the tables there are.
+/// Names of all tables.
 pub fn names() -> Vec<&'static str> {
     TABLES.iter().map(|(name, _)| *name).collect()
 }
@@ -36,19 +36,19 @@ pub fn names() -> Vec<&'static str> {
 /// How a table is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
-    /// The shorter form: what takes minutes is done on fewer cases; each row's text says so.
+    /// The shorter form: long measurements run on fewer cases, as each row's text says.
     pub quick: bool,
-    /// The program `mortise`, for rows that measure a command of its.
+    /// The program `mortise`, for rows that measure one of its commands.
     pub program: &'a Path,
     /// The thesis pair with 1 mm clearance.
     pub pair: &'a Path,
 }
 
-/// Measures the table `name`, each row judged by its claim of `claims`; each row goes to `out` as soon as it is known. The last row counts those
+/// Measures the table `name` and judges each row by its claim in `claims`; passes each row to `out` as soon as it is known. The last row counts those
 /// whose bound is not near a claim.
 ///
 /// # Errors
-/// `NoSuchFigures`; anything that keeps a row from being measured. A row that does not hold is no error.
+/// `NoSuchFigures`; anything that prevents a row from being measured. A row that does not hold is not an error.
 pub fn figures(
     name: &str,
     plan: &Plan<'_>,

@@ -1,4 +1,4 @@
-//! Contact: exact to micrometres, and cheap enough for the board.
+//! Contact: accurate to micrometres, at a cost that the board can afford.
 
 mod accuracy;
 mod baking;
@@ -8,9 +8,9 @@ mod ticks;
 use super::{Plan, Row};
 use crate::LabError;
 
-/// Cells of the accuracy that is claimed, mm.
+/// Cells at which the accuracy is claimed, mm.
 const CELL_MM: f64 = 0.5;
-/// The tightest fit asked for, mm.
+/// The tightest required fit, mm.
 const TIGHT_MM: f64 = 0.02;
 
 /// Measures every row.
