@@ -13,9 +13,9 @@ use crate::rate::{self, Mode};
 use crate::variant::Variant;
 
 const TARGETS: f64 = 4.0;
-/// Largest cost with targets over the cost without, instructions.
+/// Largest ratio of the instructions with targets to those without.
 const RATIO: f64 = 1.2;
-/// Largest number of instructions of a tick with targets and without: a quarter of the 480,000 of a millisecond, and 10 µs' worth.
+/// Largest number of instructions of a tick with targets and without: a quarter of the 480,000 of a millisecond, plus 10 µs' worth.
 const GUIDED: f64 = 125_000.0;
 const UNGUIDED: f64 = GUIDED;
 /// Ticks between refreshes, and until a target that is not refreshed expires.

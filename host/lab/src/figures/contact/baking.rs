@@ -18,7 +18,7 @@ const MOTOR: &str = "05_motor/motor_nested.step";
 const ACCURACY_MM: f64 = 0.01;
 /// Longest time, s, on two cores.
 const SECONDS: f64 = 60.0;
-/// Largest growth of time and size when the cell is halved: surface cells grow fourfold, plus an eighth of overhead.
+/// Largest factor on time and size when the cell is halved: surface cells grow fourfold, plus an eighth of overhead.
 const HALF_CELL: f64 = 4.5;
 
 /// Cell that is compared with half of it, mm, in the full and in the shorter form.

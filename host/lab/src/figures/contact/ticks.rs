@@ -234,7 +234,7 @@ pub(super) fn more_points(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(
             .sum())
     };
     let base = points(&sparse)?;
-    // The number of points grows at most with the square root of the error bound.
+    // The number of points grows at most with the inverse square root of the error bound.
     let mut dense = sparse;
     let mut ratio = 1.0;
     while ratio < DENSER {
