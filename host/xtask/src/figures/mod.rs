@@ -1,8 +1,7 @@
-//! `cargo xtask figures NAME`: measures and keeps the figures of one part of the product.
+//! `cargo xtask figures NAME`: measures and stores the figures of one part of the product.
 //!
-//! The program prints one JSON object a row, `{"what","value","unit","bound","holds"}`; this writes
-//! them as a table to `docs/figures/NAME.md`. `--check` compares what pages say with what is measured; `--renew` makes anew what is stale, `--record`
-//! takes what was made by hand.
+//! The program prints one JSON object a row, `{"what","value","unit","bound","holds"}`; this module writes them as a table to `docs/figures/NAME.md`.
+//! `--check` compares the numbers of pages with measured ones; `--renew` makes stale artefacts anew, `--record` records artefacts made by hand.
 
 pub mod artefacts;
 mod claims;
@@ -24,7 +23,7 @@ use crate::program::Programs;
 use crate::setup::{self, Consent, Group};
 use crate::{firmware, shell};
 
-/// What one run of `mortise-lab figures` gave.
+/// Result of one run of `mortise-lab figures`.
 #[derive(Debug)]
 pub struct Measured {
     /// The rows, in the program's order.
@@ -33,14 +32,14 @@ pub struct Measured {
     pub success: bool,
 }
 
-/// What `mortise-lab figures` judges rows by.
+/// Source of the claims by which `mortise-lab figures` judges rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
-    /// The claims it was built with; a row without one makes the last row fail.
+    /// The claims built into the program; a row without one makes the last row fail.
     Kept,
-    /// The same, and where there is none, what it measures.
+    /// The same, completed by measured values.
     Completed,
-    /// What it measures.
+    /// Measured values.
     Measured,
 }
 
@@ -103,7 +102,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     })
 }
 
-/// Whether the page of a table is made from the shorter form; `None` when there is no such table.
+/// True if the page of a table is made from the shorter form; `None` when there is no such table.
 fn page_is_quick(name: &str) -> Option<bool> {
     let of = |artefact: &Artefact| match artefact.made {
         Made::Page { quick } if artefact.name == name => Some(quick),
@@ -112,7 +111,7 @@ fn page_is_quick(name: &str) -> Option<bool> {
     ARTEFACTS.iter().find_map(of)
 }
 
-/// Measures a table, keeps the claims of new rows and writes the page; true if every bound holds.
+/// Measures a table, stores the claims of new rows and writes the page; true if every bound holds.
 fn write_page(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<bool> {
     let Some(of_page) = page_is_quick(name).map(|page| page == quick) else {
         bail!("there is no table `{name}`; `mortise-lab figures --help` names them");
@@ -130,7 +129,7 @@ fn write_page(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> R
     Ok(measured.success && !measured.rows.iter().any(Row::fails))
 }
 
-/// The step of `cargo xtask test`: [`check`], once figures have been renewed for the first time; until then, whether the bounds of `end-to-end` hold.
+/// The step of `cargo xtask test`: [`check`] once a manifest exists; before that, whether the bounds of `end-to-end` hold.
 ///
 /// # Errors
 /// As [`check`].
@@ -148,12 +147,12 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
     ))
 }
 
-/// Measures the shorter form of every table that README quotes, and compares: bounds, claims, what pages quote, and the pages of
-/// figures. Bounds of what the machine decides are told and not judged: another machine, or a busy one, breaks no promise. What the page of figures
-/// says does not hold is told, too.
+/// Measures the shorter form of every table that README quotes and compares bounds, claims, quoted numbers, and the pages of figures. Bounds of
+/// machine-dependent values are reported, not judged: another or a busy machine breaks no promise. Rows that fail on the page of figures are reported
+/// as well.
 ///
 /// # Errors
-/// When a bound does not hold, or a number differs; what and where was printed.
+/// When a bound does not hold, or a number differs; the details were printed.
 pub fn check(root: &Path, program: &Path) -> Result<String> {
     let quoted = quoted::of_pages(root)?;
     let claims = Claims::read(root)?;
@@ -222,7 +221,7 @@ fn page_of(root: &Path, table: &str) -> Result<Vec<Row>> {
 /// Runs `mortise-lab figures NAME --json` and prints each row as it comes.
 ///
 /// # Errors
-/// When the program cannot be started or prints no rows, or something that is not a row.
+/// When the program cannot be started, or prints no rows or an invalid one.
 pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<Measured> {
     let mut command = Command::new(program);
     command

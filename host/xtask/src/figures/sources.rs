@@ -1,14 +1,14 @@
 //! A hash of the sources that an artefact depends on.
 //!
-//! Of Rust files the tokens count: comments, documentation, white space and what is compiled for tests alone do not, so that a change of words makes
-//! no chart stale. Other files count as they are. The hash is FNV-1a of 64 bits: it finds changes, and is no protection against somebody who
-//! wants none to be found.
+//! For Rust files it covers the tokens: comments, documentation, white space and code compiled only for tests are excluded, so that rewording makes
+//! no chart stale. Other files are hashed byte for byte. The hash is FNV-1a of 64 bits: it detects changes, and does not protect against deliberate
+//! collisions.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-/// Hash of all files at and below `places`, paths from `root`; files of tests are left out.
+/// Hash of all files at and below `places`, paths from `root`; test files are excluded.
 ///
 /// # Errors
 /// When a place does not exist or cannot be read.
@@ -71,25 +71,25 @@ impl Default for Fnv {
 }
 
 impl Fnv {
-    /// Adds bytes and where they end.
+    /// Adds bytes, followed by their length.
     pub fn add(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().copied().chain((bytes.len() as u64).to_le_bytes()) {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
         }
     }
 
-    /// The hash, 16 digits.
+    /// The hash as 16 hexadecimal digits.
     pub fn text(&self) -> String {
         format!("{:016x}", self.0)
     }
 }
 
-/// The tokens of a Rust source, separated by single spaces where it had any space between two words, without items under `#[cfg(test)]`.
+/// The tokens of a Rust source, separated by single spaces where two words had white space between them, without items under `#[cfg(test)]`.
 fn tokens(source: &str) -> String {
     without_tests(&words(source)).join(" ")
 }
 
-/// Words, literals and single signs, without comments.
+/// Words, literals and single punctuation characters, without comments.
 fn words(source: &str) -> Vec<String> {
     let letters: Vec<char> = source.chars().collect();
     let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
@@ -128,7 +128,7 @@ fn words(source: &str) -> Vec<String> {
     found
 }
 
-/// Length of a comment, others within it included.
+/// Length of a block comment, including nested ones.
 fn block_comment(rest: &[char]) -> usize {
     let (mut depth, mut at) = (0usize, 0);
     while at < rest.len() {
@@ -148,7 +148,7 @@ fn block_comment(rest: &[char]) -> usize {
     at
 }
 
-/// Length of a string in quotes.
+/// Length of a quoted string.
 fn quoted(rest: &[char]) -> usize {
     let mut at = 1;
     while at < rest.len() && rest[at] != '"' {
@@ -157,7 +157,7 @@ fn quoted(rest: &[char]) -> usize {
     (at + 1).min(rest.len())
 }
 
-/// Length of a raw string, `r"…"` or `r#"…"#`, bytes too.
+/// Length of a raw string, `r"…"` or `r#"…"#`, including byte strings.
 fn raw(rest: &[char]) -> Option<usize> {
     let start = rest
         .iter()
@@ -175,7 +175,7 @@ fn raw(rest: &[char]) -> Option<usize> {
     Some(start + hashes + 1 + length + end.len())
 }
 
-/// Length of a character in quotes, or of the quote of a lifetime.
+/// Length of a character literal, or of the quote of a lifetime.
 fn quote(rest: &[char]) -> usize {
     if rest.get(1) == Some(&'\\') {
         let end = rest.iter().skip(3).position(|&letter| letter == '\'');
@@ -187,7 +187,7 @@ fn quote(rest: &[char]) -> usize {
     }
 }
 
-/// Drops what follows `#[cfg(test)]`: attributes, and an item to its `;` or closing brace.
+/// Removes the item after `#[cfg(test)]`: its attributes, and the item up to its `;` or closing brace.
 fn without_tests(words: &[String]) -> Vec<&str> {
     const TEST: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut kept = Vec::new();

@@ -1,7 +1,7 @@
-//! `cargo xtask test`: everything CI runs, cheapest first, stopping at the first failing step.
+//! `cargo xtask test`: every check of CI, cheapest first, stopping at the first failing step.
 //!
-//! Host crates are checked, tested and run in one profile, `release`, so that nothing large is
-//! compiled twice and what is tested is what a user runs.
+//! Host crates are checked, tested and run in one profile, `release`, so that nothing large is compiled twice and the tested code is the code that
+//! users run.
 
 mod report;
 mod steps;
@@ -18,19 +18,19 @@ use crate::program::Programs;
 use crate::setup::{self, Consent, Group};
 use crate::shell;
 
-/// One thing that is checked.
+/// One check.
 struct Step {
     name: &'static str,
     what: &'static str,
     run: fn(&mut Bench) -> Result<String>,
 }
 
-/// What steps share.
+/// State shared by the steps.
 struct Bench {
     root: PathBuf,
-    /// The programs, once the step `build` made them.
+    /// The programs, once the step `build` has made them.
     programs: Option<Programs>,
-    /// Tests counted in the step that runs.
+    /// Tests counted in the current step.
     counts: Counts,
 }
 
@@ -103,7 +103,7 @@ pub fn command(arguments: &[String]) -> Result<ExitCode> {
     })
 }
 
-/// Steps that the arguments ask for; `None` for `--list`.
+/// Steps selected by the arguments; `None` for `--list`.
 fn choose(arguments: &[String]) -> Result<Option<Vec<&'static Step>>> {
     let position = |name: &str| {
         STEPS.iter().position(|step| step.name == name).with_context(|| {
