@@ -274,5 +274,5 @@ pub fn the_log_is_readable(client: Client) -> Verdict {
             return Ok(line);
         }
     }
-    Err("no line of the log tells of the restart".into())
+    Err("no line of the log reports the restart".into())
 }

@@ -74,12 +74,12 @@ fn command(experiment: &dyn Experiment) -> Command {
                 .long("out")
                 .value_name("FOLDER")
                 .value_parser(value_parser!(PathBuf))
-                .help("Folder for tables (CSV) and charts (SVG and PNG); made where there is none"),
+                .help("Folder for tables (CSV) and charts (SVG and PNG); created if absent"),
         )
         .arg(
             flag("force")
                 .requires("out")
-                .help("Replace tables and charts that are there already"),
+                .help("Replace existing tables and charts"),
         );
     let parts = experiment.parts();
     if !parts.is_empty() {
@@ -89,7 +89,7 @@ fn command(experiment: &dyn Experiment) -> Command {
                 .long("map")
                 .value_name("MAP")
                 .value_parser(parts)
-                .help("Only the map of this name, that of its files"),
+                .help("Make only the map of this name, which is also the name of its files"),
         );
     }
     command

@@ -36,7 +36,7 @@ pub fn names() -> Vec<&'static str> {
 /// How a table is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
-    /// The shorter form: long measurements run on fewer cases, as each row's text says.
+    /// The shorter form: long measurements run on fewer cases, as each row's text states.
     pub quick: bool,
     /// The program `mortise`, for rows that measure one of its commands.
     pub program: &'a Path,

@@ -50,7 +50,10 @@ pub fn run(bench: &mut Bench) -> Result<String> {
     let mut seen = HashSet::new();
     loop {
         if let Some(status) = child.0.try_wait()? {
-            bail!("the program ended by itself ({status}); it said:\n{}", tail(&log));
+            bail!(
+                "the program ended by itself ({status}); its output:\n{}",
+                tail(&log)
+            );
         }
         if let Some(window) = visible_window(&screen.display) {
             take_picture(&screen.display, &window, &picture)?;
@@ -71,7 +74,7 @@ pub fn run(bench: &mut Bench) -> Result<String> {
         }
         if Instant::now() > deadline {
             bail!(
-                "no window that {} within {} s (picture: {}); the program said:\n{}",
+                "no window that {} within {} s (picture: {}); the program's output:\n{}",
                 if seen.is_empty() { "is drawn" } else { "moves" },
                 PATIENCE.as_secs(),
                 shown(&bench.root, &picture),
@@ -118,7 +121,10 @@ fn idle_share(root: &Path, program: &Path, screen: &Screen, place: &Path) -> Res
     let mut least = f64::INFINITY;
     while Instant::now() < deadline {
         if let Some(status) = child.0.try_wait()? {
-            bail!("the program ended by itself ({status}); it said:\n{}", tail(&log));
+            bail!(
+                "the program ended by itself ({status}); its output:\n{}",
+                tail(&log)
+            );
         }
         let Some(window) = visible_window(&screen.display) else {
             std::thread::sleep(Duration::from_millis(500));
@@ -227,7 +233,7 @@ impl Screen {
         std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line)?;
         if line.trim().is_empty() {
             bail!(
-                "Xvfb found no free display; it said:\n{}",
+                "Xvfb found no free display; its output:\n{}",
                 tail(&place.join("xvfb.log"))
             );
         }
