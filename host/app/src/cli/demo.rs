@@ -14,7 +14,7 @@ use super::{mistyped, window};
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// STEP file with a peg before a hole [default: the sample that comes with the program]
+    /// STEP file with a peg in front of a hole [default: the built-in sample]
     file: Option<PathBuf>,
     /// Without a window: play the insertion tick by tick and print what was measured
     #[arg(long)]

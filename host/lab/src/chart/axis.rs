@@ -28,7 +28,7 @@ impl Axis {
         }
         Some(match self.scale {
             AxisScale::Logarithmic => {
-                // A fifteenth of the span on either side, and at least a quarter of a power of ten in total.
+                // A fifteenth of the span on either side, and at least a tenth of a decade in total (0.24 / ln 10).
                 let room = ((high / low).ln() / 15.0).max(0.12).exp();
                 (low / room, high * room)
             }

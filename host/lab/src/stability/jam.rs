@@ -117,7 +117,7 @@ fn tilt(hole: f64, peg: f64, depth: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Distance of the push from the hole's axis at that tilt, derived from the contacts of wall and tip.
+/// Distance of the push from the hole's axis at that tilt, found from the wall at which the tip's edge touches.
 fn aside(hole: f64, peg: f64, depth: f64, height: f64) -> f64 {
     let (sin, cos) = tilt(hole, peg, depth).sin_cos();
     -0.5 * hole + 0.5 * peg * cos + (depth + height) * sin

@@ -61,7 +61,7 @@ pub struct Task {
 }
 
 impl Hand {
-    /// The worst hand of the distribution: largest offset and tilt, in opposing directions.
+    /// The worst hand of the distribution: largest offset and largest tilt, both in one plane.
     pub const WORST: Self = Self {
         off: [OFF, 0.0],
         tilt_deg: [0.0, TILT_DEG],
