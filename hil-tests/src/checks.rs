@@ -1,6 +1,6 @@
-//! What every rig must do, whatever the scene. Each check takes a connection and leaves the board idle.
+//! Checks that hold for every rig and scene. Each takes a connection and leaves the board idle.
 //!
-//! A check returns what it saw in one line, or what was wrong.
+//! A check returns a one-line observation, or what is wrong.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ use crate::described::descriptions_are_kept_and_driven;
 use crate::image;
 use crate::verdict::Verdict;
 
-/// A check by its name.
+/// A check with its name.
 pub type Check = (&'static str, fn(Client) -> Verdict);
 
 /// All checks.
@@ -49,7 +49,7 @@ fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String>
     if holds { Ok(()) } else { Err(otherwise()) }
 }
 
-/// Every parameter has its default, takes its bounds, and refuses what is beyond them, naming the range.
+/// Every parameter has its default, accepts its bounds, and refuses values beyond them, stating the range.
 pub fn parameters_keep_their_ranges(client: Client) -> Verdict {
     for row in PARAMETERS {
         let id = row.id;
@@ -93,7 +93,7 @@ fn scene(client: &Client) -> Result<Option<u32>, String> {
     Ok(fine(client.refresh_capabilities())?.scene)
 }
 
-/// Another layout, damaged, too large, incomplete: each refused with its reason, the scene in use stays.
+/// Scenes of another layout, damaged, too large, or incomplete: each is refused with its reason, and the scene in use stays.
 pub fn bad_scenes_are_refused(client: Client) -> Verdict {
     let good = image(3000, 1);
     fine(client.upload(&good, &mut |_| {}))?;
@@ -123,7 +123,7 @@ pub fn bad_scenes_are_refused(client: Client) -> Verdict {
     ensure(matches!(reason, Refusal::SceneIncomplete { .. }), || {
         format!("incomplete: {reason:?}")
     })?;
-    // Whatever is left of it.
+    // Discard the incomplete upload, if there is one.
     let _ = client.request(ToDevice::SceneAbort);
     let found = scene(&client)?;
     ensure(found == in_use, || {
@@ -132,7 +132,7 @@ pub fn bad_scenes_are_refused(client: Client) -> Verdict {
     Ok("layout, damaged, too large, incomplete".into())
 }
 
-/// An upload cut off after some chunks by a restart: the old scene is still in use. (Every boundary with power lost: `host/rig` tests.)
+/// An upload interrupted by a restart after some chunks: the old scene is still in use. (Power loss at every boundary: `host/rig` tests.)
 pub fn cut_uploads_leave_the_old_scene(client: Client) -> Verdict {
     let (old, new) = (image(4 * MAX_CHUNK + 12, 4), image(6 * MAX_CHUNK + 100, 5));
     fine(client.upload(&old, &mut |_| {}))?;
@@ -159,7 +159,7 @@ pub fn cut_uploads_leave_the_old_scene(client: Client) -> Verdict {
     Ok(format!("{} cuts", chunks + 1))
 }
 
-/// Bytes that are no frames, and frames with flipped bits, change nothing; the next message is answered.
+/// Invalid bytes, and frames with flipped bits, change nothing; the next message is answered.
 pub fn garbage_does_no_harm(client: Client) -> Verdict {
     const PIECES: u64 = 200;
     let before = fine(client.statistics(false))?.bad_frames;
@@ -170,7 +170,7 @@ pub fn garbage_does_no_harm(client: Client) -> Verdict {
                 seed ^= seed << 13;
                 seed ^= seed >> 7;
                 seed ^= seed << 17;
-                // No delimiters inside: one bad frame a piece.
+                // No delimiters inside: one bad frame per piece.
                 (seed as u8).max(1)
             })
             .collect();
@@ -184,7 +184,7 @@ pub fn garbage_does_no_harm(client: Client) -> Verdict {
     Ok(format!("{bad} pieces thrown away"))
 }
 
-/// A host of another version is told the board's, and then nothing is carried out for it but STOP.
+/// A host of another version receives the board's version; after that no command of its is carried out but STOP.
 pub fn another_version_is_shut_out(client: Client) -> Verdict {
     let own = Version::own();
     let other = Version {
@@ -207,7 +207,7 @@ pub fn another_version_is_shut_out(client: Client) -> Verdict {
     Ok("refused until greeted by its own version".into())
 }
 
-/// Armed, then STOP: stopped, and it stays so until cleared. In lockstep too, where no tick runs meanwhile: STOP waits for none.
+/// Armed, then STOP: stopped, and stays so until cleared. The same in lockstep, where no tick runs meanwhile: STOP waits for no tick.
 pub fn stop_stops(client: Client) -> Verdict {
     fine(client.upload(&image(500, 6), &mut |_| {}))?;
     if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
@@ -235,7 +235,7 @@ pub fn stop_stops(client: Client) -> Verdict {
     Ok("stopped until cleared".into())
 }
 
-/// A second of ticks with nothing to do: none is missed. Only where a deadline means something: not on a PC's own clock.
+/// One second of idle ticks: none is missed. Only on rigs with a real deadline, not on a PC's clock.
 pub fn idle_ticks_are_on_time(client: Client) -> Verdict {
     const TICKS: u32 = 1000;
     fine(client.statistics(true))?;
@@ -254,14 +254,14 @@ pub fn idle_ticks_are_on_time(client: Client) -> Verdict {
     Ok(format!("{} ticks, 0 missed", statistics.ticks))
 }
 
-/// A restarted board says so in its log, in words: the log's frames and the firmware's ELF fit together. The simulation has no log, and a real
-/// board's ELF is not known.
+/// A restarted board writes so to its log, in words: the log's frames match the firmware's ELF. The simulation has no log, and a real board's ELF is
+/// not known.
 pub fn the_log_is_readable(client: Client) -> Verdict {
     if client.capabilities().cost_unit != CostUnit::Instructions {
         return Ok("no log here whose words are known".into());
     }
     let client = fine(client.restart())?;
-    // Log has the lowest rank on the link: it comes when there is nothing else to say.
+    // Log frames have the lowest priority on the link and arrive when it is otherwise idle.
     for _ in 0..50 {
         fine(client.run(1))?;
         let found = client.events().try_iter().find_map(|event| match event {
@@ -272,5 +272,5 @@ pub fn the_log_is_readable(client: Client) -> Verdict {
             return Ok(line);
         }
     }
-    Err("no line of the log tells of the restart".into())
+    Err("no line of the log reports the restart".into())
 }

@@ -1,4 +1,4 @@
-//! Rigs by their description: every example is sent, kept over a restart, driven, and gives the same bits wherever it is simulated.
+//! Rigs by their description: every example is sent, kept over a restart, driven, and gives the same bits on every simulation.
 
 use mortise_protocol::message::{HandScript, Keyframe, Refusal, ToDevice, WirePose};
 use mortise_protocol::rig::Rig;
@@ -15,10 +15,10 @@ const EXAMPLES: [(&str, &str); 4] = [
     ),
     ("polhem", include_str!("../../firmware/rigs/polhem.toml")),
 ];
-/// Ticks the hand takes, and rests.
+/// Ticks of the hand's motion, and of its rest.
 const TICKS: u32 = 400;
 
-/// See the module. A board whose mechanism is compiled in has to say so.
+/// See the module. A board with a built-in mechanism must report so.
 pub fn descriptions_are_kept_and_driven(client: Client) -> Verdict {
     let mut client = client;
     let mut said = Vec::new();
@@ -65,7 +65,7 @@ fn in_process(rig: &Rig) -> Result<u64, String> {
     drive(&client.restart().map_err(words)?, rig)
 }
 
-/// A hand takes the handle 10 mm along each axis; the state hash of that, if the handle went where it can.
+/// Moves the handle 10 mm along each axis by the hand; returns the state hash if the handle went where the joints allow.
 fn drive(client: &Client, rig: &Rig) -> Result<u64, String> {
     client.request(ToDevice::ResetScene).map_err(words)?;
     client
@@ -102,7 +102,7 @@ fn drive(client: &Client, rig: &Rig) -> Result<u64, String> {
         .map(|(a, b)| (a - b) * (a - b))
         .sum::<f32>()
         .sqrt();
-    // Of the 17 mm the part along what the joints allow: all for three, at least a third for one, less what friction holds.
+    // Of the 17 mm, the part along the directions of the joints: all with three, at least a third with one, minus what friction holds.
     if !(0.002..0.02).contains(&moved) {
         return Err(format!(
             "{}: the handle moved {moved} m, from {home:?} to {end:?}",
@@ -112,9 +112,9 @@ fn drive(client: &Client, rig: &Rig) -> Result<u64, String> {
     Ok(ran.state_hash)
 }
 
-/// Where the last sample has the handle.
+/// Position of the handle in the last sample.
 fn position(client: &Client) -> Result<[f32; 3], String> {
-    // The sample may come behind the answer to the run, but not behind this one.
+    // The sample may arrive after the answer to the run, but not after this answer.
     client.run(0).map_err(words)?;
     let samples = client.events().try_iter().filter_map(|event| match event {
         Event::Telemetry(sample) => Some(sample.handle.position),

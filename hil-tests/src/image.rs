@@ -1,11 +1,11 @@
-//! A scene image without parts, of any size: for checks of the link that need no geometry.
+//! A scene image without parts, of any size, for checks of the link that need no geometry.
 
 use mortise_protocol::image::{CRC, Header, LAYOUT_VERSION, MAGIC};
 
 /// Sections in a header; the last is the blob.
 const SECTIONS: usize = 10;
 
-/// A sound scene image without parts: a header and `filling` bytes (rounded up to 4) that depend on `seed`.
+/// A valid scene image without parts: a header and `filling` bytes (rounded up to 4) that depend on `seed`.
 pub fn image(filling: usize, seed: u8) -> Vec<u8> {
     let head = size_of::<Header>();
     let filling = filling.next_multiple_of(4);

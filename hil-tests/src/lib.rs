@@ -1,7 +1,7 @@
-//! Hardware in the loop: the same scenarios and link checks against the simulated rig, the emulated board, and a real one.
+//! Hardware in the loop: the same scenarios and link checks on the simulated rig, the emulated board, and a real one.
 //!
-//! Scenarios are the files in `scenarios/`; [`scenarios`] finds them, `tests/bench.rs` runs them. [`checks`] are what a rig must do that no
-//! scenario shows: refuse with the reason, survive garbage, keep its scene when an upload is cut off, stop.
+//! Scenarios are the files in `scenarios/`; [`scenarios`] lists them, `tests/bench.rs` runs them. [`checks`] tests what no scenario covers: a rig
+//! must refuse with a reason, ignore garbage, keep its scene when an upload is interrupted, and stop.
 
 pub mod checks;
 mod described;
@@ -12,13 +12,13 @@ use std::path::{Path, PathBuf};
 
 pub use image::image;
 
-/// Names a real port; then everything that needs no simulated hand runs there too.
+/// Name of a real port, on which everything that needs no simulated hand then runs too.
 pub const PORT_VARIABLE: &str = "MORTISE_PORT";
 
-/// The scenario files, by name.
+/// Paths of the scenario files, sorted by name.
 ///
 /// # Errors
-/// What the operating system says; an empty folder.
+/// Error of the operating system, or an empty folder.
 pub fn scenarios() -> std::io::Result<Vec<PathBuf>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let mut files = Vec::new();

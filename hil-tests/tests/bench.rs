@@ -1,7 +1,7 @@
-//! Runs every scenario and every check on every rig there is to be: the simulation and the emulated board always, a real one when
-//! `MORTISE_PORT` or `--port NAME` names it.
+//! Runs every scenario and every check on every rig: always on the simulation and the emulated board, and on a real one when `MORTISE_PORT` or
+//! `--port NAME` names it.
 //!
-//! A missing emulator or firmware, or a port that cannot be opened, fails: a bench that tests nothing must not look as if it had.
+//! A missing emulator or firmware, or a port that cannot be opened, is a failure: a bench without rigs must not appear to pass.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use mortise_scenario::ScenarioError;
 use mortise_scenario::{Outcome, PreparedScene, Scenario, connect, run_on};
 
 fn main() -> ExitCode {
-    // First: this program is also the process that reads STEP files for itself.
+    // First, because STEP files are read in a child process that is this same program.
     mortise_brep::child::init();
     let mut arguments: Vec<String> = std::env::args().collect();
     let port = match take_port(&mut arguments) {
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// `--port NAME` or `--port=NAME`, else the environment's; taken out of the arguments.
+/// Removes `--port NAME` or `--port=NAME` from the arguments; without it, the environment's port.
 fn take_port(arguments: &mut Vec<String>) -> Result<Option<String>, String> {
     let flag = arguments
         .iter()
@@ -98,7 +98,7 @@ fn trials(port: Option<String>) -> Result<Vec<Trial>, String> {
     Ok(trials)
 }
 
-/// QEMU's other way out, in a process of its own because the environment chooses it.
+/// QEMU over TCP instead, in a separate process because an environment variable selects it.
 fn over_tcp() -> Result<(), Failed> {
     let output = std::process::Command::new(std::env::current_exe()?)
         .args(["--exact", "emulated::idle_ticks_are_on_time"])
@@ -119,7 +119,7 @@ fn run_check((name, check): Check, spec: &RigSpec) -> Result<(), Failed> {
     Ok(())
 }
 
-/// Values made once, by whoever asks first; the others wait for it. A failure is not kept.
+/// Cache of values: the first caller computes a value and the others wait for it. A failure is not kept.
 struct Once<K, V>(Mutex<HashMap<K, Slot<V>>>);
 
 type Slot<V> = Arc<Mutex<Option<V>>>;
@@ -146,7 +146,7 @@ impl<K: std::hash::Hash + Eq, V: Clone> Once<K, V> {
     }
 }
 
-/// Scenes baked and outcomes measured, so that comparing two rigs does not measure them again.
+/// Baked scenes and measured outcomes, so that comparing two rigs does not measure them again.
 #[derive(Default)]
 struct Bench {
     scenes: Once<String, Arc<PreparedScene>>,
@@ -199,7 +199,7 @@ impl Bench {
         }
     }
 
-    /// The board computes what this computer computes, to the bit; and computes it again the same.
+    /// The board computes the same bits as this computer, and the same again in a second run.
     fn equal(&self, file: &Path, sim: &RigSpec, emulated: &RigSpec) -> Result<(), Failed> {
         let scenario = Scenario::load(file)?;
         let here = self.outcome(file, &scenario, sim)?.state_hash;

@@ -1,7 +1,7 @@
-//! The program `mortise`: the window, the commands, and the state both share.
+//! The program `mortise`: the window, the commands, and the state that both share.
 //!
-//! [`session`] holds everything that happens and knows no window; [`ui`] draws it; [`viewport`] draws the parts; [`cli`] is the
-//! same without a window, and all that a build without the feature `window` has.
+//! [`session`] holds the state and does not depend on the window; [`ui`] draws it; [`viewport`] draws the parts; [`cli`] is the same without a
+//! window, and the whole program in a build without the feature `window`.
 
 pub mod cli;
 #[cfg(feature = "window")]

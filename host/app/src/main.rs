@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // First: this program is also the process that reads STEP files for itself.
+    // First, because STEP files are read in a child process that is this same program.
     mortise_brep::child::init();
     mortise::cli::main()
 }

@@ -1,8 +1,8 @@
-//! How force and engagement go over an insertion: the blend of the thesis beside the default guidance.
+//! Force and engagement over an insertion: the blend of the thesis beside the default guidance.
 //!
-//! A hand 1 mm and 2° off, trembling, takes a peg from above its hole through it; what touches is recognised and sent as in the window. Told are
-//! each tick's force on the handle, what the constraint pulls with, its engagement and how far off the axis the peg is. The thesis' blend
-//! (Faas 2010, eqs. 13–19) pulls with x·0.8·k_T; its weight x is read off the force the board tells of, |f|/(0.8·k_T·d).
+//! An operator model, 1 mm and 2° off and trembling, moves a peg from above its hole through it; contacts are recognised and targets sent as in the
+//! window. Each tick reports the force on the handle, the force of the constraint, its engagement, and the peg's distance from the axis. The thesis'
+//! blend (Faas 2010, eqs. 13–19) pulls with x·0.8·k_T; its weight x is computed from the force that the board reports, |f|/(0.8·k_T·d).
 
 use std::fmt;
 
@@ -24,22 +24,22 @@ use crate::guided::{SIM, inserted, insertion, largest_step, play_to};
 use crate::table::rounded;
 use crate::variant::Variant;
 
-/// Clearances, mm: one that any hand gets in, and one that none does; a chart each.
+/// Clearances, mm, one chart each: one at which any operator succeeds, and one at which none does.
 pub const CLEARANCES_MM: [f64; 2] = [1.0, 0.02];
 /// Cell of the field, mm: d₀ of the thesis.
 const CELL_MM: f64 = 0.5;
-/// Stiffness of the thesis' constraint spring over the coupling's.
+/// Stiffness of the thesis' constraint spring as a share of the coupling's.
 const THESIS_SHARE: f64 = 0.8;
-/// Nearer to the axis than this, mm, the thesis' weight is not read off a force: single precision has nanometres there.
+/// Smallest distance from the axis, mm, at which the thesis' weight is computed from a force: single precision resolves nanometres there.
 const LEAST_OFF_MM: f64 = 0.01;
-/// Of so many ticks one is kept for table and chart.
+/// Table and chart keep one tick of this many.
 const KEPT_TICKS: usize = 5;
 
 /// How a part is guided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Guided {
-    /// Stiff up to a cap.
+    /// Saturating spring: stiff up to a cap.
     Default,
     /// The blend of Faas 2010.
     Thesis,
@@ -48,26 +48,26 @@ pub enum Guided {
 /// Both, the default first.
 pub const METHODS: [Guided; 2] = [Guided::Default, Guided::Thesis];
 
-/// A moment of an insertion.
+/// One kept tick of an insertion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Moment {
     /// How it is guided.
     pub guided: Guided,
     /// Hole's diameter less the peg's, mm.
     pub clearance_mm: f64,
-    /// Since the hand began to move, s.
+    /// Time since the hand began to move, s.
     pub t_s: f64,
-    /// How far the peg is in, mm; negative above the hole.
+    /// Depth of the peg in the hole, mm; negative above it.
     pub depth_mm: f64,
-    /// Peg's centre of mass off the hole's axis, mm.
+    /// Distance of the peg's centre of mass from the hole's axis, mm.
     pub off_axis_mm: f64,
     /// Force on the handle, N.
     pub handle_n: f64,
-    /// What the constraint pulls with, N.
+    /// Force of the constraint, N.
     pub pull_n: f64,
     /// Engagement a, 0 to 1.
     pub engagement: f64,
-    /// Weight of the constraint: the engagement, times x of the thesis where its blend guides; absent where that cannot be told.
+    /// Weight of the constraint: the engagement, times x of the thesis where its blend guides; absent where it cannot be determined.
     pub weight: Option<f64>,
 }
 
@@ -78,27 +78,27 @@ pub struct Course {
     pub guided: Guided,
     /// Hole's diameter less the peg's, mm.
     pub clearance_mm: f64,
-    /// How far the peg came, mm; the hole is 40 mm deep.
+    /// Final depth of the peg, mm; the hole is 40 mm deep.
     pub depth_mm: f64,
-    /// When it was through, s; absent when it was not.
+    /// Time at which the peg was through, s; absent when it never was.
     pub through_s: Option<f64>,
     /// Largest force on the handle, N.
     pub peak_n: f64,
     /// Largest change of that force between two ticks, N, landing included.
     pub step_n: f64,
-    /// The same of the torque, mN m.
+    /// Largest change of the torque on the handle between two ticks, mN m, landing included.
     pub step_mnm: f64,
-    /// Farthest off the axis once guidance has settled, µm; absent when it never did.
+    /// Largest distance from the axis once guidance has settled, µm; absent when it never did.
     pub off_axis_um: Option<f64>,
-    /// What happened when.
+    /// The kept ticks.
     #[serde(skip)]
     pub moments: Vec<Moment>,
 }
 
-/// Plays both methods at every clearance; `quick` takes the first clearance only. Each course goes to `out`.
+/// Plays both methods at every clearance; `quick` takes the first clearance only. Passes each course to `out`.
 ///
 /// # Errors
-/// Anything that keeps an insertion from being played.
+/// Anything that prevents an insertion from being played.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Course)) -> Result<Vec<Course>, LabError> {
     let clearances = &CLEARANCES_MM[..if quick { 1 } else { CLEARANCES_MM.len() }];
     let mut courses = Vec::new();
@@ -205,7 +205,7 @@ fn moments(
         .collect()
 }
 
-/// How far the moving point is off the fixed axis of a concentric target, mm: d of the thesis.
+/// Distance of the moving point from the fixed axis of a concentric target, mm: d of the thesis.
 fn off_target_mm(target: &ConstraintTarget, scene: &PreparedScene, sample: &Telemetry) -> f64 {
     let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let fixed = scene.report.parts[usize::from(target.static_part)].model_part;
@@ -219,7 +219,7 @@ fn off_target_mm(target: &ConstraintTarget, scene: &PreparedScene, sample: &Tele
     from.reject_from_normalized(axis.normalize()).length()
 }
 
-/// The courses of one clearance, above one another: force on the handle, weight of the constraint, distance from the axis.
+/// Panels of one clearance, stacked: force on the handle, weight of the constraint, distance from the axis.
 fn charts(courses: &[&Course]) -> Vec<Chart> {
     let clearance = courses.first().map_or(f64::NAN, |course| course.clearance_mm);
     type Quantity = fn(&Moment) -> Option<f64>;
@@ -346,8 +346,8 @@ impl Experiment for Blend {
 mod tests {
     use super::*;
 
-    /// What is read off the force is the thesis' weight: with the cell as d₀ and the peg upright, x = ½ + ½e^(−d/d₀) at least where θ is small.
-    /// Half a millimetre of the hand's millimetre stays, k_T/(k_T + x·0.8·k_T) at the least.
+    /// The weight computed from the force is the thesis': with the cell as d₀ and the peg upright, x is at least ½ + ½e^(−d/d₀) where θ is small. At
+    /// least k_T/(k_T + x·0.8·k_T), about half, of the hand's 1 mm offset remains.
     #[test]
     fn the_thesis_stays_off_and_the_default_does_not() {
         let courses = sweep(true, &mut |_| {}).expect("played");
@@ -361,7 +361,7 @@ mod tests {
             let Some(weight) = moment.weight else { continue };
             assert!((0.0..=1.001).contains(&weight), "{moment:?}");
             if moment.engagement == 1.0 && moment.depth_mm > 5.0 {
-                // e^(−d/d₀) of the offset that this weight leaves; θ adds up to as much again.
+                // e^(−d/d₀) of the offset that remains at this weight; θ adds at most as much again.
                 let least = 0.5 * (-moment.off_axis_mm / CELL_MM).exp();
                 assert!(weight > 0.8 * least, "{moment:?}, at least {least}");
                 weights += 1;

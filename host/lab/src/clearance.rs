@@ -1,9 +1,10 @@
-//! The smallest clearance that assembles: a peg in its hole, without any help from constraints, pushed by a trembling hand.
+//! The smallest clearance that assembles: a peg pushed into its hole by a trembling hand, without constraints.
 //!
-//! The scenario is `host/lab/data/tight_insertion.toml`; for each way to model the scene, the border between what goes and what does not is looked
-//! for by halves: what goes at one clearance is taken to go at all larger ones. The hand is 0.3 mm off the axis and leans by 2°, so that the peg is
-//! pressed to both sides of its hole all the way. A trial goes when the peg comes to where the hand wants it, no surface lies deeper in another in any
-//! tick than the radial clearance (closed form, see `exact_fit`: else it went through the wall, not the hole), and the hand felt no more than 3 N.
+//! The scenario is `host/lab/data/tight_insertion.toml`. For each model of the scene, bisection finds the limit between success and failure, assuming
+//! that a model that succeeds at one clearance succeeds at all larger ones. The hand is 0.3 mm off the axis and leans by 2°, so that the peg is
+//! pressed against both sides of its hole all the way. A trial succeeds when the peg reaches the hand's end position, no surface lies deeper in
+//! another in any tick than the radial clearance (closed form, see `exact_fit`: else it went through the wall, not the hole), and the force on the
+//! handle stays within 3 N.
 
 use std::fmt;
 
@@ -35,17 +36,17 @@ pub struct Trial {
     pub cell_mm: f64,
     /// Hole's diameter less the peg's, mm.
     pub clearance_mm: f64,
-    /// Whether it goes.
+    /// True if the trial succeeds.
     pub goes: bool,
-    /// What does not hold, where it does not; empty otherwise.
+    /// The condition that fails, if one does; empty otherwise.
     pub why: String,
-    /// How far the peg came, mm; the hole is 40 mm deep.
+    /// Depth that the peg reached, mm; the hole is 40 mm deep.
     pub inserted_mm: Option<f64>,
     /// Deepest penetration in any tick, closed form, mm.
     pub penetration_mm: Option<f64>,
     /// Largest force on the handle, N.
     pub peak_force_n: Option<f64>,
-    /// Ticks in which points were left out, %.
+    /// Ticks with decimated points, %.
     pub left_out_percent: Option<f64>,
     /// Bytes of the scene image.
     pub image_bytes: Option<usize>,
@@ -54,7 +55,7 @@ pub struct Trial {
 /// Plays one insertion on the rig `spec`.
 ///
 /// # Errors
-/// Anything that keeps it from being played but a fault of the board, which only means that it does not go.
+/// Anything that prevents playing the insertion, except a fault of the board, which only makes the trial fail.
 pub fn trial(variant: &Variant, fit: &Fit, spec: &RigSpec) -> Result<(Trial, Option<Outcome>), LabError> {
     let file = fit.file()?;
     let mut scenario = Scenario::parse(SCENARIO, "tight_insertion")?;
@@ -101,8 +102,8 @@ pub fn trial(variant: &Variant, fit: &Fit, spec: &RigSpec) -> Result<(Trial, Opt
     Ok((trial, Some(outcome)))
 }
 
-/// Tries `clearances_mm`, descending, by halves on the in-process rig; each trial goes to `out`. Gives the smallest that goes, mm: the next smaller
-/// one, if there is one, was tried and does not go.
+/// Bisects `clearances_mm` (descending) on the in-process rig; passes each trial to `out`. Returns the smallest clearance that succeeds, mm: the next
+/// smaller one, if there is one, was tried and fails.
 ///
 /// # Errors
 /// As [`trial`].
@@ -113,7 +114,7 @@ pub fn smallest(
 ) -> Result<Option<f64>, LabError> {
     let simulated = RigSpec::Simulated { realtime: false };
     let (mut goes, mut stuck) = (0, clearances_mm.len());
-    // All before `goes` go, none from `stuck` on.
+    // All indices before `goes` succeed, all from `stuck` on fail.
     while goes < stuck {
         let middle = usize::midpoint(goes, stuck);
         let (trial, _) = trial(variant, &Fit::thesis(clearances_mm[middle]), &simulated)?;
@@ -127,7 +128,7 @@ pub fn smallest(
     Ok(goes.checked_sub(1).map(|last| clearances_mm[last]))
 }
 
-/// The ways to model the scene that the chart compares; `quick` has one cell of each kind.
+/// The models of the scene that the chart compares; `quick` has one cell of each kind.
 pub fn variants(quick: bool) -> Vec<Variant> {
     let cells: &[f64] = if quick { &[1.0] } else { &CELLS_MM };
     let kinds: [fn(f64) -> Variant; 3] = [Variant::textbook, Variant::field, |cell| {
@@ -138,7 +139,7 @@ pub fn variants(quick: bool) -> Vec<Variant> {
         .collect()
 }
 
-/// Smallest clearance over cell, one line for each kind.
+/// Smallest clearance over cell size, one line for each kind.
 pub fn chart(trials: &[Trial]) -> Chart {
     let mut series: Vec<Series> = Vec::new();
     for trial in trials {
@@ -168,7 +169,7 @@ pub fn chart(trials: &[Trial]) -> Chart {
             point.label = format!("{} µm", (um * 10.0).round() / 10.0);
             point.at_least = false;
         } else if !trial.goes && point.at_least && um > point.y {
-            // Until one goes, the smallest that goes is larger than the largest that was tried.
+            // Start from the largest clearance tried, a lower bound until a trial succeeds.
             point.y = um;
             point.label = format!("not even {} mm", trial.clearance_mm);
         }
@@ -249,7 +250,7 @@ impl Experiment for Clearance {
 mod tests {
     use super::*;
 
-    /// The textbook's voxels are wider than the gap, whatever the hand does; exact faces know no cell.
+    /// The textbook's voxels are wider than the gap, whatever the hand does; analytic faces do not depend on the cell.
     #[test]
     fn a_field_goes_where_voxels_stick() {
         let simulated = RigSpec::Simulated { realtime: false };
@@ -263,8 +264,8 @@ mod tests {
         assert!(!voxels.goes && !voxels.why.is_empty(), "{voxels}");
     }
 
-    /// A peg that leans leaves its hole with one side pressed to the rim: it hooked behind it and stopped 40.05 mm deep of 42, for the samples of the
-    /// rim stood before the peg's end by the 0.2 µm that its side was in the wall.
+    /// A leaning peg leaves its hole with one side pressed against the rim. It once hooked behind the rim and stopped 40.05 mm deep of 42, because
+    /// the samples of the rim stood 0.2 µm, the depth of its side in the wall, in front of the peg's end.
     #[test]
     fn a_leaning_peg_does_not_hook_behind_the_rim() {
         let simulated = RigSpec::Simulated { realtime: false };
@@ -294,7 +295,7 @@ mod tests {
             left_out_percent: None,
             image_bytes: None,
         };
-        // In the order halves are tried.
+        // In the order in which bisection tries them.
         let trials = [
             trial(2.0, 0.5, false),
             trial(2.0, 1.0, false),

@@ -1,11 +1,11 @@
-//! What the contact law makes of the exact surfaces: the force on the moving part that its pointshell and the other parts' would get if every
-//! distance were the exact surface's.
+//! The contact law evaluated on the exact surfaces: the force on the moving part that both pointshells would produce if every distance were that of
+//! the exact surface.
 //!
-//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, φ its signed distance from the other part's exact surface at the end of the tick
-//! (f64, CAD faces: no field, no image but for where the points are), φ̇ its change over the tick, along the exact surface's normal. That
-//! is held against the contact force the board tells of the same tick.
+//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell; φ is its signed distance from the other part's exact surface at the end of the
+//! tick (f64, CAD faces; no field; of the image only the positions of the points), φ̇ its change over the tick, along the exact surface's normal. The
+//! sum is compared with the contact force that the board reports for the same tick.
 //!
-//! The poses are told in single precision: half a unit in the last place of 0.05 m and of a quaternion is 2 nm each at the peg's rim, 0.8 mN a point
+//! Poses are reported in single precision: half a unit in the last place of 0.05 m and of a quaternion is 2 nm each at the peg's rim, 0.8 mN a point
 //! at 200 kN/m.
 
 use glam::{DAffine3, DVec3};
@@ -18,22 +18,22 @@ use mortise_scenario::{Body, PreparedScene};
 
 use crate::error::LabError;
 
-/// Farther off than this, mm, a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.
+/// Distance, mm, beyond which a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.
 const REACH_MM: f64 = 0.02;
 
 /// One tick's contact force on the moving part, N.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pushed {
-    /// As told.
+    /// As the board reports it.
     pub told: DVec3,
-    /// By the exact surfaces.
+    /// On the exact surfaces.
     pub exact: DVec3,
 }
 
-/// Every pair of neighbouring ticks of `samples`.
+/// Contact force of every pair of consecutive ticks of `samples`.
 ///
 /// # Errors
-/// `Input`, never for what the baker wrote.
+/// `Input`, never for images that the baker wrote.
 pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec<Pushed>, LabError> {
     let shells = shells(scene)?;
     let bodies = scene.bodies();
@@ -68,7 +68,7 @@ pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec
     Ok(all)
 }
 
-/// Sum over points of gap (mm), rate (mm/s) and direction.
+/// Sum over points given by gap (mm), rate (mm/s) and direction.
 fn force(points: &[(f64, f64, DVec3)]) -> DVec3 {
     let law = Settings::default().contact;
     let touching = points.iter().filter(|(gap, ..)| *gap < 0.0).count().max(1);
@@ -79,7 +79,7 @@ fn force(points: &[(f64, f64, DVec3)]) -> DVec3 {
         .sum()
 }
 
-/// Points of each part's shell, mm, its shape's frame.
+/// Points of each part's shell, mm, in its shape's frame.
 fn shells(scene: &PreparedScene) -> Result<Vec<Vec<DVec3>>, LabError> {
     let mut words = vec![0u32; scene.image.len().div_ceil(4)];
     bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..scene.image.len()].copy_from_slice(&scene.image);
@@ -95,7 +95,7 @@ fn shells(scene: &PreparedScene) -> Result<Vec<Vec<DVec3>>, LabError> {
         .collect())
 }
 
-/// How far points are known to be clear of a body: a distance changes by no more than its point moves.
+/// Distance by which points are known to be clear of a body: a distance changes by no more than its point moves.
 struct Clear {
     at: Vec<DVec3>,
     distance: Vec<f64>,
@@ -109,7 +109,8 @@ impl Clear {
         }
     }
 
-    /// Gap, rate and outward normal (of `body`, its frame) of every point within reach, moved from the first to the second of `to_body` in a tick.
+    /// Gap, rate and outward normal (frame of `body`) of every point within reach; the pose changes from the first of `to_body` to the second in one
+    /// tick.
     fn touching(
         &mut self,
         points: &[DVec3],

@@ -1,5 +1,5 @@
-//! Contacts of the shared test parts, held against what others found: `expected.json`, which an independent program made, and counts that other
-//! systems' exports of the same assemblies have.
+//! Contacts of the shared test parts compared with independent results: `expected.json`, written by an independent program, and counts from other
+//! systems' exports of the same assemblies.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,17 +11,17 @@ use serde::Deserialize;
 
 use crate::LabError;
 
-/// (kind, part, part) with the names in order, and how many patches.
+/// Number of patches by (kind, part, part), the names in order.
 type Pairs = BTreeMap<(String, String, String), usize>;
 
-/// The motor, whose counts are known from Iacob et al. 2008 too.
+/// The motor, whose counts are also known from Iacob et al. 2008.
 pub const MOTOR: &str = "05_motor/motor_flat.step";
 /// The fixture of many parts.
 pub const FIXTURE: &str = "real/o2ac_fixture_diagonal.step";
-/// Spelt in a way the checker's own reader finds nothing in: the flat motor.
+/// The flat motor in a spelling that the checker's own reader does not recognise.
 const MOTOR_SPELT_OTHERWISE: &str = "08_hard/ok_comments_before_equals.step";
 
-/// Assemblies with known numbers of planar and cylindrical pairs, and of no others.
+/// Assemblies with known numbers of planar and cylindrical pairs, and no other pairs.
 pub const COUNTED: [(&str, usize, usize); 5] = [
     (MOTOR, 14, 21),
     ("real/as1-oc-214.stp", 16, 22),
@@ -30,25 +30,25 @@ pub const COUNTED: [(&str, usize, usize); 5] = [
     ("real/dn_flex_assembly.step", 1, 6),
 ];
 
-/// A file whose contacts were looked for.
+/// Result of finding the contacts of one file.
 #[derive(Clone, Debug)]
 pub struct Checked {
     /// Path below the folder of test parts.
     pub file: String,
-    /// Pairs of parts in contact, each kind for itself.
+    /// Pairs of parts in contact, counted for each kind separately.
     pub contacts: usize,
-    /// What differs from what was expected; `None` when nothing does.
+    /// Difference from the expected contacts; `None` when there is none.
     pub wrong: Option<String>,
 }
 
-/// What is written about a file.
+/// Entry of `expected.json` for one file.
 #[derive(Clone, Deserialize)]
 struct Expected {
     parts: Vec<String>,
     contacts: Vec<(String, String, String, usize)>,
 }
 
-/// Looks for the contacts of every file that `expected.json` in `cad` lists, pair by pair.
+/// Finds the contacts of every file that `expected.json` in `cad` lists and compares them pair by pair.
 ///
 /// # Errors
 /// `Unreadable` when the list cannot be read.
@@ -85,7 +85,7 @@ pub fn expected(cad: &Path) -> Result<Vec<Checked>, LabError> {
 
 fn differs(path: &Path, expected: &Expected) -> Result<(usize, Option<String>), LabError> {
     let model = load_step(path)?;
-    // The checker's names, some of which are not decoded; the order of parts is the same.
+    // The checker's names, some of which are not decoded; the parts are in the same order.
     let names: Vec<&str> = (expected.parts.iter())
         .map(|path| path.rsplit('/').next().unwrap_or(path))
         .collect();
@@ -112,7 +112,7 @@ fn pairs(names: &[&str], contacts: &[Contact]) -> Pairs {
     pairs
 }
 
-/// How many contacts an assembly has, and the time they took.
+/// Number of contacts of an assembly, and the time to find them.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted {
     /// Parts.
@@ -129,7 +129,7 @@ pub struct Counted {
     pub fit_mm: f64,
 }
 
-/// Looks for the contacts of one file.
+/// Finds the contacts of one file.
 ///
 /// # Errors
 /// `Brep`.

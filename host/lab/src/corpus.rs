@@ -1,6 +1,7 @@
 //! The shared test parts: every file is read, every real assembly is baked and one of its parts moved.
 //!
-//! The folder is named by `MORTISE_SHARED`, or lies beside the repository as `shared`; where it is absent nothing is measured and the caller says so.
+//! The environment variable `MORTISE_SHARED` names the folder; without it the folder is `shared` beside the repository. Without the folder nothing is
+//! measured, and the caller reports so.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,10 +18,10 @@ use mortise_scenario::{Bounds, Hand, Key, Run, Scenario, ScenarioError, Scene, S
 use self::written::Written;
 use crate::LabError;
 
-/// How far the hand takes a part along each axis, mm.
+/// How far the hand moves a part along each axis, mm.
 const SWEEP_MM: f64 = 30.0;
 
-/// The shared parts' `cad` folder, if it is there.
+/// The shared parts' `cad` folder, if it exists.
 pub fn folder() -> Option<PathBuf> {
     let shared = match std::env::var_os("MORTISE_SHARED") {
         Some(named) => PathBuf::from(named),
@@ -29,17 +30,17 @@ pub fn folder() -> Option<PathBuf> {
     Some(shared.join("cad")).filter(|cad| cad.is_dir())
 }
 
-/// What reading one file came to.
+/// Result of reading one file.
 #[derive(Clone, Debug)]
 pub struct Import {
     /// Path below the folder.
     pub file: String,
-    /// What differs from what is written about the file; `None` when nothing does.
+    /// Difference from the expected result; `None` when there is none.
     pub wrong: Option<String>,
 }
 
 impl Import {
-    /// What its refusal must say, where it must be refused.
+    /// Text that the refusal must contain, where the file must be refused.
     pub fn refusal(&self) -> Option<&'static str> {
         match written::of(&self.file)? {
             Written::Refused(why) => Some(why),
@@ -48,14 +49,14 @@ impl Import {
     }
 }
 
-/// What is written about a file beside it.
+/// Entry of `expected.json` for one file.
 #[derive(Deserialize)]
 struct Expected {
     parts: Vec<String>,
 }
 
-/// Reads every STEP file below `cad` and holds it against `expected.json`, parts by name, or against what is written here. A file on which nothing is
-/// written is wrong, and so is one that is written about and not there.
+/// Reads every STEP file below `cad` and compares it with `expected.json`, parts by name, or with the results listed in `corpus/written.rs`. A file
+/// without an expected result fails, and so does a listed file that is missing.
 ///
 /// # Errors
 /// `Unreadable` when the folder or `expected.json` cannot be read.
@@ -70,7 +71,7 @@ pub fn imports(cad: &Path) -> Result<Vec<Import>, LabError> {
             path: list,
             source: error.into(),
         })?;
-    // The list's own kernel reads nothing from this spelling of the motor.
+    // The kernel that made the list reads nothing from this spelling of the motor.
     if let Some(flat) = expected
         .get("05_motor/motor_flat.step")
         .map(|flat| flat.parts.clone())
@@ -128,22 +129,22 @@ fn judge(file: &str, expected: Option<&Expected>, read: Result<CadModel, BrepErr
     }
 }
 
-/// Whether a part's `name` is the `wanted` one. The list joins the tree's levels with slashes, and its kernel puts a number where a name has no
-/// ASCII letter.
+/// True if a part's `name` is the `wanted` one. The list joins the tree's levels with slashes, and its kernel substitutes a number for a name without
+/// ASCII letters.
 fn is_named(name: &str, wanted: &str) -> bool {
     let wanted = wanted.rsplit('/').next().unwrap_or(wanted);
     let numbered = wanted.chars().all(|c| c.is_ascii_digit());
     name == wanted || (numbered && !name.is_ascii())
 }
 
-/// What baking a real assembly and moving one of its parts came to.
+/// Result of baking a real assembly and moving one of its parts.
 #[derive(Clone, Debug)]
 pub struct Moved {
     /// File name.
     pub file: String,
-    /// The part moved, and bytes of the image; or why the file cannot be used.
+    /// The part moved, and the image's size in bytes; or why the file cannot be used.
     pub outcome: Result<(String, usize), String>,
-    /// A fault, a panic of the rig or the like: what must not happen.
+    /// True after a fault, a panic of the rig or the like, none of which may happen.
     pub failed: bool,
 }
 
@@ -184,7 +185,7 @@ pub fn assemblies(cad: &Path, seconds: f64) -> Result<Vec<Moved>, LabError> {
     Ok(moved)
 }
 
-/// A hand that takes the smallest part with a volume to and fro along each axis.
+/// Scenario whose hand moves the smallest part with a volume to and fro along each axis.
 fn sweep(path: &Path, model: &CadModel, seconds: f64) -> (Scenario, String) {
     let volume = |index: usize| {
         let volume = model.shapes[model.parts[index].shape].volume_mm3;

@@ -1,4 +1,4 @@
-//! Why an experiment could not be made.
+//! Errors of experiments.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use mortise_brep::BrepError;
 use mortise_rig::RigError;
 use mortise_scenario::ScenarioError;
 
-/// Why an experiment could not be made. A bound that does not hold is no error but a verdict.
+/// Why an experiment could not be run. A bound that does not hold is not an error but a verdict.
 #[derive(Debug, thiserror::Error)]
 pub enum LabError {
     /// A file of the experiment could not be read.
@@ -14,7 +14,7 @@ pub enum LabError {
     Unreadable {
         /// File.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A file could not be written.
@@ -22,13 +22,13 @@ pub enum LabError {
     Unwritable {
         /// File or folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A table or chart is not written.
+    /// A table or chart cannot be written.
     #[error(transparent)]
     Output(#[from] mortise_output::OutputError),
-    /// Something given to an experiment cannot be used.
+    /// An input of an experiment cannot be used.
     #[error("{name}: {what}")]
     Input {
         /// File, with the line where there is one.
@@ -42,9 +42,9 @@ pub enum LabError {
     /// There are no figures of this name.
     #[error("there are no figures named `{name}`; there are: {known}")]
     NoSuchFigures {
-        /// Asked for.
+        /// The requested name.
         name: String,
-        /// Names there are.
+        /// The known names.
         known: String,
     },
     /// A program of the experiment could not be run.
@@ -52,7 +52,7 @@ pub enum LabError {
     Program {
         /// Program.
         program: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }

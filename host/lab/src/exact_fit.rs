@@ -1,16 +1,16 @@
-//! Peg in hole in closed form: how deep the two solids overlap at a pose, how far the peg is tilted, and how far its tip is off the axis.
+//! Peg in hole in closed form: depth of the overlap of the two solids at a pose, tilt of the peg, and distance of its tip from the axis.
 //!
-//! An oracle that shares nothing with the force law: no field, no pointshell, no tessellation; f64 throughout. The peg is a cylinder between two
-//! planes, the block six planes and a bore (see [`crate::fit`]). Inside either solid the distance to its surface is the least of the distances to
-//! its faces, for the foot of the nearest one always lies on that face. The penetration is the largest such distance of any point of one surface inside the other solid;
-//! it is attained
+//! A reference that shares nothing with the force law: no field, no pointshell, no tessellation; f64 throughout. The peg is a cylinder between two
+//! planes, the block six planes and a bore (see [`crate::fit`]). Inside either solid the distance to its surface is the least of the distances to its
+//! faces, because the foot of the nearest one always lies on that face. The penetration is the largest such distance of any point of one surface
+//! inside the other solid; it is attained
 //!
 //! * for the peg's surface on its rims, or on a generator of its side where that leaves the block or its depth changes from one face to another: the
 //!   distance to the bore's axis is convex along a straight line, that to a plane linear;
 //! * for the block's surface on the rims of the bore, or on a generator of the bore, along which the depth in the peg is concave.
 //!
-//! Rims and generators are followed in 0.5° steps, and the best step is refined by golden sections: what a step leaves out of the depth is below
-//! r/2·(0.25°)² ≈ 0.1 µm for the sharpest case, two rims that cross, before the refinement. Cost: some 50 µs a pose that touches.
+//! Rims and generators are sampled in 0.5° steps, and golden-section search refines the best step. Before the refinement a step underestimates the
+//! depth by less than r/2·(0.25°)² ≈ 0.1 µm in the sharpest case, two rims that cross. Cost: about 50 µs for a pose in contact.
 
 use std::f64::consts::TAU;
 
@@ -21,7 +21,7 @@ use crate::fit::Fit;
 
 /// Steps round a rim.
 const STEPS: u32 = 720;
-/// Golden sections of the best step, each a factor of 0.618.
+/// Golden-section iterations on the best step, each a factor of 0.618.
 const SECTIONS: u32 = 24;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
@@ -29,11 +29,11 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ExactFit {
     fit: Fit,
-    /// World to peg where the file places it.
+    /// World to the peg's frame at its placement in the file.
     placed: DAffine3,
 }
 
-/// `scene`, known to be made from `fit`: penetration is then measured in closed form.
+/// `scene`, which must be made from `fit`, with its penetration measured in closed form.
 pub(crate) fn made_from(scene: PreparedScene, fit: Fit) -> PreparedScene {
     let exact = ExactFit::of(&scene, fit);
     scene.with_closed_form(Box::new(move |pose| exact.penetration_mm(pose)))
@@ -43,7 +43,7 @@ pub(crate) fn made_from(scene: PreparedScene, fit: Fit) -> PreparedScene {
 #[derive(Clone, Copy, Debug)]
 struct Peg {
     tip: DVec3,
-    /// From the tip to the other end, and two directions square to it.
+    /// From the tip to the other end, and two directions perpendicular to it.
     axis: DVec3,
     across: [DVec3; 2],
     radius: f64,
@@ -70,25 +70,25 @@ impl ExactFit {
         }
     }
 
-    /// Deepest point of either solid's surface inside the other, mm, with the peg's shape at `pose`; 0 when nowhere inside.
+    /// Deepest point of either solid's surface inside the other, mm, with the peg's shape at `pose`; 0 without overlap.
     pub fn penetration_mm(&self, pose: &DAffine3) -> f64 {
         self.overlap(&self.peg(pose))
     }
 
-    /// Angle between the peg's axis and the hole's, degrees, and how far the middle of the peg's leading end is off the hole's axis, mm.
+    /// Angle between the peg's axis and the hole's, degrees, and distance of the middle of the peg's leading end from the hole's axis, mm.
     pub fn leaning(&self, pose: &DAffine3) -> (f64, f64) {
         let peg = self.peg(pose);
         let tilt = peg.axis.truncate().length().atan2(peg.axis.z);
         (tilt.to_degrees(), peg.tip.truncate().length())
     }
 
-    /// How far the leading end's lowest point lies below the block's top, mm.
+    /// Depth of the leading end's lowest point below the block's top, mm.
     pub fn depth_mm(&self, pose: &DAffine3) -> f64 {
         let peg = self.peg(pose);
         peg.radius * peg.axis.truncate().length() - peg.tip.z
     }
 
-    /// How deep `p` lies in the block; negative outside.
+    /// Depth of `p` in the block; negative outside.
     fn in_block(&self, p: DVec3) -> f64 {
         let half = 0.5 * self.fit.width_mm;
         (p.truncate().length() - 0.5 * self.fit.hole_mm)
@@ -104,7 +104,7 @@ impl ExactFit {
         let rims = [0.0, peg.length].map(|s| round(|angle| self.in_block(peg.side(angle, s))));
         let mouths = [0.0, -height].map(|z| round(|angle| peg.contains(on_bore(angle, z))));
         let side = round(|angle| self.along_side(peg, angle));
-        // Along the bore's wall a depth changes by no more than the tilt's sine a millimetre.
+        // Along the bore's wall a depth changes by at most the sine of the tilt per millimetre.
         let change = 0.5 * height * peg.axis.truncate().length();
         let wall = round(|angle| {
             let most = peg.radial(on_bore(angle, -0.5 * height)) + change;
@@ -118,26 +118,26 @@ impl ExactFit {
             .fold(0.0, f64::max)
     }
 
-    /// Deepest place of one generator of the peg's side in the block: at its ends within the block, or where it is as far from the bore as from the
+    /// Deepest point of one generator of the peg's side in the block: at its ends within the block, or where it is as far from the bore as from the
     /// block's top or bottom.
     fn along_side(&self, peg: &Peg, angle: f64) -> f64 {
         let at = |s: f64| peg.side(angle, s);
         let climb = peg.axis.z;
         if climb.abs() < 1e-6 {
-            // It lies on its side: no insertion gets there.
+            // The peg lies on its side, which no insertion reaches.
             return f64::NEG_INFINITY;
         }
         let when = |z: f64| ((z - at(0.0).z) / climb).clamp(0.0, peg.length);
         let (bottom, top) = (when(-self.fit.height_mm), when(0.0));
         let beyond = |s: f64| at(s).truncate().length() - 0.5 * self.fit.hole_mm;
-        // Convex: where neither end is in the wall nothing between them is.
+        // Convex: if neither end is in the wall, no point between them is.
         if beyond(bottom) <= 0.0 && beyond(top) <= 0.0 {
             return f64::NEG_INFINITY;
         }
         let middle = 0.5 * (bottom + top);
         [top, bottom]
             .map(|end| {
-                // From the end on, where the plane is as near as can be, to where the bore's wall is nearer.
+                // From the end, where the plane is nearest, to where the bore's wall is nearer.
                 let (mut near, mut far) = (end, middle);
                 for _ in 0..40 {
                     let s = 0.5 * (near + far);
@@ -161,26 +161,26 @@ impl ExactFit {
 }
 
 impl Peg {
-    /// A point of the side, `s` from the tip.
+    /// A point of the side at distance `s` from the tip.
     fn side(&self, angle: f64, s: f64) -> DVec3 {
         let out = self.across[0] * angle.cos() + self.across[1] * angle.sin();
         self.tip + out * self.radius + self.axis * s
     }
 
-    /// How deep `q` lies in the peg as if that had no ends; negative outside.
+    /// Depth of `q` in the peg's infinite cylinder; negative outside.
     fn radial(&self, q: DVec3) -> f64 {
         let from = q - self.tip;
         self.radius - (from - self.axis * from.dot(self.axis)).length()
     }
 
-    /// How deep `q` lies in the peg; negative outside.
+    /// Depth of `q` in the peg; negative outside.
     fn contains(&self, q: DVec3) -> f64 {
         let s = (q - self.tip).dot(self.axis);
         self.radial(q).min(s).min(self.length - s)
     }
 }
 
-/// Largest value round a circle.
+/// Largest value on a circle.
 fn round(of: impl Fn(f64) -> f64) -> f64 {
     let step = TAU / f64::from(STEPS);
     let (mut at, mut most) = (0.0, f64::NEG_INFINITY);
@@ -191,7 +191,7 @@ fn round(of: impl Fn(f64) -> f64) -> f64 {
             (at, most) = (angle, value);
         }
     }
-    // Far from touching nobody asks how far.
+    // Far from contact the exact value is not needed.
     if most < -1e-3 {
         return most;
     }

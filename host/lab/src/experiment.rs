@@ -1,4 +1,4 @@
-//! What an experiment is: a name, a run in a whole and a quick form, and the rows and charts that the run finds.
+//! The interface of an experiment: a name, a full and a quick run, and the rows and charts that a run finds.
 
 use std::fmt;
 
@@ -14,31 +14,31 @@ pub trait Experiment: Sync {
     /// Name of its command, and the start of its files' names.
     fn name(&self) -> &'static str;
 
-    /// What it finds, one line.
+    /// Its result in one line.
     fn about(&self) -> &'static str;
 
-    /// What the quick form has, one line.
+    /// Scope of the quick form, one line.
     fn quick(&self) -> &'static str;
 
-    /// Names of the tables that a run may find, without their ending.
+    /// Names of the tables that a run may write, without extension.
     fn rows(&self) -> Vec<String>;
 
-    /// Names of the charts, likewise.
+    /// Names of the charts, without extension.
     fn charts(&self) -> Vec<String>;
 
-    /// Parts that can be run alone, each named as its one table and its one chart; none where it has no parts.
+    /// Parts that can be run alone, each named as its one table and its one chart; empty where it has no parts.
     fn parts(&self) -> Vec<&'static str> {
         Vec::new()
     }
 
-    /// Runs it; `report` gets each result as soon as it is measured.
+    /// Runs it; calls `report` with each result as soon as it is measured.
     ///
     /// # Errors
-    /// Anything that keeps a trial from being made.
+    /// Anything that prevents a trial.
     fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError>;
 }
 
-/// How much of an experiment is run.
+/// Scope of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Form<'f> {
     /// The quick form.
@@ -47,10 +47,10 @@ pub struct Form<'f> {
     pub only: Option<&'f str>,
 }
 
-/// Takes results as they are measured.
+/// Receives results as they are measured.
 pub type Report<'r> = dyn FnMut(&dyn Line) + 'r;
 
-/// One result: words for a person, JSON for a program.
+/// One result: text for a person, JSON for a program.
 pub trait Line: fmt::Display {
     /// One JSON object.
     ///
@@ -65,7 +65,7 @@ impl<T: Serialize + fmt::Display> Line for T {
     }
 }
 
-/// What a run found: tables, and charts of one panel or several above one another.
+/// Results of a run: tables, and charts of one panel or several stacked ones.
 #[derive(Debug, Default)]
 pub struct Findings {
     rows: Vec<(String, Vec<u8>)>,
@@ -73,10 +73,10 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// With a table of plain structs, as CSV.
+    /// Adds a table of plain structs, as CSV.
     ///
     /// # Errors
-    /// `Input` for rows that are no table.
+    /// `Input` for rows that do not form a table.
     pub fn rows<T: Serialize>(mut self, name: impl Into<String>, rows: &[T]) -> Result<Self, LabError> {
         let name = name.into();
         let table = csv(rows).map_err(|error| LabError::Input {
@@ -87,12 +87,12 @@ impl Findings {
         Ok(self)
     }
 
-    /// With a chart.
+    /// Adds a chart.
     pub fn chart(self, name: impl Into<String>, chart: Chart) -> Self {
         self.stack(name, vec![chart])
     }
 
-    /// With charts above one another in one file, the first on top.
+    /// Adds stacked charts in one file, the first on top.
     pub fn stack(mut self, name: impl Into<String>, charts: Vec<Chart>) -> Self {
         self.charts.push((name.into(), charts));
         self
@@ -113,7 +113,7 @@ impl Findings {
     }
 }
 
-/// Names of the files that a run may write; of one part alone, where `only` names one.
+/// Names of the files that a run may write; of one part alone if `only` names one.
 pub fn files(experiment: &dyn Experiment, only: Option<&str>) -> Vec<String> {
     let wanted = |name: &String| only.is_none_or(|only| only == name);
     let tables = (experiment.rows().into_iter().filter(wanted)).map(|name| format!("{name}.csv"));

@@ -26,7 +26,7 @@ pub const ALL: &[&dyn Experiment] = &[
 mod tests {
     use super::*;
 
-    /// A file's name says which experiment made it.
+    /// A file's name begins with that of its experiment.
     #[test]
     fn names_differ_and_files_are_named_after_their_experiment() {
         for (index, experiment) in ALL.iter().enumerate() {

@@ -1,6 +1,6 @@
-//! Pegs in holes as STEP files: the same two parts with any dimensions, so that a sweep needs no file for each of its steps.
+//! Pegs in holes as STEP files: the same two parts with any dimensions, so that a sweep needs no file for each step.
 //!
-//! World: block's top at z = 0, hole along z through the origin, the peg above or in it. Parts are named `block` and `peg`.
+//! World frame: block's top at z = 0, hole along z through the origin, the peg above or in it. Parts are named `block` and `peg`.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use tempfile::{Builder, NamedTempFile};
 
 use crate::error::LabError;
 
-/// The two parts with names in place of numbers; faces are planes and cylinders only.
+/// The two parts with placeholders instead of numbers; faces are planes and cylinders only.
 const TEMPLATE: &str = include_str!("../data/peg_in_hole.step.in");
 
 /// A peg and a block with a through hole, mm.
@@ -24,7 +24,7 @@ pub struct Fit {
     pub peg_mm: f64,
     /// Length of the peg.
     pub length_mm: f64,
-    /// How far the peg is in the hole, where the file places it; negative above it.
+    /// Depth of the peg in the hole at its placement in the file, mm; negative above it.
     pub engaged_mm: f64,
 }
 
@@ -53,20 +53,20 @@ impl Fit {
         }
     }
 
-    /// The same, placed elsewhere along the hole.
+    /// The same fit with the peg placed elsewhere along the hole.
     pub const fn engaged(self, engaged_mm: f64) -> Self {
         Self { engaged_mm, ..self }
     }
 
-    /// Hole's diameter less the peg's, mm.
+    /// Hole's diameter minus the peg's, mm.
     pub fn clearance_mm(&self) -> f64 {
-        // To the nanometre that the file has.
+        // Rounded to the nanometres of the file.
         ((self.hole_mm - self.peg_mm) * 1e6).round() / 1e6
     }
 
     /// Its STEP text.
     pub fn step_text(&self) -> String {
-        // Nanometres: finer than the kernel's own tolerance.
+        // To nanometres: finer than the kernel's own tolerance.
         let number = |value: f64| format!("{value:.6}");
         [
             ("@half@", 0.5 * self.width_mm),
@@ -83,7 +83,7 @@ impl Fit {
         })
     }
 
-    /// Its STEP file, removed when dropped: the CAD kernel reads files only.
+    /// A temporary STEP file, removed when dropped: the CAD kernel reads files only.
     ///
     /// # Errors
     /// `Unwritable`.
@@ -110,7 +110,7 @@ mod tests {
 
     use super::*;
 
-    /// The kernel's own volume and extent of what the template says.
+    /// Compares the kernel's own volume and extent with those of the template's dimensions.
     #[test]
     fn the_parts_have_the_dimensions_asked_for() {
         for fit in [

@@ -1,4 +1,4 @@
-//! A scene, a hand, and a guide that answers telemetry: what most rows play.
+//! A scene, an operator model, and a guide that responds to telemetry: the setup of most rows.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -42,7 +42,7 @@ pub(crate) fn file(text: &str) -> Result<NamedTempFile, LabError> {
     })
 }
 
-/// One point of a hand's way.
+/// One keyframe of the hand.
 pub(crate) fn key(t_s: f64, offset_mm: [f64; 3], turn_deg: [f64; 3]) -> Key {
     Key {
         t_s,
@@ -52,14 +52,14 @@ pub(crate) fn key(t_s: f64, offset_mm: [f64; 3], turn_deg: [f64; 3]) -> Key {
     }
 }
 
-/// The guided insertion, 1 mm and 2° off with a tremor of 0.2 mm at 10 Hz, with nothing on the table yet.
+/// The guided insertion, 1 mm and 2° off with a tremor of 0.2 mm at 10 Hz, its scene not yet set.
 pub(crate) fn script(step: &Path) -> Result<Scenario, LabError> {
     let mut scenario = Scenario::parse(GUIDED, "guided-fit")?;
     scenario.scene.step = step.to_owned();
     Ok(scenario)
 }
 
-/// The guided insertion of `fit`, from 20 mm above, 2 mm farther than through.
+/// The guided insertion of `fit`, from 20 mm above to 2 mm beyond through.
 pub(crate) fn insertion(fit: &Fit, step: &Path) -> Result<Scenario, LabError> {
     let mut scenario = script(step)?;
     scenario.hand.grip_mm = [0.0, 0.0, 0.5 * fit.length_mm - fit.engaged_mm];
@@ -80,7 +80,7 @@ pub(crate) fn insertion(fit: &Fit, step: &Path) -> Result<Scenario, LabError> {
     Ok(scenario)
 }
 
-/// Plays `scenario` with a guide that hears every sample.
+/// Plays `scenario` with a guide that receives every sample.
 pub(crate) fn play(
     scenario: &Scenario,
     scene: &PreparedScene,
@@ -90,7 +90,7 @@ pub(crate) fn play(
     play_with(scenario, scene, spec, &mut guide)
 }
 
-/// As [`play`], with a guide whose list is looked at afterwards.
+/// As [`play`], with a guide of the caller's, whose list can be inspected afterwards.
 pub(crate) fn play_with(
     scenario: &Scenario,
     scene: &PreparedScene,
@@ -102,7 +102,7 @@ pub(crate) fn play_with(
     Ok(record(&client, scenario, scene, Some(&mut listener))?)
 }
 
-/// Plays `scenario` while `listener` says what to send.
+/// Plays `scenario`; `listener` returns the messages to send.
 pub(crate) fn play_to(
     scenario: &Scenario,
     scene: &PreparedScene,
@@ -117,7 +117,7 @@ pub(crate) fn play_to(
     )?)
 }
 
-/// The first target that the guide makes of what touches when `scenario` is played in-process without any.
+/// The first target that the guide creates from the contacts when `scenario` is played in-process without any.
 pub(crate) fn known_target(scenario: &Scenario, scene: &PreparedScene) -> Result<ConstraintTarget, LabError> {
     let mut guide = scene.guide(GuideSettings::default());
     let mut found = None;
@@ -155,24 +155,24 @@ pub(crate) fn refreshed(target: ConstraintTarget) -> impl FnMut(&Telemetry) -> V
     }
 }
 
-/// Ticks after full engagement in which a part comes to its axis: 1 mm shrinks below 1 µm with τ = 20 ms.
+/// Ticks after full engagement until a part is on its axis: 1 mm decays below 1 µm with τ = 20 ms.
 const SETTLING_TICKS: u32 = 150;
 
-/// How an insertion went.
+/// Result of an insertion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inserted {
-    /// How deep at the end, and how deep the hole is, mm.
+    /// Depth at the end, and depth of the hole, mm.
     pub depth_mm: f64,
     pub hole_mm: f64,
-    /// When it was through, from the hand's start, s; NaN: never.
+    /// Time at which it was through, from the hand's start, s; NaN: never.
     pub after_s: f64,
-    /// How much later that was than the handle would have been there were the hand alone, s: what it waited, not the script.
+    /// Delay behind the time at which the script alone would have the handle through, s: the time lost in contact.
     pub behind_s: f64,
-    /// Farthest off the axis once guidance had settled, mm; NaN: it never did.
+    /// Largest distance from the axis once guidance had settled, mm; NaN: it never did.
     pub off_axis_mm: f64,
 }
 
-/// When the script itself has the middle of the part through, s from its start: the hand's way down is straight between keyframes.
+/// Time at which the script itself has the middle of the part through, s from its start: the hand's path down is straight between keyframes.
 fn hand_through_s(scenario: &Scenario, way_mm: f64) -> f64 {
     let down = |key: &Key| -key.offset_mm[2];
     (scenario.hand.keyframes.windows(2))
@@ -183,7 +183,7 @@ fn hand_through_s(scenario: &Scenario, way_mm: f64) -> f64 {
         })
 }
 
-/// Looks at an insertion's samples.
+/// Evaluates an insertion's samples.
 pub(crate) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Telemetry]) -> Inserted {
     let mut seen = Inserted {
         depth_mm: f64::NAN,
@@ -219,17 +219,17 @@ pub(crate) fn inserted(scenario: &Scenario, scene: &PreparedScene, samples: &[Te
     seen
 }
 
-/// How straight a peg stood once guidance had settled; NaN: it never did.
+/// Alignment of a peg once guidance had settled; NaN: it never did.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Course {
     /// Deepest penetration, mm.
     pub penetration_mm: f64,
-    /// Largest tilt, degrees, and farthest of the leading end's middle off the axis, mm.
+    /// Largest tilt, degrees, and largest distance of the leading end's middle from the axis, mm.
     pub tilt_deg: f64,
     pub tip_off_mm: f64,
 }
 
-/// Looks at every sample by closed form.
+/// Evaluates every sample in closed form.
 pub(crate) fn course(exact: &ExactFit, samples: &[Telemetry]) -> Course {
     let mut seen = Course {
         penetration_mm: f64::NAN,
@@ -251,7 +251,7 @@ pub(crate) fn course(exact: &ExactFit, samples: &[Telemetry]) -> Course {
     seen
 }
 
-/// Largest change of the handle's force (N) and torque (N m) between two samples a tick apart.
+/// Largest change of the handle's force (N) and torque (N m) between two consecutive ticks.
 pub(crate) fn largest_step(samples: &[Telemetry]) -> (f64, f64) {
     let of = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     (samples.windows(2))

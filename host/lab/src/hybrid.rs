@@ -1,14 +1,16 @@
-//! The hybrid method of Faas 2010, chapter 8, on voxmaps: tables 6 and fig. 35, and which of her two pegs goes in by which of her three methods.
+//! The hybrid method of Faas 2010, chapter 8, on voxmaps: table 6 and fig. 35, and which of the two pegs is assembled by which of the three methods.
 //!
-//! Voxels of 10 mm, a hole of 0.7 m, pegs of 0.65 and 0.69 m. Her methods: voxmap and pointshell alone; the hybrid method without constraint evaluation,
-//! in which the contacts of voxels of faces that can make a constraint give way; and with it, in which the constraint pulls besides (eqs. 13–19).
-//! Without evaluation her text does not say by how much contacts give way; here by the same x (eq. 15). Constraints are recognised from the faces
-//! that voxels in contact name, each tenth tick, as hers. Fourth, for comparison: the distance field with the default guidance.
+//! Voxels of 10 mm, a hole of 0.7 m, pegs of 0.65 and 0.69 m. The thesis' methods: voxmap and pointshell alone; the hybrid method without constraint
+//! evaluation, in which the contacts of voxels of faces that can form a constraint are softened; and with it, in which the constraint also pulls
+//! (eqs. 13–19). The text does not state by how much contacts are softened without evaluation; here it is the same x (eq. 15). Constraints are
+//! recognised from the faces that voxels in contact name, each tenth tick, as in the thesis. A fourth method, for comparison: the distance field with
+//! the default guidance.
 //!
-//! Her block's and pegs' other lengths are not printed. Lengths of 1 m for all give her numbers of voxels within a few percent ([`counts`]), so they are
-//! taken.
+//! The other lengths of block and pegs are not printed. Lengths of 1 m throughout reproduce the thesis' numbers of voxels within a few percent
+//! ([`counts`]), so they are used here.
 //!
-//! Update rates are those that the time of a tick allows, in-process on one core of this computer: as hers, a figure of a computer, not of a board.
+//! Update rates are those that the time of a tick allows, in-process on one core of this computer: like the thesis', a figure of a computer, not of a
+//! board.
 
 use std::fmt;
 
@@ -36,29 +38,29 @@ use crate::variant::Variant;
 const VOXEL_MM: f64 = 10.0;
 /// Diameters of the pegs, mm: high clearance, low clearance.
 pub const PEGS_MM: [f64; 2] = [650.0, 690.0];
-/// The peg ends so far beyond its hole, mm.
+/// Distance of the peg's end beyond its hole at the end of the script, mm.
 const BEYOND_MM: f64 = 10.0;
-/// Speed of the hand, mm/s; until it is off the axis and at the end, s.
+/// Speed of the hand, mm/s; time until it is off the axis, and at the end, s.
 const MM_PER_S: f64 = 400.0;
 const COMES_S: f64 = 0.3;
 const ENDS_S: f64 = 0.3;
-/// How an insertion begins: one thing changed at a time, the first as hers.
+/// Start condition of an insertion: each differs from the first, the thesis', in one respect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
-    /// In words.
+    /// Description.
     pub name: &'static str,
-    /// How far the peg is in at the start, mm; negative above the hole.
+    /// Depth of the peg at the start, mm; negative above the hole.
     engaged_mm: f64,
-    /// How far the hand is off: a share of the radial play, and degrees.
+    /// Offset of the hand: a share of the radial clearance, and degrees.
     off: f64,
     tilt_deg: f64,
-    /// Contact stiffness of a point, N/m; the default where there is none.
+    /// Contact stiffness of a point, N/m; `None`: the default.
     stiffness_n_per_m: Option<f32>,
-    /// The textbook's step: explicit, with ten points' worth of stiffness in all contacts together.
+    /// True for the textbook's explicit step, with the stiffness of ten points in all contacts together.
     explicit: bool,
 }
 
-/// All of them. Every hand trembles by 0.1 mm.
+/// All cases. Every hand trembles by 0.1 mm.
 pub const CASES: [Case; 5] = [
     FROM_ABOVE,
     Case {
@@ -92,26 +94,26 @@ const FROM_ABOVE: Case = Case {
     stiffness_n_per_m: None,
     explicit: false,
 };
-/// Constraints are evaluated each tenth frame, as hers.
+/// Ticks between evaluations of constraints, as in the thesis.
 const HEED_TICKS: u16 = 10;
-/// The median tick of so many is told.
+/// Ticks of a window; its median tick is reported.
 const WINDOW_TICKS: usize = 20;
 
-/// How contact is found and guided.
+/// Method of contact and guidance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Condition {
     /// Voxmap and pointshell alone.
     Voxels,
-    /// The hybrid method, contacts giving way, nothing pulling.
+    /// The hybrid method with softened contacts and no pull.
     HybridWithoutEvaluation,
     /// The hybrid method with the constraint's pull.
     Hybrid,
-    /// Distance field, default guidance.
+    /// Distance field and default guidance.
     DistanceField,
 }
 
-/// All of them, hers first.
+/// All methods, the thesis' first.
 pub const CONDITIONS: [Condition; 4] = [
     Condition::Voxels,
     Condition::HybridWithoutEvaluation,
@@ -119,18 +121,18 @@ pub const CONDITIONS: [Condition; 4] = [
     Condition::DistanceField,
 ];
 
-/// Some ticks.
+/// A window of consecutive ticks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Window {
-    /// How it begins.
+    /// Name of the case.
     pub case: &'static str,
-    /// How contact is found and guided.
+    /// Method of contact and guidance.
     pub condition: Condition,
     /// Diameter of the peg, mm.
     pub peg_mm: f64,
-    /// Since the hand began to move, s.
+    /// Time since the hand began to move, s.
     pub t_s: f64,
-    /// How far the peg is in, mm; negative above the hole.
+    /// Depth of the peg, mm; negative above the hole.
     pub depth_mm: f64,
     /// Force on the handle, N.
     pub handle_n: f64,
@@ -138,54 +140,54 @@ pub struct Window {
     pub targets: u8,
     /// Time of the median tick, µs.
     pub tick_us: f64,
-    /// The rate that it allows, Hz.
+    /// The rate that this time allows, Hz.
     pub rate_hz: f64,
 }
 
 /// An insertion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Course {
-    /// How it begins.
+    /// Name of the case.
     pub case: &'static str,
-    /// How contact is found and guided.
+    /// Method of contact and guidance.
     pub condition: Condition,
     /// Diameter of the peg, mm.
     pub peg_mm: f64,
-    /// Whether hers was assembled; absent for what she had not.
+    /// True if the thesis' peg was assembled; absent for methods that the thesis does not have.
     pub faas_through: Option<bool>,
-    /// Whether ours came through.
+    /// True if the peg came through here.
     pub through: bool,
-    /// How far it came, mm; the hole is 1 m deep.
+    /// Final depth, mm; the hole is 1 m deep.
     pub depth_mm: f64,
     /// Largest force on the handle, N.
     pub peak_n: f64,
-    /// Constraints that were recognised.
+    /// Names of the recognised constraints.
     pub recognised: String,
-    /// Faces of peg and block that touch at the end.
+    /// Faces of peg and block in contact at the end.
     pub touching: String,
-    /// Lowest update rate of hers in the low-clearance case, Hz: “above 800”, “not below 800”, “dropped to 100”.
+    /// The thesis' lowest update rate in the low-clearance case, Hz: “above 800”, “not below 800”, “dropped to 100”.
     pub faas_lowest_hz: Option<f64>,
-    /// Rate that the slowest window's median tick allows, Hz.
+    /// Rate allowed by the median tick of the slowest window, Hz.
     pub lowest_hz: f64,
-    /// What happened when.
+    /// All windows.
     #[serde(skip)]
     pub windows: Vec<Window>,
 }
 
-/// Voxels of a part, hers and ours.
+/// Numbers of voxels of a part in the thesis and here.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Count {
     /// Part.
     pub part: &'static str,
-    /// As printed in table 6.
+    /// Number printed in table 6.
     pub faas: u32,
-    /// Surface voxels of ours.
+    /// Surface voxels here.
     pub ours: u32,
-    /// Ours over hers less one, %.
+    /// Difference of the latter from the former, %.
     pub off_percent: f64,
 }
 
-/// Her pair, its lengths as in the module's documentation.
+/// The thesis' pair, its lengths as in the module's documentation.
 fn fit(peg_mm: f64, engaged_mm: f64) -> Fit {
     Fit {
         width_mm: 1000.0,
@@ -200,7 +202,7 @@ fn fit(peg_mm: f64, engaged_mm: f64) -> Fit {
 /// Table 6: surface voxels of the block and of both pegs.
 ///
 /// # Errors
-/// Anything that keeps a part from being baked.
+/// Anything that prevents a part from being baked.
 pub fn counts() -> Result<Vec<Count>, LabError> {
     let mut found = Vec::new();
     for (number, &peg) in PEGS_MM.iter().enumerate() {
@@ -257,11 +259,11 @@ fn surface_voxels(field: &Field<'_>) -> u32 {
     count
 }
 
-/// Plays every condition with both pegs, and the low-clearance one in every case; `quick` takes that one in the first case only. Each course goes to
+/// Plays every method with both pegs, and the low-clearance peg in every case; `quick` plays that peg in the first case only. Passes each course to
 /// `out`.
 ///
 /// # Errors
-/// Anything that keeps an insertion from being played.
+/// Anything that prevents an insertion from being played.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Course)) -> Result<Vec<Course>, LabError> {
     let mut plays: Vec<(f64, Case)> = vec![(PEGS_MM[1], CASES[0])];
     if !quick {
@@ -425,7 +427,7 @@ impl Condition {
         }
     }
 
-    /// Section 8.2: without evaluation both pegs were assembled, with it the low-clearance one was not, for want of update rate.
+    /// Section 8.2: without evaluation both pegs were assembled; with it the low-clearance one was not, because the update rate was too low.
     fn faas_through(self, peg_mm: f64) -> Option<bool> {
         let high = peg_mm == PEGS_MM[0];
         match self {
@@ -435,7 +437,7 @@ impl Condition {
         }
     }
 
-    /// In words.
+    /// Description.
     pub fn name(self) -> &'static str {
         match self {
             Self::Voxels => "voxels alone",
@@ -446,7 +448,7 @@ impl Condition {
     }
 }
 
-/// Fig. 35: the rate that ticks allow over the insertion of the low-clearance peg, hers beside.
+/// Fig. 35: the update rate that ticks allow over the insertion of the low-clearance peg, with the thesis' rates.
 pub fn chart(courses: &[Course]) -> Chart {
     let of: Vec<&Course> = courses
         .iter()

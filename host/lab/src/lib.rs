@@ -1,10 +1,9 @@
-//! Experiments: the figures the product is measured by, sweeps and studies. Scenarios and probes come from `mortise-scenario`.
+//! Experiments: the figures by which the product is measured, sweeps and studies. Scenarios and probes come from `mortise-scenario`.
 //!
-//! [`figures::figures`] measures every row of a named table. An [`experiment`] has a name, runs in a whole and a quick form and finds rows and
-//! charts; [`experiments::ALL`] lists them.
-//! [`clearance`] finds the smallest clearance that assembles, [`pareto`] holds accuracy against cost; [`chart`] and [`table`] write what sweeps find.
-//! [`rate`] and [`blend`] show an insertion tick by tick, the thesis' figures or method beside ours; [`study`] repeats its chapter 7.
-//! [`stability`] closes loops on one axis and finds where they become unstable.
+//! [`figures::figures`] measures every row of a named table. An [`experiment`] has a name and a full and a quick form, and its run finds rows and
+//! charts; [`experiments::ALL`] lists all experiments. [`clearance`] finds the smallest clearance that assembles, [`pareto`] compares accuracy with
+//! cost; [`chart`] and [`table`] write the results of sweeps. [`rate`] and [`blend`] show an insertion tick by tick, beside the thesis' figures or
+//! method; [`study`] repeats its chapter 7. [`stability`] closes loops on one axis and finds where they become unstable.
 
 pub mod blend;
 pub mod chart;

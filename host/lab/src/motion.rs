@@ -1,4 +1,4 @@
-//! Motions whose ticks are counted: a peg pressed to the wall of its hole and slid along it, and one moved where nothing is.
+//! Motions whose ticks are measured: a peg pressed to the wall of its hole and slid along it, and one moved in free air.
 
 use std::ops::ControlFlow;
 
@@ -14,34 +14,34 @@ use crate::variant::Variant;
 
 const PRESSED: &str = include_str!("../data/pressed.toml");
 
-/// How long the press grows, s.
+/// Time in which the press force grows, s.
 const PRESSED_S: f64 = 0.3;
-/// Farthest it slides either way, mm.
+/// Largest slide in either direction, mm.
 const SLIDE_MM: f64 = 40.0;
-/// A slide's shortest time either way, s.
+/// Shortest time of a slide in one direction, s.
 const SLIDE_S: f64 = 0.25;
-/// Slides.
+/// Number of slides.
 const SLIDES: usize = 4;
 
-/// Tilt of the peg on its rim, and how far the hand pushes on from where it touches: 2 N through 286 N/m.
+/// Tilt of the peg on its rim, degrees, and how far the hand pushes on from first contact: 2 N through 286 N/m.
 const RIM_DEG: f64 = 10.0;
 const RIM_PRESS_MM: f64 = 7.0;
 
-/// What the peg does.
+/// Motion of the peg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// In its hole, pulled to the wall with 5 N and slid along it at so many mm/s.
+    /// In its hole, pulled to the wall with 5 N and slid along it.
     Pressed {
-        /// mm/s.
+        /// Speed of the slide, mm/s.
         mm_per_s: f64,
     },
     /// 20 mm and more above the block, moved at 100 mm/s.
     Free,
-    /// Ten degrees tilted, set down with its lower rim on the block's top, 2 N, and slid along it: it touches at a point.
+    /// Tilted by ten degrees, its lower rim set down on the block's top with 2 N and slid along it: contact at one point.
     Rim,
 }
 
-/// The fit, placed for a motion, and the motion's scenario; its STEP file is not yet named.
+/// The fit, placed for a motion, and the motion's scenario, whose STEP file is not yet set.
 pub(crate) fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabError> {
     let mut scenario = Scenario::parse(PRESSED, "pressed")?;
     let key = |t_s: f64, offset_mm: [f64; 3]| Key {
@@ -52,14 +52,14 @@ pub(crate) fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabEr
     };
     match motion {
         Motion::Pressed { mm_per_s } => {
-            // As far out below as above, so that both rims press the peg's side.
+            // Extends as far below the block as above, so that both rims press the peg's side.
             let over = 0.5 * (fit.length_mm - fit.height_mm);
             let fit = fit.engaged(fit.height_mm + over);
             scenario.hand.grip_mm = [0.0, 0.0, -0.5 * fit.height_mm];
             let (gap, press) = (0.5 * fit.clearance_mm(), scenario.hand.keyframes[1].offset_mm[0]);
-            // Both rims stay at the peg's side, whichever way.
+            // Both rims stay at the peg's side in both directions.
             let slide = (mm_per_s * SLIDE_S).min(SLIDE_MM).min(0.8 * over);
-            // To the wall no faster than along it.
+            // The approach to the wall is no faster than the slide.
             let mut t = (gap / mm_per_s).max(0.01);
             scenario.hand.keyframes.truncate(1);
             scenario.hand.keyframes.push(key(t, [gap, 0.0, 0.0]));
@@ -77,7 +77,7 @@ pub(crate) fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabEr
         Motion::Rim => {
             let fit = fit.engaged(-5.0);
             scenario.hand.grip_mm = [0.0, 0.0, 5.0 + 0.5 * fit.length_mm];
-            // Outwards along the diagonal, where the top is whole, and lowest there.
+            // Outwards along the diagonal, where the top has no hole, and lowest there.
             let over = |t: f64, aside: f64, z: f64| Key {
                 turn_deg: [-RIM_DEG / f64::sqrt(2.0), RIM_DEG / f64::sqrt(2.0), 0.0],
                 ..key(t, [aside, aside, z])
@@ -123,11 +123,11 @@ pub(crate) fn script(fit: &Fit, motion: Motion) -> Result<(Fit, Scenario), LabEr
     }
 }
 
-/// Plays `motion` on the rig `spec`, with look-ups for at most `point_budget` points a tick if that is said. What the scenario itself asks (it does
-/// press; no tick is missed) is the caller's to look at: the second of what is given says what did not hold.
+/// Plays `motion` on the rig `spec`, with field queries for at most `point_budget` points a tick if it is given. The caller must check the scenario's
+/// own conditions (the peg presses, no tick is missed): the second returned value describes those that failed.
 ///
 /// # Errors
-/// Anything that keeps it from being played, a fault of the board too.
+/// Anything that prevents the motion from being played, including a fault of the board.
 pub fn play(
     variant: &Variant,
     fit: &Fit,
@@ -150,10 +150,10 @@ pub fn play(
     Ok((outcome, broken))
 }
 
-/// What baking a fit makes.
+/// Report on baking a fit.
 ///
 /// # Errors
-/// As [`play`], but nothing is played.
+/// As [`play`], except that nothing is played.
 pub fn report(variant: &Variant, fit: &Fit) -> Result<BakeReport, LabError> {
     let file = fit.file()?;
     let model = load_step(file.path())?;
@@ -170,7 +170,8 @@ pub fn report(variant: &Variant, fit: &Fit) -> Result<BakeReport, LabError> {
 mod tests {
     use super::*;
 
-    /// Press and slide do what their names say: the peg stays in the hole, at the wall, and a force is felt; free of it, nothing is.
+    /// Checks that the motions match their names: pressed, the peg stays in the hole, at the wall, with a force on the handle; free, there is no
+    /// force.
     #[test]
     fn pressed_is_at_the_wall_and_free_is_nowhere() {
         let simulated = RigSpec::Simulated { realtime: false };

@@ -1,8 +1,8 @@
-//! Accuracy against cost, one model beside the other: what a finer cell, a wider number or a denser shell buys.
+//! Accuracy against cost for several models: the effect of a finer cell, a wider number format or a denser shell.
 //!
-//! Accuracy is the largest error over scene P's poses ([`crate::scene_p`]) of what a tick acts on, the field's own distance, and for a few models the
-//! smallest clearance that assembles ([`crate::clearance`]). Cost is the longest tick of the emulated board, in instructions, while a peg with 0.2 mm
-//! clearance is pressed to the wall of its hole and slid along it; nanoseconds of a query on this computer; and bytes of the image.
+//! Accuracy is the largest error over scene P's poses ([`crate::scene_p`]) of the field's own distance, on which a tick acts, and for a few models
+//! the smallest clearance that assembles ([`crate::clearance`]). Cost is the longest tick of the emulated board, in instructions, while a peg with
+//! 0.2 mm clearance is pressed to the wall of its hole and slid along it; nanoseconds of a query on this computer; and bytes of the image.
 
 use std::fmt;
 
@@ -22,18 +22,18 @@ use crate::peer;
 use crate::scene_p::{self, By};
 use crate::variant::Variant;
 
-/// Clearance of the peg whose ticks are counted, mm.
+/// Clearance of the peg whose ticks are measured, mm.
 const COUNTED_MM: f64 = 0.2;
 /// Its slide along the wall, mm/s.
 const SLIDE_MM_PER_S: f64 = 10.0;
-/// How deep fields reach, mm: as deep as scene P penetrates, so that no error is the band's.
+/// Depth of the fields, mm: as deep as scene P penetrates, so that the band causes no error.
 const REACH_MM: f64 = 1.0;
 /// Bounds on the shell's error, as shares of the cell.
 const EPSILONS: [f64; 2] = [0.1, 0.01];
-/// How far the peer's meshes may leave the surfaces, mm.
+/// Largest deviation of the peer's meshes from the surfaces, mm.
 const PEER_DEFLECTIONS_MM: [f64; 4] = [0.1, 0.03, 0.01, 0.003];
 
-/// One model, how accurate and how dear it is.
+/// One model with its accuracy and cost.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Entry {
     /// Method and number format, or the peer.
@@ -46,7 +46,7 @@ pub struct Entry {
     pub gap_error_um: f64,
     /// Largest error of a penetration on scene P, µm.
     pub penetration_error_um: f64,
-    /// Smallest clearance that assembles, µm, where it was looked for.
+    /// Smallest clearance that assembles, µm, where it was determined.
     pub smallest_clearance_um: Option<f64>,
     /// Instructions of the longest tick on the emulated board.
     pub instructions: Option<u32>,
@@ -54,18 +54,18 @@ pub struct Entry {
     pub query_ns: f64,
     /// Bytes of scene P's image.
     pub image_bytes: Option<usize>,
-    /// No other of the sweep is both more accurate and takes fewer instructions.
+    /// True if no other model of the sweep is both more accurate and cheaper in instructions.
     pub on_frontier: bool,
 }
 
 impl Entry {
-    /// The larger of both errors, µm.
+    /// The larger of the two errors, µm.
     pub fn error_um(&self) -> f64 {
         self.gap_error_um.max(self.penetration_error_um)
     }
 }
 
-/// The models that are compared, and whether each's smallest clearance is looked for.
+/// The models to compare, each with whether its smallest clearance is determined.
 fn variants(quick: bool) -> Vec<(Variant, bool)> {
     let cells: &[f64] = if quick { &[1.0] } else { &CELLS_MM };
     let mut variants: Vec<(Variant, bool)> = (cells.iter())
@@ -85,10 +85,10 @@ fn variants(quick: bool) -> Vec<(Variant, bool)> {
     variants
 }
 
-/// Measures every model; each goes to `out` as soon as it is known. Gives all, the frontier marked.
+/// Measures every model; passes each to `out` as soon as it is known. Returns all of them, the frontier marked.
 ///
 /// # Errors
-/// Anything that keeps a model from being measured.
+/// Anything that prevents a model from being measured.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Entry)) -> Result<Vec<Entry>, LabError> {
     let mut entries = Vec::new();
     let mut tell = |entry: Entry| {
@@ -128,9 +128,9 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
     };
     let instructions = match play(variant, &Fit::thesis(COUNTED_MM), pressed, None, &board) {
         Ok((outcome, _)) => outcome.instructions_per_tick_max,
-        // A model too coarse for the fit pushes until the board gives up: it has no cost then.
+        // A model too coarse for the fit pushes until the board faults: it has no cost.
         Err(LabError::Scenario(ScenarioError::Fault { .. })) => None,
-        // One too large for the board is never looked at there.
+        // A model too large for the board has no cost either.
         Err(LabError::Scenario(ScenarioError::Rig(RigError::Refused {
             reason: Refusal::SceneTooLarge { .. },
             ..
@@ -156,7 +156,7 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
     })
 }
 
-/// Marks entries that none beats in error and instructions at once.
+/// Marks the entries that no other entry beats in both error and instructions.
 fn mark(entries: &mut [Entry]) {
     let cost = |entry: &Entry| Some((entry.error_um(), f64::from(entry.instructions?)));
     let costs: Vec<Option<(f64, f64)>> = entries.iter().map(cost).collect();
@@ -170,7 +170,7 @@ fn mark(entries: &mut [Entry]) {
     }
 }
 
-/// Error over instructions, the frontier as a stair.
+/// Error over instructions, the frontier as a staircase.
 pub fn ticks_chart(entries: &[Entry]) -> Chart {
     let instructions = |entry: &Entry| entry.instructions.map_or(f64::NAN, f64::from);
     let mut chart = Chart {
@@ -202,7 +202,7 @@ pub fn ticks_chart(entries: &[Entry]) -> Chart {
     chart
 }
 
-/// Error over time here, beside the peer.
+/// Error over query time on this computer, beside the peer's.
 pub fn time_chart(entries: &[Entry]) -> Chart {
     Chart {
         title: "Accuracy against the time of a query on a PC".into(),
@@ -230,7 +230,7 @@ fn series(entries: &[Entry], x: impl Fn(&Entry) -> f64, bytes: bool) -> Vec<Seri
             (Some(cell), _, Some(size)) if bytes && entry.on_frontier => {
                 format!("{cell} mm, {} KiB", (size as f64 / 1024.0).round())
             }
-            // The textbook's error is the same story told at every cell.
+            // The textbook's error bound adds nothing to a label: its error is the same at every cell.
             (Some(cell), ..) if !bytes || entry.epsilon_mm.is_none() => format!("{cell} mm"),
             (None, Some(deflection), _) => format!("{} µm mesh", 1e3 * deflection),
             _ => String::new(),
@@ -242,7 +242,7 @@ fn series(entries: &[Entry], x: impl Fn(&Entry) -> f64, bytes: bool) -> Vec<Seri
             at_least: false,
         });
     }
-    // A kind that has no value on this axis needs no place in the legend.
+    // A kind without a value on this axis is not listed in the legend.
     series.retain(|series| series.points.iter().any(|point| point.x.is_finite()));
     series
 }

@@ -1,7 +1,7 @@
-//! The same questions asked of another engine: parry3d, triangle meshes with a tree of boxes.
+//! The same queries answered by another engine: parry3d, triangle meshes with a tree of boxes.
 //!
-//! Gaps come from `query::distance`, which answers 0 for whatever overlaps; depths from `query::contact`, the deepest it finds over pairs of
-//! triangles. The meshes are the kernel's tessellation, as fine as asked. Source: <https://parry.rs>, as `Cargo.lock` has it.
+//! Gaps come from `query::distance`, which returns 0 for overlapping meshes; depths from `query::contact`, the deepest contact over pairs of
+//! triangles. The meshes are the kernel's tessellation at the requested deflection. Source: <https://parry.rs>, in the version of `Cargo.lock`.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -15,12 +15,12 @@ use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 use crate::error::LabError;
 use crate::scene_p::{self, Case, median};
 
-/// Times each query is made: what else the computer does makes one longer, never shorter, so the least is taken.
+/// Repetitions of each query: other load on the computer only lengthens it, so the shortest time is used.
 const REPEATS: usize = 5;
-/// A question that takes longer is asked once.
+/// A query that takes longer is made once, ns.
 const LONG_NS: f64 = 20e6;
 
-/// What it answered.
+/// Errors and times of its results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answers {
     /// Triangles of both meshes.
@@ -29,22 +29,22 @@ pub struct Answers {
     pub gap_error_mm: f64,
     /// Largest error of a depth, mm.
     pub depth_error_mm: f64,
-    /// Median of the least times of gaps, ns.
+    /// Median of the shortest times of gaps, ns.
     pub gap_ns: f64,
-    /// The same of depths, ns.
+    /// Median of the shortest times of depths, ns.
     pub depth_ns: f64,
-    /// The same over all cases, ns.
+    /// Median over all cases, ns.
     pub median_ns: f64,
 }
 
-/// Asks every case of scene P of meshes that leave the surfaces by at most `deflection_mm`.
+/// Queries every case of scene P on meshes that deviate from the surfaces by at most `deflection_mm`.
 ///
 /// # Errors
-/// `Unwritable`, `Brep`; `Input` when a mesh is refused.
+/// `Unwritable`, `Brep`; `Input` when parry refuses a mesh.
 pub fn ask(deflection_mm: f64) -> Result<Answers, LabError> {
     let options = LoadOptions {
         linear_deflection_mm: Some(deflection_mm),
-        // The distance alone is to decide.
+        // The angle has no effect: the deflection alone determines the mesh.
         angular_deflection_rad: 1.0,
         ..LoadOptions::default()
     };
@@ -108,7 +108,7 @@ fn timed(case: &Case, block: &TriMesh, peg: &TriMesh) -> (f64, f64) {
 
 fn signed(at: &Pose, block: &TriMesh, peg: &TriMesh) -> f64 {
     let identity = Pose::identity();
-    // Meshes are supported, so neither refuses; if one did, NaN is never within a bound.
+    // parry supports pairs of meshes, so neither query fails; if one did, NaN would fail every bound.
     match query::distance(&identity, block, at, peg) {
         Ok(gap) if gap.distance > 0.0 => gap.distance,
         Ok(_) => match query::contact(&identity, block, at, peg, 0.0) {

@@ -1,9 +1,10 @@
-//! The rate that a tick allows over an insertion: collision only, guided, and guided by what is recognised, on the emulated board.
+//! The update rate that a tick allows over an insertion: collision only, guided by a known target, and guided by recognised ones, on the emulated
+//! board.
 //!
 //! Fig. 35 of Faas 2010 shows the update rate over an insertion: it falls from 800 Hz to 100 Hz when constraints are evaluated. Here the board counts
-//! the instructions of each tick; the rate they allow is the clock over the slowest tick, at one instruction a clock cycle of a Cortex-M7 at
-//! 480 MHz. It is headroom, not pace: the loop itself runs at 1 kHz whatever happens. Recognition runs on the desktop, so the board does the same
-//! work whether a target was recognised or known.
+//! the instructions of each tick; the rate they allow is the clock over the slowest tick, at one instruction a clock cycle of a Cortex-M7 at 480 MHz.
+//! The result is headroom, not loop rate: the loop always runs at 1 kHz. Recognition runs on the desktop, so the board does the same work whether a
+//! target is recognised or known.
 
 use std::fmt;
 
@@ -24,55 +25,55 @@ use crate::guided::{emulated, inserted, key, known_target, play_to, refreshed};
 use crate::table::rounded;
 use crate::variant::Variant;
 
-/// Clock of the board, Hz, and instructions in a cycle of it.
+/// Clock of the board, Hz, and instructions a cycle.
 const CLOCK_HZ: f64 = 480e6;
 const INSTRUCTIONS_PER_CYCLE: f64 = 1.0;
-/// The slowest tick of so many is told.
+/// Ticks of a window; its slowest tick is reported.
 const WINDOW_TICKS: usize = 10;
 /// Rate before constraints are evaluated and while they are, Hz: Faas 2010, fig. 35.
 const THESIS_HZ: [f64; 2] = [800.0, 100.0];
-/// The loop's own pace, Hz.
+/// The loop's own rate, Hz.
 const LOOP_HZ: f64 = 1000.0;
 
-/// How far the hand is off: a share of the radial play, and degrees.
+/// Offset of the hand: a share of the radial clearance, and degrees.
 const OFF: f64 = 0.8;
 const TILT_DEG: f64 = 0.5;
-/// Until it is off, at least to push through, and at the end, s; and how fast it pushes at most, mm/s.
+/// Time until the hand is off the axis, shortest time of the push, and time at the end, s; and largest speed of the push, mm/s.
 const COMES_S: f64 = 0.2;
 const PUSHES_S: f64 = 1.0;
 const ENDS_S: f64 = 0.2;
 const MM_PER_S: f64 = 250.0;
 
-/// Ticks between answers to what the board tells.
+/// Ticks between answers to telemetry.
 const HEED_TICKS: u16 = 10;
 
-/// What a tick does.
+/// Guidance during an insertion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
     /// Collision only.
     Collision,
-    /// And a target that is known from the start.
+    /// Collision and a target that is known from the start.
     Guided,
-    /// And the targets that the desktop recognises.
+    /// Collision and the targets that the desktop recognises.
     Recognised,
 }
 
-/// All of them.
+/// All modes.
 pub const MODES: [Mode; 3] = [Mode::Collision, Mode::Guided, Mode::Recognised];
 
 /// A pair of parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
-    /// File name of its chart.
+    /// Name in the chart's file name.
     pub name: &'static str,
-    /// In words.
+    /// Description.
     pub what: &'static str,
     fit: Fit,
     cell_mm: f64,
 }
 
-/// The pairs: the thesis' 18.75 mm one, the same as close as it goes in unguided too, and its large one (table 6).
+/// The pairs: the thesis' 18.75 mm pair, the same with the smallest clearance that also goes in unguided, and the large pair (table 6).
 pub const PAIRS: [Pair; 3] = [
     Pair {
         name: "rate",
@@ -94,22 +95,22 @@ pub const PAIRS: [Pair; 3] = [
     },
 ];
 
-/// Some ticks.
+/// A window of consecutive ticks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Window {
     /// Name of the pair.
     pub pair: &'static str,
-    /// What a tick does.
+    /// Guidance.
     pub mode: Mode,
-    /// Since the hand began to move, s.
+    /// Time since the hand began to move, s.
     pub t_s: f64,
-    /// How far the peg is in, mm; negative above the hole.
+    /// Depth of the peg, mm; negative above the hole.
     pub depth_mm: f64,
     /// Instructions of the mean tick.
     pub instructions_mean: f64,
     /// Instructions of the slowest tick.
     pub instructions_max: u32,
-    /// The rate that it allows, Hz.
+    /// The rate that this tick allows, Hz.
     pub rate_hz: f64,
     /// Targets in force at the end.
     pub targets: u8,
@@ -120,9 +121,9 @@ pub struct Window {
 pub struct Course {
     /// Name of the pair.
     pub pair: &'static str,
-    /// What a tick does.
+    /// Guidance.
     pub mode: Mode,
-    /// How far the peg came, mm, and how deep the hole is.
+    /// Final depth of the peg, mm.
     pub depth_mm: f64,
     /// Hole's depth, mm.
     pub hole_mm: f64,
@@ -130,24 +131,24 @@ pub struct Course {
     pub instructions_mean: f64,
     /// Instructions of the slowest tick.
     pub instructions_max: u32,
-    /// The rate that it allows, Hz.
+    /// The rate that this tick allows, Hz.
     pub slowest_hz: f64,
-    /// Ticks that left out points, %.
+    /// Ticks with decimated points, %.
     pub left_out_percent: f64,
-    /// Ticks that came too late on the emulated board.
+    /// Missed ticks on the emulated board.
     pub missed_ticks: u32,
-    /// What happened when.
+    /// All windows.
     #[serde(skip)]
     pub windows: Vec<Window>,
 }
 
-/// How many of the pairs the shorter form plays.
+/// Number of pairs that the shorter form plays.
 pub const QUICK: usize = 2;
 
-/// Plays every mode with every pair; `quick` takes the first [`QUICK`] pairs only. Each course goes to `out`.
+/// Plays every mode with every pair; `quick` takes the first [`QUICK`] pairs only. Passes each course to `out`.
 ///
 /// # Errors
-/// Anything that keeps an insertion from being played.
+/// Anything that prevents an insertion from being played.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Course)) -> Result<Vec<Course>, LabError> {
     let pairs = if quick { &PAIRS[..QUICK] } else { &PAIRS[..] };
     played(pairs, &MODES, out)
@@ -175,8 +176,8 @@ pub(crate) fn played(
     Ok(courses)
 }
 
-/// From 1 mm engaged through the hole, the hand trembling, off by four fifths of the play and half a degree: near enough that it goes in without
-/// guidance too, and touches on the way.
+/// From 1 mm engaged through the hole; the hand trembles and is off by four fifths of the clearance and half a degree, so that the peg also goes in
+/// without guidance and touches on the way.
 fn scenario(fit: &Fit, step: &std::path::Path) -> Result<Scenario, LabError> {
     let mut scenario = Scenario::insertion(step)?;
     scenario.hand.tremor_mm = 0.1;
@@ -192,7 +193,7 @@ fn scenario(fit: &Fit, step: &std::path::Path) -> Result<Scenario, LabError> {
     ];
     scenario.run.duration_s = arrives + ENDS_S;
     scenario.run.telemetry_every_ticks = 1;
-    // As often as the window hears.
+    // As often as the window answers.
     scenario.run.heed_every_ticks = Some(HEED_TICKS);
     Ok(scenario)
 }
@@ -248,7 +249,7 @@ fn course(pair: &Pair, mode: Mode, scenario: &Scenario, scene: &PreparedScene) -
     })
 }
 
-/// The rate that ticks of so many instructions allow, Hz.
+/// The rate that ticks with this many instructions allow, Hz.
 fn allowed_hz(instructions: u32) -> f64 {
     rounded(
         CLOCK_HZ * INSTRUCTIONS_PER_CYCLE / f64::from(instructions.max(1)),
@@ -285,7 +286,7 @@ fn windows(
         .collect()
 }
 
-/// The rate allowed over an insertion of one pair, with the thesis' figures.
+/// The allowed rate over the insertion of one pair, with the thesis' figures.
 pub fn chart(pair: &Pair, courses: &[Course]) -> Chart {
     let of: Vec<&Course> = courses.iter().filter(|course| course.pair == pair.name).collect();
     let end =
@@ -349,7 +350,7 @@ pub fn chart(pair: &Pair, courses: &[Course]) -> Chart {
 }
 
 impl Mode {
-    /// In words.
+    /// Description.
     pub fn name(self) -> &'static str {
         match self {
             Self::Collision => "collision only",

@@ -7,15 +7,15 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A bound is at most so many times its claim.
+/// Largest ratio of a bound to its claim.
 pub const MOST_BOUND_OVER_CLAIM: f64 = 1.5;
-/// Bound over claim of what comes out the same on every machine: room for a change of the code that nobody needs to hear of.
+/// Bound over claim of values that are the same on every machine: margin for a change of the code too small to report.
 const SAME_EVERYWHERE: f64 = 1.1;
-/// Bound over claim of what the machine decides.
+/// Bound over claim of values that depend on the machine.
 const VARIES: f64 = MOST_BOUND_OVER_CLAIM;
-/// A claim taken from a value is no finer than this share of the requirement: an energy of 0 where 1 mJ is required is claimed as 0.01 mJ.
+/// Resolution of a claim derived from a value, as a share of the requirement: an energy of 0 where 1 mJ is required is claimed as 0.01 mJ.
 const FINEST_CLAIM: f64 = 0.01;
-/// Digits of claims and of the bounds made from them.
+/// Significant digits of claims and of the bounds derived from them.
 const CLAIM_DIGITS: i32 = 3;
 const BOUND_DIGITS: i32 = 4;
 
@@ -23,9 +23,9 @@ const BOUND_DIGITS: i32 = 4;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "Line", from = "Line")]
 pub struct Row {
-    /// What was measured. What stands in parentheses is a remark and may hold measured values.
+    /// What was measured. Text in parentheses is a remark and may hold measured values.
     pub what: String,
-    /// What it came to: a number, or a word where there is no number.
+    /// The measured value: a number, or a word where there is no number.
     pub value: Value,
     /// Unit of the value.
     pub unit: String,
@@ -44,12 +44,12 @@ pub enum Value {
     Text(String),
 }
 
-/// What a row came to.
+/// Verdict on a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The value keeps its bound.
+    /// The value is within its bound.
     Holds,
-    /// The value breaks its bound, or nothing was measured.
+    /// The value is outside its bound, or nothing was measured.
     Fails,
     /// There is no bound.
     Unbounded,
@@ -73,7 +73,7 @@ enum Requirement {
     },
 }
 
-/// A row as its JSON object has it.
+/// A row in the form of its JSON object.
 #[derive(Serialize, Deserialize)]
 struct Line {
     what: String,
@@ -140,7 +140,7 @@ impl Row {
         Self::new(what, Value::Text(value.to_owned()), "", Requirement::Nothing)
     }
 
-    /// A row that cannot be measured here, because something that is not part of the repository is absent.
+    /// A row that cannot be measured here, because something outside the repository is absent.
     pub(crate) fn skipped(what: impl Into<String>, why: &str) -> Self {
         Self::new(
             what,
@@ -150,14 +150,14 @@ impl Row {
         )
     }
 
-    /// The same row, its value one of this machine: time of the wall clock, memory of a process. Its bound is up to 1.5 times its claim.
+    /// The same row, its value specific to this machine: wall-clock time, memory of a process. Its bound is up to 1.5 times its claim.
     #[must_use]
     pub(crate) fn varies(mut self) -> Self {
         self.varies = true;
         self
     }
 
-    /// The same row with the figure that is stated for it.
+    /// The same row with its stated figure.
     #[must_use]
     pub(crate) fn claimed(mut self, claim: f64) -> Self {
         if self.needs_claim() {
@@ -166,7 +166,7 @@ impl Row {
         self
     }
 
-    /// The row's name, the same in every run: without remarks in parentheses.
+    /// The row's key, the same in every run: its text without remarks in parentheses.
     pub fn key(&self) -> String {
         let (mut key, mut depth) = (String::new(), 0usize);
         for letter in self.what.chars() {
@@ -183,17 +183,17 @@ impl Row {
             .replace(" :", ":")
     }
 
-    /// The figure that is stated for the row, where its bound needs one.
+    /// The row's stated figure, where its bound needs one.
     pub fn claim(&self) -> Option<f64> {
         self.claim
     }
 
-    /// True for a number whose bound is not exact: judged near its claim.
+    /// True for a number whose bound is not exact, and which is therefore judged near its claim.
     pub fn needs_claim(&self) -> bool {
         matches!((&self.required, &self.value), (Requirement::Within { min, max }, Value::Number(_)) if min < max)
     }
 
-    /// What the row came to.
+    /// The verdict on the row.
     pub fn verdict(&self) -> Verdict {
         let holds = match (&self.required, &self.value) {
             (Requirement::NotMeasured, _) => return Verdict::Skipped,
@@ -216,7 +216,7 @@ impl Row {
         self.verdict() == Verdict::Fails
     }
 
-    /// The bound in words, the requirement beside it where that is wider.
+    /// The bound in words, followed by the requirement where that is wider.
     pub fn bound(&self) -> String {
         match &self.required {
             Requirement::Nothing => NO_BOUND.to_owned(),
@@ -235,7 +235,7 @@ impl Row {
         }
     }
 
-    /// How far the bound lies from the claim, as a ratio of at least 1; infinite without a claim, `None` where none is needed.
+    /// Ratio of the bound to the claim, at least 1; infinite without a claim, `None` where none is needed.
     pub fn bound_over_claim(&self) -> Option<f64> {
         let Requirement::Within { min, max } = self.required else {
             return None;
@@ -257,7 +257,7 @@ impl Row {
         Some(above.max(below).max(1.0))
     }
 
-    /// What the page says beside the verdict.
+    /// Remark of the page beside the verdict.
     pub fn remark(&self) -> Option<&'static str> {
         let (Requirement::Within { min, max }, Value::Number(value), Some(claim)) =
             (&self.required, &self.value, self.claim)
@@ -274,7 +274,8 @@ impl Row {
         tighter.then_some(TIGHTER)
     }
 
-    /// The claim that the value supports: it in three digits, rounded to the side that it keeps, no finer than a hundredth of the requirement.
+    /// The claim that the value supports: the value in three digits, rounded to the side on which it holds, no finer than a hundredth of the
+    /// requirement.
     pub fn supported_claim(&self) -> Option<f64> {
         let (Requirement::Within { min, max }, Value::Number(value)) = (&self.required, &self.value) else {
             return None;
@@ -299,7 +300,7 @@ impl Row {
         if self.varies { VARIES } else { SAME_EVERYWHERE }
     }
 
-    /// What the value is judged by: the requirement, and on each side that it limits the claim times the spread where that is nearer.
+    /// Limits by which the value is judged: the requirement, and on each side that it limits the claim times the spread where that is nearer.
     fn limits(&self, min: f64, max: f64) -> (f64, f64) {
         let Some(claim) = self.claim else {
             return (min, max);
@@ -320,20 +321,20 @@ impl Row {
     }
 }
 
-/// The finest claim of a requirement from `min`, negative, to `max`.
+/// Resolution of claims for a requirement from `min`, negative, to `max`.
 fn finest(min: f64, max: f64) -> f64 {
     FINEST_CLAIM * if max.is_finite() { max.abs() } else { min.abs() }
 }
 
-/// `value` in so many significant digits.
+/// `value` rounded to this many significant digits.
 fn digits(value: f64, digits: i32, round: fn(f64) -> f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
     let power = digits - 1 - value.abs().log10().floor() as i32;
     let unit = 10f64.powi(power.abs());
-    // Multiplied or divided by a whole power of ten, so that the result is the number nearest to what it is written as. What is so long already
-    // stays: 1.13 times 100 is a little more than 113.
+    // Multiplied or divided by a whole power of ten, so that the result is the number nearest to its decimal form. Values of that many digits stay
+    // unchanged: 1.13 times 100 is a little more than 113.
     let (scaled, back): (f64, fn(f64, f64) -> f64) = if power >= 0 {
         (value * unit, |whole, unit| whole / unit)
     } else {
@@ -364,7 +365,7 @@ impl From<serde_json::Value> for Value {
     fn from(value: serde_json::Value) -> Self {
         match value {
             serde_json::Value::String(text) => Self::Text(text),
-            // What is not finite is written as null.
+            // Non-finite numbers are written as null.
             number => Self::Number(number.as_f64().unwrap_or(f64::NAN)),
         }
     }
@@ -482,7 +483,7 @@ mod tests {
         assert_eq!(row(62_500.0).bound(), "≤ 68750; required ≤ 500000");
         assert!(!row(68_750.0).fails());
         assert!(row(68_751.0).fails());
-        // The requirement stays where the claim would allow more.
+        // The requirement applies where the claim would allow more.
         assert!(Row::at_most("", 5.1, "", 5.0).claimed(4.9).fails());
         let least = |value: f64| Row::within("", value, "mm", 10.0, f64::INFINITY).claimed(40.0);
         assert!(least(36.0).fails());
@@ -496,7 +497,7 @@ mod tests {
         assert!(both(0.5).fails());
     }
 
-    /// Of any value within any requirement: the claim it supports is kept by it, and the bound lies within the spread of the claim.
+    /// For any value and requirement: the value holds the claim that it supports, and the bound lies within the spread of the claim.
     #[test]
     fn a_supported_claim_is_held_by_its_value() {
         let mut random = fastrand::Rng::with_seed(14);

@@ -26,9 +26,9 @@ const SIDE: f64 = 30.0;
 /// A pose, and the exact distance there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// Of the peg in the block's frame.
+    /// Pose of the peg in the block's frame.
     pub pose: NamedPose,
-    /// Gap positive, deepest penetration negative, mm.
+    /// Exact distance, mm: gap positive, deepest penetration negative.
     pub exact_mm: f64,
 }
 
@@ -43,16 +43,16 @@ fn case(name: String, position_mm: DVec3, orientation: DQuat, exact_mm: f64) -> 
     }
 }
 
-/// So far sideways, mm, in the direction of an angle: not along the samples.
+/// Offset perpendicular to the axis, mm, at an angle that lies between the samples.
 pub fn aside(by: f64, angle: f64) -> DVec3 {
     DVec3::new(by * angle.cos(), by * angle.sin(), 0.0)
 }
 
-/// All of them.
+/// All cases.
 pub fn cases() -> Vec<Case> {
     let none = DQuat::IDENTITY;
     let mut cases = Vec::new();
-    // Inside the clearance, touching, and pushed into the wall: the gap is what the offset leaves of the clearance.
+    // Inside the clearance, touching, and pushed into the wall: the gap is the radial clearance minus the offset.
     for by in [0.0, 0.02, 0.05, 0.09, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.1] {
         for angle in [0.0, 0.3, 1.23, 2.75, 4.0] {
             let exact = HOLE - PEG - by;
@@ -60,7 +60,7 @@ pub fn cases() -> Vec<Case> {
             cases.push(case(name, aside(by, angle), none, exact));
         }
     }
-    // Tilted: the rim comes nearest to the peg's side, and enters it.
+    // Tilted: the rim comes nearest to the peg's side, then penetrates it.
     for tilt in [
         0.001, 0.002, 0.004, 0.0049, 0.0052, 0.006, 0.01, 0.02, 0.03, 0.04, 0.05,
     ] {
@@ -71,7 +71,7 @@ pub fn cases() -> Vec<Case> {
             cases.push(case(name, DVec3::ZERO, DQuat::from_axis_angle(axis, tilt), exact));
         }
     }
-    // Over the block: flat on flat apart from the hole, rim to rim above it, and pressed into the top.
+    // Above the block: flat on flat apart from the hole, rim to rim above it, and pressed into the top.
     for height in [40.0, 5.0, 1.0, 0.3, 0.02, 0.0, -0.1, -0.4, -1.0] {
         let up = DVec3::Z * (BLOCK_HALF + PEG_HALF + height);
         cases.push(case(
@@ -115,7 +115,7 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// Its STEP file, removed when dropped: the CAD kernel reads files only.
+/// A temporary STEP file of the scene, removed when dropped: the CAD kernel reads files only.
 ///
 /// # Errors
 /// `Unwritable`.
@@ -131,7 +131,7 @@ pub fn file() -> Result<NamedTempFile, LabError> {
     })
 }
 
-/// Its plain geometry.
+/// The scene's CAD model.
 ///
 /// # Errors
 /// `Unwritable`, `Brep`.
@@ -139,16 +139,16 @@ pub fn model(options: &LoadOptions) -> Result<CadModel, LabError> {
     Ok(load_step_with(file()?.path(), options)?)
 }
 
-/// Every case of the scene modelled in one way.
+/// Results of every case with one model of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
     /// Bytes of the image.
     pub image_bytes: usize,
-    /// The exact distance, mm, and what was found.
+    /// The exact distance, mm, and the probe's row.
     pub rows: Vec<(f64, ProbeRow)>,
 }
 
-/// Asks every case.
+/// Probes every case.
 ///
 /// # Errors
 /// `Unwritable`, `Brep`, `Bake`, `Input`.
@@ -163,7 +163,7 @@ pub fn ask(variant: &Variant) -> Result<Asked, LabError> {
     })
 }
 
-/// The scene, and its peg against its block.
+/// The baked scene, and its pair of peg and block.
 ///
 /// # Errors
 /// As [`ask`].
@@ -174,17 +174,17 @@ pub fn bake(variant: &Variant) -> Result<(ProbeScene, Pair), LabError> {
     Ok((scene, pair))
 }
 
-/// Poses this near count as about to touch, mm: the scene's own radial clearance.
+/// Distance below which a pose counts as near contact, mm: the scene's radial clearance.
 pub const NEAR_MM: f64 = 0.1;
 
-/// Which distance is judged.
+/// The distance that is judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum By {
-    /// What a probe answers: refined by the analytic faces.
+    /// The probe's distance: refined by the analytic faces.
     Probe,
-    /// The field's own, which the force law acts on, at poses nearer than [`NEAR_MM`] or deep: farther apart no tick acts.
+    /// The field's own distance, on which the force law acts, at poses nearer than [`NEAR_MM`] or penetrating: at larger gaps no tick acts.
     Field,
-    /// The field's own within a cell of touching: edges against edges among it, whose corners the field rounds.
+    /// The field's own distance within a cell of contact, including edge against edge, where the field rounds corners.
     FieldWithin {
         /// mm.
         mm: f64,
@@ -192,7 +192,7 @@ pub enum By {
 }
 
 impl Asked {
-    /// Largest error over the gaps (`gaps`) or over the depths, mm, and where.
+    /// Largest error over the gaps (`gaps`) or over the depths, mm, and the pose's name.
     pub fn worst(&self, by: By, gaps: bool) -> (f64, &str) {
         let error = |exact: f64, row: &ProbeRow| match by {
             By::Probe => Some((row.distance_mm - exact).abs()),
@@ -200,7 +200,7 @@ impl Asked {
             By::FieldWithin { mm } if exact > mm => None,
             By::Field | By::FieldWithin { .. } => match row.field_distance_mm {
                 Some(field) => Some((field - exact).abs()),
-                // A depth that is not seen is wrong by all of it; a gap that is not seen is right.
+                // An undetected depth counts with its full depth as error; an undetected gap has no error.
                 None => (exact < 0.0).then_some(-exact),
             },
         };
@@ -211,13 +211,13 @@ impl Asked {
             .unwrap_or((f64::NAN, "none"))
     }
 
-    /// Median over the cases of each one's least time, ns.
+    /// Median over the cases of the shortest time of each, ns.
     pub fn median_ns(&self) -> f64 {
         median(self.rows.iter().map(|(_, row)| row.least_ns as f64))
     }
 }
 
-/// The middle one; NaN of none.
+/// Median; NaN without values.
 pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_unstable_by(f64::total_cmp);

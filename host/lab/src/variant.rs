@@ -1,15 +1,15 @@
-//! What the sweeps vary: method, shell, cell, number format, bound on the pointshell's error.
+//! Parameters that the sweeps vary: method, shell, cell, number format, bound on the pointshell's error.
 
 use std::fmt;
 
 use mortise_bake::{BakeOptions, Grabbable, Method, PointshellKind, SampleFormat};
 
-/// One way to model a scene.
+/// A model of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Variant {
     /// How contact finds depth and direction.
     pub method: Method,
-    /// What the pointshells are made of.
+    /// Kind of the pointshells.
     pub shell: PointshellKind,
     /// Cell edge, mm.
     pub cell_mm: f64,
@@ -17,7 +17,7 @@ pub struct Variant {
     pub format: SampleFormat,
     /// Bound on the pointshell's error, mm; `None`: as [`BakeOptions`] chooses.
     pub epsilon_mm: Option<f64>,
-    /// Depth to which the field is stored at least, mm; never less than two cells.
+    /// Smallest depth to which the field is stored, mm; never less than two cells.
     pub reach_mm: f64,
 }
 
@@ -28,8 +28,8 @@ const CLASSIC: PointshellKind = PointshellKind::Classic {
 };
 
 impl Variant {
-    /// The distance field in 16 bit, its points' error a hundredth of the cell: no more than the field's own, cell²/(8·R), up to radii of twelve
-    /// cells.
+    /// The distance field in 16 bit with a pointshell error of a hundredth of the cell: no more than the field's own error, cell²/(8·R), up to radii
+    /// R of twelve cells.
     pub const fn field(cell_mm: f64) -> Self {
         Self {
             method: Method::DistanceField,
@@ -41,7 +41,7 @@ impl Variant {
         }
     }
 
-    /// The same with the bound on the points' error that a scene is baked with when nothing else is asked for, a twentieth of the cell.
+    /// The same field with the default bound on the pointshell's error, a twentieth of the cell.
     pub const fn board(cell_mm: f64) -> Self {
         Self::field(cell_mm).epsilon_mm(cell_mm / 20.0)
     }
@@ -67,23 +67,24 @@ impl Variant {
         }
     }
 
-    /// The same in another number format.
+    /// The same model in another number format.
     pub const fn format(self, format: SampleFormat) -> Self {
         Self { format, ..self }
     }
 
-    /// The same with another bound on the pointshell's error.
+    /// The same model with another bound on the pointshell's error.
     pub const fn epsilon_mm(self, epsilon_mm: f64) -> Self {
         let epsilon_mm = Some(epsilon_mm);
         Self { epsilon_mm, ..self }
     }
 
-    /// The same with a field that reaches so deep.
+    /// The same model with a field stored to this depth.
     pub const fn reach_mm(self, reach_mm: f64) -> Self {
         Self { reach_mm, ..self }
     }
 
-    /// The same with the textbook's pointshell, a point for each voxel of `voxel_mm`, shrunk by half a voxel: else points stand out by as much.
+    /// The same model with the textbook's pointshell, a point for each voxel of `voxel_mm`, shrunk by half a voxel: otherwise points would stand out
+    /// by as much.
     pub const fn classic_shell(self, voxel_mm: f64) -> Self {
         Self {
             shell: PointshellKind::Classic {
@@ -95,7 +96,7 @@ impl Variant {
         }
     }
 
-    /// How to bake it. The image may be as large as layouts allow: what it costs is measured, not limited.
+    /// Options for baking it. The image may be as large as the layout allows: its size is measured, not limited.
     pub fn options(&self, grabbable: Grabbable) -> BakeOptions {
         let band_cells = BakeOptions::default()
             .band_cells
@@ -113,7 +114,7 @@ impl Variant {
         }
     }
 
-    /// Its kind, without the cell.
+    /// Name of its kind, without the cell.
     pub fn kind(&self) -> &'static str {
         match (self.method, self.shell, self.format) {
             (Method::Occupancy, ..) => "textbook voxmap",

@@ -1,4 +1,4 @@
-//! The program, as a person or a script runs it: its output and its exit code.
+//! The program as a person or a script runs it: output and exit code.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -13,7 +13,7 @@ fn lab(folder: &Path, arguments: &[&str]) -> Output {
         .expect("the program starts")
 }
 
-/// Exit code 2, nothing on standard output (so before the first trial), one line on standard error that names `what`.
+/// Exit code 2, nothing on standard output (so it failed before the first trial), and one line on standard error that names `what`.
 fn refused(folder: &Path, arguments: &[&str], what: &str) {
     let output = lab(folder, arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {output:?}");
@@ -26,7 +26,7 @@ fn refused(folder: &Path, arguments: &[&str], what: &str) {
     );
 }
 
-/// Every experiment of the table is a command, and its help says what the quick form has.
+/// Every experiment of the table is a command, and its help states the scope of the quick form.
 #[test]
 fn every_experiment_is_a_command() {
     let help = |arguments: &[&str]| {
@@ -73,7 +73,7 @@ fn tables_and_charts_are_replaced_on_request_only() {
     assert_eq!(std::fs::read(&table).expect("there"), b"mine");
 }
 
-/// Before the first trial, which would be on standard output.
+/// Refused before the first trial, which would print to standard output.
 #[test]
 fn a_folder_that_cannot_be_written_is_refused_before_the_sweep() {
     let place = tempfile::tempdir().expect("temporary folder");

@@ -1,5 +1,5 @@
-//! Contacts of the shared test parts are those others found. Skipped, and said so, when they are not there (`MORTISE_SHARED`, else `shared` beside
-//! the workspace).
+//! Contacts of the shared test parts match independent results. Skipped with a message when the parts are absent (`MORTISE_SHARED`, else `shared`
+//! beside the workspace).
 
 use mortise_lab::{contacts, corpus};
 

@@ -1,4 +1,4 @@
-//! The methods side by side, where the textbook's fails: a centred peg with 10 µm all round.
+//! Comparison of the methods where the textbook's fails: a centred peg with a gap of 10 µm all around.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ const CELL_MM: f64 = 0.5;
 /// Half the diametral clearance.
 const GAP_MM: f64 = 0.01;
 
-/// The peg on the hole's axis, its lower end this far below the block's top, turned about itself.
+/// The peg on the hole's axis, its lower end this far below the block's top, rotated about its axis.
 fn poses() -> Vec<NamedPose> {
     let model = load_step(file()).expect("the file is part of the sources");
     let part = |name: &str| {
@@ -75,7 +75,7 @@ fn the_distance_field_sees_no_contact() {
     }
 }
 
-/// Phantom contacts in every pose, half a voxel's diagonal deep at the most.
+/// Phantom contacts in every pose, at most half a voxel's diagonal deep.
 #[test]
 fn occupancy_sees_contact_where_there_is_none() {
     for row in rows(Method::Occupancy, PointshellKind::ErrorBounded) {
@@ -86,12 +86,12 @@ fn occupancy_sees_contact_where_there_is_none() {
             row.distance_mm < -0.1 && row.distance_mm > -half_diagonal,
             "{row}"
         );
-        // One figure for both: what the method acts on is all it knows.
+        // The two distances are equal: the voxmap has no other than the one on which the force law acts.
         assert_eq!(Some(row.distance_mm), row.field_distance_mm, "{row}");
     }
 }
 
-/// The whole textbook, its pointshell too: points off the surface by half a voxel's diagonal on top.
+/// The whole textbook, its pointshell too, whose points are off the surface by up to another half of a voxel's diagonal.
 #[test]
 fn the_classic_shell_is_no_better() {
     let classic = PointshellKind::Classic {
@@ -104,7 +104,7 @@ fn the_classic_shell_is_no_better() {
         let diagonal = CELL_MM * 3f64.sqrt();
         assert!(row.distance_mm <= 0.0 && row.distance_mm > -diagonal, "{row}");
     }
-    // Where the grids lie alike the planes just touch; turned, they do not.
+    // With aligned grids the planes just touch; rotated, they do not.
     assert!(rows.iter().any(|row| row.distance_mm < -0.1));
 }
 
@@ -117,7 +117,7 @@ fn a_gap_is_only_a_bound_to_a_voxmap() {
     pose.position_mm.z += 5.0 + exact_mm;
     let row = scene.probe(pair, &pose).expect("a good pose");
     assert_eq!((row.resolution, row.contacts), (Resolution::Bound, 0), "{row}");
-    // No more than the gap, and not far below: a brick is 4 mm wide.
+    // No more than the gap, and not far below it: a brick is 4 mm wide.
     assert!(
         row.distance_mm <= exact_mm && row.distance_mm > exact_mm - 8.0,
         "{row}"

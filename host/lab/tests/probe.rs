@@ -10,10 +10,10 @@ use mortise_lab::variant::Variant;
 use mortise_scenario::ScenarioError;
 use mortise_scenario::probe::{NamedPose, ProbeScene, Resolution, read_poses};
 
-/// Gaps: the samples along circles are as dense as a bound of 5 µm asks (cell/100), which between curves as alike as these leaves a tenth of
-/// a micrometre, but a peg against a flat may come between two samples.
+/// Tolerance of gaps, mm: samples along circles are as dense as a bound of 5 µm requires (cell/100), which between curves of nearly equal radii
+/// leaves a tenth of a micrometre, but a peg against a flat may touch between two samples.
 const GAP_TOLERANCE_MM: f64 = 0.005;
-/// Depths likewise.
+/// Tolerance of depths, mm.
 const DEPTH_TOLERANCE_MM: f64 = 0.010;
 
 fn file() -> PathBuf {
@@ -48,7 +48,7 @@ fn scene_p_against_closed_form() {
         };
         assert!(off <= tolerance, "{exact} mm: {row}");
         assert_eq!(row.resolution, Resolution::Exact, "{row}");
-        // What is clearly apart has no contact, what is clearly inside one another has.
+        // Poses clearly apart have no contact; clearly penetrating ones have.
         if *exact > GAP_TOLERANCE_MM {
             assert_eq!(row.contacts, 0, "{row}");
             assert_eq!(row.force_n, [0.0; 3], "{row}");
@@ -63,7 +63,7 @@ fn scene_p_against_closed_form() {
     }
 }
 
-/// Pushed into the wall the force points back.
+/// The force on a part pushed into the wall points back out.
 #[test]
 fn force_points_out_of_the_wall() {
     let scene = ProbeScene::load(&file(), Some(0.5)).expect("the file is part of the sources");
@@ -75,7 +75,7 @@ fn force_points_out_of_the_wall() {
     };
     let row = scene.probe(pair, &pushed).expect("a good pose");
     let force = DVec3::from_array(row.force_n.map(f64::from));
-    // The samples lie unevenly about the line of contact: half their spacing, 0.045 rad.
+    // The samples are not symmetric about the line of contact: tolerance of half their spacing, 0.045 rad.
     assert!(
         force.normalize().dot(-aside(1.0, 0.9)) > f64::cos(0.05),
         "{row} {force}"

@@ -1,7 +1,7 @@
 //! The probe's branch and bound against every point in closed form: scene P at any pose, near and far, upright and tumbled.
 //!
-//! Both parts have their origin at their centre and the hole along z. Distances here are of the solids themselves, in double precision; the points
-//! are those of the image, so that the shells' own error bound plays no part.
+//! Both parts have their origin at their centre and the hole along z. Distances here are those of the solids, in double precision; the points are
+//! those of the image, so that the shells' own error bound has no effect.
 
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
@@ -19,10 +19,10 @@ const BLOCK: u16 = 0;
 const PEG: u16 = 1;
 /// Farthest point of either part from its origin, mm: a corner of the block.
 const FARTHEST_MM: f64 = 47.0;
-/// Deeper than this a point lies beyond what the field resolves (band less a diagonal, 2.3 cells), and near an edge may not be measured, mm.
+/// Depth, mm, beyond which the field does not resolve a point (band minus a diagonal, 2.3 cells), and near an edge may not measure it.
 const RESOLVED_MM: f64 = 1.1;
 
-/// Of ø20 × 50.
+/// Signed distance to the peg, ø20 × 50.
 fn to_peg(p: DVec3) -> f64 {
     let (side, end) = (p.truncate().length() - 10.0, p.z.abs() - 25.0);
     if side <= 0.0 && end <= 0.0 {
@@ -32,7 +32,7 @@ fn to_peg(p: DVec3) -> f64 {
     }
 }
 
-/// Of 60 × 60 × 40 with a hole ø20.2.
+/// Signed distance to the block, 60 × 60 × 40 with a hole ø20.2.
 fn to_block(p: DVec3) -> f64 {
     let half = DVec3::new(30.0, 30.0, 20.0);
     let (r, hole, beyond) = (p.truncate().length(), 10.1, p.z.abs() - 20.0);
@@ -55,13 +55,14 @@ fn to_block(p: DVec3) -> f64 {
     if inside { -least } else { least }
 }
 
-/// What single precision may add, mm. A turn of a vector of length L by a rounded unit quaternion is off by at most 8·√3·2⁻²⁴·L (eight roundings an
-/// entry of its matrix); there are two, there and back, and three sums: 32·2⁻²⁴·L, L no more than the parts' distance and a point's.
+/// Largest rounding error of single precision, mm. Rotating a vector of length L by a rounded unit quaternion has an error of at most 8·√3·2⁻²⁴·L
+/// (eight roundings an entry of its matrix); there are two rotations, forth and back, and three sums: 32·2⁻²⁴·L, with L at most the parts' distance
+/// plus a point's.
 fn rounding_mm(position: Vec3) -> f64 {
     32.0 * f64::powi(2.0, -24) * (1e3 * f64::from(position.length()) + FARTHEST_MM)
 }
 
-/// The smallest over all points, both ways, mm.
+/// Smallest distance over all points, in both directions, mm.
 fn brute_force(scene: &SceneImage<'_>, position: Vec3, turn: Quat) -> f64 {
     let position = 1e3 * DVec3::from_array(position.to_array().map(f64::from));
     let turn = DQuat::from_array(turn.to_array().map(f64::from)).normalize();
@@ -74,7 +75,7 @@ fn brute_force(scene: &SceneImage<'_>, position: Vec3, turn: Quat) -> f64 {
     forward.chain(backward).fold(f64::INFINITY, f64::min)
 }
 
-/// Metres and a turn.
+/// Positions, m, and orientations.
 fn poses() -> impl Strategy<Value = (Vec3, Quat)> {
     let any_turn = (prop::array::uniform4(-1.0f32..1.0))
         .prop_filter("no direction", |q| q.iter().map(|x| x * x).sum::<f32>() > 0.1)
@@ -113,7 +114,7 @@ proptest! {
         } else {
             prop_assert!(probed < -RESOLVED_MM + rounding, "{probed} {least} {found:?}");
         }
-        // Where every point is deeper than the field reaches none has a direction to push in, and the probe says so.
+        // Where every point is deeper than the field reaches, none has a direction to push in, and the probe reports so.
         let felt = found.contacts > 0 || found.work.flags.contains(Flags::DEEP);
         if least.abs() > rounding {
             prop_assert_eq!(felt, least < 0.0, "{} {:?}", least, found);

@@ -1,4 +1,5 @@
-//! The promises on still hands, dead encoders, rotation, STOP behind a full line and external sets hold in their shorter form, and would not if nothing was measured.
+//! The promises on still hands, dead encoders, rotation, STOP behind a full line and external sets hold in their shorter form, and fail if nothing is
+//! measured.
 
 use std::path::Path;
 
@@ -6,7 +7,7 @@ use mortise_lab::figures::promises::{files, stop, watch};
 use mortise_lab::figures::{Plan, Row};
 
 fn main() {
-    // First: this program is also the process that reads STEP files for itself.
+    // First, because STEP files are read in a child process that is this same program.
     mortise_brep::child::init();
     let pair = Path::new(concat!(
         env!("CARGO_MANIFEST_DIR"),

@@ -1,4 +1,4 @@
-//! The two tables of safety hold, in their shorter form, and would not if nothing was measured.
+//! The two tables of safety hold in their shorter form, and fail if nothing is measured.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use mortise_lab::figures::stability::{faults, unsafe_commands};
 use mortise_lab::figures::{Plan, Row};
 
 fn main() {
-    // First: this program is also the process that reads STEP files for itself.
+    // First, because STEP files are read in a child process that is this same program.
     mortise_brep::child::init();
     let pair = Path::new(concat!(
         env!("CARGO_MANIFEST_DIR"),

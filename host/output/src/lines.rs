@@ -1,4 +1,4 @@
-//! Results on standard output, to a pipe that may be closed before all is written.
+//! Results on standard output, which may be a pipe that closes before everything is written.
 
 use std::io::{self, ErrorKind, Write as _};
 
@@ -30,7 +30,7 @@ pub fn text(text: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// True when the reader went away (`mortise … | head`): nothing to complain about.
+/// True when the reader closed the pipe (`mortise … | head`), which is not an error.
 pub fn is_closed(error: &anyhow::Error) -> bool {
     error
         .downcast_ref::<io::Error>()

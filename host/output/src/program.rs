@@ -1,4 +1,4 @@
-//! How a program ends: its exit code, and one line on standard error where it could not do what was asked.
+//! Exit of a program: its exit code, and one line on standard error if it failed.
 
 use std::process::ExitCode;
 
@@ -6,7 +6,7 @@ use clap::Command;
 
 use crate::lines;
 
-/// Exit code of a program called `name`: that of its result, or 2 with the reason in one line on standard error.
+/// Exit code of the program `name`: that of its result, or 2 with the reason in one line on standard error.
 pub fn end(name: &str, result: anyhow::Result<ExitCode>) -> ExitCode {
     match result {
         Ok(code) => code,
@@ -18,7 +18,7 @@ pub fn end(name: &str, result: anyhow::Result<ExitCode>) -> ExitCode {
     }
 }
 
-/// An error with its causes in one line; a cause that the message before it already states is left out.
+/// An error with its causes in one line; a cause that the previous message already states is omitted.
 fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {
@@ -32,10 +32,10 @@ fn one_line(error: &anyhow::Error) -> String {
     line
 }
 
-/// Exit code for a command line that clap refuses: help where it is asked for; otherwise what is wrong, where, and what to do, in one line.
+/// Exit code for a command line that clap rejects. Prints help where it is requested; otherwise the error, its place and a remedy in one line.
 pub fn usage(name: &str, error: &clap::Error, command: Command) -> ExitCode {
     if !error.use_stderr() {
-        // The reader may be gone, as with `mortise --help | head`.
+        // The reader may have closed the pipe, as with `mortise --help | head`.
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
@@ -48,7 +48,7 @@ pub fn usage(name: &str, error: &clap::Error, command: Command) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// `message`, of several lines, in one: the usage, which help repeats, is left out.
+/// A `message` of several lines in one; the usage, which help repeats, is omitted.
 fn refusal(name: &str, message: &str, command: &str) -> String {
     let message = message.strip_prefix("error: ").unwrap_or(message);
     let end = ["\n\nUsage:", "\n\nFor more information"]
@@ -61,7 +61,7 @@ fn refusal(name: &str, message: &str, command: &str) -> String {
     format!("{name}: {}; see `{command} --help`", words.join(" "))
 }
 
-/// The command that `arguments` name, with its subcommands.
+/// The command that `arguments` name, including subcommands.
 fn named(name: &str, arguments: &[String], command: Command) -> String {
     let (mut name, mut at) = (name.to_owned(), command);
     for argument in arguments {

@@ -1,8 +1,8 @@
-//! Why a scenario could not be played, or a scene not probed.
+//! Errors of playing a scenario or probing a scene.
 
 use std::path::PathBuf;
 
-/// Why a scenario could not be played, or a scene not probed. A bound that does not hold is no error but a verdict.
+/// Why a scenario could not be played, or a scene not probed. A bound that does not hold is not an error but a verdict.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
     /// A file could not be read.
@@ -10,10 +10,10 @@ pub enum ScenarioError {
     Unreadable {
         /// File.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A scenario is not written as it should be.
+    /// A scenario file is malformed.
     #[error("{name}: {what}")]
     Scenario {
         /// File or name of the scenario.
@@ -37,7 +37,7 @@ pub enum ScenarioError {
     Bake {
         /// STEP file.
         step: String,
-        /// Why.
+        /// Reason.
         source: mortise_bake::BakeError,
     },
     /// The scene has no part of this name.
@@ -45,15 +45,15 @@ pub enum ScenarioError {
     NoSuchPart {
         /// STEP file.
         step: String,
-        /// Asked for.
+        /// The requested name.
         part: String,
-        /// Names there are.
+        /// Names of the scene's parts.
         known: String,
     },
     /// The rig could not be used.
     #[error(transparent)]
     Rig(#[from] mortise_rig::RigError),
-    /// The scenario moves the handle, and nobody does on this rig.
+    /// The scenario moves the handle, which this rig cannot do by itself.
     #[error(
         "{rig} has a real mechanism: the scenario `{scenario}` needs a simulated hand; run it on `sim` or `emulated`"
     )]
@@ -68,7 +68,7 @@ pub enum ScenarioError {
     Fault {
         /// Tick.
         tick: u32,
-        /// Words for it.
+        /// Description of the fault.
         what: String,
     },
 }

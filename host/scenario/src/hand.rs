@@ -1,13 +1,13 @@
-//! A scenario's hand as a simulated rig is told it: the way to the grip, then the script.
+//! Scripts of a scenario's operator model for a simulated rig: the motion to the grip point, then the keyframes.
 
 use glam::{DQuat, DVec3};
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 
 use crate::scenario::{Hand, Key};
 
-/// Ticks in a second of every simulated rig.
+/// Tick rate of every simulated rig, Hz.
 pub const TICK_HZ: f64 = 1000.0;
-/// Ticks in which the hand brings the handle to the grip.
+/// Ticks in which the hand moves the handle to the grip point.
 pub const REACH_TICKS: u32 = 300;
 /// Ticks in which it comes to rest there.
 pub const REST_TICKS: u32 = 200;
@@ -31,7 +31,7 @@ fn with_keyframes(hand: &Hand, keyframes: impl Iterator<Item = Keyframe>) -> Han
     }
 }
 
-/// From where a simulated handle starts (the world's origin) to the grip, without tremor.
+/// Motion from the start of a simulated handle (the world's origin) to the grip point, without tremor.
 pub fn reach(hand: &Hand) -> HandScript {
     let keyframe = |tick, position_mm| Keyframe {
         tick,
@@ -48,7 +48,7 @@ pub fn reach(hand: &Hand) -> HandScript {
     }
 }
 
-/// From the grip along the scenario's keyframes.
+/// Motion from the grip point along the scenario's keyframes.
 pub fn script(hand: &Hand) -> HandScript {
     let grip = DVec3::from_array(hand.grip_mm);
     let keyframe = |key: &Key| Keyframe {

@@ -1,8 +1,8 @@
-//! Scenarios: a scene, a hand that moves in it, and what must hold, as data that any rig plays; and a scene's answers at given poses.
+//! Scenarios: a scene, an operator model, and bounds, as data that any rig plays; and probing of a scene at given poses.
 //!
-//! A [`Scenario`] is TOML: a STEP file, a part to grab, what the simulated hand does, and what must hold. [`run`] bakes, uploads, plays it on a
-//! rig in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and the experiments of `mortise-lab` are all this one
-//! function. [`probe`] finds gap and contacts of a scene at given poses. [`measure`], [`port`] and [`wire`] are what figures are made with.
+//! A [`Scenario`] is TOML: a STEP file, a part to grab, the motion of the simulated hand, and the bounds. [`run`] bakes, uploads, plays it on a rig
+//! in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and the experiments of `mortise-lab` all use this one
+//! function. [`probe`] finds gap and contacts of a scene at given poses. [`measure`], [`port`] and [`wire`] serve the computation of figures.
 
 mod error;
 mod hand;

@@ -9,8 +9,8 @@ use crate::scenario::{Depth, Press};
 use crate::scene::{Body, PreparedScene};
 use crate::wire::{pose_mm, vector};
 
-/// Largest force commanded from the second tick after the one in which a fault was seen, N. A sample carries the ticks that are done: its own is one
-/// less.
+/// Largest force commanded from the second tick after the one in which a fault was seen, N. A sample carries the number of finished ticks: its own
+/// tick is one less.
 pub fn force_after(samples: &[Telemetry], fault_tick: u32) -> f64 {
     (samples.iter())
         .filter(|sample| sample.tick > fault_tick + 2)
@@ -18,7 +18,7 @@ pub fn force_after(samples: &[Telemetry], fault_tick: u32) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// How far the moving part is in, mm, the hole's depth, and how far off the axis its centre of mass is.
+/// Depth of the moving part, mm, the hole's depth, and the distance of the part's centre of mass from the axis.
 pub fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<(f64, f64, f64)> {
     let axis = DVec3::from_array(depth.axis).try_normalize()?;
     let fixed = scene.bodies().get(scene.part_named(&depth.fixed)?)?;
@@ -37,13 +37,13 @@ pub fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<
     Some((tip - mouth, bottom - mouth, (off - off.dot(axis) * axis).length()))
 }
 
-/// Deepest penetration as the board told it, mm.
+/// Deepest penetration reported by the board, mm.
 pub fn board_deepest(samples: &[Telemetry]) -> f64 {
     let depths = samples.iter().filter_map(|sample| sample.pairs.first());
     depths.map(|pair| 1e3 * f64::from(pair.depth)).fold(0.0, f64::max)
 }
 
-/// Means over the settled samples of the handle's reaction and of the hand's force along the press direction, N.
+/// Means of the handle's reaction and of the hand's force along the press direction over the settled samples, N.
 pub fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> {
     let direction = DVec3::from_array(press.direction).try_normalize()?;
     let forces: Vec<(f64, f64)> = settled
@@ -66,19 +66,19 @@ pub fn press(press: &Press, settled: &[Telemetry]) -> Option<(f64, f64)> {
     Some((handle / count, hand / count))
 }
 
-/// What contacts did to the object and the handle to the hand.
+/// Impulses of the contacts on the object and of the handle on the hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Impulse {
     /// ∫|contact force| dt, N s.
     pub contact_ns: f64,
     /// Largest contact force, N.
     pub contact_peak_n: f64,
-    /// |∫(contact force − force on the handle) dt|, N s: what the object gives to the hand less than it gets, which is its momentum (plus what the
-    /// limits and the valve took).
+    /// |∫(contact force − force on the handle) dt|, N s: the impulse on the object that does not reach the hand, which is the object's momentum (plus
+    /// the reductions by limits and valve).
     pub lost_ns: f64,
 }
 
-/// Impulses over samples, each of which stands for the time since the one before.
+/// Impulses over samples, each of which represents the time since the previous one.
 pub fn impulse(samples: &[Telemetry]) -> Impulse {
     let mut found = Impulse::default();
     let mut lost = DVec3::ZERO;
@@ -93,15 +93,16 @@ pub fn impulse(samples: &[Telemetry]) -> Impulse {
     found
 }
 
-/// Most work done on the object over any interval, mJ. Nothing counts as stored: what the springs of contacts and targets give back counts as made.
+/// Largest work done on the object over any interval, mJ. Nothing counts as stored: energy that the springs of contacts and targets return counts as
+/// generated.
 pub struct ObjectEnergy {
-    /// By contacts.
+    /// Work of contacts.
     pub contact_mj: f64,
-    /// By contacts and targets together: through the whole port between the object and what constrains it.
+    /// Work of contacts and targets together: through the whole port between the object and its constraints.
     pub constraint_mj: f64,
 }
 
-/// See [`ObjectEnergy`]. The wrenches of a tick, taken at its end, moved the object to the pose told with them.
+/// Computes [`ObjectEnergy`]. The wrenches of a tick, taken at its end, moved the object to the pose reported with them.
 pub fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> ObjectEnergy {
     let (mut contacts, mut both) = (Port::default(), Port::default());
     let center = center_of_mass(scene);
@@ -127,7 +128,7 @@ pub fn object_energy(scene: &PreparedScene, samples: &[Telemetry]) -> ObjectEner
     }
 }
 
-/// Of the part in hand, its frame, mm.
+/// Centre of mass of the part in hand, its frame, mm.
 fn center_of_mass(scene: &PreparedScene) -> DVec3 {
     let part = scene.bodies().get(usize::from(scene.part));
     part.map_or(DVec3::ZERO, |part| part.surface.shape().center_of_mass)
@@ -141,7 +142,7 @@ pub(crate) fn turn(from: &DAffine3, to: &DAffine3) -> DVec3 {
         .to_scaled_axis()
 }
 
-/// Of a held wrench between two samples: all of one of them when they are neighbouring ticks, else as much of each.
+/// Share of the interval between two samples in which the first one's held wrench counts: 1 between consecutive ticks, else a half.
 fn share_of_first(from_tick: u32, to_tick: u32) -> f64 {
     if to_tick.wrapping_sub(from_tick) == 1 {
         1.0
@@ -150,21 +151,21 @@ fn share_of_first(from_tick: u32, to_tick: u32) -> f64 {
     }
 }
 
-/// The handle at the start of a tick, and the wrench held from there on.
+/// Pose of the handle at the start of a tick, and the wrench held from there on.
 #[derive(Clone, Copy, Debug)]
 pub struct Felt {
     /// The tick.
     pub tick: u32,
     /// Pose of the handle, world.
     pub handle: WirePose,
-    /// On the handle.
+    /// Wrench on the handle.
     pub wrench: WireWrench,
-    /// The motion the law was told; `None` where it is not known.
+    /// The motion that the law received; `None` where it is not known.
     pub twist: Option<Twist>,
 }
 
 impl Felt {
-    /// As the board tells it: its encoders round the pose.
+    /// From a sample: its pose is that of the encoder readings.
     pub fn told(sample: &Telemetry) -> Self {
         Self {
             tick: sample.tick,
@@ -175,11 +176,11 @@ impl Felt {
     }
 }
 
-/// Work of the device on the handle, mJ: the most over any interval beyond what was stored at its start ([`crate::port`]), and all that passed either
-/// way. Exact between neighbouring ticks, whose wrench is held from the first to the second, as far as the poses are; else trapezoids: what happens
-/// between two samples is not seen. `felt` has an entry for each of `samples`.
+/// Work of the device on the handle, mJ: the largest over any interval beyond what was stored at its start ([`crate::port`]), and all that passed in
+/// either direction. Between consecutive ticks, whose wrench is held from the first to the second, it is as exact as the poses; otherwise it is the
+/// trapezoidal sum, blind to what happens between two samples. `felt` has an entry for each of `samples`.
 ///
-/// What counts as stored: see [`Coupled::stored_mj`].
+/// For the stored energy see [`Coupled::stored_mj`].
 pub fn energy(
     scene: &PreparedScene,
     settings: &Settings,
@@ -206,10 +207,10 @@ pub fn energy(
     (port.made(), port.passed())
 }
 
-/// The part in the hand.
+/// The part in hand, for its stored energy.
 pub(crate) struct Coupled<'a> {
     settings: &'a Settings,
-    /// Centre of mass in the handle's frame as the part was grabbed, and in its own, m.
+    /// Centre of mass, m, in the handle's frame when the part was grabbed, and in its own frame.
     lever: DVec3,
     pub(crate) center: DVec3,
 }
@@ -229,17 +230,17 @@ impl<'a> Coupled<'a> {
         })
     }
 
-    /// What is stored when the last of three neighbouring ticks, `felt`, begins, mJ; `None` where that is not known.
+    /// Energy stored when the last of three consecutive ticks, `felt`, begins, mJ; `None` where it is not known.
     ///
-    /// S = ½·k·d² + ½·k_R·θ² + ½·m·v²: the coupling's springs and the motion of the object's centre of mass. Stretch and angle are found from the
-    /// wrench that the law gave, which is what moved the handle but for the encoders' probes, because where the part has slipped to in the hand is
-    /// not told. With F, τ the wrench on the object at its centre of mass, V, Ω the motion
-    /// of its place in the hand as the law was told it, and v', ω' that of the object at the tick's end (its poses' differences), the law has
+    /// S = ½·k·d² + ½·k_R·θ² + ½·m·v²: the coupling's springs and the motion of the object's centre of mass. Stretch and angle are computed from the
+    /// law's wrench, which is the wrench that moved the handle except for the encoder probes, because the slip of the part in the hand is not
+    /// reported. With F, τ the wrench on the object at its centre of mass, V, Ω the motion of its place in the hand as the law received it, and v',
+    /// ω' that of the object at the tick's end (differences of its poses), the law has
     ///
     /// F = k·d + (b + h·k)·(V − v'), and τ likewise,
     ///
-    /// d by the encoders' reading, to which is added what they rounded off. What is left out makes what is given too large: the energy of turning, and
-    /// what a wrench beyond the coupling's limits, or taken down after the coupling, does not show of the stretch.
+    /// with d from the encoders' readings, to which their rounding is added. The omitted terms make the energy delivered too large: the energy of
+    /// rotation, and the stretch that does not show in a wrench beyond the coupling's limits or reduced after the coupling.
     pub(crate) fn stored_mj(&self, samples: &[Telemetry], felt: &Felt) -> Option<f64> {
         let [a, b, c] = samples else {
             return None;
@@ -261,7 +262,7 @@ impl<'a> Coupled<'a> {
         ]
         .map(f64::from);
         let center = |object: &DAffine3| object.transform_point3(self.center);
-        // A spring of no stiffness stores nothing.
+        // A spring of zero stiffness stores no energy.
         let inverse = |stiffness: f64| if stiffness > 0.0 { stiffness.recip() } else { 0.0 };
         let read = meters(&c.handle);
         let lever = read.transform_vector3(self.lever);

@@ -1,103 +1,105 @@
-//! What a run of a scenario measured, and whether its bounds hold.
+//! Measurements of a run of a scenario, and whether its bounds hold.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Two-sided bounds: a figure that is too good is as suspicious as one that is too bad.
+/// Two-sided bounds: an implausibly good figure fails as well as a bad one.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bounds {
-    /// Smallest that holds.
+    /// Smallest accepted value.
     pub min: f64,
-    /// Largest that holds.
+    /// Largest accepted value.
     pub max: f64,
-    /// Only on rigs whose written form starts so (`emulated`), because others do not measure it.
+    /// Prefix of the rigs to which the bounds apply (`emulated`), where others do not measure the figure.
     pub only_on: Option<String>,
 }
 
-/// What a run measured. Serialised as it is for `mortise demo --headless --json`.
+/// Measurements of a run. Serialised unchanged for `mortise demo --headless --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
     /// Scenario.
     pub scenario: String,
-    /// Rig, as written.
+    /// Rig, in its written form.
     pub rig: String,
     /// Board's name.
     pub board: String,
-    /// How far the moving part's farthest point lies beyond the hole's mouth, mm.
+    /// Distance of the moving part's farthest point beyond the hole's mouth, mm.
     pub inserted_mm: Option<f64>,
     /// Depth of the hole, mm.
     pub hole_mm: Option<f64>,
-    /// Moving part's centre of mass off the hole's axis at the end, mm.
+    /// Distance of the moving part's centre of mass from the hole's axis at the end, mm.
     pub lateral_mm: Option<f64>,
     /// Ticks run.
     pub ticks: u32,
     /// Ticks missed.
     pub missed_ticks: u32,
-    /// Most instructions a tick took; `null` where the rig counts no instructions.
+    /// Largest number of instructions of a tick; `null` where the rig counts no instructions.
     pub instructions_per_tick_max: Option<u32>,
-    /// Mean of the same.
+    /// Mean number of instructions of a tick.
     pub instructions_per_tick_mean: Option<f64>,
-    /// Instructions in a tick's period; `null` where nothing is counted or due.
+    /// Instructions in a tick's period; `null` on rigs without instruction counts or deadlines.
     pub instructions_per_tick_budget: Option<u32>,
-    /// Most points a tick looked up.
+    /// Largest number of points queried in a tick.
     pub points_per_tick_max: u32,
     /// Largest force commanded to the handle, N.
     pub peak_force_n: f64,
     /// Largest torque commanded to the handle, N·m.
     pub peak_torque_nm: f64,
-    /// Force on the handle along the press direction, mean of the settled part, N.
+    /// Force on the handle along the press direction, mean over the settled part, N.
     pub press_handle_n: Option<f64>,
-    /// The hand's force along the press direction, mean of the settled part, N.
+    /// The hand's force along the press direction, mean over the settled part, N.
     pub press_hand_n: Option<f64>,
-    /// How much they differ, share of the hand's, percent.
+    /// Difference of the two as a share of the hand's, percent.
     pub press_error_percent: Option<f64>,
-    /// Deepest point of one part inside another by the exact surfaces, both ways, over all samples, mm; 0 when never inside.
+    /// Deepest point of one part inside another on the exact surfaces, in both directions, over all samples, mm; 0 without overlap.
     pub penetration_mm: f64,
-    /// The same as the board saw it, mm.
+    /// The same as reported by the board, mm.
     pub board_penetration_mm: f64,
-    /// Integral of the amount of the contact force on the object, N·s.
+    /// Integral of the magnitude of the contact force on the object, N·s.
     pub contact_impulse_ns: f64,
     /// Largest contact force on the object, N.
     pub peak_contact_n: f64,
-    /// Amount of the integral of the forces on the object by contacts and targets less that on the handle, N·s: what of it the hand did not feel.
+    /// Magnitude of the integral of the contact and target forces on the object minus the force on the handle, N·s: the impulse that the hand did not
+    /// receive.
     pub impulse_lost_ns: f64,
-    /// Most work of the device on the handle over any interval beyond what was stored at its start, mJ: energy that nobody put in. Stored are the
-    /// coupling's springs and the object's motion, as far as they are known: only where `energy_exact`, else nothing counts as stored.
+    /// Largest work of the device on the handle over any interval beyond what was stored at its start, mJ: generated energy. Stored are the
+    /// coupling's springs and the object's kinetic energy, as far as they are known, which is only where `energy_exact`; else nothing counts as
+    /// stored.
     pub energy_given_mj: f64,
-    /// Work that went through the handle either way, mJ.
+    /// Work that passed through the handle in either direction, mJ.
     pub energy_passed_mj: f64,
-    /// Whether both are of the handle's true motion, which takes every tick's sample of a simulated handle. Else they are of its encoders' readings,
-    /// whose rounding (5 µm) makes them too large by some 10 µW on each axis that moves.
+    /// True if both are computed from the handle's true motion, which takes every tick's sample of a simulated handle. Otherwise they use its encoder
+    /// readings, whose rounding (5 µm) makes them too large by about 10 µW on each moving axis.
     pub energy_exact: bool,
-    /// Most work of contacts on the object over any interval, mJ, nothing counted as stored; exact where each tick is heard, else trapezoids between
-    /// samples.
+    /// Largest work of contacts on the object over any interval, mJ, with nothing counted as stored; exact if each tick's sample is received, else
+    /// trapezoids between samples.
     pub contact_given_mj: f64,
-    /// The same of contacts and targets together: what came through the port between the object and what constrains it.
+    /// The same work of contacts and targets together: through the port between the object and its constraints.
     pub constraint_given_mj: f64,
-    /// Telemetry samples taken.
+    /// Telemetry samples received.
     pub samples: u32,
     /// Telemetry the board dropped because the link was slower.
     pub dropped_samples: u32,
-    /// Frames the board threw away.
+    /// Frames that the board discarded.
     pub bad_frames: u32,
     /// Parameter messages sent while it ran.
     pub parameter_messages: u32,
-    /// Telemetry flags seen, all together.
+    /// Union of the telemetry flags.
     pub flags: u16,
-    /// Share of the samples whose tick left out points or contacts, %.
+    /// Share of the samples whose tick decimated points or contacts, %.
     pub degraded_percent: f64,
-    /// The first fault the board told of, in words; only where the scenario lets its inputs fail, else a fault is an error.
+    /// The first fault that the board reported, in words; only where the scenario makes inputs fail, otherwise a fault is an error.
     pub fault: Option<String>,
-    /// When, ms after the hand began.
+    /// Time of that fault, ms after the hand began.
     pub fault_at_ms: Option<f64>,
-    /// Largest force commanded from the second tick after the fault on, N.
+    /// Largest force commanded from the second tick after the fault onwards, N.
     pub force_after_fault_n: Option<f64>,
     /// Bytes of the scene image.
     pub image_bytes: usize,
-    /// Deepest stack seen, bytes; 0 where not measured.
+    /// Largest stack use, bytes; 0 where not measured.
     pub stack_bytes_max: u32,
     /// Hash over every tick's state, hexadecimal: equal hashes, equal runs.
     pub state_hash: String,
@@ -110,9 +112,9 @@ pub struct Verdict {
     pub what: String,
     /// Measured; `None` when this rig does not measure it.
     pub value: Option<f64>,
-    /// Smallest that holds.
+    /// Smallest accepted value.
     pub min: f64,
-    /// Largest that holds.
+    /// Largest accepted value.
     pub max: f64,
     /// Whether it holds.
     pub holds: bool,
@@ -149,9 +151,9 @@ impl fmt::Display for Verdict {
 
 /// A measured quantity.
 pub struct Quantity {
-    /// Its field's name, as a scenario's `[holds]` has it.
+    /// Field name, as used in a scenario's `[holds]`.
     pub name: &'static str,
-    /// What it is, for people.
+    /// Description for people.
     pub what: &'static str,
     /// Its unit.
     pub unit: &'static str,
@@ -201,13 +203,13 @@ quantities! {
 }
 
 impl Quantity {
-    /// The quantity of this field.
+    /// The quantity with this field name.
     pub fn named(name: &str) -> Option<&'static Self> {
         QUANTITIES.iter().find(|quantity| quantity.name == name)
     }
 }
 
-/// `value` to three significant digits, integers whole; thousands apart.
+/// `value` to three significant digits, integers in full; thousands separated.
 pub fn three_digits(value: f64) -> String {
     if !value.is_finite() {
         return value.to_string();
@@ -215,7 +217,7 @@ pub fn three_digits(value: f64) -> String {
     let decimals = if value == value.trunc() {
         0
     } else {
-        // Digits before the point; the rounding may add one, as from 9.996 to 10.0.
+        // Digits before the point; rounding may add one, as from 9.996 to 10.0.
         let magnitude = format!("{value:.2e}");
         let exponent = magnitude
             .split_once('e')
@@ -234,12 +236,12 @@ pub fn three_digits(value: f64) -> String {
 }
 
 impl Outcome {
-    /// A measured quantity by its field's name; `None` when there is none of that name or this run did not measure it.
+    /// A measured quantity by its field name; `None` for an unknown name or a quantity that this run did not measure.
     pub fn quantity(&self, name: &str) -> Option<f64> {
         Quantity::named(name).and_then(|quantity| (quantity.get)(self))
     }
 
-    /// Every bound of a scenario's `[holds]` that concerns this rig. A quantity that was not measured does not hold.
+    /// Verdicts on every bound of a scenario's `[holds]` that applies to this rig. A quantity that was not measured fails.
     pub fn verdicts(&self, holds: &BTreeMap<String, Bounds>) -> Vec<Verdict> {
         holds
             .iter()

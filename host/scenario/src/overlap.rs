@@ -1,8 +1,8 @@
-//! How deep parts overlap by their exact surfaces, at every sample.
+//! Overlap of parts on their exact surfaces, at every sample.
 //!
-//! Points on the exact surface of the moving part are looked up in the exact surface of each other part, and the other way round. A look-up costs
-//! microseconds and a run has millions of them; most are not needed: a signed distance changes by no more than its point has moved, so one looked up
-//! once need not be again before it could be deeper than the deepest so far. What is left out changes nothing in the result.
+//! Points on the exact surface of the moving part are evaluated against the exact surface of each other part, and vice versa. An evaluation costs
+//! microseconds and a run has millions of them. Most are skipped: a signed distance changes by at most the motion of its point, so a point need not
+//! be evaluated again before it could be deeper than the deepest so far. Skipping does not change the result.
 
 use glam::{DAffine3, DVec3};
 use mortise_protocol::message::Telemetry;
@@ -10,11 +10,11 @@ use mortise_protocol::message::Telemetry;
 use crate::scene::{Body, PreparedScene};
 use crate::wire::pose_mm;
 
-/// What is known of a part's points in another part.
+/// Last evaluated distances of a part's points in another part.
 struct Known {
-    /// Where each was looked up last, the other part's frame, mm.
+    /// Position of each point at its last evaluation, the other part's frame, mm.
     at: Vec<DVec3>,
-    /// Signed distance there, mm.
+    /// Signed distance at that position, mm.
     distance: Vec<f64>,
 }
 
@@ -26,7 +26,7 @@ impl Known {
         }
     }
 
-    /// Deepest of `points` (moved by `to_body`) inside `body`, mm, unless that is less than `most`.
+    /// Deepest of `points` (transformed by `to_body`) inside `body`, mm, or `most` if none is deeper.
     fn deeper(&mut self, points: &[DVec3], to_body: &DAffine3, body: &Body, most: f64) -> f64 {
         let mut deepest = most;
         let known = self.at.iter_mut().zip(&mut self.distance);
@@ -36,7 +36,7 @@ impl Known {
                 continue;
             }
             *at = place;
-            // Outside the sphere about the body it is as far off as that at least.
+            // Outside the bounding sphere the distance to it is a lower bound.
             let off = place.distance(body.center) - body.radius;
             *distance = if off > 0.0 {
                 off
@@ -49,8 +49,8 @@ impl Known {
     }
 }
 
-/// Deepest point of the moving part in any other, or of any other in it, over all samples, mm; 0 when nowhere inside. In closed form where the scene
-/// has one.
+/// Deepest point of the moving part in any other, or of any other in it, over all samples, mm; 0 without overlap. In closed form where the scene has
+/// one.
 pub fn penetration_mm(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
     match scene.closed_form() {
         Some(closed_form) => (samples.iter().filter_map(|sample| sample.object.as_ref()))
@@ -60,7 +60,7 @@ pub fn penetration_mm(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
     }
 }
 
-/// The same by points on either part's surface, mm: what lies between them is not seen.
+/// The same by sample points on either part's surface, mm: penetration between the points is not seen.
 pub fn penetration_by_points_mm(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
     let bodies = scene.bodies();
     let moving = usize::from(scene.part);

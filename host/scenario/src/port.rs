@@ -1,16 +1,16 @@
-//! Energy made behind a port: what comes out of it, beyond what was stored, over any interval.
+//! Energy generated behind a port: the largest work that leaves it over any interval, beyond what was stored at the interval's start.
 //!
-//! With W_k the work that comes out in tick k and S_k what is stored behind the port at the tick's start, part of which may come out again,
+//! With W_k the work that leaves in tick k and S_k the energy stored behind the port at the tick's start, part of which may leave again,
 //!
 //! E = max over all a ≤ b of Σ_{a ≤ k ≤ b} W_k − S_a, and 0.
 //!
-//! It is not the largest value of the running sum: that takes what is dissipated first for a credit and does not see what is made after it. With
-//! nothing stored E is the running sum less its smallest value so far, at its largest. What of the storage is not counted makes E too large, never too
-//! small. At the first tick nothing counts as stored. The recurrence that finds E in one pass is [`Rise`]'s.
+//! E is not the largest value of the running sum: that would credit earlier dissipation and miss energy generated after it. Without storage E is the
+//! maximum of the running sum minus its smallest earlier value. Uncounted storage makes E too large, never too small. At the first tick nothing
+//! counts as stored. The recurrence that finds E in one pass is that of [`Rise`].
 
 use mortise_haptics::observer::Rise;
 
-/// Work through a port, in one unit.
+/// Account of the work through a port, in one unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Port {
     rise: Rise,
@@ -18,24 +18,24 @@ pub struct Port {
 }
 
 impl Port {
-    /// Takes one tick's work, positive out of the port; nothing is stored behind it.
+    /// Adds one tick's work, positive out of the port, with nothing stored behind it.
     pub fn add(&mut self, work: f64) {
         self.add_beyond(0.0, work);
     }
 
-    /// Takes one tick's work, `stored` being what was behind the port when the tick began.
+    /// Adds one tick's work; `stored` is the energy behind the port when the tick began.
     pub fn add_beyond(&mut self, stored: f64, work: f64) {
         self.rise.stored(stored);
         self.rise.gave(work);
         self.passed += work.abs();
     }
 
-    /// E, 0 or more.
+    /// E, at least 0.
     pub fn made(&self) -> f64 {
         self.rise.most()
     }
 
-    /// All that went through, either way.
+    /// All work that passed, in either direction.
     pub fn passed(&self) -> f64 {
         self.passed
     }
@@ -45,7 +45,7 @@ impl Port {
 mod tests {
     use super::*;
 
-    /// Every interval, summed anew: O(n²) intervals.
+    /// Sums every interval separately: O(n²) intervals.
     fn by_force(ticks: &[(f64, f64)]) -> f64 {
         let mut most = 0.0f64;
         for (a, &(stored, _)) in ticks.iter().enumerate() {
@@ -85,7 +85,7 @@ mod tests {
             let expected = by_force(&ticks);
             assert!((port.made() - expected).abs() < 1e-12, "{ticks:?}");
             assert_eq!(port.passed(), passed);
-            // The running sum's maximum sees less of the same sequences, and storage is a credit: both are tried.
+            // The running sum's maximum is smaller on some of these sequences, and storage is a credit: both cases must occur.
             beyond_the_sum += u32::from(!stores && expected > largest + 0.1);
             credited += u32::from(stores && by_force(&ticks) + 0.1 < by_force(&forgotten(&ticks)));
         }

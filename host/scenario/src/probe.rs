@@ -1,8 +1,7 @@
 //! Gap, depth and contact forces of two parts at given poses, by the force law's own trees and fields.
 //!
-//! What outside comparisons call: poses come from a CSV file, the scene from a STEP file or a baked image, and each row says how far apart or
-//! how deep, what pushes, what was looked at, and how long it took here. The distance is [`mortise_haptics::Probe`]'s; nothing is computed
-//! beside it.
+//! Interface for external comparisons: poses come from a CSV file, the scene from a STEP file or a baked image, and each row states the gap or depth,
+//! the contacts, the work of the search, and its time on this computer. The distance is that of [`mortise_haptics::Probe`], unmodified.
 
 use std::fmt;
 use std::hint::black_box;
@@ -19,35 +18,35 @@ use serde::Serialize;
 
 use crate::error::ScenarioError;
 
-/// Columns a file of poses must have, in any order.
+/// Columns of a pose file, in any order.
 pub const COLUMNS: [&str; 8] = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"];
-/// How far a quaternion may be from unit length: four decimals in each of its numbers leave half of that.
+/// Tolerance of a quaternion's length: rounding to four decimals uses half of it.
 const UNIT_TOLERANCE: f64 = 1e-3;
-/// Poses a file may hold: each is some kilobytes of work, and a file larger than this is a mistake.
+/// Largest number of poses in a file: each is some kilobytes of work, and a larger file is a mistake.
 const MAX_POSES: usize = 1_000_000;
-/// Times each query is made: what else the computer does makes one longer, never shorter, so the least is taken.
+/// Repetitions of each query: other load on the computer only lengthens it, so the shortest time is used.
 const REPEATS: usize = 33;
-/// A question that takes longer is asked once, ns.
+/// A query that takes longer is made once, ns.
 const LONG_NS: u64 = 5_000_000;
-/// Farthest a position may be, mm: what the force law takes for a place.
+/// Largest coordinate of a position, mm: the force law's limit.
 const FARTHEST_MM: f64 = 100e3;
 
-/// One line of a file of poses.
+/// One line of a pose file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedPose {
-    /// Its name.
+    /// Name of the pose.
     pub name: String,
     /// Origin of the moving part in the fixed part's frame, mm.
     pub position_mm: DVec3,
-    /// Moving part to fixed part, unit length.
+    /// Rotation from moving to fixed part, unit length.
     pub orientation: DQuat,
 }
 
-/// Reads a file of poses: CSV, a first line with the [`COLUMNS`], numbers in mm, quaternions of unit length. Empty lines and lines
-/// from `#` are passed over.
+/// Reads a pose file: CSV, a first line with the [`COLUMNS`], numbers in mm, quaternions of unit length. Skips empty lines and lines that begin with
+/// `#`.
 ///
 /// # Errors
-/// `Unreadable`; `Input` with the line and what is wrong in it.
+/// `Unreadable`; `Input` with the line and its error.
 pub fn read_poses(path: &Path) -> Result<Vec<NamedPose>, ScenarioError> {
     let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Unreadable {
         path: path.to_owned(),
@@ -59,7 +58,7 @@ pub fn read_poses(path: &Path) -> Result<Vec<NamedPose>, ScenarioError> {
     })
 }
 
-/// As [`read_poses`], from the text; a mistake comes with its line.
+/// As [`read_poses`], from the text; an error includes its line number.
 fn parse_poses(text: &str) -> Result<Vec<NamedPose>, (usize, String)> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = (text.lines().enumerate())
@@ -93,7 +92,7 @@ fn parse_poses(text: &str) -> Result<Vec<NamedPose>, (usize, String)> {
     Ok(poses)
 }
 
-/// A cell without blanks and quotation marks around it.
+/// A cell without surrounding blanks and quotation marks.
 fn cell(text: &str) -> &str {
     text.trim().trim_matches('"')
 }
@@ -137,28 +136,28 @@ fn pose(cells: &[&str], columns: usize, places: &[usize; COLUMNS.len()]) -> Resu
     })
 }
 
-/// A scene to ask, from a STEP file or an image.
+/// A scene to probe, from a STEP file or an image.
 pub struct ProbeScene {
-    /// For messages.
+    /// Name for messages.
     name: String,
-    /// The image in words, so that it is aligned.
+    /// The image as words, for alignment.
     image: Vec<u32>,
-    /// Names of its parts; an image has none, there they are numbers.
+    /// Names of its parts; an image has no names, and its parts are numbers.
     parts: Vec<String>,
 }
 
-/// How a STEP file is to be baked.
+/// Options for baking a STEP file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Model {
     /// Cell edge, mm; `None`: as [`BakeOptions`] chooses.
     pub cell_mm: Option<f64>,
-    /// How contact is found; `None`: as [`BakeOptions`] chooses, or as the image has it.
+    /// Contact method; `None`: as [`BakeOptions`] chooses, or that of the image.
     pub method: Option<Method>,
-    /// What the pointshells are made of.
+    /// Kind of the pointshells.
     pub shell: PointshellKind,
 }
 
-/// A moving part and a fixed one, by their places in the scene.
+/// A moving part and a fixed one, by their indices in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {
     /// The part that is placed.
@@ -168,10 +167,10 @@ pub struct Pair {
 }
 
 impl ProbeScene {
-    /// Reads `path`: a baked image as it is, a STEP file baked with cells of `cell_mm` (`None`: as [`BakeOptions`] chooses).
+    /// Reads `path`: a baked image unchanged, a STEP file baked with cells of `cell_mm` (`None`: as [`BakeOptions`] chooses).
     ///
     /// # Errors
-    /// `Unreadable`, `Brep`, `Bake`; `Input` for a damaged image, or one given a cell size.
+    /// `Unreadable`, `Brep`, `Bake`; `Input` for a damaged image, or an image together with a cell size.
     pub fn load(path: &Path, cell_mm: Option<f64>) -> Result<Self, ScenarioError> {
         let model = Model {
             cell_mm,
@@ -180,7 +179,7 @@ impl ProbeScene {
         Self::load_by(path, &model)
     }
 
-    /// As [`Self::load`], a STEP file as `model` says.
+    /// As [`Self::load`], a STEP file baked as `model` specifies.
     ///
     /// # Errors
     /// As [`Self::load`]; `Input` for an image of another method.
@@ -199,10 +198,10 @@ impl ProbeScene {
                     method: model.method.unwrap_or_default(),
                     shell: model.shell,
                     cell_mm,
-                    // A probe is asked for accuracy: the shell is to err no more than the field does on the radii of common parts.
+                    // For an accurate probe: the shell's error is at most the field's on the radii of common parts.
                     epsilon_mm: cell_mm.map(|cell| cell / 100.0),
                     grabbable: Grabbable::All,
-                    // What is asked for here need not fit a board.
+                    // A scene to probe need not fit a board.
                     image_limit_bytes: if cell_mm.is_some() {
                         u64::from(u32::MAX)
                     } else {
@@ -237,7 +236,7 @@ impl ProbeScene {
         Ok(Self { name, image, parts })
     }
 
-    /// Reads the STEP file at `path` and bakes it as `options` say.
+    /// Reads the STEP file at `path` and bakes it with `options`.
     ///
     /// # Errors
     /// `Unreadable`, `Brep`, `Bake`.
@@ -257,15 +256,15 @@ impl ProbeScene {
         })
     }
 
-    /// Bytes of the image, to the next four.
+    /// Size of the image in bytes, rounded up to a multiple of four.
     pub fn image_bytes(&self) -> usize {
         size_of_val(self.image.as_slice())
     }
 
-    /// The parts named so; `fixed` may be left out where there are two.
+    /// The parts of these names; `fixed` may be omitted in a scene of two parts.
     ///
     /// # Errors
-    /// `NoSuchPart`; `Input` when `fixed` is left out and there is a choice, or both are one part.
+    /// `NoSuchPart`; `Input` when `fixed` is omitted and ambiguous, or both names are one part.
     pub fn pair(&self, moving: &str, fixed: Option<&str>) -> Result<Pair, ScenarioError> {
         let moving = self.part(moving)?;
         let bad = |what: String| ScenarioError::Input {
@@ -299,7 +298,7 @@ impl ProbeScene {
             })
     }
 
-    /// Asks for one pose, several times for the least it takes here.
+    /// Probes one pose, repeatedly to find the shortest time.
     ///
     /// # Errors
     /// `Input` when the force law refuses the pose.
@@ -308,7 +307,7 @@ impl ProbeScene {
             name: format!("{}, pose `{}`", self.name, named.name),
             what,
         };
-        // It was opened before, so this cannot fail but for a bug, and then it says so.
+        // The image was opened before, so this fails only by a bug, which is then reported.
         let scene =
             SceneImage::open(bytemuck::cast_slice(&self.image)).map_err(|error| bad(error.to_string()))?;
         let [x, y, z, w] = named.orientation.as_quat().to_array();
@@ -373,14 +372,14 @@ impl ProbeScene {
     }
 }
 
-/// Bytes in words of the computer's own order, the last filled up with zeros.
+/// Words in the computer's byte order, the last one padded with zeros.
 fn words(bytes: &[u8]) -> Vec<u32> {
     let mut words = vec![0; bytes.len().div_ceil(size_of::<u32>())];
     bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..bytes.len()].copy_from_slice(bytes);
     words
 }
 
-/// What a distance is worth.
+/// Source and accuracy of a distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Resolution {
@@ -388,55 +387,55 @@ pub enum Resolution {
     Exact,
     /// Interpolated in the field.
     Field,
-    /// To the plane through a voxel's centre: all a voxmap has.
+    /// To the tangent plane through a voxel's centre: the accuracy of a voxmap.
     TangentPlane,
-    /// At least so far apart, or at least so deep: the field ends nearer than that.
+    /// A lower bound on gap or depth: the field ends nearer than that.
     Bound,
 }
 
-/// What was found at one pose. Positions and directions in the fixed part's frame.
+/// Result at one pose. Positions and directions in the fixed part's frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProbeRow {
-    /// The pose's name.
+    /// Name of the pose.
     pub name: String,
-    /// Gap positive, deepest penetration negative, mm.
+    /// Distance, mm: gap positive, deepest penetration negative.
     pub distance_mm: f64,
-    /// The same as the field interpolates it, or as the voxmap's tangent planes have it, mm: what the force law acts on; none beyond them.
+    /// Distance interpolated in the field, or from the voxmap's tangent planes, mm, on which the force law acts; absent beyond their range.
     pub field_distance_mm: Option<f64>,
-    /// What `distance_mm` is worth.
+    /// Source and accuracy of `distance_mm`.
     pub resolution: Resolution,
-    /// The point it was found at, mm.
+    /// Position of the nearest point, mm.
     pub nearest_mm: [f64; 3],
-    /// Face of the moving part there.
+    /// Face of the moving part there, if known.
     pub moving_face: Option<u16>,
-    /// Face of the fixed part there.
+    /// Face of the fixed part there, if known.
     pub fixed_face: Option<u16>,
-    /// Points that push.
+    /// Number of points in contact.
     pub contacts: u16,
-    /// They, each.
+    /// The points in contact.
     pub contact_points: Vec<ContactRow>,
-    /// On the moving part, N.
+    /// Force on the moving part, N.
     pub force_n: [f32; 3],
-    /// On the moving part about its centre of mass, N m.
+    /// Torque on the moving part about its centre of mass, N m.
     pub torque_nm: [f32; 3],
-    /// Tree nodes looked at.
+    /// Tree nodes visited.
     pub nodes: u32,
-    /// Points looked up.
+    /// Points queried.
     pub points: u32,
-    /// Least time of a query on this computer, ns.
+    /// Shortest time of a query on this computer, ns.
     pub least_ns: u64,
-    /// What was out of the ordinary.
+    /// Flags raised by the query.
     pub flags: Vec<&'static str>,
 }
 
-/// A point that pushes.
+/// A point in contact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ContactRow {
-    /// Where, mm.
+    /// Position, mm.
     pub point_mm: [f64; 3],
-    /// Direction in which the moving part is pushed.
+    /// Direction of the force on the moving part.
     pub normal: [f32; 3],
-    /// How deep, mm, positive.
+    /// Depth, mm, positive.
     pub depth_mm: f64,
     /// Face of the moving part.
     pub moving_face: Option<u16>,

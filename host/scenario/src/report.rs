@@ -1,4 +1,4 @@
-//! An outcome for people: a verdict in words, then a table with units.
+//! A human-readable outcome: a verdict in words, then a table with units.
 
 use crate::outcome::{Outcome, QUANTITIES, Quantity, Verdict, three_digits};
 
@@ -19,7 +19,7 @@ pub fn report(outcome: &Outcome, verdicts: &[Verdict]) -> String {
     lines.join("\n")
 }
 
-/// What happened.
+/// Sentences that describe the outcome.
 fn words(outcome: &Outcome) -> Vec<String> {
     let mut lines = Vec::new();
     match (outcome.inserted_mm, outcome.hole_mm) {

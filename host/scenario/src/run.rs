@@ -16,7 +16,7 @@ use crate::scenario::{Scenario, parameter_named};
 use crate::scene::PreparedScene;
 use crate::{measure, overlap, truth, wire};
 
-/// Ticks asked for at once: bounds the telemetry that waits, and the time until a fault is seen.
+/// Ticks requested at once: bounds the telemetry that waits, and the delay until a fault is seen.
 const BATCH_TICKS: u32 = 500;
 /// Ticks after disarming in which the wrench fades out.
 const FADE_TICKS: u32 = 150;
@@ -31,7 +31,7 @@ pub fn run(scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError
     run_on(&client, scenario, &scene)
 }
 
-/// As [`connect`]; an emulated board starts with the scene, which [`run_on`] then need not send. Not through a line that can fail.
+/// As [`connect`]; an emulated board starts with the scene, which [`run_on`] then need not send. The line is free of faults.
 ///
 /// # Errors
 /// `Rig`.
@@ -46,7 +46,7 @@ pub fn connect_with_scene(
     }
 }
 
-/// Connects to the rig `spec` in lockstep, through a line that can fail where `scenario` has faults.
+/// Connects to the rig `spec` in lockstep, over a faulty line if `scenario` has faults.
 ///
 /// # Errors
 /// `Rig`.
@@ -58,7 +58,7 @@ pub fn connect(scenario: &Scenario, spec: &RigSpec) -> Result<Client, ScenarioEr
     })
 }
 
-/// Plays `scenario` on a rig that is connected already and in lockstep ([`connect`]), with a scene prepared before.
+/// Plays `scenario` on a rig that is already connected and in lockstep ([`connect`]), with a scene prepared before.
 ///
 /// # Errors
 /// As [`run`].
@@ -71,23 +71,23 @@ pub fn run_on(client: &Client, scenario: &Scenario, scene: &PreparedScene) -> Re
     Ok(record(client, scenario, scene, Some(&mut listener))?.outcome)
 }
 
-/// Hears each sample the link lets through, before the next tick; says what to send.
+/// Receives each sample that the link lets through, before the next tick; returns the messages to send.
 pub type Listener<'l> = dyn FnMut(&Telemetry) -> Vec<ToDevice> + 'l;
 
-/// A run and all that was heard.
+/// A run and its telemetry.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What it measured.
+    /// Its measurements.
     pub outcome: Outcome,
-    /// Every sample the board sent from the hand's start on, also those a faulty link lost.
+    /// Every sample that the board sent from the hand's start on, including those lost on a faulty link.
     pub samples: Vec<Telemetry>,
-    /// The same handle and wrench for each: of its true motion where [`Outcome::energy_exact`], else as the board tells it.
+    /// Handle and wrench of each sample: the true motion where [`Outcome::energy_exact`], else the encoder readings.
     pub felt: Vec<Felt>,
-    /// What the link did to the frames.
+    /// Counts of the link's faults.
     pub faults: FaultCounts,
 }
 
-/// As [`run_on`], with a listener of the caller's instead of the scenario's guidance.
+/// As [`run_on`], with the caller's listener instead of the scenario's guidance.
 ///
 /// # Errors
 /// As [`run`].
@@ -119,7 +119,7 @@ pub fn record(
     let ran = play.perform(scenario, line, listener)?;
     let mut faults = FaultCounts::default();
     if let Some(line) = line {
-        // Anything still on its way.
+        // Waits for frames still on the line.
         client.run(0)?;
         play.listen()?;
         play.overheard(line)?;
@@ -128,10 +128,10 @@ pub fn record(
     }
     let statistics = client.statistics(false)?;
     client.request(ToDevice::SetTelemetry { every_ticks: 0 })?;
-    // The last sample may come behind the answer to the last run, but not behind these.
+    // The last sample may arrive after the answer to the last run, but not after these answers.
     play.listen()?;
     if play.expected {
-        // Sound inputs for whoever comes next.
+        // Clears the input faults for the next user of the rig.
         client.request(ToDevice::SimulatedInputs(heapless::Vec::new()))?;
     }
     client.request(ToDevice::Disarm)?;
@@ -148,7 +148,7 @@ pub fn record(
     })
 }
 
-/// The line the scenario's faults are for.
+/// The line to which the scenario's faults apply.
 fn line_of<'c>(client: &'c Client, scenario: &Scenario) -> Result<Option<&'c FaultLine>, ScenarioError> {
     match (&scenario.faults, client.fault_line()) {
         (Some(_), None) => Err(ScenarioError::Scenario {
@@ -166,14 +166,14 @@ struct Play<'c> {
     messages: u32,
     /// Tick in which the hand began.
     begun: u32,
-    /// The scenario lets inputs fail.
+    /// True if the scenario makes inputs fail.
     expected: bool,
     /// The first fault, with its tick.
     fault: Option<(u32, Fault)>,
 }
 
 impl Play<'_> {
-    /// Takes the samples the board sent, whatever became of them, and faults it told of.
+    /// Takes the board's samples, including lost ones, and its fault reports.
     fn overheard(&mut self, line: &FaultLine) -> Result<(), ScenarioError> {
         self.samples.clear();
         for told in line.overheard() {
@@ -186,7 +186,7 @@ impl Play<'_> {
         Ok(())
     }
 
-    /// A fault is an error unless the scenario makes it.
+    /// A fault is an error unless the scenario provokes it.
     fn faulted(&mut self, tick: u32, fault: Fault) -> Result<(), ScenarioError> {
         if !self.expected {
             let what = describe(fault);
@@ -196,10 +196,10 @@ impl Play<'_> {
         Ok(())
     }
 
-    /// Scene on the board, parameters set, handle at the grip, part in hand.
+    /// Uploads the scene, sets parameters, moves the handle to the grip point and grabs the part.
     fn prepare(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<(), ScenarioError> {
         let client = self.client;
-        // An earlier run may have left it stopped.
+        // An earlier run may have left the board stopped.
         if matches!(client.state(), DeviceState::Stopped | DeviceState::Fault(_)) {
             client.request(ToDevice::ClearFault)?;
         }
@@ -257,10 +257,10 @@ impl Play<'_> {
         }
     }
 
-    /// Sends a parameter each `every` ticks.
+    /// Sends a parameter every `every` ticks.
     fn loaded(&mut self, scenario: &Scenario, ticks: u32, every: u32) -> Result<Ran, ScenarioError> {
         let client = self.client;
-        // The limit goes to and fro well above the forces that occur, so that each message changes a setting and none the outcome.
+        // The limit alternates well above the forces that occur, so that each message changes a setting and none changes the outcome.
         let id = ParameterId::ForceLimit;
         let start = (scenario.parameters.get(id.row().name).copied()).unwrap_or(id.row().default);
         let mut value = start;
@@ -279,7 +279,7 @@ impl Play<'_> {
         if scenario.faults.is_some() {
             return Ok(ran);
         }
-        // All of them arrived when the last did: they are taken in order.
+        // Messages are handled in order: if the last one arrived, all did.
         let found = client.parameter(id)?;
         if found != value {
             return Err(ScenarioError::Scenario {
@@ -293,7 +293,7 @@ impl Play<'_> {
         Ok(ran)
     }
 
-    /// Lets `every` ticks run at a time, answering the samples with what the listener makes of them.
+    /// Runs `every` ticks at a time and sends the listener's answers to their samples.
     fn heeding(
         &mut self,
         listener: &mut Listener<'_>,
@@ -306,12 +306,12 @@ impl Play<'_> {
             let batch = left.min(every);
             let heard = self.samples.len();
             let ran = self.run(batch)?;
-            // The sample may come behind the answer to the run, but not behind this one: what is heard when must not depend on timing.
+            // The sample may arrive after the answer to the run, but not after this answer: reception must not depend on timing.
             self.client.run(0)?;
             self.listen()?;
             for sample in &self.samples[heard..] {
                 for message in listener(sample) {
-                    // An answer may be lost too: nobody waits for one then.
+                    // On a faulty link an answer may be lost, so none is awaited.
                     if faulty {
                         self.client.send(message)?;
                     } else {
@@ -326,7 +326,7 @@ impl Play<'_> {
         }
     }
 
-    /// Lets ticks run, in batches, and takes what the board says meanwhile.
+    /// Runs ticks in batches and takes the board's messages meanwhile.
     fn run(&mut self, ticks: u32) -> Result<Ran, ScenarioError> {
         let mut left = ticks;
         loop {

@@ -8,7 +8,7 @@ pub const NAME: &str = "pair_d18.75_clear1.00.step";
 /// Contents of the sample.
 pub const STEP: &[u8] = include_bytes!("../../app/samples/pair_d18.75_clear1.00.step");
 
-/// The sample as a file, removed when dropped: the CAD kernel reads files only.
+/// The sample as a temporary file, removed when dropped: the CAD kernel reads files only.
 #[derive(Debug)]
 pub struct File {
     folder: PathBuf,
@@ -36,13 +36,13 @@ impl File {
 
 impl Drop for File {
     fn drop(&mut self) {
-        // Files that cannot be removed are left to the system's own cleaning of temporary files.
+        // Files that cannot be removed are left to the system's cleanup of temporary files.
         let _ = std::fs::remove_file(&self.path);
         let _ = std::fs::remove_dir(&self.folder);
     }
 }
 
-/// Creation fails when the name exists, so that no folder of another program is ever used.
+/// Creates a new folder; fails when the name exists, so that no folder of another program is ever used.
 fn new_folder() -> std::io::Result<PathBuf> {
     let base = std::env::temp_dir();
     for attempt in 0..1_000 {

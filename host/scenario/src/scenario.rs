@@ -1,6 +1,6 @@
-//! Scenarios: a scene, a hand that moves in it, and what must hold, as data.
+//! Scenarios as data: a scene, an operator model, and bounds.
 //!
-//! Lengths in a scenario file are millimetres, angles degrees, forces newtons, times seconds; the names say so. The hand takes hold of the
+//! Lengths in a scenario file are millimetres, angles degrees, forces newtons, times seconds; field names carry the units. The hand takes hold of the
 //! part at `grip_mm` and moves relative to that point.
 
 use std::collections::BTreeMap;
@@ -25,28 +25,28 @@ pub struct Scenario {
     pub name: String,
     /// One sentence for people.
     pub what: String,
-    /// What is on the table.
+    /// The scene.
     pub scene: Scene,
-    /// How the object is moved: `implicit` or `explicit`; the board's default when absent. The same as the parameter `Integrator`, in words.
+    /// Integrator of the object: `implicit` or `explicit`; the board's default when absent. The same as the parameter `Integrator`, in words.
     pub integrator: Option<Integrator>,
     /// Parameters that differ from their defaults, by name.
     #[serde(default)]
     pub parameters: BTreeMap<String, f32>,
-    /// Who moves.
+    /// The operator model.
     pub hand: Hand,
-    /// How long, and what else goes on.
+    /// Duration and settings of the run.
     pub run: Run,
-    /// How depth is measured, where it matters.
+    /// Measurement of depth, where it is measured.
     pub depth: Option<Depth>,
-    /// Where the hand presses, where that matters.
+    /// Press direction, where the hand presses.
     pub press: Option<Press>,
-    /// What goes wrong on the link while the hand moves.
+    /// Faults of the link and of inputs while the hand moves.
     pub faults: Option<Faults>,
-    /// What must hold: a measured quantity's name and its bounds; see [`QUANTITIES`].
+    /// Bounds: a measured quantity's name and its range; see [`QUANTITIES`].
     pub holds: BTreeMap<String, Bounds>,
 }
 
-/// What is on the table.
+/// A scene.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -62,24 +62,24 @@ pub struct Scene {
     /// `error-bounded` or `classic`.
     #[serde(default)]
     pub shell: Shell,
-    /// How far points of a classic shell are moved inward, percent of a voxel.
+    /// Distance by which points of a classic shell are moved inward, percent of a voxel.
     #[serde(default)]
     pub shrink_percent: f64,
 }
 
-/// What the pointshells are made of.
+/// Kind of the pointshells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shell {
-    /// Points where an error bound needs them.
+    /// Points where an error bound requires them.
     #[default]
     ErrorBounded,
-    /// A point for each voxel of the surface, voxels as large as cells.
+    /// A point for each surface voxel, voxels as large as cells.
     Classic,
 }
 
 impl Scene {
-    /// The shell as the baker knows it.
+    /// The shell in the baker's terms.
     pub fn pointshell(&self) -> PointshellKind {
         match self.shell {
             Shell::ErrorBounded => PointshellKind::ErrorBounded,
@@ -91,13 +91,13 @@ impl Scene {
     }
 }
 
-/// How the object is moved.
+/// Integrator of the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
     /// Backward Euler.
     Implicit,
-    /// Newton–Euler, the textbook's.
+    /// Explicit Newton–Euler step, as in the textbook.
     Explicit,
 }
 
@@ -111,64 +111,64 @@ impl Integrator {
     }
 }
 
-/// The simulated hand: a spring-damper, and where it goes.
+/// The simulated hand: a spring-damper that follows keyframes.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hand {
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness_n_per_m: f32,
-    /// N·s/m.
+    /// Damping, N·s/m.
     pub damping_n_s_per_m: f32,
-    /// N·m/rad.
+    /// Angular stiffness, N·m/rad.
     pub angular_stiffness_n_m_per_rad: f32,
-    /// N·m·s/rad.
+    /// Angular damping, N·m·s/rad.
     pub angular_damping_n_m_s_per_rad: f32,
-    /// Tremor's amplitude, mm.
+    /// Amplitude of the tremor, mm.
     #[serde(default)]
     pub tremor_mm: f64,
-    /// Tremor's frequency, Hz.
+    /// Frequency of the tremor, Hz.
     #[serde(default)]
     pub tremor_hz: f32,
-    /// Where the handle takes hold, world.
+    /// Position where the handle takes hold, world, mm.
     pub grip_mm: [f64; 3],
-    /// Where it goes, times ascending, at most [`MAX_KEYFRAMES`].
+    /// Motion of the hand: times ascending, at most [`MAX_KEYFRAMES`].
     pub keyframes: Vec<Key>,
 }
 
-/// One point of the hand's way.
+/// One keyframe of the hand.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Key {
-    /// Since the part was grabbed.
+    /// Time since the part was grabbed, s.
     pub t_s: f64,
-    /// From the grip.
+    /// Offset from the grip point, mm.
     #[serde(default)]
     pub offset_mm: [f64; 3],
-    /// Rotation vector about the grip, world axes.
+    /// Rotation vector about the grip point, world axes, degrees.
     #[serde(default)]
     pub turn_deg: [f64; 3],
-    /// Added to the spring's force.
+    /// Force added to the spring's, N.
     #[serde(default)]
     pub push_n: [f32; 3],
 }
 
-/// How long, and what else goes on.
+/// Duration and settings of a run.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
-    /// Virtual time after grabbing.
+    /// Virtual time after grabbing, s.
     pub duration_s: f64,
-    /// Ticks between telemetry samples (every figure but the board's own counters comes from them).
+    /// Ticks between telemetry samples (the source of every figure but the board's own counters).
     #[serde(default = "five")]
     pub telemetry_every_ticks: u16,
-    /// Ticks after which samples are answered, those of several at once; each when absent.
+    /// Ticks between answers to samples, several samples at once; each sample is answered when absent.
     pub heed_every_ticks: Option<u16>,
-    /// Ticks between parameter messages, for load; none when absent.
+    /// Ticks between parameter messages, for load; none are sent when absent.
     pub parameter_every_ticks: Option<u32>,
-    /// Whether the desktop recognises constraints from telemetry and sends them.
+    /// True if the desktop recognises constraints from telemetry and sends them.
     #[serde(default)]
     pub guidance: bool,
-    /// The last so much of the run counts as settled.
+    /// Length of the run's end that counts as settled, s.
     #[serde(default = "half")]
     pub settled_s: f64,
 }
@@ -181,19 +181,19 @@ fn half() -> f64 {
     0.5
 }
 
-/// How depth is measured: how far the moving part's farthest point along `axis` lies beyond the fixed part's first.
+/// Measurement of depth: distance of the moving part's farthest point along `axis` from the fixed part's first point.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Depth {
     /// Name of the part with the hole; its extent along the axis is the hole's depth.
     pub fixed: String,
-    /// Way in, world.
+    /// Direction of insertion, world.
     pub axis: [f64; 3],
-    /// A point of the hole's axis, world, mm.
+    /// A point on the hole's axis, world, mm.
     pub through_mm: [f64; 3],
 }
 
-/// Where the hand presses.
+/// Press of the hand.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Press {
@@ -202,7 +202,7 @@ pub struct Press {
 }
 
 impl Scenario {
-    /// What the force law is set to on a board that took the parameters; the defaults where it refuses one.
+    /// Settings of the force law on a board that accepted the parameters; the defaults if it refused one.
     pub fn settings(&self) -> Settings {
         let taken = (self.parameters.iter()).try_fold(Parameters::default(), |set, (name, &value)| {
             set.with(parameter_named(name)?, value).ok()
@@ -227,7 +227,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// Reads a scenario's text; `name` is for messages. The STEP file's path stays as written.
+    /// Reads a scenario's text; `name` is used in messages. The STEP file's path stays as written.
     ///
     /// # Errors
     /// `Scenario`.
@@ -240,7 +240,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The sample insertion: the thesis pair with 1 mm clearance, the hand starting 0.2 mm and 0.5° off. `step` is where its STEP file lies.
+    /// The sample insertion: the thesis pair with 1 mm clearance, the hand starting 0.2 mm and 0.5° off. `step` is the path of its STEP file.
     ///
     /// # Errors
     /// `Scenario`, never with the text that comes with the program (tested).
@@ -263,7 +263,7 @@ impl Scenario {
         }
         for (quantity, bounds) in &self.holds {
             let ordered = bounds.min <= bounds.max;
-            // NaN is not.
+            // NaN is unordered.
             if !ordered {
                 return wrong(format!(
                     "holds.{quantity}: min {} is above max {}",
@@ -324,7 +324,7 @@ impl Scenario {
     }
 }
 
-/// The parameter of this name.
+/// The parameter with this name.
 pub(crate) fn parameter_named(name: &str) -> Option<ParameterId> {
     PARAMETERS.iter().find(|row| row.name == name).map(|row| row.id)
 }

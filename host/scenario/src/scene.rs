@@ -1,4 +1,4 @@
-//! From STEP file to scene image, with what measuring needs beside it: exact surfaces and sample points.
+//! From STEP file to scene image, with exact surfaces and sample points for measuring.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -13,41 +13,41 @@ use mortise_guide::{Guide, GuideSettings};
 use crate::error::ScenarioError;
 use crate::scenario::Scenario;
 
-/// Chord error of the points that penetration is measured at, as a share of the part's radius: 5 µm on a part of 100 mm, a tenth of the 0.05 mm that
+/// Chord error of the points at which penetration is measured, as a share of the part's radius: 5 µm on a part of 100 mm, a tenth of the 0.05 mm that
 /// matter there.
 const EPSILON: f64 = 1e-4;
-/// Their largest spacing, likewise: 4 mm.
+/// Largest spacing of these points, as a share of the part's radius: 4 mm.
 const SPACING: f64 = 0.08;
 
 /// A baked scene with its geometry.
 pub struct PreparedScene {
     /// The image.
     pub image: Vec<u8>,
-    /// The geometry it came from.
+    /// The geometry of the STEP file.
     pub model: CadModel,
-    /// What was baked.
+    /// The baker's report.
     pub report: BakeReport,
     /// Index of the part to grab, in the image.
     pub part: u16,
     bodies: Vec<Body>,
-    /// Its penetration in closed form, where that is known.
+    /// Penetration in closed form, if there is one.
     closed_form: Option<ClosedForm>,
 }
 
-/// Deepest point of either of two solids inside the other, mm, with the moving part's shape at a pose (mm, world); 0 when nowhere inside.
+/// Deepest point of either of two solids inside the other, mm, with the moving part's shape at a pose (mm, world); 0 without overlap.
 pub type ClosedForm = Box<dyn Fn(&DAffine3) -> f64 + Send + Sync>;
 
-/// A part as measuring sees it.
+/// A part with the geometry for measuring.
 pub struct Body {
     /// Its exact surface, shape frame, mm.
     pub surface: ExactSurface,
     /// Points on its surface, shape frame, mm.
     pub points: Vec<DVec3>,
-    /// Centre of a sphere about it, shape frame, mm.
+    /// Centre of its bounding sphere, shape frame, mm.
     pub center: DVec3,
-    /// The sphere's radius, mm.
+    /// Radius of the bounding sphere, mm.
     pub radius: f64,
-    /// Shape to world where the file places it, mm.
+    /// Shape to world at its placement in the file, mm.
     pub placement: DAffine3,
 }
 
@@ -67,7 +67,7 @@ impl PreparedScene {
         Self::with(scenario, &options)
     }
 
-    /// As [`Self::of`], baked as `options` say, whatever the scenario does.
+    /// As [`Self::of`], but baked with `options` instead of the scenario's own.
     ///
     /// # Errors
     /// As [`Self::of`].
@@ -109,7 +109,7 @@ impl PreparedScene {
         })
     }
 
-    /// The same with its penetration in closed form, which is then what runs measure.
+    /// The same scene with penetration in closed form, which runs then measure.
     pub fn with_closed_form(self, closed_form: ClosedForm) -> Self {
         Self {
             closed_form: Some(closed_form),
@@ -122,13 +122,13 @@ impl PreparedScene {
         self.closed_form.as_ref()
     }
 
-    /// Where the file places the moving part: its shape to world, mm.
+    /// Placement of the moving part in the file: its shape to world, mm.
     pub fn placement(&self) -> DAffine3 {
         let part = self.bodies.get(usize::from(self.part));
         part.map(|part| part.placement).unwrap_or_default()
     }
 
-    /// What recognises and sends constraints in this scene.
+    /// The guide that recognises and sends constraints in this scene.
     pub fn guide(&self, settings: GuideSettings) -> Guide<'_> {
         let parts = self.report.parts.iter().map(|part| part.model_part).collect();
         Guide::new(&self.model, parts, settings)
@@ -139,7 +139,7 @@ impl PreparedScene {
         &self.bodies
     }
 
-    /// Index in the image of the part named so.
+    /// Index in the image of the part of this name.
     pub fn part_named(&self, name: &str) -> Option<usize> {
         self.report.parts.iter().position(|part| part.name == name)
     }

@@ -1,14 +1,14 @@
-//! Where the simulated handle truly was, which its encoders round.
+//! The true motion of the simulated handle, before its encoders round it.
 //!
-//! Work of the device on the handle is Σ F_k·(x_{k+1} − x_k), with F_k held over the tick and x the handle's true position. Taken with readings
-//! q = x + e in its place it is wrong by Σ F_k·(e_{k+1} − e_k), and not on average right: a count of size u shows at once in the force by −g₀·u,
-//! which over the ticks until the next count resists a motion that readings do not have. While the handle moves by about a count a tick e is nearly
-//! white, uniform within ±u/2, and
+//! Work of the device on the handle is Σ F_k·(x_{k+1} − x_k), with F_k held over the tick and x the handle's true position. With readings q = x + e
+//! in its place the error is Σ F_k·(e_{k+1} − e_k), whose mean is not zero: a count of size u changes the force at once by −g₀·u, which over the
+//! ticks until the next count resists a motion that the readings do not show. While the handle moves by about a count a tick e is nearly white,
+//! uniform within ±u/2, and
 //!
 //! P = g₀·u²/(12·h) on each axis, g₀ = m/(m + h·B)·(k + B·a/h), B = b + h·k, a = h/(τ + h) of the speed's filter
 //!
-//! is made out of nothing: 10.8 µW for 5 µm, 5.2 N/mm and 1 ms, 32 µW on three axes that tremble. So the mechanism is played again instead, with the
-//! script and the wrenches of the recording. It computes the same bits on every rig; that it does, to the last reading, is checked.
+//! is the apparent power generated: 10.8 µW for 5 µm, 5.2 N/mm and 1 ms, 32 µW on three axes that tremble. Therefore the mechanism is simulated again
+//! with the script and the wrenches of the recording. It computes the same bits on every rig, which is checked to the last reading.
 
 use mortise_firmware::board::{Drive, Mechanism, Simulation};
 use mortise_firmware::wire::{pose_to_wire, wrench_to_wire};
@@ -18,10 +18,11 @@ use mortise_simulation::simulated::Simulated;
 
 use crate::measure::Felt;
 
-/// What the motors did and where the handle truly was, tick by tick.
+/// Motor commands and true poses of the handle, tick by tick.
 ///
-/// The mechanism starts as new, with nothing driven while `before` leads it for so many ticks; then `script` does, under the wrenches of `samples`.
-/// `None` unless every reading is the one recorded there: a tick is missing, inputs were made to fail, or the rig has another mechanism.
+/// The mechanism starts from its initial state, undriven while the script of `before` moves it for `before.1` ticks; then `script` does, under the
+/// wrenches of `samples`. `None` unless every reading equals the recorded one: otherwise a tick is missing, inputs were made to fail, or the rig has
+/// another mechanism.
 pub fn replay(before: (&HandScript, u32), script: &HandScript, samples: &[Telemetry]) -> Option<Vec<Felt>> {
     let mut mechanism = Simulated::new();
     mechanism.set_hand(Some(before.0));

@@ -14,7 +14,7 @@ use super::{mistyped, window};
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// STEP file with a peg before a hole [default: the sample that comes with the program]
+    /// STEP file with a peg in front of a hole [default: the built-in sample]
     file: Option<PathBuf>,
     /// Without a window: play the insertion tick by tick and print what was measured
     #[arg(long)]
@@ -45,7 +45,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     let rig = args.rig.clone().unwrap_or_else(best_rig);
-    // The sample's file is removed when this is dropped, after the run.
+    // A temporary file of the sample is removed when this is dropped, after the run.
     let sample = match &args.file {
         Some(_) => None,
         None => Some(mortise_scenario::sample::File::write()?),
@@ -59,7 +59,7 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scene = PreparedScene::of(&scenario)?;
     let client = connect_with_scene(&scenario, &rig, &scene)?;
-    // Standard output carries the result alone.
+    // Standard output carries only the result.
     eprintln!(
         "{rig}: ready after {:.1} s, playing",
         began.elapsed().as_secs_f64()
@@ -84,7 +84,7 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// The emulated board when it is there, else in-process, with a word about it.
+/// The emulated board if it is available, else the in-process rig, with a message.
 fn best_rig() -> RigSpec {
     let emulated = RigSpec::Emulated {
         mode: EmulatedMode::Interactive,

@@ -1,9 +1,9 @@
-//! `mortise lab`: where experiments are.
+//! `mortise lab`: names the program that has the experiments.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-/// Whatever experiments were called with here.
+/// Arguments that were meant for an experiment; not used.
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub struct Args {

@@ -1,4 +1,4 @@
-//! The window's arguments, and how it opens. A build without the feature `window` takes the same arguments and refuses in one line.
+//! Arguments of the window, and how it opens. A build without the feature `window` accepts the same arguments and refuses in one line.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -20,7 +20,7 @@ pub struct Open {
 }
 
 impl Open {
-    /// The STEP file, where one is named.
+    /// The STEP file, if one is named.
     pub fn file(&self) -> Option<&Path> {
         self.file.as_deref()
     }
@@ -52,7 +52,7 @@ pub fn open(open: Open) -> anyhow::Result<ExitCode> {
     shown::open(open.file, open.picture)
 }
 
-/// Opens the window with the sample insertion, or that of `file`.
+/// Opens the window with an insertion: of the sample, or of `file`.
 pub fn demo(file: Option<PathBuf>, rig: Option<RigSpec>, picture: Picture) -> anyhow::Result<ExitCode> {
     shown::demo(file, rig, picture)
 }
@@ -81,7 +81,7 @@ mod shown {
         first.extend(file.map(Intent::Open));
         first.push(Intent::Demo(rig));
         let mut options = options(picture, first)?;
-        // Glass walls show the insertion inside the hole.
+        // Transparent walls show the insertion inside the hole.
         options.see_through = true;
         app::run(options)?;
         Ok(ExitCode::SUCCESS)

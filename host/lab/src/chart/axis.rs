@@ -1,4 +1,4 @@
-//! An axis: from which value to which, where its marks are and how they are written, and what lies where between.
+//! Axes: value range, ticks and their labels, and the mapping from values to pixels.
 
 use std::ops::Range;
 
@@ -6,16 +6,16 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 
 use super::{Axis, AxisScale};
 
-/// About so many marks on an axis of equal steps.
+/// Approximate number of ticks on a linear axis.
 const MARKS: f64 = 7.0;
 
 impl Axis {
-    /// Whether a value has a place on it.
+    /// True if the axis can show the value.
     pub(super) fn shows(&self, value: f64) -> bool {
         value.is_finite() && (self.scale == AxisScale::Linear || value > 0.0)
     }
 
-    /// From a little below the smallest to a little above the largest; `None` without a value.
+    /// Range from a little below the smallest value to a little above the largest; `None` without a value.
     pub(super) fn range(&self, values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
         let ticks = self.ticks.iter().flatten().copied();
         let (low, high) = values
@@ -28,7 +28,7 @@ impl Axis {
         }
         Some(match self.scale {
             AxisScale::Logarithmic => {
-                // A fifteenth of the span either way, and at least a quarter of a power of ten altogether.
+                // A fifteenth of the span on either side, and at least a tenth of a decade in total (0.24 / ln 10).
                 let room = ((high / low).ln() / 15.0).max(0.12).exp();
                 (low / room, high * room)
             }
@@ -73,7 +73,7 @@ impl Axis {
         }
     }
 
-    /// The axis as plotters sees it.
+    /// The axis as plotters needs it.
     pub(super) fn coordinate(&self, range: (f64, f64)) -> Coordinate {
         Coordinate {
             scale: self.scale,
@@ -83,7 +83,7 @@ impl Axis {
     }
 }
 
-/// Values and where they lie.
+/// Range and scale of an axis, which map values to pixels.
 pub(super) struct Coordinate {
     scale: AxisScale,
     range: (f64, f64),
@@ -118,7 +118,7 @@ impl ValueFormatter<f64> for Coordinate {
     }
 }
 
-/// A number as people write it: thousands apart, no more digits than it has.
+/// A number for people: thousands separated, no trailing digits.
 pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
@@ -127,7 +127,7 @@ pub(super) fn number(value: f64) -> String {
         return format!("−{}", number(-value));
     }
     if value < 1000.0 {
-        // Three digits are more than any mark has; what rounding left behind them goes.
+        // No tick needs more than three digits; rounding errors behind them are cut off.
         let digits = (2 - value.log10().floor() as i32).max(0) as usize;
         let text = format!("{value:.digits$}");
         if text.contains('.') {
@@ -167,7 +167,7 @@ mod tests {
         }
     }
 
-    /// Both scales put their ends at the ends, and the middle of a scale in the middle.
+    /// Both scales map their ends to the ends and the middle of the scale to the middle.
     #[test]
     fn values_lie_where_the_scale_says() {
         for (axis, ends, middle) in [
@@ -177,7 +177,7 @@ mod tests {
             let coordinate = axis.coordinate(ends);
             for (value, pixel) in [(ends.0, 0), (middle, 500), (ends.1, 1000)] {
                 assert_eq!(coordinate.map(&value, (0, 1000)), pixel);
-                // Upwards, pixels fall.
+                // Pixel coordinates grow downwards.
                 assert_eq!(coordinate.map(&value, (1000, 0)), 1000 - pixel);
             }
         }

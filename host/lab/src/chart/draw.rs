@@ -18,17 +18,17 @@ const INK: RGBColor = RGBColor(36, 41, 47);
 const GREY: RGBColor = RGBColor(101, 109, 118);
 const GRID: RGBColor = RGBColor(225, 228, 232);
 
-/// Room above the plot for title and legend, and below for each line of the note, pixels.
+/// Space above the plot for title and legend, and below it for each line of the note, pixels.
 const HEAD: u32 = 34;
 const LEGEND_ROW: u32 = 24;
 const NOTE: u32 = 22;
-/// Free on either side of the note.
+/// Margin on either side of the note, pixels.
 const NOTE_SIDE: u32 = 16;
 
 type Area<DB> = DrawingArea<DB, Shift>;
 type Context<'a, DB> = ChartContext<'a, DB, Cartesian2d<Coordinate, Coordinate>>;
 
-/// Lengths in pixels of what is drawn on.
+/// Factor from the chart's pixels to those of the drawing area.
 #[derive(Clone, Copy)]
 struct Scale(u32);
 
@@ -46,12 +46,12 @@ impl Scale {
     }
 }
 
-/// Errors as words.
+/// An error as text.
 fn told(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-/// `text` in as many lines as fit the area with `side` left free on either side; none of nothing.
+/// `text` broken into lines that fit the area with a margin of `side` on either side; no line for empty text.
 fn wrapped<DB: DrawingBackend>(
     area: &Area<DB>,
     text: &str,
@@ -81,7 +81,7 @@ fn wrapped<DB: DrawingBackend>(
 }
 
 impl Chart {
-    /// Draws it; every length is multiplied by `scale`. Errors are words.
+    /// Draws the chart with every length multiplied by `scale`. Errors are text.
     pub(super) fn draw<DB: DrawingBackend>(&self, area: &Area<DB>, scale: u32) -> Result<(), String> {
         let scale = Scale(scale);
         let drawn = || self.series.iter().flat_map(|series| self.drawn(series));
@@ -137,7 +137,7 @@ impl Chart {
         self.plot(&context, &plot, scale)
     }
 
-    /// Names and marks in rows above the plot; gives the number of rows.
+    /// Draws names and marks in rows above the plot; returns the number of rows.
     fn legend<DB: DrawingBackend>(&self, area: &Area<DB>, scale: Scale) -> Result<u32, String> {
         let style = scale.text(16, &INK);
         let width = area.dim_in_pixel().0.cast_signed();
@@ -177,14 +177,14 @@ impl Chart {
         Ok(row + 1)
     }
 
-    /// Lines below marks below words.
+    /// Draws lines first, then marks, then labels.
     fn plot<DB: DrawingBackend>(
         &self,
         context: &Context<'_, DB>,
         area: &Area<DB>,
         scale: Scale,
     ) -> Result<(), String> {
-        // Everything is drawn in the pixels of `area`, because words are.
+        // Everything is drawn in pixel coordinates of `area`, because labels are placed in them.
         let (left, top) = area.get_base_pixel();
         let pixel = |x: f64, y: f64| {
             let (px, py) = context.backend_coord(&(x, y));
@@ -221,7 +221,7 @@ impl Chart {
             let style = scale.text(15, &colour);
             for point in self.drawn(series).filter(|point| !point.label.is_empty()) {
                 let at = pixel(point.x, point.y);
-                // Two kinds that come to the same say so once.
+                // Two series with the same label at the same point write it once.
                 if written.contains(&(point.label.as_str(), at)) {
                     continue;
                 }
@@ -239,7 +239,7 @@ impl Chart {
 }
 
 impl Chart {
-    /// The points of a series that both axes have a place for.
+    /// The points of a series that both axes can show.
     fn drawn<'s>(&'s self, series: &'s Series) -> impl Iterator<Item = &'s Point> {
         series
             .points
@@ -247,7 +247,7 @@ impl Chart {
             .filter(|point| self.x.shows(point.x) && self.y.shows(point.y))
     }
 
-    /// Corners of its line.
+    /// Corners of the series' line.
     fn corners(&self, series: &Series) -> Vec<(f64, f64)> {
         let mut corners: Vec<(f64, f64)> = Vec::new();
         for point in self.drawn(series) {
@@ -286,7 +286,7 @@ impl Look {
     }
 }
 
-/// Small boxes along a line, for words to keep clear of.
+/// Small boxes along a line that labels must not cover.
 fn along(corners: &[(i32, i32)], scale: Scale) -> Vec<Box4> {
     let step = scale.of(5);
     let mut boxes = Vec::new();
@@ -317,7 +317,7 @@ fn stroke<DB: DrawingBackend>(
     }
 }
 
-/// The mark of `look`; one that stands for "at least" has an arrow upwards.
+/// Draws the mark of `look`; a lower bound ("at least") has an arrow upwards.
 fn mark<DB: DrawingBackend>(
     area: &Area<DB>,
     at: (i32, i32),

@@ -1,4 +1,4 @@
-//! Where words go beside points: the first place around each that covers nothing drawn before.
+//! Placement of labels beside points: the first place around each point that covers nothing drawn before.
 
 /// A rectangle, pixels: left, top, right, bottom.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,7 +10,7 @@ pub(super) struct Box4 {
 }
 
 impl Box4 {
-    /// About a centre.
+    /// A square about a centre.
     pub fn about((x, y): (i32, i32), half: i32) -> Self {
         Self {
             left: x - half,
@@ -35,8 +35,8 @@ impl Box4 {
     }
 }
 
-/// The left upper corner of words of `size` beside the point `at`, inside `frame` and clear of `taken`; `None` where there is no room. The
-/// place is then taken.
+/// Upper left corner of a label of `size` beside the point `at`, inside `frame` and clear of `taken`, to which the label is then added; `None` where
+/// there is no space.
 pub(super) fn place(
     at: (i32, i32),
     size: (i32, i32),
@@ -45,7 +45,7 @@ pub(super) fn place(
     taken: &mut Vec<Box4>,
 ) -> Option<(i32, i32)> {
     let (width, height) = size;
-    // Nearest first: right, left, above, below, and the corners; then the same farther out.
+    // Nearest places first: right, left, above, below, and the corners; then the same farther out.
     for reach in [1, 2, 3, 4] {
         let gap = gap * reach;
         let (right, left, middle) = (at.0 + gap, at.0 - gap - width, at.0 - width / 2);

@@ -1,7 +1,6 @@
-//! Charts as SVG and PNG: points and lines over two axes, logarithmic or linear, each told apart by colour, mark and a label of its own.
+//! Charts as SVG and PNG: points and lines over two axes, logarithmic or linear, each series distinguished by colour, mark and a label of its own.
 //!
-//! Colours are Okabe and Ito's (2008), which people with any kind of colour blindness tell apart. Letters come from a font in the program,
-//! so a machine needs none.
+//! Colours are Okabe and Ito's (2008), distinguishable with any kind of colour blindness. The font is part of the program, so a machine needs none.
 
 mod axis;
 mod draw;
@@ -19,23 +18,23 @@ use crate::error::LabError;
 
 /// Size as shown on a page, pixels.
 const SIZE: (u32, u32) = (960, 600);
-/// Height of each of several charts above one another.
+/// Height of each chart of a stack, pixels.
 const STACKED: u32 = 260;
-/// The PNG has so many pixels to each of these, for sharp screens.
+/// Pixels of the PNG for each pixel of the page, for high-density screens.
 const SHARPNESS: u32 = 2;
-/// It is drawn finer by so much and then averaged, which smooths every edge.
+/// Supersampling factor: the PNG is drawn this much finer and then averaged, which smooths every edge.
 const SMOOTHING: u32 = 2;
 
 /// A chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
-    /// What it shows, one line.
+    /// Title: what the chart shows, one line.
     pub title: String,
-    /// How it was measured, in small letters below; may be empty.
+    /// How the data was measured, in small letters below the plot; may be empty.
     pub note: String,
-    /// Across.
+    /// Horizontal axis.
     pub x: Axis,
-    /// Up.
+    /// Vertical axis.
     pub y: Axis,
     /// What is drawn.
     pub series: Vec<Series>,
@@ -46,37 +45,37 @@ pub struct Chart {
 pub struct Axis {
     /// Quantity and unit.
     pub title: String,
-    /// Where marks are; `None`: at 1, 2 and 5 times the powers of ten, at the powers alone where there are many and at every digit where there are
-    /// few; on a linear axis at equal steps.
+    /// Values of the ticks; `None` on a logarithmic axis: 1, 2 and 5 times the powers of ten, the powers alone where there are many, every digit
+    /// where there are few; `None` on a linear axis: equal steps.
     pub ticks: Option<Vec<f64>>,
-    /// What equal lengths on it are.
+    /// Scale of the axis.
     pub scale: AxisScale,
 }
 
-/// What equal lengths on an axis are.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AxisScale {
-    /// Equal ratios.
+    /// Equal lengths are equal ratios.
     #[default]
     Logarithmic,
-    /// Equal differences.
+    /// Equal lengths are equal differences.
     Linear,
 }
 
-/// Points of one kind.
+/// A series of points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     /// Its name in the legend.
     pub name: String,
-    /// How it looks.
+    /// Colour and mark.
     pub look: Look,
-    /// Whether lines join its points.
+    /// How lines join the points.
     pub line: Line,
-    /// Its points; those that are not finite, or not positive where an axis is logarithmic, are left out.
+    /// Its points; those that are not finite, or not positive on a logarithmic axis, are omitted.
     pub points: Vec<Point>,
 }
 
-/// One of the colours and marks that can be told apart.
+/// Distinguishable pairs of colour and mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
     /// Blue disc.
@@ -96,7 +95,7 @@ pub enum Look {
 }
 
 impl Look {
-    /// A look for each kind, in the order they come.
+    /// The look of the series with this index.
     pub fn nth(index: usize) -> Self {
         const ALL: [Look; 6] = [
             Look::VermilionSquare,
@@ -110,38 +109,38 @@ impl Look {
     }
 }
 
-/// How points are joined.
+/// How lines join the points of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
-    /// Not at all.
+    /// No line.
     None,
-    /// From each to the next.
+    /// Solid line from each point to the next.
     Solid,
-    /// Likewise, broken.
+    /// Dashed line from each point to the next.
     Dashed,
-    /// As a stair of what no point beats: level until the next point, then down.
+    /// Staircase of a Pareto frontier: level until the next point, then down.
     Stair,
-    /// From each to the next, without marks: a course with more points than can be told apart.
+    /// Solid line without marks: a course with more points than can be distinguished.
     Trace,
-    /// Likewise, broken.
+    /// Dashed line without marks.
     DashedTrace,
 }
 
-/// A point, with words beside it.
+/// A point with an optional label.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Point {
-    /// Across.
+    /// Horizontal value.
     pub x: f64,
-    /// Up.
+    /// Vertical value.
     pub y: f64,
-    /// Words beside it; may be empty.
+    /// Label beside it; may be empty.
     pub label: String,
-    /// Drawn open, with an arrow upwards: the true value is at least so high.
+    /// Drawn open, with an arrow upwards: the value is a lower bound.
     pub at_least: bool,
 }
 
 impl Axis {
-    /// Logarithmic, with marks chosen by the values.
+    /// A logarithmic axis with ticks chosen from the values.
     pub fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -150,13 +149,13 @@ impl Axis {
         }
     }
 
-    /// The same with equal steps.
+    /// The same axis, linear.
     pub fn linear(self) -> Self {
         let scale = AxisScale::Linear;
         Self { scale, ..self }
     }
 
-    /// With marks at the given values.
+    /// The same axis with these ticks.
     pub fn with_ticks(self, ticks: &[f64]) -> Self {
         let ticks = Some(ticks.to_vec());
         Self { ticks, ..self }
@@ -172,8 +171,8 @@ impl Chart {
     }
 }
 
-/// Writes charts above one another, the first on top, to `NAME.svg` and `NAME.png` in `folder`. Empty titles and notes take no room, nor does a
-/// legend without names.
+/// Writes stacked charts, the first on top, to `NAME.svg` and `NAME.png` in `folder`. Empty titles and notes take no space, nor does a legend without
+/// names.
 ///
 /// # Errors
 /// `Unwritable`; `Input` for a chart without a point.
@@ -181,7 +180,7 @@ pub fn write_stack(charts: &[Chart], folder: &Folder, name: &str) -> Result<(), 
     static FONT: Once = Once::new();
     FONT.call_once(|| {
         for style in [FontStyle::Normal, FontStyle::Bold] {
-            // The only error is a font that cannot be read, and this one is part of the program (and of the test below).
+            // Registering fails only for an unreadable font; this one is part of the program and covered by the test below.
             let _ = register_font("sans-serif", style, epaint_default_fonts::UBUNTU_LIGHT);
         }
     });
@@ -296,7 +295,7 @@ mod tests {
             (info.width, info.height),
             (SIZE.0 * SHARPNESS, SIZE.1 * SHARPNESS)
         );
-        // White paper, the first series' blue somewhere, and letters, which need the font.
+        // White paper, the first series' blue somewhere, and letters, which show that the font works.
         assert_eq!(pixels[..3], [255; 3]);
         assert!(pixels.chunks(3).any(|pixel| pixel == [0, 114, 178]));
         let title = &pixels[..3 * (info.width * 40 * SHARPNESS) as usize];

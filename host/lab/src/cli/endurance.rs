@@ -15,7 +15,7 @@ const QUICK_S: f64 = 180.0;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Virtual time
+    /// Virtual time, hours
     #[arg(
         long,
         default_value_t = 1.0,
@@ -23,10 +23,10 @@ pub struct Args {
         value_name = "HOURS"
     )]
     hours: f64,
-    /// Three minutes of virtual time instead
+    /// Shorter form: three minutes of virtual time
     #[arg(long, conflicts_with = "hours")]
     quick: bool,
-    /// Where random scenes, hands and faults start from
+    /// Seed of random scenes, hands and faults
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// emulated, or sim

@@ -9,7 +9,7 @@ use mortise_lab::experiment::{Experiment, Form, files};
 use mortise_lab::experiments::ALL;
 use mortise_output::{Existing, Folder, lines};
 
-/// An experiment, how it is run, and where its files go.
+/// The chosen experiment, its form, and its output folder.
 pub struct Chosen {
     experiment: &'static dyn Experiment,
     quick: bool,
@@ -23,7 +23,7 @@ impl Chosen {
     /// Runs it.
     pub fn run(&self) -> anyhow::Result<ExitCode> {
         let only = self.only.as_deref();
-        // Before the first trial: a sweep of half an hour must not end in nothing.
+        // Before the first trial, so that a sweep of half an hour does not end in an unwritable folder.
         let folder = |path| {
             Folder::new(
                 path,
@@ -74,12 +74,12 @@ fn command(experiment: &dyn Experiment) -> Command {
                 .long("out")
                 .value_name("FOLDER")
                 .value_parser(value_parser!(PathBuf))
-                .help("Folder for tables (CSV) and charts (SVG and PNG); made where there is none"),
+                .help("Folder for tables (CSV) and charts (SVG and PNG); created if absent"),
         )
         .arg(
             flag("force")
                 .requires("out")
-                .help("Replace tables and charts that are there already"),
+                .help("Replace existing tables and charts"),
         );
     let parts = experiment.parts();
     if !parts.is_empty() {
@@ -89,7 +89,7 @@ fn command(experiment: &dyn Experiment) -> Command {
                 .long("map")
                 .value_name("MAP")
                 .value_parser(parts)
-                .help("Only the map of this name, that of its files"),
+                .help("Make only the map of this name, which is also the name of its files"),
         );
     }
     command

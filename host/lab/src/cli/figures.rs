@@ -16,27 +16,27 @@ pub struct Args {
     /// Name of the table
     #[arg(value_parser = clap::builder::PossibleValuesParser::new(figures::names()))]
     name: String,
-    /// The quick form, as each row says
+    /// Shorter form; each row states its scope
     #[arg(long)]
     quick: bool,
     /// One JSON object a row
     #[arg(long)]
     json: bool,
-    /// Where the claims that rows are judged by come from
+    /// Source of the claims by which rows are judged
     #[arg(long, value_enum, default_value = "kept")]
     claims: ClaimSource,
-    /// The program `mortise`, of which some rows measure commands [default: beside this program]
+    /// Path of the program `mortise`, whose commands some rows measure [default: beside this program]
     #[arg(long, value_name = "PATH")]
     program: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum ClaimSource {
-    /// Those in the program; a row without one makes the last row fail
+    /// Claims built into the program; a row without one makes the last row fail
     Kept,
-    /// Those in the program; of a row without one, what is measured
+    /// Claims built into the program, completed by measured values
     Completed,
-    /// What is measured
+    /// Measured values
     Measured,
 }
 

@@ -1,6 +1,6 @@
 //! Commands: a table of figures, the endurance run, and one for each experiment of the table. Each has `--json`.
 //!
-//! Exit code 0: done; 1: a figure does not hold; 2: not possible, with one line on standard error that says why.
+//! Exit code 0: done; 1: a bound does not hold; 2: failed, with the reason in one line on standard error.
 
 mod endurance;
 mod experiments;
@@ -16,7 +16,7 @@ use experiments::Chosen;
 
 const NAME: &str = "mortise-lab";
 
-/// Experiments on Mortise, and the figures it is measured by.
+/// Experiments on Mortise, and measurement of its figures.
 #[derive(Debug, Parser)]
 #[command(name = NAME, version)]
 struct Cli {
@@ -26,9 +26,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Measure a table of figures; exit code 1 when one does not hold
+    /// Measure a table of figures; exit code 1 if a bound does not hold
     Figures(figures::Args),
-    /// Keep a board busy for an hour of its own time, and see whether anything wears; exit code 1 when it does
+    /// Keep a board busy for an hour of its own time, and check that nothing degrades; exit code 1 if something does
     Endurance(endurance::Args),
     #[command(flatten)]
     Experiment(Chosen),

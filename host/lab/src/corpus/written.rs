@@ -1,16 +1,17 @@
-//! What is written here about shared files on which their own list says nothing: how many parts they have, or why they must be refused.
+//! Expected results of shared files that their own list does not cover: the number of parts, or why they must be refused.
 //!
 //! Counts of real files are those of `real/manifest.csv`, which counts the two bodies of `chrono_assembly.stp` twice, as definitions and as mapped,
-//! and the open one of `brl_ap214_nonmanifold_four_use_edge.stp` not at all. Files of `09_free_form` and `10_extraction` by their generator.
+//! and does not count the open one of `brl_ap214_nonmanifold_four_use_edge.stp`. Counts of files of `09_free_form` and `10_extraction` come from
+//! their generator.
 
 use self::Written::{Parts, Refused};
 
-/// What reading a file must come to.
+/// Expected result of reading a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Written {
-    /// So many parts.
+    /// This many parts.
     Parts(usize),
-    /// A refusal that says this.
+    /// A refusal that contains this text.
     Refused(&'static str),
 }
 
@@ -94,7 +95,7 @@ pub(crate) const WRITTEN: &[(&str, Written)] = &[
     ("real/wrs_02-PANEL.step", Parts(1)),
 ];
 
-/// What is written about a file.
+/// Expected result of a file.
 pub(crate) fn of(file: &str) -> Option<Written> {
     let file = file.replace('\\', "/");
     let at = WRITTEN.binary_search_by(|(name, _)| (*name).cmp(&file)).ok()?;

@@ -1,17 +1,17 @@
-//! Memory: of this program, of the emulator beside it, and of the firmware's statics.
+//! Memory use of this program and of the emulator, and size of the firmware's statics.
 
 use std::path::Path;
 
 use mortise_rig::{RigSpec, firmware_path};
 
-/// KiB resident; 0 where the operating system does not tell.
+/// Resident memory, KiB; 0 where the operating system does not report it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Memory {
     pub(super) program_kib: u64,
     pub(super) emulator_kib: u64,
 }
 
-/// As it is now: on Linux from `/proc`, elsewhere nothing.
+/// Current memory use: on Linux from `/proc`, 0 elsewhere.
 pub(super) fn now() -> Memory {
     let own = Path::new("/proc/self");
     let Some(program_kib) = resident(own) else {
@@ -29,7 +29,7 @@ fn resident(process: &Path) -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// The child of ours that is QEMU.
+/// Resident memory of this process's QEMU child, KiB.
 fn emulator(parent: u32) -> Option<u64> {
     let processes = std::fs::read_dir("/proc").ok()?;
     let ours = format!("PPid:\t{parent}");
@@ -43,8 +43,8 @@ fn emulator(parent: u32) -> Option<u64> {
         })
 }
 
-/// Bytes of RAM the firmware's statics take: segments of its ELF file that lie in the Cortex-M's SRAM region (0x2000_0000 to 0x3fff_ffff). 0 for a
-/// rig without firmware file.
+/// Bytes of RAM of the firmware's statics: segments of its ELF file in the Cortex-M's SRAM region (0x2000_0000 to 0x3fff_ffff). 0 for a rig without a
+/// firmware file.
 pub(super) fn statics(spec: &RigSpec) -> u64 {
     let RigSpec::Emulated { firmware, .. } = spec else {
         return 0;

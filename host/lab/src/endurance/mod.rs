@@ -1,12 +1,11 @@
-//! Endurance: a board kept busy for an hour of its own time, and whether anything wears.
+//! Endurance: keeps a board busy for an hour of its own time and checks that nothing degrades.
 //!
-//! The hour is cut into turns of `TURN_S`. Each turn uploads a scene nobody has seen before (`scenes`), arms, grabs, and lets a random hand push
-//! the part about while frames are lost, damaged, repeated, late and made up; parameters, constraint targets, releases, garbage and now and then a
-//! STOP come in between. The board runs in lockstep and counts instructions, so its time does not depend on this computer's load.
+//! The hour consists of turns of `TURN_S`. Each turn uploads a new random scene (`scenes`), arms, grabs, and lets a random hand push the part about
+//! while frames are lost, damaged, repeated, delayed and invented; parameters, constraint targets, releases, garbage and now and then a STOP come in
+//! between. The board runs in lockstep and counts instructions, so its time does not depend on this computer's load.
 //!
-//! No fault is provoked that the board would be right to report (its stop input, encoders and drivers stay whole, and in lockstep the host is never
-//! silent): each one it tells is unexplained. Memory is looked at after every turn: what had been used when `WARM` of the hour was over must still
-//! be all at its end.
+//! No reportable fault is provoked (stop input, encoders and drivers stay intact, and in lockstep the host is never silent), so every reported fault
+//! is unexplained. Memory is measured after every turn: its use may not grow after `WARM` of the hour.
 
 mod memory;
 mod scenes;
@@ -33,23 +32,24 @@ pub const TURN_S: u32 = 20;
 pub const WARM: f64 = 0.25;
 /// Ticks between two scripts for the hand.
 const SCRIPT_TICKS: u32 = 5_000;
-/// Ticks asked for at once: bounds the telemetry that waits.
+/// Ticks requested at once: bounds the telemetry that waits.
 const BATCH_TICKS: u32 = 500;
-/// Most a program's memory may grow from one quarter to the next, KiB: scenes differ in size, and baking leaves pages with the allocator. A leak of
-/// ten bytes a tick would be 9 MiB in a quarter of an hour.
+/// Largest growth of a program's memory from one quarter to the next, KiB: scenes differ in size, and baking leaves pages with the allocator. A leak
+/// of ten bytes a tick would be 9 MiB in a quarter of an hour.
 const GROWTH_KIB: f64 = 8_192.0;
 const TICKS_PER_S: u32 = 1_000;
-/// Ticks in which the handle is brought to the part, and in which motors fade out.
+/// Ticks in which the handle is moved to the part, and in which motors fade out.
 const REACH_TICKS: u32 = 500;
 const FADE_TICKS: u32 = 150;
-/// Farthest the hand goes from where it took hold along each axis, m; with at least [`KEY_TICKS`] from place to place it stays under 0.7 m/s, far
-/// below the speed limit.
+/// Largest distance of the hand from its grip along each axis, m; with at least [`KEY_TICKS`] between keyframes it stays below 0.7 m/s, far below the
+/// speed limit.
 const ROOM_M: f32 = 0.05;
 const KEY_TICKS: u32 = 250;
-/// A script's last keyframe comes no later, and is where its first one is: whichever scripts the link loses or holds back, the hand never jumps.
+/// Latest tick of a script's last keyframe, which is at the position of its first one: whichever scripts the link loses or delays, the hand never
+/// jumps.
 const BACK_TICKS: u32 = 3_900;
 
-/// What was seen after a turn.
+/// State after a turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Turn {
     /// Turns so far.
@@ -58,13 +58,13 @@ pub struct Turn {
     pub ticks: u32,
     /// Ticks missed since start.
     pub missed_ticks: u32,
-    /// Faults told since start.
+    /// Faults reported since start.
     pub faults: u32,
-    /// Bytes of the scene felt.
+    /// Bytes of the scene on the board.
     pub scene_bytes: usize,
     /// Deepest stack on the board since start, bytes.
     pub stack_bytes: u32,
-    /// Memory of this program, KiB; 0 where the operating system does not tell.
+    /// Memory of this program, KiB; 0 where the operating system does not report it.
     pub host_kib: u64,
     /// Memory of the emulator, KiB; 0 likewise.
     pub emulator_kib: u64,
@@ -90,29 +90,29 @@ impl fmt::Display for Turn {
 /// What an endurance run found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// Virtual time asked for, s.
+    /// Virtual time requested, s.
     pub seconds: u32,
     /// Rig.
     pub rig: String,
     /// Ticks run.
     pub ticks: u32,
-    /// Missed.
+    /// Ticks missed.
     pub missed_ticks: u32,
-    /// Faults the board told, in words; none was provoked.
+    /// Faults that the board reported, in words; none was provoked.
     pub faults: Vec<String>,
     /// Scenes uploaded.
     pub scenes: u32,
-    /// Frames lost, damaged, repeated, reordered, late or made up on the link.
+    /// Frames lost, damaged, repeated, reordered, delayed or invented on the link.
     pub harmed_frames: u64,
     /// Damaged frames that reached the board and were dropped there.
     pub bad_frames: u32,
-    /// Dearest tick, in the board's unit.
+    /// Cost of the worst-case tick, in the board's unit.
     pub cost_max: u32,
     /// Largest force commanded, N.
     pub peak_force: f32,
-    /// RAM of the firmware's statics, bytes: all it has beside the stack, there is no heap. 0 where there is no firmware file.
+    /// RAM of the firmware's statics, bytes: all RAM that it uses beside the stack, as there is no heap. 0 where there is no firmware file.
     pub static_bytes: u64,
-    /// Deepest stack when `WARM` of the time was over, bytes.
+    /// Deepest stack after `WARM` of the time, bytes.
     pub stack_warm_bytes: u32,
     /// Deepest stack at the end.
     pub stack_bytes: u32,
@@ -123,7 +123,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Its figures with their bounds.
+    /// The run's figures with their bounds.
     pub fn rows(&self) -> Vec<Row> {
         let run = format!(
             "endurance, {} s of virtual time on {}, {} random scenes, {} harmed frames",
@@ -192,7 +192,7 @@ impl Report {
     }
 }
 
-/// Keeps the rig busy for `seconds` of its time; `told` hears of each turn.
+/// Keeps the rig busy for `seconds` of its time; calls `told` after each turn.
 ///
 /// # Errors
 /// `Brep`, `Bake`, `Rig`; `NeedsSimulatedHand` on a real mechanism. Faults of the board and missed ticks are no errors but figures.
@@ -287,10 +287,10 @@ struct Work<'c> {
 }
 
 impl Work<'_> {
-    /// Scene on the board, handle at the part, part in hand; the link is whole meanwhile.
+    /// Uploads the scene, moves the handle to the part and grabs it; the link is fault-free meanwhile.
     fn take_up(&mut self, scene: &scenes::Scene) -> Result<(), LabError> {
         let client = self.client;
-        // What the board told of its state may have been lost on the way.
+        // The board's reports of its state may have been lost on the link.
         let state = client.refresh_capabilities()?.state;
         if matches!(state, DeviceState::Stopped | DeviceState::Fault(_)) {
             client.request(ToDevice::ClearFault)?;
@@ -308,7 +308,7 @@ impl Work<'_> {
             push: [0.0; 3],
         };
         reach.keyframes.clear();
-        // Twelve fit.
+        // The list holds twelve keyframes.
         let _ = reach.keyframes.push(key(0, [0.0; 3]));
         let _ = reach.keyframes.push(key(REACH_TICKS - 200, scene.grip));
         client.request(ToDevice::SimulatedHand(reach))?;
@@ -319,7 +319,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// The hand at work on a link that fails.
+    /// Lets the hand work on a faulty link.
     fn endure(&mut self, ticks: u32, scene: &scenes::Scene) -> Result<(), LabError> {
         let faults = self.faults(u64::from(ticks));
         self.line.begin(&faults);
@@ -328,7 +328,7 @@ impl Work<'_> {
         while left > 0 {
             if script_left == 0 {
                 let script = self.script(scene.grip);
-                // Nobody waits for an answer that may be lost.
+                // Sent without waiting for an answer, which may be lost.
                 self.client.send(ToDevice::SimulatedHand(script))?;
                 script_left = SCRIPT_TICKS;
             }
@@ -344,14 +344,14 @@ impl Work<'_> {
             }
         }
         self.line.end();
-        // What was held back comes before this.
+        // Frames that the link delayed arrive before the answer to this.
         self.client.run(0)?;
-        // Events told it a second time.
+        // Already seen on the line; the events repeat them.
         self.client.events().try_iter().for_each(drop);
         Ok(())
     }
 
-    /// Lets go and comes to rest; the link is whole again.
+    /// Releases the part and comes to rest; the link is fault-free again.
     fn put_down(&mut self) -> Result<(), LabError> {
         self.client.request(ToDevice::SetTelemetry { every_ticks: 0 })?;
         self.client.request(ToDevice::Disarm)?;
@@ -370,13 +370,13 @@ impl Work<'_> {
             let batch = left.min(BATCH_TICKS);
             self.client.run(batch)?;
             left -= batch;
-            // Telemetry is only taken away: faults are overheard, where frames cannot be lost.
+            // Events are only drained here: faults are read from the line, where no frame is lost.
             self.client.events().try_iter().for_each(drop);
         }
         Ok(())
     }
 
-    /// What a busy host does beside the hand.
+    /// Sends the messages of a busy host, beside the hand's.
     fn meddle(&mut self, part: u16) -> Result<(), LabError> {
         let random = &mut self.random;
         let message = match random.u8(0..40) {
@@ -411,7 +411,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// A hand between soft and firm that wanders about the place it took hold at, turns, pushes, trembles, and comes back there.
+    /// A hand of random stiffness that wanders about its grip, turns, pushes, trembles, and returns there.
     fn script(&mut self, grip: [f32; 3]) -> HandScript {
         let random = &mut self.random;
         let mut keyframes = heapless::Vec::new();
@@ -423,7 +423,7 @@ impl Work<'_> {
             },
             push: [0.0; 3],
         };
-        // There is room for the last, whatever the others; the first fits.
+        // The first keyframe fits, and one place is kept for the last.
         let _ = keyframes.push(at_grip(0));
         let mut tick = KEY_TICKS;
         while keyframes.len() + 1 < keyframes.capacity() && tick < BACK_TICKS - KEY_TICKS {
@@ -456,7 +456,7 @@ impl Work<'_> {
         }
     }
 
-    /// A link that fails in every way, somewhat.
+    /// A link with a moderate rate of every fault.
     fn faults(&mut self, ticks: u64) -> Faults {
         let random = &mut self.random;
         let mut window = |longest: u64| Window {
@@ -480,7 +480,7 @@ impl Work<'_> {
     }
 }
 
-/// A target that may or may not make sense; the board takes what it can keep and refuses the rest.
+/// A random target, valid or not; the board accepts valid ones and refuses the rest.
 fn target(random: &mut Rng) -> ConstraintTarget {
     let mut signed = || 2.0 * random.f32() - 1.0;
     let direction = glam::Vec3::new(signed(), signed(), signed()).normalize_or(glam::Vec3::Z);

@@ -1,5 +1,5 @@
-//! Scenes nobody has seen before: one part to move, above one to three others, all any way up, in one of the two kinds of field. It starts clear of
-//! them: a part that starts inside another is thrown out, which is faster than a handle may be.
+//! Random scenes: one moving part above one to three fixed ones, all in random orientations, in one of the two kinds of field. It starts clear of
+//! them: a part that starts inside another is pushed out faster than a handle may move.
 
 use std::ops::ControlFlow;
 
@@ -23,14 +23,14 @@ const FILES: &[(&str, &str)] = &[
     ),
     ("scene_p.step", include_str!("../../data/scene_p.step")),
 ];
-/// Name of the part that is moved.
+/// Name of the moving part.
 const MOVING: &str = "moving";
-/// Bytes of an image: small enough that an hour holds many.
+/// Bytes of an image: small enough for many uploads in an hour.
 const IMAGE_BYTES: std::ops::Range<u64> = 12_000..48_000;
-/// Farthest a fixed part's own origin is from the world's, mm.
+/// Largest distance of a fixed part's own origin from the world's, mm.
 const SPREAD_MM: f64 = 40.0;
 
-/// How far above the others the part to move starts, mm.
+/// Height of the moving part's start above the others, mm.
 const CLEAR_MM: f64 = 2.0;
 
 /// A baked scene.
@@ -42,13 +42,13 @@ pub(super) struct Scene {
     pub(super) grip: [f32; 3],
 }
 
-/// The shapes there are.
+/// The stock of shapes.
 pub(super) struct Scenes {
     stock: CadModel,
 }
 
 impl Scenes {
-    /// Reads all files.
+    /// Reads all shape files.
     pub(super) fn load() -> Result<Self, LabError> {
         let folder = tempfile::tempdir().map_err(|source| LabError::Unwritable {
             path: std::env::temp_dir(),

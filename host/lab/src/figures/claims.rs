@@ -1,7 +1,7 @@
-//! Claims: the figure that is stated for each row whose bound is not exact, kept in `docs/figures/claims.json`.
+//! Claims: the figure stated for each row whose bound is not exact, stored in `docs/figures/claims.json`.
 //!
-//! A row is judged near its claim, see [`Row`]. A claim changes only where the file is changed: `cargo xtask figures NAME` adds those of new rows from
-//! what it measures, `--claim` takes all of them anew; claims of rows that are no more are dropped (`host/xtask/src/figures/claims.rs`).
+//! A row is judged near its claim, see [`Row`]. A claim changes only by a change of the file: `cargo xtask figures NAME` adds those of new rows from
+//! what it measures, `--claim` renews all of them; claims of rows that no longer exist are dropped (`host/xtask/src/figures/claims.rs`).
 
 use std::collections::BTreeMap;
 
@@ -21,20 +21,20 @@ pub struct Claims {
     missing: Missing,
 }
 
-/// What becomes of rows that need a claim and have none.
+/// Treatment of rows that need a claim and have none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Missing {
     /// They are counted, and the table's last row fails.
     Counted,
-    /// What was measured is claimed.
+    /// The measured value becomes the claim.
     Measured,
 }
 
 impl Claims {
-    /// Claims as they are kept.
+    /// The stored claims.
     ///
     /// # Errors
-    /// `Input` where the file is no table of numbers.
+    /// `Input` where the file is not a table of numbers.
     pub fn kept() -> Result<Self, LabError> {
         let tables = serde_json::from_str(KEPT).map_err(|error| LabError::Input {
             name: "docs/figures/claims.json".into(),
@@ -46,7 +46,7 @@ impl Claims {
         })
     }
 
-    /// Claims as they are kept, those that are missing taken from what is measured.
+    /// The stored claims, completed from measured values where they are missing.
     ///
     /// # Errors
     /// As [`Self::kept`].
@@ -57,7 +57,7 @@ impl Claims {
         })
     }
 
-    /// No claim is kept: all are taken from what is measured.
+    /// No stored claims: all are taken from measured values.
     pub fn measured() -> Self {
         Self {
             tables: BTreeMap::new(),
@@ -85,18 +85,18 @@ impl Claims {
     }
 }
 
-/// How many rows came to what.
+/// Numbers of rows by verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
     /// Rows with a bound.
     pub bounded: usize,
-    /// Those of them that hold.
+    /// Bounded rows that hold.
     pub held: usize,
     /// Rows without a bound.
     pub unbounded: usize,
     /// Rows that cannot be measured here.
     pub skipped: usize,
-    /// Rows whose bound is farther from their claim than it may be, or that have none.
+    /// Rows whose bound is farther from their claim than allowed, or that have no claim.
     pub far: usize,
 }
 
@@ -117,7 +117,7 @@ impl Count {
         }
     }
 
-    /// True if no bound is broken; also when nothing was bounded.
+    /// True if no bound is broken, also when no row is bounded.
     pub fn all_hold(&self) -> bool {
         self.held == self.bounded
     }

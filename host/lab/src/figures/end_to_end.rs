@@ -1,4 +1,4 @@
-//! From a STEP file to a felt insertion: the whole chain on one sample.
+//! The whole chain on one sample: from a STEP file to an insertion with force feedback.
 
 use glam::DVec3;
 use mortise_protocol::message::Telemetry;
@@ -9,7 +9,7 @@ use super::{Plan, Row, link, parts};
 use crate::LabError;
 use crate::contact_law::pushed;
 
-/// Scenarios that press: where the hand then slides to, mm, and how exact a force is there, N.
+/// Press scenarios: the hand's slide after the press, mm, the tolerance of the force there, N, and its text.
 const PRESSES: &[(&str, [f64; 3], f64, &str)] = &[
     (
         "flat face, 1 N",
@@ -48,18 +48,18 @@ const PRESSES: &[(&str, [f64; 3], f64, &str)] = &[
         include_str!("../../../../hil-tests/scenarios/press_wall_5n.toml"),
     ),
 ];
-/// On the block's top, inside its outline; along the wall, both rims of the hole at the peg's side.
+/// Slides, mm: on the block's top, inside its outline; along the wall, with both rims of the hole at the peg's side.
 const FLAT_MM: [f64; 3] = [-2.0, -2.0, 0.0];
 const WALL_MM: [f64; 3] = [0.0, 0.0, -6.0];
-/// A slide either way, s.
+/// Time of a slide in either direction, s.
 const SLIDE_S: f64 = 0.3;
-/// How far the contact force may be off what exact surfaces make of it, N: a position 60 mm from its shape's origin is told, and looked up, to 3.7 nm in
-/// single precision, which at 200 kN/m is twice 0.75 mN a point: of some sixty on the flat, of four on the two rims of the wall.
+/// Largest difference between the contact force and that of the exact surfaces, N: a position 60 mm from its shape's origin is reported, and queried,
+/// to 3.7 nm in single precision, which at 200 kN/m is twice 0.75 mN a point: of some sixty points on the flat, of four on the two rims of the wall.
 const FLAT_OFF_N: f64 = 0.09;
 const WALL_OFF_N: f64 = 0.006;
-/// How far the force on the handle may be off the contact force while the hand sets out, turns and stops, N: 0.1 kg at half a metre a second squared.
+/// Largest difference between the force on the handle and the contact force while the hand starts, turns and stops, N: 0.1 kg at 0.5 m/s².
 const FELT_OFF_N: f64 = 0.05;
-/// Deepest, mm: 5 N on the two points of a wall's rims, 12.5 µm.
+/// Deepest penetration, mm: 5 N on the two points of a wall's rims, 12.5 µm.
 const DEEPEST_MM: f64 = 12.5e-3;
 const TOUCHING: &str = include_str!("../../../../hil-tests/scenarios/insertion_touching.toml");
 const LOAD: &str = include_str!("../../../../hil-tests/scenarios/load.toml");
@@ -158,7 +158,7 @@ fn insertion(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> 
     Ok(())
 }
 
-/// A peg that lands on the rim of its hole and goes down pressed to the wall. Every tick is looked at in-process, which is the board to the bit.
+/// A peg that lands on the rim of its hole and goes down pressed to the wall. Every tick is recorded in-process, which equals the board bit for bit.
 fn touching(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let scenario = scenario(TOUCHING, plan)?;
     let scene = PreparedScene::of(&scenario)?;
@@ -223,7 +223,7 @@ fn touching(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     Ok(())
 }
 
-/// Pressed, at rest and slid along what is pressed on.
+/// Presses at rest and sliding along the pressed face.
 fn presses(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let mut scene = None;
     for &(name, slide_mm, off_by_n, text) in PRESSES {
@@ -255,7 +255,7 @@ fn presses(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             off_by_n,
         ));
         if !plan.quick {
-            // The same bits on both rigs.
+            // Both rigs must give the same bits.
             let board = play(&scenario, scene, &emulated())?;
             out(Row::same(
                 what("state hash of the emulated board"),
@@ -298,7 +298,7 @@ fn presses(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     Ok(())
 }
 
-/// Lets the hand slide there and back once it has come to rest; the tick in which it begins.
+/// Appends a slide there and back after the hand has come to rest; returns the tick in which it begins.
 fn slid(scenario: &mut Scenario, by_mm: [f64; 3]) -> usize {
     let begins = scenario.run.duration_s;
     if let Some(last) = scenario.hand.keyframes.last().cloned() {
@@ -322,7 +322,7 @@ fn slid(scenario: &mut Scenario, by_mm: [f64; 3]) -> usize {
     (1e3 * begins) as usize
 }
 
-/// Largest difference of the contact force to what the contact law makes of the exact surfaces, N; NaN where either is nothing.
+/// Largest difference between the contact force and the contact law on the exact surfaces, N; NaN where either is zero.
 fn off_n(scene: &PreparedScene, samples: &[Telemetry]) -> Result<f64, LabError> {
     let pushed = pushed(scene, samples)?;
     let touched = pushed

@@ -1,4 +1,4 @@
-//! The link under damage: frames that are no frames, uploads that are cut off.
+//! The link under damage: invalid frames, interrupted uploads.
 
 use fastrand::Rng;
 use mortise_protocol::frame::{Decoder, encode};
@@ -15,8 +15,8 @@ use crate::LabError;
 /// Frames of each kind.
 const FRAMES: u32 = 500_000;
 
-/// Half a million random frames and as many sound ones with one to four bits flipped, delimiters included. Two sound frames follow each: the
-/// first is lost only when a delimiter was hit and joined it to the damaged one, the second never.
+/// Half a million random frames and as many valid ones with one to four bits flipped, delimiters included. Two valid frames follow each: the first is
+/// lost only when a delimiter was hit and joined it to the damaged one, the second never.
 pub(super) fn damage(out: &mut dyn FnMut(Row)) {
     // The same frames in every run.
     let mut random = Rng::with_seed(0x4d6f_7274_6973_6521);
@@ -46,7 +46,7 @@ pub(super) fn damage(out: &mut dyn FnMut(Row)) {
                 bytes[bit / 8] ^= 1 << (bit % 8);
             }
         }
-        // Flips may undo each other.
+        // Flips may cancel each other.
         if bytes == frame {
             continue;
         }
@@ -68,7 +68,7 @@ pub(super) fn damage(out: &mut dyn FnMut(Row)) {
         what("read to the end without a panic"),
         f64::from(damaged),
         "frames",
-        // What undid itself is left out: one in some thousand.
+        // Frames whose flips cancelled are not counted: about one in a thousand.
         1.99 * f64::from(FRAMES),
         2.0 * f64::from(FRAMES),
     ));
@@ -86,21 +86,21 @@ pub(super) fn damage(out: &mut dyn FnMut(Row)) {
     ));
 }
 
-/// What cuts an upload short.
+/// Ways to interrupt an upload.
 #[derive(Clone, Copy)]
 enum Cut {
-    /// The board loses its power; its flash does not. Only the in-process rig's flash outlives it.
+    /// The board loses power; its flash keeps its contents. Only the in-process rig's flash outlives it.
     Power,
     /// The board restarts.
     Restart,
 }
 
-/// Chunks of the upload that is cut off on the emulated board, where each restart takes a third of a second.
+/// Chunks of the upload that is interrupted on the emulated board, where each restart takes a third of a second.
 const CHUNKS_EMULATED: usize = 16;
 
-/// Uploads cut off behind every chunk: the old scene must be in use again each time, and the new one once it is committed.
+/// Uploads interrupted after every chunk: the old scene must be in use again each time, and the new one once it is committed.
 pub(super) fn cuts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    // Coarse cells make it short, so that cutting behind every chunk stays affordable.
+    // Coarse cells keep the upload short, so that interrupting after every chunk stays affordable.
     let coarse = |cell_mm: f64| -> Result<Vec<u8>, LabError> {
         let mut scenario = Scenario::insertion(plan.pair)?;
         scenario.scene.cell_mm = Some(cell_mm);

@@ -1,4 +1,4 @@
-//! Figures: the tables the product is measured by, every row measured when it is asked for.
+//! Figures: the tables by which the product is measured; each row is measured on request.
 
 mod claims;
 mod constraints;
@@ -18,7 +18,7 @@ pub use crate::row::{Row, Value, Verdict};
 /// Measures the rows of a table.
 type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
 
-/// Every table: its name, and what measures it.
+/// Every table: its name, and the function that measures it.
 const TABLES: &[(&str, Measure)] = &[
     ("end-to-end", end_to_end::measure),
     ("contact", contact::measure),
@@ -27,7 +27,7 @@ const TABLES: &[(&str, Measure)] = &[
     ("promises", promises::measure),
 ];
 
-/// Names of the tables there are.
+/// Names of all tables.
 pub fn names() -> Vec<&'static str> {
     TABLES.iter().map(|(name, _)| *name).collect()
 }
@@ -36,7 +36,7 @@ pub fn names() -> Vec<&'static str> {
 /// whose bound is not near a claim.
 ///
 /// # Errors
-/// `NoSuchFigures`; anything that keeps a row from being measured. A row that does not hold is no error.
+/// `NoSuchFigures`; anything that prevents a row from being measured. A row that does not hold is not an error.
 pub fn figures(
     name: &str,
     plan: &Plan<'_>,

@@ -1,4 +1,4 @@
-//! The shared test parts through the program's own eyes.
+//! The shared test parts, read by the program itself.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,7 +8,7 @@ use crate::{LabError, corpus};
 
 const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to their folder";
 
-/// `mortise inspect` of every file: parts as written, or refused for the reason that is written, in one line with exit code 2.
+/// `mortise inspect` of every file: parts as listed, or refused for the listed reason, in one line with exit code 2.
 pub(super) fn inspect(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let what = "inspect of every shared STEP file: parts, or the reason of its refusal, as written";
     let Some(cad) = corpus::folder() else {
@@ -77,7 +77,7 @@ pub(super) fn assemblies(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<()
     }
     let faults = moved.iter().filter(|one| one.failed).count();
     let wanted: Vec<&str> = corpus::written::assemblies().collect();
-    // What is moved must be what is written, no more and no less.
+    // The set of assemblies moved must equal the listed one.
     let moves = |file: &str| moved.iter().any(|one| one.file == file && one.outcome.is_ok());
     let right = wanted.iter().filter(|file| moves(file)).count();
     let others = moved

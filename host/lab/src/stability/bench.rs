@@ -1,12 +1,13 @@
 //! A closed loop on one axis: a handle on a sampled force law, which is the product's own tick with a part in hand.
 //!
 //! The handle moves along z and does not turn. m·v̇ = F_device(held) + F_hand − b·v − f_c·sign(v), F_hand = k_h·(x_w − x) + b_h·(v_w − v) + push,
-//! integrated by Runge and Kutta's fourth order in `SUBSTEPS` steps a tick in double precision; where dry friction can hold the handle, it does. The
-//! encoder rounds, the speed comes from its differences, and the force is given out so many ticks late. The work of the device is exact, because its
-//! force is held.
+//! integrated by fourth-order Runge–Kutta in `SUBSTEPS` steps a tick in double precision; where dry friction can hold the handle, it does. The
+//! encoder rounds the position, the speed is its difference quotient, and the force is applied `delay_ticks` late. The work of the device is exact,
+//! because its force is held.
 //!
-//! Energy made is the largest rise over any interval (`port.rs`). At the handle the coupling's springs and the object's motion count as stored,
-//! as [`mortise_haptics::observer`] has it; the springs of contacts do not, nor does anything at the object: what those give back counts as made.
+//! Generated energy is the largest rise over any interval (`port.rs`). At the handle the coupling's springs and the object's kinetic energy count as
+//! stored, as [`mortise_haptics::observer`] defines it. Springs of contacts do not, nor does anything at the object: energy that they return counts
+//! as generated.
 
 use glam::DVec3;
 use mortise_haptics::observer::{Observer, Place};
@@ -16,22 +17,22 @@ use mortise_scenario::port::Port;
 
 use super::oracle::Plant;
 
-/// Steps of integration a tick.
+/// Integration steps a tick.
 const SUBSTEPS: u32 = 4;
 
-/// How the handle is measured.
+/// Measurement of the handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
-    /// Δ of the encoder, m; 0: exact.
+    /// Δ, the encoder's resolution, m; 0: exact.
     pub resolution_m: f64,
-    /// Time constant of the low-pass behind the difference quotient, s.
+    /// Time constant of the low-pass on the difference quotient, s.
     pub filter_s: f64,
-    /// What the tick is told of the speed found: 1, unless a wall's damping is set by it.
+    /// Share of the measured speed that the tick receives: 1, unless it sets a wall's damping.
     pub share: f64,
 }
 
 impl Sensor {
-    /// Exact positions, their difference quotient.
+    /// Exact positions and their difference quotient.
     pub const EXACT: Self = Self {
         resolution_m: 0.0,
         filter_s: 0.0,
@@ -42,20 +43,20 @@ impl Sensor {
 /// The loop's fixed parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rig {
-    /// Handle and hand; the hand's spring pulls to where the wish is.
+    /// Handle and hand; the hand's spring pulls to the commanded position.
     pub plant: Plant,
-    /// Of `plant.damping` so much is the hand's, N s/m.
+    /// Share of `plant.damping` that is the hand's, N s/m.
     pub hand_damping: f64,
     /// f_c, N.
     pub coulomb_n: f64,
-    /// See there.
+    /// The sensor.
     pub sensor: Sensor,
-    /// Ticks from measuring to giving the force out, beyond none.
+    /// Additional ticks from measuring to applying the force.
     pub delay_ticks: usize,
 }
 
 impl Rig {
-    /// A handle held by nothing but friction of its own, measured exactly.
+    /// A handle held by nothing but its own friction, measured exactly.
     pub const fn bare(mass_kg: f64, damping: f64) -> Self {
         Self {
             plant: Plant {
@@ -70,7 +71,7 @@ impl Rig {
         }
     }
 
-    /// The simulated mechanism of the rigs in a hand of 400 N/m with 4 N s/m.
+    /// The simulated mechanism of the rigs, in a hand of 400 N/m with 4 N s/m.
     pub const fn held() -> Self {
         Self {
             plant: Plant {
@@ -90,22 +91,22 @@ impl Rig {
     }
 }
 
-/// What the hand does in a tick.
+/// Command of the operator model for one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wish {
-    /// Where it wants the handle, m.
+    /// Commanded position of the handle, m.
     pub position: f64,
-    /// And how fast that moves, m/s.
+    /// Commanded speed, m/s.
     pub speed: f64,
-    /// Added force, N.
+    /// Additional force, N.
     pub push: f64,
 }
 
-/// The loop at work.
+/// State of the closed loop.
 pub struct Bench<'a> {
-    /// What it consists of; may be changed between ticks.
+    /// The loop's parts; may be changed between ticks.
     pub rig: Rig,
-    /// Of the force law.
+    /// Settings of the force law.
     pub settings: Settings,
     scene: &'a SceneImage<'a>,
     state: Box<State>,
@@ -113,22 +114,22 @@ pub struct Bench<'a> {
     pub position: f64,
     /// v, m/s.
     pub speed: f64,
-    /// How the handle is turned, which this loop leaves as it is.
+    /// Orientation of the handle, which this loop does not change.
     pub orientation: Quat,
     last_read: f64,
     estimate: f64,
     under_way: Vec<f64>,
-    /// Of the device's work on the handle; `None` only if nothing could be grabbed.
+    /// Observer of the device's work on the handle; `None` only if nothing could be grabbed.
     observer: Option<Observer>,
     /// Work of contacts on the object, J.
     contact: Port,
 }
 
 impl<'a> Bench<'a> {
-    /// Part `part` in hand where it stands, the handle at z = 0 and at rest.
+    /// A loop with part `part` in hand where it stands, the handle at z = 0 and at rest.
     ///
     /// # Panics
-    /// Never with a scene whose part may be moved, as all of this crate's are.
+    /// Never with a scene whose part may be moved, as in all scenes of this crate.
     pub fn new(scene: &'a SceneImage<'a>, part: u16, settings: Settings, rig: Rig) -> Self {
         let mut state = Box::new(State::new());
         state.load_scene(scene);
@@ -151,27 +152,28 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Energy given to the handle over any interval beyond what was stored at its start, J: made of nothing. `NaN` if nothing is in hand.
+    /// Largest energy delivered to the handle over any interval beyond what was stored at its start, J: generated energy. `NaN` if nothing is in
+    /// hand.
     pub fn handle_made_j(&self) -> f64 {
         self.observer.as_ref().map_or(f64::NAN, Observer::given_j)
     }
 
-    /// All work that passed through the handle either way, J.
+    /// All work that passed through the handle in either direction, J.
     pub fn handle_passed_j(&self) -> f64 {
         self.observer.as_ref().map_or(f64::NAN, Observer::passed_j)
     }
 
-    /// Most work of contacts on the object over any interval, J.
+    /// Largest work of contacts on the object over any interval, J.
     pub fn contact_made_j(&self) -> f64 {
         self.contact.made()
     }
 
-    /// How passive the coupling is.
+    /// Passivity figures of the coupling.
     pub fn passivity(&self) -> Passivity {
         self.state.passivity()
     }
 
-    /// One tick, and the period after it.
+    /// Runs one tick, and the period after it.
     pub fn step(&mut self, wish: &Wish) -> Output {
         let period = f64::from(self.settings.period_s);
         let sensor = self.rig.sensor;
@@ -204,7 +206,7 @@ impl<'a> Bench<'a> {
         let from = place(self.position, self.orientation);
         self.advance(force, wish, period);
         if let Some(observer) = &mut self.observer {
-            // The handle moves along z alone: no other part of the wrench works.
+            // The handle moves along z alone: no other component of the wrench does work.
             let held = Wrench {
                 force: Vec3::new(0.0, 0.0, force as f32),
                 torque: Vec3::ZERO,
@@ -224,7 +226,7 @@ impl<'a> Bench<'a> {
         } = self.rig;
         let h = period / f64::from(SUBSTEPS);
         for i in 0..SUBSTEPS {
-            // The wish goes on within the tick, as a hand does.
+            // The commanded position moves on within the tick, as a hand does.
             let wished = |t: f64| wish.position + wish.speed * (f64::from(i) * h + t);
             let smooth = |t: f64, x: f64, v: f64| {
                 force + wish.push + plant.stiffness * (wished(t) - x) + hand_damping * wish.speed
@@ -243,7 +245,7 @@ impl<'a> Bench<'a> {
             let d = rate(h, x + h * c.0, v + h * c.1);
             self.position += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
             self.speed += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
-            // Dry friction brings to rest; what is left over starts anew in the next step.
+            // Dry friction stops the handle; the next step starts from rest.
             if coulomb_n > 0.0 && v != 0.0 && self.speed.signum() != v.signum() {
                 self.speed = 0.0;
             }

@@ -1,8 +1,7 @@
-//! Where a wall becomes unstable, found by experiment on the product's own tick.
+//! Stability boundary of a wall, found by experiment with the product's own tick.
 //!
-//! The hand presses the part on a slab until it lies still, lets go of all damping of its own but the plant's, and flicks the handle. Whether the
-//! trembling that follows dies out or grows is what is looked at: linear theory's own question, asked of the whole loop with its encoder, its
-//! coupling and its contacts.
+//! The hand presses the part on a slab until it lies still, drops all damping but the plant's own, and flicks the handle. The criterion is whether
+//! the vibration that follows decays or grows: the question of linear theory, applied to the whole loop with its encoder, coupling and contacts.
 
 use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
@@ -10,23 +9,24 @@ use mortise_protocol::image::SceneImage;
 use super::bench::{Bench, Rig, Sensor, Wish};
 use super::oracle::{Law, Search, Wall, limit};
 
-/// Pressed with this force, N.
+/// Press force, N.
 const PRESS_N: f64 = 5.0;
-/// Damping of the hand while it presses, N s/m at the most, and how long that takes, s.
+/// Largest damping of the hand while it presses, N s/m, and duration of the press, s.
 const CALM_N_S_PER_M: f64 = 20.0;
 const CALM_S: f64 = 1.0;
-/// The flick, m/s.
+/// Speed of the flick, m/s.
 const FLICK_M_PER_S: f64 = 2e-3;
-/// How long trembling is watched, s, and the parts of it at its beginning and end that are compared.
+/// Duration of the observation, s, and the intervals at its beginning and end that are compared.
 const WATCH_S: f64 = 8.0;
 const PART: f64 = 0.2;
-/// Trembling beyond this multiple of what the flick gave ends the watch: it has grown.
+/// Vibration beyond this multiple of the flick's ends the observation: it has grown.
 const GROWN: f64 = 20.0;
 
-/// A wall rendered by the product's coupling, its object pinned by contact, without the valve: settings, and what the sensor tells of the speed.
+/// A wall rendered by the product's coupling, its object pinned by contact, without the valve: settings, and the sensor with the share of the speed
+/// that the tick receives.
 ///
-/// The coupling looks a period ahead: it gives K·x + (b_T + T·K)·v̂. A textbook's wall of damping B is one with b_T = 0 that is told B/(T·K) of the
-/// speed.
+/// The coupling predicts one period ahead: it renders K·x + (b_T + T·K)·v̂. A textbook's wall of damping B is one with b_T = 0 that receives B/(T·K)
+/// of the speed.
 pub fn settings(law: Law, wall: &Wall, stiffness: f64) -> (Settings, Sensor) {
     let mut settings = open(wall.period_s);
     settings.coupling.k_t_n_per_m = stiffness as f32;
@@ -43,7 +43,7 @@ pub fn settings(law: Law, wall: &Wall, stiffness: f64) -> (Settings, Sensor) {
     (settings, sensor)
 }
 
-/// Default settings at another period with every limit out of the way, and contacts that give way by less than a thousandth of what a wall here does.
+/// Default settings at another period with all limits disabled, and contacts that deflect by less than a thousandth of a wall's deflection here.
 pub fn open(period_s: f64) -> Settings {
     let mut settings = Settings {
         period_s: period_s as f32,
@@ -58,34 +58,34 @@ pub fn open(period_s: f64) -> Settings {
     settings
 }
 
-/// What a flick led to.
+/// Response to a flick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flick {
-    /// Largest deviation at the beginning and at the end, m.
+    /// Largest deviation at the beginning, m.
     pub first_m: f64,
-    /// See `first_m`.
+    /// Largest deviation at the end, m.
     pub last_m: f64,
-    /// Deviation of the flick in a linear loop without damping, v·√(m/K), m: trembling that has grown to what limits it may fall again, but not so
-    /// far.
+    /// Deviation after the flick in a linear loop without damping, v·√(m/K), m: a vibration that has grown until limits saturate it may shrink again,
+    /// but not as far as this.
     pub linear_m: f64,
 }
 
 impl Flick {
-    /// Whether the trembling died out.
+    /// True if the vibration decayed.
     pub fn dies_out(&self) -> bool {
         self.last_m < self.first_m && self.last_m < 2.0 * self.linear_m
     }
 }
 
-/// Presses part `part` on what it stands on, flicks, and watches.
+/// Presses part `part` on its support, flicks, and observes.
 pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) -> Flick {
     let mut bench = Bench::new(scene, part, *settings, *rig);
     let ticks = |s: f64| (s / f64::from(settings.period_s)).round() as u32;
     let calm = ticks(CALM_S);
-    // No more than critical: an overdamped handle on a soft wall would still be creeping.
+    // At most critical damping: an overdamped handle on a soft wall would still be creeping.
     let critical = 2.0 * (f64::from(settings.coupling.k_t_n_per_m) * rig.plant.mass_kg).sqrt();
     bench.rig.plant.damping += critical.min(CALM_N_S_PER_M);
-    // The push grows in half of that time.
+    // The push grows during half of that time.
     for i in 0..calm {
         let push = -PRESS_N * f64::from(2 * i).min(f64::from(calm)) / f64::from(calm);
         bench.step(&Wish {
@@ -122,7 +122,7 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
     }
 }
 
-/// Largest stiffness, N/m, at which the flick dies out, with a wall that is otherwise `wall`; looked for around `near`.
+/// Largest stiffness, N/m, at which the flick decays, with a wall that is otherwise `wall`; searched around `near`.
 pub fn stiffness_limit(
     scene: &SceneImage<'_>,
     part: u16,
@@ -144,7 +144,7 @@ pub fn stiffness_limit(
             ..*rig
         };
         let flick = flick(scene, part, &settings, &rig);
-        // What is smaller than the encoder tells is not seen, and no trembling.
+        // Motion below the encoder's resolution is invisible and not counted as vibration.
         flick.dies_out() || flick.last_m < 2.0 * rig.sensor.resolution_m
     })
 }

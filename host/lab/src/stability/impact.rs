@@ -1,4 +1,4 @@
-//! A blow on a thin wall: how deep the part goes, whether it comes through, what the handle feels.
+//! Impact on a thin wall: penetration, tunnelling, and the force on the handle.
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_haptics::{Integrator, Quat, Settings};
@@ -11,33 +11,33 @@ use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::variant::Variant;
 
-/// Thickness of the wall, mm, and how far above it the part starts.
+/// Thickness of the wall, and height of the part's start above it, mm.
 pub const WALL_MM: f64 = 1.0;
 const GAP_MM: f64 = 20.0;
-/// Ticks in which a part comes to the tilt it strikes with.
+/// Ticks in which a part reaches the tilt of its impact.
 const TILT_TICKS: u32 = 400;
-/// How far beyond touching the hand wants to be, mm, and how long it stays there, s.
+/// Target of the hand beyond first contact, mm, and how long it stays there, s.
 const BEYOND_MM: f64 = 5.0;
 const STAY_S: f64 = 0.5;
-/// Speeds tried, m/s.
+/// Speeds, m/s.
 const SPEEDS: [f64; 6] = [0.03, 0.06, 0.12, 0.25, 0.5, 1.0];
 
-/// One blow.
+/// One impact.
 #[derive(Clone, Debug, Serialize)]
 pub struct Blow {
-    /// Model of the scene and step.
+    /// Model of the scene and integration step.
     pub method: &'static str,
-    /// m/s.
+    /// Speed, m/s.
     pub speed: f64,
     /// Angle of the part's axis off the wall's normal, degrees.
     pub tilt_deg: f64,
-    /// How far the part's lowest point was below the wall's face at most, closed form, µm; negative when it stopped above the wall.
+    /// Largest depth of the part's lowest point below the wall's face, closed form, µm; negative when it stopped above the wall.
     pub penetration_um: f64,
-    /// Whether it was ever past the wall's middle.
+    /// True if it was ever past the wall's middle.
     pub tunnelled: bool,
     /// Largest force on the handle, N.
     pub peak_force_n: f64,
-    /// Most work of the device on the handle over any interval beyond what was stored, mJ.
+    /// Largest work of the device on the handle over any interval beyond what was stored at its start, mJ.
     pub handle_made_mj: f64,
 }
 
@@ -55,7 +55,7 @@ impl std::fmt::Display for Blow {
     }
 }
 
-/// Ways to model wall and step.
+/// Models of wall and integration step.
 pub const METHODS: [(&str, Variant, Integrator); 3] = [
     (
         "field, implicit (ours)",
@@ -73,17 +73,17 @@ pub const METHODS: [(&str, Variant, Integrator); 3] = [
 /// The thin wall, baked.
 ///
 /// # Errors
-/// Anything that keeps it from being baked.
+/// Anything that prevents it from being baked.
 pub fn wall(variant: &Variant, thick_mm: f64) -> Result<Slab, LabError> {
     Slab::bake(variant, thick_mm, GAP_MM)
 }
 
-/// What strikes what.
+/// Conditions of an impact.
 #[derive(Clone, Copy)]
 pub struct Strike<'a> {
-    /// The wall, and its scene.
+    /// The wall.
     pub slab: &'a Slab,
-    /// See above.
+    /// The wall's scene.
     pub scene: &'a SceneImage<'a>,
     /// Thickness of the wall, mm.
     pub thick_mm: f64,
@@ -91,13 +91,13 @@ pub struct Strike<'a> {
     pub tilt_deg: f64,
     /// Name of the model.
     pub method: &'static str,
-    /// How the part is moved.
+    /// Integrator of the object.
     pub integrator: Integrator,
-    /// m/s.
+    /// Speed, m/s.
     pub speed: f64,
 }
 
-/// One blow: the part comes to its tilt at rest, then goes down.
+/// Plays one impact: the part reaches its tilt at rest, then goes down.
 pub fn strike(blow: &Strike<'_>) -> Blow {
     let &Strike {
         slab,
@@ -178,7 +178,7 @@ pub fn sweep(quick: bool, out: &mut dyn FnMut(&Blow)) -> Result<Vec<Blow>, LabEr
 
 /// Penetration over speed.
 pub fn chart(blows: &[Blow]) -> Chart {
-    // What stopped above the wall, as voxels make it, or did not go in, is drawn at the foot.
+    // Parts that stopped above the wall, as with voxels, or did not penetrate are drawn at the lower end of the axis.
     const LEAST_UM: f64 = 0.1;
     let series = METHODS.iter().enumerate().map(|(index, (method, ..))| Series {
         name: (*method).into(),

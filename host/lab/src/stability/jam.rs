@@ -1,17 +1,17 @@
-//! How far to the side a hand may push a peg that is still to go in: jamming and wedging. Contact here has no friction.
+//! Jamming and wedging: how far to the side a hand may push a peg that still goes in. Contact here has no friction.
 //!
-//! A peg of diameter d stands l deep in a hole of diameter D, leans, and touches twice: its side the hole's rim, its tip's edge the wall across. A
-//! hand pushes a place on its axis sideways with F_x and in with F_z and leaves it free to turn. Oracles, both for a rigid peg in the plane of the
-//! tilt:
+//! A peg of diameter d stands l deep in a hole of diameter D, leans, and touches twice: its side at the hole's rim, its tip's edge at the opposite
+//! wall. A hand pushes a point on its axis sideways with F_x and in with F_z and leaves it free to turn. References, both for a rigid peg in the
+//! plane of the tilt:
 //!
 //! * with dry friction μ at the walls it **jams** where F_x/F_z > 1/(μ·(1 + 2·(h − μ·d/2)/l)), h the height of the push above the rim: two-point
 //!   contact of the classical diagram, F_x/F_z against M/(r·F_z) with λ = l/(2·r·μ), for this push (D. E. Whitney, *Quasi-static assembly of
 //!   compliantly supported rigid parts*, J. Dyn. Sys. Meas. Control 104(1), 1982);
-//! * without friction the work done by the push decides: D·cos θ − l·sin θ = d ties depth to tilt, and the peg goes in where F_z·dz > F_x·dx. With a
-//!   wide gap even a slippery peg is pushed out by a hand that tilts it.
+//! * without friction the work of the push decides: D·cos θ − l·sin θ = d relates depth to tilt, and the peg goes in where F_z·dz > F_x·dx. With a
+//!   wide gap even a frictionless peg is pushed out by a hand that tilts it.
 //!
-//! **Wedging**, two-point contact that holds though nobody pushes, needs μ > l/d: contact here has no friction, so a peg must come out again however
-//! it was pushed in.
+//! **Wedging**, two-point contact that holds without a push, needs μ > l/d. Contact here has no friction, so a peg must come out again however it was
+//! pushed in.
 
 use mortise_bake::Grabbable;
 use mortise_protocol::message::{HandScript, Keyframe, ToDevice, WirePose};
@@ -28,58 +28,58 @@ use crate::error::LabError;
 use crate::fit::Fit;
 use crate::variant::Variant;
 
-/// Diametral clearances, mm; the last is exact.
+/// Diametral clearances, mm; 0 is an exact fit.
 const CLEARANCES_MM: [f64; 8] = [1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.02, 0.0];
-/// Where an exact fit is drawn on a logarithmic axis, mm.
+/// Position of an exact fit on the logarithmic axis, mm.
 const EXACT_AT_MM: f64 = 0.005;
-/// How deep the peg is in at the start, mm, and what counts as going in or coming out.
+/// Depth of the peg at the start, mm, and the change of depth that counts as going in or coming out.
 const ENGAGED_MM: f64 = 10.0;
 const MOVED_MM: f64 = 3.0;
 /// Height of the push above the block, mm.
 const HEIGHT_MM: f64 = 40.0;
-/// Length of the push, N.
+/// Magnitude of the push, N.
 const PUSH_N: f64 = 2.0;
-/// F_x/F_z tried.
+/// Smallest and largest F_x/F_z tried.
 const LEAST: f64 = 0.05;
 const MOST: f64 = 10.0;
-/// Friction of the lines.
+/// Friction coefficients of the reference lines.
 const FRICTIONS: [f64; 3] = [0.05, 0.1, 0.3];
-/// The contact's stiffness, N/m: the oracle's peg is rigid.
+/// Contact stiffness, N/m: high, because the reference's peg is rigid.
 const STIFFNESS_N_PER_M: f32 = 2e6;
-/// Of the hand, N s/m and N m s/rad: it lets the peg move at 0.1 m/s.
+/// Damping of the hand, N s/m and N m s/rad: it lets the peg move at 0.1 m/s.
 const DAMPING: f32 = 20.0;
 const ANGULAR_DAMPING: f32 = 0.02;
-/// The spring that holds the handle while the part is grabbed, N/m, and how long, ticks.
+/// Stiffness of the spring that holds the handle while the part is grabbed, N/m, and how long it holds, ticks.
 const HOLD_N_PER_M: f32 = 2000.0;
 const HOLD_TICKS: u32 = 600;
-/// How far beyond touching twice it leans then: 0.3 N through the hold and the coupling in series.
+/// Lean beyond two-point contact during that hold, mm: 0.3 N through the hold and the coupling in series.
 const LEAN_MM: f64 = 0.5;
-/// The push lasts, s.
+/// Duration of the push, s.
 const LAST_S: f64 = 1.0;
-/// Where wedging is asked it lasts this long, s, which leaves the peg in the hole; then it is pulled with so much, N.
+/// Duration of the push in the wedging test, s, which leaves the peg in the hole, and force of the pull that follows, N.
 const WEDGE_S: f64 = 0.25;
 const PULL_N: f64 = 0.2;
 
-/// Ways to model the scene.
+/// Models of the scene.
 const METHODS: [(&str, Variant); 2] = [
     ("field (ours)", Variant::board(0.5)),
     ("voxmap 0.5 mm (textbook)", Variant::textbook(0.5)),
 ];
 
-/// One clearance.
+/// Result at one clearance.
 #[derive(Clone, Debug, Serialize)]
 pub struct Push {
     /// Model of the scene.
     pub method: &'static str,
-    /// Hole's diameter less the peg's, mm.
+    /// Hole's diameter minus the peg's, mm.
     pub clearance_mm: f64,
-    /// Largest F_x/F_z at which it goes in; 0: not even straight.
+    /// Largest F_x/F_z at which it goes in; 0: not even with a straight push.
     pub experiment: f64,
-    /// The same without friction, by work; above the largest tried it is not drawn.
+    /// Limit without friction, by work; not drawn above the largest ratio tried.
     pub slippery: f64,
-    /// The same with friction 0.1, jammed beyond.
+    /// Limit with friction 0.1, beyond which it jams.
     pub friction_0_1: f64,
-    /// Pushed down and sideways alike, it comes out again when pulled: it does not wedge.
+    /// True if the peg comes out again when pulled after being pushed down and sideways alike: it does not wedge.
     pub comes_out: bool,
 }
 
@@ -98,12 +98,12 @@ impl std::fmt::Display for Push {
     }
 }
 
-/// F_x/F_z beyond which a peg jams: depth `l`, height of the push above the rim `h`, diameter `d`, one unit.
+/// F_x/F_z beyond which a peg jams; depth, height of the push above the rim, and diameter in one unit.
 pub fn jams_beyond(friction: f64, depth: f64, height: f64, diameter: f64) -> f64 {
     1.0 / (friction * (1.0 + 2.0 * (height - 0.5 * friction * diameter) / depth))
 }
 
-/// Tilt of a peg that touches twice, `depth` in, rad: D·cos θ − l·sin θ = d.
+/// Tilt of a peg in two-point contact at `depth`, rad: D·cos θ − l·sin θ = d.
 fn tilt(hole: f64, peg: f64, depth: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
@@ -117,19 +117,19 @@ fn tilt(hole: f64, peg: f64, depth: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// How far to the side of the hole's axis the push is then, from the wall's and the tip's corner on.
+/// Distance of the push from the hole's axis at that tilt, found from the wall at which the tip's edge touches.
 fn aside(hole: f64, peg: f64, depth: f64, height: f64) -> f64 {
     let (sin, cos) = tilt(hole, peg, depth).sin_cos();
     -0.5 * hole + 0.5 * peg * cos + (depth + height) * sin
 }
 
-/// F_x/F_z beyond which a peg without friction is pushed out: hole `hole`, peg `peg`, depth, and height of the push above the rim, one unit.
+/// F_x/F_z beyond which a frictionless peg is pushed out; diameters, depth, and height of the push above the rim in one unit.
 pub fn pushed_out_beyond(hole: f64, peg: f64, depth: f64, height: f64) -> f64 {
     if hole <= peg {
         return f64::INFINITY;
     }
     let (sin, cos) = tilt(hole, peg, depth).sin_cos();
-    // From the tip's centre to the push, along the axis.
+    // Distance from the tip's centre to the push, along the axis.
     let arm = depth + height;
     let deeper = -hole - depth * cos / sin;
     let down = -deeper - 0.5 * peg * cos - arm * sin;
@@ -158,8 +158,8 @@ impl Stage {
         })
     }
 
-    /// How deep the peg is, mm, when it has been leant `aside_mm` and then pushed so, N, for so long each, s; `None` when it took the handle out of
-    /// the workspace.
+    /// Depth of the peg, mm, after it has been leant by `aside_mm` and then pushed (duration, s, and force, N, of each push); `None` when it took the
+    /// handle out of the workspace.
     fn pushed(&self, aside_mm: f64, pushes: &[(f64, [f64; 3])]) -> Result<Option<f64>, LabError> {
         let client = Client::connect(&RigSpec::Simulated { realtime: false })?;
         client.upload(&self.scene.image, &mut |_| {})?;
@@ -168,7 +168,7 @@ impl Stage {
             id,
             value: STIFFNESS_N_PER_M,
         })?;
-        // Held and leant at first, then pushed and damped only.
+        // Held and leant at first, then only pushed and damped.
         let held = |x_mm| ToDevice::SimulatedHand(hand(HOLD_N_PER_M, x_mm, &[(0.0, [0.0; 3])]));
         client.request(held(0.0))?;
         client.run(HOLD_TICKS)?;
@@ -205,7 +205,7 @@ impl Stage {
     }
 }
 
-/// A hand at the height of the push, so far aside, with a spring of `stiffness` N/m and pushes, N, at times, s.
+/// A hand at the height of the push, offset by `aside_mm`, with a spring of `stiffness` N/m and pushes, N, at times, s.
 fn hand(stiffness: f32, aside_mm: f64, pushes: &[(f64, [f64; 3])]) -> HandScript {
     HandScript {
         stiffness,
@@ -214,7 +214,7 @@ fn hand(stiffness: f32, aside_mm: f64, pushes: &[(f64, [f64; 3])]) -> HandScript
         angular_damping: ANGULAR_DAMPING,
         tremor: 0.0,
         tremor_hz: 0.0,
-        // At most four.
+        // At most four keyframes.
         keyframes: (pushes.iter())
             .map(|&(t, push)| Keyframe {
                 tick: (1e3 * t) as u32,
@@ -228,10 +228,10 @@ fn hand(stiffness: f32, aside_mm: f64, pushes: &[(f64, [f64; 3])]) -> HandScript
     }
 }
 
-/// All clearances; each goes to `out`.
+/// Plays all clearances; passes each result to `out`.
 ///
 /// # Errors
-/// Anything that keeps a push from being played.
+/// Anything that prevents a push from being played.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Push)) -> Result<Vec<Push>, LabError> {
     let mut found = Vec::new();
     for (method, variant) in METHODS {
@@ -270,7 +270,7 @@ fn measure(method: &'static str, variant: &Variant, clearance_mm: f64) -> Result
     if let Some(error) = failed {
         return Err(error);
     }
-    // Sideways and in alike, then out; out of the workspace is out of the hole.
+    // Sideways and in alike, then out; leaving the workspace counts as out of the hole.
     let wedge = [(WEDGE_S, askew(1.0)), (LAST_S, [0.0, 0.0, PULL_N])];
     let before = stage.pushed(leant, &wedge[..1])?;
     let after = stage.pushed(leant, &wedge)?;
@@ -348,7 +348,7 @@ pub fn chart(found: &[Push]) -> Chart {
 mod tests {
     use super::*;
 
-    /// The closed form is the classical diagram's line: M/(r·F_z) = λ + μ·(1 + λ)·F_x/F_z taken at the tip, λ = l/(2·r·μ), for M = F_x·(h + l).
+    /// The closed form is a point of the classical diagram: M/(r·F_z) = λ + μ·(1 + λ)·F_x/F_z at the tip, λ = l/(2·r·μ), for M = F_x·(h + l).
     #[test]
     fn the_jam_limit_lies_on_the_classical_diagram() {
         for (friction, depth, height, diameter) in [(0.1, 10.0, 40.0, 18.75), (0.3, 20.0, 30.0, 10.0)] {
@@ -361,7 +361,7 @@ mod tests {
         }
     }
 
-    /// To first order in the clearance c the tilt is c/l, and the push, h + l from the tip, comes back by (h + l)·c/l² for each step deeper.
+    /// To first order in the clearance c the tilt is c/l, and the push, h + l from the tip, moves back by (h + l)·c/l² per step of depth.
     #[test]
     fn a_slippery_peg_is_pushed_out_by_leverage_alone() {
         let (hole, clearance, depth, height) = (18.75, 1e-3, 10.0, 40.0);
@@ -370,7 +370,7 @@ mod tests {
         assert!((ratio / first_order - 1.0).abs() < 2e-3, "{ratio} {first_order}");
     }
 
-    /// Ours goes in where the rigid, slippery peg does, comes out again, and takes no notice of how tight the fit is.
+    /// Mortise's peg goes in where the rigid, frictionless peg does, comes out again, and is independent of how tight the fit is.
     #[test]
     fn the_product_follows_the_slippery_peg() {
         let push = measure(METHODS[0].0, &METHODS[0].1, 1.0).expect("played");

@@ -1,8 +1,8 @@
-//! Constraint targets that come late or not at all: how long a part stays guided, and what the hand feels where guidance lapses.
+//! Constraint targets that arrive late or not at all: how long a part stays guided, and the force on the handle where guidance lapses.
 //!
 //! A peg is held half-way down its hole, 1 mm and 2° off its axis, by a hand that does not tremble; guidance holds it on the axis. The host refreshes
-//! its target each R = 100 ms and the board lets it fade after E = 300 ms without. Of refreshes lost independently with probability p the time
-//! between two that arrive is k·R, k geometric, of which the target is in force for min(k·R, E):
+//! its target each R = 100 ms, and the board lets it fade after E = 300 ms without a refresh. If refreshes are lost independently with probability p,
+//! the time between two that arrive is k·R, k geometric, of which the target is in force for min(k·R, E):
 //!
 //! share in force = E\[min(k, 3)\] / E\[k\] = (1 + p + p²)·(1 − p) = 1 − p³
 
@@ -21,24 +21,24 @@ use crate::fit::Fit;
 use crate::guided::{SIM, insertion, key, largest_step, play_to};
 use crate::variant::Variant;
 
-/// Shares lost.
+/// Shares of messages lost.
 const LOST: [f64; 7] = [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9];
-/// The peg is half-way by then, s, and held there for so long.
+/// Time at which the peg is half-way, s, and how long it is held there.
 const DOWN_S: f64 = 2.0;
 const HELD_S: f64 = 60.0;
 const HELD_QUICK_S: f64 = 6.0;
-/// Wide enough for a part that is not guided to lean to the wall.
+/// Clearance, mm: wide enough for an unguided part to lean against the wall.
 const CLEARANCE_MM: f64 = 1.0;
-/// Ticks between what the guide hears.
+/// Ticks between the samples that the guide receives.
 const HEAR_TICKS: u16 = 10;
 
-/// How targets are late, and what guides.
+/// Delay of targets, and the kind of guidance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Case {
     name: &'static str,
     /// Value of the parameter `Guidance`.
     guidance: f32,
-    /// Each message is late by up to so much, evenly, ms.
+    /// Largest delay of a message, uniformly distributed, ms.
     late_ms: u32,
     look: Look,
 }
@@ -64,31 +64,31 @@ const CASES: [Case; 3] = [
     },
 ];
 
-/// One peg held.
+/// Result of one held peg.
 #[derive(Clone, Debug, Serialize)]
 pub struct Held {
-    /// How it is guided, and how late.
+    /// Kind of guidance, and delay.
     pub case: &'static str,
     /// Share of the messages about targets that is lost.
     pub lost: f64,
     /// Share of the time in which a target was in force.
     pub in_force: f64,
-    /// The same by the closed form for messages that are never late.
+    /// Share by the closed form for messages without delay.
     pub formula: f64,
     /// Largest change of the handle's force between two ticks, N.
     pub step_n: f64,
-    /// Of its torque, mN m.
+    /// Largest change of its torque, mN m.
     pub step_mnm: f64,
-    /// Most work of the device on the handle over any interval since the grab beyond what was stored at its start, mJ, and all that passed: the first
-    /// time a target takes hold is in it.
+    /// Largest work of the device on the handle over any interval since the grab beyond what was stored at its start, mJ; it includes the first
+    /// engagement of a target.
     pub handle_made_mj: f64,
-    /// See above.
+    /// All energy that passed through the handle, mJ.
     pub handle_passed_mj: f64,
-    /// Most work of contacts and targets on the object over any interval, mJ, nothing counted as stored.
+    /// Largest work of contacts and targets on the object over any interval, mJ, with nothing counted as stored.
     pub object_made_mj: f64,
-    /// From when the first target was in force until it was fully engaged, ms.
+    /// Time from the first target in force to its full engagement, ms.
     pub engaged_ms: f64,
-    /// Times a target came into force again.
+    /// Number of times that a target came into force again.
     pub fetched: usize,
 }
 
@@ -113,10 +113,10 @@ impl std::fmt::Display for Held {
     }
 }
 
-/// Every case at every loss; each goes to `out`.
+/// Plays every case at every loss; passes each result to `out`.
 ///
 /// # Errors
-/// Anything that keeps it from being played.
+/// Anything that prevents it from being played.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Held)) -> Result<Vec<Held>, LabError> {
     let fit = Fit::thesis(CLEARANCE_MM).engaged(-20.0);
     let file = fit.file()?;
@@ -153,7 +153,7 @@ fn play(scenario: &Scenario, scene: &PreparedScene, case: &Case, lost: f64) -> R
     let mut random = Rng::with_seed(1);
     let mut under_way: Vec<(u32, ToDevice)> = Vec::new();
     let (mut begun, mut due) = (None, 0);
-    // Until it is half-way down and at rest nothing fails.
+    // The link is fault-free until the peg is half-way down and at rest.
     let held_from = (1e3 * DOWN_S) as u32;
     let mut listener = |sample: &Telemetry| {
         let begun = *begun.get_or_insert(sample.tick);
@@ -203,7 +203,7 @@ fn play(scenario: &Scenario, scene: &PreparedScene, case: &Case, lost: f64) -> R
     })
 }
 
-/// Share of the time in force, and energy made at the object and given to the handle, over what is lost.
+/// Share of the time in force, and energy generated at the object and delivered to the handle, over the share lost.
 pub fn charts(found: &[Held]) -> Vec<Chart> {
     const LINE_POINTS: u32 = 60;
     let of = |named: bool, y: fn(&Held) -> f64| -> Vec<Series> {
@@ -276,8 +276,8 @@ mod tests {
     fn a_part_stays_guided_for_as_long_as_the_closed_form_says() {
         let found = sweep(true, &mut |held| println!("{held}")).expect("played");
         for held in &found {
-            // Whatever takes hold gives the handle no more than the hand brought before, to a hundredth of what passes; the probes of the encoders,
-            // once for each axis when the hand comes to rest, are among it.
+            // An engaging target gives the handle no more energy than the hand supplied before, to a hundredth of the energy passed; this includes
+            // the encoder probes, once for each axis when the hand comes to rest.
             assert!(held.handle_made_mj <= 0.01 * held.handle_passed_mj, "{held}");
         }
         for held in found.iter().filter(|held| held.case == CASES[0].name) {
@@ -285,9 +285,9 @@ mod tests {
             assert!((held.in_force - held.formula).abs() < 0.1, "{held}");
             // A lapse fades: 0.03 µN with up to half of the messages lost.
             assert!(held.step_n < 1e-7, "{held}");
-            // The hand does not wait for it: 3 N by 0.015 N a tick.
+            // Engagement does not wait for the hand: 3 N in steps of 0.015 N a tick.
             assert!((held.engaged_ms - 200.0).abs() < 2.0, "{held}");
-            // Though the pull's energy at the object is from nowhere, as the observer there sees.
+            // The observer at the object sees the energy of the pull, which is unaccounted for there.
             assert!(
                 held.object_made_mj > 10.0 * held.handle_made_mj.max(0.01),
                 "{held}"

@@ -1,4 +1,4 @@
-//! Maps of the largest stable stiffness on one axis: theory as lines, experiment with the product's tick as marks.
+//! Maps of the largest stable stiffness on one axis: theory as lines, experiments with the product's tick as marks.
 
 use serde::Serialize;
 
@@ -10,21 +10,21 @@ use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::variant::Variant;
 
-/// Stiffer walls are not looked for, N/m.
+/// Upper limit of the search, N/m.
 const MOST_N_PER_M: f64 = 1e5;
-/// Points of a line.
+/// Points on a line.
 const FINE_POINTS: u32 = 60;
 
-/// A map: one quantity varied, one line for each of a few conditions.
+/// A map: one quantity varied, one line for each condition.
 pub struct Map {
-    /// File name of its table and charts.
+    /// Name of its table and charts.
     pub name: &'static str,
     title: &'static str,
     note: &'static str,
     across: &'static str,
     from: f64,
     to: f64,
-    /// Experiments along a line.
+    /// Experiments on a line.
     points: u32,
     conditions: Vec<Condition>,
 }
@@ -32,14 +32,14 @@ pub struct Map {
 /// A bound in closed form.
 type Formula = fn(&Rig, &Wall) -> f64;
 
-/// Builds a loop of a value across.
+/// Builds the loop for a value of the varied quantity.
 type Build = Box<dyn Fn(f64) -> (Rig, Wall)>;
 
 struct Condition {
     name: String,
     law: Law,
     build: Build,
-    /// A closed form drawn beside, with its name.
+    /// A closed form drawn as another line, with its name.
     formula: Option<(&'static str, Formula)>,
 }
 
@@ -50,7 +50,7 @@ pub struct Limit {
     pub map: &'static str,
     /// Condition.
     pub condition: String,
-    /// Quantity across.
+    /// Varied quantity.
     pub across: &'static str,
     /// Its value.
     pub value: f64,
@@ -86,7 +86,8 @@ fn colgate(rig: &Rig, wall: &Wall) -> f64 {
     oracle::passive_stiffness(rig.plant.damping, wall)
 }
 
-/// The textbook's wall without damping and the product's coupling with its default 20 N s/m and a speed filtered by 3 ms, over what `rig_of` varies.
+/// The textbook's wall without damping, and the product's coupling with its default 20 N s/m and a speed filtered by 3 ms; `rig_of` builds the rig
+/// for the varied quantity.
 fn both(rig_of: fn(f64) -> (Rig, f64)) -> Vec<Condition> {
     vec![
         Condition {
@@ -110,7 +111,7 @@ fn both(rig_of: fn(f64) -> (Rig, f64)) -> Vec<Condition> {
     ]
 }
 
-/// All of them.
+/// All maps.
 pub fn all() -> Vec<Map> {
     let delays = (0..3).map(|delay| Condition {
         name: format!("{delay} ticks late"),
@@ -167,16 +168,16 @@ pub fn all() -> Vec<Map> {
     ]
 }
 
-/// `count` values from `from` to `to`, each as many times the one before.
+/// `count` values from `from` to `to`, at a constant ratio.
 fn spread(from: f64, to: f64, count: u32) -> impl Iterator<Item = f64> {
     (0..count).map(move |i| from * (to / from).powf(f64::from(i) / f64::from(count - 1)))
 }
 
 impl Map {
-    /// Makes its experiments; each goes to `out`.
+    /// Runs its experiments; passes each to `out`.
     ///
     /// # Errors
-    /// Anything that keeps the scene from being baked.
+    /// Anything that prevents the scene from being baked.
     pub fn run(&self, quick: bool, out: &mut dyn FnMut(&Limit)) -> Result<Vec<Limit>, LabError> {
         let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0)?;
         let scene = slab.scene()?;

@@ -1,8 +1,8 @@
 //! Where closed loops become unstable, by theory and by experiment, and where each method fails.
 //!
-//! [`mod@bench`] closes a loop round the product's tick on one axis; [`oracle`] says what the linear loop must do; [`boundary`] finds what the whole
-//! one does. [`limits`] and [`quantisation`] are the maps that hold the two together, [`press`], [`impact`], [`shell`] and [`jam`] are those where
-//! methods are compared; [`lapses`] is about targets that are late or lost.
+//! [`mod@bench`] closes a loop around the product's tick on one axis; [`oracle`] predicts the behaviour of the linear loop; [`boundary`] measures
+//! that of the whole loop. The maps of [`limits`] and [`quantisation`] compare the two; those of [`press`], [`impact`], [`shell`] and [`jam`] compare
+//! methods; [`lapses`] concerns targets that are late or lost.
 
 pub mod bench;
 pub mod boundary;
@@ -28,19 +28,19 @@ use crate::experiment::{Experiment, Findings, Form, Report};
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Trial {
-    /// Of [`limits`].
+    /// Result of [`limits`].
     Limit(limits::Limit),
-    /// Of [`press`].
+    /// Result of [`press`].
     Press(press::Press),
-    /// Of [`impact`].
+    /// Result of [`impact`].
     Blow(impact::Blow),
-    /// Of [`shell`].
+    /// Result of [`shell`].
     Felt(shell::Felt),
-    /// Of [`quantisation`].
+    /// Result of [`quantisation`].
     Rest(quantisation::Rest),
-    /// Of [`jam`].
+    /// Result of [`jam`].
     Push(jam::Push),
-    /// Of [`lapses`].
+    /// Result of [`lapses`].
     Held(lapses::Held),
 }
 
@@ -58,23 +58,23 @@ impl std::fmt::Display for Trial {
     }
 }
 
-/// A map that was made.
+/// A finished map.
 pub struct Map {
     /// Name of its files.
     pub name: &'static str,
     /// Its trials.
     pub trials: Vec<Trial>,
-    /// Its charts, above one another.
+    /// Its charts, stacked.
     pub charts: Vec<Chart>,
 }
 
-/// What each experiment goes to as it is made.
+/// Receives each experiment when it is finished.
 type Out<'a> = &'a mut dyn FnMut(&Trial);
 
-/// How a map is made: the shorter form or the whole.
+/// Makes a map; true for the shorter form.
 type Make = Box<dyn Fn(bool, Out<'_>) -> Result<Map, LabError>>;
 
-/// A map's name and how it is made: by a sweep, whose trials are of a kind and are drawn.
+/// A map's name and its recipe: a sweep, the kind of its trials, and their charts.
 fn recipe<T: Clone + 'static>(
     name: &'static str,
     sweep: impl Fn(bool, &mut dyn FnMut(&T)) -> Result<Vec<T>, LabError> + 'static,
@@ -92,7 +92,7 @@ fn recipe<T: Clone + 'static>(
     (name, Box::new(make))
 }
 
-/// Every map there is.
+/// Recipes of all maps.
 fn recipes() -> Vec<(&'static str, Make)> {
     let mut all: Vec<_> = (limits::all().into_iter().map(Rc::new))
         .map(|map| {
@@ -120,15 +120,15 @@ fn recipes() -> Vec<(&'static str, Make)> {
     all
 }
 
-/// Names of the maps.
+/// Names of all maps.
 pub fn names() -> Vec<&'static str> {
     recipes().into_iter().map(|(name, _)| name).collect()
 }
 
-/// Makes every map, or the one of that name; each experiment goes to `out`.
+/// Makes every map, or the one named `only`; passes each experiment to `out`.
 ///
 /// # Errors
-/// `NoSuchFigures`; anything that keeps a scene from being baked.
+/// `NoSuchFigures`; anything that prevents a scene from being baked.
 pub fn maps(quick: bool, only: Option<&str>, out: &mut dyn FnMut(&Trial)) -> Result<Vec<Map>, LabError> {
     if let Some(name) = only.filter(|only| !names().contains(only)) {
         return Err(LabError::NoSuchFigures {

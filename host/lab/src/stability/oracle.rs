@@ -1,16 +1,16 @@
-//! What theory says of a sampled wall: spectral radius of the closed loop, and the closed forms of Colgate and Schenkel.
+//! Theory of a sampled wall: spectral radius of the closed loop, and the closed forms of Colgate and Schenkel.
 //!
-//! Plant m·ẍ + b·ẋ + k·x = u (k and part of b are the hand's), u held from tick to tick and given out d ticks late; wall u = −K·x − B·v̂ with v̂ the
+//! Plant m·ẍ + b·ẋ + k·x = u (k and part of b are the hand's), u held from tick to tick and applied d ticks late; wall u = −K·x − B·v̂ with v̂ the
 //! difference quotient of the samples, through a first-order low-pass of time constant τ where that is not 0. The loop is linear, so it is stable
-//! exactly if no eigenvalue of its step is larger than 1: that is the truth the closed forms bound. Sources: J. E. Colgate and G. G. Schenkel,
-//! *Passivity of a class of sampled-data systems*, J. Robotic Systems 14(1), 1997; J. J. Gil et al., *Stability boundary for haptic rendering*, IEEE
-//! T-RO 25(6), 2009.
+//! exactly if no eigenvalue of its step has a magnitude above 1: the reference that the closed forms bound. Sources: J. E. Colgate and G. G.
+//! Schenkel, *Passivity of a class of sampled-data systems*, J. Robotic Systems 14(1), 1997; J. J. Gil et al., *Stability boundary for haptic
+//! rendering*, IEEE T-RO 25(6), 2009.
 
 /// Largest delay, ticks.
 pub const MAX_DELAY: usize = 4;
-/// x, v, last sample, filtered speed, forces under way.
+/// State of the loop: x, v, last sample, filtered speed, delayed forces.
 const STATES: usize = 4 + MAX_DELAY;
-/// The step is squared so often: what is left of the norm's factor in the root is one part in 10⁸.
+/// Number of squarings of the step matrix: the norm's remaining factor in the root is one part in 10⁸.
 const SQUARINGS: u32 = 32;
 
 /// A handle and the hand on it, along one axis.
@@ -39,17 +39,17 @@ pub struct Wall {
     pub delay_ticks: usize,
 }
 
-/// How damping goes with stiffness.
+/// Relation of damping to stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// The textbook's wall: K·x + B·v̂.
     Wall,
-    /// The product's coupling, which looks a period ahead: K·x + (b_T + T·K)·v̂, with B in place of b_T.
+    /// The product's coupling, which predicts one period ahead: K·x + (b_T + T·K)·v̂, with B in place of b_T.
     Coupling,
 }
 
 impl Law {
-    /// `wall` as this law renders it at another stiffness; its own damping is the law's B or b_T.
+    /// `wall` rendered by this law at another stiffness; its damping is the law's B or b_T.
     pub fn at(self, wall: &Wall, stiffness: f64) -> Wall {
         let ahead = match self {
             Self::Wall => 0.0,
@@ -91,24 +91,24 @@ pub fn spectral_radius(plant: &Plant, wall: &Wall) -> f64 {
     ((logarithm + norm.ln()) / f64::from(2.0f32.powi(SQUARINGS as i32))).exp()
 }
 
-/// Largest stable K below `most`, N/m, for a wall that is otherwise `wall`; 0 when none is.
+/// Largest stable K below `most`, N/m, for a wall that is otherwise `wall`; 0 if there is none.
 pub fn stiffness_limit(plant: &Plant, law: Law, wall: &Wall, most: f64) -> f64 {
-    // Below a good many stiffnesses the first unstable one is looked for, since a wall that is damped too much is unstable when soft as well.
+    // Searches many stiffnesses for the first unstable one, because a wall with too much damping is also unstable when soft.
     limit(1e-3 * most, most, FINE, |stiffness| {
         spectral_radius(plant, &law.at(wall, stiffness)) < 1.0
     })
 }
 
-/// How closely a limit is looked for: steps of a constant ratio before bisection, and the ratio at which that ends.
+/// Resolution of a search: steps of a constant ratio before bisection, and the ratio at which bisection ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
-    /// Steps.
+    /// Number of steps.
     pub steps: i32,
-    /// Above 1.
+    /// Final ratio, above 1.
     pub ratio: f64,
 }
 
-/// For oracles, and where experiment is held against them.
+/// For references, and for experiments compared with them.
 pub const FINE: Search = Search {
     steps: 40,
     ratio: 1.0 + 1e-4,
@@ -120,7 +120,7 @@ pub const COARSE: Search = Search {
     ratio: 1.01,
 };
 
-/// The largest value up to which `stable` is true, between `least` and `most`. 0 when not even `least` is.
+/// The largest value between `least` and `most` up to which `stable` is true; 0 if it is false at `least`.
 pub fn limit(least: f64, most: f64, search: Search, mut stable: impl FnMut(f64) -> bool) -> f64 {
     let at = |i: i32| least * (most / least).powf(f64::from(i) / f64::from(search.steps));
     let Some(first) = (0..=search.steps).find(|&i| !stable(at(i))) else {
@@ -141,15 +141,15 @@ pub fn limit(least: f64, most: f64, search: Search, mut stable: impl FnMut(f64) 
     (low * high).sqrt()
 }
 
-/// Colgate and Schenkel: K below which the wall is passive to any hand, b > K·(T/2 + d·T) + |B| (with delay for B = 0 only), N/m.
+/// Colgate and Schenkel: K below which the wall is passive with any hand, b > K·(T/2 + d·T) + |B| (with delay for B = 0 only), N/m.
 pub fn passive_stiffness(damping: f64, wall: &Wall) -> f64 {
     let late = (0.5 + wall.delay_ticks as f64) * wall.period_s;
     ((damping - wall.damping.abs()) / late).max(0.0)
 }
 
-/// Position and speed a period later, of position, speed and held force.
+/// Position and speed after one period, as functions of position, speed and held force.
 fn zero_order_hold(plant: &Plant, period_s: f64) -> [[f64; 3]; 2] {
-    // exp of the step's matrix over a 2⁻¹⁶th of the period by its series to third order, then squared.
+    // Matrix exponential of the step over a 2⁻¹⁶th of the period, by its series to third order, then squared.
     const HALVINGS: u32 = 16;
     let h = period_s / f64::from(1u32 << HALVINGS);
     let a = [
@@ -186,7 +186,7 @@ fn step(state: [f64; STATES], held: &[[f64; 3]; 2], wall: &Wall) -> [f64; STATES
     let filtered = filtered + gain * ((x - before) / wall.period_s - filtered);
     let force = -wall.stiffness * x - wall.damping * filtered;
     let mut next = state;
-    // Forces under way move up; the first is given out.
+    // Delayed forces move up; the first is applied.
     next.copy_within(5.., 4);
     next[STATES - 1] = 0.0;
     let given = if wall.delay_ticks == 0 {
@@ -227,7 +227,7 @@ mod tests {
         }
     }
 
-    /// Figures found by eigenvalues in another program.
+    /// Values computed from eigenvalues in another program.
     #[test]
     fn limits_are_those_of_an_eigenvalue_solver() {
         for (damping, delay, expected) in [
@@ -244,7 +244,7 @@ mod tests {
         }
     }
 
-    /// With no damping in the wall the boundary of stability is, for a light damper, that of passivity.
+    /// Without damping in the wall, and with light damping of the plant, the stability boundary is that of passivity.
     #[test]
     fn without_damping_the_closed_form_is_near() {
         for delay in 0..3 {

@@ -1,4 +1,4 @@
-//! Many points pressed at once: how still the handle is, and how deep they are, implicit and explicit step side by side.
+//! Many points pressed at once: vibration of the handle and depth of the points, implicit and explicit step side by side.
 
 use mortise_bake::PointshellKind;
 use mortise_haptics::{Integrator, Pose, Settings, Vec3};
@@ -11,12 +11,12 @@ use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::variant::Variant;
 
-/// Pressed with this force, N.
+/// Press force, N.
 pub const PUSH_N: f64 = 10.0;
-/// Time of the press, growing in its first half, s, and what of it is looked at, s.
+/// Duration of the press, s, whose force grows in its first half, and the part of it that is evaluated, s.
 const PRESS_S: f64 = 2.0;
 const LOOK_S: f64 = 0.5;
-/// Points this much above the lowest ones touch with them, m: less than what the press makes of depth.
+/// Height above the lowest points up to which points touch with them, m: less than the depth of the press.
 const LEVEL_M: f32 = 5e-6;
 /// Edges of the shells' voxels, mm.
 const VOXELS_MM: [f64; 7] = [20.0, 8.0, 4.0, 2.0, 1.0, 0.6, 0.4];
@@ -24,19 +24,19 @@ const VOXELS_MM: [f64; 7] = [20.0, 8.0, 4.0, 2.0, 1.0, 0.6, 0.4];
 /// One press.
 #[derive(Clone, Debug, Serialize)]
 pub struct Press {
-    /// How the object is moved.
+    /// Integrator of the object.
     pub method: &'static str,
-    /// Points of the face that is pressed.
+    /// Number of points on the pressed face.
     pub points: usize,
-    /// Largest less smallest force on the handle at the end, N.
+    /// Largest minus smallest force on the handle at the end, N.
     pub unrest_n: f64,
     /// Deepest point at the end, µm.
     pub penetration_um: f64,
     /// Force on the handle at the end, mean, N.
     pub force_n: f64,
-    /// Most work of contacts on the object over any interval, mJ: made of nothing, or held by their springs.
+    /// Largest work of contacts on the object over any interval, mJ: generated, or stored in their springs.
     pub contact_made_mj: f64,
-    /// Most work of the device on the handle over any interval beyond what was stored, mJ.
+    /// Largest work of the device on the handle over any interval beyond what was stored at its start, mJ.
     pub handle_made_mj: f64,
 }
 
@@ -50,10 +50,10 @@ impl std::fmt::Display for Press {
     }
 }
 
-/// The slab under a peg whose flat end is so finely sampled: centres of voxels, not moved inward, so that all of them lie in one plane.
+/// The slab under a peg whose flat end is sampled at `voxel_mm`: centres of voxels, not moved inward, so that all of them lie in one plane.
 ///
 /// # Errors
-/// Anything that keeps it from being baked.
+/// Anything that prevents it from being baked.
 pub fn slab(voxel_mm: f64) -> Result<Slab, LabError> {
     let variant = Variant {
         shell: PointshellKind::Classic {
@@ -66,7 +66,7 @@ pub fn slab(voxel_mm: f64) -> Result<Slab, LabError> {
     Slab::bake(&variant, 10.0, 0.5 * voxel_mm + 0.05)
 }
 
-/// Points that lie on the peg's lower end.
+/// Number of points on the peg's lower end.
 pub fn touching(scene: &SceneImage<'_>, part: u16) -> usize {
     let record = &scene.parts()[usize::from(part)];
     let pose = Pose::from_arrays(record.position, record.orientation);
@@ -78,7 +78,7 @@ pub fn touching(scene: &SceneImage<'_>, part: u16) -> usize {
     heights.iter().filter(|&&z| z < lowest + LEVEL_M).count()
 }
 
-/// Settings of a press that looks at every point and does not slip at [`PUSH_N`].
+/// Settings of a press that queries every point and does not slip at [`PUSH_N`].
 pub fn settings(integrator: Integrator, in_all_n_per_m: f32) -> Settings {
     let mut settings = Settings {
         integrator,
@@ -93,7 +93,7 @@ pub fn settings(integrator: Integrator, in_all_n_per_m: f32) -> Settings {
 /// Presses part `part`.
 pub fn press(scene: &SceneImage<'_>, part: u16, settings: &Settings) -> Press {
     let mut rig = Rig::held();
-    // The hand pushes and damps; it does not hold on to a place.
+    // The hand pushes and damps, without a position spring.
     rig.plant.stiffness = 0.0;
     let mut bench = Bench::new(scene, part, *settings, rig);
     let ticks = (PRESS_S / f64::from(settings.period_s)) as u32;
@@ -146,9 +146,9 @@ pub fn sweep(quick: bool, out: &mut dyn FnMut(&Press)) -> Result<Vec<Press>, Lab
     Ok(presses)
 }
 
-/// Unrest over points.
+/// Variation of the force over the number of points.
 pub fn chart(presses: &[Press]) -> Chart {
-    // Stiller than what a logarithmic axis can show is drawn at its foot.
+    // Variations below the range of the logarithmic axis are drawn at its lower end.
     const LEAST_N: f64 = 1e-5;
     let of = |method: &str| -> Vec<Point> {
         (presses.iter().filter(|press| press.method == method))

@@ -1,14 +1,14 @@
-//! Encoder steps against dry friction: up to which stiffness a pressed wall lets the handle rest.
+//! Encoder resolution against dry friction: the largest stiffness at which a pressed wall lets the handle rest.
 //!
-//! An encoder of step Δ makes of a wall K a stair: its force jumps by K·Δ. Pressed with a force half-way between two stairs the handle has no place
-//! to rest unless dry friction f_c holds the half step that is left, K·Δ/2. With viscous friction b against the sampled wall the whole condition is
+//! An encoder of step Δ turns a wall K into a staircase whose force jumps by K·Δ. Pressed with a force half-way between two stairs, the handle has no
+//! equilibrium unless dry friction f_c holds the remaining half step, K·Δ/2. With viscous friction b against the sampled wall the whole condition is
 //!
 //! K ≤ min(2·b/T, 2·f_c/Δ)
 //!
 //! (J. J. Abbott and A. M. Okamura, *Effects of position quantization and sampling rate on virtual-wall passivity*, IEEE T-RO 21(5), 2005; N.
 //! Diolaiti, G. Niemeyer, F. Barbagli and J. K. Salisbury, *Stability of haptic rendering: discretization, quantization, time delay, and Coulomb
-//! effects*, IEEE T-RO 22(2), 2006). The second bound is sharp, which is what the experiment shows; beyond the first one dry friction still bears
-//! small motions, so that the marks may lie above it.
+//! effects*, IEEE T-RO 22(2), 2006). The second bound is sharp, as the experiment shows; beyond the first one dry friction still damps small motions,
+//! so that the marks may lie above it.
 
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;
@@ -21,7 +21,7 @@ use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::variant::Variant;
 
-/// Handle, kg and N s/m; period, s.
+/// Mass of the handle, kg, its damping, N s/m, and the period, s.
 const MASS_KG: f64 = 0.15;
 const VISCOUS: f64 = 1.0;
 const PERIOD_S: f64 = 1e-3;
@@ -31,18 +31,19 @@ const COULOMB_N: [f64; 3] = [0.01, 0.03, 0.1];
 const FINEST_M: f64 = 2e-6;
 const COARSEST_M: f64 = 200e-6;
 const STEPS: u32 = 8;
-/// About so much presses, N: to the fraction of a stair that is tried.
+/// Approximate press force, N, adjusted to the fraction of a stair under test.
 const PRESS_N: f64 = 5.0;
-/// Between two stairs; the half is the worst.
+/// Fractions of a stair; a half is the worst case.
 const FRACTIONS: [f64; 3] = [0.0, 0.25, 0.5];
-/// The flick after it lies still, m/s.
+/// Speed of the flick after the handle lies still, m/s.
 const FLICK_M_PER_S: f64 = 0.05;
-/// Then so long is waited, s, and in the last part of it nothing may move.
+/// Duration of the observation, s, in the last part of which nothing may move.
 const WATCH_S: f64 = 4.0;
 const STILL_S: f64 = 0.5;
-/// Of the closed form, where the search begins. No odd fraction: there f_c is a whole number of half stairs, and the handle creeps for ever.
+/// Start of the search as a fraction of the closed form. Not 1/n with odd n: there f_c is a whole number of half stairs, and the handle creeps
+/// for ever.
 const LEAST: f64 = 0.37;
-/// Stiffer walls are not looked for, N/m.
+/// Upper limit of the search, N/m.
 const MOST_N_PER_M: f64 = 8e3;
 
 /// One boundary.
@@ -68,12 +69,12 @@ impl std::fmt::Display for Rest {
     }
 }
 
-/// min(2·b/T, 2·f_c/Δ), N/m; the second is infinite for an exact encoder.
+/// min(2·b/T, 2·f_c/Δ), N/m; the second bound is infinite for an exact encoder.
 pub fn restful_stiffness(viscous: f64, period_s: f64, coulomb_n: f64, resolution_m: f64) -> f64 {
     (2.0 * viscous / period_s).min(2.0 * coulomb_n / resolution_m)
 }
 
-/// Whether the handle, pressed on what part `part` stands on, comes to rest on a wall of `stiffness` N/m, wherever between two stairs the press ends.
+/// True if the handle, pressed on the support of part `part`, comes to rest on a wall of `stiffness` N/m at every tested fraction of a stair.
 pub fn rests(scene: &SceneImage<'_>, part: u16, stiffness: f64, coulomb_n: f64, resolution_m: f64) -> bool {
     let wall = Wall {
         stiffness,
@@ -114,7 +115,7 @@ pub fn rests(scene: &SceneImage<'_>, part: u16, stiffness: f64, coulomb_n: f64, 
             bench.step(&wish);
         }
         let at = bench.position;
-        // Dry friction that holds, holds exactly.
+        // A handle held by dry friction does not move at all.
         (0..still).all(|_| {
             bench.step(&wish);
             bench.position == at
@@ -122,10 +123,10 @@ pub fn rests(scene: &SceneImage<'_>, part: u16, stiffness: f64, coulomb_n: f64, 
     })
 }
 
-/// The boundary for each friction and encoder; each goes to `out`.
+/// The boundary for each friction and encoder; passes each to `out`.
 ///
 /// # Errors
-/// Anything that keeps the scene from being baked.
+/// Anything that prevents the scene from being baked.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Rest)) -> Result<Vec<Rest>, LabError> {
     let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0)?;
     let scene = slab.scene()?;
@@ -203,7 +204,7 @@ pub fn chart(found: &[Rest]) -> Chart {
 mod tests {
     use super::*;
 
-    /// Half-way between two stairs only dry friction holds: the closed form is where that ends, from either side.
+    /// Half-way between two stairs only dry friction holds: the closed form is the limit of that, approached from either side.
     #[test]
     fn dry_friction_holds_half_a_stair_and_no_more() {
         let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0).expect("baked");

@@ -1,7 +1,7 @@
-//! Where a surface is felt: the textbook's pointshell shrunk by part of a voxel, voxel by voxel, against the exact surface.
+//! Where a surface is felt: the textbook's pointshell shrunk by a share of a voxel, for several voxels, against the exact surface.
 //!
-//! A voxel's centre lies up to half a voxel inside the surface, so a shell of them feels a wall before it is there (phantom force); shrunk by more
-//! than half a voxel it passes through what it should touch.
+//! A voxel's centre lies up to half a voxel inside the surface, so a shell of them touches a wall too early (phantom force); shrunk by more than half
+//! a voxel it penetrates before it touches.
 
 use mortise_bake::{Method, PointshellKind};
 use mortise_haptics::{Settings, Vec3};
@@ -13,13 +13,13 @@ use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
 use crate::variant::Variant;
 
-/// The part starts so far above the slab, mm, and is lowered at this speed, mm/s, to so far below where it touches.
+/// Height of the part's start above the slab, mm, speed at which it is lowered, mm/s, and depth below first contact at the end, mm.
 const GAP_MM: f64 = 3.0;
 const LOWER_MM_PER_S: f64 = 10.0;
 const BELOW_MM: f64 = 3.0;
-/// Felt from this force on, N.
+/// Smallest force that counts as felt, N.
 const FELT_N: f32 = 0.05;
-/// Shares of a voxel, percent, and voxels, mm.
+/// Shrink distances, percent of a voxel, and voxels, mm.
 const SHRINKS: [f64; 6] = [0.0, 25.0, 50.0, 75.0, 90.0, 100.0];
 const CELLS_MM: [f64; 3] = [0.5, 1.0, 2.0];
 
@@ -28,11 +28,11 @@ const CELLS_MM: [f64; 3] = [0.5, 1.0, 2.0];
 pub struct Felt {
     /// Model of the scene.
     pub method: &'static str,
-    /// Voxel or cell, mm.
+    /// Edge of a voxel or cell, mm.
     pub cell_mm: f64,
-    /// Share of a voxel the shell is shrunk by, percent; none for our own shell.
+    /// Shrink distance, percent of a voxel; absent for Mortise's own shell.
     pub shrink_percent: f64,
-    /// Gap at which the wall is first felt, mm: positive is phantom, negative is inside; absent when never felt.
+    /// Gap at which the wall is first felt, mm: positive is phantom contact, negative penetration; absent when never felt.
     pub gap_mm: Option<f64>,
 }
 
@@ -57,7 +57,7 @@ fn lower(variant: &Variant, method: &'static str, shrink_percent: f64) -> Result
     let slab = Slab::bake(variant, 10.0, GAP_MM)?;
     let scene = slab.scene()?;
     let mut rig = Rig::held();
-    // A hand that nothing holds up, so that the way is known.
+    // A stiff hand that contact cannot hold up, so that the path is known.
     rig.plant.stiffness = 20e3;
     rig.plant.damping = 100.0;
     rig.hand_damping = 99.0;
@@ -89,10 +89,10 @@ fn lower(variant: &Variant, method: &'static str, shrink_percent: f64) -> Result
     })
 }
 
-/// Every shell on every voxel, and ours.
+/// Every textbook shell on every voxel, and Mortise's own.
 ///
 /// # Errors
-/// Anything that keeps a scene from being baked.
+/// Anything that prevents a scene from being baked.
 pub fn sweep(quick: bool, out: &mut dyn FnMut(&Felt)) -> Result<Vec<Felt>, LabError> {
     let mut all = Vec::new();
     let cells = if quick { &CELLS_MM[1..2] } else { &CELLS_MM[..] };
@@ -117,7 +117,7 @@ pub fn sweep(quick: bool, out: &mut dyn FnMut(&Felt)) -> Result<Vec<Felt>, LabEr
     Ok(all)
 }
 
-/// Gap over shrinking.
+/// Gap over shrink distance.
 pub fn chart(all: &[Felt]) -> Chart {
     let mut series: Vec<Series> = (CELLS_MM.iter().enumerate())
         .map(|(index, &cell)| Series {

@@ -19,10 +19,10 @@ pub struct Slab {
 }
 
 impl Slab {
-    /// The peg, 20 mm across and long, stands `gap_mm` above a slab so thick. The slab has a pinhole of 1 mm below the peg's middle.
+    /// The peg, 20 mm across and long, stands `gap_mm` above a slab `thick_mm` thick. The slab has a pinhole of 1 mm below the peg's middle.
     ///
     /// # Errors
-    /// Anything that keeps it from being baked.
+    /// Anything that prevents it from being baked.
     pub fn bake(variant: &Variant, thick_mm: f64, gap_mm: f64) -> Result<Self, LabError> {
         let fit = Fit {
             width_mm: 50.0,
@@ -48,7 +48,7 @@ impl Slab {
     /// Its scene.
     ///
     /// # Errors
-    /// `Input`, never for what the baker wrote.
+    /// `Input`, never for images that the baker wrote.
     pub fn scene(&self) -> Result<SceneImage<'_>, LabError> {
         SceneImage::open(bytemuck::cast_slice(&self.words)).map_err(|error| LabError::Input {
             name: "slab".into(),

@@ -1,12 +1,12 @@
-//! Designs of experiments over factors with levels: which combinations are tried.
+//! Designs of experiments over factors with levels: the combinations to try.
 //!
-//! *Space-filling*: a Latin hypercube, each level of a factor as often as any other (within one), its columns exchanged until the smallest distance
-//! between two trials is large (maximin, Morris & Mitchell 1995). *D-optimal*: the determinant of XᵀX of the model with an intercept and one linear
-//! term a factor is as large as coordinate exchange makes it (Meyer & Nachtsheim 1995), the best of several starts.
+//! *Space-filling*: a Latin hypercube with each level of a factor as often as any other (within one), its columns exchanged until the smallest
+//! distance between two trials is large (maximin, Morris & Mitchell 1995). *D-optimal*: coordinate exchange maximises the determinant of XᵀX of the
+//! model with an intercept and one linear term a factor (Meyer & Nachtsheim 1995); the best of several starts.
 
 use nalgebra::DMatrix;
 
-/// How trials are chosen.
+/// Kind of design.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Design {
@@ -16,14 +16,14 @@ pub enum Design {
     DOptimal,
 }
 
-/// Exchanges tried by a space-filling design.
+/// Number of exchanges that a space-filling design tries.
 const EXCHANGES: usize = 4000;
-/// Random starts of coordinate exchange, and rounds through all coordinates at most.
+/// Number of random starts of coordinate exchange, and largest number of rounds through all coordinates.
 const STARTS: usize = 5;
 const ROUNDS: usize = 20;
 
 impl Design {
-    /// `runs` trials, each with a level (from 0) of every factor; `levels` are how many each has.
+    /// `runs` trials, each with a level (from 0) of every factor; `levels` is the number of levels of each factor.
     pub fn drawn(self, levels: &[usize], runs: usize, seed: u64) -> Vec<Vec<usize>> {
         let mut random = fastrand::Rng::with_seed(seed);
         match self {
@@ -38,7 +38,7 @@ impl Design {
     }
 }
 
-/// A level as −1 to 1.
+/// A level mapped to −1 to 1.
 fn coded(level: usize, levels: usize) -> f64 {
     2.0 * level as f64 / (levels.max(2) - 1) as f64 - 1.0
 }
@@ -52,7 +52,7 @@ fn space_filling(levels: &[usize], runs: usize, random: &mut fastrand::Rng) -> V
             .zip(column)
             .for_each(|(row, level)| row[factor] = level);
     }
-    // Nearest pairs count most: Σ d^(−2p), p = 8, which the smallest distance rules.
+    // Near pairs dominate: Σ d^(−2p), p = 8, which the smallest distance governs.
     let crowding = |rows: &[Vec<usize>], i: usize| -> f64 {
         (0..rows.len())
             .filter(|&j| j != i)
@@ -126,7 +126,7 @@ mod tests {
 
     const LEVELS: [usize; 4] = [10, 10, 3, 11];
 
-    /// Each level of a factor as often as any other, within one; the same seed draws the same.
+    /// Each level of a factor as often as any other, within one; the same seed gives the same design.
     #[test]
     fn a_space_filling_design_is_balanced() {
         for seed in 0..20 {
@@ -141,8 +141,8 @@ mod tests {
         }
     }
 
-    /// The D-optimal design of a linear model lies at the ends of all factors (Kiefer): det XᵀX is that of a regular two-level design within the
-    /// share that 27 runs, which no power of two divides, must lose.
+    /// The D-optimal design of a linear model lies at the ends of all factors (Kiefer): det XᵀX is that of a regular two-level design, except for the
+    /// loss that 27 runs, not a power of two, cannot avoid.
     #[test]
     fn a_d_optimal_design_lies_at_the_ends() {
         let rows = Design::DOptimal.drawn(&LEVELS, 27, 3);

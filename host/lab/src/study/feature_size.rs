@@ -1,9 +1,9 @@
-//! Whether a feature's size matters, and the voxel that a fit asks for: the second study of Faas 2010, chapter 7, repeated.
+//! The effect of a feature's size, and the voxel that a fit requires: the second study of Faas 2010, chapter 7, repeated.
 //!
-//! 62 trials with pegs of 15 to 95 mm, hole diameters drawn at random, points shrunk by half a voxel (table 2); voxels of 2.0 and 0.4 mm, the same for
-//! peg and hole as for her formula (section 7.3). Then, as she did, the voxel size of the trials that went is fitted by least squares with the two
-//! diameters as terms: tables 4 and 5, eq. 20. How holes were drawn is not said; ours are wider than the peg by anything up to [`WIDEST_MM`]. Peg and
-//! block are as large as their hole: the block 3 × 3 × 1.5 diameters, the peg 2 diameters long (ours).
+//! 62 trials with pegs of 15 to 95 mm, hole diameters drawn at random, points shrunk by half a voxel (table 2); voxels of 2.0 and 0.4 mm, the same
+//! for peg and hole as in the thesis' formula (section 7.3). As in the thesis, the voxel size of the successful trials is then fitted by least
+//! squares with the two diameters as terms: tables 4 and 5, eq. 20. The thesis does not state how holes were drawn; here they are wider than the peg
+//! by up to [`WIDEST_MM`]. Peg and block scale with the hole: the block 3 × 3 × 1.5 diameters, the peg 2 diameters long (own choice).
 
 use std::fmt;
 
@@ -22,14 +22,14 @@ use crate::table::rounded;
 pub const PEGS_MM: [f64; 5] = [15.0, 35.0, 55.0, 75.0, 95.0];
 /// Voxels, mm.
 pub const VOXELS_MM: [f64; 2] = [2.0, 0.4];
-/// How far points are moved inward, voxels.
+/// Distance by which points are moved inward, voxels.
 pub const SHRINKING: f64 = 0.5;
 /// Largest diametral clearance drawn, mm: two of the larger voxels.
 pub const WIDEST_MM: f64 = 4.0;
 /// Trials of a combination, and of those with the smallest peg.
 const TRIALS: usize = 6;
 const TRIALS_SMALLEST: usize = 7;
-/// The shorter form leaves out pegs beyond this, mm.
+/// Largest peg of the shorter form, mm.
 const QUICK_MM: f64 = 35.0;
 
 /// One insertion.
@@ -41,41 +41,41 @@ pub struct Trial {
     pub hole_mm: f64,
     /// Edge of a voxel, mm.
     pub voxel_mm: f64,
-    /// Whether the peg came through.
+    /// True if the peg came through.
     pub through: bool,
-    /// How far it came, as a share of the hole's depth.
+    /// Depth that it reached, as a share of the hole's depth.
     pub share_inserted: Option<f64>,
     /// Largest force on the handle, N.
     pub peak_n: Option<f64>,
-    /// Share of ticks that left out points, %.
+    /// Share of ticks with decimated points, %.
     pub degraded_percent: Option<f64>,
 }
 
-/// A number of tables 4 and 5 or eq. 20, hers and ours.
+/// A number of tables 4 and 5 or eq. 20, in the thesis and here.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Compared {
     /// Table or equation.
     pub of: &'static str,
-    /// What it is.
+    /// Quantity.
     pub what: String,
     /// As printed.
     pub faas: f64,
-    /// Ours; absent where it cannot be computed.
+    /// Own value; absent where it cannot be computed.
     pub ours: Option<f64>,
 }
 
-/// What the study found.
+/// Results of the study.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Study {
-    /// 62 unless quick.
+    /// 62 trials, fewer in the quick form.
     pub trials: Vec<Trial>,
     /// Tables 4 and 5, eq. 20.
     pub table: Vec<Compared>,
-    /// What peg, clearance and voxel explain of whether a trial goes: the logistic model of the first study.
+    /// Effect of peg, clearance and voxel on success: the logistic model of the first study.
     pub terms: Vec<Term>,
 }
 
-/// Something the study found.
+/// A result of the study.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Found<'s> {
@@ -83,11 +83,11 @@ pub enum Found<'s> {
     Trial(&'s Trial),
     /// A number of a table.
     Compared(&'s Compared),
-    /// What a term explains.
+    /// The effect of a term.
     Term(&'s Term),
 }
 
-/// A peg of the family in its hole.
+/// The peg of this diameter in its hole.
 fn fit(peg_mm: f64, clearance_mm: f64) -> Fit {
     Fit {
         width_mm: 3.0 * peg_mm,
@@ -99,10 +99,10 @@ fn fit(peg_mm: f64, clearance_mm: f64) -> Fit {
     }
 }
 
-/// Makes the study; `quick` has the two smallest pegs only. What is found goes to `out`.
+/// Runs the study; `quick` uses the two smallest pegs only. Passes each result to `out`.
 ///
 /// # Errors
-/// Anything that keeps a trial from being played.
+/// Anything that prevents a trial from being played.
 pub fn study(quick: bool, out: &mut dyn FnMut(Found<'_>)) -> Result<Study, LabError> {
     let mut study = Study::default();
     let mut random = fastrand::Rng::with_seed(2010);
@@ -142,7 +142,7 @@ pub fn study(quick: bool, out: &mut dyn FnMut(Found<'_>)) -> Result<Study, LabEr
     Ok(study)
 }
 
-/// Tables 4 and 5 and eq. 20 of the trials that went, voxel sizes in mm.
+/// Tables 4 and 5 and eq. 20 from the successful trials, voxel sizes in mm.
 fn compared(trials: &[Trial]) -> Vec<Compared> {
     let (x, y): (Vec<Vec<f64>>, Vec<f64>) = (trials.iter().filter(|trial| trial.through))
         .map(|t| (vec![t.peg_mm, t.hole_mm], t.voxel_mm))
@@ -208,7 +208,7 @@ fn compared(trials: &[Trial]) -> Vec<Compared> {
     ]
 }
 
-/// Which trials went, by diameter of the peg and clearance.
+/// Success of trials over diameter of the peg and clearance.
 pub fn chart(study: &Study) -> Chart {
     let kinds = [(2.0, true), (2.0, false), (0.4, true), (0.4, false)];
     let looks = [

@@ -1,4 +1,4 @@
-//! Chapter 7 of the thesis (Faas 2010) again, with a simulated operator: which voxels let a peg into its hole.
+//! Chapter 7 of the thesis (Faas 2010) repeated with a simulated operator: which voxels let a peg into its hole.
 
 pub mod design;
 pub mod faas;

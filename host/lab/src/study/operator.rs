@@ -1,6 +1,7 @@
-//! A simulated operator: takes a peg from just above its hole and pushes it through, with a hand that is a little off and trembles.
+//! A simulated operator, who moves a peg from just above its hole and pushes it through, with a hand that is slightly off and trembles.
 //!
-//! Every trial has a hand of its own, drawn from a seed: off the axis by up to half of the play, up to half a degree tilted, both any way round.
+//! Every trial draws a hand of its own from a seed: off the axis by up to half of the clearance, tilted by up to half a degree, both in any
+//! direction.
 
 use std::f64::consts::TAU;
 
@@ -17,37 +18,37 @@ use crate::variant::Variant;
 
 const SCENARIO: &str = include_str!("../../data/tight_insertion.toml");
 
-/// The peg starts so far above its hole, and ends so far beyond, mm.
+/// Height of the peg's start above its hole, and distance of its end beyond, mm.
 const ABOVE_MM: f64 = 5.0;
 const BEYOND_MM: f64 = 2.0;
-/// Time to come to the hole's axis, at least to push through, and at the end, s; and the pushing's speed, mm/s.
+/// Time to reach the hole's axis, shortest time of the push, and time at the end, s; and speed of the push, mm/s.
 const COMES_S: f64 = 0.3;
 const PUSHES_S: f64 = 1.5;
 const ENDS_S: f64 = 0.3;
 const MM_PER_S: f64 = 50.0;
-/// Largest tilt, degrees, and largest offset as a share of the radial play.
+/// Largest tilt, degrees, and largest offset as a share of the radial clearance.
 const TILT_DEG: f64 = 0.5;
 const OFF: f64 = 0.5;
 
-/// Where a hand goes wrong.
+/// Errors of a hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hand {
-    /// Off the axis, as a share of the radial play.
+    /// Offset from the axis, as a share of the radial clearance.
     pub off: [f64; 2],
-    /// Rotation vector across the axis, degrees.
+    /// Rotation vector perpendicular to the axis, degrees.
     pub tilt_deg: [f64; 2],
 }
 
-/// How a trial went.
+/// Result of a trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Went {
-    /// The peg came through its hole.
+    /// True if the peg came through its hole.
     pub through: bool,
-    /// How far it came, mm; absent where the board gave up.
+    /// Depth that it reached, mm; absent where the board faulted.
     pub inserted_mm: Option<f64>,
     /// Largest force on the handle, N, likewise.
     pub peak_n: Option<f64>,
-    /// Share of ticks that could not look at all points, %, likewise.
+    /// Share of ticks that could not query all points, %, likewise.
     pub degraded_percent: Option<f64>,
 }
 
@@ -60,16 +61,16 @@ pub struct Task {
 }
 
 impl Hand {
-    /// The worst that is drawn: as far off and as tilted as any, one towards the other.
+    /// The worst hand of the distribution: largest offset and largest tilt, both in one plane.
     pub const WORST: Self = Self {
         off: [OFF, 0.0],
         tilt_deg: [0.0, TILT_DEG],
     };
 
-    /// The hand of this seed.
+    /// The hand drawn from this seed.
     pub fn of(seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
-        // Areas, not radii, are evenly hit.
+        // Uniform over the area, not over the radius.
         let mut any = |most: f64| {
             let (radius, angle) = (most * random.f64().sqrt(), TAU * random.f64());
             [radius * angle.cos(), radius * angle.sin()]
@@ -82,7 +83,7 @@ impl Hand {
 }
 
 impl Task {
-    /// Bakes the fit as `variant` says. The whole budget of points is the tick's: the textbook's shells have many.
+    /// Bakes the fit as `variant` specifies. The tick gets the whole budget of points: the textbook's shells have many.
     ///
     /// # Errors
     /// As [`PreparedScene::with`].
@@ -90,7 +91,7 @@ impl Task {
         Self::with(fit, variant, None)
     }
 
-    /// Bakes the fit for the textbook's method, peg and hole with voxels of their own, mm.
+    /// Bakes the fit for the textbook's method, with separate voxel sizes for peg and hole, mm.
     ///
     /// # Errors
     /// As [`PreparedScene::with`].
@@ -122,10 +123,10 @@ impl Task {
         self.scene.image.len()
     }
 
-    /// One trial, in-process, with points moved inward by this share of the peg's voxel.
+    /// Plays one trial in-process, with points moved inward by this share of the peg's voxel.
     ///
     /// # Errors
-    /// Anything that keeps it from being played but a fault of the board: the operator pushed until it gave up.
+    /// Anything that prevents playing it, except a fault of the board, which means that the operator pushed until it gave up.
     pub fn tried(&self, hand: &Hand, shrinking: f64) -> Result<Went, LabError> {
         let mut scenario = self.scenario.clone();
         let name = ParameterId::Shrinking.row().name.to_owned();
@@ -162,7 +163,7 @@ impl Task {
 mod tests {
     use super::*;
 
-    /// Hands differ, stay within bounds, and are the same again.
+    /// Hands differ, stay within bounds, and are reproducible.
     #[test]
     fn hands_are_drawn() {
         for seed in 0..200 {
@@ -174,7 +175,7 @@ mod tests {
         }
     }
 
-    /// Voxels as wide as the play stick; a field on cells as wide goes in.
+    /// Voxels as wide as the clearance stick; a field on cells as wide goes in.
     #[test]
     fn an_operator_gets_in_where_there_is_room() {
         let fit = Fit::thesis(1.0);

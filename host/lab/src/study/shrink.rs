@@ -1,11 +1,11 @@
-//! Which voxels let a peg into its hole, and what shrinking the pointshell does: the first study of Faas 2010, chapter 7, repeated.
+//! Which voxels let a peg into its hole, and the effect of shrinking the pointshell: the first study of Faas 2010, chapter 7, repeated.
 //!
-//! Her factors and levels (table 1), 27 trials a design, her model (logistic, one linear term a factor) and her test (χ² of each term's likelihood
-//! ratio). Which design her software drew is not said; we draw space-filling ones, which use all of the levels she names, and D-optimal ones, and
-//! each anew from several seeds, so that the χ² of one design of 27 has a spread to be compared with. The peg and the hole have voxels of their own;
-//! shrinking is a parameter of the running board. Each trial has a hand of its own, drawn ([`super::operator`]).
+//! The thesis' factors and levels (table 1), 27 trials a design, its model (logistic, one linear term a factor) and its test (χ² of each term's
+//! likelihood ratio). The thesis does not state which design its software drew. Here designs are space-filling, which use all of the named levels,
+//! and D-optimal, each drawn from several seeds, so that the χ² of one design of 27 can be compared with a spread. The peg and the hole have separate
+//! voxel sizes; shrinking is a parameter of the running board. Each trial draws a hand of its own ([`super::operator`]).
 //!
-//! What makes a difference is found by changing one thing at a time: [`VARIATIONS`].
+//! The causes of differences are found by changing one thing at a time: [`VARIATIONS`].
 
 use std::fmt;
 
@@ -30,27 +30,27 @@ pub const FACTORS: [&str; 4] = [
     "clearance, mm",
     "shrinking, voxels",
 ];
-/// Levels of the factors: 10 voxels from 0.25 to 2.0 mm at equal intervals, twice; the clearances; 0 to 1 by tenths.
+/// Numbers of levels of the factors: 10 voxels from 0.25 to 2.0 mm at equal intervals, twice; the clearances; 0 to 1 by tenths.
 const LEVELS: [usize; 4] = [10, 10, 3, 11];
 /// Trials of a design.
 const RUNS: usize = 27;
-/// Designs drawn of each variation.
+/// Designs drawn for each variation.
 const SEEDS: u64 = 4;
-/// Baked scenes kept: a D-optimal design comes back to the same eight.
+/// Number of baked scenes kept: a D-optimal design reuses the same eight.
 const KEPT: usize = 8;
 
-/// What is changed from the first to the others.
+/// A variation of the study; all but the first change one thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Variation {
-    /// In words.
+    /// Description.
     pub name: &'static str,
-    /// How trials are chosen.
+    /// Kind of design.
     pub design: Design,
-    /// Hands that may try before a trial counts as stuck: hers had as long as it liked.
+    /// Number of hands that try before a trial counts as stuck: the thesis' operator had unlimited time.
     pub hands: u64,
 }
 
-/// One thing changed at a time, the first one as it is.
+/// The baseline, then one change at a time.
 pub const VARIATIONS: [Variation; 3] = [
     Variation {
         name: "space-filling",
@@ -72,58 +72,58 @@ pub const VARIATIONS: [Variation; 3] = [
 /// One insertion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
-    /// Of [`VARIATIONS`].
+    /// Name in [`VARIATIONS`].
     pub variation: &'static str,
-    /// Design, by its seed.
+    /// Seed of the design.
     pub seed: u64,
     /// Edge of the peg's voxels, mm.
     pub peg_voxel_mm: f64,
     /// Edge of the hole's voxels, mm.
     pub hole_voxel_mm: f64,
-    /// Hole's diameter less the peg's, mm.
+    /// Hole's diameter minus the peg's, mm.
     pub clearance_mm: f64,
-    /// How far points were moved inward, in voxels of the peg.
+    /// Distance by which points were moved inward, in voxels of the peg.
     pub shrinking: f64,
-    /// Whether the peg came through: her “1”.
+    /// True if the peg came through: the thesis' “1”.
     pub through: bool,
-    /// Hands that tried.
+    /// Number of hands that tried.
     pub hands: u64,
-    /// How far the last came, mm; the hole is 40 mm deep.
+    /// Depth that the last one reached, mm; the hole is 40 mm deep.
     pub inserted_mm: Option<f64>,
     /// Largest force on its handle, N.
     pub peak_n: Option<f64>,
-    /// Share of ticks that left out points, %.
+    /// Share of ticks with decimated points, %.
     pub degraded_percent: Option<f64>,
 }
 
-/// A term of table 3, hers and ours.
+/// A term of table 3, in the thesis and here.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Compared {
-    /// Of [`VARIATIONS`].
+    /// Name in [`VARIATIONS`].
     pub variation: &'static str,
     /// Factor.
     pub source: &'static str,
-    /// χ² and p of table 3.
+    /// χ² of table 3.
     pub faas_chi_squared: f64,
-    /// See `faas_chi_squared`.
+    /// p of table 3.
     pub faas_p: f64,
-    /// Of our designs of 27: the median, the least and the largest χ².
+    /// Median χ² over the designs of 27.
     pub median_chi_squared: f64,
-    /// See `median_chi_squared`.
+    /// Least χ² over the designs.
     pub least_chi_squared: f64,
-    /// See `median_chi_squared`.
+    /// Largest χ² over the designs.
     pub most_chi_squared: f64,
     /// p of the median.
     pub median_p: f64,
-    /// Designs in which the term has p ≤ 0.05, of `designs`.
+    /// Number of designs in which the term has p ≤ 0.05, of `designs`.
     pub significant: usize,
-    /// Designs.
+    /// Number of designs.
     pub designs: usize,
-    /// Of them, those whose terms tell all 27 trials apart.
+    /// Number of designs whose terms separate all 27 trials.
     pub separated: usize,
     /// χ² of the trials of all designs together.
     pub pooled_chi_squared: f64,
-    /// Its p.
+    /// p of the pooled χ².
     pub pooled_p: f64,
     /// Coefficient of the pooled model, per unit of the factor; absent where there is no finite one.
     pub pooled_coefficient: Option<f64>,
@@ -133,7 +133,7 @@ pub struct Compared {
     pub share_through: f64,
 }
 
-/// What the study found.
+/// Results of the study.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Study {
     /// All trials.
@@ -142,7 +142,7 @@ pub struct Study {
     pub table: Vec<Compared>,
 }
 
-/// Something the study found.
+/// A result of the study.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Found<'s> {
@@ -152,10 +152,10 @@ pub enum Found<'s> {
     Term(&'s Compared),
 }
 
-/// Makes the study; `quick` draws one space-filling design. What is found goes to `out` as words and rows.
+/// Runs the study; `quick` draws one space-filling design. Passes each result to `out` as text and rows.
 ///
 /// # Errors
-/// Anything that keeps a trial from being played.
+/// Anything that prevents a trial from being played.
 pub fn study(quick: bool, out: &mut dyn FnMut(Found<'_>)) -> Result<Study, LabError> {
     let mut study = Study::default();
     let (variations, seeds) = if quick {
@@ -192,7 +192,7 @@ fn values(levels: &[usize]) -> [f64; 4] {
     ]
 }
 
-/// Scenes baked lately.
+/// Cache of recently baked scenes.
 #[derive(Default)]
 struct Tasks(Vec<([f64; 3], Task)>);
 
@@ -211,7 +211,7 @@ impl Tasks {
     }
 }
 
-/// One trial of these levels; hands are drawn from the seed `first` on.
+/// Plays one trial of these levels; hands are drawn from the seed `first` on.
 fn trial(
     variation: &Variation,
     seed: u64,
@@ -242,7 +242,7 @@ fn trial(
     })
 }
 
-/// What each factor explains of these trials, and whether they are told apart.
+/// Effect of each factor on these trials, and whether they are separated.
 fn terms(trials: &[&Trial]) -> Option<(Vec<Term>, bool)> {
     let (x, went): (Vec<Vec<f64>>, Vec<bool>) = (trials.iter())
         .map(|t| {
@@ -254,7 +254,7 @@ fn terms(trials: &[&Trial]) -> Option<(Vec<Term>, bool)> {
     Some((Logistic::terms(&FACTORS, &x, &went)?, separated))
 }
 
-/// Table 3 of one variation. Designs in which all trials went alike say nothing and count as χ² = 0.
+/// Table 3 of one variation. Designs whose trials all had the same result carry no information and count as χ² = 0.
 fn compared(variation: &Variation, trials: &[Trial]) -> Vec<Compared> {
     let seeds = trials.iter().map(|trial| trial.seed + 1).max().unwrap_or(0);
     let each: Vec<Option<(Vec<Term>, bool)>> = (0..seeds)
@@ -306,7 +306,7 @@ fn compared(variation: &Variation, trials: &[Trial]) -> Vec<Compared> {
         .collect()
 }
 
-/// Share of the trials of the first variation that went through over shrinking, a line for each clearance.
+/// Share of the first variation's trials that came through over shrinking, a line for each clearance.
 pub fn chart(study: &Study) -> Chart {
     const STEPS: [(f64, f64); 4] = [(0.0, 0.2), (0.3, 0.5), (0.6, 0.7), (0.8, 1.0)];
     let of: Vec<&Trial> = (study.trials.iter())

@@ -1,21 +1,21 @@
-//! The statistics of the studies: a logistic model, what each of its terms explains, and a straight line through points.
+//! Statistics of the studies: a logistic model, the effect of each of its terms, and a straight line through points.
 //!
-//! A trial goes with probability p, ln(p/(1 − p)) = β₀ + Σ βᵢ·xᵢ, fitted by maximum likelihood (Newton's method: the log likelihood is concave).
-//! A term is tested by the likelihood ratio: without it the deviance −2·ln L grows by χ², distributed with one degree of freedom where the
-//! term explains nothing (Wilks 1938). That holds also where trials are told apart entirely and coefficients grow without bound.
+//! A trial succeeds with probability p, ln(p/(1 − p)) = β₀ + Σ βᵢ·xᵢ, fitted by maximum likelihood (Newton's method: the log likelihood is concave).
+//! A term is tested by the likelihood ratio: without it the deviance −2·ln L grows by χ², distributed with one degree of freedom where the term has
+//! no effect (Wilks 1938). That also holds for completely separated trials, whose coefficients grow without bound.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
-/// Newton's steps at most: it doubles the digits with each; of trials told apart entirely the deviance falls by e with each.
+/// Largest number of Newton steps: each doubles the digits; for completely separated trials each divides the deviance by e.
 const STEPS: usize = 60;
-/// Converged: the deviance changes by less.
+/// Convergence: the deviance changes by less.
 const CONVERGED: f64 = 1e-10;
-/// As good as certain: |η| beyond this, a chance of one in a hundred million. No sample of a hundred trials shows so much; some term or sum of terms
-/// tells trials apart entirely, and coefficients grow without bound.
+/// |η| that counts as certain: beyond it the other result has a chance of one in a hundred million. A sample of a hundred trials cannot show that;
+/// some term or sum of terms separates the trials completely, and coefficients grow without bound.
 const CERTAIN: f64 = 18.4;
-/// A ridge on the information matrix, for trials told apart: far below what any coefficient is known to.
+/// Ridge on the information matrix, for separated trials: far below the uncertainty of any coefficient.
 const RIDGE: f64 = 1e-12;
 
 /// A fitted model.
@@ -27,11 +27,11 @@ pub struct Logistic {
     pub errors: Vec<f64>,
     /// −2·ln L.
     pub deviance: f64,
-    /// Terms tell trials apart entirely: coefficients have no finite best value, and those above are where it was left off.
+    /// True if terms separate the trials completely: coefficients have no finite optimum, and those above are the last iterate.
     pub separated: bool,
 }
 
-/// What a term explains.
+/// Effect of a term.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Term {
     /// Its name with its unit.
@@ -40,20 +40,20 @@ pub struct Term {
     pub coefficient: Option<f64>,
     /// The coefficient's standard error, likewise.
     pub error: Option<f64>,
-    /// Growth of the deviance without it.
+    /// Growth of the deviance without the term.
     pub chi_squared: f64,
-    /// Probability of so much by chance, one degree of freedom.
+    /// Probability of a χ² at least as large by chance, with one degree of freedom.
     pub p: f64,
 }
 
-/// Probability that χ² with so many degrees of freedom is larger; `None` for degrees that are not positive.
+/// Probability that χ² with `degrees` degrees of freedom is larger; `None` for degrees that are not positive.
 pub fn chi_squared_p(chi_squared: f64, degrees: f64) -> Option<f64> {
     Some(ChiSquared::new(degrees).ok()?.sf(chi_squared.max(0.0)))
 }
 
 impl Logistic {
-    /// Fits the model to trials: each one's values, one a term, and whether it went. `None` when there are no trials, when they have unequal numbers
-    /// of values, or when terms depend on each other.
+    /// Fits the model to trials: the values of each, one a term, and whether it succeeded. `None` when there are no trials, when they have unequal
+    /// numbers of values, or when terms are linearly dependent.
     pub fn fit(values: &[Vec<f64>], went: &[bool]) -> Option<Self> {
         let count = values.first()?.len() + 1;
         if values.len() != went.len() || values.iter().any(|of| of.len() + 1 != count) {
@@ -75,7 +75,7 @@ impl Logistic {
             information = x.transpose() * weighted;
             let ridge = RIDGE * DMatrix::from_diagonal(&(x.transpose() * &x).diagonal());
             let mut step = (&information + ridge).cholesky()?.solve(&gradient);
-            // Halved until it helps: far off, a full step may not.
+            // Halve the step until it improves the deviance: far from the optimum a full step may not.
             let (next, best) = (0..30).find_map(|_| {
                 let next = &beta + &step;
                 let reached = self::deviance(&x, &y, &next);
@@ -102,7 +102,7 @@ impl Logistic {
         })
     }
 
-    /// What each term explains: its coefficient, and χ² and p of the model without it.
+    /// Effect of each term: its coefficient, and χ² and p against the model without it.
     pub fn terms(names: &[&str], values: &[Vec<f64>], went: &[bool]) -> Option<Vec<Term>> {
         let full = Self::fit(values, went)?;
         (names.iter().enumerate())
@@ -127,7 +127,7 @@ impl Logistic {
     }
 }
 
-/// −2·ln L = 2·Σ ln(1 + e^(∓η)), which does not overflow.
+/// −2·ln L = 2·Σ ln(1 + e^(∓η)), in a form that does not overflow.
 fn deviance(x: &DMatrix<f64>, y: &DVector<f64>, beta: &DVector<f64>) -> f64 {
     let eta = x * beta;
     let lost = |(eta, y): (&f64, &f64)| {
@@ -151,23 +151,23 @@ impl std::fmt::Display for Term {
     }
 }
 
-/// Least squares with several terms and an intercept, and what each of them explains.
+/// Least squares with several terms and an intercept, and the effect of each term.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Regression {
     /// β₀, then one for each term.
     pub coefficients: Vec<f64>,
-    /// Sum of squares that the model explains.
+    /// Sum of squares explained by the model.
     pub model: f64,
-    /// Sum of squares that is left.
+    /// Residual sum of squares.
     pub error: f64,
-    /// Degrees of freedom of both.
+    /// Degrees of freedom of model and residual.
     pub freedom: [usize; 2],
-    /// For each term: the sum of squares lost without it, its F ratio and p with one degree of freedom.
+    /// For each term: the sum of squares lost without it, its F ratio and p, with one degree of freedom.
     pub effects: Vec<[f64; 3]>,
 }
 
 impl Regression {
-    /// Fits `y` by the terms of `x`, one row a trial; `None` when there are too few trials or terms depend on each other.
+    /// Fits `y` by the terms of `x`, one row a trial; `None` when there are too few trials or terms are linearly dependent.
     pub fn fit(x: &[Vec<f64>], y: &[f64]) -> Option<Self> {
         let (coefficients, error) = residual(x, y)?;
         let terms = coefficients.len() - 1;
@@ -203,13 +203,13 @@ impl Regression {
         self.model / model / (self.error / error)
     }
 
-    /// Share of the variance that it explains.
+    /// Share of the variance explained.
     pub fn r_squared(&self) -> f64 {
         self.model / (self.model + self.error)
     }
 }
 
-/// Coefficients and the sum of squares that is left.
+/// Coefficients and residual sum of squares.
 fn residual(x: &[Vec<f64>], y: &[f64]) -> Option<(Vec<f64>, f64)> {
     let count = x.first()?.len() + 1;
     let design = DMatrix::from_fn(
@@ -227,19 +227,19 @@ fn residual(x: &[Vec<f64>], y: &[f64]) -> Option<(Vec<f64>, f64)> {
     Some((beta.iter().copied().collect(), error))
 }
 
-/// The straight line with the least sum of squares through points (x, y).
+/// Least-squares line through points (x, y).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LeastSquares {
     /// Slope.
     pub slope: f64,
     /// Value at x = 0.
     pub intercept: f64,
-    /// Share of the variance it explains.
+    /// Share of the variance explained.
     pub r_squared: f64,
 }
 
 impl LeastSquares {
-    /// Through at least two points of different x; `None` otherwise.
+    /// The line through at least two points of different x; `None` otherwise.
     pub fn through(points: &[(f64, f64)]) -> Option<Self> {
         let count = points.len() as f64;
         let (x, y) = points
@@ -254,7 +254,7 @@ impl LeastSquares {
         })
     }
 
-    /// Its value at x.
+    /// The line's value at x.
     pub fn at(&self, x: f64) -> f64 {
         self.slope * x + self.intercept
     }
@@ -289,8 +289,8 @@ mod tests {
         close(term.p, 0.0006, 5e-5);
     }
 
-    /// One term that is 0 or 1 has a closed form: β₁ is the logarithm of the odds ratio, its variance 1/a + 1/b + 1/c + 1/d, and the likelihood
-    /// ratio is G = 2·Σ O·ln(O/E).
+    /// One binary term has a closed form: β₁ is the logarithm of the odds ratio, its variance 1/a + 1/b + 1/c + 1/d, and the likelihood ratio is G =
+    /// 2·Σ O·ln(O/E).
     #[test]
     fn a_table_of_four_has_its_closed_form() {
         let counts: [[f64; 2]; 2] = [[12.0, 5.0], [4.0, 19.0]];
@@ -324,7 +324,7 @@ mod tests {
         close(term.chi_squared, g.iter().sum(), 1e-8);
     }
 
-    /// Told apart entirely, a model has no deviance; the model without the term has that of a coin's share.
+    /// For completely separated trials the model's deviance is 0; the model without the term has that of a constant probability.
     #[test]
     fn what_is_told_apart_says_so_and_is_tested_still() {
         let values: Vec<Vec<f64>> = (0..10).map(|i| vec![f64::from(i)]).collect();
@@ -354,7 +354,7 @@ mod tests {
         assert_eq!(chi_squared_p(1.0, 0.0), None);
     }
 
-    /// Anscombe's first again, as a regression of one term: R² = 0.6665, F = 17.99 and p = 0.00217 with 9 degrees of freedom.
+    /// Anscombe's first data set as a regression of one term: R² = 0.6665, F = 17.99 and p = 0.00217 with 9 degrees of freedom.
     #[test]
     fn a_regression_of_one_term_is_anscombes() {
         let x = [10.0, 8.0, 13.0, 9.0, 11.0, 14.0, 6.0, 4.0, 12.0, 7.0, 5.0];
@@ -377,7 +377,7 @@ mod tests {
         close(line.slope, 0.027, 1e-12);
         close(line.intercept, -0.001, 1e-12);
         close(line.r_squared, 1.0, 1e-12);
-        // Anscombe's first: y = 3.00 + 0.500·x, R² = 0.67.
+        // Anscombe's first data set: y = 3.00 + 0.500·x, R² = 0.67.
         let x = [10.0, 8.0, 13.0, 9.0, 11.0, 14.0, 6.0, 4.0, 12.0, 7.0, 5.0];
         let y = [8.04, 6.95, 7.58, 8.81, 8.33, 9.96, 7.24, 4.26, 10.84, 4.82, 5.68];
         let anscombe: Vec<(f64, f64)> = x.into_iter().zip(y).collect();

@@ -13,7 +13,8 @@ use crate::guided::{SIM, play_to};
 use crate::motion::{Motion, script};
 use crate::variant::Variant;
 
-/// What is left out changes nothing, and closed form finds the same: a peg pressed to the wall, and one moved about at random into the block.
+/// Skipping queries that cannot find a deeper point changes nothing, and the closed form gives the same: a peg pressed to the wall, and one moved at
+/// random into the block.
 #[test]
 fn leaving_out_what_cannot_be_deeper_changes_nothing() {
     let (fit, mut scenario) = script(&Fit::thesis(0.2), Motion::Pressed { mm_per_s: 40.0 }).expect("known");
@@ -37,7 +38,7 @@ fn leaving_out_what_cannot_be_deeper_changes_nothing() {
         "{pressed} {}",
         closed(&samples)
     );
-    // Random poses: in by up to half a millimetre, tilted by up to three degrees.
+    // Random poses: up to half a millimetre deep, tilted by up to three degrees.
     let mut random = fastrand::Rng::with_seed(3);
     let mut unit = || 2.0 * random.f64() - 1.0;
     let start = samples[0].object.expect("in hand");
@@ -57,7 +58,7 @@ fn leaving_out_what_cannot_be_deeper_changes_nothing() {
             },
         ));
         let one = std::slice::from_ref(sample);
-        // Points 4 mm apart leave out what lies between; closed form leaves out nothing.
+        // Points 4 mm apart miss what lies between them; the closed form misses nothing.
         let (sampled, exact) = (penetration_by_points_mm(&scene, one), closed(one));
         assert!(
             sampled <= exact + 1e-3 && sampled >= 0.9 * exact - 5e-3,

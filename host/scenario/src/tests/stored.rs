@@ -1,4 +1,4 @@
-//! What the coupling stores, from wrenches and from poses.
+//! Energy stored in the coupling, computed from wrenches and from poses.
 
 use glam::DAffine3;
 use mortise_protocol::message::Telemetry;
@@ -9,8 +9,7 @@ use crate::run::{connect, record};
 use crate::scenario::Scenario;
 use crate::scene::PreparedScene;
 
-/// In a hand in which nothing slips the stretch is known from the poses as well, however the hand moves: from the handle's true pose and the
-/// object's at the tick's start.
+/// Without slip the stretch also follows from the poses, however the hand moves: from the handle's true pose and the object's at the tick's start.
 #[test]
 fn what_is_stored_is_what_the_poses_say_where_nothing_slips() {
     let text = include_str!("../../../../hil-tests/scenarios/press_flat_5n.toml");
@@ -31,7 +30,7 @@ fn what_is_stored_is_what_the_poses_say_where_nothing_slips() {
     let grabbed = |sample: &Telemetry| meters(&sample.object.as_ref().expect("in hand").1);
     let offset = meters(&samples[0].handle).inverse() * grabbed(&samples[0]);
     let (mut most, mut worst) = (0.0f64, 0.0f64);
-    // Behind the ramp after the grab, in which a part slips.
+    // After the ramp that follows the grab, during which a part slips.
     for (three, felt) in samples.windows(3).zip(&felt[2..]).skip(200) {
         let place = meters(&felt.handle) * offset;
         let [before, at] = [grabbed(&three[0]), grabbed(&three[1])];
@@ -46,7 +45,7 @@ fn what_is_stored_is_what_the_poses_say_where_nothing_slips() {
         worst = worst.max((found - 1e3 * exact).abs());
     }
     println!("up to {most} mJ stored, found to {worst} mJ");
-    // 5 N on 1 N/mm store 12.5 mJ. How the hand holds the part is taken from the readings of the first sample, to a count: 5 µm by 5 N.
+    // 5 N on 1 N/mm store 12.5 mJ. The part's pose in the hand comes from the readings of the first sample, to a count: 5 µm by 5 N.
     assert!(most > 12.0, "{most} mJ");
     assert!(worst < 25e-3, "{worst} mJ of {most} mJ");
 }

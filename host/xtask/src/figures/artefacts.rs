@@ -1,4 +1,4 @@
-//! What lies in `docs/figures`, how it is made, and what it depends on; `docs/figures/manifest.json` keeps what it was made from.
+//! Artefacts in `docs/figures`: how each is made and which sources it depends on; `docs/figures/manifest.json` records the sources of each.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -8,22 +8,22 @@ use tinyjson::JsonValue;
 
 use super::sources::{self, Fnv};
 
-/// Where artefacts lie, from the root.
+/// Folder of artefacts, from the root.
 pub const FOLDER: &str = "docs/figures";
-/// Where it is kept what they were made from, from the root.
+/// Manifest of the sources that artefacts were made from, from the root.
 pub const MANIFEST: &str = "docs/figures/manifest.json";
 
 /// Files that one command makes.
 pub struct Artefact {
-    /// Name: a page's is that of its table; other files are called so, or so and `-`.
+    /// Name: a page has the name of its table; other files have this name, or begin with it and `-`.
     pub name: &'static str,
-    /// How they are made.
+    /// How it is made.
     pub made: Made,
-    /// Sources, files and folders from the root.
+    /// Source files and folders, from the root.
     sources: &'static [&'static [&'static str]],
 }
 
-/// How files are made.
+/// How an artefact is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Made {
     /// A page: `cargo xtask figures NAME`.
@@ -34,14 +34,15 @@ pub enum Made {
     ByHand,
 }
 
-/// The force law, and the scenes it acts on. The board's control plane is left out where only a tick's force and cost are measured: it runs beside the tick.
+/// The force law, and the scenes on which it acts. The board's control plane is excluded where only a tick's force and cost are measured: it runs
+/// beside the tick.
 const LAW: &[&str] = &[
     "protocol/src/image",
     "firmware/haptics/src",
     "host/bake/src",
     "host/brep/src",
 ];
-/// The closed loop: control plane, rig, recognition and guidance besides.
+/// The rest of the closed loop: control plane, rig, recognition and guidance.
 const LOOP: &[&str] = &[
     "protocol/src",
     "firmware/mechanism/src",
@@ -209,7 +210,7 @@ pub const ARTEFACTS: &[Artefact] = &[
     },
 ];
 
-/// Files in `docs/figures` that people write, or that record what others are judged by.
+/// Files in `docs/figures` that people write, or that record the reference of other checks.
 const WRITTEN: &[&str] = &["sweeps.md", "claims.json", "manifest.json"];
 
 impl Artefact {
@@ -241,7 +242,7 @@ impl Artefact {
         !file.ends_with(".md") && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
     }
 
-    /// What the artefact would be recorded as now: hashes of its sources and of its files.
+    /// The artefact's current record: hashes of its sources and of its files.
     ///
     /// # Errors
     /// When a source is missing.
@@ -268,7 +269,7 @@ fn files(root: &Path) -> Result<Vec<String>> {
     Ok(found)
 }
 
-/// What an artefact was made from, and what it was when it was made.
+/// Record of an artefact: its sources and files when it was made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct State {
     /// Hash of its sources.
@@ -277,15 +278,15 @@ pub struct State {
     pub files: String,
 }
 
-/// What every artefact was made from.
+/// Records of all artefacts.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Manifest(pub BTreeMap<String, State>);
 
 impl Manifest {
-    /// Reads the manifest; nothing where there is none yet.
+    /// Reads the manifest; `None` if there is none yet.
     ///
     /// # Errors
-    /// When it is not as it is written.
+    /// When it is malformed.
     pub fn read(root: &Path) -> Result<Option<Self>> {
         let path = root.join(MANIFEST);
         if !path.is_file() {
@@ -338,7 +339,7 @@ impl Manifest {
     }
 }
 
-/// Why an artefact is not as it must be, if it is not.
+/// Why an artefact is stale; `None` when it is current.
 ///
 /// # Errors
 /// When a source is missing.
@@ -356,7 +357,7 @@ pub fn stale(root: &Path, artefact: &Artefact, manifest: &Manifest) -> Result<Op
     })
 }
 
-/// All that is wrong in `docs/figures`, each with the file it concerns. Nothing is looked at until a first manifest is there.
+/// All problems in `docs/figures`, each with the file it concerns. Nothing is checked before the first manifest exists.
 ///
 /// # Errors
 /// When a file cannot be read.

@@ -1,10 +1,10 @@
-//! `docs/figures/claims.json`: the figure that is stated for each row whose bound is not exact, by table.
+//! `docs/figures/claims.json`: the figure stated for each row whose bound is not exact, by table.
 //!
-//! The program is compiled with it and judges by it. Measuring a table adds the claims of rows that had none; `--claim` takes all of them anew.
+//! The program is compiled with this file and judges by it. Measuring a table adds the claims of rows that had none; `--claim` renews all of them.
 //!
-//! A table is measured in full or in its shorter form, and its page is made from one of the two. Claims of that form's rows stand under the table's name;
-//! those of rows that only the other form has, under the name and [`OTHER_FORM`]. What the page's form does not measure any more goes over to the
-//! other form's, and what that does not measure either is dropped.
+//! A table is measured in full or in its shorter form, and its page is made from one of the two. Claims of that form's rows are listed under the
+//! table's name; those of rows that only the other form has, under the name and [`OTHER_FORM`]. A claim that the page's form no longer measures moves
+//! to the other form's list, and is dropped if that form does not measure it either.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -14,10 +14,10 @@ use tinyjson::JsonValue;
 
 use super::row::Row;
 
-/// Where claims are kept, from the root.
+/// File of the claims, from the root.
 pub const FILE: &str = "docs/figures/claims.json";
 
-/// Behind a table's name: rows that only the form has of which there is no page.
+/// Suffix of a table's name for rows of the form from which the page is not made.
 const OTHER_FORM: &str = ", other form";
 
 /// Claims by table and row.
@@ -25,10 +25,10 @@ const OTHER_FORM: &str = ", other form";
 pub struct Claims(BTreeMap<String, BTreeMap<String, f64>>);
 
 impl Claims {
-    /// Claims as they are kept.
+    /// The stored claims.
     ///
     /// # Errors
-    /// When the file cannot be read or is no table of numbers.
+    /// When the file cannot be read or is not a table of numbers.
     pub fn read(root: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(root.join(FILE)).with_context(|| format!("reading {FILE}"))?;
         Self::parse(&text).with_context(|| format!("{FILE} is no table of numbers by table and row"))
@@ -54,7 +54,7 @@ impl Claims {
         rows.insert(key.to_owned(), claim);
     }
 
-    /// Takes the claims of all rows of one run over; `of_page` when it was of the form that the page has. Returns the claims that were dropped.
+    /// Adopts the claims of all rows of one run; `of_page` if the page is made from the run's form. Returns the dropped claims.
     pub fn take(&mut self, table: &str, of_page: bool, rows: &[Row]) -> Vec<String> {
         let other = format!("{table}{OTHER_FORM}");
         for row in rows {
@@ -83,7 +83,7 @@ impl Claims {
         if of_page { Vec::new() } else { left }
     }
 
-    /// Claims under this form's name of which a run of it has no row. A row that was skipped may stand for several whose names begin as its does.
+    /// Claims stored for this form whose row is missing in a run of it. A skipped row may represent several whose names begin as its does.
     pub fn without_row(&self, table: &str, of_page: bool, rows: &[Row]) -> Vec<String> {
         let own = match of_page {
             true => table.to_owned(),
@@ -102,7 +102,7 @@ impl Claims {
             .collect()
     }
 
-    /// Writes them, one a line, in order.
+    /// Writes the claims in order, one a line.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -182,7 +182,7 @@ mod tests {
         };
         assert_eq!(named(&claims, "contact"), ["both", "old", "page"]);
         assert_eq!(named(&claims, &other), ["short"]);
-        // What the page's form has no more may be the other's; what neither has is dropped.
+        // A claim that the page's form no longer has may be the other form's; a claim of neither is dropped.
         let now = rows(&["both", "page"]);
         assert_eq!(claims.without_row("contact", true, &now), ["old"]);
         assert!(claims.take("contact", true, &now).is_empty());

@@ -1,8 +1,7 @@
-//! `cargo xtask figures NAME`: measures and keeps the figures of one part of the product.
+//! `cargo xtask figures NAME`: measures and stores the figures of one part of the product.
 //!
-//! The program prints one JSON object a row, `{"what","value","unit","bound","holds"}`; this writes
-//! them as a table to `docs/figures/NAME.md`. `--check` compares what pages say with what is measured; `--renew` makes anew what is stale, `--record`
-//! takes what was made by hand.
+//! The program prints one JSON object a row, `{"what","value","unit","bound","holds"}`; this module writes them as a table to `docs/figures/NAME.md`.
+//! `--check` compares the numbers of pages with measured ones; `--renew` makes stale artefacts anew, `--record` records artefacts made by hand.
 
 pub mod artefacts;
 mod claims;
@@ -88,12 +87,12 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
     ))
 }
 
-/// Measures the shorter form of every table that README quotes, and compares: bounds, claims, what pages quote, and the pages of
-/// figures. Bounds of what the machine decides are told and not judged: another machine, or a busy one, breaks no promise. What the page of figures
-/// says does not hold is told, too.
+/// Measures the shorter form of every table that README quotes and compares bounds, claims, quoted numbers, and the pages of figures. Bounds of
+/// machine-dependent values are reported, not judged: another or a busy machine breaks no promise. Rows that fail on the page of figures are reported
+/// as well.
 ///
 /// # Errors
-/// When a bound does not hold, or a number differs; what and where was printed.
+/// When a bound does not hold, or a number differs; the details were printed.
 pub fn check(root: &Path, program: &Path) -> Result<String> {
     let quoted = quoted::of_pages(root)?;
     let claims = Claims::read(root)?;

@@ -4,8 +4,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::row::{Row, count};
 
-/// A sweep that belongs to a table: the experiment of `mortise-lab` that makes it, and the charts it leaves in `docs/figures`, drawn from one table
-/// of the experiment's name, or each from one of its own.
+/// A sweep that belongs to a table: the experiment of `mortise-lab` that makes it, and its charts in `docs/figures`, drawn from one table with the
+/// experiment's name, or each from a table of its own.
 struct Sweep {
     table: &'static str,
     experiment: &'static str,
@@ -69,7 +69,7 @@ const SWEEPS: &[Sweep] = &[
     },
 ];
 
-/// The page of a table: its rows, and the charts that belong to it.
+/// The page of a table: its rows, and its charts.
 pub fn text(name: &str, quick: bool, rows: &[Row]) -> String {
     let mut text = page(name, quick, rows, &today());
     for sweep in SWEEPS.iter().filter(|sweep| sweep.table == name) {
@@ -78,7 +78,7 @@ pub fn text(name: &str, quick: bool, rows: &[Row]) -> String {
     text
 }
 
-/// The charts of a sweep as a page shows them.
+/// The charts of a sweep, as Markdown.
 fn charts(sweep: &Sweep) -> String {
     let experiment = sweep.experiment;
     let mut text = format!("\n`mortise-lab {experiment} --out docs/figures --force` makes the following");
@@ -150,7 +150,7 @@ fn civil_from_days(days: u64) -> (u64, u64, u64) {
     let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
     let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    // Months counted from March.
+    // Months are counted from March.
     let month_from_march = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
     let month = if month_from_march < 10 {
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn dates() {
-        // `date -u -d @0`, and leap days either side of a century that is one.
+        // `date -u -d @0`, and leap days around a century that is a leap year.
         assert_eq!(civil_from_days(0), (1970, 1, 1));
         assert_eq!(civil_from_days(11_016), (2000, 2, 29));
         assert_eq!(civil_from_days(19_782), (2024, 2, 29));

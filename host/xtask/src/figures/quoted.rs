@@ -1,11 +1,11 @@
-//! Figures that pages quote: each measured number in README or `docs/*.md` has a comment behind it that names its row,
+//! Figures quoted by pages: each measured number in README or `docs/*.md` is followed by a comment that names its row,
 //!
 //! ```text
 //! stay within 9.06 µm<!-- row end-to-end: hole wall, 5 N + penetration -->
 //! ```
 //!
-//! the table, then parts of the row's text, all of which it must have and no other row. The number is right when the row's value, in the unit that stands
-//! behind the number, rounds to it as it is written; a value that the machine decides, when neither is more than twice the other.
+//! with the table, then parts of the row's text that together match exactly one row. The number is right when the row's value, in the unit that
+//! follows the number, rounds to it at its written precision; a machine-dependent value, when the two differ by at most a factor of two.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,31 +18,31 @@ const README: &str = "README.md";
 const PAGE: &str = "the page of figures";
 const START: &str = "<!-- row ";
 const END: &str = "-->";
-/// How far values of one machine may lie from those of another, as a ratio.
+/// Largest ratio of values from two machines.
 const VARIES: f64 = 2.0;
-/// How far a page's value may lie from the measured one that comes out the same everywhere, as a share: what another mathematical library makes of it.
+/// Largest relative difference between a page's value and a measured one that is the same everywhere: the effect of another mathematical library.
 const SAME: f64 = 1e-3;
 
 /// A number that a page quotes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quoted {
-    /// The page, from the root.
+    /// Path of the page, from the root.
     pub page: PathBuf,
     /// Line, counted from one.
     pub line: usize,
-    /// The number as it is written.
+    /// The number as written.
     pub number: String,
-    /// The word behind it.
+    /// The word that follows it.
     unit: String,
-    /// The table it is from.
+    /// Its table.
     pub table: String,
     parts: Vec<String>,
 }
 
-/// All numbers that README and the pages beside `docs/figures` quote.
+/// All numbers quoted by README and the pages beside `docs/figures`.
 ///
 /// # Errors
-/// When a page cannot be read or a comment is not as described.
+/// When a page cannot be read or a comment is malformed.
 pub fn of_pages(root: &Path) -> Result<Vec<Quoted>> {
     let mut pages = vec![PathBuf::from(README), PathBuf::from("docs/figures/sweeps.md")];
     for entry in std::fs::read_dir(root.join("docs"))? {
@@ -92,7 +92,7 @@ fn of_text(page: &Path, text: &str) -> Result<Vec<Quoted>> {
     Ok(found)
 }
 
-/// The last number of a text and the word behind it.
+/// The last number of a text and the word that follows it.
 fn last_number(text: &str) -> Option<(String, String)> {
     let end = text.rfind(|letter: char| letter.is_ascii_digit())? + 1;
     let start = text[..end]
@@ -105,7 +105,7 @@ fn last_number(text: &str) -> Option<(String, String)> {
 }
 
 impl Quoted {
-    /// The one row of its parts.
+    /// The one row that contains all of its parts.
     fn row<'a>(&self, rows: &'a [Row], place: &str) -> Result<&'a Row> {
         let fits = |row: &&Row| self.parts.iter().all(|part| row.what.contains(part.as_str()));
         let found: Vec<&Row> = rows.iter().filter(fits).collect();
@@ -138,10 +138,10 @@ impl Quoted {
         Ok(())
     }
 
-    /// Fails when the number, the page of figures and what was measured differ.
+    /// Fails when the number, the page of figures and the measured value differ.
     ///
     /// # Errors
-    /// Where they do, with all three.
+    /// When they differ; the message has all three.
     pub fn check(&self, measured: &[Row], page: &[Row]) -> Result<()> {
         let now = self.row(measured, "what was measured")?;
         self.agrees(now, "what was measured")?;
@@ -153,7 +153,7 @@ impl Quoted {
     /// Fails when the number and the page of figures differ.
     ///
     /// # Errors
-    /// Where they do, with both.
+    /// When they differ; the message has both.
     pub fn check_page(&self, page: &[Row]) -> Result<()> {
         self.agrees(self.row(page, PAGE)?, PAGE)
     }
@@ -178,7 +178,7 @@ impl std::fmt::Display for Quoted {
     }
 }
 
-/// Factor from one unit of length to another; 1 between all others.
+/// Factor from one unit of length to another; 1 for all other units.
 fn scale(from: &str, to: &str) -> f64 {
     let metres = |unit: &str| match unit {
         "µm" => Some(1e-6),
@@ -192,8 +192,8 @@ fn scale(from: &str, to: &str) -> f64 {
     }
 }
 
-/// Tables that README quotes, and those that promise something: they are measured whenever figures are checked. What other pages quote is compared with
-/// the pages of figures, whose own sources are recorded.
+/// Tables that README quotes, and those of promises: they are measured whenever figures are checked. Numbers on other pages are compared with the
+/// pages of figures, whose own sources are recorded.
 pub fn measured(quoted: &[Quoted]) -> BTreeSet<String> {
     let of_readme = quoted.iter().filter(|quoted| quoted.page == Path::new(README));
     let mut tables: BTreeSet<String> = of_readme.map(|quoted| quoted.table.clone()).collect();
@@ -228,7 +228,7 @@ pub fn page_rows(text: &str) -> Vec<Row> {
         .collect()
 }
 
-/// Numbers that come out the same everywhere and differ between a page of figures and what was measured, for rows of the same text.
+/// Differences between a page of figures and measured values, for rows of the same text whose number is the same everywhere.
 pub fn differences(table: &str, measured: &[Row], page: &[Row]) -> Vec<String> {
     let mut found = Vec::new();
     for row in measured.iter().filter(|row| !row.varies && row.claim.is_some()) {
@@ -281,7 +281,7 @@ mod tests {
         assert!(of_text(Path::new("a"), "1 <!-- row a b -->").is_err());
     }
 
-    /// The first sentence of README once said 2 µm where 9.06 µm were measured and the page said 1.62.
+    /// The first sentence of README once stated 2 µm where 9.06 µm were measured and the page had 1.62.
     #[test]
     fn a_number_that_is_not_measured_is_found() {
         let depth = |value: f64| {

@@ -1,4 +1,5 @@
-//! `cargo xtask figures --renew`: makes anew what is stale in `docs/figures`, and says how long each took; `--record` takes what lies there as made now.
+//! `cargo xtask figures --renew`: makes stale artefacts of `docs/figures` anew and prints the time of each; `--record` records existing files as
+//! current.
 
 use std::path::Path;
 use std::process::Command;
@@ -11,11 +12,11 @@ use super::measure::By;
 use super::write::write_page;
 use crate::shell;
 
-/// Makes all stale artefacts of `names`, or of all where there are none; true if every bound of the tables among them holds. The manifest is written
-/// after each, so that what is interrupted goes on where it stopped.
+/// Makes all stale artefacts of `names`, or of all if `names` is empty; true if every bound of the tables among them holds. The manifest is written
+/// after each, so that an interrupted run resumes where it stopped.
 ///
 /// # Errors
-/// When a command fails, or a name is not known.
+/// When a command fails, or a name is unknown.
 pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
     for name in names {
         named(name)?;
@@ -51,10 +52,10 @@ pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
     Ok(all_hold)
 }
 
-/// Takes the files of `names` for what their commands, run by hand, make of the sources there are now.
+/// Records the files of `names` as the result of their commands, run by hand, on the current sources.
 ///
 /// # Errors
-/// When a name is not known, or the manifest cannot be written.
+/// When a name is unknown, or the manifest cannot be written.
 pub fn record_all(root: &Path, names: &[String]) -> Result<()> {
     let artefacts: Result<Vec<_>> = names.iter().map(|name| named(name)).collect();
     for artefact in artefacts? {
@@ -72,7 +73,7 @@ fn named(name: &str) -> Result<&'static Artefact> {
     })
 }
 
-/// Another run may have recorded what it made meanwhile: the manifest is read anew.
+/// Reads the manifest anew, because another run may have recorded artefacts meanwhile.
 fn record(root: &Path, artefact: &Artefact) -> Result<()> {
     let mut manifest = Manifest::read(root)?.unwrap_or_default();
     (manifest.0).retain(|name, _| ARTEFACTS.iter().any(|artefact| artefact.name == *name));
@@ -93,7 +94,7 @@ fn make(root: &Path, program: &Path, artefact: &Artefact) -> Result<bool> {
                 .with_context(|| format!("`{}` made nothing", artefact.command()))?;
             Ok(true)
         }
-        // Never asked for.
+        // Never reached: artefacts made by hand are not selected.
         Made::ByHand => Ok(true),
     }
 }

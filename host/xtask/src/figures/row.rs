@@ -10,19 +10,19 @@ use tinyjson::JsonValue;
 pub struct Row {
     /// What was measured.
     pub what: String,
-    /// What it came to, as a person reads it.
+    /// The value in human-readable form.
     pub value: String,
     /// Unit of the value.
     pub unit: String,
-    /// What it must keep.
+    /// The bound, in words.
     pub bound: String,
-    /// Whether it does; nothing where there is no bound, or nothing was measured.
+    /// True if the bound holds; `None` without a bound or a measured value.
     pub holds: Option<bool>,
-    /// The figure that is stated for the row.
+    /// The row's stated figure.
     pub claim: Option<f64>,
-    /// The value is one of this machine.
+    /// True if the value depends on the machine.
     pub varies: bool,
-    /// What the page says beside the verdict.
+    /// Remark of the page beside the verdict.
     pub remark: Option<String>,
 }
 
@@ -42,7 +42,7 @@ impl Row {
         self.value.parse().ok()
     }
 
-    /// The row's name, the same in every run: without remarks in parentheses. As `Row::key` of the laboratory.
+    /// The row's key, the same in every run: its text without remarks in parentheses. Same as `Row::key` of the laboratory.
     pub fn key(&self) -> String {
         let (mut key, mut depth) = (String::new(), 0usize);
         for letter in self.what.chars() {
@@ -76,7 +76,7 @@ impl Row {
     /// Reads one line of JSON.
     ///
     /// # Errors
-    /// When it is no object with the five keys.
+    /// When it is not an object with the five keys.
     pub fn parse(line: &str) -> Result<Self> {
         let value: JsonValue = line.parse().map_err(|error| anyhow::anyhow!("{error}"))?;
         let fields: &HashMap<String, JsonValue> = value.get().context("not a JSON object")?;
@@ -99,7 +99,7 @@ impl Row {
     }
 }
 
-/// A value as a person reads it: text without quotes, the shortest number that reads back the same.
+/// A value in human-readable form: text without quotes, or the shortest number that reads back the same.
 fn plain(value: &JsonValue) -> Result<String> {
     Ok(match value {
         JsonValue::String(text) => text.clone(),

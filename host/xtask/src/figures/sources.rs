@@ -1,8 +1,8 @@
 //! A hash of the sources that an artefact depends on.
 //!
-//! Of Rust files the tokens count: comments, documentation, white space and what is compiled for tests alone do not, so that a change of words makes
-//! no chart stale. Other files count as they are. The hash is FNV-1a of 64 bits: it finds changes, and is no protection against somebody who
-//! wants none to be found.
+//! For Rust files it covers the tokens: comments, documentation, white space and code compiled only for tests are excluded, so that rewording makes
+//! no chart stale. Other files are hashed byte for byte. The hash is FNV-1a of 64 bits: it detects changes, and does not protect against deliberate
+//! collisions.
 
 use std::path::{Path, PathBuf};
 
@@ -73,20 +73,20 @@ impl Default for Fnv {
 }
 
 impl Fnv {
-    /// Adds bytes and where they end.
+    /// Adds bytes, followed by their length.
     pub fn add(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().copied().chain((bytes.len() as u64).to_le_bytes()) {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
         }
     }
 
-    /// The hash, 16 digits.
+    /// The hash as 16 hexadecimal digits.
     pub fn text(&self) -> String {
         format!("{:016x}", self.0)
     }
 }
 
-/// The tokens of a Rust source, separated by single spaces where it had any space between two words, without items under `#[cfg(test)]`.
+/// The tokens of a Rust source, separated by single spaces where two words had white space between them, without items under `#[cfg(test)]`.
 fn tokens(source: &str) -> String {
     let words: Vec<&str> = words(source).iter().map(|word| word.text).collect();
     without_tests(&words).join(" ")

@@ -1,16 +1,16 @@
-//! Which system this is, and the commands to type where nothing is installed by this program.
+//! Detects the operating system, and lists the commands to type where this program installs nothing.
 
 use super::packages::{Group, Package};
 use super::rust::Part;
 
-/// Systems told apart by how they install.
+/// Systems, distinguished by their installers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum System {
-    /// Debian, Ubuntu and what descends from them.
+    /// Debian, Ubuntu and their derivatives.
     Apt,
-    /// Fedora and what descends from it.
+    /// Fedora and its derivatives.
     Dnf,
-    /// Arch and what descends from it.
+    /// Arch and its derivatives.
     Pacman,
     /// macOS.
     Mac,
@@ -57,7 +57,7 @@ pub fn os_release_value(text: &str, name: &str) -> Option<String> {
         .filter(|value| !value.is_empty())
 }
 
-/// The commands which a person types to have `packages` and `parts` on `system`.
+/// The commands that a person types to install `packages` and `parts` on `system`.
 pub fn commands(system: System, packages: &[&Package], parts: &[Part]) -> Vec<String> {
     let has = |group: Group| packages.iter().any(|package| package.group == group);
     let list = |name: fn(&Package) -> &'static str| {

@@ -10,28 +10,28 @@ use super::advice;
 use super::sources::{self, Backports, Source};
 use crate::shell;
 
-/// Can refuse to install from the release's own suite, when newer packages of the same source
-/// (`qemu-utils`) are there from backports.
+/// Package that apt-get can refuse to install from the release's own suite when newer packages of the same source (`qemu-utils`) are installed from
+/// backports.
 const FROM_BACKPORTS_IF_REFUSED: &str = "qemu-system-arm";
 
-/// The file this program may add. One of its own, so that nothing of the user's is edited.
+/// The file that this program may add. It is separate, so that none of the user's files is edited.
 const BACKPORTS_FILE: &str = "/etc/apt/sources.list.d/mortise-backports.list";
 
-/// Install what was asked for and what it needs, and never take away a package of the user's: apt-get
-/// would remove a newer `qemu-utils` to make room for an older emulator.
+/// Options that install only the named packages and their dependencies and never remove a package of the user's: apt-get would remove a newer
+/// `qemu-utils` to install an older emulator.
 const SPARING: [&str; 2] = ["--no-install-recommends", "--no-remove"];
 
-/// Installs `packages`, of which none is there.
+/// Installs `packages`, none of which is installed.
 ///
 /// # Errors
-/// When there are neither root rights nor sudo, or apt-get fails; its output has gone through.
+/// When there are neither root rights nor sudo, or apt-get fails; its output was passed through.
 pub fn install(packages: &[&str]) -> Result<()> {
     let rights = Rights::find(packages)?;
     if lists_are_absent(Path::new("/var/lib/apt/lists")) {
         rights.apt_get(&["update"])?;
     }
     if !would_install(packages)? {
-        // The lists may be too old to know the packages: one fresh look before anything else.
+        // The package lists may be too old to contain the packages: update them first.
         rights.apt_get(&["update"])?;
     }
     let (refused, plain): (Vec<&str>, Vec<&str>) = if would_install(packages)? {
@@ -51,7 +51,7 @@ pub fn install(packages: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// The command for a person.
+/// The command that a person types.
 pub fn install_line(packages: &[&str]) -> String {
     format!("apt-get install {} {}", SPARING.join(" "), packages.join(" "))
 }
@@ -64,7 +64,7 @@ fn install_from(rights: &Rights, suite: Option<&str>, packages: &[&str]) -> Resu
     }
     arguments.extend(packages);
     if rights.apt_get(&arguments).is_err() {
-        // A mirror drops superseded versions: a stale list then names files that are gone.
+        // Mirrors drop superseded versions, so a stale list names files that no longer exist.
         eprintln!("apt-get failed; trying once more with fresh lists.");
         rights.apt_get(&["update"])?;
         rights.apt_get(&arguments)?;
@@ -72,7 +72,7 @@ fn install_from(rights: &Rights, suite: Option<&str>, packages: &[&str]) -> Resu
     Ok(())
 }
 
-/// True if apt-get finds a way to install `packages`, by a simulation that needs no rights.
+/// True if apt-get can install `packages`, by a simulation that needs no root rights.
 fn would_install(packages: &[&str]) -> Result<bool> {
     let output = Command::new("apt-get")
         .args(["--simulate", "install"])
@@ -84,7 +84,7 @@ fn would_install(packages: &[&str]) -> Result<bool> {
     Ok(output.status.success())
 }
 
-/// Makes the backports suite known and returns its name.
+/// Adds the backports suite and returns its name.
 fn add_backports(rights: &Rights) -> Result<String> {
     let release = std::fs::read_to_string("/etc/os-release").context("reading /etc/os-release")?;
     let Some(codename) = advice::os_release_value(&release, "VERSION_CODENAME") else {
@@ -120,7 +120,7 @@ fn read_sources(etc_apt: &Path) -> Result<Vec<Source>> {
     Ok(found)
 }
 
-/// True if apt was never asked what there is, as in a fresh container.
+/// True if apt's package lists were never downloaded, as in a fresh container.
 fn lists_are_absent(lists: &Path) -> bool {
     let entries: Vec<PathBuf> = std::fs::read_dir(lists)
         .map(|entries| {
@@ -131,7 +131,7 @@ fn lists_are_absent(lists: &Path) -> bool {
         .unwrap_or_default();
     !entries.iter().any(|file| {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        // Stored plain or compressed: `…_Packages`, `…_Packages.lz4`.
+        // Files are plain or compressed: `…_Packages`, `…_Packages.lz4`.
         name.rsplit_once("_Packages")
             .is_some_and(|(_, end)| end.is_empty() || end.starts_with('.'))
     })

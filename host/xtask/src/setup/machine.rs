@@ -1,4 +1,4 @@
-//! What is on this machine, found without rights and without starting anything.
+//! Detects what is installed on this machine, without root rights and without starting a program.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use anyhow::{Context, Result};
 
 use super::packages::{Package, Sign};
 
-/// Folders of fonts lie this deep: by kind, then by family.
+/// Depth of font folders: by kind, then by family.
 const FONT_FOLDERS: usize = 3;
 
-/// The places looked at. Tests point `root` at a directory of their own.
+/// The directories to search. Tests point `root` at a directory of their own.
 #[derive(Debug)]
 pub struct Machine {
     root: PathBuf,
@@ -23,7 +23,7 @@ impl Machine {
     /// The machine this runs on.
     ///
     /// # Errors
-    /// When dpkg's status file is there and cannot be read.
+    /// When dpkg's status file exists and cannot be read.
     pub fn this() -> Result<Self> {
         let status = Path::new("/var/lib/dpkg/status");
         let installed = if status.is_file() {
@@ -33,7 +33,7 @@ impl Machine {
             HashSet::new()
         };
         let mut prefixes: Vec<PathBuf> = Vec::new();
-        // An OpenCASCADE of one's own, or conda's, counts as much as the system's.
+        // A user's own OpenCASCADE, or conda's, counts like the system's.
         prefixes.extend(
             ["OCCT_ROOT", "CASROOT", "CONDA_PREFIX"]
                 .iter()
@@ -59,14 +59,14 @@ impl Machine {
         })
     }
 
-    /// True if `package`, or the same thing from another source, is there.
+    /// True if `package`, or its equivalent from another source, is installed.
     pub fn has(&self, package: &Package) -> bool {
         self.installed.contains(package.apt) || self.shows(package.sign)
     }
 
     fn shows(&self, sign: Sign) -> bool {
         match sign {
-            // The Windows compiler stands in no `PATH`; the build finds it by its own registry.
+            // The Windows compiler is not in `PATH`; the build finds it through its own registry.
             Sign::Program("c++") if cfg!(windows) => true,
             Sign::Program(name) => {
                 let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
@@ -113,7 +113,7 @@ impl Machine {
     }
 }
 
-/// Whether a file below `folder`, at most `depth` folders down, begins with one of `names`.
+/// True if the name of a file below `folder`, at most `depth` folders down, begins with one of `names`.
 fn holds_font(folder: &Path, names: &[&str], depth: usize) -> bool {
     entries(folder).iter().any(|entry| {
         let name = entry.file_name().unwrap_or_default().to_string_lossy();
@@ -122,7 +122,7 @@ fn holds_font(folder: &Path, names: &[&str], depth: usize) -> bool {
     })
 }
 
-/// Names of the packages that a dpkg status file calls installed, without their architecture.
+/// Names of the packages that a dpkg status file lists as installed, without their architecture.
 pub fn installed_packages(status: &str) -> HashSet<String> {
     let mut installed = HashSet::new();
     let mut name = None;

@@ -1,8 +1,7 @@
-//! Finds out what this machine lacks, and installs that and nothing else.
+//! Detects which prerequisites this machine lacks, and installs only those.
 //!
-//! Looking needs no rights: it reads dpkg's status file, looks for programs, headers and libraries
-//! and asks rustc for its sysroot. Only what is missing is installed, after a question, by
-//! [`apt`] on Debian and Ubuntu and by rustup anywhere; elsewhere the commands are printed.
+//! Detection needs no root rights: it reads dpkg's status file, searches for programs, headers and libraries and queries rustc for its sysroot.
+//! Missing parts are installed after a question, by [`apt`] on Debian and Ubuntu and by rustup anywhere; on other systems the commands are printed.
 
 mod advice;
 mod apt;
@@ -23,14 +22,14 @@ pub use self::rust::BOARD_TARGET;
 use crate::arguments::Installing;
 use crate::shell;
 
-/// What is asked of the user before something is installed.
+/// The user's consent to an installation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Consent {
     /// Install without a question.
     Given,
-    /// Ask at the terminal; without a terminal, install and say so.
+    /// Ask at the terminal; without a terminal, install and report it.
     Ask,
-    /// Install nothing: say what is missing and stop.
+    /// Install nothing: list what is missing and stop.
     Refused,
 }
 
@@ -47,7 +46,7 @@ impl From<Installing> for Consent {
     }
 }
 
-/// What is missing for some groups.
+/// Missing prerequisites of some groups.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Missing {
     packages: Vec<&'static packages::Package>,
@@ -92,10 +91,10 @@ pub fn command(installing: Installing) -> Result<ExitCode> {
     })
 }
 
-/// Sees to it that everything in `groups` is there. Says what it does.
+/// Ensures that every prerequisite in `groups` is installed, and prints each step.
 ///
-/// Returns false when something is still missing because the user declined or refused beforehand,
-/// or because this system has no installer known here; the reason has been printed.
+/// Returns false when something is still missing because the user declined or refused beforehand, or because no installer for this system is known
+/// here; the reason was printed.
 ///
 /// # Errors
 /// When an installer ran and failed.
@@ -138,7 +137,7 @@ pub fn ensure(groups: &[Group], consent: Consent) -> Result<bool> {
     Ok(true)
 }
 
-/// Prints the commands and settles whether they run: asks at the terminal unless the answer was given beforehand.
+/// Prints the commands and decides whether they run: asks at the terminal unless consent was given beforehand.
 fn agreed(consent: Consent, names: &[&str], rust: &[rust::Part]) -> Result<bool> {
     let mut commands = Vec::new();
     if !names.is_empty() {
@@ -165,7 +164,7 @@ fn agreed(consent: Consent, names: &[&str], rust: &[rust::Part]) -> Result<bool>
     eprint!("Go ahead? [Y/n] ");
     std::io::stderr().flush()?;
     let mut answer = String::new();
-    // End of input, unlike an empty line, is not an answer.
+    // Unlike an empty line, end of input is not an answer.
     let answered = std::io::stdin().lock().read_line(&mut answer)? > 0;
     Ok(answered && matches!(answer.trim().to_lowercase().as_str(), "" | "y" | "yes"))
 }

@@ -1,6 +1,6 @@
-//! What the product needs from the system, and how to see that it is there.
+//! The product's system packages, and how to detect each.
 
-/// What a package is needed for. A command asks only for the groups it cannot do without.
+/// Purpose of a package. A command requires only the groups that it needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
     /// Compiling the desktop program.
@@ -11,20 +11,20 @@ pub enum Group {
     Board,
     /// Opening a window.
     Window,
-    /// Opening a window where there is no display, and looking at it.
+    /// Opening a window without a display, and capturing it.
     Screen,
 }
 
 impl Group {
-    /// Every group, in the order they are reported.
+    /// Every group, in the order of reports.
     pub const ALL: [Self; 5] = [Self::Build, Self::Checks, Self::Board, Self::Window, Self::Screen];
 
-    /// True if this kind of system has the group at all: only Linux gets its window libraries one by one.
+    /// True if this system needs the group: only Linux installs window libraries separately.
     pub fn applies(self) -> bool {
         cfg!(target_os = "linux") || !matches!(self, Self::Window | Self::Screen)
     }
 
-    /// One line for the user.
+    /// Purpose in one line, for the user.
     pub fn purpose(self) -> &'static str {
         match self {
             Self::Build => "to compile the program: a C++ compiler and OpenCASCADE, which reads STEP files",
@@ -38,7 +38,7 @@ impl Group {
     }
 }
 
-/// A sign that something is there, whoever installed it.
+/// Evidence that a package is installed, by whatever installer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
     /// A program in `PATH`.
@@ -56,11 +56,11 @@ pub enum Sign {
 /// One package of Debian and Ubuntu with its counterparts elsewhere.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Package {
-    /// What it is needed for.
+    /// Purpose.
     pub group: Group,
     /// Its name for apt.
     pub apt: &'static str,
-    /// What shows that it, or the same thing from another source, is there.
+    /// Evidence that it, or its equivalent from another source, is installed.
     pub sign: Sign,
     /// Its name for dnf (Fedora).
     pub dnf: &'static str,
@@ -84,7 +84,7 @@ const fn package(
     }
 }
 
-/// Fonts that have Japanese, so that names of parts in it are seen to be drawn.
+/// Fonts with Japanese glyphs, to check that Japanese part names are drawn.
 const JAPANESE: &[&str] = &[
     "DroidSansFallback",
     "NotoSansCJK",
@@ -95,8 +95,7 @@ const JAPANESE: &[&str] = &[
     "ipag",
 ];
 
-/// Everything needed from the system. `serialport` without udev, and a window system that loads
-/// its libraries when it runs, need no development packages.
+/// All system packages. `serialport` without udev, and a window system that loads its libraries at run time, need no development packages.
 #[rustfmt::skip]
 pub const PACKAGES: &[Package] = &[
     package(Group::Build, "g++", Sign::Program("c++"), "gcc-c++", "gcc"),

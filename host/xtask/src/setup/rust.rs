@@ -8,10 +8,10 @@ use anyhow::{Result, bail};
 use super::Group;
 use crate::shell;
 
-/// Target of the boards' Cortex-M7 with its double-precision FPU, hard-float calls.
+/// Target of the boards' Cortex-M7 with its double-precision FPU and hard-float calling convention.
 pub const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Something rustup adds to a toolchain, or cargo installs beside it.
+/// A component that rustup adds to a toolchain, or a tool that cargo installs beside it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The standard library for [`BOARD_TARGET`].
@@ -27,7 +27,7 @@ pub enum Part {
 impl Part {
     const ALL: [Self; 4] = [Self::Target, Self::Rustfmt, Self::Clippy, Self::Deny];
 
-    /// rustup's or cargo's name for it.
+    /// Name in rustup or cargo.
     pub fn name(self) -> &'static str {
         match self {
             Self::Target => BOARD_TARGET,
@@ -37,7 +37,7 @@ impl Part {
         }
     }
 
-    /// What it is needed for.
+    /// Purpose.
     pub fn group(self) -> Group {
         match self {
             Self::Target => Group::Board,
@@ -56,7 +56,7 @@ impl Part {
         match self {
             Self::Target => ("rustup", vec!["target", "add", self.name()]),
             Self::Rustfmt | Self::Clippy => ("rustup", vec!["component", "add", self.name()]),
-            // The versions its own lock file names, so that it builds wherever it was built before.
+            // Versions from its own lock file, with which it is known to build.
             Self::Deny => ("cargo", vec!["install", "--locked", self.name()]),
         }
     }
@@ -80,10 +80,10 @@ impl Part {
     }
 }
 
-/// Parts of `groups` which the toolchain of the repository lacks.
+/// Parts of `groups` missing in the repository's toolchain.
 ///
 /// # Errors
-/// When rustc cannot be asked where its sysroot is.
+/// When rustc cannot be queried for its sysroot.
 pub fn missing(groups: &[Group], root: &Path) -> Result<Vec<Part>> {
     let wanted: Vec<Part> = Part::ALL
         .into_iter()
@@ -101,10 +101,10 @@ pub fn missing(groups: &[Group], root: &Path) -> Result<Vec<Part>> {
     Ok(wanted.into_iter().filter(|part| !part.is_in(&sysroot)).collect())
 }
 
-/// Adds `parts` to the toolchain of the repository.
+/// Adds `parts` to the repository's toolchain.
 ///
 /// # Errors
-/// When there is no rustup, or it fails.
+/// When rustup is absent, or fails.
 pub fn add(parts: &[Part], root: &Path) -> Result<()> {
     for part in parts {
         let (program, words) = part.adding();
@@ -141,7 +141,7 @@ mod tests {
         }
         assert!(Part::Target.is_in(sysroot));
         assert!(Part::Rustfmt.is_in(sysroot));
-        // Half of a component is no component.
+        // An incomplete component counts as missing.
         assert!(!Part::Clippy.is_in(sysroot));
     }
 }

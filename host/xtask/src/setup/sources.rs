@@ -1,4 +1,4 @@
-//! Reads apt's lists of package sources, to add a backports suite from the mirror already in use.
+//! Reads apt's lists of package sources, to add a backports suite from the mirror in use.
 //!
 //! Formats: one-line (`*.list`) and deb822 (`*.sources`), as in sources.list(5).
 
@@ -15,7 +15,7 @@ pub struct Source {
     pub components: Vec<String>,
     /// Options in one-line form, such as `signed-by=/usr/share/keyrings/x.gpg`.
     pub options: Vec<String>,
-    /// The signing key stands in the file itself, which the one-line form cannot say.
+    /// True if the signing key is inline in the file, which the one-line form cannot express.
     pub key_inline: bool,
 }
 
@@ -102,19 +102,19 @@ fn sources_of(fields: &[(String, String)]) -> Vec<Source> {
         .collect()
 }
 
-/// What to do to have the backports suite.
+/// How to obtain the backports suite.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Backports {
-    /// A source in use has it.
+    /// A source in use already has it.
     Present,
     /// This line for a `*.list` file adds it.
     Add(String),
 }
 
-/// Finds how to have `codename`'s backports from the mirror that already serves `codename`.
+/// Determines how to obtain `codename`'s backports from the mirror that already serves `codename`.
 ///
 /// # Errors
-/// When no source serves `codename`, or its key cannot be named in one line.
+/// When no source serves `codename`, or its key cannot be given in the one-line form.
 pub fn backports(sources: &[Source], codename: &str) -> Result<Backports> {
     let suite = format!("{codename}-backports");
     if sources.iter().any(|source| source.suites.contains(&suite)) {

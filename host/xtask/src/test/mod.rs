@@ -1,7 +1,7 @@
-//! `cargo xtask test`: everything CI runs, cheapest first, stopping at the first failing step.
+//! `cargo xtask test`: every check of CI, cheapest first, stopping at the first failing step.
 //!
-//! Host crates are checked, tested and run in one profile, `release`, so that nothing large is
-//! compiled twice and what is tested is what a user runs.
+//! Host crates are checked, tested and run in one profile, `release`, so that nothing large is compiled twice and the tested code is the code that
+//! users run.
 
 mod bench;
 mod report;
@@ -19,7 +19,7 @@ use crate::arguments::Test;
 use crate::setup::{self, Group};
 use crate::shell;
 
-/// One thing that is checked.
+/// One check.
 struct Step {
     name: &'static str,
     what: &'static str,

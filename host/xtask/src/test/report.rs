@@ -1,4 +1,4 @@
-//! What a run of the steps found: times, counts of tests, and the closing line.
+//! Results of a run of the steps: times, numbers of tests, and the closing line.
 
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Adds a step that was run, with the tests it counted and what it has to say, if anything.
+    /// Adds a finished step with its tests and its remark, if any.
     pub fn add(&mut self, name: &'static str, took: Duration, counts: Counts, outcome: Result<String>) {
         self.entries.push(Entry {
             name,
@@ -76,7 +76,7 @@ impl Report {
         self.entries.iter().any(|entry| entry.outcome.is_err())
     }
 
-    /// The summary; `not_run` are the steps after the failing one.
+    /// The summary; `not_run` lists the steps after the failing one.
     pub fn text(&self, not_run: &[&str]) -> String {
         let mut text = format!("\n{:<12} {:>11}  result\n", "step", "time");
         let mut total = Duration::ZERO;
@@ -106,7 +106,7 @@ impl Report {
             text.push_str(&format!("{name:<12} {:>11}  not run\n", "-"));
         }
         text.push_str(&format!("{:<12} {:>11}\n\n", "all", clock(total)));
-        // In the words of cargo's own closing line, which tools that read logs know.
+        // Worded like cargo's own closing line, which log-reading tools recognise.
         text.push_str(&format!(
             "test result: {}. {} passed; {} failed; {} ignored; 0 measured; 0 filtered out; finished in {:.2}s\n",
             if self.failed() { "FAILED" } else { "ok" },

@@ -1,4 +1,4 @@
-//! The steps, one function each. `window` has a file of its own.
+//! The steps, one function each. `window` has its own file.
 
 use std::path::Path;
 use std::process::Command;
@@ -12,8 +12,8 @@ use crate::{figures, firmware as boards, fuzz, setup, shell, tidy};
 const HIL_TESTS: &str = "mortise-hil-tests";
 const HIL_BENCH: &str = "bench";
 const FUZZ_EACH: Duration = Duration::from_secs(15);
-/// What property tests draw their cases from, unless the environment says otherwise: a commit passes or fails here as it does everywhere. Plain
-/// `cargo test` draws anew each time.
+/// Seed of the property tests' cases, unless the environment sets another: a commit passes or fails the same everywhere. Plain `cargo test` draws new
+/// cases each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
 const BOARD_SIDE: [&str; 5] = [
     "mortise-protocol",
@@ -36,7 +36,7 @@ pub fn tidy(bench: &mut Bench) -> Result<String> {
     Ok(String::new())
 }
 
-/// `cargo deny` over both workspaces that ship. The list of advisories comes from the network: where that cannot be reached, the step says so.
+/// `cargo deny` over both shipped workspaces. The list of advisories comes from the network; if that is unreachable, the step reports so.
 pub fn dependencies(bench: &mut Bench) -> Result<String> {
     let deny = |manifest: &str, checks: &[&str]| {
         let mut command = shell::cargo(&bench.root);
@@ -48,7 +48,7 @@ pub fn dependencies(bench: &mut Bench) -> Result<String> {
                 "check",
                 "--hide-inclusion-graph",
             ])
-            // One list serves both trees: an exception the other one needs is no finding.
+            // One list serves both dependency trees: an exception used only by the other tree is not a finding.
             .args([
                 "--allow",
                 "unmatched-skip",
@@ -87,7 +87,7 @@ pub fn lint(bench: &mut Bench) -> Result<String> {
     Ok(String::new())
 }
 
-/// Tests run with the standard library: without this, a crate that needs it would go unseen.
+/// Compiles without the standard library. Tests run with it, so a crate that needs it would otherwise go unnoticed.
 pub fn no_std(bench: &mut Bench) -> Result<String> {
     let mut command = shell::cargo(&bench.root);
     command.args(["check", "--release", "--target", setup::BOARD_TARGET]);
@@ -164,7 +164,8 @@ pub fn hil(bench: &mut Bench) -> Result<String> {
     counted(bench, &mut command)
 }
 
-/// The loom model checker: every interleaving of two planes' threads, weak memory included. A workspace of its own, since its atomics are loom's.
+/// The loom model checker: every interleaving of the two planes' threads, weak memory included. It is a separate workspace, because its atomics are
+/// loom's.
 pub fn interleavings(bench: &mut Bench) -> Result<String> {
     let mut command = shell::cargo(&bench.root);
     command
@@ -175,7 +176,7 @@ pub fn interleavings(bench: &mut Bench) -> Result<String> {
     counted(bench, &mut command)
 }
 
-/// The shorter form: long enough to find what a change broke near the kept corpora. `cargo xtask fuzz --minutes 10` goes on.
+/// The shorter form: long enough to find errors that a change causes near the stored corpora. `cargo xtask fuzz --minutes 10` searches longer.
 pub fn fuzz(bench: &mut Bench) -> Result<String> {
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
         return Ok("not run: set up for Linux on x86-64 alone".to_owned());
@@ -212,7 +213,7 @@ fn host_triple(root: &Path) -> Result<String> {
     Ok(host.context("`rustc -vV` names no host")?.to_owned())
 }
 
-/// Runs tests and counts them, failed ones too; none at all is a failure, as it says nothing.
+/// Runs tests and counts them, including failed ones; a run without tests is a failure, because it shows nothing.
 fn counted(bench: &mut Bench, command: &mut Command) -> Result<String> {
     let (name, seed) = PROPERTY_SEED;
     if std::env::var_os(name).is_none() {

@@ -1,6 +1,5 @@
-//! Plays the sample insertion in the real program's window, on a virtual screen, and looks whether it
-//! is drawn and moves; then, at twice the scale, whether the window fits the screen and how much of a core it
-//! takes with a rig connected and the motors off.
+//! Plays the sample insertion in the real program's window, on a virtual screen, and checks that it is drawn and moves; then, at twice the scale,
+//! that the window fits the screen, and how much of a core it uses with a rig connected and the motors off.
 //!
 //! Needs no display and no GPU: Xvfb is the screen, Mesa draws in software.
 
@@ -15,24 +14,24 @@ use anyhow::{Context, Result, bail};
 use super::bench::Bench;
 use crate::shell;
 
-/// Time for the window to appear and be drawn; software rendering of the first frame takes seconds.
+/// Longest time for the window to appear and be drawn; software rendering of the first frame takes seconds.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A blank window has one colour and an empty panel a handful; text alone, with its smoothed
-/// edges, has more than this.
+/// Smallest number of colours of a drawn window: a blank one has one, an empty panel a handful; text with its smoothed edges alone has more than
+/// this.
 const COLOURS_MIN: u32 = 64;
 
-/// The virtual screen, pixels.
+/// Size of the virtual screen, pixels.
 const SCREEN: (u32, u32) = (1600, 1000);
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
-/// Most of a core that an idle window may take with software rendering: a picture every ten seconds, and 1,000 ticks a second.
+/// Largest share of a core that an idle window may use with software rendering: a frame every ten seconds, and 1,000 ticks a second.
 const IDLE_MAX: f64 = 0.10;
-/// The in-process rig's thread: there once the rig is connected.
+/// Name of the in-process rig's thread, which exists once the rig is connected.
 const BOARD_THREAD: &str = "mortise-board";
-/// Over this long: two pictures at least, so that no span is judged by what lies between them.
+/// Duration of the measurement: at least two frames, so that no result depends on the time between frames.
 const IDLE_SPAN: Duration = Duration::from_secs(20);
 
-/// Different pictures to be seen: opening and baking the sample show a few, live plots one each time.
+/// Smallest number of different frames: opening and baking the sample show a few, and live plots a new one each time.
 const PICTURES_MIN: usize = 10;
 
 pub fn run(bench: &mut Bench) -> Result<String> {
@@ -40,7 +39,7 @@ pub fn run(bench: &mut Bench) -> Result<String> {
         return Ok("not run: there is no Xvfb on this system".to_owned());
     }
     let program = bench.programs()?.mortise;
-    // Beside the build, which is where passing files of a run belong.
+    // Beside the build, where temporary files of a run belong.
     let place = program.parent().unwrap_or(Path::new(".")).join("window-test");
     std::fs::create_dir_all(&place)?;
     let screen = Screen::start(&place)?;
@@ -51,7 +50,10 @@ pub fn run(bench: &mut Bench) -> Result<String> {
     let mut seen = HashSet::new();
     loop {
         if let Some(status) = child.0.try_wait()? {
-            bail!("the program ended by itself ({status}); it said:\n{}", tail(&log));
+            bail!(
+                "the program ended by itself ({status}); its output:\n{}",
+                tail(&log)
+            );
         }
         if let Some(window) = visible_window(&screen.display) {
             take_picture(&screen.display, &window, &picture)?;
@@ -72,7 +74,7 @@ pub fn run(bench: &mut Bench) -> Result<String> {
         }
         if Instant::now() > deadline {
             bail!(
-                "no window that {} within {} s (picture: {}); the program said:\n{}",
+                "no window that {} within {} s (picture: {}); the program's output:\n{}",
                 if seen.is_empty() { "is drawn" } else { "moves" },
                 PATIENCE.as_secs(),
                 shown(&bench.root, &picture),
@@ -98,7 +100,7 @@ fn start(
         .current_dir(root)
         .env("DISPLAY", &screen.display)
         .env("WINIT_X11_SCALE_FACTOR", scale.to_string())
-        // Or the window would open on the desktop of whoever runs this.
+        // Otherwise the window would open on the user's desktop.
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("WAYLAND_SOCKET")
         .stdin(Stdio::null())
@@ -109,8 +111,8 @@ fn start(
     Ok(Running(child))
 }
 
-/// Share of a core that the program takes with the sample open, the in-process rig connected, and its motors off: the least of several spans,
-/// since reading and baking come first.
+/// Share of a core that the program uses with the sample open, the in-process rig connected, and its motors off: the smallest of several intervals,
+/// because reading and baking come first.
 fn idle_share(root: &Path, program: &Path, screen: &Screen, place: &Path) -> Result<f64> {
     let log = place.join("idle.log");
     let arguments = ["open", SAMPLE, "--connect", "sim"];
@@ -119,7 +121,10 @@ fn idle_share(root: &Path, program: &Path, screen: &Screen, place: &Path) -> Res
     let mut least = f64::INFINITY;
     while Instant::now() < deadline {
         if let Some(status) = child.0.try_wait()? {
-            bail!("the program ended by itself ({status}); it said:\n{}", tail(&log));
+            bail!(
+                "the program ended by itself ({status}); its output:\n{}",
+                tail(&log)
+            );
         }
         let Some(window) = visible_window(&screen.display) else {
             std::thread::sleep(Duration::from_millis(500));
@@ -149,7 +154,7 @@ fn idle_share(root: &Path, program: &Path, screen: &Screen, place: &Path) -> Res
     )
 }
 
-/// Whether a process has a thread of this name.
+/// True if a process has a thread of this name.
 fn has_thread(process: u32, name: &str) -> bool {
     let threads = std::fs::read_dir(format!("/proc/{process}/task"));
     (threads.into_iter().flatten().flatten())
@@ -161,8 +166,8 @@ fn has_thread(process: u32, name: &str) -> bool {
 fn processor_s(process: u32) -> Result<f64> {
     let path = format!("/proc/{process}/stat");
     let text = std::fs::read_to_string(&path).with_context(|| format!("reading {path}"))?;
-    // The name, in parentheses, may hold spaces; user and system time are the 12th and 13th after it, in hundredths of a second
-    // (USER_HZ, the same on every Linux).
+    // The name, in parentheses, may contain spaces; user and system time are the 12th and 13th fields after it, in hundredths of a second (USER_HZ,
+    // the same on every Linux).
     let fields = text.rsplit_once(')').map_or("", |(_, fields)| fields);
     let times: Vec<f64> = (fields.split_whitespace().skip(11).take(2))
         .filter_map(|field| field.parse().ok())
@@ -187,18 +192,18 @@ fn size_of(display: &str, window: &str) -> Result<(u32, u32)> {
     (read("WIDTH=").zip(read("HEIGHT="))).with_context(|| format!("`xdotool` printed `{}`", text.trim()))
 }
 
-/// A child that does not outlive its value.
+/// A child process that is killed when the value is dropped.
 struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It may have ended already; there is nothing to do about any other failure here.
+        // It may have ended already; any other failure cannot be handled here.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// A virtual screen with a number that was free.
+/// A virtual screen with an unused display number.
 struct Screen {
     display: String,
     _server: Running,
@@ -228,7 +233,7 @@ impl Screen {
         std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line)?;
         if line.trim().is_empty() {
             bail!(
-                "Xvfb found no free display; it said:\n{}",
+                "Xvfb found no free display; its output:\n{}",
                 tail(&place.join("xvfb.log"))
             );
         }
@@ -239,7 +244,7 @@ impl Screen {
     }
 }
 
-/// Number of the program's window, once it is shown.
+/// Number of the program's window, once it is visible.
 fn visible_window(display: &str) -> Option<String> {
     let output = Command::new("xdotool")
         .args(["search", "--onlyvisible", "--name", "[Mm]ortise"])
@@ -267,7 +272,7 @@ fn take_picture(display: &str, window: &str, picture: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What tells one picture from another.
+/// Fingerprint of a frame.
 #[derive(Debug)]
 struct Look {
     colours: u32,

@@ -1,4 +1,4 @@
-//! Which faces touch: the contacts of the shared parts, and the time they take.
+//! Recognition of touching faces: the contacts of the shared parts, and the time to find them.
 
 use crate::figures::{Plan, Row};
 use crate::{LabError, contacts, corpus};
@@ -61,7 +61,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         };
         let what = format!("{file}: time for them after reading");
         out(if plan.quick {
-            // A time is held to a bound where a person runs it, not in a test that other programs may slow down.
+            // A time has a bound only where a person runs it, not in a test that other programs may slow down.
             Row::told(what, found.seconds, "s").varies()
         } else {
             Row::at_most(what, found.seconds, "s", most).varies()

@@ -1,4 +1,4 @@
-//! What targets cost the board: the dearest tick with four of them in force against the same motion without.
+//! Cost of targets on the board: the worst-case tick with four of them in force against the same motion without them.
 
 use mortise_bake::Grabbable;
 use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Telemetry, ToDevice};
@@ -13,17 +13,17 @@ use crate::rate::{self, Mode};
 use crate::variant::Variant;
 
 const TARGETS: f64 = 4.0;
-/// Times the instructions without.
+/// Largest ratio of the instructions with targets to those without.
 const RATIO: f64 = 1.2;
-/// Most instructions of a tick with targets, and without: a quarter of the 480,000 of a millisecond, and as much as 10 µs are worth.
+/// Largest number of instructions of a tick with targets and without: a quarter of the 480,000 of a millisecond, plus 10 µs' worth.
 const GUIDED: f64 = 125_000.0;
 const UNGUIDED: f64 = GUIDED;
 /// Ticks between refreshes, and until a target that is not refreshed expires.
 const REFRESH_TICKS: u32 = 100;
 const EXPIRY_TICKS: u16 = 300;
 
-/// Four different targets that a peg on its axis keeps all at once: the hole's axis, its top's plane, and each end of the peg's axis on the hole's, as a
-/// ball in a bore and as a bore on a ball. Each takes rows of its own in every solve.
+/// Four different targets that a peg on its axis satisfies at once: the hole's axis, its top's plane, and each end of the peg's axis on the hole's,
+/// as a ball in a bore and as a bore on a ball. Each adds rows of its own to every solve.
 fn different(axis: &ConstraintTarget, fit: &Fit) -> [ConstraintTarget; 4] {
     let along = |by_mm: f64| {
         let mut target = axis.clone();
@@ -52,7 +52,7 @@ fn different(axis: &ConstraintTarget, fit: &Fit) -> [ConstraintTarget; 4] {
     ]
 }
 
-/// Sends targets under numbers of their own, again and again.
+/// Sends the targets under consecutive ids and refreshes them.
 fn all_of(targets: [ConstraintTarget; 4]) -> impl FnMut(&Telemetry) -> Vec<ToDevice> {
     let (mut due, mut sequence) = (None, 0u16);
     move |sample| {
@@ -75,7 +75,7 @@ fn all_of(targets: [ConstraintTarget; 4]) -> impl FnMut(&Telemetry) -> Vec<ToDev
     }
 }
 
-/// The target that the guide makes of the first touch of the pair.
+/// The target that the guide creates at the first touch of the pair.
 pub(super) fn peg_in_hole(fit: &Fit) -> Result<ConstraintTarget, LabError> {
     let file = fit.file()?;
     let mut scenario = insertion(fit, file.path())?;
@@ -85,7 +85,8 @@ pub(super) fn peg_in_hole(fit: &Fit) -> Result<ConstraintTarget, LabError> {
     known_target(&scenario, &scene)
 }
 
-/// Insertions with a hand off by four fifths of the play, by collision alone, the target known from the start, or recognised on the desktop.
+/// Insertions with a hand off by four fifths of the clearance: by collision alone, with the target known from the start, and with the target
+/// recognised on the desktop.
 pub(super) fn guided_ticks(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let pairs = &rate::PAIRS[..rate::QUICK];
     let modes: &[Mode] = if plan.quick {
@@ -121,7 +122,7 @@ pub(super) fn guided_ticks(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<
     Ok(())
 }
 
-/// The 20 µm fit pressed to the wall and slid, so that contact is at its dearest, and on its way in.
+/// The 20 µm fit pressed to the wall and slid, where contact costs most, and during insertion.
 pub(super) fn four_targets(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let fit = Fit::thesis(0.02);
     let axis = peg_in_hole(&fit.engaged(-20.0))?;
@@ -144,7 +145,7 @@ pub(super) fn four_targets(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         &without,
         out,
     );
-    // 4 × 0.5 N leave 3 of the 5 N to the wall: all contacts are still there. The default caps hold the peg off it.
+    // 4 × 0.5 N leave 3 of the 5 N to the wall, so that all contacts remain. The default caps hold the peg off it.
     for (cap_n, how) in [
         (0.5, "which the hand overcomes"),
         (axis.force_cap, "which hold it"),
@@ -177,7 +178,7 @@ pub(super) fn four_targets(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     Ok(())
 }
 
-/// The longest tick, and what it left out.
+/// The longest tick, and how much it decimated.
 fn counted(what: &dyn Fn(&str) -> String, recording: &Recording, out: &mut dyn FnMut(Row)) {
     out(Row::at_most(
         what("instructions in the longest tick"),

@@ -1,4 +1,4 @@
-//! What goes into what with a guide, in the closed loop.
+//! Insertions with guidance in the closed loop.
 
 use mortise_bake::Grabbable;
 use mortise_protocol::parameter::ParameterId;
@@ -16,30 +16,31 @@ use crate::variant::Variant;
 const CELL_MM: f64 = 0.5;
 /// Longest insertion, s of virtual time.
 const SECONDS: f64 = 3.0;
-/// Farthest off the axis, µm.
+/// Largest distance from the axis, µm.
 const OFF_AXIS_UM: f64 = 5.0;
-/// Most that a peg comes later than the hand leads it, ms: springs in series lag m/k's root, a landing as long as guidance takes.
+/// Largest delay of a peg behind the hand's script, ms: springs in series lag by the root of m/k, a landing by the time guidance takes.
 const BEHIND_MS: f64 = 50.0;
-/// Deepest, µm: contact between guided faces makes room of 0.1 mm, so that a target can pull the part through what it would stand on; and once guidance
-/// has settled, when a part is to lie where it belongs.
+/// Deepest penetration, µm: contact between guided faces has an allowance of 0.1 mm, so that a target can pull the part through an edge that it would
+/// rest on; and the limit once guidance has settled, when a part should be in place.
 const DEEPEST_UM: f64 = 100.0;
 const SETTLED_UM: f64 = 5.0;
-/// Leading end off the axis, µm, and tilt, degrees, once guidance has settled: the end of a peg that stands still within 5 µm and that angle.
+/// Distance of the leading end from the axis, µm, and tilt, degrees, once guidance has settled: the end of a peg at rest is within 5 µm plus that
+/// angle.
 const TIP_UM: f64 = 10.0;
 const TILT_DEG: f64 = 0.02;
-/// The hand that pushes: its spring, N/m, damper, N s/m, and force, N; and how much longer than alone it may take.
+/// The hand that pushes: its spring, N/m, damper, N s/m, and force, N; and the most time it may take beyond a handle alone.
 const PUSHED_N_PER_M: f32 = 10.0;
 const PUSHED_N_S_PER_M: f32 = 20.0;
 const PUSHED_N: f64 = 2.0;
 const PUSHED_TIMES: f64 = 1.5;
-/// Clearances of the thesis pair, mm; the last is an exact fit.
+/// Clearances of the thesis pair, mm; 0 is an exact fit.
 const CLEARANCES_MM: [f64; 7] = [1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.0];
-/// The shorter form plays these on the emulated board; in-process it plays all.
+/// The shorter form plays these on the emulated board, and all of them in-process.
 const CLEARANCES_QUICK_MM: [f64; 2] = [1.0, 0.0];
 /// Value of [`ParameterId::Guidance`] for the blend of the thesis.
 const THESIS: f32 = 2.0;
 
-/// ISO 286 H7/g6 at 18 mm, as near as it may be: the smallest hole (+0) and the largest shaft (−6 µm).
+/// ISO 286 H7/g6 at 18 mm at its tightest: the smallest hole (+0) and the largest shaft (−6 µm).
 fn iso_fit() -> Fit {
     Fit {
         hole_mm: 18.0,
@@ -58,7 +59,7 @@ fn played(fit: &Fit, variant: &Variant, thesis: bool, specs: &[RigSpec]) -> Resu
     let file = fit.file()?;
     let mut scenario = insertion(fit, file.path())?;
     if fit.height_mm > 100.0 {
-        // Off by more than the play, so that they meet: 420 mm at 150 mm/s.
+        // Off by more than the clearance, so that they meet: 420 mm at 150 mm/s.
         let aside = 1.0 + 0.5 * fit.clearance_mm();
         scenario.hand.keyframes.truncate(1);
         for (t, down) in [(0.6, 17.0), (3.4, fit.height_mm - fit.engaged_mm + 2.0)] {
@@ -70,7 +71,7 @@ fn played(fit: &Fit, variant: &Variant, thesis: bool, specs: &[RigSpec]) -> Resu
         let name = ParameterId::Guidance.row().name.to_owned();
         scenario.parameters.insert(name, THESIS);
     }
-    // Every tick is looked at; the guide hears each tenth, as before.
+    // Every tick is recorded; the guide receives each tenth, as before.
     scenario.run.heed_every_ticks = Some(scenario.run.telemetry_every_ticks);
     scenario.run.telemetry_every_ticks = 1;
     let options = variant.options(Grabbable::Named(vec![scenario.scene.part.clone()]));
@@ -89,7 +90,7 @@ fn played(fit: &Fit, variant: &Variant, thesis: bool, specs: &[RigSpec]) -> Resu
         .collect()
 }
 
-/// From 1 mm clearance to none.
+/// Thesis pairs with clearances from 1 mm to none.
 pub(super) fn fits(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let variant = Variant::field(CELL_MM);
     let fits = CLEARANCES_MM
@@ -188,7 +189,7 @@ pub(super) fn fits(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
     Ok(())
 }
 
-/// The larger of both; NaN where either was never measured.
+/// The larger of the two; NaN where either was never measured.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() {
         f64::NAN
@@ -197,8 +198,8 @@ fn worse(a: f64, b: f64) -> f64 {
     }
 }
 
-/// A hand that leads nobody down: it holds the handle 1 mm and 2° off by a soft spring and pushes with a force. How long the peg then takes is up to
-/// what it meets; a handle alone takes b/k·ln(1/(1 − k·z/F)), a spring and a damper pushed.
+/// A hand that follows no script: it holds the handle 1 mm and 2° off by a soft spring and pushes with a constant force, so contact determines how
+/// long the peg takes. A handle alone, a spring and damper under a constant force, takes b/k·ln(1/(1 − k·z/F)).
 fn pushed(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     for clearance in [1.0, 0.02] {
         let fit = Fit::thesis(clearance).engaged(-20.0);
@@ -216,7 +217,7 @@ fn pushed(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             still(0.3, 0.0),
             still(0.301, PUSHED_N),
         ];
-        // Twice as long as a handle alone takes: so much later it is out at the other end.
+        // Twice the time of a handle alone, which is then out at the other end.
         scenario.run.duration_s = 1.7;
         scenario.run.telemetry_every_ticks = 1;
         scenario.run.heed_every_ticks = Some(10);

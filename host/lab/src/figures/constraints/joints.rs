@@ -1,4 +1,4 @@
-//! Joints of other kinds: taken apart, put together with a hand that is off, and what freedom is left named.
+//! Joints of other kinds: taken apart, assembled by a hand that is off, and the remaining freedom identified.
 
 use glam::DVec3;
 use mortise_guide::GuideSettings;
@@ -14,11 +14,11 @@ struct Joint {
     name: &'static str,
     step: &'static str,
     part: &'static str,
-    /// How far up it is taken out, mm.
+    /// Height to which the part is lifted out, mm.
     lift_mm: f64,
-    /// How far below its place the hand pulls in the end, mm: 400 N/m.
+    /// How far below the assembled position the hand pulls at the end, mm, through 400 N/m.
     pull_mm: f64,
-    /// Lower pair that is left, and its degrees of freedom.
+    /// Lower pair that remains, and its degrees of freedom.
     freedom: &'static str,
     count: usize,
 }
@@ -71,14 +71,14 @@ const JOINTS: [Joint; 5] = [
         count: 4,
     },
 ];
-/// Cells, mm: the largest of these parts then fits the board's flash.
+/// Cells, mm: with these the largest of the parts fits the board's flash.
 const CELL_MM: f64 = 0.7;
-/// Farthest from its place along the way in, mm, of what has a stop.
+/// Largest distance from the assembled position along the insertion direction, mm, for joints with a stop.
 const SEATED_MM: f64 = 0.05;
-/// Farthest from what any of its targets asks for, mm.
+/// Largest alignment error of any of its targets, mm.
 const MISFIT_MM: f64 = 0.05;
 
-/// A row or three for each joint.
+/// One to three rows for each joint.
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     JOINTS.iter().try_for_each(|joint| assemble(joint, out))
 }
@@ -156,8 +156,8 @@ fn assemble(joint: &Joint, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
 mod tests {
     use super::*;
 
-    /// The rows themselves, for what overload and guidance leave of a contact shows here first: a bolt once went through its seat, and a ball stood on
-    /// its socket's rim.
+    /// Measures the rows themselves, because errors of decimation and guidance in contact appear here first: a bolt once went through its seat, and a
+    /// ball stood on its socket's rim.
     #[test]
     fn every_joint_is_put_together() {
         let mut rows = 0;

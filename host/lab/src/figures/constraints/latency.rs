@@ -1,8 +1,8 @@
-//! From a touch on the board to a target in force, over the emulated board's serial line.
+//! Time from a touch on the board to a target in force, over the emulated board's serial line.
 //!
-//! Two clocks are added up: the board's own, in lockstep, from the touch to the sample that tells of it and from the target's arrival to the
-//! sample that tells it is in force; and this computer's, from that sample's end of run to the board's answer to the target: reading it, recognising,
-//! both ways of the line. An emulated board is slower than a real one, so a single clock would tell of the emulator.
+//! The time is a sum over two clocks. The board's own, in lockstep, counts from the touch to the sample that reports it and from the target's arrival
+//! to the sample that reports it in force. This computer's counts from the end of that sample's run to the board's answer to the target: reading the
+//! sample, recognition, both directions of the line. An emulated board is slower than a real one, so a single clock would measure the emulator.
 
 use std::time::Instant;
 
@@ -21,17 +21,17 @@ use crate::variant::Variant;
 
 const MEDIAN_MS: f64 = 30.0;
 const P99_MS: f64 = 100.0;
-/// Touches, and of the shorter form.
+/// Number of touches, in the full and in the shorter form.
 const TOUCHES: u32 = 100;
 const TOUCHES_QUICK: u32 = 20;
 /// Ticks between samples.
 const EVERY_TICKS: u16 = 5;
-/// Ticks of the hand's way down.
+/// Ticks of the hand's motion down.
 const DOWN_TICKS: u32 = 150;
-/// What must come comes within so many ticks.
+/// Ticks within which an expected sample must arrive.
 const PATIENCE_TICKS: u32 = 4000;
 
-/// The peg is set down 1 mm off on its hole's rim, again and again.
+/// Sets the peg down 1 mm off on its hole's rim, repeatedly.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let touches = if plan.quick { TOUCHES_QUICK } else { TOUCHES };
     let fit = Fit::thesis(0.2).engaged(-4.0);
@@ -75,17 +75,17 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
 struct Bench<'c, 's> {
     client: &'c Client,
     guide: Guide<'s>,
-    /// Where the handle takes hold, mm.
+    /// Where the hand holds the handle, mm.
     grip: DVec3,
-    /// This computer's part of the last target that was sent, ms.
+    /// This computer's share of the delay of the last target sent, ms.
     sent_ms: f64,
 }
 
 impl Bench<'_, '_> {
-    /// Down onto the rim until a target is in force, up until none is; gives the delay, ms.
+    /// Moves down onto the rim until a target is in force, then up until none is; returns the delay, ms.
     fn touch(&mut self, number: u32) -> Result<f64, LabError> {
         let (up, down) = (DVec3::ZERO, DVec3::new(1.0, 0.0, -5.0));
-        // The touch falls anywhere between two samples.
+        // Varies the tick of the touch between two samples.
         self.move_hand(up, down, DOWN_TICKS + number % u32::from(EVERY_TICKS))?;
         self.sent_ms = f64::NAN;
         let (mut untouched, mut touched) = (None, false);
@@ -98,12 +98,12 @@ impl Bench<'_, '_> {
         })?;
         self.move_hand(down, up, DOWN_TICKS)?;
         self.until(|sample| sample.guidance.active == 0 && sample.pairs.is_empty())?;
-        // It may have touched in the tick after the last sample that does not say so.
+        // The earliest tick of the touch is the one after the last sample without contact.
         let ticks = untouched.map_or(f64::NAN, |untouched| f64::from(active - (untouched + 1)));
         Ok(ticks + self.sent_ms)
     }
 
-    /// Takes the hand from one offset to another, mm from the grip.
+    /// Moves the hand from one offset to another, mm from the grip.
     fn move_hand(&self, from: DVec3, to: DVec3, ticks: u32) -> Result<(), LabError> {
         let keyframe = |tick, offset: DVec3| Keyframe {
             tick,
@@ -125,7 +125,7 @@ impl Bench<'_, '_> {
         Ok(())
     }
 
-    /// Guides from sample to sample until one is as wanted; gives its tick.
+    /// Guides from sample to sample until one is as `wanted`; returns its tick.
     fn until(&mut self, mut wanted: impl FnMut(&Telemetry) -> bool) -> Result<u32, LabError> {
         let mut left = PATIENCE_TICKS;
         while left > 0 {
@@ -133,7 +133,7 @@ impl Bench<'_, '_> {
             left -= batch;
             self.client.run(batch)?;
             let begun = Instant::now();
-            // The sample may come behind the answer to the run, but not behind this one.
+            // The sample may arrive after the answer to the run, but not after this answer.
             self.client.run(0)?;
             for event in self.client.events().try_iter() {
                 match event {

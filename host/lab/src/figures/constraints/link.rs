@@ -1,4 +1,4 @@
-//! Guidance over a link that fails.
+//! Guidance over a faulty link.
 
 use std::time::{Duration, Instant};
 
@@ -14,32 +14,32 @@ use crate::fit::Fit;
 use crate::guided::{SIM, inserted, insertion, key, largest_step, play_to};
 use crate::variant::Variant;
 
-/// Ticks between what the guide hears.
+/// Ticks between the samples that the guide receives.
 const HEAR_TICKS: u32 = 10;
-/// Largest step between two ticks while only guidance changes.
+/// Largest change of force, N, and torque between two ticks while only guidance changes.
 const FORCE_N: f64 = 0.05;
 const TORQUE_MNM: f64 = 2.0;
-/// What is felt over a faulty link, in times of what is over a sound one; a step also by what guidance alone may make of it.
+/// Largest step and force over a faulty link as a multiple of those over a fault-free one; a step may also reach the limit of guidance alone.
 const FACTOR: f64 = 1.2;
-/// A hand that has landed presses harder until it is guided: 22.5 mm/s on two springs in series, 400 and 1000 N/m.
+/// Growth of the force of a hand that has landed and is not yet guided: 22.5 mm/s on two springs in series, 400 and 1000 N/m.
 const LANDING_N_PER_MS: f64 = 22.5e-6 * 286.0;
-/// Where three of ten messages are lost three in a row are in one of forty: so long nothing is heard.
+/// Longest gap between messages received, ms: where three of ten are lost, three in a row are lost in one of forty cases.
 const LOST_MS: f64 = 30.0;
-/// Most over the sound link, which has none to be compared with: a hand's 400 N/m that lands 1 mm off with 23 mm/s, and guidance of 3 N and 0.1 N m.
+/// Largest step over the fault-free link, which has no reference: a hand of 400 N/m that lands 1 mm off at 23 mm/s, and guidance of 3 N and 0.1 N m.
 const ALONE_STEP_N: f64 = 0.3;
 const ALONE_STEP_NM: f64 = 0.01;
 const ALONE_N: f64 = 4.0;
 const ALONE_NM: f64 = 0.1;
-/// Cut of the link while the peg is held half-way, ms.
+/// Interval in which the link is cut while the peg is held half-way, ms.
 const CUT: Window = Window {
     at_ms: 1500,
     for_ms: 450,
 };
 
-/// When the hand holds still, and nothing swings any more, ms.
+/// Interval in which the hand holds still and oscillations have decayed, ms.
 const HELD_MS: [usize; 2] = [1450, 2350];
 
-/// Half-way in by 1.2 s, held there until 2.4 s, through by 3.6 s.
+/// Half-way in at 1.2 s, held there until 2.4 s, through at 3.6 s.
 fn prepared(clearance_mm: f64) -> Result<(Scenario, PreparedScene), LabError> {
     let fit = Fit::thesis(clearance_mm).engaged(-20.0);
     let file = fit.file()?;
@@ -60,7 +60,7 @@ fn prepared(clearance_mm: f64) -> Result<(Scenario, PreparedScene), LabError> {
     Ok((scenario, scene))
 }
 
-/// A fault of the board is an outcome here, not an error.
+/// Plays the scenario; a fault of the board is a result here, not an error.
 fn play(scenario: &Scenario, scene: &PreparedScene) -> Result<Result<Recording, String>, LabError> {
     let mut guide = scene.guide(GuideSettings::default());
     let mut due = 0;
@@ -84,7 +84,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     still.hand.tremor_mm = 0.0;
     cut(&still, &held_scene, out)?;
     let (scenario, scene) = prepared(0.02)?;
-    // Shorter than a target's expiry, longer, and so long that most of the insertion goes on without guidance.
+    // Stalls shorter than a target's expiry, longer than it, and so long that most of the insertion is unguided.
     let stall = |for_ms| Faults {
         stall: vec![Window { at_ms: 1200, for_ms }],
         ..Faults::default()
@@ -108,7 +108,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         flood_per_s: 200,
         ..Faults::default()
     };
-    // With each: how late the guide's first word may come, ms, and whether guidance lapses while the peg is held half-way.
+    // Each with the largest delay of the guide's first message, ms, and whether guidance lapses while the peg is held half-way.
     let mut cases = vec![
         ("nothing is wrong", Faults::default(), 0.0, false),
         ("nothing comes for 0.2 s", stall(200), 0.0, false),
@@ -133,13 +133,13 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     for (name, faults, late_ms, lapses) in cases {
         held(&still, &held_scene, name, faults.clone(), lapses, out)?;
         let steps = through(&scenario, &scene, (name, late_ms), faults, sound, out)?;
-        // The first is the sound one.
+        // The first case is the fault-free link, the reference.
         sound = sound.or(steps);
     }
     by_the_clock(&scene, out)
 }
 
-/// What is felt of an insertion.
+/// Forces of an insertion and their largest steps.
 #[derive(Clone, Copy)]
 struct FeltThere {
     /// Largest steps between two ticks, N and N m.
@@ -150,7 +150,7 @@ struct FeltThere {
     torque: f64,
 }
 
-/// The insertion of the 20 µm fit over a link with `faults`; what is felt of it, held against what is over a `sound` link.
+/// Plays the insertion of the 20 µm fit over a link with `faults` and compares its forces with those over a fault-free link (`sound`).
 fn through(
     scenario: &Scenario,
     scene: &PreparedScene,
@@ -189,7 +189,7 @@ fn through(
         force: recording.outcome.peak_force_n,
         torque: recording.outcome.peak_torque_nm,
     };
-    // Over a sound link nothing is to compare with: a hand that lands 1 mm off meets the block, and 3 N of guidance.
+    // The fault-free link has no reference: a hand that lands 1 mm off meets the block, and guidance pulls with 3 N.
     let bound = |sound_is: fn(&FeltThere) -> f64, slack: f64, alone: f64| {
         sound
             .as_ref()
@@ -222,7 +222,7 @@ fn through(
     Ok(Some(felt))
 }
 
-/// A peg held half-way, 1 mm off without tremor, over a link with `faults`: only guidance could change what is felt.
+/// A peg held half-way, 1 mm off without tremor, over a link with `faults`: only guidance can change the force on the handle.
 fn held(
     still: &Scenario,
     scene: &PreparedScene,
@@ -264,7 +264,7 @@ fn engagements(samples: &[Telemetry]) -> impl Iterator<Item = f32> {
     samples.iter().map(|sample| sample.guidance.engagement)
 }
 
-/// Steps while nothing but guidance changes.
+/// Steps of force and torque while only guidance changes.
 fn steps(what: &dyn Fn(&str) -> String, samples: &[Telemetry], out: &mut dyn FnMut(Row)) {
     let (force, torque) = largest_step(samples);
     out(Row::at_most(
@@ -281,7 +281,7 @@ fn steps(what: &dyn Fn(&str) -> String, samples: &[Telemetry], out: &mut dyn FnM
     ));
 }
 
-/// The same when the link is cut: guidance runs out and comes again.
+/// The same steps with a cut link: targets expire and are sent again.
 fn cut(still: &Scenario, scene: &PreparedScene, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let mut scenario = still.clone();
     scenario.faults = Some(Faults {
@@ -334,7 +334,7 @@ fn cut(still: &Scenario, scene: &PreparedScene, out: &mut dyn FnMut(Row)) -> Res
     Ok(())
 }
 
-/// By the wall clock, where the board counts the host's silence: a part in hand outlives a cut of 300 ms.
+/// In real time, in which the board measures the host's silence: the part stays in hand during a cut of 300 ms.
 fn by_the_clock(scene: &PreparedScene, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let client = Client::connect_with_faults(&RigSpec::Simulated { realtime: true })?;
     client.upload(&scene.image, &mut |_| {})?;

@@ -1,4 +1,4 @@
-//! Constraints: what touches is recognised, what is recognised guides, and neither costs a tick.
+//! Constraints: contacts are recognised, recognised contacts guide, and neither adds much to a tick.
 
 mod contacts;
 mod cost;

@@ -1,4 +1,4 @@
-//! A row of equal holes: a pin carried above it is pulled into none, whether targets are taken up by touch or near, and goes into the one it touches.
+//! A row of equal holes: a pin carried above it is pulled into none, whether targets engage on contact or near, and goes into the one it touches.
 
 use mortise_guide::{GuideSettings, When};
 use mortise_protocol::message::Telemetry;
@@ -8,20 +8,20 @@ use crate::LabError;
 use crate::figures::Row;
 use crate::guided::{SIM, file, key, play, play_with, script};
 
-/// Plate of 15 mm with ten holes of 8.05 mm, 16 mm apart, three of them taken, and a free pin of 8 × 30 mm.
+/// Plate of 15 mm with ten holes of 8.05 mm, 16 mm apart, three of them occupied, and a free pin of 8 × 30 mm.
 const STEP: &str = include_str!("../../../data/fixture_row.step");
-/// Where the three pins stand, as the file has it.
+/// Positions of the three pins, as written in the file.
 const TAKEN_X: [&str; 3] = ["-40.", "-24.", "40."];
-/// The free pin's place, and its middle's height, mm.
+/// Start of the free pin along the row, and height of its middle, mm.
 const START_X: f64 = 15.9;
 const START_Z: f64 = 55.0;
-/// Its middle's height with its end on the plate, mm.
+/// Height of its middle when its end is on the plate, mm.
 const LANDED_Z: f64 = 30.0;
-/// All holes, mm.
+/// Positions of all holes, mm.
 const HOLES_X: [f64; 10] = [-72.0, -56.0, -40.0, -24.0, -8.0, 8.0, 24.0, 40.0, 56.0, 72.0];
-/// How high it is carried, mm: nearer than a target is taken up when near, and farther.
+/// Heights at which the pin is carried, mm: nearer than the distance at which targets engage near, and farther.
 const ABOVE_MM: [f64; 2] = [1.0, 2.5];
-/// Free stretches of the row, mm.
+/// Unoccupied stretches of the row, mm.
 const SPANS_X: [(f64, f64); 3] = [(-16.0, 32.0), (-80.0, -48.0), (48.0, 80.0)];
 
 fn prepared(step: &str) -> Result<(Scenario, PreparedScene), LabError> {
@@ -34,19 +34,19 @@ fn prepared(step: &str) -> Result<(Scenario, PreparedScene), LabError> {
     Ok((scenario, scene))
 }
 
-/// The same with those three 200 mm above their holes, out of the way.
+/// The same plate with those three pins 200 mm above their holes, out of the way.
 fn emptied() -> String {
     TAKEN_X.iter().fold(STEP.to_owned(), |text, x| {
         text.replace(&format!("({x},0.,0.5)"), &format!("({x},0.,200.5)"))
     })
 }
 
-/// The hand so far along the row and so high above where the pin's end meets the plate.
+/// Keyframe at a position along the row and a height above that at which the pin's end meets the plate.
 fn at(t_s: f64, x: f64, above: f64) -> Key {
     key(t_s, [x - START_X, 0.0, LANDED_Z + above - START_Z], [0.0; 3])
 }
 
-/// Both rows.
+/// Measures both rows.
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let (mut scenario, scene) = prepared(STEP)?;
     for when in When::ALL {
@@ -67,7 +67,7 @@ fn carried(
 ) -> Result<(), LabError> {
     let (mut pulled, mut heard, mut lowest) = (0, 0, f64::INFINITY);
     for (from, to) in SPANS_X {
-        // Over the pins that stand in the row at 25 mm, over the free holes so far above them.
+        // Passes the standing pins at 25 mm, and the free holes at the height under test.
         scenario.hand.keyframes = vec![
             at(0.0, START_X, 25.0),
             at(0.8, from, 25.0),
@@ -98,7 +98,7 @@ fn carried(
         )
     };
     let pulls = what("samples in which a target pulled");
-    // Nearer than the approach that is asked for it is to be lined up with each hole it comes by; it must not be drawn into one.
+    // Below the engagement distance the pin should be aligned with each hole that it passes, but must not be drawn into one.
     out(
         if when == When::Near && above < GuideSettings::default().approach_mm {
             Row::told(pulls, pulled as f64, &format!("of {heard}"))
@@ -110,7 +110,7 @@ fn carried(
         what("lowest height of its end over the plate"),
         lowest - 15.0,
         "mm",
-        // Tremor of 0.2 mm and what a spring lags.
+        // 0.2 mm of tremor plus the spring's lag.
         above - 0.3,
         above,
     ));

@@ -1,4 +1,4 @@
-//! Nothing about a target is ever switched: force when it comes, goes or runs out; and how a stronger hand gets away.
+//! Targets never switch abruptly: force when a target arrives, leaves or expires; and escape from it with a stronger hand.
 
 use mortise_bake::Grabbable;
 use mortise_protocol::message::{ConstraintTarget, Telemetry, ToDevice};
@@ -12,19 +12,19 @@ use crate::fit::Fit;
 use crate::guided::{SIM, insertion, key, largest_step, play_to};
 use crate::variant::Variant;
 
-/// Largest step of force and torque between two ticks.
+/// Largest change of force, N, and torque between two ticks.
 const FORCE_N: f64 = 0.05;
 const TORQUE_MNM: f64 = 2.0;
-/// How near the cap: the coupling's share of it that already sets the part in motion, N, and a share of the cap.
+/// Tolerance of the cap: the coupling's share of it that already sets the part in motion, N, and a share of the cap.
 const CAP_WITHIN_N: f64 = 0.1;
 const CAP_WITHIN_SHARE: f64 = 0.03;
-/// Away: so far off the axis, mm; and how long that may take, ms.
+/// Escaped: distance from the axis, mm, and the longest time that may take, ms.
 const AWAY_MM: f64 = 5.0;
 const AWAY_MS: f64 = 200.0;
-/// Held: no farther off the axis, mm.
+/// Held: largest distance from the axis, mm.
 const HELD_MM: f64 = 0.1;
 
-/// The thesis pair with 1 mm clearance, and a hand that takes the peg along `keys`; telemetry each tick.
+/// The thesis pair with 1 mm clearance, and a hand that moves the peg along `keys`; telemetry each tick.
 fn prepared(
     engaged_mm: f64,
     keys: &[(f64, [f64; 3], [f64; 3])],
@@ -50,13 +50,13 @@ fn target(cap_n: f32) -> Result<ConstraintTarget, LabError> {
     })
 }
 
-/// Ticks after the hand's start.
+/// Number of ticks since the hand's start.
 fn since_start() -> impl FnMut(&Telemetry) -> u32 {
     let mut start = None;
     move |sample| sample.tick - *start.get_or_insert(sample.tick)
 }
 
-/// A peg 20 mm in its hole, held 1 mm and 2° off: a target comes and runs out, another comes and is cleared.
+/// A peg 20 mm in its hole, held 1 mm and 2° off: a target arrives and expires, another arrives and is cleared.
 pub(super) fn come_and_go(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     const COMES: u32 = 1000;
     const RUNS_OUT: u32 = 1500;
@@ -90,7 +90,7 @@ pub(super) fn come_and_go(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         ("is cleared", CLEARED, END),
     ] {
         let samples = between(from, to);
-        // Nothing is shown where nothing engaged.
+        // Without an engaged target the rows would prove nothing.
         let (force, torque) = if engaged(samples) == 1.0 {
             largest_step(samples)
         } else {
@@ -105,7 +105,7 @@ pub(super) fn come_and_go(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     Ok(())
 }
 
-/// A peg above its hole, where nothing but the target holds it, is pulled aside at 40 mm/s.
+/// Pulls a peg above its hole, where only the target holds it, aside at 40 mm/s.
 pub(super) fn leave(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     for cap_n in [1.0, 3.0, 8.0] {
         let keys = [

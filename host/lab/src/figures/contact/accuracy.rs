@@ -1,4 +1,4 @@
-//! How near distances come to closed form, and what a query takes here.
+//! Error of distances against the closed form, and the time of a query on this computer.
 
 use glam::{DQuat, DVec3};
 use mortise_bake::Grabbable;
@@ -12,7 +12,7 @@ use crate::peer;
 use crate::scene_p::{self, By};
 use crate::variant::Variant;
 
-/// The peer's meshes leave the surfaces by at most what our gaps may err, mm.
+/// Largest deviation of the peer's meshes from the surfaces, mm: the permitted error of Mortise's gaps.
 const PEER_DEFLECTION_MM: f64 = 0.005;
 
 /// Gap, penetration and time on scene P.
@@ -73,12 +73,12 @@ pub(super) fn scene_p(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     Ok(())
 }
 
-/// A peg in the middle of its hole touches nothing.
+/// A peg in the middle of its hole has no contact.
 pub(super) fn centred(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let fit = Fit::thesis(TIGHT_MM);
     let pose = NamedPose {
         name: "centred".into(),
-        // The peg's frame is at its upper end, upside down.
+        // The peg's frame is at its upper end and points downwards.
         position_mm: DVec3::new(0.0, 0.0, 0.5 * (fit.height_mm + fit.length_mm)),
         orientation: DQuat::from_rotation_x(std::f64::consts::PI),
     };
@@ -100,7 +100,7 @@ pub(super) fn centred(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         "contacts",
         0.0,
     ));
-    // Half the clearance, within what gaps may err: it is in the hole.
+    // Half the clearance, within the permitted error of gaps: it is in the hole.
     let gap = 500.0 * TIGHT_MM;
     out(Row::within(
         what(&field, "gap"),

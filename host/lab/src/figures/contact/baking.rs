@@ -1,4 +1,4 @@
-//! What baking takes, and whether every real part can be baked.
+//! Time and size of baking, and whether every real part can be baked.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -16,12 +16,12 @@ const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to thei
 const MOTOR: &str = "05_motor/motor_nested.step";
 /// Accuracy of the motor, mm.
 const ACCURACY_MM: f64 = 0.01;
-/// Most seconds it may take on two cores.
+/// Longest time, s, on two cores.
 const SECONDS: f64 = 60.0;
-/// Most that half the cell may cost: surface grows fourfold, and an eighth more is overhead.
+/// Largest factor on time and size when the cell is halved: surface cells grow fourfold, plus an eighth of overhead.
 const HALF_CELL: f64 = 4.5;
 
-/// Cell whose half is baked beside it, mm, and of the shorter form.
+/// Cell that is compared with half of it, mm, in the full and in the shorter form.
 const COMPARED_MM: f64 = 1.0;
 const COMPARED_QUICK_MM: f64 = 2.0;
 
@@ -34,7 +34,7 @@ pub(super) fn motor(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     let path = cad.join(MOTOR);
     let model = load_step(&path)?;
     let what = |what: &str| format!("{} parts of the motor, {what}", model.parts.len());
-    // Times are told, not judged, in the shorter form: it is a test, and other programs run beside it.
+    // Times are reported, not judged, in the shorter form: it runs as a test beside other programs.
     let timed = |what: String, value: f64, unit: &str, bound: f64| {
         if plan.quick {
             Row::told(what, value, unit).varies()
@@ -84,7 +84,7 @@ fn baked(path: &Path, model: &CadModel, variant: &Variant) -> Result<(f64, f64),
     Ok((start.elapsed().as_secs_f64(), baked.image.len() as f64))
 }
 
-/// Seconds, bytes, and whether the request is met.
+/// Time, s, size, bytes, and whether the requested accuracy is met.
 fn planned(path: &Path, model: &CadModel) -> Result<(f64, f64, bool), LabError> {
     let request = Request {
         accuracy_mm: ACCURACY_MM,
@@ -110,23 +110,23 @@ fn refusal(path: &Path) -> impl Fn(BakeError) -> LabError {
     }
 }
 
-/// Random points over all real parts together, and of the shorter form.
+/// Random points over all real parts together, in the full and in the shorter form.
 const SIGN_POINTS: usize = 100_000;
 const SIGN_POINTS_QUICK: usize = 5_000;
 /// Files of the shorter form, bytes at most.
 const SMALL_BYTES: u64 = 80 << 10;
 /// Cells of the field whose signs are compared, along a part's longest side.
 const SIGN_CELLS: f64 = 32.0;
-/// Longest time of the CAD kernel for one part, s: its classifier shoots a ray a point, and on free-form faces that takes milliseconds.
+/// Longest time of the CAD kernel for one part, s: its classifier shoots a ray for each point, which takes milliseconds on free-form faces.
 const SIGN_LIMIT_S: u64 = 60;
 
-/// A real file that can be read.
+/// A readable real file.
 struct RealFile {
     path: PathBuf,
     model: CadModel,
 }
 
-/// Every real file is baked, or refused in one line; inside and outside of every closed part against the CAD kernel's own classifier.
+/// Every real file is baked, or refused in one line; inside and outside of every closed part are compared with the CAD kernel's own classifier.
 pub(super) fn real_parts(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let what = if plan.quick {
         "real files by others, the small ones"
@@ -198,7 +198,7 @@ fn signs(plan: &Plan<'_>, of: &str, files: &[RealFile], out: &mut dyn FnMut(Row)
                         what: format!("signs of shape {index} cannot be compared: {error}"),
                     }
                 })?;
-            // Where a shell is open, the kernel's own answer means nothing.
+            // For an open shell the kernel's own answer is meaningless.
             if !check.closed {
                 continue;
             }

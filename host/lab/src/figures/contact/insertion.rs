@@ -1,4 +1,4 @@
-//! What goes into what, in the closed loop.
+//! Insertions in the closed loop, by collision alone.
 
 use super::limits::{CELL_MM, TIGHT_MM};
 use crate::LabError;
@@ -9,15 +9,15 @@ use crate::guided::SIM;
 use crate::motion::report;
 use crate::variant::Variant;
 
-/// Deepest anything goes at the forces of these insertions, mm: 1 N on the three points that carry least, and as much for their spacing.
+/// Deepest penetration at the forces of these insertions, mm: 1 N on three points (the fewest that carry it), and as much for their spacing.
 const DEEPEST_MM: f64 = 5e-3;
-/// How deep the peg has to come, mm: where the hand wants it, less what the hand's spring lags.
+/// Smallest depth of the peg, mm: the hand's end position less the lag of its spring.
 const THROUGH_MM: f64 = 41.5;
 const HAND: &str = "1 mm engaged, hand 0.3 mm and 2° off with 0.1 mm tremor at 10 Hz";
 
-/// The smallest clearance that assembles, each that is to assemble, and the image that takes.
+/// The smallest clearance that assembles, each required clearance, and the image size that it takes.
 pub(super) fn tight(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    // Below what is asked for too, to tell where it ends.
+    // Includes clearances below the required one, to find the limit.
     let clearances: Vec<f64> = (CLEARANCES_MM.into_iter())
         .filter(|&clearance| clearance <= 1.0 && (!plan.quick || clearance == 1.0 || clearance <= 0.1))
         .collect();
@@ -66,7 +66,7 @@ pub(super) fn tight(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     Ok(())
 }
 
-/// How one insertion went, by the exact surfaces in every tick.
+/// Result of one insertion, measured on the exact surfaces in every tick.
 fn each(variant: &Variant, trial: &Trial, out: &mut dyn FnMut(Row)) {
     let what = |what: &str| {
         let clearance = trial.clearance_mm;

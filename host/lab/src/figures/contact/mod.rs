@@ -1,4 +1,4 @@
-//! Contact: exact to micrometres, and cheap enough for the board.
+//! Contact: accurate to micrometres, at a cost that the board can afford.
 
 mod accuracy;
 mod baking;

@@ -1,4 +1,4 @@
-//! What a tick costs on the emulated board, counted in instructions.
+//! Cost of a tick on the emulated board, counted in instructions.
 
 use mortise_bake::SampleFormat;
 use mortise_rig::{EmulatedMode, RigSpec};
@@ -12,21 +12,22 @@ use crate::motion::{Motion, play, report};
 use crate::variant::Variant;
 use mortise_scenario::Outcome;
 
-/// Instructions a tick in contact may take.
+/// Largest number of instructions of a tick in contact.
 const CONTACT: f64 = 120_000.0;
-/// Instructions a tick in contact may take with the textbook's shell of 35,000 points.
+/// Largest number of instructions of a tick in contact with the textbook's shell of 35,000 points.
 const CLASSIC: f64 = 240_000.0;
-/// Voxels of the textbook's shell: with those of 10 mm that the thesis names, our rule for which are surface gives fewer points than it counts.
+/// Voxels of the textbook's shell, mm: at the 10 mm that the thesis states, Mortise's rule for surface voxels gives fewer points than the thesis
+/// counts.
 const CLASSIC_VOXEL_MM: f64 = 8.33;
-/// The budget that stays within that, look-ups; a scene is otherwise played with 520.
+/// Point budget within that limit, in field queries; otherwise a scene is played with 520.
 const CLASSIC_BUDGET: f32 = 1185.0;
-/// Ticks that may leave something out, %: the first look at everything round the peg takes more than one.
+/// Share of ticks that may decimate, %: the first search of everything around the peg takes more than one tick.
 const FIRST_LOOK_PERCENT: f64 = 5.0;
-/// Instructions a tick in free motion may take.
+/// Largest number of instructions of a tick in free motion.
 const FREE: f64 = 20_000.0;
-/// Times the points of the dense shell at least.
+/// Smallest number of points of the dense shell, as a multiple of the sparse one's.
 const DENSER: f64 = 10.0;
-/// Most that ten times the points may cost.
+/// Largest cost of ten times the points, as a multiple.
 const DENSER_COST: f64 = 1.5;
 
 fn emulated() -> RigSpec {
@@ -40,21 +41,21 @@ fn most(outcome: &Outcome) -> f64 {
     outcome.instructions_per_tick_max.map_or(f64::NAN, f64::from)
 }
 
-/// What is counted, and what it may cost.
+/// A scene and motion whose instructions are counted, with their bounds.
 struct Counted<'a> {
     variant: &'a Variant,
     fit: &'a Fit,
     motion: Motion,
-    /// Other than the board's own.
+    /// Point budget other than the board's default.
     point_budget: Option<f32>,
-    /// Most instructions a tick.
+    /// Largest number of instructions a tick.
     bound: f64,
-    /// Most of the ticks in which something may be left out, %; `None`: told.
+    /// Largest share of ticks that may decimate, %; `None`: reported without a bound.
     degraded_percent: Option<f64>,
 }
 
 impl Counted<'_> {
-    /// Plays the motion and tells its dearest tick, how much was left out, and whether it did what it says.
+    /// Plays the motion and reports its worst-case tick, the share of decimated ticks, and whether the motion was as specified.
     fn rows(&self, what: &str, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         let (outcome, broken) = play(
             self.variant,
@@ -86,11 +87,10 @@ impl Counted<'_> {
     }
 }
 
-/// The tight fit at the wall, and the same peg in the air: at the accuracy that distances and insertions are measured at, and as a scene is baked when
-/// nothing is asked for.
+/// The tight fit at the wall, and the same peg in free air: at the cell of the claimed accuracy and insertions, and as a scene is baked by default.
 pub(super) fn tight(_: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let fit = Fit::thesis(TIGHT_MM);
-    // The finer shell asks for more than the budget where it is pressed along both rims: how much is left out is told beside.
+    // The finer shell exceeds the budget where it is pressed along both rims; the share of decimated ticks is reported beside.
     for (variant, left_out) in [
         (Variant::field(CELL_MM), None),
         (Variant::board(CELL_MM), Some(FIRST_LOOK_PERCENT)),
@@ -120,7 +120,7 @@ pub(super) fn tight(_: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
     Ok(())
 }
 
-/// The thesis' 0.7 m block, with the shell of a bounded error, at any speed.
+/// The thesis' 0.7 m block, with the shell of bounded error, at any speed.
 pub(super) fn large(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let variant = Variant::field(10.0).epsilon_mm(0.05);
     let speeds: &[f64] = if plan.quick {
@@ -149,8 +149,8 @@ pub(super) fn large(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     Ok(())
 }
 
-/// The same with the textbook's shell: a point for each voxel that the surface crosses. The thesis counts 35,304 on this peg, with voxels of 10 mm
-/// and a rule of its own for which of them are surface; by ours it takes [`CLASSIC_VOXEL_MM`].
+/// The same with the textbook's shell: a point for each voxel that the surface crosses. The thesis counts 35,304 on this peg with voxels of 10 mm and
+/// its own rule for surface voxels; Mortise's rule gives as many at [`CLASSIC_VOXEL_MM`].
 pub(super) fn large_classic(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let (variant, fit) = (
         Variant::field(10.0)
@@ -188,13 +188,13 @@ pub(super) fn large_classic(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result
         motion: Motion::Pressed { mm_per_s: 20.0 },
         point_budget: Some(CLASSIC_BUDGET),
         bound: CLASSIC,
-        // Equal to looking at every point.
+        // Result equal to querying every point.
         degraded_percent: Some(FIRST_LOOK_PERCENT),
     }
     .rows(&what("pressed to the wall with 5 N, slid at 20 mm/s"), out)?;
     let speeds: &[f64] = if plan.quick { &[] } else { &[200.0, 1000.0] };
     for &mm_per_s in speeds {
-        // Faster than it can be followed it may degrade, but not miss.
+        // At speeds beyond the budget it may decimate, but not miss a tick.
         let motion = Motion::Pressed { mm_per_s };
         let (outcome, _) = play(&variant, &fit, motion, Some(CLASSIC_BUDGET), &emulated())?;
         let what = |of: &str| {
@@ -222,7 +222,7 @@ pub(super) fn large_classic(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result
     Ok(())
 }
 
-/// Ten times the points, where few of them touch.
+/// Ten times the points, of which few touch.
 pub(super) fn more_points(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let fit = Fit::thesis(1.0);
     let sparse = Variant::field(CELL_MM).epsilon_mm(0.05);
@@ -234,7 +234,7 @@ pub(super) fn more_points(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(
             .sum())
     };
     let base = points(&sparse)?;
-    // Points grow with the root of the bound at most.
+    // The number of points grows at most with the inverse square root of the error bound.
     let mut dense = sparse;
     let mut ratio = 1.0;
     while ratio < DENSER {
@@ -256,7 +256,7 @@ pub(super) fn more_points(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(
     if plan.quick {
         return Ok(());
     }
-    // In the hole every point of the peg's side is half a millimetre from a wall: no sparse contact, told for comparison.
+    // In the hole every point of the peg's side is half a millimetre from a wall: not a sparse contact, reported for comparison.
     let inserted = |variant: &Variant| trial(variant, &fit, &emulated()).map(|(_, outcome)| outcome);
     if let (Some(few), Some(many)) = (inserted(&sparse)?, inserted(&dense)?) {
         compared(&|of| what("on its way into the hole", of), &few, &many, None, out);
@@ -264,7 +264,7 @@ pub(super) fn more_points(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(
     Ok(())
 }
 
-/// What many points take and what few do, and how many were left out of it.
+/// Cost with many points over the cost with few, and the share of ticks that decimate.
 fn compared(
     what: &dyn Fn(&str) -> String,
     few: &Outcome,

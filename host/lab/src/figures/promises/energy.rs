@@ -1,4 +1,4 @@
-//! What targets give the hand, by the observer outside of the law: see `mortise_haptics::observer` for what is counted.
+//! Energy that targets give to the operator, by the observer outside the law: see `mortise_haptics::observer` for the account.
 
 use std::thread;
 
@@ -17,13 +17,13 @@ mod trial;
 
 use trial::{Bench, Seen, play};
 
-/// Most beyond what the hand brought, µJ.
+/// Largest energy beyond what the hand supplied, µJ.
 const MOST_UJ: f64 = 10.0;
-/// Sequences, in the full form and in the shorter one, and ticks of each.
+/// Number of sequences in the full form and in the shorter one, and ticks of each.
 const SEQUENCES: u64 = 10_000;
 const SEQUENCES_QUICK: u64 = 400;
 const TICKS: u32 = 2000;
-/// Clearance of the peg in its hole, mm; how deep it is at first, or how far above; and how far the hand goes, m.
+/// Clearance of the peg in its hole, mm; its depth at the start, or height above; and the range of the hand, m.
 const CLEARANCE_MM: f64 = 1.0;
 const PLACES: [(f64, f64); 2] = [(10.0, 3e-3), (-40.0, 30e-3)];
 
@@ -49,7 +49,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     Ok(())
 }
 
-/// Plays them on as many threads as there are cores: a sequence is made of its seed alone.
+/// Plays the sequences on as many threads as there are cores: a sequence depends only on its seed.
 fn sequences(scenes: &[Scene; 2], count: u64) -> Result<Vec<Seen>, LabError> {
     let threads = thread::available_parallelism().map_or(1, usize::from) as u64;
     thread::scope(|scope| {

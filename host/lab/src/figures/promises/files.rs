@@ -1,4 +1,4 @@
-//! Files and processes: what the program must not destroy, and what it refuses to read, by the program itself.
+//! Files and processes, tested on the program itself: what it must not destroy, and what it must refuse to read.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -55,18 +55,18 @@ fn pair(plan: &Plan<'_>) -> Result<String, LabError> {
     })
 }
 
-/// Inches in a millimetre.
+/// Inches per millimetre.
 const INCH: f64 = 1.0 / 25.4;
-/// Times the pair is placed.
+/// Number of placements of the pair.
 const PLACES: usize = 8;
-/// Points whose places are compared lie this far along the axes of a part, mm.
+/// Distance along a part's axes of the points whose positions are compared, mm.
 const REACH_MM: f64 = 100.0;
 
-/// The pair placed several times in an assembly in inches, each time by a turned and moved axis of its own: in one file, and from a file beside it. Both
-/// must have all parts, each where item 2 · (item 1)⁻¹ of ISO 10303-43 puts it.
+/// The pair placed several times in an assembly in inches, each time by a rotated and translated axis placement of its own: in one file, and from an
+/// external file. Both must have all parts, each where item 2 · (item 1)⁻¹ of ISO 10303-43 places it.
 ///
 /// # Errors
-/// When the pair cannot be read, or what is made of it.
+/// When the pair or a file made from it cannot be read.
 pub fn external_set(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let (place, text) = (folder()?, pair(plan)?);
     let (place, text) = (place.path(), text.as_str());
@@ -114,7 +114,7 @@ pub fn external_set(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     for model in &models {
         let mut left: Vec<&(&str, DAffine3)> = wanted.iter().collect();
         for part in &model.parts {
-            // Of those of this name, the one that is nearest to where it is: each is taken once.
+            // The nearest of the parts of this name, each used once.
             let far = |wanted: &DAffine3| {
                 let points = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|point| REACH_MM * point);
                 let apart = |p: DVec3| {
@@ -148,21 +148,22 @@ pub fn external_set(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     Ok(())
 }
 
-/// Axis of the pair that is placed, mm.
+/// Axis placement of the pair, mm.
 fn own(i: usize) -> DAffine3 {
     let i = i as f64;
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4 * i - PI, 0.3 * i, 0.2 + 0.7 * i);
     DAffine3::from_rotation_translation(turn, DVec3::new(7.0 - 3.0 * i, 11.0 * i, -5.0))
 }
 
-/// Axis of the assembly on which it lies, mm.
+/// Axis placement in the assembly onto which that of the pair is mapped, mm.
 fn given(i: usize) -> DAffine3 {
     let i = i as f64;
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 1.1 * i, 0.5 - 0.2 * i, 0.9 * i);
     DAffine3::from_rotation_translation(turn, DVec3::new(150.0 * i, 20.0, 30.0 - 40.0 * i))
 }
 
-/// An assembly in inches of the product definition `#child` with the representation `#shape`, in whose unit a millimetre is `scale`. Numbers from `first` on.
+/// An assembly in inches of the product definition `#child` with the representation `#shape`, in whose unit a millimetre is `scale`. Entity numbers
+/// start at `first`.
 fn assembly(first: u64, child: u64, shape: u64, scale: f64) -> String {
     let mut data = String::new();
     let mut next = first;
@@ -194,7 +195,7 @@ fn assembly(first: u64, child: u64, shape: u64, scale: f64) -> String {
     data
 }
 
-/// A context of representations in inches.
+/// A representation context in inches.
 fn inches(add: &mut impl FnMut(String) -> u64) -> u64 {
     let metre = add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.))".into());
     let measure = add(format!(
@@ -240,7 +241,7 @@ fn product(add: &mut impl FnMut(String) -> u64, name: &str, context: u64, origin
     (definition, representation)
 }
 
-/// The pair's text with the assembly in it.
+/// The pair's text with the assembly added.
 fn flat(text: &str) -> Option<String> {
     let (child, shape) = (
         number(text, "PRODUCT_DEFINITION(")?,
@@ -252,7 +253,7 @@ fn flat(text: &str) -> Option<String> {
     Some(format!("{}{assembly}{}", &text[..end], &text[end..]))
 }
 
-/// The assembly alone; what it places is in `pair.step`.
+/// The assembly alone; the parts that it places are in `pair.step`.
 fn set() -> String {
     let mut data = String::new();
     let mut next = 1;
@@ -279,7 +280,7 @@ fn set() -> String {
     )
 }
 
-/// Number of the first entity of a type; `before` is how its body begins.
+/// Number of the first entity whose text after the number begins with `before`.
 fn number(text: &str, before: &str) -> Option<u64> {
     let at = text
         .find(&format!("= {before}"))
@@ -288,7 +289,7 @@ fn number(text: &str, before: &str) -> Option<u64> {
     text[start + 1..at].trim().parse().ok()
 }
 
-/// Largest number of an entity.
+/// Largest entity number.
 fn largest(text: &str) -> Option<u64> {
     let numbers = text.lines().filter_map(|line| {
         let number = line.strip_prefix('#')?.split(['=', ' ']).next()?;
@@ -297,7 +298,7 @@ fn largest(text: &str) -> Option<u64> {
     numbers.max()
 }
 
-/// How many of the dangerous outputs are refused with everything left as it was, and how many there are.
+/// How many of the dangerous outputs are refused with every file unchanged, and how many there are.
 fn outputs(program: &Path, place: &Path, text: &str) -> Result<(u32, u32), LabError> {
     let write = |name: &str, bytes: &[u8]| {
         let path = place.join(name);
@@ -331,7 +332,7 @@ fn outputs(program: &Path, place: &Path, text: &str) -> Result<(u32, u32), LabEr
     Ok((kept, u32::try_from(cases.len()).unwrap_or(u32::MAX)))
 }
 
-/// Seconds until `text` is refused; infinite when it is not within a multiple of the bound.
+/// Time until `text` is refused, s; infinite when it is not within a multiple of the bound.
 fn refusal(program: &Path, place: &Path, text: Option<String>) -> Result<f64, LabError> {
     let Some(text) = text else {
         return Ok(f64::INFINITY);
@@ -343,7 +344,7 @@ fn refusal(program: &Path, place: &Path, text: Option<String>) -> Result<f64, La
     })?;
     let begun = Instant::now();
     let mut command = Command::new(program);
-    // Its own limit ends what would not be refused.
+    // Its own limit ends a run that would not be refused.
     command.args(["inspect", "--timeout", "20"]).arg(&path);
     let output = run(command)?;
     let words = String::from_utf8_lossy(&output.stderr).contains("not read within");
@@ -376,7 +377,7 @@ fn huge(text: &str) -> Option<String> {
     Some(format!("{}1.E308{}", &text[..start], &text[end..]))
 }
 
-/// The text with its first product placed twice in an assembly, that twice in the next, 24 times over.
+/// The text with its first product placed twice in an assembly, that twice in the next, 24 levels deep.
 fn bomb(text: &str) -> Option<String> {
     let mut child = number(text, "PRODUCT_DEFINITION(")?;
     let mut next = 1 + largest(text)?;

@@ -1,4 +1,4 @@
-//! Promises: what the pages on safety, protocol and files say, tried by somebody who wants it to fail.
+//! Promises: statements of the pages on safety, protocol and files, tested adversarially.
 
 mod energy;
 pub mod files;

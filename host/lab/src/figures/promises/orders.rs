@@ -5,14 +5,14 @@ use mortise_orders::{Broken, PROMISES, Report, enumerate, enumerate_topics};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 
-/// Events of the whole alphabet in the longest orders.
+/// Events in the longest orders over the whole alphabet.
 const DEPTH: usize = 4;
-/// Events of one topic in the longest orders.
+/// Events in the longest orders over one topic.
 const TOPIC_DEPTH: usize = 8;
 
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    // The shorter form covers one event less of everything.
+    // The shorter form covers orders one event shorter.
     let depth = DEPTH - usize::from(plan.quick);
     rows(
         &format!("orders of messages, all events, to depth {depth}"),
@@ -46,7 +46,7 @@ fn rows(what: &str, report: &Report, out: &mut dyn FnMut(Row)) {
     }
 }
 
-/// What an order that breaks the promise does.
+/// Description of the violation of a promise.
 fn words(promise: Broken) -> &'static str {
     match promise {
         Broken::NoChecksum => "motors live without the scene's checksum",

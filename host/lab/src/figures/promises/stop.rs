@@ -1,7 +1,7 @@
-//! STOP behind everything else: the output full, the host not reading, and commands waiting before it.
+//! STOP behind everything else: the output full, the host not reading, and commands queued ahead of it.
 //!
-//! The in-process rig in lockstep through raw bytes, so that ticks are counted. The host reads nothing while telemetry all but fills the line; then one
-//! write releases more ticks, asks 200 things whose answers find no room, and ends in STOP. Only then it reads.
+//! Uses the in-process rig in lockstep through raw bytes, so that ticks are counted. The host reads nothing while telemetry nearly fills the line;
+//! then one write releases more ticks, sends 200 requests whose answers have no space, and ends in STOP. Only then does the host read.
 
 use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
@@ -17,21 +17,21 @@ use mortise_scenario::{PreparedScene, Scenario};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 
-/// Commands before STOP.
+/// Commands ahead of STOP.
 const COMMANDS: usize = 200;
 /// Ticks released before STOP and not yet run.
 const RELEASED: u32 = 50;
 /// Share of the line that telemetry fills before.
 const FILLED: f64 = 0.95;
-/// A bound for what takes milliseconds: only a hang reaches it.
+/// Time limit of actions that take milliseconds: only a hang reaches it.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Long enough for the board to run all ticks it may and to take in what was written.
+/// Time for the board to run all released ticks and to read everything written.
 const PAUSE: Duration = Duration::from_millis(500);
 
 /// Measures the row.
 ///
 /// # Errors
-/// Anything that keeps the scene from being baked or the board from answering.
+/// Anything that prevents the scene from being baked or the board from answering.
 pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let ticks = ticks_until_off(plan, true)?;
     out(Row::exactly(
@@ -45,8 +45,8 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
     Ok(())
 }
 
-/// Ticks that run from the one in which the board has taken in STOP until the first without a wrench; without `stop`, the same with no STOP at the end.
-/// NaN when the output was not full, or the motors were not driven before.
+/// Ticks from the one in which the board has read STOP to the first without a wrench; without `stop`, the same sequence with no STOP at the end. NaN
+/// when the output was not full, or the motors were not driven before.
 ///
 /// # Errors
 /// As [`measure`].
@@ -83,7 +83,7 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
     ] {
         host.done(&message)?;
     }
-    // Past the ramp that follows arming.
+    // After the ramp that follows arming.
     let seen = host.ticks(1_000)?;
     let bytes_a_tick = seen.bytes as f64 / 1_000.0;
     let filling = (FILLED * PIPE_CAPACITY as f64 / bytes_a_tick) as u32;
@@ -91,7 +91,7 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
     std::thread::sleep(PAUSE);
 
     let mut burst = host.frame(&ToDevice::Run { ticks: RELEASED })?;
-    // Most of them with long answers, so that the output is full before the last.
+    // Most of them have long answers, so that the output is full before the last.
     let messages = [
         ToDevice::Release,
         ToDevice::GetCapabilities,
@@ -153,7 +153,7 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
     })
 }
 
-/// A hand that pushes and is never at rest, so that the motors are driven in every tick.
+/// A hand that pushes and trembles all the time, so that the motors are driven in every tick.
 fn trembling(pose: WirePose) -> HandScript {
     HandScript {
         stiffness: 400.0,
@@ -172,7 +172,7 @@ fn trembling(pose: WirePose) -> HandScript {
     }
 }
 
-/// A host of raw bytes.
+/// A host that reads and writes raw bytes.
 struct Host {
     reader: Box<dyn io::Read + Send>,
     writer: Box<dyn io::Write + Send>,
@@ -183,14 +183,14 @@ struct Host {
     session: Option<u32>,
 }
 
-/// What the board has said.
+/// Messages received from the board.
 #[derive(Default)]
 struct Seen {
     bytes: usize,
     telemetry: Vec<Telemetry>,
-    /// Ticks since start at the end of each run.
+    /// Ticks since start, as reported at the end of each run.
     ran: Vec<u32>,
-    /// Everything else.
+    /// All other messages.
     others: Vec<FromDevice>,
 }
 
@@ -235,7 +235,7 @@ impl Host {
         self.writer.write_all(&frame)
     }
 
-    /// Sends, and waits until it is done.
+    /// Sends the message and waits until it is done.
     fn done(&mut self, message: &ToDevice) -> io::Result<()> {
         self.send(message)?;
         let asked = self.sequence;
@@ -250,7 +250,7 @@ impl Host {
         seen.others.iter().find_map(answer).unwrap_or(Ok(()))
     }
 
-    /// Lets so many ticks run, and reads all of them.
+    /// Lets this many ticks run, and reads all of their telemetry.
     fn ticks(&mut self, ticks: u32) -> io::Result<Seen> {
         self.send(&ToDevice::Run { ticks })?;
         self.until(|seen| !seen.ran.is_empty())

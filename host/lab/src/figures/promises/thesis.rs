@@ -1,11 +1,11 @@
-//! The thesis repeated (Faas 2010, chapters 7 and 8): her printed values and ours.
+//! The thesis repeated (Faas 2010, chapters 7 and 8): its printed values and Mortise's.
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::hybrid::{self, Condition, PEGS_MM};
 use crate::study::{faas::TABLE_3, shrink};
 
-/// Her numbers of voxels are met within this share: lengths of 1 m are read off them, and how VPS counts voxels at edges is not known.
+/// Tolerance of the thesis' numbers of voxels, as a share: lengths of 1 m are inferred from them, and how VPS counts voxels at edges is not known.
 const VOXELS: f64 = 0.02;
 
 /// Measures every row.
@@ -26,7 +26,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             PEGS_MM[1],
             course.condition.name()
         );
-        // Both methods must give what they are known for; how far her blend helps depends on what she does not say.
+        // Both methods must show their known behaviour; how far the thesis' blend helps depends on unstated details.
         out(match (course.condition, course.faas_through) {
             (Condition::Voxels, Some(hers)) => Row::same(of, word(course.through), word(hers)),
             (Condition::DistanceField, _) => Row::same(of, word(course.through), word(true)),

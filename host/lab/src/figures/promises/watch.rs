@@ -1,4 +1,4 @@
-//! Promises on what is watched in every tick: dead encoders against still hands, and rotation.
+//! Promises on the checks of every tick: dead encoders against still hands, and rotation.
 
 use fastrand::Rng;
 use mortise_rig::RigSpec;
@@ -8,17 +8,17 @@ use crate::LabError;
 use crate::figures::stability::faults;
 use crate::figures::{Plan, Row};
 
-/// Seconds of the still press.
+/// Duration of the still press, s.
 const PRESS_S: f64 = 60.0;
-/// Random cases, in full and in short.
+/// Number of random cases, in the full and in the shorter form.
 const CASES: [u32; 2] = [200, 24];
-/// Same cases in every run.
+/// Seed of the cases, the same in every run.
 const SEED: u64 = 0x5743_7a8d;
 
-/// A still press, encoders that freeze under motion, a handle that turns too fast.
+/// A still press, encoders that freeze under motion, and a handle that turns too fast.
 ///
 /// # Errors
-/// Anything that keeps the scene from being baked or a run from being played.
+/// Anything that prevents the scene from being baked or a run from being played.
 pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let text = include_str!("../../../../../hil-tests/scenarios/input_stuck.toml");
     let mut scenario = Scenario::parse(text, "input_stuck")?;
@@ -67,11 +67,11 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
     Ok(())
 }
 
-/// The peg pressed onto the block with 10 N by a hand that does not move at all.
+/// The peg pressed onto the block with 10 N by a hand that does not move.
 fn still_press(scenario: &Scenario, scene: &PreparedScene) -> Result<Row, LabError> {
     let mut still = scenario.clone();
     still.hand.tremor_mm = 0.0;
-    // 35 mm beyond touching, through 400 N/m and 1,000 N/m in series; a coupling that bears it without slipping.
+    // 35 mm beyond touching, through 400 N/m and 1,000 N/m in series; a coupling that carries the force without slipping.
     if let Some(last) = still.hand.keyframes.last_mut() {
         last.offset_mm[2] = -55.0;
     }
@@ -82,7 +82,7 @@ fn still_press(scenario: &Scenario, scene: &PreparedScene) -> Result<Row, LabErr
     let client = connect(&still, &RigSpec::Simulated { realtime: false })?;
     let faults = match run_on(&client, &still, scene) {
         Ok(outcome) => {
-            // A press that was none shows nothing.
+            // Without a press the row would prove nothing.
             if outcome.peak_force_n > 9.5 { 0.0 } else { f64::NAN }
         }
         Err(ScenarioError::Fault { .. }) => 1.0,
@@ -92,7 +92,7 @@ fn still_press(scenario: &Scenario, scene: &PreparedScene) -> Result<Row, LabErr
     Ok(Row::exactly(what, faults, "", 0.0))
 }
 
-/// A random hand that is never at rest, in free air and pressed onto the block, and when which encoder freezes.
+/// A random hand that is never at rest, in free air and pressed onto the block; which encoder freezes, and when.
 fn frozen(scenario: &Scenario, random: &mut Rng) -> (Scenario, f64) {
     let mut between = |low: f64, high: f64| low + (high - low) * random.f64();
     let mut moved = scenario.clone();
@@ -100,7 +100,7 @@ fn frozen(scenario: &Scenario, random: &mut Rng) -> (Scenario, f64) {
     moved.hand = Hand {
         stiffness_n_per_m: stiffness as f32,
         damping_n_s_per_m: (stiffness * between(0.004, 0.02)) as f32,
-        // Half of them do not tremble.
+        // Half of the hands do not tremble.
         tremor_mm: between(-0.2, 0.2).max(0.0),
         tremor_hz: between(6.0, 12.0) as f32,
         keyframes: (0..12)

@@ -1,11 +1,11 @@
-//! Promises on the program itself, by running it: what it answers to a mistyped command.
+//! Promises on the program itself, tested by running it: its answer to a mistyped command.
 
 use std::process::{Command, Stdio};
 
 use crate::LabError;
 use crate::figures::{Plan, Row};
 
-/// Arguments, and what the one line of the answer must contain.
+/// Arguments, and the text that the one line of the answer must contain.
 const MISTYPED: [(&str, &str); 4] = [
     ("opne", "did you mean `open`?"),
     ("insepct", "did you mean `inspect`?"),
@@ -17,7 +17,7 @@ const MISTYPED: [(&str, &str); 4] = [
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let mut wrong = 0;
     for (argument, expected) in MISTYPED {
-        // Without a display: a program that opened a window would fail in other words instead of waiting to be closed.
+        // Without a display, a program that opened a window would fail with another message instead of waiting to be closed.
         let run = Command::new(plan.program)
             .arg(argument)
             .env_remove("DISPLAY")

@@ -1,4 +1,4 @@
-//! The boundary of a wall's stability, found with the product's tick, against the spectral radius of the linear loop.
+//! The stability boundary of a wall, found with the product's tick, against the spectral radius of the linear loop.
 
 use crate::LabError;
 use crate::figures::Row;
@@ -8,7 +8,7 @@ use crate::stability::oracle::{self, FINE, Law, Wall};
 use crate::stability::slab::Slab;
 use crate::variant::Variant;
 
-/// How near experiment and oracle must come.
+/// Largest difference between experiment and reference, percent.
 const WITHIN_PERCENT: f64 = 1.0;
 
 /// Four walls on a handle of 0.1 kg with 0.5 N s/m at 1 kHz.

@@ -1,4 +1,4 @@
-//! Two thousand points at once.
+//! Two thousand points in contact at once.
 
 use mortise_haptics::Integrator;
 
@@ -6,13 +6,13 @@ use crate::LabError;
 use crate::figures::Row;
 use crate::stability::press::{PUSH_N, press, settings, slab, touching};
 
-/// Stiffness of all of them together, N/m.
+/// Total stiffness of the contacts, N/m.
 const IN_ALL_N_PER_M: f32 = 1e6;
-/// Deepest at [`PUSH_N`], µm.
+/// Deepest penetration at [`PUSH_N`], µm.
 const DEEPEST_UM: f64 = 20.0;
-/// Still: the force varies by no more than a thousandth.
+/// Largest variation of the force at rest: a thousandth.
 const STILL_N: f64 = 1e-3 * PUSH_N;
-/// Trembling that anybody feels, N.
+/// Perceptible vibration, N.
 const FELT_N: f64 = 0.5;
 
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {

@@ -1,16 +1,16 @@
-//! Endurance: a board kept busy, and nothing that wears.
+//! Endurance: a board kept busy, whose memory, stack and timing must not degrade.
 
 use mortise_rig::{EmulatedMode, RigSpec};
 
 use super::{Plan, Row};
 use crate::{LabError, endurance};
 
-/// Virtual time, s: the hour, and the shorter form.
+/// Virtual time of the full and of the shorter form, s.
 const HOUR_S: u32 = 3_600;
 const QUICK_S: u32 = 180;
 const SEED: u64 = 1;
 
-/// An hour of virtual time on the emulated board with random scenes, a random hand and faults on the link; the rows say how long it was.
+/// An hour of virtual time on the emulated board with random scenes, a random hand and link faults; the rows state the duration.
 pub(super) fn hour(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let emulated = RigSpec::Emulated {
         mode: EmulatedMode::Lockstep,

@@ -1,4 +1,4 @@
-//! What the whole chain makes of nothing, in every closed-loop scenario there is.
+//! Energy that the whole chain generates, in every closed-loop scenario.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::figures::{Plan, Row};
 use crate::fit::Fit;
 use crate::stability::lapses;
 
-/// Most energy made at the handle over any interval, mJ, and of what passed, %.
+/// Largest energy generated at the handle over any interval, mJ, and as a share of the energy passed, %.
 const MADE_MJ: f64 = 1.0;
 const MADE_PERCENT: f64 = 1.0;
 
@@ -21,7 +21,7 @@ macro_rules! scenarios {
     };
 }
 
-/// Every scenario of the bench.
+/// Every scenario of the bench but the guided one.
 const SCENARIOS: &[(&str, &str)] = scenarios!(
     "insertion",
     "guided_fit",
@@ -33,9 +33,9 @@ const SCENARIOS: &[(&str, &str)] = scenarios!(
     "press_wall_5n",
     "load"
 );
-/// The one with targets, and a fit of its own.
+/// The scenario with targets and a fit of its own.
 const GUIDED: &str = "guided_fit";
-/// A minute long: left out of the shorter form.
+/// The scenario of a minute: omitted in the shorter form.
 const LONG: &str = "load";
 
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
@@ -51,7 +51,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         let guided = name == GUIDED;
         let outcome = play(name, text, if guided { tight.path() } else { plan.pair })?;
         let what = format!("scenario {name}, every tick");
-        // Readings are not good enough: what their rounding makes is more than some scenarios may.
+        // Readings are not accurate enough: their rounding generates more energy than some scenarios may.
         let exact = if outcome.energy_exact { 1.0 } else { f64::NAN };
         out(Row::at_most(
             format!("{what}: energy made at the handle over any interval"),
@@ -103,7 +103,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
 fn play(name: &str, text: &str, step: &Path) -> Result<Outcome, LabError> {
     let mut scenario = Scenario::parse(text, name)?;
     scenario.scene.step = step.to_owned();
-    // Every tick: the handle's true motion is known then, and what a held force does in it.
+    // With telemetry each tick the handle's true motion is known, and so is the work that a held force does on it.
     scenario.run.telemetry_every_ticks = 1;
     Ok(run(&scenario, &RigSpec::Simulated { realtime: false })?)
 }
@@ -112,8 +112,8 @@ fn play(name: &str, text: &str, step: &Path) -> Result<Outcome, LabError> {
 mod tests {
     use super::*;
 
-    /// The presses in which least passes, where a constant amount made weighs most: the ramp after the grab made an eleventh of it while it scaled
-    /// the wrench.
+    /// The presses that pass the least energy, where a constant error weighs most: the ramp after the grab generated an eleventh of it while it
+    /// scaled the wrench.
     #[test]
     fn what_passes_little_makes_little() {
         let pair = concat!(
@@ -136,8 +136,7 @@ mod tests {
         }
     }
 
-    /// A target that takes hold of a part beside its axis brings the energy of its pull from there; the observer must see it, and it is all there may
-    /// be.
+    /// A target that engages a part beside its axis supplies the energy of its pull. The observer must see that energy, and no more may appear.
     #[test]
     fn targets_are_seen_at_the_object_and_give_little() {
         let tight = Fit::thesis(0.02).engaged(-20.0).file().expect("written");

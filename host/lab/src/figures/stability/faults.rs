@@ -1,7 +1,7 @@
 //! Every fault in every state: what the motors do, and what the operator reads.
 //!
-//! Both planes of the board run here on a mechanism that does as told. Each case starts a board, brings it into the state by messages, lets one
-//! thing go wrong, and looks at what the motors were told in the tick that saw it and the one after.
+//! Both planes of the board run here on a mechanism that the test controls. Each case starts a board, brings it into the state by messages, causes
+//! one fault, and checks the motor commands in the tick that sees it and in the next.
 
 use std::cell::{Cell, RefCell};
 use std::path::Path;
@@ -29,12 +29,12 @@ use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 
-/// Ticks within which motors must be off or fading, the one that sees the fault counted.
+/// Ticks within which motors must be off or fading, including the one that sees the fault.
 const WITHIN_TICKS: u32 = 2;
-/// Missed ticks in a row that are a fault on this board.
+/// Consecutive missed ticks that are a fault on this board.
 const OVERRUN_TICKS: u8 = 3;
 
-/// States a board can be brought into.
+/// States into which a board can be brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Before {
     Boot,
@@ -69,16 +69,16 @@ impl Before {
     }
 }
 
-/// Axis of the faults that have one.
+/// Axis of the faults that name one.
 const AXIS: u16 = 1;
 
-/// Whether this bench can cause the fault. A damaged scene is detected when arming, which reads all of it, and has its own test
+/// True if this bench can cause the fault. A damaged scene is detected when arming, which reads all of it, and has its own test
 /// (`firmware/app/tests/link.rs`); no input is known that makes the computed wrench non-finite.
 fn can_be_caused(fault: &Fault) -> bool {
     !matches!(fault, Fault::SceneDamaged | Fault::NonFinite)
 }
 
-/// Whether a board with its motors off looks for this fault.
+/// True if a board with its motors off checks for this fault.
 fn seen_at_rest(fault: Fault) -> bool {
     matches!(
         fault,
@@ -94,7 +94,7 @@ fn seen_at_rest(fault: Fault) -> bool {
 /// Longest time from the first reading of a handle that turns too fast to motors off, ticks.
 ///
 /// # Errors
-/// Anything that keeps the scene from being baked.
+/// Anything that prevents the scene from being baked.
 pub(crate) fn ticks_until_off_when_turning(pair: &Path) -> Result<u32, LabError> {
     let scenario = Scenario::insertion(pair)?;
     let scene = PreparedScene::of(&scenario)?;
@@ -115,7 +115,7 @@ pub(crate) fn ticks_until_off_when_turning(pair: &Path) -> Result<u32, LabError>
                 let mut channels = Box::default();
                 let mut board = Board::start(&mut channels, &mut flash);
                 board.bring(state, scene.part);
-                // Just within the limit is no fault.
+                // Just within the limit there is no fault.
                 board.pull(|s| s.twist.angular = axis * (0.9975 * limit));
                 board.ticks(10);
                 let sound = board.control.safety().live();
@@ -133,10 +133,10 @@ pub(crate) fn ticks_until_off_when_turning(pair: &Path) -> Result<u32, LabError>
     Ok(longest)
 }
 
-/// How many cases there were, and how many of them went wrong in which way.
+/// Number of cases, and how many of them fail in which way.
 ///
 /// # Errors
-/// Anything that keeps the scene from being baked.
+/// Anything that prevents the scene from being baked.
 pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let scenario = Scenario::insertion(plan.pair)?;
     let scene = PreparedScene::of(&scenario)?;
@@ -157,9 +157,9 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
             if !quiet {
                 driven.push(case.clone());
             }
-            // The first fault is the one that is told; with motors off some are none.
+            // The first fault is the one reported; some are no faults while the motors are off.
             let told = matches!(state, Before::FadingInFault | Before::Faulted);
-            // A host that disarmed may leave before the fade is over.
+            // A host that disarmed may leave before the fade ends.
             let gone = state == Before::Disarming && matches!(fault, Fault::HostSilent { .. });
             let expected = !told && !gone && (state.live() || seen_at_rest(fault));
             if expected && words.is_none_or(|said| said != describe(board.as_seen(fault))) {
@@ -209,7 +209,7 @@ fn named(cases: &[String]) -> String {
     }
 }
 
-/// Shared with the mechanism and the clock.
+/// State shared by the test, the mechanism and the clock.
 struct Strings {
     sensed: RefCell<Sensed>,
     drive: Cell<Drive>,
@@ -259,7 +259,7 @@ impl Outbound for Wire {
     }
 }
 
-/// Both planes on one thread.
+/// Both planes of the board on one thread.
 struct Board<'c, 's> {
     link: LinkPlane<'c, 's, RamFlash<'s>>,
     control: ControlPlane<'c, 's, Puppet, Late>,
@@ -308,7 +308,7 @@ impl<'c, 's> Board<'c, 's> {
         }
     }
 
-    /// One call of the control plane, and what the host hears of it.
+    /// Runs one tick and one call of the control plane, and takes the messages to the host.
     fn tick(&mut self) {
         self.control.tick();
         self.link.poll(&mut self.wire);
@@ -325,11 +325,11 @@ impl<'c, 's> Board<'c, 's> {
         }
     }
 
-    /// Sends and lets the board take it.
+    /// Sends a message and lets the board take it.
     fn say(&mut self, message: &ToDevice) {
         let mut frame = [0; MAX_FRAME];
         self.seq = self.seq.wrapping_add(1);
-        // Every message fits a frame, and the wire has room for sixteen answers.
+        // Every message fits a frame, and the wire has space for sixteen answers.
         let stamp = Stamp {
             session: self.link.session(),
             count: u32::from(self.seq),
@@ -370,7 +370,7 @@ impl<'c, 's> Board<'c, 's> {
         self.control.safety().reported()
     }
 
-    /// Into a state, by messages alone.
+    /// Brings the board into a state by messages alone.
     fn bring(&mut self, state: Before, part: u16) -> bool {
         if state == Before::Boot {
             return self.state() == DeviceState::Boot;
@@ -387,7 +387,7 @@ impl<'c, 's> Board<'c, 's> {
         }
         if state != Before::Armed && state.live() {
             self.say(&ToDevice::Grab { part });
-            // A wrench to fade: the handle 4 mm ahead of the part.
+            // Builds up a wrench to fade: the handle is 4 mm ahead of the part.
             self.pull(|s| s.handle.position += Vec3::new(0.0, 0.0, 0.004));
             self.ticks(30);
         }
@@ -419,7 +419,7 @@ impl<'c, 's> Board<'c, 's> {
         }
     }
 
-    /// Lets something go wrong. Whether motors are off or stopping softly in time, and what the host reads of it.
+    /// Causes a fault. Returns whether the motors are off or stopping softly in time, and what the host reads.
     fn suffer(&mut self, fault: Fault) -> (bool, Option<String>) {
         self.told = None;
         let report = |axis, kind| Some(DriverFault { axis, kind });
@@ -434,7 +434,7 @@ impl<'c, 's> Board<'c, 's> {
             Fault::OverTemperature { axis } => {
                 self.pull(|s| s.driver_fault = report(axis, DriverFaultKind::OverTemperature));
             }
-            // No reading makes the law compute what is not finite: what would is refused as a bad reading.
+            // No reading makes the law compute a non-finite value: one that would is refused as a bad reading.
             Fault::BadReading | Fault::NonFinite => self.pull(|s| s.handle.position.y = f32::NAN),
             Fault::ImpossiblePosture => self.pull(|s| s.impossible_posture = true),
             Fault::ReferenceLost => self.pull(|s| s.referenced = false),
@@ -444,11 +444,11 @@ impl<'c, 's> Board<'c, 's> {
             Fault::OverSpeed => self.pull(|s| s.twist.linear = Vec3::new(0.0, 0.0, -3.0)),
             Fault::Workspace => self.pull(|s| s.handle.position = Vec3::new(0.0, 2.5, 0.0)),
             Fault::TickOverrun => {
-                // So many in a row are the fault: it is there with the last of them.
+                // The fault is this many in a row, reported with the last of them.
                 self.strings.missed.set(1);
                 within += u32::from(OVERRUN_TICKS) - 1;
             }
-            // Silence as long as is borne, then the tick that finds it too long.
+            // Silence up to the limit, then the tick that exceeds it.
             Fault::HostSilent { .. } | Fault::SceneDamaged => {
                 within += (ParameterId::HostTimeout.row().default * 1e3) as u32 + 1;
             }
@@ -462,7 +462,7 @@ impl<'c, 's> Board<'c, 's> {
         if let Some(Fault::HostSilent { silent_ms }) = self.told {
             self.silent_ms = silent_ms;
         }
-        // A host that was not there yet is told the state when it asks.
+        // A host that was not yet connected receives the state on request.
         let told = self.told.or(match self.state() {
             DeviceState::Fault(fault) => Some(fault),
             _ => None,
@@ -470,7 +470,7 @@ impl<'c, 's> Board<'c, 's> {
         (quiet, told.map(describe))
     }
 
-    /// The fault as this board saw it.
+    /// The fault as this board reports it.
     fn as_seen(&self, fault: Fault) -> Fault {
         match fault {
             Fault::HostSilent { .. } => Fault::HostSilent {

@@ -1,4 +1,4 @@
-//! Bytes that others wrote: what trying them by the million came to.
+//! Fuzzing of externally supplied bytes: the results of millions of inputs.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -7,14 +7,14 @@ use std::process::{Command, Stdio};
 use super::{Plan, Row};
 use crate::LabError;
 
-/// Each target so long, min: the whole, and the shorter form.
+/// Minutes for each target in the full and in the shorter form.
 const MINUTES: &str = "10";
 const QUICK_MINUTES: &str = "0.25";
-/// What is run, from the repository's root alone: it builds the targets with counters and sanitizer.
+/// The command, run from the repository's root alone: it builds the targets with counters and sanitizer.
 const COMMAND: [&str; 4] = ["xtask", "fuzz", "--json", "--minutes"];
 const TARGETS: &str = "hil-tests/fuzz/Cargo.toml";
 
-/// Every fuzz target, as `cargo xtask fuzz` tells of it.
+/// Every fuzz target, as `cargo xtask fuzz` reports it.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let what = "fuzzing what reads frames, scenes, rig descriptions and STEP files";
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {

@@ -1,4 +1,4 @@
-//! A blow at a metre a second on a thin wall, flat and tilted.
+//! Impact at a metre per second on a thin wall, flat and tilted.
 
 use mortise_haptics::Settings;
 
@@ -6,19 +6,19 @@ use crate::LabError;
 use crate::figures::Row;
 use crate::stability::impact::{METHODS, Strike, WALL_MM, strike, wall};
 
-/// So many speeds up to 1 m/s, a tenth of it apart at the most: where within a tick the blow falls differs with each.
+/// Number of speeds up to 1 m/s, at most a tenth of it apart: the phase of the impact within a tick differs with each.
 const SPEEDS: u32 = 21;
 /// A wall thinner than half a cell, mm.
 const THIN_MM: f64 = 0.2;
 /// Angles of the part's axis off the wall's normal, degrees: flat, and on its rim.
 const TILTS_DEG: [f64; 2] = [0.0, 10.0];
-/// Deepest, µm: 12 N, the most that is ever felt, on the one point that a rim touches with, and as much for the blow.
+/// Deepest penetration, µm: 12 N, the largest force at the handle, on the one point with which a rim touches, and as much for the impact.
 const DEEPEST_UM: f64 = 120.0;
 
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let most_n = f64::from(Settings::default().limits.force_n);
     for (index, (method, variant, integrator)) in METHODS.into_iter().enumerate() {
-        // The first method is ours; the others stand beside it, flat on the thicker wall.
+        // The first method is Mortise's; the others are compared flat on the thicker wall.
         let ours = index == 0;
         let walls: &[f64] = if ours { &[WALL_MM, THIN_MM] } else { &[WALL_MM] };
         for &thick_mm in walls {

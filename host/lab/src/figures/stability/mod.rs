@@ -1,4 +1,4 @@
-//! Stability: where theory puts the boundary, what the whole loop does on either side of it, and what it makes of nothing.
+//! Stability: the theoretical boundary, the behaviour of the whole loop on either side of it, and the energy it generates.
 
 mod boundary;
 mod contacts;

@@ -1,4 +1,4 @@
-//! What a slower tick costs: the coupling stays passive, and less stiffness is to be had.
+//! Effect of a slower tick: the coupling stays passive, at a lower stiffness.
 
 use mortise_haptics::Settings;
 
@@ -10,18 +10,18 @@ use crate::stability::oracle::{self, COARSE, Law, Wall};
 use crate::stability::slab::Slab;
 use crate::variant::Variant;
 
-/// Pressed with this, N, tapped with this, m/s, for so long, s.
+/// Press force, N, tap speed, m/s, and duration, s.
 const PRESS_N: f64 = 5.0;
 const TAP_M_PER_S: f64 = 0.1;
 const WATCH_S: f64 = 4.0;
-/// Most that may be made, mJ.
+/// Largest energy generated, mJ.
 const MADE_MJ: f64 = 1.0;
 
 /// Default settings at 1000, 500 and 250 Hz: a loose hand presses, taps every half second, and lets go.
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.05)?;
     let scene = slab.scene()?;
-    // Nobody damps: the mechanism's own friction only.
+    // The hand has no damping: only the mechanism's own friction remains.
     let mut rig = Rig::held();
     rig.plant.stiffness = 0.0;
     rig.plant.damping = 1.0;

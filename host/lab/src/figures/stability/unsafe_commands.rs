@@ -1,10 +1,9 @@
-//! Random inputs to the tick, and every force command looked at.
+//! Random inputs to the tick, with a check of every force command.
 //!
-//! Unsafe is a command that is not finite, one beyond the limits in force, and one that gives power into a wall: the peg is pressed onto the slab,
-//! the handle beyond it and on its way further, and the force points that way too. Left out of that last count are ticks in which the slew limit
-//! still takes an earlier force back, and those in which the peg does not touch or falls ahead of the handle. One input in twenty is absurd (not a
-//! number, infinite, out of all proportion, not a rotation); limits and gains change at random every 500 inputs. The implicit step, which is the
-//! board's default.
+//! A command is unsafe if it is not finite, exceeds the limits in force, or delivers power into a wall: the peg is pressed onto the slab, the handle
+//! is beyond it and moves further, and the force points the same way. That last count excludes ticks in which the slew limit still reduces an earlier
+//! force, and those in which the peg does not touch or moves ahead of the handle. One input in twenty is absurd (not a number, infinite, of absurd
+//! magnitude, not a rotation); limits and gains change at random every 500 inputs. The tick uses the implicit step, the board's default.
 
 use std::thread;
 
@@ -17,25 +16,25 @@ use crate::figures::{Plan, Row};
 use crate::stability::slab::Slab;
 use crate::variant::Variant;
 
-/// Inputs in all, and in the shorter form.
+/// Number of inputs, in the full and in the shorter form.
 const INPUTS: u64 = 10_000_000;
 const QUICK: u64 = 200_000;
-/// Threads; each has inputs of its own.
+/// Threads; each draws inputs of its own.
 const SHARES: u64 = 2;
 /// Inputs from one grab to the next.
 const EPISODE: u64 = 500;
 /// Ticks from one velocity of the hand to the next.
 const STROKE: u64 = 20;
-/// The peg touches when the slab pushes it with more than this, N.
+/// Force of the slab on the peg above which the peg counts as touching, N.
 const TOUCHING_N: f32 = 0.5;
-/// The handle is beyond the wall by more than this, m: far more than the peg sinks in.
+/// Distance of the handle beyond the wall above which it counts as beyond, m: far more than the peg sinks in.
 const BEYOND_M: f32 = 0.5e-3;
-/// Force into the wall that counts, N: a thousandth of the least limit.
+/// Smallest force into the wall that counts, N: a thousandth of the smallest limit.
 const LEAST_N: f32 = 2e-3;
-/// The limit is kept but for a rounding of the vector's length.
+/// Tolerance of the limit: rounding of the vector's length.
 const ROUNDING: f32 = 1.000_001;
 
-/// What was unsafe.
+/// Counts of unsafe commands.
 #[derive(Clone, Copy, Debug, Default)]
 struct Unsafe {
     inputs: u64,
@@ -48,10 +47,10 @@ struct Unsafe {
     into_wall: u64,
 }
 
-/// Three rows that must be 0, and what they are of.
+/// Three rows that must be 0, and the number of inputs behind them.
 ///
 /// # Errors
-/// Anything that keeps the scene from being baked.
+/// Anything that prevents the scene from being baked.
 pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let inputs = if plan.quick { QUICK } else { INPUTS };
     let slab = Slab::bake(&Variant::board(1.0), 10.0, 0.0)?;
@@ -65,7 +64,7 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
             })
             .collect();
         for share in shares {
-            // A panic of the tick is what must not be: let it through.
+            // A panic of the tick is the failure under test: propagate it.
             let found = share
                 .join()
                 .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
@@ -86,7 +85,7 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
         inputs as f64,
         f64::INFINITY,
     ));
-    // Else the zeros below would say nothing.
+    // Without forces the zeros below would prove nothing.
     out(Row::within(
         format!("{what}: share with a force"),
         share(sum.felt, sum.inputs),
@@ -120,7 +119,7 @@ fn share(part: u64, all: u64) -> f64 {
     100.0 * part as f64 / all.max(1) as f64
 }
 
-/// The same inputs every time.
+/// Random numbers, the same in every run.
 struct Random(Rng);
 
 impl Random {
@@ -167,7 +166,7 @@ fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsaf
     while found.inputs < inputs {
         if found.inputs.is_multiple_of(EPISODE) {
             state.load_scene(scene);
-            // The peg stands on the slab; the handle takes hold of it at the world's origin. It can be grabbed: the baker made it so.
+            // The peg stands on the slab; the handle grabs it at the world's origin. It can be grabbed: the baker made it so.
             let grabbed = state.grab(scene, part, &Pose::IDENTITY);
             debug_assert!(grabbed.is_ok(), "{grabbed:?}");
             hand = Hand::at_rest();
@@ -196,8 +195,8 @@ fn share_of(scene: &SceneImage<'_>, part: u16, inputs: u64, share: u64) -> Unsaf
         }
         let taking_back = output.work.flags.intersects(Flags::FORCE_SLEW);
         let into = input.handle.position.z < -BEYOND_M && input.handle_twist.linear.z < 0.0;
-        // Speed of the peg's point under the handle; `object` is about the peg's own frame, the twist about its centre of mass. Falling flat onto the
-        // slab from its rim the peg may run ahead of the handle, and drags it along as a body does: that is no wall's doing.
+        // Speed of the peg's point under the handle; `object` is about the peg's own frame, the twist about its centre of mass. A peg that falls flat
+        // onto the slab from its rim may run ahead of the handle and drags it along as a body does; the wall does not cause that.
         let peg = output.object_twist;
         let arm = input.handle.position - output.object.position;
         let ahead = (peg.linear + peg.angular.cross(arm)).z < input.handle_twist.linear.z;
@@ -227,7 +226,7 @@ impl Hand {
         }
     }
 
-    /// Another velocity: back when it has come too far. Within 8 mm the peg stays over the slab.
+    /// Draws another velocity, back when the hand is too far out. Within 8 mm the peg stays over the slab.
     fn turn(&mut self, random: &mut Random) {
         self.linear = random.vector(0.4);
         self.angular = random.vector(1.0);
@@ -244,7 +243,7 @@ impl Hand {
         }
     }
 
-    /// A tick further.
+    /// Moves on by one tick.
     fn moved(&mut self) -> Input {
         const TICK_S: f32 = 1e-3;
         self.position += self.linear * TICK_S;
@@ -259,7 +258,7 @@ impl Hand {
         }
     }
 
-    /// The same with one number that none should be.
+    /// The same input with one absurd number.
     fn absurd(&self, random: &mut Random) -> Input {
         let number = random.absurd();
         let mut position = self.position;
@@ -280,7 +279,7 @@ impl Hand {
     }
 }
 
-/// Gains and limits an operator can set.
+/// Gains and limits that an operator can set.
 fn some_settings(random: &mut Random) -> Settings {
     let mut settings = Settings::default();
     settings.coupling.k_t_n_per_m = random.even(200.0, 2000.0);
