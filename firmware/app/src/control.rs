@@ -443,8 +443,8 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             self.ramp = self.ramp.saturating_add(1).min(RAMP_TICKS);
             let ramping = self.ramp < RAMP_TICKS;
             let [position, angle] = self.mechanism.count();
-            let told = &mut self.settings.law.passivity;
-            (told.position_count_m, told.angle_count_rad) = (position, angle);
+            let passivity = &mut self.settings.law.passivity;
+            (passivity.position_count_m, passivity.angle_count_rad) = (position, angle);
             self.ends.law.set_slipping(ramping);
             let ramped;
             let law = if ramping {

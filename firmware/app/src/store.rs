@@ -315,7 +315,7 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         rig::keep(&mut self.flash, rig)
     }
 
-    /// The flash, for a test that looks at it.
+    /// The flash, for inspection by a test.
     pub fn into_flash(self) -> F {
         self.flash
     }

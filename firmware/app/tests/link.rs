@@ -79,7 +79,7 @@ fn nothing_but_hello_and_stop_before_hello() {
     assert_eq!(
         bench.ask(&ToDevice::Hello(other)),
         FromDevice::Hello(Version::own()),
-        "a stranger is told who this is"
+        "a host of another schema receives this version"
     );
     assert_eq!(bench.request(&ToDevice::Arm), Err(Refusal::NotGreeted));
     bench.greet();
@@ -444,7 +444,7 @@ fn logs_are_sent_in_pieces_that_fit() {
 }
 
 #[test]
-fn targets_are_taken_and_told_of() {
+fn targets_are_accepted_and_reported() {
     let mut bench: Bench = Bench::new(TestFlash::leaked());
     bench.ticks(1);
     bench.greet();

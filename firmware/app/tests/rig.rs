@@ -70,7 +70,7 @@ fn a_cell_that_fails_is_found_wherever_it_is() {
     assert_eq!(kept(&flash), Kept::Rig(arm()));
 }
 
-fn told(bench: &mut Bench) -> (Option<Rig>, bool) {
+fn reported(bench: &mut Bench) -> (Option<Rig>, bool) {
     match bench.ask(&ToDevice::GetRig) {
         FromDevice::Rig { rig, in_use } => (rig, in_use),
         other => panic!("{other:?}"),
@@ -83,15 +83,15 @@ fn a_description_is_in_use_from_the_next_start_on_and_scenes_stay() {
     let mut bench: Bench = Bench::new(flash.clone());
     bench.greet();
     bench.upload(&two_parts(1)).unwrap();
-    assert_eq!(told(&mut bench), (None, true));
+    assert_eq!(reported(&mut bench), (None, true));
     bench.request(&ToDevice::SetRig(arm())).unwrap();
-    assert_eq!(told(&mut bench), (Some(arm()), false));
+    assert_eq!(reported(&mut bench), (Some(arm()), false));
     bench.request(&ToDevice::Arm).unwrap();
     let refused = bench.request(&ToDevice::SetRig(paddle()));
     assert!(matches!(refused, Err(Refusal::State(_))), "{refused:?}");
     let mut bench: Bench = Bench::new(flash.clone());
     bench.greet();
-    assert_eq!(told(&mut bench), (Some(arm()), true));
+    assert_eq!(reported(&mut bench), (Some(arm()), true));
     assert!(bench.capabilities().scene.is_some());
     assert_eq!(Store::open(flash).rig(), Kept::Rig(arm()));
 }
@@ -104,7 +104,7 @@ fn what_cannot_be_a_rig_is_refused_with_the_reason_and_the_one_before_stays() {
         let mut rig = arm();
         change(&mut rig);
         let answer = bench.request(&ToDevice::SetRig(rig));
-        assert_eq!(told(&mut bench).0, Some(paddle()));
+        assert_eq!(reported(&mut bench).0, Some(paddle()));
         match answer {
             Err(Refusal::Rig(fault)) => fault,
             other => panic!("{other:?}"),

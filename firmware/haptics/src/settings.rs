@@ -63,7 +63,7 @@ pub struct Settings {
     pub guidance: GuidanceSettings,
     /// How much energy the coupling may generate.
     pub passivity: PassivitySettings,
-    /// What may reach the motors.
+    /// Limits on the wrench to the motors.
     pub limits: LimitSettings,
     /// Time from tick to tick (h in the notation), s. Default 1 ms.
     pub period_s: f32,
@@ -111,7 +111,7 @@ group! {
         total_stiffness_n_per_m: f32 = 20e6, 1000.0 => 1e9;
         /// Damping on approach as a ratio of stiffness, s: λ = k·(depth + damping_s · approach speed).
         damping_s: f32 = host(ParameterId::ContactDamping), 0.0 => 0.01;
-        /// Points that come this near in a tick, by twice the motion so far or without contacts, enter the step, m.
+        /// Distance within which points enter the step, m: by the end of a tick with twice the motion so far, or twice the motion without contacts.
         margin_m: f32 = 5e-6, 1e-6 => 1e-3;
         /// Largest work of a tick, in field queries of about 190 instructions: a tree node queried counts 1½, a point out of reach 1, one within the margin
         /// 1¾, one that may touch 3⅛, a solve 8 and 5 more for each target ([`crate::cost`]). With the default, of the motions measured with up to four targets none takes
@@ -166,7 +166,7 @@ group! {
         /// Upper bound of its largest radius of gyration, m: the inertia of a larger part is scaled down as a whole, so that the rotational
         /// coupling stays as well damped as with a part that fits the hand.
         gyration_max_m: f32 = 20e-3, 1e-3 => 1.0;
-        /// No point of the object moves faster, m/s: the object lags a faster handle instead of outrunning the look-ahead.
+        /// Speed limit of every point of the object, m/s: the object lags a faster handle instead of exceeding the look-ahead.
         speed_max_m_per_s: f32 = 1.0, 0.01 => 10.0;
     }
 }
@@ -174,11 +174,11 @@ group! {
 group! {
     /// How constraint targets guide; see `constraints` in the sources.
     GuidanceSettings: "guidance" {
-        /// How a target pulls.
+        /// Force law of targets.
         method: GuidanceMethod = GuidanceMethod::Capped;
         /// Allowance added to gaps between guided faces, m.
         allowance_m: f32 = 0.1e-3, 0.0 => 1e-3;
-        /// τ: time in which the remaining way falls to 1/e, s.
+        /// τ: time in which the remaining distance falls to 1/e, s.
         time_s: f32 = 20e-3, 1e-3 => 1.0;
         /// Whether mating faces that an engaged target keeps apart are excluded from contact: the forces are the same.
         exclusions: bool = true;
@@ -188,7 +188,7 @@ group! {
 /// How a target pulls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GuidanceMethod {
-    /// Not at all: what was engaged fades.
+    /// No force: engaged targets fade.
     Off,
     /// Stiff up to a largest force.
     Capped,
@@ -199,21 +199,21 @@ pub enum GuidanceMethod {
 group! {
     /// How much energy the coupling may generate; see `passivity` in the sources.
     PassivitySettings: "passivity" {
-        /// Largest energy that the coupling may generate and not have dissipated, J; from half of it on the wrench is reduced. 0 switches observer and
-        /// valve off. The default is a tap of 0.1 kg at 0.1 m/s.
+        /// Largest generated energy of the coupling in excess of its dissipation, J; above half of it the wrench is reduced. 0 switches observer and
+        /// valve off. The default is the kinetic energy of 0.1 kg at 0.1 m/s.
         tank_j: f32 = 0.5e-3, 0.0 => 0.1;
-        /// E₀: energy that targets may deliver to the hand beyond what it has put in, J. Infinite: no bound, for comparison. Of the 10 µJ that the hand is
-        /// promised, the rest is for what encoders and the coupling generate.
+        /// E₀: energy that targets may deliver to the operator beyond the energy that the operator supplied, J. Infinite: no bound, for comparison. The
+        /// rest of the guaranteed 10 µJ is for the energy that encoders and the coupling generate.
         initial_budget_j: f32 = 8e-6;
-        /// The handle's own viscous friction, N s/m, as far as it is certain: the energy that it dissipates may be generated.
+        /// Lower bound of the handle's own viscous friction, N s/m: the coupling may generate the energy that it dissipates.
         damping: f32 = 0.0, 0.0 => 20.0;
         /// The same in rotation, N m s/rad.
         angular_damping: f32 = 0.0, 0.0 => 0.1;
-        /// Whole ticks from a wrench to the motors that give it. 0: they give it within the period.
+        /// Whole ticks of delay from a wrench to the motors. 0: they apply it within the period.
         delay_ticks: u32 = 0, 0 => MAX_DELAY_TICKS;
-        /// Counts of the encoders at the handle, m: its position is measured within half of this. 0: exactly, or not known.
+        /// Size of an encoder count at the handle, m: its position is measured within half of this. 0: exact, or unknown.
         position_count_m: f32 = 0.0, 0.0 => 1e-3;
-        /// The same of its orientation, rad.
+        /// The same for its orientation, rad.
         angle_count_rad: f32 = 0.0, 0.0 => 0.1;
     }
 }
@@ -270,7 +270,7 @@ pub struct SettingsError {
     pub name: &'static str,
     /// The value refused.
     pub value: f32,
-    /// What would be accepted.
+    /// The accepted range.
     pub range: Range,
 }
 
@@ -290,7 +290,7 @@ impl Settings {
     /// Checks every number against its range.
     ///
     /// # Errors
-    /// [`SettingsError`] with the first that is outside of its range, or not a number.
+    /// [`SettingsError`] with the first that is outside its range or not a number.
     pub fn validate(&self) -> Result<(), SettingsError> {
         self.coupling.validate()?;
         self.contact.validate()?;

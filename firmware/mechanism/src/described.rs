@@ -13,7 +13,7 @@ pub struct DescribedMechanism {
     joints: Joints,
     watch: EncoderWatch<ENCODERS>,
     /// A grabbed part is rendered.
-    felt: bool,
+    rendered: bool,
     /// Currents without the encoders' probes, A.
     driven: [f32; MAX_JOINTS],
     referenced: bool,
@@ -28,7 +28,7 @@ impl DescribedMechanism {
         Ok(Self {
             joints: Joints::new(rig)?,
             watch: EncoderWatch::new(),
-            felt: false,
+            rendered: false,
             driven: [0.0; MAX_JOINTS],
             referenced,
         })
@@ -42,7 +42,7 @@ impl DescribedMechanism {
     /// Processes the counts of one tick: pose, velocity and encoder faults. The reference is lost with the first jump and in an impossible posture.
     pub fn read(&mut self, counts: &[i32; ENCODERS]) -> Sensed {
         let reading = self.joints.read(counts);
-        let encoder_stuck = if self.felt {
+        let encoder_stuck = if self.rendered {
             self.watch
                 .update(&self.joints.axis_ticks(&reading.moved, &self.driven))
         } else {
@@ -69,7 +69,7 @@ impl DescribedMechanism {
             Drive::Wrench(wrench) => self.joints.currents(wrench.force),
         };
         let mut currents = self.driven;
-        if drive == Drive::Off || !self.felt {
+        if drive == Drive::Off || !self.rendered {
             return currents;
         }
         for (joint, current) in currents.iter_mut().enumerate() {
@@ -81,8 +81,8 @@ impl DescribedMechanism {
     }
 
     /// See [`crate::interface::Mechanism::watch_encoders`].
-    pub fn watch_encoders(&mut self, felt: bool) {
-        self.felt = felt;
+    pub fn watch_encoders(&mut self, rendered: bool) {
+        self.rendered = rendered;
     }
 
     /// Sets the reference: the mechanism rests at these counts, with which the next reading is compared.
@@ -95,7 +95,7 @@ impl DescribedMechanism {
     /// Returns to the initial state: in the home pose, which is known.
     pub fn reset(&mut self) {
         self.reference(&[0; ENCODERS]);
-        self.felt = false;
+        self.rendered = false;
         self.driven = [0.0; MAX_JOINTS];
     }
 }

@@ -213,7 +213,7 @@ impl Axis {
         let alive = self.shows_life(tick.moved);
         if alive || !tick.able {
             self.still = 0;
-            if alive && self.probe.asks() {
+            if alive && self.probe.awaits_answer() {
                 self.owes_answer = false;
             }
             self.probe.end();
@@ -243,13 +243,13 @@ impl Probe {
     }
 
     /// Whether it awaits an answer.
-    fn asks(&self) -> bool {
+    fn awaits_answer(&self) -> bool {
         matches!(self.phase, Phase::Rise | Phase::Fall | Phase::Listen)
     }
 
     fn end(&mut self) {
         self.listened = 0;
-        if self.asks() {
+        if self.awaits_answer() {
             self.phase = Phase::Return;
         }
     }

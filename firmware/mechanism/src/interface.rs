@@ -93,7 +93,7 @@ pub trait Mechanism {
 
     /// Whether a part is rendered from here on. The mechanism may probe its encoders ([`crate::encoder_watch`]) only while one is. Called in each
     /// tick before [`Self::drive`].
-    fn watch_encoders(&mut self, _felt: bool) {}
+    fn watch_encoders(&mut self, _rendered: bool) {}
 
     /// Upper bound of an encoder count at the handle: m and rad. Readings are within half of this; 0: unknown.
     fn count(&self) -> [f32; 2] {

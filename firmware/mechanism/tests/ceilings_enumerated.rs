@@ -66,15 +66,19 @@ fn check(wrench: Wrench, handle: Vec3, twist: &Twist) {
     }
     .with(POWER, RADIUS);
     let out = restrain(wrench, handle, twist, &bounds);
-    let told = || format!("{wrench:?} at {handle}, {twist:?}: {out:?}");
-    assert!(out.is_finite(), "{}", told());
+    let context = || format!("{wrench:?} at {handle}, {twist:?}: {out:?}");
+    assert!(out.is_finite(), "{}", context());
     // Scaling to a length rounds three times, and the length once more: 4·2⁻²⁴ of itself.
     let (force, torque) = (out.force.as_dvec3(), out.torque.as_dvec3());
-    assert!(force.length() <= f64::from(FORCE) * (1.0 + 2.4e-7), "{}", told());
+    assert!(
+        force.length() <= f64::from(FORCE) * (1.0 + 2.4e-7),
+        "{}",
+        context()
+    );
     assert!(
         torque.length() <= f64::from(TORQUE) * (1.0 + 2.4e-7),
         "{}",
-        told()
+        context()
     );
     let (linear, angular) = (twist.linear.as_dvec3(), twist.angular.as_dvec3());
     if linear.is_finite() && angular.is_finite() {
@@ -86,7 +90,7 @@ fn check(wrench: Wrench, handle: Vec3, twist: &Twist) {
         assert!(
             power <= f64::from(POWER) + 12.0 * 6e-8 * largest.max(f64::from(POWER)),
             "{power} W: {}",
-            told()
+            context()
         );
     }
     if handle.is_finite() && handle.as_dvec3().length() > f64::from(RADIUS) * (1.0 + 1e-6) {
@@ -95,7 +99,7 @@ fn check(wrench: Wrench, handle: Vec3, twist: &Twist) {
         assert!(
             outwards <= 8.0 * 6e-8 * force.length().max(f64::from(FORCE)),
             "{outwards} N outwards: {}",
-            told()
+            context()
         );
     }
 }

@@ -306,8 +306,8 @@ impl Mechanism for Described {
         self.currents = self.mechanism.currents(drive);
     }
 
-    fn watch_encoders(&mut self, felt: bool) {
-        self.mechanism.watch_encoders(felt);
+    fn watch_encoders(&mut self, rendered: bool) {
+        self.mechanism.watch_encoders(rendered);
     }
 
     fn count(&self) -> [f32; 2] {

@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_fault_lasts_as_told_and_a_glitch_comes_once() {
+    fn each_fault_lasts_as_scripted_and_a_glitch_occurs_once() {
         let mut script = InputScript::new();
         script.start(&[
             InputFault {

@@ -68,7 +68,7 @@ pub struct Simulated {
     driven: Wrench,
     motors: Wrench,
     /// Whether a part is rendered, and the encoder watch, which runs while it is.
-    felt: bool,
+    rendered: bool,
     watch: EncoderWatch<AXES>,
 }
 
@@ -114,7 +114,7 @@ impl Simulated {
             hand_wrench: Wrench::ZERO,
             driven: Wrench::ZERO,
             motors: Wrench::ZERO,
-            felt: false,
+            rendered: false,
             watch: EncoderWatch::swinging(SWING_COUNTS),
         }
     }
@@ -131,7 +131,7 @@ impl Simulated {
 
     /// The first encoder that does not follow its motor.
     fn dead_encoder(&mut self, moved: [i32; AXES]) -> Option<u8> {
-        if !self.felt {
+        if !self.rendered {
             self.watch.rest();
             return None;
         }
@@ -290,7 +290,7 @@ impl Encoders {
             angular[axis] = self.angular[axis].update(steps[3 + axis], ANGULAR_RESOLUTION);
         }
         self.orientation = unit(rotation::exp(Vec3::from_array(moved)) * self.orientation);
-        let seen = Pose {
+        let measured = Pose {
             position: Vec3::from_array(position),
             orientation: self.orientation,
         };
@@ -300,7 +300,7 @@ impl Encoders {
         };
         self.referenced &= jump.is_none();
         Reading {
-            handle: seen,
+            handle: measured,
             twist,
             jump,
             steps,
@@ -352,7 +352,7 @@ impl Mechanism for Simulated {
             },
         };
         self.motors = self.driven;
-        if drive == Drive::Off || !self.felt {
+        if drive == Drive::Off || !self.rendered {
             return;
         }
         for axis in 0..3 {
@@ -362,8 +362,8 @@ impl Mechanism for Simulated {
         }
     }
 
-    fn watch_encoders(&mut self, felt: bool) {
-        self.felt = felt;
+    fn watch_encoders(&mut self, rendered: bool) {
+        self.rendered = rendered;
     }
 
     fn count(&self) -> [f32; 2] {

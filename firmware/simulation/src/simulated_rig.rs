@@ -49,8 +49,8 @@ impl Mechanism for SimulatedRig {
         each!(self, mechanism => mechanism.drive(drive));
     }
 
-    fn watch_encoders(&mut self, felt: bool) {
-        each!(self, mechanism => mechanism.watch_encoders(felt));
+    fn watch_encoders(&mut self, rendered: bool) {
+        each!(self, mechanism => mechanism.watch_encoders(rendered));
     }
 
     fn count(&self) -> [f32; 2] {

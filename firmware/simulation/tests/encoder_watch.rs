@@ -112,7 +112,7 @@ fn press(mut rig: impl Rig, grip: Grip, push: Vec3, ticks: u32, mut each: impl F
     dead
 }
 
-/// Ten newtons for a minute, nothing moving except by the probe. A rule that took stillness under load for a dead encoder failed after 500 ms.
+/// Ten newtons for a minute, nothing moving except by the probe. A rule that treated stillness under load as a dead encoder failed after 500 ms.
 #[test]
 fn a_still_hand_that_presses_for_a_minute_is_no_dead_encoder() {
     let mut way = Vec::new();

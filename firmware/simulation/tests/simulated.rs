@@ -155,7 +155,7 @@ fn encoders_round_to_their_resolution_and_never_drift() {
 }
 
 #[test]
-fn a_glitch_is_told_as_a_jump_once() {
+fn a_glitch_is_reported_as_a_jump_once() {
     let mut rig = Simulated::new();
     rig.sense();
     rig.wiring.glitch[0] = 100_000;

@@ -79,12 +79,12 @@ mod tests {
 
     #[test]
     fn sessions_of_a_start_and_of_the_next_differ() {
-        let mut seen = std::collections::BTreeSet::new();
+        let mut names = std::collections::BTreeSet::new();
         for entropy in 0..100 {
             let mut freshness = Freshness::new(entropy);
             for number in 1..=100 {
                 freshness.begin(number);
-                assert!(seen.insert(freshness.session()), "{entropy}, {number}");
+                assert!(names.insert(freshness.session()), "{entropy}, {number}");
             }
         }
     }

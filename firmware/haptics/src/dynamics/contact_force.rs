@@ -67,7 +67,7 @@ pub(crate) struct ContactForce<'a> {
     /// The last iterate.
     last: [f32; 6],
     /// Upper bound of the change of any rate since all were evaluated, m/s.
-    way: f32,
+    rate_change: f32,
 }
 
 impl<'a> ContactForce<'a> {
@@ -90,7 +90,7 @@ impl<'a> ContactForce<'a> {
             stiffness: Symmetric6::ZERO,
             push: [0.0; 6],
             last: [0.0; 6],
-            way: 0.0,
+            rate_change: 0.0,
         }
     }
 
@@ -149,9 +149,9 @@ impl<'a> ContactForce<'a> {
         let row_length = above_root(1.0 + lever * lever);
         let moved: [f32; 6] = array::from_fn(|i| x[i] - self.last[i]);
         self.last = *x;
-        self.way += row_length * above_root(dot(&moved, &moved));
+        self.rate_change += row_length * above_root(dot(&moved, &moved));
         // A free point whose gap at the step's end, by the rate last evaluated, exceeds this cannot have closed since, m.
-        let out_of_reach = closing_s * self.way;
+        let out_of_reach = closing_s * self.rate_change;
         let rate_band = if solves <= ROUGH_SOLVES {
             RATE_BAND_M_PER_S + self.farthest * TURN_ROUNDING / h
         } else {

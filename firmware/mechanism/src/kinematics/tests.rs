@@ -171,7 +171,7 @@ proptest! {
 
     /// At any angles a force within the limit requires torques within a bound, because the applied share fades before J grows.
     #[test]
-    fn no_posture_asks_for_endless_torque(kind in 0..3usize, a in -6.3f32..6.3, b in -6.3f32..6.3, c in -6.3f32..6.3, force in vector(20.0)) {
+    fn no_posture_requires_unbounded_torque(kind in 0..3usize, a in -6.3f32..6.3, b in -6.3f32..6.3, c in -6.3f32..6.3, force in vector(20.0)) {
         let (kinematics, home) = [(ARM, [0.0, 0.0, 1.5]), (LINKAGE, [2.3, 0.8, 0.0]), (PADDLE, [0.0; 3])][kind];
         let model = Model::new(&rig(kinematics, home, [0.0; 3])).unwrap();
         if let Some(posture) = model.posture([a, b, c], [0.0; 3]) {

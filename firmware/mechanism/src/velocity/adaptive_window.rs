@@ -83,11 +83,11 @@ mod tests {
         }
         // One count over the full window.
         assert!(worst <= 1.0 / WINDOW as f32, "{worst}");
-        assert!(worst > 0.0, "the flicker must have been seen");
+        assert!(worst > 0.0, "the flicker must affect the estimate");
     }
 
     #[test]
-    fn a_step_in_speed_is_seen_at_once() {
+    fn a_step_in_speed_is_estimated_at_once() {
         let mut estimator = AdaptiveWindow::<WINDOW>::AT_REST;
         for _ in 0..50 {
             estimator.rate(0);
