@@ -9,8 +9,9 @@
 //! Limits: processor time ([`LoadOptions::time_limit_s`]) and address space, enforced by the system; `PATIENCE` times the processor time, by the
 //! parent's clock; and the length of the answer.
 
-use crate::oracle::{self, Answer, Question};
-use crate::{BrepError, CadModel, LoadOptions, kernel, load_in_process};
+use crate::assemble::assemble;
+use crate::question::{Answer, Question, answer};
+use crate::{BrepError, CadModel, LoadOptions, kernel};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
@@ -82,9 +83,9 @@ fn serve(path: &Path, request: &OsStr) -> ! {
             // Without the thread the system still ends this process when its processor time is used up.
             let _ = thread::Builder::new().spawn(|| end_with_pipe(std::io::stdin().lock()));
             match question {
-                None => respond(&load_in_process(path, &options)),
+                None => respond(&assemble(path, &options)),
                 Some(None) => respond(&Err::<(), _>(damaged())),
-                Some(Some(question)) => respond(&oracle::answer(path, &options, &question)),
+                Some(Some(question)) => respond(&answer(path, &options, &question)),
             }
         }
         None => respond(&Err::<(), _>(damaged())),

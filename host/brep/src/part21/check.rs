@@ -4,7 +4,8 @@
 //! because the kernel would drop a solid or crash on them; the same faults in styles, notes and the like are warnings. Cost: a few passes over the
 //! entities.
 
-use super::{Exchange, Part21Error, reference, references, schema};
+use super::exchange::{Exchange, LARGEST_LENGTH, Part21Error, reference, references};
+use super::schema;
 
 /// Types of solids, each of which the kernel turns into a solid.
 pub const SOLIDS: &[&str] = &[
@@ -16,8 +17,6 @@ pub const SOLIDS: &[&str] = &[
 /// Types of surface models, which a file without solids may contain.
 pub const SURFACES: &[&str] = &["SHELL_BASED_SURFACE_MODEL", "FACE_BASED_SURFACE_MODEL"];
 
-/// Largest coordinate or radius, in the file's unit: a thousand kilometres in millimetres, where a double still resolves 0.1 µm.
-pub const LARGEST_LENGTH: f64 = 1e9;
 /// Largest number of any other kind, such as a knot or a vector's length: its square and cube are still finite.
 const LARGEST_NUMBER: f64 = 1e30;
 

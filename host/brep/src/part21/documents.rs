@@ -3,8 +3,9 @@
 //! A `DOCUMENT_FILE` represents the file; `APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT` names it; `APPLIED_DOCUMENT_REFERENCE` assigns it to a product
 //! definition, or the definition lists it itself (`PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS`).
 
+use super::exchange::{Exchange, references};
 use super::structure::{argument, is_definition, of_kind};
-use super::{Exchange, references, text};
+use super::text;
 use std::collections::HashMap;
 
 /// A product whose shape is in another file.

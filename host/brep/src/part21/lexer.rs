@@ -1,7 +1,6 @@
 //! Lexer, from bytes to entities: one pass, no recursion, no backtracking.
 
-use super::check::LARGEST_LENGTH;
-use super::{Entity, Exchange, Part21Error};
+use super::exchange::{Entity, Exchange, LARGEST_LENGTH, Part21Error};
 
 /// Deepest nesting of parentheses; real files have fewer than ten.
 const MAX_DEPTH: usize = 1000;
@@ -542,5 +541,21 @@ mod tests {
             let _ = parse(&bytes);
             let _ = parse(&[b"ISO-10303-21;HEADER;ENDSEC;DATA;#1=", &bytes[..]].concat());
         }
+    }
+
+    #[test]
+    fn a_complex_entity_gives_its_types_and_arguments() {
+        let text =
+            b"ISO-10303-21;HEADER;ENDSEC;DATA;#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\
+            #2=A('x,(''y',(1.,#1),$);ENDSEC;END-ISO-10303-21;";
+        let file = parse(text).unwrap();
+        assert_eq!(file.kinds(0), ["LENGTH_UNIT", "NAMED_UNIT", "SI_UNIT"]);
+        assert_eq!(
+            file.arguments_as(0, "SI_UNIT").unwrap(),
+            [&b".MILLI."[..], b".METRE."]
+        );
+        assert_eq!(file.kind(1), "A");
+        assert_eq!(file.arguments(1), [&b"'x,(''y'"[..], b"(1.,#1)", b"$"]);
+        assert_eq!(file.references_of(1), [1]);
     }
 }

@@ -1,7 +1,7 @@
 //! Joins the texts of several files into one: renumbers entities, and replaces a product that another file describes by that file's product.
 
+use super::exchange::{Entity, Exchange, reference};
 use super::structure::{Structure, argument};
-use super::{Entity, Exchange, reference};
 use std::ops::Range;
 
 impl Exchange {

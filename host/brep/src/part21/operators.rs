@@ -5,7 +5,8 @@
 //! = −M, k = −s when M mirrors), which is part of the occurrence's token ([`Exchange::scales`]). Other mapped items of a representation with such an
 //! operator become occurrences, because only those have names.
 
-use super::{Exchange, Part21Error, reference, references, units};
+use super::exchange::{Exchange, Part21Error, reference, references};
+use super::units;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Largest deviation from 1 of a scale that counts as rigid.
@@ -247,7 +248,7 @@ impl Exchange {
         self.largest = id;
         let line = self.entities.last().map_or(0, |e| e.line);
         self.index.insert(id, self.entities.len() as u32);
-        self.entities.push(super::Entity {
+        self.entities.push(super::exchange::Entity {
             id,
             written: id,
             file: 0,

@@ -5,8 +5,9 @@
 //! reference direction in its own way. So such placements are rewritten here: from the identity, onto the axis given · own⁻¹. The identity is the
 //! same in every unit, so the placed representation can then be substituted by another, in any unit.
 
+use super::exchange::{Exchange, reference, references};
 use super::structure::{Structure, argument, of_kind};
-use super::{Exchange, reference, references, units};
+use super::units;
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
 

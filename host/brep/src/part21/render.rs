@@ -1,6 +1,7 @@
 //! The text for the kernel, and the tokens that protect names from it.
 
-use super::{Exchange, text};
+use super::exchange::Exchange;
+use super::text;
 
 /// Renders the file: entities numbered from 1 in file order (so any 64-bit number is safe), one per line, without comments, strings in ASCII, names
 /// of products and occurrences replaced by tokens. [`name`] decodes a token. Cost: one pass.
@@ -83,7 +84,7 @@ fn renumbered(file: &Exchange, body: &[u8], out: &mut Vec<u8>) {
             }
             b'#' if !quoted => {
                 let digits = body[i..].iter().take_while(|b| b.is_ascii_digit()).count();
-                let id = super::reference(&body[i - 1..i + digits]).and_then(|id| file.find(id));
+                let id = super::exchange::reference(&body[i - 1..i + digits]).and_then(|id| file.find(id));
                 // A dangling reference (outside the shapes; otherwise the check rejects it) becomes "not given".
                 match id {
                     Some(entity) => out.extend_from_slice(format!("#{}", entity + 1).as_bytes()),

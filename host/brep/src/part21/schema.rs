@@ -3,7 +3,7 @@
 //!
 //! Only certain faults are reported: if a family has types not listed here, they are left to the kernel.
 
-use super::{Exchange, Part21Error, reference};
+use super::exchange::{Exchange, Part21Error, reference};
 
 /// Family of a type, as far as references distinguish it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

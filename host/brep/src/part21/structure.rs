@@ -1,7 +1,7 @@
 //! Products, their occurrences in each other, and the representations that contain their shapes.
 
 use super::check::{SOLIDS, SURFACES};
-use super::{Exchange, reference, references};
+use super::exchange::{Exchange, reference, references};
 use std::collections::{HashMap, HashSet};
 
 /// Placements of products in each other, and the representations of their shapes. All numbers are indices of entities.

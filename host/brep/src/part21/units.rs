@@ -1,6 +1,7 @@
 //! The length unit of a STEP file, by name. The kernel converts to millimetres.
 
-use super::{Exchange, Part21Error, reference, references, text};
+use super::exchange::{Exchange, Part21Error, reference, references};
+use super::text;
 
 /// Names of the length units that the file's representation contexts use, each once, in file order.
 ///

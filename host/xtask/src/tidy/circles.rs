@@ -19,7 +19,6 @@ const NOT_YET: &[&str] = &[
     "firmware/boards",
     "firmware/mechanism",
     "host/app",
-    "host/brep",
 ];
 
 /// Deepest chain of re-exports that is followed.
