@@ -659,7 +659,7 @@ flags! {
     NON_FINITE = 4, "the computed force was not finite";
     /// A sensor reading was not finite or implausible.
     ///
-    /// Out of all proportion, or not a rotation: zero wrench, and nothing moved.
+    /// Out of range, or not a rotation: zero wrench, and nothing moved.
     BAD_INPUT = 13, "a sensor reading was not a number or out of proportion";
     /// The force limit acted.
     FORCE_LIMIT = 1, "force limit acts";

@@ -46,12 +46,12 @@ fn beside(board: &mut Board, messages: Vec<ToDevice>, stop_is_last: bool) -> boo
         mut link,
         mut control,
     } = board.take();
-    let told = Arc::clone(&stopped);
+    let reported = Arc::clone(&stopped);
     let linked = spawn(move || {
         for frame in frames {
             link.receive(&frame);
         }
-        told.store(true, Ordering::Release);
+        reported.store(true, Ordering::Release);
         link
     });
     let mut driven = false;

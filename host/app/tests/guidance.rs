@@ -17,7 +17,7 @@ use mortise::viewport::compose::compose;
 use mortise::viewport::picture::Ground;
 use mortise_guide::{GuideSettings, List, Row, Standing, When};
 use mortise_mating::Axis;
-use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId};
+use mortise_mating::recognise::{AlignmentError, Freedom, Target, TargetId};
 use mortise_protocol::message::{ConstraintKind, DeviceState, Telemetry, TouchingPair};
 use mortise_protocol::parameter::ParameterId;
 
@@ -51,7 +51,7 @@ fn targets_appear_by_themselves_can_be_switched_off_and_end_with_stop() {
     harness.get_by_label_contains("slides and turns about one axis (z)");
     harness.get_by_label_contains("shaft Ø 17.750 in hole Ø 18.750");
     until(&mut harness, "it is on the axis", |s| {
-        row(s).is_some_and(|row| row.misfit.distance_mm < 0.01)
+        row(s).is_some_and(|row| row.alignment_error.distance_mm < 0.01)
     });
 
     let switch = |harness: &mut Harness<'_, Window>, on: &str| {
@@ -63,7 +63,7 @@ fn targets_appear_by_themselves_can_be_switched_off_and_end_with_stop() {
     });
     // With the target off, the hand's push moves the peg to the wall: half the clearance away.
     until(&mut harness, "it is at the wall", |s| {
-        row(s).is_some_and(|row| row.misfit.distance_mm > 0.3)
+        row(s).is_some_and(|row| row.alignment_error.distance_mm > 0.3)
     });
     switch(&mut harness, "on");
     until(&mut harness, "guided again", |s| {
@@ -212,7 +212,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
                 fixed_faces: vec![u32::MAX],
             },
             standing,
-            misfit: Misfit {
+            alignment_error: AlignmentError {
                 distance_mm: f64::NAN,
                 angle_rad: f64::NAN,
             },

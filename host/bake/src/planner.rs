@@ -98,12 +98,12 @@ pub fn plan(
         }
     }
     let fits = best.is_some();
-    let told = best.or(last).or(scout).ok_or(BakeError::TooLarge {
+    let reported = best.or(last).or(scout).ok_or(BakeError::TooLarge {
         bytes: u64::from(u32::MAX),
         limit: request.flash_bytes,
         enough_mm: accuracy,
     })?;
-    Ok(told.into_planned(false, fits))
+    Ok(reported.into_planned(false, fits))
 }
 
 /// Size and cost of an attempt as multiples of their limits.
@@ -280,11 +280,11 @@ impl<'a> Planner<'a> {
     }
 
     fn over(&self, attempt: &Attempt) -> Over {
-        let dearest = attempt.plan.ticks.first().map_or(0, |t| t.cost.instructions);
+        let worst = attempt.plan.ticks.first().map_or(0, |t| t.cost.instructions);
         let allowed = self.request.tick_instructions;
         Over {
             bytes: attempt.baked.image.len() as f64 / self.request.flash_bytes.max(1) as f64,
-            instructions: allowed.map_or(0.0, |most| dearest as f64 / most.max(1) as f64),
+            instructions: allowed.map_or(0.0, |most| worst as f64 / most.max(1) as f64),
         }
     }
 

@@ -211,18 +211,18 @@ fn the_tick_takes_its_points_where_they_matter_least() {
         ("thin", peg(9.0, 60.0, 64), at(150.0)),
     ]);
     let free = run(&model, &request(10.0, 4096));
-    let dearest = free.plan.ticks[0].cost.instructions;
+    let worst = free.plan.ticks[0].cost.instructions;
     let shapes = &free.plan.shapes;
     assert!(shapes.iter().all(|s| s.crossing_epsilon_mm == s.epsilon_mm));
     let tight = run(
         &model,
         &Request {
-            tick_instructions: Some(dearest / 2),
+            tick_instructions: Some(worst / 2),
             ..request(10.0, 4096)
         },
     );
     assert!(tight.met, "{:?}", tight.plan.ticks);
-    assert!(tight.plan.ticks[0].cost.instructions <= dearest / 2);
+    assert!(tight.plan.ticks[0].cost.instructions <= worst / 2);
     assert!(
         tight
             .plan

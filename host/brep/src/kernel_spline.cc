@@ -54,7 +54,7 @@ Handle(Geom_BSplineSurface) spline_of(const TopoDS_Face& face) {
   return spline;
 }
 
-double misfit(const TopoDS_Face& face, const Handle(Geom_BSplineSurface) & spline) {
+double deviation_of(const TopoDS_Face& face, const Handle(Geom_BSplineSurface) & spline) {
   const BRepAdaptor_Surface adaptor(face, false);
   if (adaptor.GetType() == GeomAbs_BSplineSurface || adaptor.GetType() == GeomAbs_BezierSurface) return 0;
   const Handle(Geom_Surface) surface = BRep_Tool::Surface(face);
@@ -87,7 +87,7 @@ RawSpline describe_spline(const TopoDS_Face& face, std::uint32_t number) {
       raw.poles.push_back(spline->Weight(i, j));
     }
   }
-  raw.deviation = misfit(face, spline);
+  raw.deviation = deviation_of(face, spline);
   return raw;
 }
 

@@ -169,10 +169,10 @@ fn a_missing_file_is_named_and_the_rest_is_read() {
     std::fs::remove_file(folder.path().join("part-5.step")).unwrap();
     let set = load_step(folder.path().join("main.step")).unwrap();
     assert_eq!(set.parts.len(), PARTS - 1);
-    let told = set.warnings.join("\n");
+    let reported = set.warnings.join("\n");
     assert!(
-        told.contains("part 5") && told.contains("\"part-5.step\" is missing"),
-        "{told}"
+        reported.contains("part 5") && reported.contains("\"part-5.step\" is missing"),
+        "{reported}"
     );
     for i in 0..PARTS {
         let _ = std::fs::remove_file(folder.path().join(format!("part-{i}.step")));
@@ -336,6 +336,6 @@ fn a_part_that_has_its_shape_here_is_not_read_from_a_file() {
         model
             .warnings
             .iter()
-            .any(|told| told.contains("have a shape here"))
+            .any(|reported| reported.contains("have a shape here"))
     );
 }

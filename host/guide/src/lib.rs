@@ -146,7 +146,7 @@ impl<'a> Guide<'a> {
         };
         let row = |entry: &Entry| Row {
             standing: self.standing(entry),
-            misfit: entry.misfit,
+            alignment_error: entry.alignment_error,
             depth_mm: entry.depth_mm,
             inside_mm: match entry.target.kind {
                 ConstraintKind::Concentric
@@ -179,8 +179,8 @@ impl<'a> Guide<'a> {
     /// Faces at right angles touch all the time: a candidate is listed only when a movement of the hand could make it a target.
     fn is_worth_reading(&self, entry: &Entry) -> bool {
         let limits = self.recogniser.thresholds();
-        let near = entry.misfit.distance_mm <= LISTED * limits.distance_mm
-            && entry.misfit.angle_rad <= LISTED * limits.angle_rad;
+        let near = entry.alignment_error.distance_mm <= LISTED * limits.distance_mm
+            && entry.alignment_error.angle_rad <= LISTED * limits.angle_rad;
         near || entry.state != State::Far || entry.pinned
     }
 
@@ -253,12 +253,12 @@ impl<'a> Guide<'a> {
         }
         let limits = self.recogniser.thresholds();
         let near = |target: &&Target| {
-            let misfit = target.misfit(
+            let alignment_error = target.alignment_error(
                 &self.poses[target.id.moving_part],
                 &self.poses[target.id.fixed_part],
             );
-            misfit.distance_mm <= limits.distance_mm
-                && misfit.angle_rad <= limits.angle_rad
+            alignment_error.distance_mm <= limits.distance_mm
+                && alignment_error.angle_rad <= limits.angle_rad
                 && self.inside(target) > -self.settings.approach_mm
         };
         let targets = self.possible.iter().flat_map(|(_, targets)| targets);

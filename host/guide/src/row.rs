@@ -1,6 +1,6 @@
 //! The list of targets as the operator reads it.
 
-use mortise_mating::recognise::{Freedom, Misfit, Target, TargetId};
+use mortise_mating::recognise::{AlignmentError, Freedom, Target, TargetId};
 
 /// Status of a target.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct Row {
     /// Its status.
     pub standing: Standing,
     /// Its alignment error.
-    pub misfit: Misfit,
+    pub alignment_error: AlignmentError,
     /// Largest depth at which its faces touch, mm; 0 without contact.
     pub depth_mm: f64,
     /// Overlap of the surfaces along the axis, mm; negative: gap. `None` where there is no axis.

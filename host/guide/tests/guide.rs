@@ -229,7 +229,7 @@ fn switched_off_altogether_it_recognises_and_sends_nothing() {
 }
 
 #[test]
-fn another_cap_goes_to_the_board_at_once_and_its_refusal_is_told() {
+fn another_cap_goes_to_the_board_at_once_and_its_refusal_is_reported() {
     let model = model();
     let mut guide = guide(&model, When::Touching);
     guide.hear(&sample(0, 0.5, -10.0, true));

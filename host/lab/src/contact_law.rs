@@ -25,7 +25,7 @@ const REACH_MM: f64 = 0.02;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pushed {
     /// As the board reports it.
-    pub told: DVec3,
+    pub reported: DVec3,
     /// On the exact surfaces.
     pub exact: DVec3,
 }
@@ -61,7 +61,7 @@ pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec
             });
         }
         all.push(Pushed {
-            told: vector(sample.contact.force),
+            reported: vector(sample.contact.force),
             exact: force(&exact),
         });
     }

@@ -296,7 +296,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wrong_answer_is_told() {
+    fn a_wrong_answer_is_reported() {
         let read = |parts: usize| {
             let part = mortise_brep::Part {
                 name: "part".into(),

@@ -226,7 +226,7 @@ fn course(pair: &Pair, mode: Mode, scenario: &Scenario, scene: &PreparedScene) -
         return Err(LabError::Input {
             name: recording.outcome.rig.clone(),
             what: format!(
-                "{} ticks were not told of: the link is too slow",
+                "{} ticks were not reported: the link is too slow",
                 recording.outcome.dropped_samples
             ),
         });

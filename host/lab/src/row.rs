@@ -131,7 +131,7 @@ impl Row {
     }
 
     /// A row without a bound. It fails when nothing was measured.
-    pub(crate) fn told(what: impl Into<String>, value: f64, unit: &str) -> Self {
+    pub(crate) fn reported(what: impl Into<String>, value: f64, unit: &str) -> Self {
         Self::new(what, Value::Number(value), unit, Requirement::Nothing)
     }
 
@@ -423,12 +423,12 @@ mod tests {
         assert!(Row::at_most("", f64::NAN, "", 1.0).fails());
         assert!(Row::exactly("", 1.0, "", 0.0).fails());
         assert!(Row::same("", "a", "b").fails());
-        assert!(Row::told("", f64::NAN, "").fails());
+        assert!(Row::reported("", f64::NAN, "").fails());
     }
 
     #[test]
     fn what_has_no_bound_or_was_skipped_does_not_hold() {
-        assert_eq!(Row::told("", 1.0, "").verdict(), Verdict::Unbounded);
+        assert_eq!(Row::reported("", 1.0, "").verdict(), Verdict::Unbounded);
         assert_eq!(Row::noted("", "a").verdict(), Verdict::Unbounded);
         assert_eq!(Row::skipped("", "absent").verdict(), Verdict::Skipped);
     }
@@ -441,7 +441,7 @@ mod tests {
             r#"{"what":"depth","value":0.25,"unit":"mm","bound":"≤ 0.5","holds":true}"#
         );
         assert_eq!(
-            json(Row::told("depth", 0.25, "mm")),
+            json(Row::reported("depth", 0.25, "mm")),
             r#"{"what":"depth","value":0.25,"unit":"mm","bound":"none","holds":null}"#
         );
         assert_eq!(
@@ -467,9 +467,9 @@ mod tests {
         );
         for row in [
             Row::skipped("", "absent"),
-            Row::told("", 1.0, ""),
-            Row::told("", 2.5e-7, ""),
-            Row::told("", f64::NAN, ""),
+            Row::reported("", 1.0, ""),
+            Row::reported("", 2.5e-7, ""),
+            Row::reported("", f64::NAN, ""),
             Row::same("", "a", "b"),
         ] {
             let text = serde_json::to_string(&row).expect("plain");

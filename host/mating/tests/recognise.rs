@@ -246,9 +246,9 @@ proptest! {
             });
             for motion in slides.chain(turns) {
                 for target in seated.active() {
-                    let misfit = target.misfit(&(motion * home[1]), &home[0]);
+                    let alignment_error = target.alignment_error(&(motion * home[1]), &home[0]);
                     // Of second order in the step: at most 60 mm · step².
-                    prop_assert!(misfit.distance_mm < 1e-6 && misfit.angle_rad < 1e-7, "{file} {misfit:?} {motion:?}");
+                    prop_assert!(alignment_error.distance_mm < 1e-6 && alignment_error.angle_rad < 1e-7, "{file} {alignment_error:?} {motion:?}");
                 }
             }
         }

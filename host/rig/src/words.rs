@@ -79,7 +79,7 @@ impl Words for Fault {
                 "the encoders report an impossible posture of the links: check their plugs and the reference, then clear the fault".into()
             }
             Self::BadReading => {
-                "a sensor reading is not a number or out of all proportion: check the sensors' cables, then clear the fault".into()
+                "a sensor reading is not a number or out of range: check the sensors' cables, then clear the fault".into()
             }
         }
     }

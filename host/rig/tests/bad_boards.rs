@@ -113,7 +113,7 @@ fn a_board_that_started_anew_is_told_with_the_reason() {
     for asks in [false, true] {
         let (transport, mut far) = wire();
         let board = std::thread::spawn(move || {
-            let mut told = capabilities(DeviceState::Idle);
+            let mut reported = capabilities(DeviceState::Idle);
             let (mut greeted, mut refused) = (false, 0);
             while let Some((seq, message)) = far.next() {
                 match message {
@@ -128,12 +128,12 @@ fn a_board_that_started_anew_is_told_with_the_reason() {
                             reason: Refusal::NotGreeted,
                         });
                     }
-                    ToDevice::GetCapabilities => far.say(&FromDevice::Capabilities(told.clone())),
+                    ToDevice::GetCapabilities => far.say(&FromDevice::Capabilities(reported.clone())),
                     ToDevice::Disarm => {
                         far.say(&FromDevice::Ack { seq });
                         // The board then fails.
                         greeted = false;
-                        told.reset = ResetReason::Panic { line: 4242 };
+                        reported.reset = ResetReason::Panic { line: 4242 };
                     }
                     _ => far.say(&FromDevice::Ack { seq }),
                 }
@@ -150,13 +150,12 @@ fn a_board_that_started_anew_is_told_with_the_reason() {
                 "{failed}"
             );
         }
-        let told = std::iter::from_fn(|| client.events().recv_timeout(Duration::from_secs(5)).ok()).find_map(
-            |event| match event {
+        let reported = std::iter::from_fn(|| client.events().recv_timeout(Duration::from_secs(5)).ok())
+            .find_map(|event| match event {
                 Event::LinkLost(why) => Some(why),
                 _ => None,
-            },
-        );
-        assert_eq!(told.as_deref(), Some(reason));
+            });
+        assert_eq!(reported.as_deref(), Some(reason));
         drop(client);
         assert!(board.join().expect("ended") > 0);
     }

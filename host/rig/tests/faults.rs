@@ -23,7 +23,7 @@ fn played(faults: &Faults) -> (Vec<u32>, usize, FaultCounts) {
     // A sample may arrive after the answer to the run, but not after this one.
     client.run(0).expect("time is not harmed");
     let overheard = line.overheard();
-    let telemetry = |told: &&FromDevice| matches!(told, FromDevice::Telemetry(_));
+    let telemetry = |reported: &&FromDevice| matches!(reported, FromDevice::Telemetry(_));
     let overheard = overheard.iter().filter(telemetry).count();
     line.end();
     // The link works again at once.

@@ -107,7 +107,7 @@ fn a_board_that_starts_anew_says_why() {
     let spec: RigSpec = bridge.port.parse().expect("a port's name");
     let client = Client::connect(&spec).expect("the board greets");
     client.send(ToDevice::Restart).expect("sent");
-    let told =
+    let reported =
         std::iter::from_fn(|| client.events().recv_timeout(Duration::from_secs(5)).ok()).find_map(|event| {
             match event {
                 Event::LinkLost(why) => Some(why),
@@ -115,7 +115,7 @@ fn a_board_that_starts_anew_says_why() {
             }
         });
     assert_eq!(
-        told.as_deref(),
+        reported.as_deref(),
         Some("the board has restarted: the board restarted on request")
     );
     drop(client);

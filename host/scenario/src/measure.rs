@@ -166,7 +166,7 @@ pub struct Felt {
 
 impl Felt {
     /// From a sample: its pose is that of the encoder readings.
-    pub fn told(sample: &Telemetry) -> Self {
+    pub fn reported(sample: &Telemetry) -> Self {
         Self {
             tick: sample.tick,
             handle: sample.handle,
@@ -250,7 +250,7 @@ impl<'a> Coupled<'a> {
         }
         let [before, at, after] = [&a.object, &b.object, &c.object].map(|object| object.as_ref());
         let [before, at, after] = [before?, at?, after?].map(|(_, pose)| meters(pose));
-        let told = felt.twist?;
+        let reported = felt.twist?;
         let s = &self.settings.coupling;
         let [h, m, k, b, k_r, b_r] = [
             self.settings.period_s,
@@ -269,8 +269,8 @@ impl<'a> Coupled<'a> {
         let truly = meters(&felt.handle);
         let force = -vector(c.wrench.force);
         let torque = -vector(c.wrench.torque) - lever.cross(force);
-        let turning = told.angular.as_dvec3();
-        let place = told.linear.as_dvec3() + turning.cross(lever);
+        let turning = reported.angular.as_dvec3();
+        let place = reported.linear.as_dvec3() + turning.cross(lever);
         let linear = place - (center(&after) - center(&at)) / h;
         let angular = turning - turn(&at, &after) / h;
         let d = (force - (b + h * k) * linear) * inverse(k) + truly.transform_point3(self.lever)

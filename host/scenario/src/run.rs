@@ -139,7 +139,7 @@ pub fn record(
     let before = (&reach(&scenario.hand), REACH_TICKS + REST_TICKS);
     let replayed = truth::replay(before, &script(&scenario.hand), &play.samples);
     let exact = replayed.is_some();
-    let felt = replayed.unwrap_or_else(|| play.samples.iter().map(Felt::told).collect());
+    let felt = replayed.unwrap_or_else(|| play.samples.iter().map(Felt::reported).collect());
     Ok(Recording {
         outcome: outcome(scenario, scene, client, &play, &statistics, ran, (&felt, exact)),
         samples: play.samples,
@@ -176,8 +176,8 @@ impl Play<'_> {
     /// Takes the board's samples, including lost ones, and its fault reports.
     fn overheard(&mut self, line: &FaultLine) -> Result<(), ScenarioError> {
         self.samples.clear();
-        for told in line.overheard() {
-            match told {
+        for reported in line.overheard() {
+            match reported {
                 FromDevice::Telemetry(sample) => self.samples.push(sample),
                 FromDevice::Fault { tick, fault } => self.faulted(tick, fault)?,
                 _ => {}

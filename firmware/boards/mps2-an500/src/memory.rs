@@ -42,7 +42,7 @@ pub fn guard_stack(mpu: &mut MPU) {
     cortex_m::asm::isb();
 }
 
-/// Starts since power-on, and the complement by which memory that was never written is told.
+/// Starts since power-on, and the complement by which memory that was never written is reported.
 // SAFETY: the section exists in the linker script and start-up leaves it alone; every bit pattern is a valid `MaybeUninit`.
 #[unsafe(link_section = ".uninit.STARTS")]
 static mut STARTS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();

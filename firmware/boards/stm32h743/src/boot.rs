@@ -18,7 +18,7 @@ pub struct ResetFlags {
     pub pin: bool,
 }
 
-/// What the host is told. The status of a hard fault goes to the log.
+/// What the host is reported. The status of a hard fault goes to the log.
 pub const fn reset_reason(flags: ResetFlags, crash: Option<Crash>) -> ResetReason {
     // After power-on or brown-out memory is undefined: no record counts.
     if flags.power_on {

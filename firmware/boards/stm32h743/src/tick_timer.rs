@@ -32,7 +32,7 @@ impl Cycles {
     /// Sets timer and cycle counter up, timer stopped.
     pub fn new(_timer: Peri<'static, TIM7>, core_hz: u32, dcb: &mut DCB, dwt: &mut DWT) -> Self {
         dcb.enable_trace();
-        // A Cortex-M7 keeps the counter locked until told otherwise.
+        // A Cortex-M7 keeps the counter locked until reported otherwise.
         DWT::unlock();
         dwt.enable_cycle_counter();
 

@@ -95,9 +95,9 @@ mod tests {
             .build()
             .unwrap();
         let portal = server.join().unwrap();
-        let (told, heard) = mpsc::channel();
+        let (reported, heard) = mpsc::channel();
         let watching = std::thread::spawn(move || {
-            let _ = watch(&bus, &mut |theme| told.send(theme).unwrap());
+            let _ = watch(&bus, &mut |theme| reported.send(theme).unwrap());
         });
         let next = || heard.recv_timeout(std::time::Duration::from_secs(20)).unwrap();
         assert_eq!(next(), Theme::Light);

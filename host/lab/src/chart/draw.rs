@@ -47,7 +47,7 @@ impl Scale {
 }
 
 /// An error as text.
-fn told(error: impl std::fmt::Display) -> String {
+fn reported(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
@@ -65,7 +65,7 @@ fn wrapped<DB: DrawingBackend>(
         let fits = match &longer {
             Some(line) => {
                 area.estimate_text_size(line, style)
-                    .map_err(told)?
+                    .map_err(reported)?
                     .0
                     .cast_signed()
                     <= most
@@ -93,14 +93,14 @@ impl Chart {
             .y
             .range(drawn().map(|point| point.y))
             .ok_or("it has no point")?;
-        area.fill(&WHITE).map_err(told)?;
+        area.fill(&WHITE).map_err(reported)?;
         let (head, rest) = area.split_vertically(if self.title.is_empty() { 0 } else { scale.of(HEAD) });
         head.draw(&Text::new(
             self.title.as_str(),
             (scale.of(16), scale.of(14)),
             scale.text(21, &INK),
         ))
-        .map_err(told)?;
+        .map_err(reported)?;
         let rows = self.legend(&rest, scale)?;
         let (_, rest) = rest.split_vertically(scale.of(LEGEND_ROW * rows + 6));
         let height = rest.dim_in_pixel().1.cast_signed();
@@ -109,7 +109,7 @@ impl Chart {
         for (row, line) in note.into_iter().enumerate() {
             let at = (scale.of(NOTE_SIDE), scale.of(4) + scale.of(NOTE) * row as i32);
             foot.draw(&Text::new(line, at, scale.text(14, &GREY)))
-                .map_err(told)?;
+                .map_err(reported)?;
         }
 
         let mut context: Context<'_, DB> = ChartBuilder::on(&plot)
@@ -119,7 +119,7 @@ impl Chart {
             .x_label_area_size(scale.of(52))
             .y_label_area_size(scale.of(78))
             .build_cartesian_2d(self.x.coordinate(x), self.y.coordinate(y))
-            .map_err(told)?;
+            .map_err(reported)?;
         context
             .configure_mesh()
             .bold_line_style(scale.stroke(GRID, 1))
@@ -133,7 +133,7 @@ impl Chart {
             .x_label_formatter(&|value| number(*value))
             .y_label_formatter(&|value| number(*value))
             .draw()
-            .map_err(told)?;
+            .map_err(reported)?;
         self.plot(&context, &plot, scale)
     }
 
@@ -152,7 +152,7 @@ impl Chart {
             return Ok(0);
         }
         for series in named {
-            let (words, _) = area.estimate_text_size(&series.name, &style).map_err(told)?;
+            let (words, _) = area.estimate_text_size(&series.name, &style).map_err(reported)?;
             let taken = scale.of(26) + words.cast_signed() + scale.of(26);
             if x + taken > width && x > start {
                 (x, row) = (start, row + 1);
@@ -171,7 +171,7 @@ impl Chart {
                 (x + scale.of(18), y + scale.of(2)),
                 level,
             ))
-            .map_err(told)?;
+            .map_err(reported)?;
             x += taken;
         }
         Ok(row + 1)
@@ -225,12 +225,12 @@ impl Chart {
                 if written.contains(&(point.label.as_str(), at)) {
                     continue;
                 }
-                let (width, height) = area.estimate_text_size(&point.label, &style).map_err(told)?;
+                let (width, height) = area.estimate_text_size(&point.label, &style).map_err(reported)?;
                 let size = (width.cast_signed(), height.cast_signed() + scale.of(3));
                 if let Some(corner) = place(at, size, scale.of(9), &frame, &mut taken) {
                     written.push((point.label.as_str(), at));
                     area.draw(&Text::new(point.label.as_str(), corner, style.clone()))
-                        .map_err(told)?;
+                        .map_err(reported)?;
                 }
             }
         }
@@ -310,10 +310,10 @@ fn stroke<DB: DrawingBackend>(
     let style = scale.stroke(series.look.colour(), 2);
     if series.line.is_broken() {
         let dashed = DashedPathElement::new(corners.iter().copied(), scale.of(7), scale.of(5), style);
-        area.draw(&dashed).map_err(told)
+        area.draw(&dashed).map_err(reported)
     } else {
         area.draw(&PathElement::new(corners.to_vec(), style))
-            .map_err(told)
+            .map_err(reported)
     }
 }
 
@@ -331,7 +331,7 @@ fn mark<DB: DrawingBackend>(
     let corner = |dx: i32, dy: i32| (x + dx * scale.of(1), y + dy * scale.of(1));
     let line = |from: (i32, i32), to: (i32, i32)| {
         let element = PathElement::new(vec![from, to], scale.stroke(colour, 2));
-        area.draw(&element).map_err(told)
+        area.draw(&element).map_err(reported)
     };
     if at_least {
         line(corner(0, -5), corner(0, -18))?;
@@ -342,7 +342,7 @@ fn mark<DB: DrawingBackend>(
         Look::BlueDisc => area.draw(&Circle::new(at, scale.of(5), filled)),
         Look::SkyRing => {
             area.draw(&Circle::new(at, scale.of(5), WHITE.filled()))
-                .map_err(told)?;
+                .map_err(reported)?;
             area.draw(&Circle::new(at, scale.of(5), scale.stroke(colour, 2)))
         }
         Look::VermilionSquare => area.draw(&Rectangle::new([corner(-5, -5), corner(5, 5)], filled)),
@@ -360,7 +360,7 @@ fn mark<DB: DrawingBackend>(
         }
         Look::Black => return Ok(()),
     }
-    .map_err(told)
+    .map_err(reported)
 }
 
 #[cfg(test)]

@@ -154,7 +154,7 @@ impl Report {
             ),
         ];
         if self.stack_bytes > 0 {
-            rows.push(Row::told(
+            rows.push(Row::reported(
                 format!("{run}: deepest stack"),
                 f64::from(self.stack_bytes),
                 "B",
@@ -167,7 +167,7 @@ impl Report {
             ));
         }
         if self.static_bytes > 0 {
-            rows.push(Row::told(
+            rows.push(Row::reported(
                 format!("{run}: the board's memory beside the stack, all of it static"),
                 self.static_bytes as f64,
                 "B",
@@ -178,7 +178,7 @@ impl Report {
             ("the emulator's", self.emulator_kib),
         ] {
             if last > 0 {
-                rows.push(Row::told(format!("{run}: {whose} memory"), last as f64, "KiB").varies());
+                rows.push(Row::reported(format!("{run}: {whose} memory"), last as f64, "KiB").varies());
                 let growth = Row::at_most(
                     format!("{run}: growth of {whose} memory from the third to the last quarter"),
                     last as f64 - before as f64,
@@ -192,11 +192,16 @@ impl Report {
     }
 }
 
-/// Keeps the rig busy for `seconds` of its time; calls `told` after each turn.
+/// Keeps the rig busy for `seconds` of its time; calls `reported` after each turn.
 ///
 /// # Errors
 /// `Brep`, `Bake`, `Rig`; `NeedsSimulatedHand` on a real mechanism. Faults of the board and missed ticks are no errors but figures.
-pub fn run(spec: &RigSpec, seconds: u32, seed: u64, told: &mut dyn FnMut(&Turn)) -> Result<Report, LabError> {
+pub fn run(
+    spec: &RigSpec,
+    seconds: u32,
+    seed: u64,
+    reported: &mut dyn FnMut(&Turn),
+) -> Result<Report, LabError> {
     let client = Client::connect_with_faults(&spec.lockstep())?;
     if !client.capabilities().simulated {
         return Err(ScenarioError::NeedsSimulatedHand {
@@ -238,7 +243,7 @@ pub fn run(spec: &RigSpec, seconds: u32, seed: u64, told: &mut dyn FnMut(&Turn))
             host_kib: memory.program_kib,
             emulator_kib: memory.emulator_kib,
         };
-        told(&turn);
+        reported(&turn);
         turns.push(turn);
     }
     let statistics = client.statistics(false)?;
@@ -338,8 +343,8 @@ impl Work<'_> {
             left -= batch;
             script_left -= batch;
         }
-        for told in self.line.overheard() {
-            if let FromDevice::Fault { tick, fault } = told {
+        for reported in self.line.overheard() {
+            if let FromDevice::Fault { tick, fault } = reported {
                 self.faults.push(format!("tick {tick}: {}", describe(fault)));
             }
         }

@@ -175,7 +175,7 @@ mod tests {
         for row in [
             Row::exactly("", 1.0, "", 1.0),
             Row::exactly("", 1.0, "", 2.0),
-            Row::told("", 1.0, ""),
+            Row::reported("", 1.0, ""),
             Row::skipped("", "absent"),
         ] {
             count.add(&row);

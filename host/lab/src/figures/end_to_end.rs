@@ -327,10 +327,10 @@ fn off_n(scene: &PreparedScene, samples: &[Telemetry]) -> Result<f64, LabError> 
     let pushed = pushed(scene, samples)?;
     let touched = pushed
         .iter()
-        .all(|tick| tick.exact.length() > 0.5 && tick.told.length() > 0.5);
+        .all(|tick| tick.exact.length() > 0.5 && tick.reported.length() > 0.5);
     Ok(if touched && !pushed.is_empty() {
         (pushed.iter())
-            .map(|tick| (tick.told - tick.exact).length())
+            .map(|tick| (tick.reported - tick.exact).length())
             .fold(0.0, f64::max)
     } else {
         f64::NAN

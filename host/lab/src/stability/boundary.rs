@@ -134,11 +134,11 @@ pub fn stiffness_limit(
 ) -> f64 {
     let around = if search.steps > 10 { 4.0 } else { 2.0 };
     limit(near / around, near * around, search, |stiffness| {
-        let (settings, told) = settings(law, wall, stiffness);
+        let (settings, reported) = settings(law, wall, stiffness);
         let rig = Rig {
             sensor: Sensor {
                 resolution_m: rig.sensor.resolution_m,
-                ..told
+                ..reported
             },
             delay_ticks: wall.delay_ticks,
             ..*rig

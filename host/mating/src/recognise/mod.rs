@@ -19,7 +19,7 @@ use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
 
 pub use solve::{Freedom, Solution};
-pub use target::{Misfit, Target, TargetId};
+pub use target::{AlignmentError, Target, TargetId};
 
 use crate::merge::{MergedSurface, merge};
 use crate::tolerances::Tolerances;
@@ -105,7 +105,7 @@ pub struct Entry {
     /// Whether it is active, and if not, why.
     pub state: State,
     /// Present alignment error.
-    pub misfit: Misfit,
+    pub alignment_error: AlignmentError,
     /// Largest depth at which its faces touch, mm; 0 without contact.
     pub depth_mm: f64,
     /// Whether the operator pinned it.
@@ -174,7 +174,7 @@ impl<'a> Recogniser<'a> {
             let entry = self.entries.entry(target.id).or_insert(Entry {
                 target,
                 state: State::Far,
-                misfit: Misfit {
+                alignment_error: AlignmentError {
                     distance_mm: 0.0,
                     angle_rad: 0.0,
                 },
@@ -307,7 +307,7 @@ impl<'a> Recogniser<'a> {
         let size = self.surfaces.get(shape).map_or(1.0, |s| s.size).max(1e-6);
         let mut order = Vec::new();
         for (id, entry) in &mut self.entries {
-            entry.misfit = entry.target.misfit(pose, &seen.poses[id.fixed_part]);
+            entry.alignment_error = entry.target.alignment_error(pose, &seen.poses[id.fixed_part]);
             let was_active = entry.state == State::Active;
             let factor = if was_active || entry.pinned {
                 limits.release
@@ -315,14 +315,14 @@ impl<'a> Recogniser<'a> {
                 1.0
             };
             let distance_mm = limits.distance_mm + entry.target.play_mm.max(0.0);
-            let near = entry.misfit.distance_mm <= factor * distance_mm
-                && entry.misfit.angle_rad <= factor * limits.angle_rad;
+            let near = entry.alignment_error.distance_mm <= factor * distance_mm
+                && entry.alignment_error.angle_rad <= factor * limits.angle_rad;
             entry.state = match (entry.off, near) {
                 (true, _) => State::Off,
                 (false, false) => State::Far,
                 (false, true) => {
-                    let off =
-                        entry.misfit.distance_mm / distance_mm + entry.misfit.angle_rad / limits.angle_rad;
+                    let off = entry.alignment_error.distance_mm / distance_mm
+                        + entry.alignment_error.angle_rad / limits.angle_rad;
                     order.push((!entry.pinned, !was_active, off, *id));
                     State::Conflict(Vec::new())
                 }
@@ -344,7 +344,7 @@ impl<'a> Recogniser<'a> {
                 let solution = solve(&targets, pose, size);
                 let fits = targets
                     .iter()
-                    .zip(&solution.misfits)
+                    .zip(&solution.alignment_errors)
                     .all(|((t, _), m)| keeps(t, m, size));
                 fits.then_some(solution)
             };
@@ -372,10 +372,10 @@ impl<'a> Recogniser<'a> {
 }
 
 /// Whether a target is satisfied: within its play plus the effect of a fit error of 1 µm over the part.
-fn keeps(target: &Target, misfit: &Misfit, size: f64) -> bool {
+fn keeps(target: &Target, alignment_error: &AlignmentError, size: f64) -> bool {
     const FIT_MM: f64 = 1e-3;
     let play = target.play_mm.max(0.0) + FIT_MM;
-    misfit.distance_mm <= play && misfit.angle_rad <= play / size
+    alignment_error.distance_mm <= play && alignment_error.angle_rad <= play / size
 }
 
 impl ShapeSurfaces {

@@ -14,7 +14,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use mortise_protocol::message::ConstraintKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::target::{Misfit, Target, placed};
+use super::target::{AlignmentError, Target, placed};
 use crate::contact::Axis;
 
 /// Singular values below this fraction of the largest count as zero: 1 mm over a part of 1 m.
@@ -29,7 +29,7 @@ pub struct Solution {
     /// Pose of the moving part with the smallest error over all targets.
     pub pose: DAffine3,
     /// Residual alignment error of each target at that pose.
-    pub misfits: Vec<Misfit>,
+    pub alignment_errors: Vec<AlignmentError>,
     /// Number of independent conditions, 0 to 6.
     pub rank: usize,
     /// Remaining motion.
@@ -89,13 +89,13 @@ pub(crate) fn solve(targets: &[Placed<'_>], pose: &DAffine3, size: f64) -> Solut
     let mut pose = *pose;
     for _ in 0..STEPS {
         let center = reference(targets, &pose);
-        let (jacobian, misfit) = rows(targets, &pose, center, size);
+        let (jacobian, alignment_error) = rows(targets, &pose, center, size);
         if jacobian.nrows() == 0 {
             break;
         }
         let svd = jacobian.svd(true, true);
         let floor = RANK * svd.singular_values.max();
-        let Ok(step) = svd.solve(&misfit, floor) else {
+        let Ok(step) = svd.solve(&alignment_error, floor) else {
             break;
         };
         let by = DVec3::new(step[0], step[1], step[2]);
@@ -113,7 +113,10 @@ pub(crate) fn solve(targets: &[Placed<'_>], pose: &DAffine3, size: f64) -> Solut
     let (rank, freedom) = freedom(jacobian, center, size);
     Solution {
         pose,
-        misfits: targets.iter().map(|(t, fixed)| t.misfit(&pose, fixed)).collect(),
+        alignment_errors: targets
+            .iter()
+            .map(|(t, fixed)| t.alignment_error(&pose, fixed))
+            .collect(),
         rank,
         freedom,
     }

@@ -46,7 +46,7 @@ pub struct Target {
 
 /// Alignment error of a target. The letters are those of the notation page.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misfit {
+pub struct AlignmentError {
     /// d, mm.
     pub distance_mm: f64,
     /// θ, radians.
@@ -158,7 +158,7 @@ impl Target {
     }
 
     /// (d, θ) at the given placements of both parts.
-    pub fn misfit(&self, moving: &DAffine3, fixed: &DAffine3) -> Misfit {
+    pub fn alignment_error(&self, moving: &DAffine3, fixed: &DAffine3) -> AlignmentError {
         let (a, b) = (placed(&self.moving, moving), placed(&self.fixed, fixed));
         let between = a.origin - b.origin;
         let lines = a.direction.cross(b.direction).length();
@@ -172,7 +172,7 @@ impl Target {
                 (between.reject_from(self.bore(&a, &b)).length(), 0.0)
             }
         };
-        Misfit {
+        AlignmentError {
             distance_mm,
             angle_rad,
         }

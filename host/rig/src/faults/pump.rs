@@ -59,7 +59,9 @@ pub(super) fn to_board(frame: &[u8]) -> Kind {
 pub(super) fn from_board(frame: &[u8]) -> Kind {
     match message::<FromDevice>(frame) {
         Some(FromDevice::Ran { .. }) => Kind::Ran,
-        Some(told @ (FromDevice::Telemetry(_) | FromDevice::Fault { .. })) => Kind::Telling(Box::new(told)),
+        Some(reported @ (FromDevice::Telemetry(_) | FromDevice::Fault { .. })) => {
+            Kind::Telling(Box::new(reported))
+        }
         _ => Kind::Other,
     }
 }
@@ -223,12 +225,12 @@ impl Pump {
             }
             _ if !self.acting() => write_whole(&mut *self.to, &frame),
             kind => {
-                if let Kind::Telling(told) = kind {
+                if let Kind::Telling(reported) = kind {
                     let overheard = &self.shared.overheard;
                     overheard
                         .lock()
                         .unwrap_or_else(PoisonError::into_inner)
-                        .push(*told);
+                        .push(*reported);
                 }
                 self.harm(frame);
                 self.release(false)

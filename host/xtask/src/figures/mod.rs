@@ -101,11 +101,11 @@ pub fn check(root: &Path, program: &Path) -> Result<String> {
     for table in &measured_tables {
         let measured = measure(root, program, table, true, By::Kept)?;
         let page = page_of(root, table)?;
-        let told = |row: &Row| page.iter().any(|kept| kept.key() == row.key() && kept.fails());
+        let reported = |row: &Row| page.iter().any(|kept| kept.key() == row.key() && kept.fails());
         for row in measured.rows.iter().filter(|row| row.fails()) {
             if row.varies {
                 said.push(format!("not judged, as the machine decides it: {}", row.line()));
-            } else if told(row) {
+            } else if reported(row) {
                 said.push(format!("fails, as its page says: {}", row.line()));
             } else {
                 wrong.push(format!("{table}: {}", row.line()));

@@ -8,6 +8,7 @@ mod layers;
 mod sources;
 mod tree;
 mod unsafety;
+mod words;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -47,6 +48,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     for file in &files {
         findings.extend(sources::check(root, file)?);
         findings.extend(unsafety::check(root, file)?);
+        findings.extend(words::check(root, file)?);
     }
     findings.extend(docs::check_paths(root, &files)?);
     findings.extend(layers::check(root, &files)?);

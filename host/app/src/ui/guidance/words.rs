@@ -54,7 +54,10 @@ pub fn surfaces(target: &Target) -> String {
 
 /// Alignment error of a row, and how far the surfaces are inserted.
 pub fn alignment(row: &Row) -> String {
-    let (d, degrees) = (row.misfit.distance_mm, row.misfit.angle_rad.to_degrees());
+    let (d, degrees) = (
+        row.alignment_error.distance_mm,
+        row.alignment_error.angle_rad.to_degrees(),
+    );
     let mut text = match row.target.kind {
         ConstraintKind::Concentric => format!("axis off by {d:.3} mm, {degrees:.2}°"),
         ConstraintKind::Coplanar => format!("gap {d:.3} mm, {degrees:.2}°"),
@@ -169,7 +172,7 @@ fn letter(direction: Option<DVec3>) -> Option<&'static str> {
 mod tests {
     use mortise_brep::{CadModel, Part};
     use mortise_mating::Axis;
-    use mortise_mating::recognise::Misfit;
+    use mortise_mating::recognise::AlignmentError;
 
     use super::*;
 
@@ -199,7 +202,7 @@ mod tests {
                 fixed_faces: (0..9).collect(),
             },
             standing: Standing::Sent,
-            misfit: Misfit {
+            alignment_error: AlignmentError {
                 distance_mm: 0.25,
                 angle_rad: 0.5f64.to_radians(),
             },

@@ -62,7 +62,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         let what = format!("{file}: time for them after reading");
         out(if plan.quick {
             // A time has a bound only where a person runs it, not in a test that other programs may slow down.
-            Row::told(what, found.seconds, "s").varies()
+            Row::reported(what, found.seconds, "s").varies()
         } else {
             Row::at_most(what, found.seconds, "s", most).varies()
         });

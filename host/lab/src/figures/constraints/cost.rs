@@ -113,7 +113,7 @@ pub(super) fn guided_ticks(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<
             "instructions",
             most,
         ));
-        out(Row::told(
+        out(Row::reported(
             what("ticks that left out points"),
             course.left_out_percent,
             "%",
@@ -186,7 +186,7 @@ fn counted(what: &dyn Fn(&str) -> String, recording: &Recording, out: &mut dyn F
         "instructions",
         GUIDED,
     ));
-    out(Row::told(
+    out(Row::reported(
         what("ticks that left out points"),
         recording.outcome.degraded_percent,
         "%",

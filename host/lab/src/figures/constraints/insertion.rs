@@ -180,9 +180,9 @@ pub(super) fn fits(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
         let fit = Fit::thesis(clearance).engaged(-20.0);
         let seen = played(&fit, &variant, true, &[SIM])?[0].seen;
         let what = |what: &str| format!("the same by the thesis' blend, {clearance} mm clearance: {what}");
-        out(Row::told(what("depth reached of 40 mm"), seen.depth_mm, "mm"));
+        out(Row::reported(what("depth reached of 40 mm"), seen.depth_mm, "mm"));
         out(match seen.off_axis_mm {
-            off if off.is_finite() => Row::told(what("farthest off the axis"), 1e3 * off, "µm"),
+            off if off.is_finite() => Row::reported(what("farthest off the axis"), 1e3 * off, "µm"),
             _ => Row::noted(what("farthest off the axis"), "guidance never settled"),
         });
     }

@@ -133,13 +133,13 @@ fn assemble(joint: &Joint, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         ));
     }
     let recogniser = guide.recogniser();
-    let misfit = (recogniser.entries())
+    let alignment_error = (recogniser.entries())
         .filter(|entry| entry.state == State::Active)
-        .map(|entry| entry.misfit.distance_mm)
+        .map(|entry| entry.alignment_error.distance_mm)
         .fold(f64::NAN, f64::max);
     out(Row::at_most(
         what("farthest from what a target asks for"),
-        misfit,
+        alignment_error,
         "mm",
         MISFIT_MM,
     ));

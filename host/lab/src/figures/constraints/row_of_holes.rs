@@ -101,7 +101,7 @@ fn carried(
     // Below the engagement distance the pin should be aligned with each hole that it passes, but must not be drawn into one.
     out(
         if when == When::Near && above < GuideSettings::default().approach_mm {
-            Row::told(pulls, pulled as f64, &format!("of {heard}"))
+            Row::reported(pulls, pulled as f64, &format!("of {heard}"))
         } else {
             Row::exactly(pulls, pulled as f64, &format!("of {heard}"), 0.0)
         },

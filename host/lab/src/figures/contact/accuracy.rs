@@ -36,36 +36,36 @@ pub(super) fn scene_p(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
     let what_rounded = what(&format!(
         "largest gap error by the field, 1 mm apart or nearer (at {at})"
     ));
-    out(Row::told(what_rounded, 1e3 * rounded, "µm"));
-    out(Row::told(what("image"), asked.image_bytes as f64, "bytes"));
+    out(Row::reported(what_rounded, 1e3 * rounded, "µm"));
+    out(Row::reported(what("image"), asked.image_bytes as f64, "bytes"));
     let ns = asked.median_ns();
     out(Row::at_most(what("median query on this computer"), ns, "ns", 15_000.0).varies());
     let peer = peer::ask(PEER_DEFLECTION_MM)?;
     let of = format!("parry3d, {} triangles", peer.triangles);
-    let told = Row::told(
+    let reported = Row::reported(
         what(&format!("{of}: median query over ours")),
         peer.median_ns / ns,
         "",
     );
-    out(told.varies());
-    let told = Row::told(
+    out(reported.varies());
+    let reported = Row::reported(
         what(&format!("{of}: median gap query over our median")),
         peer.gap_ns / ns,
         "",
     );
-    out(told.varies());
-    let told = Row::told(
+    out(reported.varies());
+    let reported = Row::reported(
         what(&format!("{of}: median depth query over our median")),
         peer.depth_ns / ns,
         "",
     );
-    out(told.varies());
-    out(Row::told(
+    out(reported.varies());
+    out(Row::reported(
         what(&format!("{of}: largest gap error")),
         1e3 * peer.gap_error_mm,
         "µm",
     ));
-    out(Row::told(
+    out(Row::reported(
         what(&format!("{of}: largest penetration error")),
         1e3 * peer.depth_error_mm,
         "µm",

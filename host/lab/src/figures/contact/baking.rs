@@ -37,7 +37,7 @@ pub(super) fn motor(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     // Times are reported, not judged, in the shorter form: it runs as a test beside other programs.
     let timed = |what: String, value: f64, unit: &str, bound: f64| {
         if plan.quick {
-            Row::told(what, value, unit).varies()
+            Row::reported(what, value, unit).varies()
         } else {
             Row::at_most(what, value, unit, bound).varies()
         }
@@ -46,7 +46,7 @@ pub(super) fn motor(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
         let (seconds, bytes, met) = planned(&path, &model)?;
         let at = format!("planned and baked at {} µm", 1e3 * ACCURACY_MM);
         out(timed(what(&at), seconds, "s", SECONDS));
-        out(Row::told(what(&format!("{at}: image")), bytes, "bytes"));
+        out(Row::reported(what(&format!("{at}: image")), bytes, "bytes"));
         out(Row::same(
             what(&format!("{at}: the accuracy is met")),
             if met { "yes" } else { "no" },

@@ -49,7 +49,7 @@ pub(super) fn tight(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
     let beside = crate::clearance::smallest(&textbook, wide, &mut |trial| eprintln!("{trial}"))?;
     let what = format!("the same insertion, {textbook}: smallest clearance of those tried");
     out(match beside {
-        Some(mm) => Row::told(what, 1e3 * mm, "µm"),
+        Some(mm) => Row::reported(what, 1e3 * mm, "µm"),
         None => Row::noted(what, &format!("none; {} mm does not go", wide[0])),
     });
     let variant = Variant::field(CELL_MM);
@@ -91,7 +91,7 @@ fn each(variant: &Variant, trial: &Trial, out: &mut dyn FnMut(Row)) {
         "N",
         3.0,
     ));
-    out(Row::told(
+    out(Row::reported(
         what("ticks that left out points"),
         trial.left_out_percent.unwrap_or(f64::NAN),
         "%",

@@ -73,7 +73,7 @@ impl Counted<'_> {
         let left_out = format!("{what}: ticks that left out points");
         out(match self.degraded_percent {
             Some(bound) => Row::at_most(left_out, outcome.degraded_percent, "%", bound),
-            None => Row::told(left_out, outcome.degraded_percent, "%"),
+            None => Row::reported(left_out, outcome.degraded_percent, "%"),
         });
         out(Row::same(
             format!("{what}: pressed or moved as meant, no tick missed"),
@@ -208,12 +208,12 @@ pub(super) fn large_classic(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result
             "ticks",
             0.0,
         ));
-        out(Row::told(
+        out(Row::reported(
             what("instructions in the longest tick"),
             most(&outcome),
             "instructions",
         ));
-        out(Row::told(
+        out(Row::reported(
             what("ticks that left out points"),
             outcome.degraded_percent,
             "%",
@@ -278,7 +278,7 @@ fn compared(
     );
     out(match bound {
         Some(bound) => Row::at_most(of, ratio, "", bound),
-        None => Row::told(of, ratio, ""),
+        None => Row::reported(of, ratio, ""),
     });
     for (which, outcome) in [("with few", few), ("with many", many)] {
         out(Row::at_most(
@@ -287,7 +287,7 @@ fn compared(
             "instructions",
             CONTACT,
         ));
-        out(Row::told(
+        out(Row::reported(
             what(&format!("ticks that left out points {which}")),
             outcome.degraded_percent,
             "%",

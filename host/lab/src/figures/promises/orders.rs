@@ -30,7 +30,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
 }
 
 fn rows(what: &str, report: &Report, out: &mut dyn FnMut(Row)) {
-    out(Row::told(
+    out(Row::reported(
         format!("{what}: orders covered"),
         report.orders as f64,
         "orders",

@@ -126,7 +126,7 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
             earlier.all(|sample| driven(&sample)),
         ),
         (
-            "every tick was told",
+            "every tick was reported",
             seen.telemetry.len() == (filling + RELEASED) as usize,
         ),
         ("the released ticks ran", seen.ran[1] == before + RELEASED),
@@ -258,14 +258,14 @@ impl Host {
 
     fn statistics(&mut self) -> io::Result<Statistics> {
         self.send(&ToDevice::GetStatistics { reset: false })?;
-        let told = |seen: &Seen| {
+        let reported = |seen: &Seen| {
             seen.others.iter().find_map(|message| match message {
                 FromDevice::Statistics(statistics) => Some(*statistics),
                 _ => None,
             })
         };
-        let seen = self.until(|seen| told(seen).is_some())?;
-        Ok(told(&seen).unwrap_or_default())
+        let seen = self.until(|seen| reported(seen).is_some())?;
+        Ok(reported(&seen).unwrap_or_default())
     }
 
     fn until(&mut self, done: impl Fn(&Seen) -> bool) -> io::Result<Seen> {

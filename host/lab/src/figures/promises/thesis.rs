@@ -45,7 +45,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
             "thesis' table 3, {}: χ² of one space-filling design of 27 trials (hers: {})",
             printed.source, printed.statistic
         );
-        out(Row::told(what, row.median_chi_squared, "χ²"));
+        out(Row::reported(what, row.median_chi_squared, "χ²"));
     }
     Ok(())
 }

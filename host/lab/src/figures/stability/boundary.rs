@@ -29,7 +29,7 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         let what = format!(
             "handle 0.1 kg, 0.5 N s/m, 1 kHz; wall through coupling and contact, B = {damping} N s/m, {delay_ticks} ticks late: "
         );
-        out(Row::told(
+        out(Row::reported(
             format!("{what}largest stable stiffness by experiment"),
             found,
             "N/m",

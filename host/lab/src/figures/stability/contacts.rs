@@ -55,12 +55,12 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         FELT_N,
         f64::INFINITY,
     ));
-    out(Row::told(
+    out(Row::reported(
         format!("{what}, explicit beside it: deepest point"),
         explicit.penetration_um,
         "µm",
     ));
-    out(Row::told(
+    out(Row::reported(
         format!("{what}, explicit beside it: energy that contacts made at the object over any interval"),
         explicit.contact_made_mj,
         "mJ",

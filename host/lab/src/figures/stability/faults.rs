@@ -158,16 +158,16 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
                 driven.push(case.clone());
             }
             // The first fault is the one reported; some are no faults while the motors are off.
-            let told = matches!(state, Before::FadingInFault | Before::Faulted);
+            let reported = matches!(state, Before::FadingInFault | Before::Faulted);
             // A host that disarmed may leave before the fade ends.
             let gone = state == Before::Disarming && matches!(fault, Fault::HostSilent { .. });
-            let expected = !told && !gone && (state.live() || seen_at_rest(fault));
+            let expected = !reported && !gone && (state.live() || seen_at_rest(fault));
             if expected && words.is_none_or(|said| said != describe(board.as_seen(fault))) {
                 unsaid.push(case);
             }
         }
     }
-    out(Row::told(
+    out(Row::reported(
         "every fault in every state: cases",
         f64::from(cases),
         "",
@@ -268,7 +268,7 @@ struct Board<'c, 's> {
     decoder: Decoder,
     seq: u16,
     silent_ms: u16,
-    told: Option<Fault>,
+    reported: Option<Fault>,
 }
 
 impl<'c, 's> Board<'c, 's> {
@@ -304,7 +304,7 @@ impl<'c, 's> Board<'c, 's> {
             decoder: Decoder::new(),
             seq: 0,
             silent_ms: 0,
-            told: None,
+            reported: None,
         }
     }
 
@@ -314,7 +314,7 @@ impl<'c, 's> Board<'c, 's> {
         self.link.poll(&mut self.wire);
         for byte in std::mem::take(&mut self.wire.0) {
             if let Some(Ok((_, FromDevice::Fault { fault, .. }))) = self.decoder.push::<FromDevice>(byte) {
-                self.told.get_or_insert(fault);
+                self.reported.get_or_insert(fault);
             }
         }
     }
@@ -421,7 +421,7 @@ impl<'c, 's> Board<'c, 's> {
 
     /// Causes a fault. Returns whether the motors are off or stopping softly in time, and what the host reads.
     fn suffer(&mut self, fault: Fault) -> (bool, Option<String>) {
-        self.told = None;
+        self.reported = None;
         let report = |axis, kind| Some(DriverFault { axis, kind });
         let mut within = WITHIN_TICKS;
         match fault {
@@ -459,15 +459,15 @@ impl<'c, 's> Board<'c, 's> {
             Drive::Off => !self.control.safety().live(),
             Drive::Wrench(wrench) => stopping && wrench.is_finite(),
         };
-        if let Some(Fault::HostSilent { silent_ms }) = self.told {
+        if let Some(Fault::HostSilent { silent_ms }) = self.reported {
             self.silent_ms = silent_ms;
         }
         // A host that was not yet connected receives the state on request.
-        let told = self.told.or(match self.state() {
+        let reported = self.reported.or(match self.state() {
             DeviceState::Fault(fault) => Some(fault),
             _ => None,
         });
-        (quiet, told.map(describe))
+        (quiet, reported.map(describe))
     }
 
     /// The fault as this board reports it.

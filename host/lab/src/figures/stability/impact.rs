@@ -68,9 +68,9 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
                         DEEPEST_UM.min(500.0 * thick_mm),
                     ));
                 } else {
-                    out(Row::told(through_of, through, ""));
-                    out(Row::told(peak_of, peak, "N"));
-                    out(Row::told(deepest_of, deepest, "µm"));
+                    out(Row::reported(through_of, through, ""));
+                    out(Row::reported(peak_of, peak, "N"));
+                    out(Row::reported(deepest_of, deepest, "µm"));
                 }
             }
         }

@@ -60,7 +60,7 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             "%",
             1.0,
         ));
-        out(Row::told(
+        out(Row::reported(
             format!("{what}: stiffness the valve took"),
             100.0 * f64::from(bench.passivity().softened),
             "%",
@@ -79,7 +79,7 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             fastest = found;
         }
         let what = format!("{hertz} Hz, b_T = 20 N s/m, handle 0.15 kg that nobody holds");
-        out(Row::told(format!("{what}: largest stable k_T"), found, "N/m"));
+        out(Row::reported(format!("{what}: largest stable k_T"), found, "N/m"));
         out(Row::within(
             format!("{what}: the same off the spectral radius' {theory:.0} N/m"),
             100.0 * (found / theory - 1.0),
@@ -87,7 +87,7 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             -3.0,
             3.0,
         ));
-        out(Row::told(
+        out(Row::reported(
             format!("{what}: loss against 1000 Hz"),
             100.0 * (1.0 - found / fastest),
             "%",
