@@ -179,7 +179,7 @@ impl Felt {
 /// way. Exact between neighbouring ticks, whose wrench is held from the first to the second, as far as the poses are; else trapezoids: what happens
 /// between two samples is not seen. `felt` has an entry for each of `samples`.
 ///
-/// What counts as stored: see [`Coupled::stored_mj`].
+/// What counts as stored: see `Coupled::stored_mj`.
 pub fn energy(
     scene: &PreparedScene,
     settings: &Settings,
