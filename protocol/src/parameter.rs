@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn choices_are_told_by_the_nearest_number() {
+    fn choices_are_named_by_the_nearest_number() {
         let row = ParameterId::Integrator.row();
         for (value, choice) in [
             (0.0, "implicit"),

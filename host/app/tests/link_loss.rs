@@ -96,7 +96,7 @@ fn errors(session: &Session) -> Vec<String> {
 }
 
 #[test]
-fn a_lost_link_is_told_once_with_its_reason_and_reconnect_mends_it() {
+fn a_lost_link_is_reported_once_with_its_reason_and_reconnect_mends_it() {
     let cable = Cable::new();
     let mut harness = harness();
     open_sample(&mut harness);
@@ -146,7 +146,7 @@ fn a_lost_link_is_told_once_with_its_reason_and_reconnect_mends_it() {
 
 /// A restart of the board is reported as a lost link with the board's own reason.
 #[test]
-fn a_board_that_starts_anew_is_told_once_and_reached_again() {
+fn a_board_that_starts_anew_is_reported_once_and_reached_again() {
     let cable = Cable::new();
     let mut harness = harness();
     let spec: RigSpec = cable.port.parse().expect("a port's name");

@@ -258,7 +258,7 @@ fn what_cannot_be_baked_is_refused_in_one_line() {
 }
 
 #[test]
-fn progress_is_told_and_can_stop() {
+fn progress_is_reported_and_can_stop() {
     let calls = AtomicUsize::new(0);
     let last = std::sync::Mutex::new(None);
     let seen = |p: mortise_bake::Progress<'_>| {

@@ -310,7 +310,7 @@ fn a_chain_of_files_is_bounded() {
 }
 
 #[test]
-fn a_fault_in_a_referenced_file_is_told_with_its_name() {
+fn a_fault_in_a_referenced_file_is_reported_with_its_name() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("other.step"), "Dear all,\n").unwrap();
     let error = main_for(folder.path(), "other.step")

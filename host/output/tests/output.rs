@@ -131,7 +131,7 @@ fn only_a_regular_file_is_replaced() {
 }
 
 #[test]
-fn what_cannot_be_written_is_told_before_the_work() {
+fn what_cannot_be_written_is_reported_before_the_work() {
     let folder = folder();
     let file = folder.path().join("file");
     std::fs::write(&file, "no folder").expect("written");

@@ -109,7 +109,7 @@ fn a_pulled_cable_shows_as_event_and_error() {
 /// A board that fails and restarts has lost its greeting; the operator reads the reason of the restart, whether or not the program sends
 /// requests.
 #[test]
-fn a_board_that_started_anew_is_told_with_the_reason() {
+fn a_board_that_started_anew_is_reported_with_the_reason() {
     for asks in [false, true] {
         let (transport, mut far) = wire();
         let board = std::thread::spawn(move || {

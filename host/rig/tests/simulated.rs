@@ -181,7 +181,7 @@ fn a_restart_keeps_scene_and_link() {
 }
 
 #[test]
-fn lockstep_runs_what_it_is_told_and_repeats_itself() {
+fn lockstep_runs_what_it_is_sent_and_repeats_itself() {
     let hashes: Vec<u64> = (0..2)
         .map(|_| {
             let client = connect_fast();

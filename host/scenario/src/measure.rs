@@ -180,7 +180,7 @@ impl Felt {
 /// either direction. Between consecutive ticks, whose wrench is held from the first to the second, it is as exact as the poses; otherwise it is the
 /// trapezoidal sum, blind to what happens between two samples. `felt` has an entry for each of `samples`.
 ///
-/// For the stored energy see [`Coupled::stored_mj`].
+/// For the stored energy see `Coupled::stored_mj`.
 pub fn energy(
     scene: &PreparedScene,
     settings: &Settings,

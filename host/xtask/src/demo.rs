@@ -109,7 +109,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn displays_of_this_machine_are_told_from_remote_ones() {
+    fn displays_of_this_machine_are_distinguished_from_remote_ones() {
         assert_eq!(local_display_number(":1.0"), Some(1));
         assert_eq!(local_display_number("unix:12"), Some(12));
         assert_eq!(local_display_number("localhost:10.0"), None);

@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_force_is_told_in_two_digits() {
+    fn a_small_force_is_reported_in_two_digits() {
         let expected = [
             (0.0, "0.00"),
             (0.004, "0.00"),

@@ -326,7 +326,7 @@ mod tests {
 
     /// For completely separated trials the model's deviance is 0; the model without the term has that of a constant probability.
     #[test]
-    fn what_is_told_apart_says_so_and_is_tested_still() {
+    fn what_is_distinguished_says_so_and_is_tested_still() {
         let values: Vec<Vec<f64>> = (0..10).map(|i| vec![f64::from(i)]).collect();
         let went: Vec<bool> = (0..10).map(|i| i >= 5).collect();
         let model = Logistic::fit(&values, &went).expect("fits");

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn systems_are_told_by_id_and_family() {
+    fn systems_are_identified_by_id_and_family() {
         let cases = [
             ("ID=debian\nVERSION_CODENAME=bookworm\n", System::Apt),
             (

@@ -174,6 +174,8 @@ impl Rights {
         shell::run(
             self.command("env")
                 .args(["DEBIAN_FRONTEND=noninteractive", "apt-get"])
+                // A machine just started may be updating itself: wait for its lock, s.
+                .args(["-o", "DPkg::Lock::Timeout=300"])
                 .args(arguments)
                 .stdin(Stdio::null()),
         )

@@ -76,7 +76,7 @@ const CELL_MM: f64 = 0.7;
 /// Largest distance from the assembled position along the insertion direction, mm, for joints with a stop.
 const SEATED_MM: f64 = 0.05;
 /// Largest alignment error of any of its targets, mm.
-const MISFIT_MM: f64 = 0.05;
+const ALIGNMENT_ERROR_MM: f64 = 0.05;
 
 /// One to three rows for each joint.
 pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
@@ -141,7 +141,7 @@ fn assemble(joint: &Joint, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
         what("farthest from what a target asks for"),
         alignment_error,
         "mm",
-        MISFIT_MM,
+        ALIGNMENT_ERROR_MM,
     ));
     let freedom = recogniser.freedom();
     out(Row::same(
