@@ -20,8 +20,8 @@
 //! holds what the wall held before, an exact fit can be inserted, and a part pulled off its axis against the cap meets the wall again. All other
 //! contacts are unchanged, and so are planes and cones: they stop a part, and a push above the cap must not penetrate a stop by 0.1 mm.
 //!
-//! [`GuidanceMethod::Thesis`] is the blend of Faas 2010 (eqs. 13–19), for comparison: a spring of 0.8·k_T without a cap, weighted with x = ½e^(−θ/θ₀)
-//! + ½e^(−d/d₀), θ₀ = voxel/insertion depth, d₀ = voxel, and the contacts of those faces weighted with 1 − x. A target whose caps are 0 exerts no
+//! [`GuidanceMethod::Thesis`] is the blend of Faas 2010 (eqs. 13–19), for comparison: a spring of 0.8·k_T without a cap, weighted with
+//! x = ½e^(−θ/θ₀) + ½e^(−d/d₀), θ₀ = voxel/insertion depth, d₀ = voxel, and the contacts of those faces weighted with 1 − x. A target whose caps are 0 exerts no
 //! force there either, and only the contacts are softened: her hybrid method “without constraint evaluation” (section 8.2.2).
 
 use glam::Vec3;
