@@ -306,7 +306,7 @@ pub struct Capabilities {
     pub cost_unit: CostUnit,
     /// Limit of a tick's cost, in `cost_unit`; 0 when there is no deadline.
     pub cost_budget: u32,
-    /// Most constraint targets evaluated at the same time; 0: none.
+    /// Largest number of constraint targets evaluated at the same time; 0: none.
     pub max_targets: u8,
     /// Reason of the last start.
     pub reset: ResetReason,

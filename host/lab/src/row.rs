@@ -321,7 +321,7 @@ impl Row {
     }
 }
 
-/// Resolution of claims for a requirement from `min`, negative, to `max`.
+/// Smallest step in which a claim is stated, for a requirement from `min` (negative) to `max`.
 fn finest(min: f64, max: f64) -> f64 {
     FINEST_CLAIM * if max.is_finite() { max.abs() } else { min.abs() }
 }

@@ -231,7 +231,7 @@ mod tests {
         };
         let safety = read("safety.md");
         for fault in Fault::every(NUMBER) {
-            // The page writes axis n, and n ms.
+            // In safety.md an axis is written n, and a time n ms.
             let words = describe(fault).replace(&format!(" {NUMBER}"), " n");
             assert!(safety.contains(&format!("\"{words}\"")), "{words}");
         }

@@ -53,7 +53,7 @@ async fn serve(mut link: Link, mut bytes: Consumer<'static, u8>) {
     let mut piece: Vec<u8, PIECE> = Vec::new();
     let mut stack_at = 0;
     loop {
-        // Bounded by what was there when the loop began.
+        // Bounded by the bytes that had arrived when the loop began.
         for _ in 0..=bytes.len() / PIECE {
             piece.clear();
             piece.extend(core::iter::from_fn(|| bytes.dequeue()).take(PIECE));
