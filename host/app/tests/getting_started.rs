@@ -167,7 +167,7 @@ fn the_builders_labels_are_in_the_window() {
     let page = page();
     let steps = steps(&page, "### First start");
     let named: BTreeSet<&str> = steps.iter().flat_map(|step| labels(step)).collect();
-    assert_eq!(named, BTreeSet::from(["off", "Position", "Fault"]));
+    assert_eq!(named, BTreeSet::from(["off", "Set home", "Position", "Fault"]));
     let mut harness = harness();
     harness.run_steps(2);
     until(&mut harness, "rigs are listed", |s| !s.rigs.is_empty());
