@@ -9,6 +9,7 @@
 //! first. After an interruption at any moment, the scene in use is untouched in its own slot and found again at the next start.
 
 pub mod rig;
+mod sequence;
 
 use core::hash::{Hash, Hasher};
 
@@ -17,6 +18,7 @@ use mortise_protocol::limits::MAX_PARTS;
 use mortise_protocol::message::Refusal;
 use mortise_protocol::rig::Rig;
 
+use self::sequence::newer;
 use crate::board::{Flash, FlashError, SLOTS, WRITE_SIZE};
 
 /// First bytes of a commit record.
@@ -372,11 +374,6 @@ fn check(bytes: &[u8]) -> Result<SceneImage<'_>, ReadError> {
         return Err(ReadError::TooManyParts);
     }
     Ok(image)
-}
-
-/// Whether `a` is newer than `b`: sequence numbers wrap, and half their range counts as newer.
-fn newer(a: u32, b: u32) -> bool {
-    a.wrapping_sub(b) as i32 > 0
 }
 
 /// Writes the collected word at byte `at` of the slot, erasing ahead where needed.

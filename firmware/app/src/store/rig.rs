@@ -14,7 +14,7 @@ use mortise_protocol::limits::MAX_MESSAGE;
 use mortise_protocol::message::Refusal;
 use mortise_protocol::rig::{Rig, layout};
 
-use super::newer;
+use super::sequence::newer;
 use crate::board::{Flash, RIG_SLOTS, WRITE_SIZE};
 
 const MAGIC: [u8; 8] = *b"MRIG0001";

@@ -12,6 +12,7 @@
 
 mod paddle;
 mod pantograph;
+mod placed;
 mod serial_arm;
 
 use glam::{Mat3, Quat, Vec3};
@@ -32,18 +33,6 @@ pub struct Model {
     origin: Vec3,
     turn: Quat,
     wrist: Option<Wrist>,
-}
-
-/// Handle pose and derivatives from a mechanism's own joints, in its own frame.
-#[derive(Clone, Copy, Debug)]
-struct Placed {
-    position: Vec3,
-    /// ∂p/∂θ, columns by joint; zero for absent joints.
-    linear: Mat3,
-    /// Orientation of the link that carries the wrist.
-    link: Quat,
-    /// Angular velocity of that link for each joint's rate.
-    angular: Mat3,
 }
 
 /// The mechanism in one posture.

@@ -3,7 +3,7 @@
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::limits::MAX_JOINTS;
 
-use super::Placed;
+use super::placed::Placed;
 
 pub(super) fn place(radius: f32, angles: [f32; MAX_JOINTS]) -> Placed {
     let (sin, cos) = libm::sincosf(angles[0]);

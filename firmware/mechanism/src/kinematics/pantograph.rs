@@ -13,7 +13,7 @@
 use glam::{Mat3, Quat, Vec2, Vec3};
 use mortise_protocol::limits::MAX_JOINTS;
 
-use super::Placed;
+use super::placed::Placed;
 
 /// The distal links are treated as collinear when the handle is nearer to the line of the elbows than this share of a link: 0.06°.
 const FLAT: f32 = 1e-3;

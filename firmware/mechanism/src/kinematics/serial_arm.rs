@@ -12,7 +12,7 @@
 use glam::{Mat3, Quat, Vec3};
 use mortise_protocol::limits::MAX_JOINTS;
 
-use super::Placed;
+use super::placed::Placed;
 
 pub(super) fn place(base_height: f32, upper: f32, lower: f32, angles: [f32; MAX_JOINTS]) -> Placed {
     let (yaw_sin, yaw_cos) = libm::sincosf(angles[0]);

@@ -6,7 +6,7 @@
 //!
 //! Error at steady speed with a window of n ticks: at most 2/n counts per tick. Cost: at most `N²/2` comparisons, 128 for [`WINDOW`].
 
-use super::Estimator;
+use super::estimator::Estimator;
 use crate::interface::TICK_HZ;
 
 /// Ticks of the longest window, by default.

@@ -1,6 +1,6 @@
 //! Velocity from encoder counts: first-order low-pass of the difference quotient.
 
-use super::Estimator;
+use super::estimator::Estimator;
 use crate::interface::{TICK_HZ, TICK_S};
 
 /// Time constant of the speed estimate, s.

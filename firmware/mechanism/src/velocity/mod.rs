@@ -20,20 +20,12 @@
 //! much with it.
 
 pub mod adaptive_window;
+mod estimator;
 pub mod low_pass;
 
 pub use adaptive_window::AdaptiveWindow;
+pub use estimator::Estimator;
 pub use low_pass::LowPass;
-
-/// Estimator of the speed of one axis, called once per tick.
-pub trait Estimator {
-    /// Initial state, at rest.
-    const AT_REST: Self;
-
-    /// Takes the counts moved in this tick and the size of a count (m, rad); returns the speed (m/s, rad/s). Finite for any counts while `per_count`
-    /// is.
-    fn update(&mut self, moved: i32, per_count: f32) -> f32;
-}
 
 /// The estimator used to drive motors.
 pub type InUse = LowPass;
