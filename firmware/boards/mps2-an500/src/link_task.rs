@@ -9,8 +9,9 @@ use mortise_protocol::message::ResetReason;
 use static_cell::StaticCell;
 
 use crate::device::Interrupt;
+use crate::planes::{Link, milliseconds};
+use crate::timer;
 use crate::uart::{self, Sender};
-use crate::{Link, milliseconds, timer};
 
 /// How often the deepest stack is looked up, ms: it reads the whole unused stack.
 const STACK_EVERY: u32 = TICK_HZ as u32;

@@ -13,29 +13,13 @@ mod device;
 mod link_task;
 mod memory;
 mod motors;
+mod planes;
 mod timer;
 mod uart;
 
-use core::sync::atomic::{AtomicU32, Ordering};
-
 use cortex_m_rt as _;
-use mortise_firmware::control::ControlPlane;
-use mortise_firmware::link::LinkPlane;
-use mortise_simulation::ram_flash::RamFlash;
 
-/// The control plane of this board.
-type Control = ControlPlane<'static, 'static, motors::Motors, timer::TickClock>;
-/// The link plane of this board.
-type Link = LinkPlane<'static, 'static, RamFlash<'static>>;
-
-static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
-
-/// Timer ticks since start, for the log's timestamps.
-fn milliseconds() -> u32 {
-    MILLISECONDS.load(Ordering::Relaxed)
-}
-
-defmt::timestamp!("{=u32:ms}", milliseconds());
+defmt::timestamp!("{=u32:ms}", planes::milliseconds());
 
 #[rtic::app(device = crate::device, peripherals = false)]
 mod app {
@@ -53,7 +37,8 @@ mod app {
     use mortise_protocol::message::{CostUnit, ResetReason};
 
     use crate::device::Interrupt;
-    use crate::{Control, Link, MILLISECONDS, link_task, memory, motors, timer, uart};
+    use crate::planes::{Control, Link, MILLISECONDS};
+    use crate::{link_task, memory, motors, timer, uart};
 
     #[shared]
     struct Shared {}

@@ -2,23 +2,18 @@
 
 use std::path::Path;
 
-use clap::CommandFactory as _;
-
-use super::Cli;
-
 /// Largest number of edits (one character added, omitted, replaced, or two swapped) at which a word counts as a mistyped command.
 const MAX_EDITS: usize = 2;
 
-/// Checks a lone argument before a window opens for it.
+/// Checks a lone argument of `command` before a window opens for it.
 ///
 /// # Errors
 /// One line: the file does not exist, with the probable command when the argument could be one.
-pub(super) fn check_lone(argument: &Path) -> anyhow::Result<()> {
+pub(super) fn check_lone(argument: &Path, command: &clap::Command) -> anyhow::Result<()> {
     let typed = argument.as_os_str().to_string_lossy();
     if argument.exists() || !could_be_a_command(&typed) {
         return check_file(argument);
     }
-    let command = Cli::command();
     let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
     match nearest(&typed, &names) {
         Some(name) => anyhow::bail!("`{typed}` is neither a command nor a file; did you mean `{name}`?"),

@@ -68,7 +68,9 @@ pub fn main() -> ExitCode {
     };
     let result = match cli {
         Cli { command: None, open } => {
-            let checked = open.file().map_or(Ok(()), mistyped::check_lone);
+            let checked = open
+                .file()
+                .map_or(Ok(()), |file| mistyped::check_lone(file, &Cli::command()));
             checked.and_then(|()| window::open(open))
         }
         Cli {

@@ -4,8 +4,11 @@ use egui::{ComboBox, RichText, Slider, Ui, Vec2};
 use mortise_bake::Method;
 use mortise_protocol::parameter::{PARAMETERS, Parameter};
 
-use super::{control, guidance, theme};
+use super::{control, theme};
 use crate::session::{Intent, Session, obstacle};
+
+/// First word of the parameters that the section on guidance shows instead.
+pub const GUIDANCE: &str = "Guidance";
 
 /// First word of the parameters' names in a group, and the group's heading.
 const GROUPS: [(&str, &str); 5] = [
@@ -36,7 +39,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         let mut rows = PARAMETERS
             .iter()
             .filter(|row| row.name.starts_with(word) && !earlier.iter().any(|(w, _)| row.name.starts_with(w)))
-            .filter(|row| !row.name.starts_with(guidance::WORD))
+            .filter(|row| !row.name.starts_with(GUIDANCE))
             .peekable();
         if rows.peek().is_none() {
             continue;

@@ -10,20 +10,17 @@ use super::{control, parameters, theme};
 use crate::session::document::Document;
 use crate::session::{GUIDE_CAP_N, Intent, Session};
 
-/// First word of the parameters shown in this section and not among the others.
-pub const WORD: &str = "Guidance";
-
 /// Draws the section.
 pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     control::section(ui, "Guidance");
     ui.add_space(2.0);
-    for row in PARAMETERS.iter().filter(|row| row.name == WORD) {
+    for row in PARAMETERS.iter().filter(|row| row.name == parameters::GUIDANCE) {
         parameters::choice(ui, session, wanted, row);
     }
     when(ui, session, wanted);
     for row in PARAMETERS
         .iter()
-        .filter(|row| row.name.starts_with(WORD) && row.name != WORD)
+        .filter(|row| row.name.starts_with(parameters::GUIDANCE) && row.name != parameters::GUIDANCE)
     {
         parameters::one(ui, session, wanted, row);
     }
