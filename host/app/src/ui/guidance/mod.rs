@@ -36,8 +36,10 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         return;
     };
     let free = words::freedom(&list.freedom);
-    control::row(ui, "Remaining motion", free)
+    // On two lines: side by side the value would be cut off.
+    ui.label(RichText::new("Remaining motion").color(theme::of(ui).text_weak))
         .on_hover_text("Motion that all active targets together leave to the held part");
+    ui.label(free);
     if list.rows.is_empty() {
         explain(ui, "It touches no surface that it could fit.");
     }
