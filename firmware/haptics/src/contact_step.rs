@@ -11,7 +11,8 @@ use crate::collision::rules::FacePairRules;
 use crate::collision::search::Search;
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::contact_force::{ContactForce, Stiffness};
-use crate::dynamics::step::{MAX_SOLVES, Solution, Step, Terms};
+use crate::dynamics::force::ForceTerm;
+use crate::dynamics::step::{MAX_SOLVES, Solution, Step};
 use crate::hand::ContactMemory;
 use crate::io::{Flags, Work};
 use crate::math::scalar::{larger, smaller};
@@ -53,7 +54,7 @@ pub(crate) struct Constraints<'a> {
 }
 
 /// A step, its force terms, and the solution without contacts.
-type Motion<'a, 't> = (&'a Step, Terms<'a, 't>, &'a Solution);
+type Motion<'a, T> = (&'a Step, &'a mut T, &'a Solution);
 
 impl Given<'_, '_> {
     /// Speed limit of any point of the object, m/s. The textbook methods look no farther than the next voxel, so half a cell a tick (eq. 5 of Faas
@@ -99,11 +100,11 @@ impl Given<'_, '_> {
 }
 
 /// The step of the `grabbed` part with the contacts within `reach`.
-pub(crate) fn contact_step(
+pub(crate) fn contact_step<T: ForceTerm>(
     given: &Given<'_, '_>,
     memory: &mut ContactMemory,
     grabbed: &Grabbed,
-    (step, terms, free): Motion<'_, '_>,
+    (step, terms, free): Motion<'_, T>,
     reach: &Reach,
     constraints: &Constraints<'_>,
     work: &mut Work,
@@ -180,11 +181,11 @@ fn search(
 }
 
 /// The step with the contacts in `memory`, by the integrator in the settings.
-fn solve(
+fn solve<T: ForceTerm>(
     given: &Given<'_, '_>,
     memory: &mut ContactMemory,
     grabbed: &Grabbed,
-    (step, terms, free): Motion<'_, '_>,
+    (step, terms, free): Motion<'_, T>,
     guided_share: f32,
     solves: u8,
 ) -> Solution {

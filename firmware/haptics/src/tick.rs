@@ -11,8 +11,9 @@ use crate::constraints::targets::{Situation, TargetRules};
 use crate::contact_step::{Constraints, Given, Reach, contact_step};
 use crate::dynamics::body::Grabbed;
 use crate::dynamics::coupling::{Coupling, CouplingForce, slipping, take_hold};
+use crate::dynamics::force::ForceTerm;
 use crate::dynamics::friction::Friction;
-use crate::dynamics::step::{Solution, Step, Terms};
+use crate::dynamics::step::{Solution, Step};
 use crate::hand::Hand;
 use crate::io::{Flags, GuidanceState, Input, Output, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose, usable_twist};
@@ -139,10 +140,11 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     hand.targets.add_springs(&situation, &mut springs);
     let turning_j = grabbed.turning_energy(mass_kg, gyration2);
     hand.tank.keep(coupled.moving_j + turning_j);
-    let mut coupling_force = CouplingForce::new(coupling, &settings.coupling, period_s, length);
-    let mut target_force = TargetForce::new(&springs, period_s, length);
-    let mut friction = Friction::new(&settings.friction, period_s, length);
-    let terms: Terms<'_, '_> = &mut [&mut coupling_force, &mut target_force, &mut friction];
+    let terms = &mut (
+        CouplingForce::new(coupling, &settings.coupling, period_s, length),
+        TargetForce::new(&springs, period_s, length),
+        Friction::new(&settings.friction, period_s, length),
+    );
 
     let (free, reach) = free_motion(given, &grabbed, &step, terms);
     if (hand.targets).exclude(&situation, &springs, &reach.motions, given.slack()) {
@@ -202,7 +204,7 @@ fn free_motion(
     given: &Given<'_, '_>,
     grabbed: &Grabbed,
     step: &Step,
-    terms: Terms<'_, '_>,
+    terms: &mut impl ForceTerm,
 ) -> (Solution, Reach) {
     let settings = given.settings;
     let mut free = match settings.integrator {

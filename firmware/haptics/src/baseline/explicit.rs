@@ -15,7 +15,8 @@
 use glam::Vec3;
 
 use crate::collision::contact::{Contact, Phase};
-use crate::dynamics::step::{Solution, Step, Terms};
+use crate::dynamics::force::ForceTerm;
+use crate::dynamics::step::{Solution, Step};
 use crate::math::pose::{Twist, Wrench};
 use crate::math::symmetric6::dot;
 use crate::settings::ContactSettings;
@@ -33,7 +34,7 @@ pub(crate) fn shared_stiffness(contact: &ContactSettings, touching: f32) -> f32 
 }
 
 /// The step without contacts.
-pub(crate) fn free(step: &Step, terms: Terms<'_, '_>) -> Solution {
+pub(crate) fn free(step: &Step, terms: &impl ForceTerm) -> Solution {
     Solution {
         twist: accelerated(step, at_start(step, terms)),
         contact: Wrench::ZERO,
@@ -46,7 +47,7 @@ pub(crate) fn free(step: &Step, terms: Terms<'_, '_>) -> Solution {
 /// and their rates those of its motion as limited by `allowed`.
 pub(crate) fn with_contacts(
     step: &Step,
-    terms: Terms<'_, '_>,
+    terms: &impl ForceTerm,
     contacts: &mut [Contact],
     k: f32,
     braking_m: f32,
@@ -81,12 +82,10 @@ pub(crate) fn with_contacts(
 }
 
 /// Wrench of all terms at the tick's start.
-fn at_start(step: &Step, terms: Terms<'_, '_>) -> Wrench {
+fn at_start(step: &Step, terms: &impl ForceTerm) -> Wrench {
     let before = step.scale(step.twist);
     let mut wrench = Wrench::ZERO;
-    for term in terms.iter() {
-        term.add_wrench(&before, 0.0, &mut wrench);
-    }
+    terms.add_wrench(&before, 0.0, &mut wrench);
     wrench
 }
 

@@ -8,7 +8,7 @@
 //! with Kᵢ and wᵢ those of the majorisers. The iteration ends when no term's majoriser changes by more than the step resolves. With every Kᵢ positive
 //! semi-definite the step is stable.
 //!
-//! To add a force, implement [`ForceTerm`] in a file of its own, give it a settings group, and name it in the list of terms in `tick.rs`.
+//! To add a force, implement [`ForceTerm`] in a file of its own, give it a settings group, and name it in the tuple of terms in `tick.rs`.
 
 use crate::dynamics::contact_force::ContactForce;
 use crate::dynamics::system::System;
@@ -41,6 +41,37 @@ pub(crate) trait ForceTerm {
     /// Energy that the term stores once the twist `x` has acted, J: the potential of its wrench. A damper stores none.
     #[cfg(test)]
     fn energy_j(&self, x: &[f32; 6]) -> f32;
+}
+
+/// Terms together are a term: a step takes them as a tuple, in the order in which they enter the sums.
+impl<A: ForceTerm, B: ForceTerm, C: ForceTerm> ForceTerm for (A, B, C) {
+    fn begin(&mut self, x: &[f32; 6]) {
+        self.0.begin(x);
+        self.1.begin(x);
+        self.2.begin(x);
+    }
+
+    fn linearise(&mut self, at: &Iterate<'_>) -> bool {
+        // All of them, settled or not.
+        self.0.linearise(at) & self.1.linearise(at) & self.2.linearise(at)
+    }
+
+    fn add_to(&self, system: &mut System) {
+        self.0.add_to(system);
+        self.1.add_to(system);
+        self.2.add_to(system);
+    }
+
+    fn add_wrench(&self, x: &[f32; 6], period_s: f32, to: &mut Wrench) {
+        self.0.add_wrench(x, period_s, to);
+        self.1.add_wrench(x, period_s, to);
+        self.2.add_wrench(x, period_s, to);
+    }
+
+    #[cfg(test)]
+    fn energy_j(&self, x: &[f32; 6]) -> f32 {
+        self.0.energy_j(x) + self.1.energy_j(x) + self.2.energy_j(x)
+    }
 }
 
 /// Properties that every term guarantees, for the tests of each.

@@ -52,16 +52,11 @@ pub(crate) struct Solution {
     pub settled: bool,
 }
 
-/// The force terms of a step without contact, in the order in which they enter the sums.
-pub(crate) type Terms<'a, 't> = &'a mut [&'t mut dyn ForceTerm];
-
 impl Step {
     /// The step without contacts.
-    pub fn free(&self, terms: Terms<'_, '_>) -> Solution {
+    pub fn free(&self, terms: &mut impl ForceTerm) -> Solution {
         let start = self.scale(self.twist);
-        for term in terms.iter_mut() {
-            term.begin(&start);
-        }
+        terms.begin(&start);
         let mut solves = 0;
         loop {
             let x = self.system(terms).solve();
@@ -84,7 +79,7 @@ impl Step {
     pub fn with_contacts(
         &self,
         free: &Solution,
-        terms: Terms<'_, '_>,
+        terms: &mut impl ForceTerm,
         contact: &mut ContactForce<'_>,
         max_solves: u8,
     ) -> Solution {
@@ -121,11 +116,9 @@ impl Step {
     }
 
     /// System of inertia and all terms except contact: (M + Σ h·Kᵢ)·V' = M·V + Σ h·wᵢ.
-    fn system(&self, terms: Terms<'_, '_>) -> System {
+    fn system(&self, terms: &impl ForceTerm) -> System {
         let mut system = self.inertia();
-        for term in terms.iter() {
-            term.add_to(&mut system);
-        }
+        terms.add_to(&mut system);
         system
     }
 
@@ -165,13 +158,8 @@ impl Step {
 }
 
 /// Linearises every term at `x`; returns whether all had settled.
-fn linearise(terms: Terms<'_, '_>, x: &[f32; 6], contact: Option<&ContactForce<'_>>) -> bool {
-    let at = Iterate { x, contact };
-    let mut settled = true;
-    for term in terms.iter_mut() {
-        settled &= term.linearise(&at);
-    }
-    settled
+fn linearise(terms: &mut impl ForceTerm, x: &[f32; 6], contact: Option<&ContactForce<'_>>) -> bool {
+    terms.linearise(&Iterate { x, contact })
 }
 
 #[cfg(test)]
@@ -219,7 +207,7 @@ mod tests {
             let stiffness = settings.contact.stiffness_n_per_m;
             let k = Stiffness { point: stiffness, guided: stiffness };
             let mut coupling_force = CouplingForce::new(&coupling, &settings.coupling, h, step.length);
-            let terms: Terms<'_, '_> = &mut [&mut coupling_force];
+            let terms = &mut coupling_force;
             let free = step.free(terms);
             let mut force = ContactForce::new(contacts.as_mut_slice(), k, h, damping, (farthest, step.length));
             let solution = step.with_contacts(&free, terms, &mut force, MAX_SOLVES);
