@@ -115,7 +115,8 @@ group! {
         margin_m: f32 = 5e-6, 1e-6 => 1e-3;
         /// Largest work of a tick, in field queries of about 190 instructions: a tree node queried counts 1½, a point out of reach 1, one within the margin
         /// 1¾, one that may touch 3⅛, a solve 8 and 5 more for each target ([`crate::cost`]). With the default, of the motions measured with up to four targets none takes
-        /// more than 130,000 instructions a tick (121,880 with four targets, 128,300 guided and 119,840 unguided into a fit of 0.02 mm).
+        /// more than about 136,000 instructions a tick: 121,880 with four targets, 128,300 guided and 119,840 unguided into a fit of 0.02 mm were
+        /// measured before ticks became up to 6 % longer.
         point_budget: u32 = host(ParameterId::PointBudget) as u32, 16 => 100_000;
         /// Distance by which points of the held part are moved inward along their normals for voxmap queries, in voxels of that part: the textbook's
         /// pointshell shrinking. Distance fields have no shrinking. Beyond a voxel points lie outside of their own voxels, on the wrong side.
