@@ -45,8 +45,8 @@ pub(crate) struct Reach {
 }
 
 /// Effect of the active constraints on contact.
-pub(crate) struct Constraints<'a> {
-    pub rules: &'a dyn FacePairRules,
+pub(crate) struct Constraints<'a, R> {
+    pub rules: &'a R,
     /// Share of the contact stiffness left between guided faces.
     pub guided_share: f32,
     /// Number of saturating springs among the force terms.
@@ -106,7 +106,7 @@ pub(crate) fn contact_step<T: ForceTerm>(
     grabbed: &Grabbed,
     (step, terms, free): Motion<'_, T>,
     reach: &Reach,
-    constraints: &Constraints<'_>,
+    constraints: &Constraints<'_, impl FacePairRules>,
     work: &mut Work,
 ) -> Solution {
     let budget = given.settings.contact.point_budget;
@@ -129,7 +129,7 @@ fn search(
     grabbed: &Grabbed,
     (step, free): (&Step, &Solution),
     reach: &Reach,
-    constraints: &Constraints<'_>,
+    constraints: &Constraints<'_, impl FacePairRules>,
     work: &mut Work,
 ) -> u32 {
     let settings = given.settings;

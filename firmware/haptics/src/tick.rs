@@ -141,11 +141,11 @@ fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: 
     hand.targets.add_springs(&situation, &mut springs);
     let turning_j = grabbed.turning_energy(mass_kg, gyration2);
     hand.tank.keep(coupled.moving_j + turning_j);
-    let terms = &mut (
+    let constrained = (
         CouplingForce::new(coupling, &settings.coupling, period_s, length),
         TargetForce::new(&springs, period_s, length),
-        Friction::new(&settings.friction, period_s, length),
     );
+    let terms = &mut (constrained, Friction::new(&settings.friction, period_s, length));
 
     let (free, reach) = free_motion(given, &grabbed, &step, terms);
     if (hand.targets).exclude(&situation, &springs, &reach.motions, given.slack()) {

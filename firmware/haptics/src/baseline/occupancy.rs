@@ -23,7 +23,7 @@ use crate::collision::contact::Phase;
 use crate::collision::cost::MATING;
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::node_cursor::NodeCursor;
-use crate::collision::rules::Mating;
+use crate::collision::rules::{FacePairRules, Mating};
 use crate::collision::search::Traversal;
 use crate::io::Flags;
 use crate::math::scalar::inverse_sqrt;
@@ -78,7 +78,7 @@ impl ContactSettings {
     }
 }
 
-impl Traversal<'_, '_, '_> {
+impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Queries one point and offers it as a contact. Returns a lower bound of its distance from any surface voxel, m.
     pub fn voxel(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         let position = shrunk(point, self.search.shrunk_m);

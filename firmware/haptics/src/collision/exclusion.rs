@@ -23,7 +23,7 @@ use mortise_protocol::image::{EDGE_ERROR_CELLS, PointRecord};
 
 use crate::collision::cost::{EXCLUSION, EXCLUSION_READS, LOOKUP};
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::rules::{MAX_EXCLUDED, holds};
+use crate::collision::rules::{FacePairRules, MAX_EXCLUDED, holds};
 use crate::collision::search::Traversal;
 
 /// Distance around a leaf's points within which cells must name the mating face only, in cells: half a brick, or else the next cell.
@@ -37,7 +37,7 @@ const MAX_READS: u32 = 1000;
 /// A tick starts no further exclusion query once they have taken one part in this many of its budget, in field queries of [`LOOKUP`] each.
 const EXCLUSION_SHARE: u32 = 12;
 
-impl Traversal<'_, '_, '_> {
+impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Distance that the object may travel before a point of the leaf at `points` could touch anything but the faces that exclusions keep it from, m.
     /// `None` when that is unknown, too short to store, or this tick has made enough exclusion queries.
     pub(crate) fn excluded(&mut self, pair: &DirectedPair<'_>, points: &[PointRecord]) -> Option<f32> {

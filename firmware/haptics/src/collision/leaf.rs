@@ -9,6 +9,7 @@ use crate::collision::exact_surface::on_face;
 use crate::collision::face_cache::CachedFace;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Key, Points};
+use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
 
 /// Leaves per tick whose decimated points are queried for their distance.
@@ -26,7 +27,7 @@ const MAX_FACE_SEARCHES: u32 = 2;
 /// Limit on reads of the field per face search; see [`DirectedPair::only_face_near`].
 const FACE_SEARCH_READS: u32 = 200;
 
-impl Traversal<'_, '_, '_> {
+impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Queries all points of a leaf as far as the budget allows. Returns the leaf's advancement bound.
     pub fn points(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, points: &[PointRecord]) -> Bound {
         let count = (self.left() as usize).min(points.len());

@@ -47,7 +47,13 @@ impl MatingCache {
 
     /// [`Mating`] of these faces; queries `rules` only when the faces differ from the last ones.
     #[inline]
-    pub fn get(&mut self, rules: &dyn FacePairRules, part: u16, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
+    pub fn get(
+        &mut self,
+        rules: &impl FacePairRules,
+        part: u16,
+        moving: [u16; 2],
+        fixed: [u16; 2],
+    ) -> Mating {
         if (self.part, self.moving, self.fixed) != (part, moving, fixed) {
             *self = Self {
                 part,

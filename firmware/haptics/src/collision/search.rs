@@ -46,7 +46,7 @@ pub(crate) const APPROACH: f32 = 2.0;
 /// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
 /// Inputs of one search.
-pub(crate) struct Search<'s, 'i> {
+pub(crate) struct Search<'s, 'i, R> {
     pub scene: &'s SceneImage<'i>,
     pub parts: &'s [Placed],
     /// Index of the held part.
@@ -83,10 +83,10 @@ pub(crate) struct Search<'s, 'i> {
     /// Gap below which points are braked, m; 0 for no braking. With braking, points in proximity voxels are candidates too.
     pub braking_m: f32,
     /// Rules of the constraints in force for guided faces.
-    pub rules: &'s dyn FacePairRules,
+    pub rules: &'s R,
 }
 
-impl<'i> Search<'_, 'i> {
+impl<'i, R: FacePairRules> Search<'_, 'i, R> {
     /// Gap below which points are queried every tick, m.
     #[inline]
     pub fn near(&self) -> f32 {
@@ -172,7 +172,7 @@ impl<'i> Search<'_, 'i> {
         coherence: &'w mut Coherence,
         contacts: &'w mut Contacts,
         work: &'w mut Work,
-    ) -> Traversal<'w, 'w, 'i> {
+    ) -> Traversal<'w, 'w, 'i, R> {
         contacts.begin(keep_previous);
         Traversal {
             search: self,
@@ -194,8 +194,8 @@ impl<'i> Search<'_, 'i> {
 }
 
 /// A search in progress.
-pub(crate) struct Traversal<'w, 's, 'i> {
-    pub search: &'w Search<'s, 'i>,
+pub(crate) struct Traversal<'w, 's, 'i, R> {
+    pub search: &'w Search<'s, 'i, R>,
     pub coherence: &'w mut Coherence,
     /// Travel at which bounds of points within the margin expire, nm.
     horizon: u32,
@@ -221,7 +221,7 @@ pub(crate) struct Traversal<'w, 's, 'i> {
     pub near: u32,
 }
 
-impl Traversal<'_, '_, '_> {
+impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Searches a whole pair.
     pub fn all(&mut self, pair: &DirectedPair<'_>) {
         let _ = self.nodes(pair, 0, u32::MAX);

@@ -43,34 +43,31 @@ pub(crate) trait ForceTerm {
     fn energy_j(&self, x: &[f32; 6]) -> f32;
 }
 
-/// Terms together are a term: a step takes them as a tuple, in the order in which they enter the sums.
-impl<A: ForceTerm, B: ForceTerm, C: ForceTerm> ForceTerm for (A, B, C) {
+/// Two terms are a term, and so are any number of them in nested pairs: a step takes them so, in the order in which they enter the sums.
+impl<A: ForceTerm, B: ForceTerm> ForceTerm for (A, B) {
     fn begin(&mut self, x: &[f32; 6]) {
         self.0.begin(x);
         self.1.begin(x);
-        self.2.begin(x);
     }
 
     fn linearise(&mut self, at: &Iterate<'_>) -> bool {
-        // All of them, settled or not.
-        self.0.linearise(at) & self.1.linearise(at) & self.2.linearise(at)
+        // Both of them, settled or not.
+        self.0.linearise(at) & self.1.linearise(at)
     }
 
     fn add_to(&self, system: &mut System) {
         self.0.add_to(system);
         self.1.add_to(system);
-        self.2.add_to(system);
     }
 
     fn add_wrench(&self, x: &[f32; 6], period_s: f32, to: &mut Wrench) {
         self.0.add_wrench(x, period_s, to);
         self.1.add_wrench(x, period_s, to);
-        self.2.add_wrench(x, period_s, to);
     }
 
     #[cfg(test)]
     fn energy_j(&self, x: &[f32; 6]) -> f32 {
-        self.0.energy_j(x) + self.1.energy_j(x) + self.2.energy_j(x)
+        self.0.energy_j(x) + self.1.energy_j(x)
     }
 }
 

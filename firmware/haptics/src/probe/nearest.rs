@@ -13,6 +13,7 @@ use mortise_protocol::image::{
 
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, closed_form, exact, on_face, unsigned_distance};
+use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
 use crate::io::Work;
 
@@ -146,7 +147,11 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
 
     /// Evaluates all leaves that could hold the nearest point or an overlapping one, as far as a field query settles their points. Overlapping points
     /// go to `contacts`. Leaves beyond the band are deferred until a point in the band is found.
-    pub fn traverse(&mut self, progress: &mut Progress, contacts: &mut Traversal<'_, '_, '_>) {
+    pub fn traverse(
+        &mut self,
+        progress: &mut Progress,
+        contacts: &mut Traversal<'_, '_, '_, impl FacePairRules>,
+    ) {
         self.leaves(progress, u32::MAX, |search, progress, leaf| {
             if progress.best.distance_m > search.band {
                 search.deferred_end = leaf.node + 1;
@@ -169,7 +174,11 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     }
 
     /// Evaluates what [`Self::traverse`] left open: deferred leaves, and points to be measured.
-    pub fn finish(&mut self, progress: &mut Progress, contacts: &mut Traversal<'_, '_, '_>) {
+    pub fn finish(
+        &mut self,
+        progress: &mut Progress,
+        contacts: &mut Traversal<'_, '_, '_, impl FacePairRules>,
+    ) {
         let needed = |lower: f32, limit: f32| lower < f32::INFINITY && lower <= limit;
         if needed(self.deferred_bound, progress.limit()) && progress.best.distance_m > self.band {
             self.descend(progress);
