@@ -1,8 +1,12 @@
-//! The message table: all messages on the link, in one file.
+//! The message table: all messages on the link, in one file. Faults, flags and constraints, of which more than the link speaks, are in files of their own.
 //!
 //! Every host message is answered by [`FromDevice::Ack`] or [`FromDevice::Refused`] with its sequence number, or by the value it queries.
 //! [`ToDevice::Hello`] and [`FromDevice::Hello`] keep their place (variant 0) and layout in every version, so that two sides with no other common
 //! message can still identify each other. SI units and radians; quaternions x, y, z, w; poses are frame-to-world.
+
+mod constraint;
+mod fault;
+mod flags;
 
 use heapless::{String, Vec};
 use postcard_schema::Schema;
@@ -13,6 +17,10 @@ use crate::image::ImageError;
 use crate::limits::*;
 use crate::parameter::ParameterId;
 use crate::rig::{Rig, RigFault};
+
+pub use self::constraint::{ConstraintKind, ConstraintTarget, Feature};
+pub use self::fault::Fault;
+pub use self::flags::{FlagRow, Flags};
 
 /// Hash of the schemas of both message enums and of the bounds of their lists: any change to a message changes it.
 pub const SCHEMA_HASH: u64 = schema_hash();
@@ -373,87 +381,6 @@ pub enum DeviceState {
     Fault(Fault),
 }
 
-/// Declares [`Fault`] and, from the same list, every variant of it.
-macro_rules! faults {
-    ($(#[$about:meta])+ pub enum Fault {
-        $($(#[$doc:meta])+ $name:ident $({ $(#[$field_doc:meta])+ $field:ident: $type:ty, })?,)+
-    }) => {
-        $(#[$about])+
-        pub enum Fault {
-            $($(#[$doc])+ $name $({ $(#[$field_doc])+ $field: $type })?,)+
-        }
-
-        impl Fault {
-            /// Number of kinds.
-            pub const COUNT: usize = [$(stringify!($name)),+].len();
-
-            /// One fault of every kind, in the order of the enum; those with an axis or a time have `number` there.
-            pub const fn every(number: u16) -> [Self; Self::COUNT] {
-                [$(Self::$name $({ $field: number as $type })?),+]
-            }
-        }
-    };
-}
-
-faults! {
-    /// Kind of fault.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-    pub enum Fault {
-        /// The stop input is open.
-        StopInput,
-        /// No message from the host for too long while armed.
-        HostSilent {
-            /// Time since the last message, ms.
-            silent_ms: u16,
-        },
-        /// An encoder reading jumped farther than the mechanism can move in a tick.
-        EncoderJump {
-            /// Axis.
-            axis: u8,
-        },
-        /// An encoder did not follow a small push of its motor: it is stuck or unplugged, or the mechanism is jammed.
-        EncoderStuck {
-            /// Axis.
-            axis: u8,
-        },
-        /// The handle moves faster than allowed.
-        OverSpeed,
-        /// The handle left the workspace.
-        Workspace,
-        /// A motor driver reports a fault without its kind.
-        Driver {
-            /// Axis.
-            axis: u8,
-        },
-        /// A motor driver reports overcurrent.
-        OverCurrent {
-            /// Axis.
-            axis: u8,
-        },
-        /// A motor or its driver is too hot.
-        OverTemperature {
-            /// Axis.
-            axis: u8,
-        },
-        /// The supply fell below the needs of motors and sensors; the processor still runs.
-        SupplyLow,
-        /// A tick took longer than its period.
-        TickOverrun,
-        /// The scene no longer passes its checks.
-        SceneDamaged,
-        /// The computed wrench is not finite.
-        NonFinite,
-        /// The handle turns faster than allowed.
-        AngularOverSpeed,
-        /// The encoders have lost their reference, although none of them jumped.
-        ReferenceLost,
-        /// The encoders give a position that the links cannot reach.
-        ImpossiblePosture,
-        /// A sensor reading is not finite, or implausible.
-        BadReading,
-    }
-}
-
 /// Why a message was not executed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
@@ -618,138 +545,6 @@ pub struct Guidance {
     pub wrench: WireWrench,
 }
 
-/// Set of conditions of a tick, as the force law raises them, the board adds to them, and [`Telemetry::flags`] carries them.
-#[derive(Clone, Copy, Default, PartialEq, Eq)]
-pub struct Flags(u16);
-
-/// A flag with what is said about it.
-#[derive(Clone, Copy, Debug)]
-pub struct FlagRow {
-    /// The flag.
-    pub flag: Flags,
-    /// Name in the message table.
-    pub name: &'static str,
-    /// When it is set, a sentence.
-    pub meaning: &'static str,
-    /// Text in the window.
-    pub words: &'static str,
-}
-
-/// Declares every flag with its meaning (the first line of its documentation), bit and words.
-macro_rules! flags {
-    ($(#[doc = $meaning:literal] $(#[doc = $detail:literal])* $name:ident = $bit:literal, $words:literal;)+) => {
-        impl Flags {
-            $(#[doc = $meaning] $(#[doc = $detail])* pub const $name: Self = Self(1 << $bit);)+
-
-            /// Every flag, most important first.
-            pub const ALL: &[FlagRow] = &[$(FlagRow {
-                flag: Self::$name,
-                name: stringify!($name),
-                meaning: $meaning.trim_ascii(),
-                words: $words,
-            },)+];
-        }
-    };
-}
-
-flags! {
-    /// A computed number was not finite: the wrench is zero.
-    ///
-    /// The object stays where it was.
-    NON_FINITE = 4, "the computed force was not finite";
-    /// A sensor reading was not finite or implausible.
-    ///
-    /// Out of range, or not a rotation: zero wrench, and nothing moved.
-    BAD_INPUT = 13, "a sensor reading was not a number or out of proportion";
-    /// The force limit acted.
-    FORCE_LIMIT = 1, "force limit acts";
-    /// The torque limit acted.
-    TORQUE_LIMIT = 2, "torque limit acts";
-    /// The limit on the change of force acted.
-    FORCE_SLEW = 3, "limit on change of force acts";
-    /// The limit on the change of torque acted.
-    TORQUE_SLEW = 14, "limit on change of torque acts";
-    /// The coupling slipped at its largest force.
-    COUPLING_FORCE = 7, "the coupling slips: force";
-    /// The coupling slipped at its largest torque.
-    COUPLING_TORQUE = 12, "the coupling slips: torque";
-    /// The part's speed was limited to its maximum, or to the search margin.
-    SPEED_LIMIT = 9, "speed limit acts";
-    /// The handle's wrench is damped because the loop generated energy.
-    SOFTENED = 8, "damped for stability";
-    /// A point is too deep inside for the field to give a way out.
-    ///
-    /// The point does not push.
-    DEEP = 10, "penetration too deep";
-    /// The step's touching points had not come to rest.
-    ///
-    /// Their set still changed in the last solve allowed.
-    UNSETTLED = 11, "contacts had not settled";
-    /// The point budget was reached: some points were not queried this tick.
-    ///
-    /// Points are decimated evenly; when that is not enough, the rest waits for the next ticks. Points that touched stay felt.
-    BUDGET = 0, "point budget reached";
-    /// More contacts than the board stores.
-    ///
-    /// Kept are the deepest candidates, and of the rest those that a rotation would bring to touch first. If more touch than fit, points are
-    /// decimated evenly from the next tick on ([`Self::BUDGET`]).
-    CONTACTS = 6, "more contacts than fit";
-    /// More face pairs touch than the message holds.
-    ///
-    /// Added by the board's control plane; the force law raises all others.
-    PAIRS = 5, "more touching faces than are shown";
-}
-
-impl Flags {
-    /// None.
-    pub const fn empty() -> Self {
-        Self(0)
-    }
-
-    /// As sent in telemetry.
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
-    /// From telemetry; unknown bits are kept.
-    pub const fn from_bits(bits: u16) -> Self {
-        Self(bits)
-    }
-
-    /// Whether all of `other` are set.
-    pub const fn contains(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// Whether any of `other` is set.
-    pub const fn intersects(self, other: Self) -> bool {
-        self.0 & other.0 != 0
-    }
-
-    /// Sets all of `other`.
-    pub const fn insert(&mut self, other: Self) {
-        self.0 |= other.0;
-    }
-
-    /// Sets all of `other` when `condition` holds.
-    pub const fn insert_if(&mut self, condition: bool, other: Self) {
-        if condition {
-            self.insert(other);
-        }
-    }
-
-    /// Rows of the flags that are set, most important first.
-    pub fn rows(self) -> impl Iterator<Item = &'static FlagRow> {
-        (Self::ALL.iter()).filter(move |row| self.contains(row.flag))
-    }
-}
-
-impl core::fmt::Debug for Flags {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_set().entries(self.rows().map(|row| row.name)).finish()
-    }
-}
-
 /// Counters since start or the last reset of the counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Statistics {
@@ -779,84 +574,6 @@ pub struct Statistics {
     pub dropped: u32,
     /// Largest stack depth seen, bytes; 0 where not measured.
     pub stack_max: u32,
-}
-
-/// Declares [`ConstraintKind`] and, from the same list, every variant of it and its name.
-macro_rules! constraint_kinds {
-    ($(#[$about:meta])+ pub enum ConstraintKind { $($(#[$doc:meta])+ $name:ident = $word:literal,)+ }) => {
-        $(#[$about])+
-        pub enum ConstraintKind {
-            $($(#[$doc])+ $name,)+
-        }
-
-        impl ConstraintKind {
-            /// Every kind, in the order of the enum.
-            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$name),+];
-
-            /// Name of the kind. Both annular kinds have the same name: it does not say which part has the sphere.
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$name => $word,)+
-                }
-            }
-        }
-    };
-}
-
-constraint_kinds! {
-    /// Kinds of constraint between a surface of the grabbed part and one of another part: the recogniser's, the link's and the force law's.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-    pub enum ConstraintKind {
-        /// Axis on axis (cylinder in cylinder). Leaves a slide and a rotation.
-        Concentric = "concentric",
-        /// Plane on plane, face to face: turns the grabbed part until the planes are parallel; contact determines the distance. Leaves two slides and a
-        /// rotation.
-        Coplanar = "coplanar",
-        /// Axis on axis and apex on apex, so that circles of one radius coincide (cone in cone). Leaves a rotation.
-        Conical = "conical",
-        /// Centre on centre (sphere in sphere). Leaves three rotations.
-        Spherical = "spherical",
-        /// Centre on axis: sphere of the grabbed part in a cylinder of the other. Leaves a slide and three rotations.
-        Annular = "annular",
-        /// Axis on centre: cylinder of the grabbed part over a sphere of the other. Leaves a slide and three rotations.
-        AnnularBore = "annular",
-    }
-}
-
-/// A point and a direction fixed to a part.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
-pub struct Feature {
-    /// Position, m, shape frame.
-    pub point: [f32; 3],
-    /// Unit vector, shape frame.
-    pub direction: [f32; 3],
-}
-
-/// A constraint recognised by the desktop program, towards which the board guides.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
-pub struct ConstraintTarget {
-    /// Identifies the target; a message with the same id replaces or refreshes it.
-    pub id: u16,
-    /// Increases with every message about this id; a lower one is stale.
-    pub sequence: u16,
-    /// Kind.
-    pub kind: ConstraintKind,
-    /// Feature of the moving part.
-    pub moving: Feature,
-    /// Index of the mating part.
-    pub static_part: u16,
-    /// Feature of that part.
-    pub fixed: Feature,
-    /// Stiffness, N/m.
-    pub stiffness: f32,
-    /// Largest guidance force, N.
-    pub force_cap: f32,
-    /// Largest guidance torque, N·m.
-    pub torque_cap: f32,
-    /// The target fades out unless refreshed within this many ticks.
-    pub expiry_ticks: u16,
-    /// Moving and static faces whose contact the target replaces.
-    pub faces: Vec<(u16, u16), MAX_TARGET_PAIRS>,
 }
 
 /// A simulated operator's hand: a spring-damper that pulls the handle towards a moving target, plus a push.
@@ -942,23 +659,6 @@ pub enum InputFaultKind {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn each_flag_has_a_bit_a_name_and_words_of_its_own() {
-        for (i, row) in Flags::ALL.iter().enumerate() {
-            assert_eq!(row.flag.bits().count_ones(), 1, "{}", row.name);
-            assert!(row.meaning.ends_with('.') && !row.words.is_empty(), "{row:?}");
-            for other in &Flags::ALL[..i] {
-                assert!(!row.flag.intersects(other.flag), "{row:?}, {other:?}");
-                assert!(
-                    row.name != other.name && row.words != other.words,
-                    "{row:?}, {other:?}"
-                );
-            }
-        }
-        assert_eq!(Flags::from_bits(u16::MAX).rows().count(), Flags::ALL.len());
-        assert_eq!(Flags::empty().rows().count(), 0);
-    }
 
     #[test]
     fn every_bound_counts_in_the_schema_hash() {
