@@ -13,7 +13,7 @@ use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, bake_field};
 use crate::format::FieldOptions;
-use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement};
+use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::partners::Partners;
@@ -64,6 +64,7 @@ pub fn bake(
         .map(|&s| ExactSurface::new(&model.shapes[s]))
         .collect();
     scene.find_partners(&prepared);
+    scene.find_edges(&prepared, options.method);
     let first = scene.cells(model, options);
     let each = vec![options.clone(); scene.shapes.len()];
     let made = match options.cell_mm {
@@ -157,7 +158,22 @@ impl Scene {
         first: &[f64],
         progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
     ) -> Result<Made, BakeError> {
+<<<<<<< HEAD
         let fixed = self.fixed_bytes(model);
+=======
+        let faces: usize = self.shapes.iter().map(|&s| model.shapes[s].faces.len()).sum();
+        let fixed = (size_of::<Header>()
+            + 2 * PALETTE_PADDING
+            + self.parts.len() * size_of::<PartRecord>()
+            + self.shapes.len() * (size_of::<ShapeRecord>() + size_of::<FieldRecord>())
+            + faces * size_of::<FaceRecord>()
+            + self
+                .edges
+                .iter()
+                .map(|pieces| edge_bytes(pieces.len()))
+                .sum::<usize>()
+            + 64) as u64;
+>>>>>>> main
         let mut scale = SCOUT;
         // Exponent of the bytes in the inverse cell: 2 at most, less where bricks repeat; two attempts show the actual value.
         let mut power = 2.0;
@@ -374,8 +390,12 @@ impl Scene {
             let shape = prepared[i].shape();
             let mut entry = shape_report(&self.names[i], &prepared[i], &field, &each[i], &shells[i]);
             report.warnings.extend(doubts(&entry));
+<<<<<<< HEAD
             report.warnings.extend(unproven(&entry, &field));
             (_, entry.bytes) = builder.add_shape(shape, field, &shells[i]);
+=======
+            (_, entry.bytes) = builder.add_shape(shape, field, &shells[i], &self.edges[i]);
+>>>>>>> main
             report.bytes = add(&report.bytes, &entry.bytes);
             report.shapes.push(entry);
         }
@@ -495,6 +515,7 @@ fn add(a: &ByteCount, b: &ByteCount) -> ByteCount {
         points: a.points + b.points,
         nodes: a.nodes + b.nodes,
         faces: a.faces + b.faces,
+        edges: a.edges + b.edges,
         records: a.records + b.records,
     }
 }
