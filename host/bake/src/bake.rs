@@ -158,22 +158,7 @@ impl Scene {
         first: &[f64],
         progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
     ) -> Result<Made, BakeError> {
-<<<<<<< HEAD
         let fixed = self.fixed_bytes(model);
-=======
-        let faces: usize = self.shapes.iter().map(|&s| model.shapes[s].faces.len()).sum();
-        let fixed = (size_of::<Header>()
-            + 2 * PALETTE_PADDING
-            + self.parts.len() * size_of::<PartRecord>()
-            + self.shapes.len() * (size_of::<ShapeRecord>() + size_of::<FieldRecord>())
-            + faces * size_of::<FaceRecord>()
-            + self
-                .edges
-                .iter()
-                .map(|pieces| edge_bytes(pieces.len()))
-                .sum::<usize>()
-            + 64) as u64;
->>>>>>> main
         let mut scale = SCOUT;
         // Exponent of the bytes in the inverse cell: 2 at most, less where bricks repeat; two attempts show the actual value.
         let mut power = 2.0;
@@ -239,6 +224,11 @@ impl Scene {
             + self.parts.len() * size_of::<PartRecord>()
             + self.shapes.len() * (size_of::<ShapeRecord>() + size_of::<FieldRecord>())
             + faces * size_of::<FaceRecord>()
+            + self
+                .edges
+                .iter()
+                .map(|pieces| edge_bytes(pieces.len()))
+                .sum::<usize>()
             + 64) as u64
     }
 
@@ -390,12 +380,8 @@ impl Scene {
             let shape = prepared[i].shape();
             let mut entry = shape_report(&self.names[i], &prepared[i], &field, &each[i], &shells[i]);
             report.warnings.extend(doubts(&entry));
-<<<<<<< HEAD
             report.warnings.extend(unproven(&entry, &field));
-            (_, entry.bytes) = builder.add_shape(shape, field, &shells[i]);
-=======
             (_, entry.bytes) = builder.add_shape(shape, field, &shells[i], &self.edges[i]);
->>>>>>> main
             report.bytes = add(&report.bytes, &entry.bytes);
             report.shapes.push(entry);
         }
