@@ -18,6 +18,8 @@ const LENGTH: f64 = 200.0;
 const PRESS_N: f64 = 9.5;
 /// Deepest overlap allowed under it, mm: on one contact of 200 kN/m it is 0.0475 mm at rest, and a tenth more as the bar lands.
 const DEEPEST: f64 = 0.053;
+/// Further overlap as the hand lands, mm per m/s: a tenth of what 0.1 kg would sink into one undamped contact.
+const LANDING: f64 = 0.07;
 
 /// Gap of two boxes along the best separating axis, mm; minus the least translation that separates them where they overlap.
 fn separation(half: DVec3, [a, b]: [DAffine3; 2]) -> f64 {
@@ -163,7 +165,7 @@ fn crossing_bars_stay_apart() {
             let (depth, passed) = play(&motion);
             worst.set(worst.get().max(depth));
             proptest::prop_assert!(!passed, "passed through");
-            proptest::prop_assert!(depth <= DEEPEST, "{} mm deep", depth);
+            proptest::prop_assert!(depth <= DEEPEST + LANDING * speed, "{} mm deep", depth);
             Ok(())
         })
         .expect("bars stay apart");

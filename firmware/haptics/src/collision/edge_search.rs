@@ -6,7 +6,7 @@
 //!
 //! Two edges that cross are offered as a contact at any gap within the margin, so a fast edge is stopped before it passes another. An overlap deeper
 //! than [`DEPTH_SHARE`] of the thinner part is not taken for a contact unless the same edges crossed in the tick before: else the far edges of a
-//! thin bar, which face the other part too, would pull it through.
+//! thin bar, which face the other part too, would pull it through. The same holds for edges at a flat angle, see [`DEPTH_PER_SINE_M`].
 
 use glam::Vec3;
 use heapless::Vec;
@@ -26,6 +26,9 @@ use crate::math::vector::length;
 /// Deepest overlap of two edges that touch for the first time, as a share of the thinner part's thickness at them: at half of it the far sides are as
 /// near as the near ones.
 const DEPTH_SHARE: f32 = 0.45;
+/// The same for edges that are nearly parallel, m, times the sine of their angle: where two rims cross at a flat angle, a peg that leans on the wall
+/// of its hole lies below the mouth by any depth, and the wall pushes it, not the mouth.
+const DEPTH_PER_SINE_M: f32 = 1e-3;
 /// Edges that overlap by more than this are not found, m: their distance is that far too. A tick that stops a metre a second is a quarter of it deep.
 const DEEPEST_M: f32 = 0.5e-3;
 /// A leaf without near edges is searched this far, m, and as far as [`RESERVE_TICKS`] ticks of the last motion, for a bound that lasts.
@@ -204,7 +207,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     ) {
         let edges = [own.edge as u16, other.edge as u16];
         let thinner = smaller(own.thickness, other.thickness);
-        let too_deep = found.gap < -DEPTH_SHARE * thinner && !self.contacts.crossed(leaf.part(), edges);
+        let deepest = smaller(DEPTH_SHARE * thinner, DEPTH_PER_SINE_M * found.sine);
+        let too_deep = found.gap < -deepest && !self.contacts.crossed(leaf.part(), edges);
         let excluded = || {
             let kept_apart = |of: &[u16; 2]| own.faces.contains(&of[0]) && other.faces.contains(&of[1]);
             pair.excluded.iter().any(kept_apart)
