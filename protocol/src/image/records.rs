@@ -509,7 +509,7 @@ mod tests {
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
         assert_eq!(size_of::<PointRecord>(), 20);
-        assert_eq!(size_of::<super::super::EdgeRecord>(), 56);
+        assert_eq!(size_of::<super::super::EdgeRecord>(), 60);
         assert_eq!(size_of::<FaceRecord>(), 40);
     }
 
