@@ -1,6 +1,6 @@
 """Bullet by pybullet: `getClosestPoints` of the fixed part's triangles against the moving part's hull, and of two hulls.
 
-Triangles against triangles are not offered: the call answers nothing. Each shape has a margin of 0.001, in mm here, so gaps are told 1 to 2 µm short.
+Triangles against triangles are not offered: the call answers nothing. Each shape has a margin of 0.001, in mm here, so gaps are 1 to 2 µm short.
 """
 
 from importlib.metadata import version

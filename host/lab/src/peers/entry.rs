@@ -39,14 +39,18 @@ pub struct Entry {
     pub floor_us: Option<f64>,
     /// Median over that of our default bake on the scene.
     pub over_ours: Option<f64>,
-    /// Poses more than [`SIGN_MM`] apart told to overlap, or overlapping more than that told apart.
+    /// Poses more than [`SIGN_MM`] apart reported to overlap, or overlapping more than that reported apart.
     pub wrong_signs: Option<usize>,
     /// Poses whose distance it does not give.
     pub without_distance: Option<usize>,
     /// Largest error of a gap, µm.
     pub gap_error_um: Option<f64>,
+    /// Pose of it.
+    pub gap_at: Option<String>,
     /// Largest error of a depth, µm.
     pub depth_error_um: Option<f64>,
+    /// Pose of it.
+    pub depth_at: Option<String>,
     /// Why it is not measured.
     pub skipped: Option<String>,
 }
@@ -81,14 +85,16 @@ impl Entry {
     }
 
     fn judged(self, cases: &[Case], method: &Method) -> Self {
-        let pairs = || cases.iter().map(|case| case.exact_mm).zip(&method.answers);
+        let pairs = || cases.iter().zip(&method.answers);
         let worst = |gaps: bool| {
             pairs()
-                .filter(|(exact, _)| (*exact >= 0.0) == gaps)
-                .filter_map(|(exact, answer)| error_mm(exact, answer))
-                .max_by(f64::total_cmp)
-                .map(|error| 1e3 * error)
+                .filter(|(case, _)| (case.exact_mm >= 0.0) == gaps)
+                .filter_map(|(case, answer)| Some((error_mm(case.exact_mm, answer)?, &case.pose.name)))
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+                .map(|(error, name)| (1e3 * error, name.clone()))
+                .unzip()
         };
+        let ((gap_error_um, gap_at), (depth_error_um, depth_at)) = (worst(true), worst(false));
         Self {
             peer: method.peer.clone(),
             method: method.name.clone(),
@@ -104,10 +110,16 @@ impl Entry {
                 .map(|answer| answer.us)
                 .max_by(f64::total_cmp),
             floor_us: method.floor_us,
-            wrong_signs: Some(pairs().filter(|(exact, answer)| is_wrong(*exact, answer)).count()),
+            wrong_signs: Some(
+                pairs()
+                    .filter(|(case, answer)| is_wrong(case.exact_mm, answer))
+                    .count(),
+            ),
             without_distance: Some(pairs().filter(|(_, answer)| answer.mm.is_none()).count()),
-            gap_error_um: worst(true),
-            depth_error_um: worst(false),
+            gap_error_um,
+            gap_at,
+            depth_error_um,
+            depth_at,
             ..self
         }
     }
@@ -193,7 +205,7 @@ mod tests {
             // Within the tolerance of either sign.
             (true, Some(-0.001), 9.0),
             (true, None, 4.0),
-            // Told apart without a distance: errs by at least the depth.
+            // Reported apart without a distance: errs by at least the depth.
             (false, None, 5.0),
         ]);
         let entry = Entry::of("s", &cases, &asked);

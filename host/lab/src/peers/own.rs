@@ -15,6 +15,8 @@ use crate::peer;
 
 /// Name of the method whose median others are compared with.
 pub const DEFAULT: &str = "mortise, default bake";
+/// Rounds of repetitions at a pose: one that is interrupted at its first query, which then seems too long to be repeated, does not decide.
+const ROUNDS: usize = 3;
 /// Accuracy that the planned bake is asked for, mm.
 const PLANNED_MM: f64 = 0.005;
 
@@ -47,7 +49,11 @@ impl Bake {
 pub fn probe(scene: &Scene, bake: Bake) -> Result<Method, LabError> {
     let (probed, pair) = baked(scene, bake)?;
     let answer = |case: &crate::scene_p::Case| {
-        let row = probed.probe(pair, &case.pose)?;
+        let mut row = probed.probe(pair, &case.pose)?;
+        for _ in 1..ROUNDS {
+            let again = probed.probe(pair, &case.pose)?;
+            row.least_ns = row.least_ns.min(again.least_ns);
+        }
         Ok(Answer {
             overlaps: row.distance_mm < 0.0,
             mm: (row.resolution != Resolution::Bound).then_some(row.distance_mm),
@@ -116,11 +122,12 @@ fn planned(scene: &Scene) -> Result<(ProbeScene, Pair), LabError> {
 pub fn parry(scene: &Scene, model: &CadModel, deflection_mm: f64) -> Result<Method, LabError> {
     let (fixed, moving) = (peer::mesh(model, scene.fixed)?, peer::mesh(model, scene.moving)?);
     let answer = |case: &crate::scene_p::Case| {
-        let (mm, ns) = peer::timed(&case.pose, &fixed, &moving);
+        let (mm, first_ns) = peer::timed(&case.pose, &fixed, &moving);
+        let (_, second_ns) = peer::timed(&case.pose, &fixed, &moving);
         Answer {
             overlaps: mm < 0.0,
             mm: mm.is_finite().then_some(mm),
-            us: 1e-3 * ns,
+            us: 1e-3 * first_ns.min(second_ns),
         }
     };
     Ok(Method {

@@ -17,6 +17,8 @@ use crate::error::LabError;
 
 /// Variable that names the interpreter.
 pub const PYTHON: &str = "MORTISE_PEERS_PYTHON";
+/// Variable that names what could not be installed: lines `PEER: REASON`.
+const MISSING: &str = "MORTISE_PEERS_MISSING";
 /// Repetitions of a query, of which the shortest counts, as those of our probe.
 const REPEATS: usize = 33;
 /// Longest time on one pose, s: after it no query is repeated.
@@ -48,7 +50,7 @@ const COMMON: (&str, &str) = ("common.py", include_str!("../../peers/common.py")
 
 /// A line of a script.
 #[derive(Debug, Deserialize)]
-#[serde(tag = "say", rename_all = "kebab-case", deny_unknown_fields)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 enum Said {
     /// A method begins.
     Method {
@@ -74,12 +76,13 @@ enum Said {
 /// # Errors
 /// `Input`, `Unwritable`. A peer that cannot be had is no error.
 pub fn ask(scene: &Scene, model: &CadModel, deflection_mm: f64) -> Result<Vec<Asked>, LabError> {
+    let missing = std::env::var(MISSING).unwrap_or_default();
     let Some(python) = std::env::var_os(PYTHON) else {
-        let skipped = |(peer, ..): (&str, &str, &str)| {
-            let reason = "no Python environment: start this by `cargo xtask peers`";
-            skipped(peer, peer, reason.into())
+        let none = "there is no Python environment: start this by `cargo xtask peers`";
+        let skip = |(peer, ..): (&str, &str, &str)| {
+            skipped(peer, peer, not_installed(&missing, peer).unwrap_or(none).into())
         };
-        return Ok(SCRIPTS.map(skipped).into());
+        return Ok(SCRIPTS.map(skip).into());
     };
     let unwritable = |source| LabError::Unwritable {
         path: std::env::temp_dir(),
@@ -95,6 +98,10 @@ pub fn ask(scene: &Scene, model: &CadModel, deflection_mm: f64) -> Result<Vec<As
     }
     let mut all = Vec::new();
     for (peer, script, _) in SCRIPTS {
+        if let Some(why) = not_installed(&missing, peer) {
+            all.push(skipped(peer, peer, why.into()));
+            continue;
+        }
         match run(&python, folder.path(), script) {
             Ok(output) => {
                 let said = String::from_utf8_lossy(&output.stdout);
@@ -106,6 +113,11 @@ pub fn ask(scene: &Scene, model: &CadModel, deflection_mm: f64) -> Result<Vec<As
         }
     }
     Ok(all)
+}
+
+/// Why a peer could not be installed, if it could not.
+fn not_installed<'m>(missing: &'m str, peer: &str) -> Option<&'m str> {
+    (missing.lines()).find_map(|line| line.strip_prefix(peer)?.strip_prefix(": "))
 }
 
 fn job(scene: &Scene) -> String {
@@ -246,12 +258,9 @@ fn complete(all: Vec<Asked>, poses: usize) -> Vec<Asked> {
 mod tests {
     use super::*;
 
-    const BEGIN: &str =
-        r#"{"say":"method","method":"X, hulls","kind":"hulls","version":"1.2","floor_us":0.5}"#;
-    const FIRST: &str =
-        r#"{"say":"answer","method":"X, hulls","pose":0,"overlaps":false,"mm":0.25,"us":3.5}"#;
-    const SECOND: &str =
-        r#"{"say":"answer","method":"X, hulls","pose":1,"overlaps":true,"mm":null,"us":4.0}"#;
+    const BEGIN: &str = r#"{"method":{"method":"X, hulls","kind":"hulls","version":"1.2","floor_us":0.5}}"#;
+    const FIRST: &str = r#"{"answer":{"method":"X, hulls","pose":0,"overlaps":false,"mm":0.25,"us":3.5}}"#;
+    const SECOND: &str = r#"{"answer":{"method":"X, hulls","pose":1,"overlaps":true,"mm":null,"us":4.0}}"#;
 
     fn read_two(lines: &[&str], end: Option<&str>) -> Vec<Asked> {
         read("X", &lines.join("\n"), end, 2, (0.01, 12))
@@ -292,10 +301,17 @@ mod tests {
             reasons(&read_two(&[BEGIN, FIRST], None)),
             ["answered 1 of 2 poses"]
         );
-        let refused = r#"{"say":"skipped","method":"X, hulls","reason":"no volume"}"#;
+        let refused = r#"{"skipped":{"method":"X, hulls","reason":"no volume"}}"#;
         assert_eq!(reasons(&read_two(&[BEGIN, FIRST, refused], None)), ["no volume"]);
         assert!(reasons(&read_two(&[BEGIN, SECOND, FIRST], None))[0].contains("out of turn"));
-        assert!(reasons(&read_two(&["{\"say\":\"dance\"}"], None))[0].contains("is no answer"));
+        assert!(reasons(&read_two(&["{\"dance\":{}}"], None))[0].contains("is no answer"));
+    }
+
+    #[test]
+    fn what_could_not_be_installed_has_its_reason() {
+        let missing = "Drake: no wheel for this machine\nFCL: no network";
+        assert_eq!(not_installed(missing, "FCL"), Some("no network"));
+        assert_eq!(not_installed(missing, "coal"), None);
     }
 
     #[test]
