@@ -49,7 +49,9 @@ impl Experiment for Peers {
     }
 
     fn charts(&self) -> Vec<String> {
-        ["peers", "peers-free-form"].map(String::from).into()
+        ["peers", "peers-depths", "peers-free-form"]
+            .map(String::from)
+            .into()
     }
 
     fn run(&self, form: Form<'_>, report: &mut Report<'_>) -> Result<Findings, LabError> {
@@ -69,28 +71,23 @@ impl Experiment for Peers {
             },
             &mut tell,
         )?;
-        measure(
-            &scene::crossing_bars()?,
-            &[Bake::Default],
-            &[DEFLECTION_MM],
-            &mut tell,
-        )?;
+        let mut others = vec![scene::crossing_bars()?];
         if !form.quick {
             match scene::shared_pairs()? {
-                Some(pairs) => {
-                    for pair in &pairs {
-                        measure(pair, &[Bake::Default, Bake::Planned], &[DEFLECTION_MM], &mut tell)?;
-                    }
-                }
+                Some(pairs) => others.extend(pairs),
                 None => tell(Entry::skipped(
                     "free-form and planar fits",
                     "the shared test parts are not on this machine",
                 )),
             }
         }
+        for pair in &others {
+            measure(pair, &[Bake::Default, Bake::Planned], &[DEFLECTION_MM], &mut tell)?;
+        }
         let findings = Findings::default()
             .rows("peers", &entries)?
-            .stack("peers", charts::thesis(&entries));
+            .chart("peers", charts::gaps(&entries))
+            .chart("peers-depths", charts::depths(&entries));
         Ok(match charts::free_form(&entries) {
             Some(chart) => findings.chart("peers-free-form", chart),
             None => findings,

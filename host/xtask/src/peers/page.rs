@@ -20,7 +20,11 @@ pub fn text(rows: &[Row], quick: bool, date: &str) -> String {
         count(rows),
         table(&thesis)
     );
-    text.push_str("\n![Error of gaps and depths over the time of a query, scene P](peers.png)\n");
+    for (what, file) in [("gaps", "peers"), ("depths", "peers-depths")] {
+        text.push_str(&format!(
+            "\n![Error of {what} over the time of a query, scene P]({file}.png)\n"
+        ));
+    }
     let pairs = scenes(&others).len();
     text.push_str(&format!("\n## All other scenes together\n\n{}", summary(&others)));
     if pairs > 1
