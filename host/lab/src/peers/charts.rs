@@ -82,7 +82,7 @@ pub fn free_form(entries: &[Entry]) -> Option<Chart> {
     let series = series(points);
     (scenes.len() > 1 && !series.is_empty()).then(|| Chart {
         title: format!("{} pairs of free-form and planar parts: error of a gap over time", scenes.len()),
-        note: "Median over the pairs of the median query; the largest error of any free pose. Meshes within 5 µm of the surfaces. Down and left is \
+        note: "Median over the pairs of the median query; the largest error of any free pose. Meshes within 10 µm of the surfaces. Down and left is \
                better."
             .into(),
         x: Axis::new("median query, µs"),

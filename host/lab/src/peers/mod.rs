@@ -23,8 +23,9 @@ use scene::Scene;
 
 /// Largest deviation of scene P's meshes from the surfaces, mm; the quick form uses the first.
 const THESIS_DEFLECTIONS_MM: [f64; 2] = [0.01, 0.001];
-/// The same of all other scenes, mm: a quarter of the smallest clearance among them.
-const DEFLECTION_MM: f64 = 0.005;
+/// The same of all other scenes, mm: half of the smallest clearance among them. Finer meshes of splines have so many triangles that queries of
+/// triangles take seconds.
+const DEFLECTION_MM: f64 = 0.01;
 /// Cells of a second bake of scene P, mm.
 const FINE_CELLS_MM: f64 = 0.5;
 

@@ -21,10 +21,10 @@ pub const PYTHON: &str = "MORTISE_PEERS_PYTHON";
 const MISSING: &str = "MORTISE_PEERS_MISSING";
 /// Repetitions of a query, of which the shortest counts, as those of our probe.
 const REPEATS: usize = 33;
-/// Longest time on one pose, s: after it no query is repeated.
+/// Longest time on one pose, s: after it no query is repeated more than once.
 const LONGEST_S: f64 = 0.05;
 /// Longest time of a peer on a scene, s.
-const LIMIT_S: u32 = 900;
+const LIMIT_S: u32 = 300;
 
 /// Peers, each with its script.
 const SCRIPTS: [(&str, &str, &str); 5] = [
