@@ -47,7 +47,11 @@ pub fn command(arguments: &Peers) -> Result<ExitCode> {
             println!("{line}");
         }
         match Row::parse(line) {
-            Ok(row) => rows.push(row),
+            Ok(row) => {
+                // Free-form pairs take minutes each.
+                eprintln!("{}: {}", row.scene, row.method);
+                rows.push(row);
+            }
             Err(error) => unread = Some(error.context(format!("`{line}`"))),
         }
     })?;
