@@ -44,5 +44,5 @@ def balls() -> Place:
 
 pybullet.connect(pybullet.DIRECT)
 VERSION = version("pybullet")
-report(JOB, "Bullet, triangles against a hull", "triangles", VERSION, lambda: parts(pybullet.GEOM_FORCE_CONCAVE_TRIMESH), balls)
 report(JOB, "Bullet, hulls", "hulls", VERSION, lambda: parts(0), balls)
+report(JOB, "Bullet, triangles against a hull", "triangles", VERSION, lambda: parts(pybullet.GEOM_FORCE_CONCAVE_TRIMESH), balls)

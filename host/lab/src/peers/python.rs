@@ -23,8 +23,8 @@ const MISSING: &str = "MORTISE_PEERS_MISSING";
 const REPEATS: usize = 33;
 /// Longest time on one pose, s: after it no query is repeated more than once.
 const LONGEST_S: f64 = 0.05;
-/// Longest time of a peer on a scene, s.
-const LIMIT_S: u32 = 300;
+/// Longest time of a peer on a scene for each pose, s: far beyond any use in a loop, and it bounds a run.
+const LIMIT_S: usize = 3;
 
 /// Peers, each with its script.
 const SCRIPTS: [(&str, &str, &str); 5] = [
@@ -132,7 +132,7 @@ fn job(scene: &Scene) -> String {
         "poses": scene.cases.iter().map(pose).collect::<Vec<_>>(),
         "repeats": REPEATS,
         "longest_s": LONGEST_S,
-        "limit_s": LIMIT_S,
+        "limit_s": LIMIT_S * scene.cases.len(),
         "farthest_mm": scene.farthest_mm(),
     })
     .to_string()
@@ -156,7 +156,7 @@ fn ending(output: &Output) -> Option<String> {
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&output.status) {
         return Some(match signal {
             // SIGALRM on every Unix.
-            14 => format!("took longer than {LIMIT_S} s"),
+            14 => format!("took longer than {LIMIT_S} s a pose"),
             signal => format!("its process crashed (signal {signal})"),
         });
     }
@@ -214,7 +214,20 @@ fn read(peer: &str, said: &str, end: Option<&str>, poses: usize, mesh: (f64, usi
         }
     }
     if let Some(end) = end {
-        all.push(skipped(peer, peer, end.to_owned()));
+        let cut = match all.last() {
+            Some(Asked::Answered(last)) if last.answers.len() < poses => {
+                Some((last.name.clone(), last.answers.len()))
+            }
+            _ => None,
+        };
+        all.push(match cut {
+            Some((name, answered)) => skipped(
+                peer,
+                &name,
+                format!("{end}: answered {answered} of {poses} poses"),
+            ),
+            None => skipped(peer, peer, end.to_owned()),
+        });
     } else if all.is_empty() {
         all.push(skipped(peer, peer, "said nothing".into()));
     }
@@ -319,7 +332,7 @@ mod tests {
         let crash = Some("its process crashed (signal 11)");
         assert_eq!(
             reasons(&read_two(&[BEGIN, FIRST], crash)),
-            ["answered 1 of 2 poses", "its process crashed (signal 11)"]
+            ["its process crashed (signal 11): answered 1 of 2 poses"]
         );
         let all = read_two(&[BEGIN, FIRST, SECOND], crash);
         assert!(

@@ -62,7 +62,12 @@ pub fn command(arguments: &Peers) -> Result<ExitCode> {
         bail!("`mortise-lab peers` printed nothing");
     }
     if !arguments.json {
-        println!("{}{}", page::tables(&rows), row::count(&rows));
+        println!(
+            "{}{}\n{}",
+            page::tables(&rows),
+            row::count(&rows),
+            page::required(&rows)
+        );
     }
     if arguments.write {
         let text = page::text(&rows, arguments.quick, &figures::today());

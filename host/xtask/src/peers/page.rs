@@ -5,6 +5,11 @@ use super::row::{Row, count};
 /// The scene whose table comes first.
 const THESIS: &str = "scene P";
 
+/// Our method that the requirement is about, and its bounds on scene P, µs.
+const OURS: &str = "mortise, default bake";
+const MEDIAN_US: f64 = 10.0;
+const WORST_US: f64 = 60.0;
+
 /// What each peer's figure means, for the page.
 const MEANING: &str = include_str!("meaning.md");
 
@@ -16,8 +21,9 @@ pub fn text(rows: &[Row], quick: bool, date: &str) -> String {
         "# Figures: Peers\n\n\
          Written by `cargo xtask peers{option} --write` on {date}; {}. Every method answers the same poses in one run on one thread. Times\n\
          are this one machine's; compare the ratios. All figures: [peers.csv](peers.csv).\n\n\
-         {MEANING}\n## Scene P\n\n{}",
+         {MEANING}\n## Scene P\n\n{}\n\n{}",
         count(rows),
+        required(rows),
         table(&thesis)
     );
     for (what, file) in [("gaps", "peers"), ("depths", "peers-depths")] {
@@ -49,6 +55,32 @@ pub fn tables(rows: &[Row]) -> String {
         format!("{scene}\n\n{}\n", table(&own))
     };
     scenes(&all).into_iter().map(of).collect()
+}
+
+/// Verdict on our query on scene P. What is not measured does not hold.
+pub fn required(rows: &[Row]) -> String {
+    let ours = rows.iter().find(|row| row.scene == THESIS && row.method == OURS);
+    let Some((median, worst)) = ours.and_then(|row| row.median_us.zip(row.worst_us)) else {
+        let why = ours
+            .and_then(|row| row.skipped.as_deref())
+            .unwrap_or("not measured");
+        return format!(
+            "Required of {OURS}, median ≤ {MEDIAN_US} µs and worst ≤ {WORST_US} µs: skipped: {why}."
+        );
+    };
+    let verdict = |value: f64, bound: f64| {
+        let holds = if value <= bound {
+            "holds"
+        } else {
+            "**does not hold**"
+        };
+        format!("{} µs, ≤ {bound} required: {holds}", short(Some(value)))
+    };
+    format!(
+        "{OURS}: median {}; worst {}.",
+        verdict(median, MEDIAN_US),
+        verdict(worst, WORST_US)
+    )
 }
 
 /// Each scene once, in the order of its first row.
@@ -267,6 +299,26 @@ mod tests {
         assert_eq!(
             (line("n")[2].as_str(), line("n")[5].as_str()),
             ("1 of 2", "0 of 20")
+        );
+    }
+
+    #[test]
+    fn a_skip_does_not_hold_the_requirement() {
+        assert!(required(&[skipped(THESIS, OURS)]).ends_with("skipped: no | package."));
+        assert!(required(&[measured("bars", OURS, 0.0)]).ends_with("skipped: not measured."));
+        let row = |median_us, worst_us| Row {
+            median_us: Some(median_us),
+            worst_us: Some(worst_us),
+            ..measured(THESIS, OURS, 0.0)
+        };
+        let holds = |row| required(&[row]).matches(": holds").count();
+        assert_eq!(
+            [
+                holds(row(10.0, 60.0)),
+                holds(row(9.0, 61.0)),
+                holds(row(11.0, 61.0))
+            ],
+            [2, 1, 0]
         );
     }
 
