@@ -19,9 +19,10 @@ pub fn text(rows: &[Row], quick: bool, date: &str) -> String {
     let (thesis, others): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| row.scene == THESIS);
     let mut text = format!(
         "# Figures: Peers\n\n\
-         Written by `cargo xtask peers{option} --write` on {date}; {}. Every method answers the same poses in one run on one thread. Times\n\
-         are this one machine's; compare the ratios. All figures: [peers.csv](peers.csv).\n\n\
+         Written by `cargo xtask peers{option} --write` on {date}; {} scenes, {}. Every method answers the same poses in one run on one\n\
+         thread. Times are this one machine's; compare the ratios. All figures: [peers.csv](peers.csv).\n\n\
          {MEANING}\n## Scene P\n\n{}\n\n{}",
+        scenes(&rows.iter().collect::<Vec<_>>()).len(),
         count(rows),
         required(rows),
         table(&thesis)
@@ -255,7 +256,10 @@ mod tests {
             true,
             "2024-02-29",
         );
-        assert!(text.contains("on 2024-02-29; 1 measured, 1 skipped."), "{text}");
+        assert!(
+            text.contains("on 2024-02-29; 1 scenes, 1 measured, 1 skipped."),
+            "{text}"
+        );
         assert!(text.contains("skipped: no \\| package"), "{text}");
         let row = text.lines().find(|line| line.starts_with("| m ")).unwrap();
         let cells: Vec<&str> = row.split('|').map(str::trim).collect();
