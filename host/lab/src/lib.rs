@@ -23,6 +23,7 @@ pub mod hybrid;
 pub mod motion;
 pub mod pareto;
 pub mod peer;
+pub mod peers;
 pub mod rate;
 mod row;
 pub mod scene_p;
