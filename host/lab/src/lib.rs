@@ -10,6 +10,7 @@ pub mod chart;
 pub mod clearance;
 mod contact_law;
 pub mod contacts;
+mod convex;
 pub mod corpus;
 pub mod endurance;
 mod error;
@@ -26,7 +27,9 @@ pub mod peer;
 pub mod rate;
 mod row;
 pub mod scene_p;
+mod separation;
 pub mod stability;
+mod step_text;
 pub mod study;
 pub mod table;
 #[cfg(test)]

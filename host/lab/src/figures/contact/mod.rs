@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod baking;
+mod convex_pairs;
 mod insertion;
 mod limits;
 mod ticks;
@@ -9,15 +10,39 @@ mod ticks;
 use super::{Plan, Row};
 use crate::LabError;
 
-/// Measures every row.
+/// Measures some rows.
+type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
+
+/// The table's parts, in its order.
+const PARTS: &[(&str, Measure)] = &[
+    ("accuracy", |_, out| {
+        accuracy::scene_p(out)?;
+        accuracy::centred(out)
+    }),
+    ("insertion", insertion::tight),
+    ("ticks", |plan, out| {
+        ticks::tight(plan, out)?;
+        ticks::large_classic(plan, out)?;
+        ticks::large(plan, out)?;
+        ticks::more_points(plan, out)
+    }),
+    ("convex-pairs", convex_pairs::measure),
+    ("baking", |plan, out| {
+        baking::motor(plan, out)?;
+        baking::real_parts(plan, out)
+    }),
+];
+
+/// Measures every row, or those of one part.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    accuracy::scene_p(out)?;
-    accuracy::centred(out)?;
-    insertion::tight(plan, out)?;
-    ticks::tight(plan, out)?;
-    ticks::large_classic(plan, out)?;
-    ticks::large(plan, out)?;
-    ticks::more_points(plan, out)?;
-    baking::motor(plan, out)?;
-    baking::real_parts(plan, out)
+    let wanted = |name: &str| plan.only.is_none_or(|only| only == name);
+    if let Some(only) = plan.only
+        && !PARTS.iter().any(|(name, _)| wanted(name))
+    {
+        return Err(LabError::NoSuchFigures {
+            name: only.to_owned(),
+            known: PARTS.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "),
+        });
+    }
+    (PARTS.iter().filter(|(name, _)| wanted(name))).try_for_each(|(_, measure)| measure(plan, out))
 }
