@@ -6,9 +6,10 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 
 use glam::{DAffine3, DVec3};
-use tempfile::{Builder, NamedTempFile};
+use tempfile::NamedTempFile;
 
 use crate::error::LabError;
+use crate::guided;
 
 /// A text under construction.
 pub(crate) struct StepText {
@@ -232,22 +233,11 @@ impl StepText {
     /// # Errors
     /// `Unwritable`.
     pub fn file(&self) -> Result<NamedTempFile, LabError> {
-        let write = || {
-            let file = Builder::new().prefix("mortise-").suffix(".step").tempfile()?;
-            std::fs::write(
-                file.path(),
-                format!(
-                    "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n\
-                     FILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;\n{}ENDSEC;\nEND-ISO-10303-21;\n",
-                    self.data
-                ),
-            )?;
-            Ok(file)
-        };
-        write().map_err(|source| LabError::Unwritable {
-            path: std::env::temp_dir(),
-            source,
-        })
+        guided::file(&format!(
+            "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n\
+             FILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;\n{}ENDSEC;\nEND-ISO-10303-21;\n",
+            self.data
+        ))
     }
 }
 

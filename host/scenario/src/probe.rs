@@ -236,6 +236,15 @@ impl ProbeScene {
         Ok(Self { name, image, parts })
     }
 
+    /// The scene of an image that the baker wrote, with the names of its parts; `name` is used in messages.
+    pub fn of_image(name: String, image: &[u8], parts: Vec<String>) -> Self {
+        Self {
+            name,
+            image: words(image),
+            parts,
+        }
+    }
+
     /// Reads the STEP file at `path` and bakes it with `options`.
     ///
     /// # Errors
@@ -249,11 +258,7 @@ impl ProbeScene {
                 source,
             })?;
         let parts = baked.report.parts.into_iter().map(|part| part.name).collect();
-        Ok(Self {
-            name,
-            image: words(&baked.image),
-            parts,
-        })
+        Ok(Self::of_image(name, &baked.image, parts))
     }
 
     /// Size of the image in bytes, rounded up to a multiple of four.

@@ -1,11 +1,9 @@
 //! Random convex pairs, probed near touching, against separating axes and GJK.
 
-use std::path::Path;
-use std::thread;
-
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_scenario::probe::{NamedPose, ProbeRow, ProbeScene, Resolution};
 
+use super::parallel::trials;
 use crate::LabError;
 use crate::convex::Convex;
 use crate::figures::{Plan, Row};
@@ -74,25 +72,8 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     } else {
         (PAIRS, POSES)
     };
-    let tally = thread::scope(|scope| {
-        let halves: Vec<_> = (0..2)
-            .map(|half| {
-                scope.spawn(move || {
-                    (half..pairs)
-                        .step_by(2)
-                        .try_fold(Tally::default(), |tally, pair| {
-                            Ok::<_, LabError>(tally.add(probed(pair, poses)?))
-                        })
-                })
-            })
-            .collect();
-        (halves.into_iter())
-            .map(|half| {
-                half.join()
-                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-            })
-            .try_fold(Tally::default(), |sum, tally| Ok::<_, LabError>(sum.add(tally?)))
-    })?;
+    let all = trials(pairs, |pair| probed(pair, poses))?;
+    let tally = all.into_iter().fold(Tally::default(), Tally::add);
     let what = |what: &str| {
         format!(
             "{} poses of {pairs} random convex pairs, aspect ratios to 1 : 200, default bake: {what}",
@@ -151,13 +132,7 @@ fn baked(fixed: &Convex, moving: &Convex) -> Result<ProbeScene, LabError> {
         let written = solid.write(&mut text);
         text.part(name, written, DAffine3::from_translation(DVec3::Z * at));
     }
-    let file = text.file()?;
-    load(file.path())
-}
-
-/// As `mortise probe` reads it.
-fn load(path: &Path) -> Result<ProbeScene, LabError> {
-    Ok(ProbeScene::load(path, None)?)
+    Ok(ProbeScene::load(text.file()?.path(), None)?)
 }
 
 /// The pose that the probe sees: rounded to single precision, in metres.

@@ -3,12 +3,18 @@
 mod accuracy;
 mod baking;
 mod convex_pairs;
+mod errors;
+mod free_form;
 mod insertion;
 mod limits;
+mod parallel;
 mod ticks;
 
 use super::{Plan, Row};
 use crate::LabError;
+
+/// Why a row of shared parts is skipped.
+const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to their folder";
 
 /// Measures some rows.
 type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
@@ -27,6 +33,8 @@ const PARTS: &[(&str, Measure)] = &[
         ticks::more_points(plan, out)
     }),
     ("convex-pairs", convex_pairs::measure),
+    ("planned-pairs", free_form::planned),
+    ("exact-pairs", free_form::exact),
     ("baking", |plan, out| {
         baking::motor(plan, out)?;
         baking::real_parts(plan, out)
