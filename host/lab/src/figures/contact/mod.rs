@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod baking;
+mod bars;
 mod convex_pairs;
 mod errors;
 mod free_form;
@@ -33,6 +34,7 @@ const PARTS: &[(&str, Measure)] = &[
         ticks::more_points(plan, out)
     }),
     ("convex-pairs", convex_pairs::measure),
+    ("crossing-bars", bars::measure),
     ("planned-pairs", free_form::planned),
     ("exact-pairs", free_form::exact),
     ("baking", |plan, out| {
