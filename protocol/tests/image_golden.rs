@@ -93,6 +93,17 @@ fn golden_scene_reads_back() {
         (3, 3, 2)
     );
     assert_eq!(oct_decode(shape.points[0].normal), [0.0, 0.0, 1.0]);
+    let [node] = shape.edge_nodes else {
+        panic!("{:?}", shape.edge_nodes)
+    };
+    let [edge] = node.points(shape.edges) else {
+        panic!("{:?}", shape.edges)
+    };
+    assert_eq!(
+        (edge.faces, edge.is_straight(), oct_decode(edge.normals[1])),
+        ([0, 1], true, [0.0, -1.0, 0.0])
+    );
+    assert!(image.shape(1).edges.is_empty());
     let near = |x: f32, y: f32, z: f32| match shape.field.lookup([x, y, z]) {
         Lookup::Near(sample) => sample,
         far => panic!("{far:?}"),

@@ -13,7 +13,7 @@ use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, bake_field};
 use crate::format::FieldOptions;
-use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement};
+use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::partners::Partners;
@@ -62,6 +62,7 @@ pub fn bake(
         .map(|&s| ExactSurface::new(&model.shapes[s]))
         .collect();
     scene.find_partners(&prepared);
+    scene.find_edges(&prepared, options.method);
     let first = scene.cells(model, options);
     let each = vec![options.clone(); scene.shapes.len()];
     let made = match options.cell_mm {
@@ -158,6 +159,11 @@ impl Scene {
             + self.parts.len() * size_of::<PartRecord>()
             + self.shapes.len() * (size_of::<ShapeRecord>() + size_of::<FieldRecord>())
             + faces * size_of::<FaceRecord>()
+            + self
+                .edges
+                .iter()
+                .map(|pieces| edge_bytes(pieces.len()))
+                .sum::<usize>()
             + 64) as u64;
         let mut scale = SCOUT;
         // Exponent of the bytes in the inverse cell: 2 at most, less where bricks repeat; two attempts show the actual value.
@@ -327,7 +333,7 @@ impl Scene {
             let shape = prepared[i].shape();
             let mut entry = shape_report(&self.names[i], &prepared[i], &field, &each[i], &shells[i]);
             report.warnings.extend(doubts(&entry));
-            (_, entry.bytes) = builder.add_shape(shape, field, &shells[i]);
+            (_, entry.bytes) = builder.add_shape(shape, field, &shells[i], &self.edges[i]);
             report.bytes = add(&report.bytes, &entry.bytes);
             report.shapes.push(entry);
         }
@@ -437,6 +443,7 @@ fn add(a: &ByteCount, b: &ByteCount) -> ByteCount {
         points: a.points + b.points,
         nodes: a.nodes + b.nodes,
         faces: a.faces + b.faces,
+        edges: a.edges + b.edges,
         records: a.records + b.records,
     }
 }

@@ -5,10 +5,11 @@
 //! ones between faces without convex curvature, need no samples: a partner that touches there has an edge of its own, or also touches an adjacent
 //! face.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::BTreeSet;
 
 use mortise_protocol::image::NO_FACE;
 
+use crate::chains::edge_chains;
 use crate::distance::ExactSurface;
 use glam::DVec3;
 use mortise_brep::Surface;
@@ -39,37 +40,28 @@ pub(crate) fn sample_edges(
     out: &mut Vec<ShellPoint>,
 ) -> BTreeSet<u32> {
     let pieces = &surface.topology.pieces;
-    // One group for each B-rep edge; where the edge is unknown, one for each set of adjacent faces.
-    let mut groups: BTreeMap<(Option<u32>, Vec<u32>), Vec<u32>> = BTreeMap::new();
-    for (i, piece) in pieces.iter().enumerate() {
-        let mut faces: Vec<u32> = piece.sides.iter().map(|s| s.face).collect();
-        faces.sort_unstable();
-        groups.entry((piece.edge, faces)).or_default().push(i as u32);
-    }
     let mut corners = BTreeSet::new();
     let convex: Vec<f64> = (0..surface.shape().faces.len() as u32)
         .map(|face| face_range(surface, face).map_or(0.0, |[_, high]| high))
         .collect();
-    for group in groups.into_values() {
-        for chain in chains(pieces, &group) {
-            let demands = chain
-                .iter()
-                .filter_map(|&(i, _)| demand(surface, &pieces[i as usize], &convex, options));
-            let Some(demand) = demands.reduce(|a, b| Demand {
-                curvature: a.curvature.max(b.curvature),
-                max_spacing_mm: a.max_spacing_mm.min(b.max_spacing_mm),
-                ..a
-            }) else {
-                continue;
-            };
-            sample_chain(surface, &chain, &demand, options, out);
-            sample_ring(surface, &chain, options, out);
-            if let (Some(&(first, from)), Some(&(last, to))) = (chain.first(), chain.last()) {
-                let start = pieces[first as usize].ends[usize::from(!from)];
-                let end = pieces[last as usize].ends[usize::from(to)];
-                if start != end || is_corner(surface, start) {
-                    corners.extend([start, end]);
-                }
+    for chain in edge_chains(surface) {
+        let demands = chain
+            .iter()
+            .filter_map(|&(i, _)| demand(surface, &pieces[i as usize], &convex, options));
+        let Some(demand) = demands.reduce(|a, b| Demand {
+            curvature: a.curvature.max(b.curvature),
+            max_spacing_mm: a.max_spacing_mm.min(b.max_spacing_mm),
+            ..a
+        }) else {
+            continue;
+        };
+        sample_chain(surface, &chain, &demand, options, out);
+        sample_ring(surface, &chain, options, out);
+        if let (Some(&(first, from)), Some(&(last, to))) = (chain.first(), chain.last()) {
+            let start = pieces[first as usize].ends[usize::from(!from)];
+            let end = pieces[last as usize].ends[usize::from(to)];
+            if start != end || is_corner(surface, start) {
+                corners.extend([start, end]);
             }
         }
     }
@@ -83,48 +75,6 @@ fn is_corner(surface: &ExactSurface, vertex: u32) -> bool {
         .vertex_pieces
         .get(&vertex)
         .is_some_and(|p| p.len() > 2)
-}
-
-/// Joins pieces end to end. A chain stops where the group forks.
-fn chains(pieces: &[Piece], group: &[u32]) -> Vec<Vec<Link>> {
-    let mut at: HashMap<u32, Vec<u32>> = HashMap::new();
-    for &i in group {
-        for end in pieces[i as usize].ends {
-            at.entry(end).or_default().push(i);
-        }
-    }
-    let mut used: BTreeSet<u32> = BTreeSet::new();
-    let mut all = Vec::new();
-    let walk = |first: u32, forward: bool, used: &mut BTreeSet<u32>| {
-        let mut chain = vec![(first, forward)];
-        used.insert(first);
-        let mut tip = pieces[first as usize].ends[usize::from(forward)];
-        while let Some(&[a, b]) = at.get(&tip).map(Vec::as_slice) {
-            let last = chain[chain.len() - 1].0;
-            let next = if a == last { b } else { a };
-            if !used.insert(next) {
-                break;
-            }
-            let forward = pieces[next as usize].ends[0] == tip;
-            tip = pieces[next as usize].ends[usize::from(forward)];
-            chain.push((next, forward));
-        }
-        chain
-    };
-    // Open chains first, from their ends; what is left is closed.
-    for &i in group {
-        for (k, end) in pieces[i as usize].ends.iter().enumerate() {
-            if !used.contains(&i) && at[end].len() != 2 {
-                all.push(walk(i, k == 0, &mut used));
-            }
-        }
-    }
-    for &i in group {
-        if !used.contains(&i) {
-            all.push(walk(i, true, &mut used));
-        }
-    }
-    all
 }
 
 fn sample_chain(

@@ -4,15 +4,17 @@ use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
 use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
-    BrickRecord, CRC, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE, NodeRecord,
-    PART_GRABBABLE, PartRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode, surface_kind,
+    BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
+    NodeRecord, PART_GRABBABLE, PartRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode,
+    surface_kind,
 };
 
+use crate::edges::EdgePiece;
 use crate::field::BakedField;
 use crate::grid::bounding_box;
 use crate::report::ByteCount;
 use crate::shell::Pointshell;
-use crate::tree::{build_tree, round_up};
+use crate::tree::{build_edge_tree, build_tree, edge_node_count, round_up};
 
 /// Placement of a part in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,10 +40,16 @@ pub struct ImageBuilder {
     palette: Vec<u16>,
     grid: Vec<u16>,
     blob: Vec<u8>,
+    edges: Vec<EdgeRecord>,
 }
 
 /// Padding after the palettes: the last palette runs must cover every value their indices can take.
 pub(crate) const PALETTE_PADDING: usize = 256;
+
+/// Bytes of this many pieces of edges and of the tree over them.
+pub(crate) fn edge_bytes(pieces: usize) -> usize {
+    pieces * size_of::<EdgeRecord>() + edge_node_count(pieces) * size_of::<NodeRecord>()
+}
 
 impl ImageBuilder {
     /// An image with nothing in it.
@@ -49,8 +57,14 @@ impl ImageBuilder {
         Self::default()
     }
 
-    /// Adds a shape with its field and pointshell; returns its number and the bytes it takes.
-    pub fn add_shape(&mut self, shape: &Shape, field: BakedField, shell: &Pointshell) -> (u32, ByteCount) {
+    /// Adds a shape with its field, pointshell and edges; returns its number and the bytes it takes.
+    pub(crate) fn add_shape(
+        &mut self,
+        shape: &Shape,
+        field: BakedField,
+        shell: &Pointshell,
+        edges: &[EdgePiece],
+    ) -> (u32, ByteCount) {
         let positions: Vec<[f32; 3]> = shell
             .points
             .iter()
@@ -58,6 +72,8 @@ impl ImageBuilder {
             .collect();
         let offsets: Vec<f32> = shell.offsets.iter().map(|mm| (mm / 1000.0) as f32).collect();
         let tree = build_tree(&positions, &offsets);
+        let hulls: Vec<_> = edges.iter().map(EdgePiece::hull).collect();
+        let edge_tree = build_edge_tree(&hulls);
         let (lo, hi) = bounding_box(shape);
         let center = ((lo + hi) / 2000.0).as_vec3();
         // Half the diagonal contains the tessellation; the exact surface can bulge past it, by less than the grid's own margin of a cell.
@@ -86,6 +102,10 @@ impl ImageBuilder {
             volume: (shape.volume_mm3 * 1e-9) as f32,
             center_of_mass: meters.as_vec3().to_array(),
             inertia,
+            first_edge_node: (self.nodes.len() + tree.nodes.len()) as u32,
+            edge_node_count: edge_tree.nodes.len() as u32,
+            first_edge: self.edges.len() as u32,
+            edge_count: edges.len() as u32,
         });
         let bytes = ByteCount {
             samples: field.sample_bytes,
@@ -96,9 +116,13 @@ impl ImageBuilder {
             points: positions.len() * size_of::<PointRecord>(),
             nodes: tree.nodes.len() * size_of::<NodeRecord>(),
             faces: shape.faces.len() * size_of::<FaceRecord>(),
+            edges: edge_bytes(edges.len()),
             records: size_of::<ShapeRecord>() + size_of::<FieldRecord>(),
         };
         self.nodes.extend(tree.nodes);
+        self.nodes.extend(edge_tree.nodes);
+        self.edges
+            .extend(edge_tree.order.iter().map(|&old| edges[old as usize].record()));
         self.points.extend(tree.order.iter().map(|&old| {
             let p = &shell.points[old as usize];
             PointRecord {
@@ -159,6 +183,7 @@ impl ImageBuilder {
             + padded(2 * (self.palette.len() + PALETTE_PADDING))
             + padded(size_of_val(self.grid.as_slice()))
             + padded(self.blob.len())
+            + padded(size_of_val(self.edges.as_slice()))
     }
 
     /// Whether the image has no shapes and no parts.
@@ -183,6 +208,7 @@ impl ImageBuilder {
             palette: append(&mut bytes, &self.palette),
             grid: append(&mut bytes, &self.grid),
             blob: append(&mut bytes, &self.blob),
+            edges: append(&mut bytes, &self.edges),
             ..Header::zeroed()
         };
         header.length = bytes.len() as u32;

@@ -24,6 +24,9 @@ pub struct ByteCount {
     pub nodes: usize,
     /// Face records.
     pub faces: usize,
+    /// Pieces of edges and their tree.
+    #[serde(default)]
+    pub edges: usize,
     /// Shape and field records.
     pub records: usize,
 }
@@ -39,6 +42,7 @@ impl ByteCount {
             + self.points
             + self.nodes
             + self.faces
+            + self.edges
             + self.records
     }
 }

@@ -8,9 +8,10 @@ use mortise_protocol::limits::MAX_PARTS;
 use rayon::prelude::*;
 
 use crate::distance::ExactSurface;
+use crate::edges::{EdgePiece, edge_pieces};
 use crate::error::BakeError;
 use crate::grid::bounding_box;
-use crate::options::{BakeOptions, Grabbable};
+use crate::options::{BakeOptions, Grabbable, Method};
 use crate::partners::{Met, Partners};
 
 /// Shapes and parts of a model that go into the image.
@@ -25,6 +26,8 @@ pub(crate) struct Scene {
     pub grabbable: Vec<bool>,
     /// Partners of each of `shapes`.
     pub partners: Vec<Partners>,
+    /// Pieces of the sharp convex edges of each shape; none for voxmaps, whose method knows no edges.
+    pub edges: Vec<Vec<EdgePiece>>,
     /// Skipped parts, as text.
     pub warnings: Vec<String>,
 }
@@ -38,6 +41,7 @@ impl Scene {
             parts: Vec::new(),
             grabbable: Vec::new(),
             partners: Vec::new(),
+            edges: Vec::new(),
             warnings: Vec::new(),
         };
         for (index, part) in model.parts.iter().enumerate() {
@@ -94,6 +98,15 @@ impl Scene {
             Partners::Known(Met::all(self.met_by(shape).into_iter().map(|other| &each[other])))
         };
         self.partners = (0..self.shapes.len()).map(of).collect();
+    }
+
+    /// Finds the pieces of edges for contact of edges with edges.
+    pub fn find_edges(&mut self, prepared: &[ExactSurface], method: Method) {
+        let of = |surface: &ExactSurface| match method {
+            Method::DistanceField => edge_pieces(surface),
+            Method::Occupancy => Vec::new(),
+        };
+        self.edges = prepared.par_iter().map(of).collect();
     }
 
     /// Shapes whose parts can meet a part of this shape.

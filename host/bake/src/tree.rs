@@ -5,6 +5,8 @@ use mortise_protocol::image::NodeRecord;
 
 /// Most points of a leaf.
 pub const LEAF_POINTS: usize = 16;
+/// Most pieces of edges of a leaf.
+const LEAF_PIECES: usize = 4;
 
 /// A tree and the order of points it refers to.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,29 +26,57 @@ const OFFSET_WEIGHT: f32 = 128.0;
 /// `offsets` (same unit; may be empty) are the points' distances from the surface. They count as a fourth axis, so that points of equal depth share a
 /// leaf: they come near together, and a leaf with one near point is examined as a whole.
 pub fn build_tree(positions: &[[f32; 3]], offsets: &[f32]) -> SphereTree {
+    let items: Vec<[[f32; 3]; 1]> = positions.iter().map(|&p| [p]).collect();
+    build(&items, offsets, LEAF_POINTS)
+}
+
+/// Builds the tree over pieces of edges, each given by points whose convex hull contains it; leaves have at most 4 pieces.
+pub(crate) fn build_edge_tree(hulls: &[[[f32; 3]; 3]]) -> SphereTree {
+    build(hulls, &[], LEAF_PIECES)
+}
+
+/// Builds the tree over items of N points each.
+fn build<const N: usize>(items: &[[[f32; 3]; N]], offsets: &[f32], leaf: usize) -> SphereTree {
     let mut tree = SphereTree {
         nodes: Vec::new(),
-        order: (0..positions.len() as u32).collect(),
+        order: (0..items.len() as u32).collect(),
     };
-    if !positions.is_empty() {
-        split(positions, offsets, &mut tree, 0, positions.len());
+    if !items.is_empty() {
+        split(items, offsets, leaf, &mut tree, 0, items.len());
     }
     tree
 }
 
 /// Number of nodes of the tree over `points` points.
 pub(crate) fn node_count(points: usize) -> usize {
-    match points {
+    count_nodes(points, LEAF_POINTS)
+}
+
+/// Number of nodes of the tree over this many pieces of edges.
+pub(crate) fn edge_node_count(pieces: usize) -> usize {
+    count_nodes(pieces, LEAF_PIECES)
+}
+
+fn count_nodes(items: usize, leaf: usize) -> usize {
+    match items {
         0 => 0,
-        1..=LEAF_POINTS => 1,
-        _ => 1 + node_count(points / 2) + node_count(points - points / 2),
+        n if n <= leaf => 1,
+        n => 1 + count_nodes(n / 2, leaf) + count_nodes(n - n / 2, leaf),
     }
 }
 
-fn split(positions: &[[f32; 3]], offsets: &[f32], tree: &mut SphereTree, first: usize, count: usize) {
-    let at = |i: u32| DVec3::from_array(positions[i as usize].map(f64::from));
+fn split<const N: usize>(
+    items: &[[[f32; 3]; N]],
+    offsets: &[f32],
+    leaf: usize,
+    tree: &mut SphereTree,
+    first: usize,
+    count: usize,
+) {
     let run = &mut tree.order[first..first + count];
-    let points: Vec<DVec3> = run.iter().map(|&i| at(i)).collect();
+    let points: Vec<DVec3> = (run.iter().flat_map(|&i| items[i as usize]))
+        .map(|p| DVec3::from_array(p.map(f64::from)))
+        .collect();
     let (center, radius) = sphere(&points);
     let index = tree.nodes.len();
     tree.nodes.push(NodeRecord {
@@ -56,10 +86,11 @@ fn split(positions: &[[f32; 3]], offsets: &[f32], tree: &mut SphereTree, first: 
         point_count: count as u32,
         skip: 0,
     });
-    if count > LEAF_POINTS {
+    if count > leaf {
         let along = |i: u32, axis: usize| match axis {
             3 => OFFSET_WEIGHT * offsets.get(i as usize).copied().unwrap_or(0.0),
-            _ => positions[i as usize][axis],
+            // The middle point of a piece stands for it.
+            _ => items[i as usize][N / 2][axis],
         };
         let extent: [f32; 4] = std::array::from_fn(|axis| {
             let range = run.iter().map(|&i| along(i, axis));
@@ -71,8 +102,8 @@ fn split(positions: &[[f32; 3]], offsets: &[f32], tree: &mut SphereTree, first: 
         // The index breaks ties, so the order is the same on every machine.
         run.sort_unstable_by(|&a, &b| along(a, axis).total_cmp(&along(b, axis)).then(a.cmp(&b)));
         let half = count / 2;
-        split(positions, offsets, tree, first, half);
-        split(positions, offsets, tree, first + half, count - half);
+        split(items, offsets, leaf, tree, first, half);
+        split(items, offsets, leaf, tree, first + half, count - half);
     }
     tree.nodes[index].skip = tree.nodes.len() as u32;
 }

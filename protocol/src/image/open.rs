@@ -3,6 +3,7 @@
 use bytemuck::{Pod, try_cast_slice};
 use crc::{CRC_32_ISO_HDLC, Crc};
 
+use super::edge::EdgeRecord;
 use super::error::ImageError;
 use super::field::Field;
 use super::occupancy::VOXEL_BRICK_BYTES;
@@ -21,6 +22,7 @@ const SECTION_BRICKS: u8 = 6;
 const SECTION_PALETTE: u8 = 7;
 const SECTION_GRID: u8 = 8;
 const SECTION_BLOB: u8 = 9;
+const SECTION_EDGES: u8 = 10;
 
 /// A scene image, read in place.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +38,7 @@ pub struct SceneImage<'a> {
     palette: &'a [u16],
     grid: &'a [u16],
     blob: &'a [u8],
+    edges: &'a [EdgeRecord],
 }
 
 /// One shape of an image with its arrays.
@@ -49,6 +52,10 @@ pub struct Shape<'a> {
     pub points: &'a [PointRecord],
     /// B-rep faces.
     pub faces: &'a [FaceRecord],
+    /// Tree over the edges, preorder.
+    pub edge_nodes: &'a [NodeRecord],
+    /// Pieces of sharp convex edges.
+    pub edges: &'a [EdgeRecord],
     /// Signed distance.
     pub field: Field<'a>,
 }
@@ -99,6 +106,7 @@ impl<'a> SceneImage<'a> {
             palette: section(bytes, header.palette, SECTION_PALETTE)?,
             grid: section(bytes, header.grid, SECTION_GRID)?,
             blob: section(bytes, header.blob, SECTION_BLOB)?,
+            edges: section(bytes, header.edges, SECTION_EDGES)?,
         };
         image.check()?;
         Ok(image)
@@ -129,6 +137,8 @@ impl<'a> SceneImage<'a> {
             nodes: run(self.nodes, record.first_node, record.node_count),
             points: run(self.points, record.first_point, record.point_count),
             faces: run(self.faces, record.first_face, record.face_count),
+            edge_nodes: run(self.nodes, record.first_edge_node, record.edge_node_count),
+            edges: run(self.edges, record.first_edge, record.edge_count),
             field: Field {
                 record: field,
                 grid: &self.grid[field.first_grid as usize..][..entries],
@@ -161,6 +171,8 @@ impl<'a> SceneImage<'a> {
                 && fits(shape.first_node, shape.node_count, self.nodes.len())
                 && fits(shape.first_point, shape.point_count, self.points.len())
                 && fits(shape.first_face, shape.face_count, self.faces.len())
+                && fits(shape.first_edge_node, shape.edge_node_count, self.nodes.len())
+                && fits(shape.first_edge, shape.edge_count, self.edges.len())
                 && shape.face_count <= u32::from(NO_FACE)
                 && finite(&shape.center)
                 && finite(&shape.center_of_mass)
@@ -214,14 +226,8 @@ impl<'a> SceneImage<'a> {
         })?;
         for (index, shape) in self.shapes.iter().enumerate() {
             let nodes = run(self.nodes, shape.first_node, shape.node_count);
-            let good = nodes.iter().enumerate().all(|(i, node)| {
-                finite(&node.center)
-                    && node.radius.is_finite()
-                    && node.radius >= 0.0
-                    && fits(node.first_point, node.point_count, shape.point_count as usize)
-                    && node.skip as usize > i
-                    && node.skip <= shape.node_count
-            });
+            let edge_nodes = run(self.nodes, shape.first_edge_node, shape.edge_node_count);
+            let good = is_tree(nodes, shape.point_count) && is_tree(edge_nodes, shape.edge_count);
             let points = run(self.points, shape.first_point, shape.point_count);
             let good = good
                 && points.iter().all(|p| {
@@ -229,6 +235,8 @@ impl<'a> SceneImage<'a> {
                         && u32::from(p.face) < shape.face_count
                         && (p.edge_face == NO_FACE || u32::from(p.edge_face) < shape.face_count)
                 });
+            let edges = run(self.edges, shape.first_edge, shape.edge_count);
+            let good = good && edges.iter().all(|e| is_edge(e, shape.face_count));
             if !good {
                 return Err(ImageError::Record {
                     section: SECTION_SHAPES,
@@ -243,6 +251,28 @@ impl<'a> SceneImage<'a> {
                 && finite(&[face.sense, face.radius, face.second])
         })
     }
+}
+
+/// Whether these are the nodes of a tree over `count` items, in preorder.
+fn is_tree(nodes: &[NodeRecord], count: u32) -> bool {
+    nodes.iter().enumerate().all(|(i, node)| {
+        finite(&node.center)
+            && node.radius.is_finite()
+            && node.radius >= 0.0
+            && fits(node.first_point, node.point_count, count as usize)
+            && node.skip as usize > i
+            && node.skip as usize <= nodes.len()
+    })
+}
+
+/// Whether the numbers of a piece of an edge are usable.
+fn is_edge(edge: &EdgeRecord, faces: u32) -> bool {
+    finite(&edge.center)
+        && finite(&edge.half)
+        && finite(&edge.bend)
+        && edge.thickness.is_finite()
+        && edge.thickness >= 0.0
+        && edge.faces.iter().all(|&face| u32::from(face) < faces)
 }
 
 /// Bytes of a brick's samples; `None` for a format that this side does not know.

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// First eight bytes of every scene image.
 pub const MAGIC: [u8; 8] = *b"MORTISE\0";
 /// Version of this layout. Any change to a record or its meaning increments it.
-pub const LAYOUT_VERSION: u32 = 2;
+pub const LAYOUT_VERSION: u32 = 3;
 /// Cells along a brick's edge.
 pub const BRICK_CELLS: usize = 8;
 /// Samples along a brick's edge: the last layer repeats the neighbour's first (shared apron).
@@ -61,6 +61,8 @@ pub struct Header {
     pub grid: Section,
     /// Bytes: field samples and cell-to-palette indices.
     pub blob: Section,
+    /// [`super::EdgeRecord`]s.
+    pub edges: Section,
 }
 
 /// The part may be grabbed and moved.
@@ -113,6 +115,14 @@ pub struct ShapeRecord {
     pub center_of_mass: [f32; 3],
     /// Inertia about the centre of mass at unit density, m⁵: xx, yy, zz, xy, xz, yz.
     pub inertia: [f32; 6],
+    /// Nodes of the tree over its edges.
+    pub first_edge_node: u32,
+    /// Number of nodes.
+    pub edge_node_count: u32,
+    /// Pieces of its sharp convex edges.
+    pub first_edge: u32,
+    /// Number of pieces.
+    pub edge_count: u32,
 }
 
 /// Samples are `i8`.
@@ -294,7 +304,7 @@ pub struct BrickRecord {
     pub index_bits: u16,
 }
 
-/// A sphere about a run of points: one node of the pointshell's tree.
+/// A sphere about a run of points, or of pieces of edges: one node of a tree.
 ///
 /// Preorder: children follow their parent; `skip` is the next node to visit when this one is culled. A leaf has `skip == own index + 1`.
 #[repr(C)]
@@ -313,9 +323,10 @@ pub struct NodeRecord {
 }
 
 impl NodeRecord {
-    /// The points of this node's subtree, given all points of its shape. Empty for a record out of range, which an opened image cannot contain.
+    /// The points (or pieces of edges) of this node's subtree, given all of its shape. Empty for a record out of range, which an opened image cannot
+    /// contain.
     #[inline]
-    pub fn points<'a>(&self, all: &'a [PointRecord]) -> &'a [PointRecord] {
+    pub fn points<'a, T>(&self, all: &'a [T]) -> &'a [T] {
         let first = self.first_point as usize;
         all.get(first..first + self.point_count as usize).unwrap_or(&[])
     }
@@ -411,13 +422,14 @@ mod tests {
 
     #[test]
     fn records_have_the_documented_sizes() {
-        assert_eq!(size_of::<Header>(), 104);
+        assert_eq!(size_of::<Header>(), 112);
         assert_eq!(size_of::<PartRecord>(), 36);
-        assert_eq!(size_of::<ShapeRecord>(), 88);
+        assert_eq!(size_of::<ShapeRecord>(), 104);
         assert_eq!(size_of::<FieldRecord>(), 44);
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
         assert_eq!(size_of::<PointRecord>(), 20);
+        assert_eq!(size_of::<super::super::EdgeRecord>(), 56);
         assert_eq!(size_of::<FaceRecord>(), 40);
     }
 

@@ -128,7 +128,17 @@ pub fn bytes() -> Vec<u8> {
         node([0.001, 0.001, 0.004], 0.0001, 0, 1, 2),
         node([0.0055, 0.001, 0.004], 0.0016, 1, 2, 3),
         node([0.002, 0.0, 0.0], 0.0001, 0, 1, 1),
+        node([0.004, 0.0, 0.004], 0.0041, 0, 1, 1),
     ];
+    let edge = EdgeRecord {
+        center: [0.004, 0.0, 0.004],
+        half: [0.004, 0.0, 0.0],
+        bend: [0.0; 3],
+        normals: [oct_encode([0.0, 0.0, 1.0]), oct_encode([0.0, -1.0, 0.0])],
+        faces: [0, 1],
+        thickness: 0.004,
+        edge: 0,
+    };
     let plane = |origin: [f32; 3], axis: [f32; 3]| FaceRecord {
         kind: surface_kind::PLANE,
         sense: 1.0,
@@ -165,6 +175,10 @@ pub fn bytes() -> Vec<u8> {
             volume: 2.56e-7,
             center_of_mass: [0.004, 0.004, 0.002],
             inertia: [1e-12, 2e-12, 3e-12, 0.0, 0.0, 0.0],
+            first_edge_node: 4,
+            edge_node_count: 1,
+            first_edge: 0,
+            edge_count: 1,
         },
         ShapeRecord {
             field: 1,
@@ -203,6 +217,7 @@ pub fn bytes() -> Vec<u8> {
         palette: &palette,
         grid: &grid,
         blob: &blob,
+        edges: &[edge],
     }
     .image()
 }
@@ -270,6 +285,7 @@ pub fn occupancy_bytes() -> Vec<u8> {
         palette: &[0],
         grid: &grid,
         blob: &voxels,
+        edges: &[],
     }
     .image()
 }
@@ -285,6 +301,7 @@ struct Sections<'a> {
     palette: &'a [u16],
     grid: &'a [u16],
     blob: &'a [u8],
+    edges: &'a [EdgeRecord],
 }
 
 impl Sections<'_> {
@@ -303,6 +320,7 @@ impl Sections<'_> {
             palette: section(&mut bytes, self.palette),
             grid: section(&mut bytes, self.grid),
             blob: section(&mut bytes, self.blob),
+            edges: section(&mut bytes, self.edges),
             ..Header::zeroed()
         };
         header.length = bytes.len() as u32;

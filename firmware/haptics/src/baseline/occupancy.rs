@@ -17,7 +17,7 @@
 //! method of Faas 2010, section 5.4.
 
 use glam::Vec3;
-use mortise_protocol::image::{Field, PointRecord, Voxel, VoxelSample, oct_decode};
+use mortise_protocol::image::{Field, NO_FACE, PointRecord, Voxel, VoxelSample, oct_decode};
 
 use crate::collision::contact::Phase;
 use crate::collision::cost::MATING;
@@ -123,6 +123,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             contact.guided = mating.guided;
             (contact.moving_face, contact.static_face) = (point.face, sample.faces[0]);
             (contact.moving_edge_face, contact.static_edge_face) = (point.edge_face, sample.faces[1]);
+            contact.edges = [NO_FACE; 2];
             contact.leaf = leaf;
         }
         0.0

@@ -33,6 +33,8 @@ pub(crate) struct Contact {
     pub moving_edge_face: u16,
     /// The other part's second face, likewise.
     pub static_edge_face: u16,
+    /// Numbers of the edges of the held part and of the other part that cross, else [`mortise_protocol::image::NO_FACE`].
+    pub edges: [u16; 2],
     /// Leaf in which it was found; identifies the other part.
     pub leaf: NodeCursor,
 }
@@ -51,6 +53,7 @@ impl Contact {
         static_face: 0,
         moving_edge_face: 0,
         static_edge_face: 0,
+        edges: [0; 2],
         leaf: NodeCursor::FIRST,
     };
 }
@@ -92,6 +95,8 @@ pub(crate) struct Contacts {
     lost: u32,
     /// Square of the longest arm, m².
     farthest2: f32,
+    /// Length of the last tick's list.
+    previous_len: usize,
     /// Number of the last tick's contacts that can be carried over.
     carried_len: usize,
 }
@@ -173,6 +178,7 @@ impl Contacts {
             dropped: false,
             lost: 0,
             farthest2: 0.0,
+            previous_len: 0,
             carried_len: 0,
         }
     }
@@ -183,11 +189,13 @@ impl Contacts {
         self.dropped = false;
         self.lost = 0;
         self.farthest2 = 0.0;
+        self.previous_len = 0;
         self.carried_len = 0;
     }
 
     /// Empties the store for the next tick. With `keep_previous` the contacts it held can be restored by [`Self::carry`].
     pub fn begin(&mut self, keep_previous: bool) {
+        self.previous_len = self.len;
         self.carried_len = if keep_previous { self.len } else { 0 };
         self.current = 1 - self.current;
         self.len = 0;
@@ -214,6 +222,14 @@ impl Contacts {
                 };
             }
         }
+    }
+
+    /// Whether these edges of the held part and of part `part` crossed in the last tick.
+    pub fn crossed(&self, part: u16, edges: [u16; 2]) -> bool {
+        let previous = self.lists[1 - self.current]
+            .get(..self.previous_len)
+            .unwrap_or(&[]);
+        previous.iter().any(|c| c.edges == edges && c.leaf.part() == part)
     }
 
     fn list(&self) -> &[Contact; MAX_CONTACTS] {

@@ -72,6 +72,10 @@ costs! {
     NOTED = 24;
     /// Fixed cost of an exclusion query for a leaf, before anything is read.
     EXCLUSION = 760;
+    /// Bound of the distance from a piece of an edge to a node, or to a piece, of the other part's edges.
+    EDGE_BOUND = 48;
+    /// Contact of two pieces of edges.
+    CROSSING = 285;
     /// Setting up a target's spring and what depends on it, without its cost in a solve.
     SPRING = 1140;
     /// One solve without springs.
@@ -135,6 +139,8 @@ mod tests {
                 ("FIND_FACE", 32),
                 ("NOTED", 1),
                 ("EXCLUSION", 32),
+                ("EDGE_BOUND", 2),
+                ("CROSSING", 12),
                 ("SPRING", 48),
                 ("SOLVE", 64),
                 ("SPRING_IN_SOLVE", 20),

@@ -1,7 +1,7 @@
 //! Directed pair: the tree of one part against the field of the other, with the transforms between their frames.
 
 use glam::{Mat3, Vec3};
-use mortise_protocol::image::{FaceRecord, Field, NodeRecord, Place, PointRecord, Shape};
+use mortise_protocol::image::{EdgeRecord, FaceRecord, Field, NodeRecord, Place, PointRecord, Shape};
 
 use crate::collision::exact_surface::exact;
 use crate::collision::node_key::Keys;
@@ -23,6 +23,9 @@ pub(crate) struct DirectedPair<'i> {
     /// Keys of the nodes in the coherence tables.
     pub keys: Keys,
     pub points: &'i [PointRecord],
+    pub edges: EdgeTree<'i>,
+    /// Edges of the field's shape.
+    pub field_edges: EdgeTree<'i>,
     pub field: Field<'i>,
     /// Exact surfaces of the field's shape.
     pub faces: &'i [FaceRecord],
@@ -32,6 +35,22 @@ pub(crate) struct DirectedPair<'i> {
     pub to_arm: Affine,
     /// Field gradient to the direction, in the world, that pushes the held part away.
     pub to_push: Mat3,
+}
+
+/// Pieces of sharp convex edges under their tree.
+#[derive(Clone, Copy)]
+pub(crate) struct EdgeTree<'i> {
+    pub nodes: &'i [NodeRecord],
+    pub pieces: &'i [EdgeRecord],
+}
+
+impl<'i> EdgeTree<'i> {
+    fn of(shape: &Shape<'i>) -> Self {
+        Self {
+            nodes: shape.edge_nodes,
+            pieces: shape.edges,
+        }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -46,6 +65,16 @@ impl Affine {
         self.linear * Vec3::from_array(p) + self.offset
     }
 
+    /// The point that [`Self::apply`] takes to `p`.
+    pub fn unapply(&self, p: Vec3) -> Vec3 {
+        self.linear.transpose_mul_vec3(p - self.offset)
+    }
+
+    /// Its rotation.
+    pub fn rotation(&self) -> &Mat3 {
+        &self.linear
+    }
+
     /// Rotates a direction.
     #[inline]
     pub fn turn(&self, direction: Vec3) -> Vec3 {
@@ -57,6 +86,11 @@ impl<'i> DirectedPair<'i> {
     /// Whether the method does not use this direction: points of the other part against a voxmap of the held part.
     pub fn unused(&self) -> bool {
         self.backward && self.field.is_occupancy()
+    }
+
+    /// Position in the tree's frame of a point `p` of the field's, m.
+    pub fn in_tree(&self, p: Vec3) -> [f32; 3] {
+        self.to_field.unapply(p).to_array()
     }
 
     /// Position of a point of the tree in cells from the corner of the field's grid.
@@ -123,8 +157,10 @@ impl<'i> DirectedPair<'i> {
             guided: false,
             excluded: ExcludedPairs::new(),
             nodes: tree.nodes,
-            keys: Keys::new(index, tree.nodes.len()),
+            keys: Keys::new(index, tree.nodes.len() + tree.edge_nodes.len()),
             points: tree.points,
+            edges: EdgeTree::of(tree),
+            field_edges: EdgeTree::of(field),
             field: field.field,
             faces: field.faces,
             to_field,

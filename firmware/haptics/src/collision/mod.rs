@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `search`, `leaf` | traversal of all trees within a work budget; the points of one leaf |
+//! | `edge_search`, `edge_crossing` | edges of one part against edges of the other; contact of two edges |
 //! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
 //! | `exact_surface`, `facing` | distance to exact surfaces; normals that rule out a contact |
 //! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
@@ -17,6 +18,8 @@ pub(crate) mod contact;
 pub mod cost;
 pub(crate) mod decimation;
 pub(crate) mod directed_pair;
+pub(crate) mod edge_crossing;
+mod edge_search;
 pub(crate) mod exact_surface;
 mod exclusion;
 mod face_cache;

@@ -19,7 +19,7 @@ use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecor
 
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
-use crate::collision::contact::{Contacts, Phase};
+use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
     ALLOWANCE, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, Used,
 };
@@ -198,7 +198,7 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     pub search: &'w Search<'s, 'i, R>,
     pub coherence: &'w mut Coherence,
     /// Travel at which bounds of points within the margin expire, nm.
-    horizon: u32,
+    pub horizon: u32,
     pub contacts: &'w mut Contacts,
     pub work: &'w mut Work,
     /// Budget spent, eighths of a field query.
@@ -255,7 +255,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 Some(end) if end.pair == index => end.node,
                 _ => u32::MAX,
             };
-            let stopped = self.nodes(&pair, from, to);
+            let stopped = self
+                .nodes(&pair, from, to)
+                .or_else(|| self.edges(&pair, from, to));
             if stopped.is_some() {
                 return stopped;
             }
@@ -450,22 +452,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         };
         let gap = found.distance + mating.allowance_m;
         let arm = pair.to_arm.apply(point.position);
-        let turn = arm.cross(n) * self.search.inverse_length;
-        let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
-        let slack = self.search.slack;
-        if gap >= slack && gap >= slack + self.search.approach(&row) {
-            return;
-        }
-        self.count_candidate();
-        let arm2 = arm.length_squared();
-        let reach_gap = gap - self.search.swing * arm2;
-        let Some(contact) = self.contacts.offer(gap, reach_gap, arm2) else {
+        let Some(contact) = self.offer(gap, n, arm) else {
             return;
         };
-        contact.row = row;
-        contact.arm = arm;
-        contact.rate = 0.0;
-        contact.phase = Phase::Free;
         contact.guided = mating.guided;
         (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
         (contact.moving_edge_face, contact.static_edge_face) = if pair.backward {
@@ -473,7 +462,29 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         } else {
             (point.edge_face, found.edge_face)
         };
+        contact.edges = [NO_FACE; 2];
         contact.leaf = leaf;
+    }
+
+    /// Slot for a contact at lever arm `arm` with a `gap` along the world normal `n`, if it is a candidate and is kept. The caller fills in faces,
+    /// edges and leaf.
+    #[inline(always)]
+    pub fn offer(&mut self, gap: f32, n: Vec3, arm: Vec3) -> Option<&mut Contact> {
+        let turn = arm.cross(n) * self.search.inverse_length;
+        let row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
+        let slack = self.search.slack;
+        if gap >= slack && gap >= slack + self.search.approach(&row) {
+            return None;
+        }
+        self.count_candidate();
+        let arm2 = arm.length_squared();
+        let reach_gap = gap - self.search.swing * arm2;
+        let contact = self.contacts.offer(gap, reach_gap, arm2)?;
+        contact.row = row;
+        contact.arm = arm;
+        contact.rate = 0.0;
+        contact.phase = Phase::Free;
+        Some(contact)
     }
 
     /// Mating of a point and a face.

@@ -128,6 +128,7 @@ impl Writer {
                 0.0,
                 0.0,
             ],
+            ..ShapeRecord::zeroed()
         });
         self.shapes.len() as u32 - 1
     }
@@ -315,6 +316,7 @@ impl Writer {
         header.palette = section(&mut bytes, &self.palette);
         header.grid = section(&mut bytes, &self.grid);
         header.blob = section(&mut bytes, &self.blob);
+        header.edges = section::<EdgeRecord>(&mut bytes, &[]);
         pad(&mut bytes);
         header.length = bytes.len() as u32;
         bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));

@@ -487,3 +487,64 @@ pub fn with_void(outer: &Shape, void: &Shape) -> Shape {
     }));
     finish(shape)
 }
+
+/// A box about the origin with these half sizes, mm, its faces in the order −x, +x, −y, +y, −z, +z.
+pub fn block(half: DVec3) -> Shape {
+    let corner =
+        |i: usize| DVec3::from_array([0, 1, 2].map(|a| if i >> a & 1 == 1 { half[a] } else { -half[a] }));
+    let vertices: Vec<DVec3> = (0..8).map(corner).collect();
+    let mut mesh = Mesh {
+        vertices: vertices.clone(),
+        ..Mesh::default()
+    };
+    let mut faces = Vec::new();
+    for axis in 0..3 {
+        for side in [0, 1] {
+            let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+            let first = side << axis;
+            let ring = [first, first | u, first | u | v, first | v].map(|i: usize| i as u32);
+            let [a, b, c, d] = if side == 1 {
+                ring
+            } else {
+                [ring[0], ring[3], ring[2], ring[1]]
+            };
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+            mesh.triangle_face.extend([faces.len() as u32; 2]);
+            let normal = DVec3::AXES[axis] * if side == 1 { 1.0 } else { -1.0 };
+            let frame = frame_at(normal * half[axis], normal);
+            faces.push(face(Surface::Plane { frame }, false));
+        }
+    }
+    let mut edges = Vec::new();
+    for axis in 0..3 {
+        for k in 0..4usize {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let from = ((k & 1) << u) | ((k >> 1) << v);
+            let ends = [from, from | 1 << axis].map(|i| vertices[i]);
+            let own = [2 * u + (k & 1), 2 * v + (k >> 1)].map(|f| f as u32);
+            for f in own {
+                faces[f as usize].edges.push(edges.len() as u32);
+            }
+            edges.push(Edge {
+                curve: Curve::Line {
+                    origin: ends[0],
+                    direction: DVec3::AXES[axis],
+                },
+                length_mm: ends[0].distance(ends[1]),
+                faces: own.to_vec(),
+                polyline: ends.to_vec(),
+            });
+        }
+    }
+    let mut shape = finish(Shape {
+        faces,
+        edges,
+        mesh,
+        ..Shape::default()
+    });
+    let square = half * half;
+    for axis in 0..3 {
+        shape.inertia_mm5[axis][axis] = shape.volume_mm3 / 3.0 * (square.element_sum() - square[axis]);
+    }
+    shape
+}

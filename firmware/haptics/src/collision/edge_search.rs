@@ -1,0 +1,194 @@
+//! Edges of the held part against edges of the other part.
+//!
+//! The tree of the held part's pieces is traversed as the pointshell's is: a node whose sphere the other part's field shows to be far is skipped, and
+//! its advancement bound stored. A piece of a near leaf is compared with the pieces under the other part's edge tree. A leaf that lies on the other
+//! part's surface but far from its edges, such as the rim of a peg in its bore, keeps that distance as its bound.
+//!
+//! Two edges that cross are offered as a contact at any gap within the margin, so a fast edge is stopped before it passes another. An overlap deeper
+//! than [`DEPTH_SHARE`] of the thinner part is not taken for a contact unless the same edges crossed in the tick before: else the far edges of a
+//! thin bar, which face the other part too, would pull it through.
+
+use mortise_protocol::image::{EDGE_ERROR_CELLS, EdgeRecord, NodeRecord};
+
+use crate::collision::ancestors::Ancestors;
+use crate::collision::coherence::{Bound, Known};
+use crate::collision::cost::{CROSSING, EDGE_BOUND, LOOKUP, MATING, NODE, PASSED_OVER};
+use crate::collision::directed_pair::DirectedPair;
+use crate::collision::edge_crossing::{Crossing, Piece, crossing};
+use crate::collision::node_cursor::NodeCursor;
+use crate::collision::rules::{FacePairRules, Mating};
+use crate::collision::search::Traversal;
+
+/// Deepest overlap of two edges that touch for the first time, as a share of the thinner part's thickness at them: at half of it the far sides are as
+/// near as the near ones.
+const DEPTH_SHARE: f32 = 0.45;
+/// A leaf without near edges is searched this far, m, and as far as [`RESERVE_TICKS`] ticks of the last motion, for a bound that lasts.
+const RESERVE_M: f32 = 1e-3;
+/// See [`RESERVE_M`].
+const RESERVE_TICKS: f32 = 32.0;
+
+impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
+    /// Searches the edges of a forward pair; nodes are numbered on from the pointshell's. Returns where it stopped when the budget ran out.
+    ///
+    /// Terminates because every record's `skip` points forward (checked when the image was opened).
+    pub fn edges(&mut self, pair: &DirectedPair<'_>, from: u32, to: u32) -> Option<NodeCursor> {
+        if pair.backward || pair.field.is_occupancy() || pair.field_edges.nodes.is_empty() {
+            return None;
+        }
+        let first = pair.nodes.len() as u32;
+        let to = to.saturating_sub(first);
+        let edge_error = EDGE_ERROR_CELLS * pair.field.record().cell;
+        let limit = LOOKUP.saturating_mul(self.search.budget);
+        let mut ancestors = Ancestors::new();
+        let mut index = from.saturating_sub(first);
+        while index < to {
+            let Some(node) = pair.edges.nodes.get(index as usize) else {
+                break;
+            };
+            let here = NodeCursor {
+                pair: pair.index,
+                node: first + index,
+            };
+            if self.spent >= limit {
+                return Some(here);
+            }
+            ancestors.close(index, self.coherence);
+            let key = pair.keys.of(here.node);
+            match self.coherence.query(key, self.horizon, false) {
+                Known::Far(bound) => {
+                    self.spent += PASSED_OVER;
+                    ancestors.note(bound);
+                    index = node.skip;
+                    continue;
+                }
+                Known::Near(_) | Known::Expired => self.spent += PASSED_OVER,
+                Known::Nothing => {
+                    self.spent += NODE;
+                    self.work.nodes += 1;
+                    let distance = pair.distance(node.center) - (node.radius + edge_error);
+                    if distance > self.search.margin {
+                        ancestors.note(self.coherence.set_distance(key, distance));
+                        index = node.skip;
+                        continue;
+                    }
+                    self.coherence.set_near(key);
+                }
+            }
+            index += 1;
+            if node.skip != index {
+                ancestors.open(key, node.skip);
+                continue;
+            }
+            let distance = self.edge_leaf(pair, here, node);
+            ancestors.note(if distance > self.search.margin {
+                self.coherence.set_distance(key, distance)
+            } else {
+                Bound::NOW
+            });
+        }
+        ancestors.close(index, self.coherence);
+        None
+    }
+
+    /// Compares the pieces of a leaf with the other part's edges. Returns a lower bound of their distance from those edges, m.
+    #[inline(never)]
+    fn edge_leaf(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, node: &NodeRecord) -> f32 {
+        let margin = self.search.margin;
+        let mut least = f32::INFINITY;
+        for record in node.points(pair.edges.pieces) {
+            let center = pair.to_field.apply(record.center);
+            let own = Piece::new(record).placed(pair.to_field.rotation(), center);
+            let mut distance = self.near_edges(pair, &own, margin, |search, other| {
+                search.spent += CROSSING;
+                if let Some(found) = crossing(&own, &Piece::new(other)) {
+                    search.touch(pair, leaf, [record, other], &found);
+                }
+            });
+            if distance > margin {
+                let reserve = margin + RESERVE_M + RESERVE_TICKS * self.search.way;
+                distance = self.near_edges(pair, &own, reserve, |_, _| {});
+            }
+            if distance < least {
+                least = distance;
+            }
+        }
+        least
+    }
+
+    /// Passes to `visit` every piece of the other part's edges that may lie within `reach` (m) of the piece `own`. Returns a lower bound of the distance
+    /// of all, m; at most `reach` when a piece was visited.
+    #[inline(always)]
+    fn near_edges<'i>(
+        &mut self,
+        pair: &DirectedPair<'i>,
+        own: &Piece,
+        reach: f32,
+        mut visit: impl FnMut(&mut Self, &'i EdgeRecord),
+    ) -> f32 {
+        let tree = pair.field_edges;
+        let mut least = f32::INFINITY;
+        let mut index = 0;
+        while let Some(node) = tree.nodes.get(index as usize) {
+            self.spent += EDGE_BOUND;
+            let distance = own.distance_to(node.center) - node.radius;
+            if distance > reach {
+                least = if distance < least { distance } else { least };
+                index = node.skip;
+                continue;
+            }
+            index += 1;
+            if node.skip != index {
+                continue;
+            }
+            for piece in node.points(tree.pieces) {
+                self.spent += EDGE_BOUND;
+                let distance = own.distance_to(piece.center) - Piece::new(piece).reach();
+                least = if distance < least { distance } else { least };
+                if distance <= reach {
+                    visit(self, piece);
+                }
+            }
+        }
+        least
+    }
+
+    /// Offers two edges that cross as a contact, unless they are too deep for a first touch.
+    fn touch(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        [own, other]: [&EdgeRecord; 2],
+        found: &Crossing,
+    ) {
+        let edges = [own.edge as u16, other.edge as u16];
+        let thinner = if own.thickness < other.thickness {
+            own.thickness
+        } else {
+            other.thickness
+        };
+        let too_deep = found.gap < -DEPTH_SHARE * thinner && !self.contacts.crossed(leaf.part(), edges);
+        let excluded = || {
+            let kept_apart = |of: &[u16; 2]| own.faces.contains(&of[0]) && other.faces.contains(&of[1]);
+            pair.excluded.iter().any(kept_apart)
+        };
+        if found.gap >= self.search.margin || too_deep || excluded() {
+            return;
+        }
+        let mating = if pair.guided {
+            self.spent += MATING;
+            self.mating_of(leaf, own.faces, other.faces)
+        } else {
+            Mating::NONE
+        };
+        let gap = found.gap + mating.allowance_m;
+        let arm = pair.to_arm.apply(pair.in_tree(found.point));
+        let Some(contact) = self.offer(gap, pair.to_push * found.normal, arm) else {
+            return;
+        };
+        contact.guided = mating.guided;
+        [contact.moving_face, contact.moving_edge_face] = own.faces;
+        [contact.static_face, contact.static_edge_face] = other.faces;
+        contact.edges = edges;
+        contact.leaf = leaf;
+    }
+}

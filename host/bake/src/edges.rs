@@ -1,0 +1,212 @@
+//! Pieces of sharp convex edges, for contact of edges with edges: each a quadratic curve within [`TOLERANCE_MM`] of the exact edge.
+//!
+//! A chain of boundary pieces is divided by halves until a quadratic fits and the tangent turns little. The number of pieces depends on the curve
+//! alone: one for a straight edge, some 25 for a circle of 10 mm.
+
+use glam::DVec3;
+use mortise_protocol::image::EdgeRecord;
+use mortise_protocol::image::oct_encode;
+
+use crate::chains::edge_chains;
+use crate::distance::{ExactSurface, Scratch};
+use crate::piece::{Link, Piece};
+use crate::tree::round_up;
+
+/// Largest distance of a piece from the exact edge, mm, across its direction. Twice the tolerance of edges that are neither lines nor circles.
+const TOLERANCE_MM: f64 = 2.0 * mortise_brep::EDGE_TOLERANCE_MM;
+/// Largest angle by which a piece's tangent turns from its middle to an end, rad.
+const MOST_TURN: f64 = 0.2;
+/// Halvings of a chain at most: a kink inside a chain would be divided without end.
+const MOST_HALVINGS: u32 = 12;
+/// Faces whose normals differ by a smaller angle (rad) meet smoothly: ten times the error that modellers and STEP files leave.
+const SMOOTH: f64 = 0.01;
+/// Pieces of an edge at which the thickness is measured.
+const THICKNESS_PIECES: usize = 5;
+/// Ratio of consecutive depths at which the thickness is measured, and their number: 1.25⁻⁴⁰ is a ten-thousandth.
+const DEPTH_RATIO: f64 = 1.25;
+const DEPTHS: i32 = 40;
+
+/// A piece of an edge, mm.
+pub(crate) struct EdgePiece {
+    center: DVec3,
+    half: DVec3,
+    bend: DVec3,
+    normals: [DVec3; 2],
+    faces: [u32; 2],
+    thickness: f64,
+    edge: u32,
+}
+
+impl EdgePiece {
+    /// Points whose convex hull contains the piece, m: its ends and its middle control point.
+    pub fn hull(&self) -> [[f32; 3]; 3] {
+        [
+            self.center - self.half + self.bend,
+            self.center - self.bend,
+            self.center + self.half + self.bend,
+        ]
+        .map(meters)
+    }
+
+    /// The piece as stored.
+    pub fn record(&self) -> EdgeRecord {
+        EdgeRecord {
+            center: meters(self.center),
+            half: meters(self.half),
+            bend: meters(self.bend),
+            normals: self.normals.map(|n| oct_encode(n.as_vec3().to_array())),
+            faces: self.faces.map(|face| face as u16),
+            thickness: round_up(self.thickness / 1000.0),
+            edge: self.edge,
+        }
+    }
+}
+
+fn meters(mm: DVec3) -> [f32; 3] {
+    (mm / 1000.0).as_vec3().to_array()
+}
+
+/// The sharp convex edges of a shape, in pieces. Borders of open shells, and edges of more than two faces, are left out.
+pub(crate) fn edge_pieces(surface: &ExactSurface) -> Vec<EdgePiece> {
+    let mut all = Vec::new();
+    for (edge, links) in edge_chains(surface).into_iter().enumerate() {
+        let chain = Chain::new(&surface.topology.pieces, links);
+        if chain.length <= 0.0 {
+            continue;
+        }
+        let first = all.len();
+        divide(
+            surface,
+            &chain,
+            [0.0, chain.length],
+            MOST_HALVINGS,
+            edge as u32,
+            &mut all,
+        );
+        let thickness = thickness(surface, &all[first..]);
+        for piece in &mut all[first..] {
+            piece.thickness = thickness;
+        }
+    }
+    all
+}
+
+/// A chain and the arc length at which each of its pieces begins, mm.
+struct Chain<'a> {
+    pieces: &'a [Piece],
+    links: Vec<Link>,
+    starts: Vec<f64>,
+    length: f64,
+}
+
+impl<'a> Chain<'a> {
+    fn new(pieces: &'a [Piece], links: Vec<Link>) -> Self {
+        let mut length = 0.0;
+        let starts = (links.iter())
+            .map(|&(i, _)| {
+                let start = length;
+                length += pieces[i as usize].length();
+                start
+            })
+            .collect();
+        Self {
+            pieces,
+            links,
+            starts,
+            length,
+        }
+    }
+
+    /// The boundary piece at arc length `s`, and the point there.
+    fn at(&self, s: f64) -> (&'a Piece, DVec3) {
+        let k = self.starts.partition_point(|&start| start <= s).max(1) - 1;
+        let (i, forward) = self.links[k];
+        let piece = &self.pieces[i as usize];
+        let t = ((s - self.starts[k]) / piece.length().max(1e-300)).clamp(0.0, 1.0);
+        (piece, piece.at(if forward { t } else { 1.0 - t }))
+    }
+}
+
+/// Appends the pieces of a chain between two arc lengths.
+fn divide(
+    surface: &ExactSurface,
+    chain: &Chain<'_>,
+    [from, to]: [f64; 2],
+    halvings: u32,
+    edge: u32,
+    out: &mut Vec<EdgePiece>,
+) {
+    let middle = 0.5 * (from + to);
+    let [a, center, b] = [from, middle, to].map(|s| chain.at(s).1);
+    let half = (b - a) / 2.0;
+    let mut bend = (a + b) / 2.0 - center;
+    if bend.length() < 1e-6 * half.length() {
+        bend = DVec3::ZERO;
+    }
+    let fits = || {
+        [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75].iter().all(|&t| {
+            let exact = chain.at(middle + t * (to - middle)).1;
+            let off = center + half * t + bend * (t * t) - exact;
+            off.reject_from(half + 2.0 * t * bend).length() <= TOLERANCE_MM
+        })
+    };
+    let turn = 2.0 * bend.length() / half.length().max(1e-300);
+    if halvings > 0 && half.length() > TOLERANCE_MM && (turn > MOST_TURN || !fits()) {
+        divide(surface, chain, [from, middle], halvings - 1, edge, out);
+        divide(surface, chain, [middle, to], halvings - 1, edge, out);
+        return;
+    }
+    let (piece, at) = chain.at(middle);
+    if let Some((normals, faces)) = sharp(surface, piece, at) {
+        out.push(EdgePiece {
+            center,
+            half,
+            bend,
+            normals,
+            faces,
+            thickness: 0.0,
+            edge,
+        });
+    }
+}
+
+/// Outward normals and numbers of the two faces that meet at a point of a boundary piece, if they form a sharp convex edge.
+fn sharp(surface: &ExactSurface, piece: &Piece, at: DVec3) -> Option<([DVec3; 2], [u32; 2])> {
+    let [first, second] = piece.sides.as_slice() else {
+        return None;
+    };
+    let normals = [first, second].map(|side| surface.topology.outward(surface.shape(), side.triangle, at));
+    let [a, b] = normals;
+    if a.cross(b).length() < SMOOTH && a.dot(b) > 0.0 {
+        return None;
+    }
+    // Direction into the first face, which lies on the left of its side.
+    let inward = a.cross(piece.tangent(at) * if first.forward { 1.0 } else { -1.0 });
+    (b.dot(inward) < 0.0).then_some((normals, [first.face, second.face]))
+}
+
+/// Smallest thickness of the solid behind the pieces of one edge, mm: at each, twice the depth of the deepest point on the bisector of the faces from
+/// which those faces are nearest. It is at most the true one.
+fn thickness(surface: &ExactSurface, pieces: &[EdgePiece]) -> f64 {
+    let size = pieces.iter().map(|p| p.half.length()).fold(0.0, f64::max);
+    let (low, high) = crate::grid::bounding_box(surface.shape());
+    let size = (high - low).length().max(size);
+    let step = pieces.len().div_ceil(THICKNESS_PIECES).max(1);
+    let mut scratch = Scratch::default();
+    let depth_at = |piece: &EdgePiece, scratch: &mut Scratch| {
+        let inward = -(piece.normals[0] + piece.normals[1]).normalize_or_zero();
+        let mut deepest = 0.0f64;
+        for k in 0..DEPTHS {
+            let p = piece.center + inward * (size * DEPTH_RATIO.powi(k - DEPTHS));
+            match surface.query(p, f64::INFINITY, scratch) {
+                Some(nearest) if nearest.distance <= 0.0 => deepest = deepest.max(-nearest.distance),
+                // The bisector has left the solid.
+                _ => break,
+            }
+        }
+        2.0 * deepest
+    };
+    let thicknesses = pieces.iter().step_by(step).map(|p| depth_at(p, &mut scratch));
+    let least = thicknesses.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
+}
