@@ -38,13 +38,15 @@ impl Image {
 
 /// Pose of the handle at a time: position of the grip, mm, and rotation from the part's orientation in the file.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Key {
-    pub t_s: f64,
-    pub position_mm: DVec3,
-    pub turn: DQuat,
+struct Key {
+    t_s: f64,
+    position_mm: DVec3,
+    turn: DQuat,
+    /// Whether the way to it begins and ends at rest.
+    eased: bool,
 }
 
-/// Keys in the order of time; between them positions are linear and turns along the shortest arc.
+/// Keys in the order of time; between them positions are on a line and turns along the shortest arc.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct HandlePath {
     keys: Vec<Key>,
@@ -57,17 +59,28 @@ impl HandlePath {
             t_s: 0.0,
             position_mm,
             turn,
+            eased: false,
         };
         Self { keys: vec![first] }
     }
 
-    /// Goes on to a pose within `seconds`.
-    pub fn then(mut self, seconds: f64, position_mm: DVec3, turn: DQuat) -> Self {
+    /// Goes on to a pose within `seconds` at constant speed.
+    pub fn then(self, seconds: f64, position_mm: DVec3, turn: DQuat) -> Self {
+        self.with(seconds, position_mm, turn, false)
+    }
+
+    /// Goes on to a pose within `seconds`, at rest at both ends, as a hand does.
+    pub fn ease(self, seconds: f64, position_mm: DVec3, turn: DQuat) -> Self {
+        self.with(seconds, position_mm, turn, true)
+    }
+
+    fn with(mut self, seconds: f64, position_mm: DVec3, turn: DQuat, eased: bool) -> Self {
         let t_s = self.duration_s() + seconds;
         self.keys.push(Key {
             t_s,
             position_mm,
             turn,
+            eased,
         });
         self
     }
@@ -82,7 +95,10 @@ impl HandlePath {
         let (from, to, part) = match next {
             Some(next) if next > 0 => {
                 let (from, to) = (self.keys[next - 1], self.keys[next]);
-                (from, to, (t_s - from.t_s) / (to.t_s - from.t_s))
+                let part = (t_s - from.t_s) / (to.t_s - from.t_s);
+                // 3s² − 2s³: no speed at the ends.
+                let eased = part * part * (3.0 - 2.0 * part);
+                (from, to, if to.eased { eased } else { part })
             }
             Some(_) => (self.keys[0], self.keys[0], 0.0),
             None => {

@@ -22,6 +22,7 @@ pub mod figures;
 pub mod fit;
 mod guided;
 pub mod hybrid;
+mod least_distance;
 pub mod motion;
 pub mod pareto;
 pub mod peer;

@@ -100,7 +100,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         what("smallest of the runs' largest contact forces"),
         least,
         "N",
-        9.0,
+        5.0,
         f64::INFINITY,
     ));
     Ok(())
@@ -175,13 +175,13 @@ fn crossing(width: f64, image: &Image, seed: u64) -> Result<Crossing, LabError> 
     let [above, near, down] = [start.z, low + SLOW_MM, low].map(|z| along(x, y, z));
     let turned = yaw * tilt;
     let path = HandlePath::from(start, DQuat::IDENTITY)
-        .then(0.2, above, turned)
+        .ease(0.2, above, turned)
         .then((above.z - near.z) / speed, near, turned)
-        .then(SLOW_S, down, turned)
-        .then(0.3, down + slide, turned)
-        .then(0.3, down + slide, yaw * roll * tilt)
-        .then(0.3, down - slide, yaw * roll.inverse() * tilt)
-        .then(0.1, down, turned);
+        .ease(SLOW_S, down, turned)
+        .ease(0.4, down + slide, turned)
+        .ease(0.4, down + slide, yaw * roll * tilt)
+        .ease(0.4, down - slide, yaw * roll.inverse() * tilt)
+        .ease(0.2, down, turned);
     let scene = image.scene()?;
     let solid = bar(width)?;
     let (mut deepest_mm, mut force_n) = (0.0f64, 0.0f64);

@@ -9,6 +9,7 @@ mod free_form;
 mod insertion;
 mod limits;
 mod parallel;
+mod random_fits;
 mod ticks;
 
 use super::{Plan, Row};
@@ -36,6 +37,7 @@ const PARTS: &[(&str, Measure)] = &[
     ("convex-pairs", convex_pairs::measure),
     ("crossing-bars", bars::measure),
     ("planned-pairs", free_form::planned),
+    ("random-fits", random_fits::measure),
     ("exact-pairs", free_form::exact),
     ("baking", |plan, out| {
         baking::motor(plan, out)?;
