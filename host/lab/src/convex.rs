@@ -1,4 +1,4 @@
-//! Convex solids: boxes, prisms, bars, wedges, chamfered blocks and cylinders of random size, as STEP solids and as support functions.
+//! Convex solids: boxes, prisms, bars, wedges, chamfered blocks and cylinders of random size; balls, as STEP solids and as support functions.
 
 use glam::{DVec2, DVec3};
 
@@ -20,6 +20,11 @@ pub(crate) enum Convex {
         radius: f64,
         /// Half of its length.
         half: f64,
+    },
+    /// A ball about the origin.
+    Ball {
+        /// Radius.
+        radius: f64,
     },
 }
 
@@ -121,6 +126,7 @@ impl Convex {
                 let across = direction.truncate().try_normalize().unwrap_or(DVec2::X) * *radius;
                 across.extend(half.copysign(direction.z))
             }
+            Self::Ball { radius } => direction.normalize_or_zero() * *radius,
         }
     }
 
@@ -129,6 +135,7 @@ impl Convex {
         match self {
             Self::Polytope(solid) => solid.normals.clone(),
             Self::Cylinder { .. } => vec![DVec3::Z],
+            Self::Ball { .. } => Vec::new(),
         }
     }
 
@@ -137,6 +144,7 @@ impl Convex {
         match self {
             Self::Polytope(solid) => solid.edges.clone(),
             Self::Cylinder { .. } => vec![DVec3::Z],
+            Self::Ball { .. } => Vec::new(),
         }
     }
 
@@ -145,6 +153,7 @@ impl Convex {
         match self {
             Self::Polytope(solid) => solid.corners.iter().map(|p| p.length()).fold(0.0, f64::max),
             Self::Cylinder { radius, half } => radius.hypot(*half),
+            Self::Ball { radius } => *radius,
         }
     }
 
@@ -153,6 +162,7 @@ impl Convex {
         match self {
             Self::Polytope(solid) => text.polyhedron(&solid.corners, &solid.faces),
             Self::Cylinder { radius, half } => text.cylinder(*radius, *half),
+            Self::Ball { radius } => text.ball(*radius),
         }
     }
 

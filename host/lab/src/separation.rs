@@ -43,6 +43,12 @@ impl SupportMap for Convex {
 
 /// Signed distance of `a` and of `b` at `pose` in `a`'s frame, mm.
 pub(crate) fn signed_distance_mm(a: &Convex, b: &Convex, pose: &DAffine3) -> f64 {
+    // A ball is its centre, grown by its radius.
+    if let Convex::Ball { radius } = *b
+        && radius > 0.0
+    {
+        return signed_distance_mm(a, &Convex::Ball { radius: 0.0 }, pose) - radius;
+    }
     let gap = distance_support_map_support_map(&peer_pose(pose), a, b);
     if gap > 0.0 {
         return gap;

@@ -176,6 +176,17 @@ impl StepText {
         self.solid(&[bottom, side, top])
     }
 
+    /// A ball about the origin.
+    pub fn ball(&mut self, radius: f64) -> u64 {
+        let pole = self.vertex(DVec3::Z * radius);
+        let pole = self.add(&format!("VERTEX_LOOP('',#{pole})"));
+        let bound = self.add(&format!("FACE_BOUND('',#{pole},.T.)"));
+        let axis = self.axis(DVec3::ZERO, DVec3::Z, DVec3::X);
+        let sphere = self.add(&format!("SPHERICAL_SURFACE('',#{axis},{})", number(radius)));
+        let face = self.add(&format!("ADVANCED_FACE('',(#{bound}),#{sphere},.T.)"));
+        self.solid(&[face])
+    }
+
     /// A solid of these faces.
     pub fn solid(&mut self, faces: &[u64]) -> u64 {
         let shell = self.add(&format!("CLOSED_SHELL('',{})", list(faces)));

@@ -5,14 +5,16 @@ use std::path::Path;
 
 use mortise_bake::{BakeOptions, Grabbable, Planned, Request};
 use mortise_brep::load_step;
-use mortise_scenario::ScenarioError;
 use mortise_scenario::probe::{NamedPose, ProbeScene};
+use mortise_scenario::{Body, ScenarioError};
 
 use super::ABSENT;
+use super::convex_pairs::placed;
 use super::errors::Errors;
 use super::parallel::trials;
 use crate::corpus::truths::{TrueCase, TruePair, true_pairs};
 use crate::figures::{Plan, Row};
+use crate::least_distance::least_distance_mm;
 use crate::{LabError, corpus, scene_p};
 
 /// Planned accuracy, mm.
@@ -28,6 +30,11 @@ const QUICK: [&str; 5] = [
     "loft_peg_c0.10",
     "torus_ring",
 ];
+
+/// Names of pairs of convex solids begin so.
+const CONVEX: [&str; 3] = ["bars", "plate", "wedges"];
+/// Of the poses searched in the shorter form one of so many.
+const SEARCHED_QUICK: usize = 6;
 
 fn shared(plan: &Plan<'_>) -> Result<Option<Vec<TruePair>>, LabError> {
     let Some(cad) = corpus::folder() else {
@@ -189,5 +196,34 @@ pub(super) fn exact(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
             "%",
         ));
     }
+    Ok(())
+}
+
+/// The search that gives the truth of random fits, against the true distances of the shared ones.
+pub(super) fn search(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let what = "search on the exact surfaces, of shared fits with true distances: largest error";
+    let Some(mut pairs) = shared(plan)? else {
+        out(Row::skipped(what, ABSENT));
+        return Ok(());
+    };
+    // Truths of convex pairs are least translations, not depths of points.
+    pairs.retain(|pair| !CONVEX.iter().any(|kind| pair.name.starts_with(kind)));
+    let errors = trials(pairs.len(), |index| {
+        let pair = &pairs[index];
+        let model = load_step(&pair.step)?;
+        let part = |name: &str| model.parts.iter().position(|part| part.name == name).unwrap_or(0);
+        let [moving, fixed] = pair.parts.map(|name| Body::of(&model, part(name)));
+        let step = if plan.quick { SEARCHED_QUICK } else { 1 };
+        let error = (pair.cases.iter().step_by(step))
+            .map(|case| {
+                let found = least_distance_mm(&fixed, &moving, &placed(&case.pose));
+                ((found - case.distance_mm).abs() - case.error_mm).max(0.0)
+            })
+            .fold(0.0, f64::max);
+        eprintln!("{}: search off by {:.3} µm", pair.name, 1e3 * error);
+        Ok(error)
+    })?;
+    let worst = errors.into_iter().fold(0.0, f64::max);
+    out(Row::at_most(what, 1e3 * worst, "µm", 1.0));
     Ok(())
 }

@@ -3,6 +3,7 @@
 mod accuracy;
 mod baking;
 mod bars;
+mod blows;
 mod convex_pairs;
 mod errors;
 mod free_form;
@@ -36,8 +37,12 @@ const PARTS: &[(&str, Measure)] = &[
     }),
     ("convex-pairs", convex_pairs::measure),
     ("crossing-bars", bars::measure),
+    ("blows", blows::measure),
     ("planned-pairs", free_form::planned),
-    ("random-fits", random_fits::measure),
+    ("random-fits", |plan, out| {
+        random_fits::measure(plan, out)?;
+        free_form::search(plan, out)
+    }),
     ("exact-pairs", free_form::exact),
     ("baking", |plan, out| {
         baking::motor(plan, out)?;
