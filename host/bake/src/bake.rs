@@ -39,6 +39,8 @@ const SCOUT: f64 = 4.0;
 /// Cell edge over the pointshell's default error bound. The error reaches the bound only where a lone convex edge or a curved face touches a
 /// dissimilar surface; in a fit it is smaller by the factor of the radius difference over the radius.
 const EPSILON_PER_CELL: f64 = 20.0;
+/// Times that the cell of a shape is halved so that its faces settle every cell.
+const HALVINGS: usize = 2;
 /// Default for the largest spacing along edges, in cells.
 const MAX_SPACING_CELLS: f64 = 4.0;
 
@@ -67,7 +69,10 @@ pub fn bake(
     let each = vec![options.clone(); scene.shapes.len()];
     let made = match options.cell_mm {
         Some(_) => scene.fields_and_shells(&each, &mut prepared, first, progress)?,
-        None => scene.fit(model, &each, &mut prepared, &first, progress)?,
+        None => {
+            let made = scene.fit(model, &each, &mut prepared, &first, progress)?;
+            scene.resolve(model, &each, &mut prepared, made, progress)?
+        }
     };
     let baked = scene.assemble(model, &each, &prepared, made)?;
     let bytes = baked.image.len() as u64;
@@ -153,18 +158,7 @@ impl Scene {
         first: &[f64],
         progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
     ) -> Result<Made, BakeError> {
-        let faces: usize = self.shapes.iter().map(|&s| model.shapes[s].faces.len()).sum();
-        let fixed = (size_of::<Header>()
-            + 2 * PALETTE_PADDING
-            + self.parts.len() * size_of::<PartRecord>()
-            + self.shapes.len() * (size_of::<ShapeRecord>() + size_of::<FieldRecord>())
-            + faces * size_of::<FaceRecord>()
-            + self
-                .edges
-                .iter()
-                .map(|pieces| edge_bytes(pieces.len()))
-                .sum::<usize>()
-            + 64) as u64;
+        let fixed = self.fixed_bytes(model);
         let mut scale = SCOUT;
         // Exponent of the bytes in the inverse cell: 2 at most, less where bricks repeat; two attempts show the actual value.
         let mut power = 2.0;
@@ -220,6 +214,59 @@ impl Scene {
                 self.fields_and_shells(each, prepared, cells, progress)
             }
         }
+    }
+
+    /// Bytes of the image that do not depend on the cells.
+    fn fixed_bytes(&self, model: &CadModel) -> u64 {
+        let faces: usize = self.shapes.iter().map(|&s| model.shapes[s].faces.len()).sum();
+        (size_of::<Header>()
+            + 2 * PALETTE_PADDING
+            + self.parts.len() * size_of::<PartRecord>()
+            + self.shapes.len() * (size_of::<ShapeRecord>() + size_of::<FieldRecord>())
+            + faces * size_of::<FaceRecord>()
+            + self
+                .edges
+                .iter()
+                .map(|pieces| edge_bytes(pieces.len()))
+                .sum::<usize>()
+            + 64) as u64
+    }
+
+    /// Halves the cell of shapes that have crossed cells without a proven rule, as long as the image still fits and it helps.
+    fn resolve(
+        &self,
+        model: &CadModel,
+        each: &[BakeOptions],
+        prepared: &mut [ExactSurface],
+        mut made: Made,
+        progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    ) -> Result<Made, BakeError> {
+        let limit = each.iter().map(|o| o.image_limit_bytes).min().unwrap_or(u64::MAX);
+        for (i, options) in each.iter().enumerate() {
+            for _ in 0..HALVINGS {
+                let before = made.fields[i].unproven_cells;
+                // Bytes grow at most fourfold.
+                let growth = 3 * field_bytes(&made.fields[i]);
+                if before == 0 || self.fixed_bytes(model) + made.bytes() + growth > limit {
+                    break;
+                }
+                let mut cell = f64::from(made.fields[i].record.cell) * 500.0;
+                let field = self.field(i, &mut prepared[i], &mut cell, options, progress)?;
+                if 2 * field.unproven_cells >= before {
+                    break;
+                }
+                let shell = self.shell(i, &prepared[i], &self.partners[i], cell, options, progress)?;
+                let coarse = (
+                    std::mem::replace(&mut made.fields[i], field),
+                    std::mem::replace(&mut made.shells[i], shell),
+                );
+                if self.fixed_bytes(model) + made.bytes() > limit {
+                    (made.fields[i], made.shells[i]) = coarse;
+                    break;
+                }
+            }
+        }
+        Ok(made)
     }
 
     fn field(
@@ -333,6 +380,7 @@ impl Scene {
             let shape = prepared[i].shape();
             let mut entry = shape_report(&self.names[i], &prepared[i], &field, &each[i], &shells[i]);
             report.warnings.extend(doubts(&entry));
+            report.warnings.extend(unproven(&entry, &field));
             (_, entry.bytes) = builder.add_shape(shape, field, &shells[i], &self.edges[i]);
             report.bytes = add(&report.bytes, &entry.bytes);
             report.shapes.push(entry);
@@ -431,6 +479,16 @@ fn doubts(shape: &ShapeReport) -> Vec<String> {
         ));
     }
     out
+}
+
+/// Says that the sign is interpolated where edges are finer than the cells.
+fn unproven(shape: &ShapeReport, field: &BakedField) -> Option<String> {
+    let at = field.unproven_at?;
+    Some(format!(
+        "part \"{}\": in {} cells of {:.3} mm (one at {:.2} {:.2} {:.2} mm) its surface is only interpolated, because edges lie closer together than \
+         the cells; contact there may be off by a cell: choose smaller cells or allow a larger image",
+        shape.name, field.unproven_cells, shape.cell_mm, at.x, at.y, at.z
+    ))
 }
 
 fn add(a: &ByteCount, b: &ByteCount) -> ByteCount {

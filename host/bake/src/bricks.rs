@@ -1,13 +1,12 @@
 //! One brick: 9³ exact samples, and the nearest face or faces of each of its 8³ cells.
 
 use glam::DVec3;
-use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby};
 
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
 use crate::grid::Grid;
-use crate::nearby::{CellNearby, ExactSample};
+use crate::nearby::{CellNearby, ExactSample, Unproven};
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {
@@ -21,6 +20,8 @@ pub(crate) struct Brick {
     pub palette: Vec<u16>,
     /// Number of entries, without groups.
     pub palette_len: u16,
+    /// Crossed cells without a rule.
+    pub unproven: Unproven,
 }
 
 /// Samples the brick at place `at` of `grid`.
@@ -61,7 +62,7 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
             }
         }
     }
-    let cells = cells(surface, grid, at, &exact, &mut scratch);
+    let (cells, unproven) = cells(surface, grid, at, &exact, &mut scratch);
     let Packed {
         palette,
         palette_len,
@@ -74,6 +75,7 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
         indices,
         palette,
         palette_len,
+        unproven,
     }
 }
 
@@ -92,40 +94,31 @@ fn cells(
     at: [u32; 3],
     samples: &[ExactSample],
     scratch: &mut Scratch,
-) -> [Nearby; CELLS_PER_BRICK] {
-    let faces: Vec<(Surface, f64)> = (surface.shape().faces.iter())
-        .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
-        .collect();
-    let nearby = CellNearby {
-        faces: &faces,
-        samples,
-        origin: grid.sample(at, [0; 3]),
-        cell: grid.cell(),
-    };
+) -> ([Nearby; CELLS_PER_BRICK], Unproven) {
+    let mut nearby = CellNearby::new(surface, samples, grid.sample(at, [0; 3]), grid.cell());
     let mut cells = [Nearby::Unknown; CELLS_PER_BRICK];
-    let mut i = 0;
-    for z in 0..BRICK_CELLS {
-        for y in 0..BRICK_CELLS {
-            for x in 0..BRICK_CELLS {
-                let corner = |c: usize| {
-                    let (x, y, z) = (x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
-                    samples[x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)].face
-                };
-                let first = corner(0);
-                let nearest = if (1..8).all(|c| corner(c) == first) {
-                    first
-                } else {
-                    let center = grid.sample(at, [x, y, z]) + DVec3::splat(grid.cell() / 2.0);
-                    surface
-                        .query(center, f64::INFINITY, scratch)
-                        .map_or(NO_FACE, |n| n.face as u16)
-                };
-                cells[i] = nearby.of([x, y, z], nearest);
-                i += 1;
-            }
-        }
+    for (i, cell) in cells.iter_mut().enumerate() {
+        let [x, y, z] = [
+            i % BRICK_CELLS,
+            i / BRICK_CELLS % BRICK_CELLS,
+            i / BRICK_CELLS / BRICK_CELLS,
+        ];
+        let corner = |c: usize| {
+            let (x, y, z) = (x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
+            samples[x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)].face
+        };
+        let first = corner(0);
+        let nearest = if (1..8).all(|c| corner(c) == first) {
+            first
+        } else {
+            let center = grid.sample(at, [x, y, z]) + DVec3::splat(grid.cell() / 2.0);
+            surface
+                .query(center, f64::INFINITY, scratch)
+                .map_or(NO_FACE, |n| n.face as u16)
+        };
+        *cell = nearby.of([x, y, z], nearest);
     }
-    cells
+    (cells, nearby.unproven)
 }
 
 /// Nearest faces of the cells of a brick, as stored.
@@ -173,7 +166,7 @@ pub(crate) fn pack(cells: &[Nearby; CELLS_PER_BRICK]) -> Packed {
         let at = (entries.len() + groups.len()) as u16;
         palette.push(entry.to_bits(at));
         if let Nearby::Convex(group) | Nearby::Reentrant(group) = entry {
-            groups.extend(group);
+            groups.extend(group.words());
         }
     }
     let palette_len = palette.len() as u16;
@@ -188,6 +181,8 @@ pub(crate) fn pack(cells: &[Nearby; CELLS_PER_BRICK]) -> Packed {
 
 #[cfg(test)]
 mod tests {
+    use mortise_protocol::image::Group;
+
     use super::*;
 
     #[test]
@@ -213,8 +208,9 @@ mod tests {
 
     #[test]
     fn groups_stand_behind_the_entries() {
-        let edge = Nearby::Convex([3, 9, NO_FACE]);
-        let corner = Nearby::Reentrant([1, 2, 3]);
+        let group = |clauses: &[&[u16]]| Group::new(clauses).expect("few faces");
+        let edge = Nearby::Convex(group(&[&[3], &[9]]));
+        let corner = Nearby::Reentrant(group(&[&[1], &[2, 3]]));
         let mut cells = [Nearby::Face(3); CELLS_PER_BRICK];
         (cells[1], cells[2]) = (edge, corner);
         let Packed {
@@ -225,11 +221,9 @@ mod tests {
         } = pack(&cells);
         let read = |cell: usize| {
             let index = usize::from(indices[cell / 2] >> (4 * (cell & 1)) & 15);
-            Nearby::from_bits(palette[index], |at| {
-                palette.get(usize::from(at)..)?.first_chunk().copied()
-            })
+            Nearby::from_bits(palette[index], |at| Group::read(palette.get(usize::from(at)..)?))
         };
         assert_eq!((read(0), read(1), read(2)), (Nearby::Face(3), edge, corner));
-        assert_eq!((palette.len(), palette_len), (9, 3));
+        assert_eq!((palette.len(), palette_len), (8, 3));
     }
 }

@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
+use glam::DVec3;
 use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry};
 use rayon::prelude::*;
 
@@ -38,6 +39,10 @@ pub struct BakedField {
     pub sign_disagreements: usize,
     /// Number of brick centres tested.
     pub sign_tests: usize,
+    /// Number of cells crossed by the surface in which the analytic faces near them were not proven to give the distance.
+    pub unproven_cells: usize,
+    /// Centre of one of these, mm.
+    pub unproven_at: Option<DVec3>,
 }
 
 /// Most grid entries of a field (2 bytes each; a larger grid would not fit any board).
@@ -73,11 +78,15 @@ pub fn bake_field(
         })
         .collect();
     let bricks = bricks.ok_or(BakeError::Cancelled)?;
+    let unproven_cells = bricks.iter().map(|brick| brick.unproven.cells).sum();
+    let unproven_at = bricks.iter().find_map(|brick| brick.unproven.at);
     let packed = pack(&grid, options, &near.classes, &near.stored, bricks);
     check_brick_count(packed.bricks.len(), options.cell_mm, part)?;
     Ok(BakedField {
         sign_tests: near.sign_tests,
         sign_disagreements: near.sign_disagreements,
+        unproven_cells,
+        unproven_at,
         ..packed
     })
 }
@@ -275,6 +284,8 @@ fn pack(
         stored_entries: stored.len(),
         sign_disagreements: 0,
         sign_tests: 0,
+        unproven_cells: 0,
+        unproven_at: None,
     }
 }
 

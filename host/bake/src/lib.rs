@@ -40,6 +40,7 @@ mod planner;
 mod pointshell;
 mod report;
 mod ring_samples;
+mod rule;
 mod scene;
 mod shell;
 mod sign_check;

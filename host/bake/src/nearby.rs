@@ -1,17 +1,28 @@
-//! Palette entries beyond the nearest face: whether and how exact surfaces give the distance in a cell.
+//! Palette entries: whether and how exact surfaces give the distance in a cell.
 //!
-//! A cell is *exact* when the distance at all its corners equals that to the unbounded surface of one face. At a convex edge or corner the distance
-//! is the largest of the distances to two or three faces (exact inside and at the faces; outside it is a lower bound of the right sign); at a
-//! re-entrant one it is the smallest. Cells for which the corners do not prove either are interpolated.
+//! A point of a cell has its nearest surface point on one of the faces with a triangle near the cell; among these the cell's rule is sought. The cell
+//! is *exact* where one face's unbounded surface gives the distance. At convex edges, corners and thin walls the largest of several distances does
+//! (exact inside and at the faces; outside it is a lower bound of the right sign), at re-entrant ones the smallest, at mixed ones a largest of
+//! smallest ones or the reverse (see `rule`). A rule is tested against the exact distance at the corners and half-way between them, at points of the
+//! near faces in the cell and, where the surface crosses the cell, on a lattice of 4³ more; a point at which it fails joins the tests of the next
+//! attempt. Cells without a rule are interpolated.
 
 use glam::DVec3;
 use mortise_brep::Surface;
-use mortise_protocol::image::{BRICK_SAMPLES, NO_FACE, Nearby};
+use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, NO_FACE, Nearby};
 
+use crate::distance::{ExactSurface, Scratch};
+use crate::rule::{SAME_MM, Test, find_rule, holds};
 use crate::surface::to_local;
 
-/// Tolerance of exact distances, mm: rounding, and vertices a tenth of a micrometre off their curves.
-const SAME_MM: f64 = 2e-4;
+/// Half steps of samples along a brick's edge.
+const HALVES: usize = 2 * BRICK_CELLS + 1;
+/// Attempts to find a rule: each failed one adds tests.
+const ATTEMPTS: usize = 4;
+/// Most points of near faces that are tests.
+const MOST_TOUCHES: usize = 24;
+/// Points along a cell's edge at which the rule of a crossed cell is verified.
+const VERIFIED: usize = 4;
 
 /// A sample of a brick before rounding.
 #[derive(Clone, Copy)]
@@ -22,88 +33,189 @@ pub(crate) struct ExactSample {
     pub face: u16,
 }
 
-/// Samples and faces from which the nearest faces of a cell are found.
-pub(crate) struct CellNearby<'a> {
-    /// Faces of the shape: surface, and +1 where the outward normal is the natural one, −1 where it is reversed.
-    pub faces: &'a [(Surface, f64)],
-    /// 9³ samples of the brick, x fastest.
-    pub samples: &'a [ExactSample],
-    /// Position of sample (0, 0, 0), mm, and the sample step.
-    pub origin: DVec3,
-    pub cell: f64,
+/// Cells crossed by the surface that have no rule although all near faces have a closed form.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Unproven {
+    /// Their number.
+    pub cells: usize,
+    /// Centre of one of them, mm.
+    pub at: Option<DVec3>,
 }
 
-impl CellNearby<'_> {
+/// Finds the palette entries of a brick's cells.
+pub(crate) struct CellNearby<'a> {
+    surface: &'a ExactSurface,
+    /// Faces of the shape: surface, and +1 where the outward normal is the natural one, −1 where it is reversed.
+    faces: Vec<(Surface, f64)>,
+    /// 9³ samples of the brick, x fastest.
+    samples: &'a [ExactSample],
+    /// Position of sample (0, 0, 0), mm, and the sample step.
+    origin: DVec3,
+    cell: f64,
+    /// Whether only one face is near the brick.
+    alone: bool,
+    /// Distances on the lattice of half steps, NaN where not yet computed.
+    halves: Vec<f64>,
+    scratch: Scratch,
+    /// Crossed cells without a rule so far.
+    pub unproven: Unproven,
+}
+
+impl<'a> CellNearby<'a> {
+    /// Of the brick with `samples` from `origin` in steps of `cell`, mm.
+    pub fn new(surface: &'a ExactSurface, samples: &'a [ExactSample], origin: DVec3, cell: f64) -> Self {
+        let mut this = Self {
+            surface,
+            faces: (surface.shape().faces.iter())
+                .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
+                .collect(),
+            samples,
+            origin,
+            cell,
+            alone: false,
+            halves: vec![f64::NAN; HALVES * HALVES * HALVES],
+            scratch: Scratch::default(),
+            unproven: Unproven::default(),
+        };
+        let center = origin + DVec3::splat(0.5 * cell * BRICK_CELLS as f64);
+        this.alone = this
+            .near(center, cell * BRICK_CELLS as f64, f64::INFINITY)
+            .0
+            .len()
+            < 2;
+        this
+    }
+
     /// Palette entry of the cell with the lowest corner `at`; `nearest` is the face nearest to it.
-    pub fn of(&self, at: [usize; 3], nearest: u16) -> Nearby {
+    pub fn of(&mut self, at: [usize; 3], nearest: u16) -> Nearby {
         if nearest > Nearby::MAX_FACES {
             return Nearby::Unknown;
         }
-        let corners: [(DVec3, ExactSample); 8] = std::array::from_fn(|c| {
+        let corners = (0..8).all(|c| {
             let place = [at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)];
-            (self.position(place), self.samples[index(place)])
+            let distance = self.samples[index(place, BRICK_SAMPLES)].distance;
+            (self.distance(nearest, self.position(place)) - distance).abs() <= SAME_MM
         });
-        if corners
-            .iter()
-            .all(|(p, s)| (self.distance(nearest, *p) - s.distance).abs() <= SAME_MM)
-        {
-            return Nearby::Face(nearest);
+        let (candidates, touches) = if self.alone {
+            (vec![nearest], Vec::new())
+        } else {
+            let center = self.position(at) + DVec3::splat(0.5 * self.cell);
+            self.near(center, self.cell, self.within(at))
+        };
+        if candidates.len() < 2 {
+            return if corners {
+                Nearby::Face(nearest)
+            } else {
+                Nearby::Roughly(nearest)
+            };
         }
-        let group = self.faces_about(at, nearest);
-        if group[1] != NO_FACE {
-            if self.all(&corners, &group, f64::max, |exact| exact <= SAME_MM) {
-                return Nearby::Convex(group);
+        let crossed = !touches.is_empty();
+        let mut tests = self.tests(at, &candidates, touches);
+        for _ in 0..ATTEMPTS {
+            let Some(rule) = find_rule(&tests, &candidates, nearest) else {
+                break;
+            };
+            let failed = if crossed {
+                self.failures(at, rule, &candidates)
+            } else {
+                Vec::new()
+            };
+            if failed.is_empty() {
+                return rule;
             }
-            if self.all(&corners, &group, f64::min, |exact| exact >= -SAME_MM) {
-                return Nearby::Reentrant(group);
-            }
+            tests.extend(failed);
+        }
+        if crossed && tests.iter().all(|test| test.faces.iter().all(|d| d.is_finite())) {
+            self.unproven.cells += 1;
+            (self.unproven.at).get_or_insert(self.position(at) + DVec3::splat(0.5 * self.cell));
         }
         Nearby::Roughly(nearest)
     }
 
-    /// Whether `fold` of the distances to the faces of `group` has, at all corners, the sign of the true distance and no larger magnitude, and equals
-    /// the true distance where `must` requires it.
-    fn all(
-        &self,
-        corners: &[(DVec3, ExactSample); 8],
-        group: &[u16; 3],
-        fold: impl Fn(f64, f64) -> f64,
-        must: impl Fn(f64) -> bool,
-    ) -> bool {
-        corners.iter().all(|(p, s)| {
-            let found = (group.iter().filter(|&&face| face != NO_FACE))
-                .map(|&face| self.distance(face, *p))
-                .reduce(&fold)
-                .unwrap_or(f64::NAN);
-            if must(s.distance) {
-                (found - s.distance).abs() <= SAME_MM
-            } else {
-                found * s.distance > 0.0 && found.abs() <= s.distance.abs() + SAME_MM
+    /// Faces that can hold the point nearest to some point of the cube with this centre and edge; and points of their triangles in the cube. No face is
+    /// farther from the centre than `within`.
+    fn near(&mut self, center: DVec3, edge: f64, within: f64) -> (Vec<u16>, Vec<DVec3>) {
+        let (mut faces, mut touches) = (Vec::new(), Vec::new());
+        let Some(nearest) = self.surface.query(center, within, &mut self.scratch) else {
+            return (faces, touches);
+        };
+        let diagonal = edge * 3f64.sqrt();
+        let radius = nearest.distance.abs() + diagonal + 2.0 * self.surface.chord + SAME_MM;
+        self.surface.triangles.within(center, radius, |triangle, on, _| {
+            faces.push(self.surface.shape.mesh.triangle_face[triangle as usize] as u16);
+            if (on.point - center).abs().max_element() <= 0.5 * edge {
+                touches.push(on.point);
             }
-        })
+        });
+        faces.sort_unstable();
+        faces.dedup();
+        faces.retain(|&face| face <= Nearby::MAX_FACES && face != NO_FACE);
+        let step = touches.len().div_ceil(MOST_TOUCHES).max(1);
+        (faces, touches.into_iter().step_by(step).collect())
     }
 
-    /// The faces nearest to the samples around a cell, `nearest` first; only `nearest` if there are more than three.
-    fn faces_about(&self, at: [usize; 3], nearest: u16) -> [u16; 3] {
-        let mut group = [nearest, NO_FACE, NO_FACE];
-        let mut count = 1;
-        let range = |a: usize| a.saturating_sub(1)..(a + 3).min(BRICK_SAMPLES);
-        for z in range(at[2]) {
-            for y in range(at[1]) {
-                for x in range(at[0]) {
-                    let face = self.samples[index([x, y, z])].face;
-                    if face == NO_FACE || group[..count].contains(&face) {
-                        continue;
-                    }
-                    if count == 3 || face > Nearby::MAX_FACES {
-                        return [nearest, NO_FACE, NO_FACE];
-                    }
-                    group[count] = face;
-                    count += 1;
-                }
+    /// Tests on the lattice of half steps of the cell, and at points of the surface.
+    fn tests(&mut self, at: [usize; 3], candidates: &[u16], touches: Vec<DVec3>) -> Vec<Test> {
+        let mut tests = Vec::with_capacity(27 + touches.len());
+        for i in 0..27 {
+            let place = [2 * at[0] + i % 3, 2 * at[1] + i / 3 % 3, 2 * at[2] + i / 9];
+            let p = self.origin + DVec3::from_array(place.map(|i| i as f64)) * (0.5 * self.cell);
+            let known = self.halves[index(place, HALVES)];
+            let distance = if place.iter().all(|i| i % 2 == 0) {
+                self.samples[index(place.map(|i| i / 2), BRICK_SAMPLES)].distance
+            } else if known.is_nan() {
+                self.exact(at, p)
+            } else {
+                known
+            };
+            self.halves[index(place, HALVES)] = distance;
+            tests.push(self.test(p, distance, candidates));
+        }
+        for p in touches {
+            let distance = self.exact(at, p);
+            tests.push(self.test(p, distance, candidates));
+        }
+        tests
+    }
+
+    /// Tests at which `rule` fails, of the lattice by which a crossed cell is verified.
+    fn failures(&mut self, at: [usize; 3], rule: Nearby, candidates: &[u16]) -> Vec<Test> {
+        let mut failed = Vec::new();
+        let low = self.position(at);
+        for i in 0..VERIFIED * VERIFIED * VERIFIED {
+            let place = [i % VERIFIED, i / VERIFIED % VERIFIED, i / VERIFIED / VERIFIED];
+            let share = DVec3::from_array(place.map(|i| (i as f64 + 0.5) / VERIFIED as f64));
+            let p = low + share * self.cell;
+            let distance = self.exact(at, p);
+            let test = self.test(p, distance, candidates);
+            if !holds(rule, &test, candidates) {
+                failed.push(test);
             }
         }
-        group
+        failed
+    }
+
+    fn test(&self, p: DVec3, distance: f64, candidates: &[u16]) -> Test {
+        Test {
+            distance,
+            faces: candidates.iter().map(|&face| self.distance(face, p)).collect(),
+        }
+    }
+
+    /// Exact distance at `p` in the cell with the lowest corner `at`.
+    fn exact(&mut self, at: [usize; 3], p: DVec3) -> f64 {
+        let within = self.within(at);
+        (self.surface.query(p, within, &mut self.scratch)).map_or(f64::NAN, |n| n.distance)
+    }
+
+    /// Upper bound of the distance's magnitude in a cell, mm: that at its lowest corner and the diagonal.
+    fn within(&self, at: [usize; 3]) -> f64 {
+        let corner = self.samples[index(at, BRICK_SAMPLES)].distance.abs();
+        if corner.is_nan() {
+            f64::INFINITY
+        } else {
+            corner + 1.7321 * self.cell
+        }
     }
 
     fn position(&self, place: [usize; 3]) -> DVec3 {
@@ -137,6 +249,6 @@ impl CellNearby<'_> {
     }
 }
 
-fn index([x, y, z]: [usize; 3]) -> usize {
-    x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)
+fn index([x, y, z]: [usize; 3], across: usize) -> usize {
+    x + across * (y + across * z)
 }

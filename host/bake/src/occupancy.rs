@@ -19,8 +19,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 use mortise_protocol::image::{
-    BRICK_CELLS, BrickRecord, CELLS_PER_BRICK, FORMAT_OCCUPANCY, FieldRecord, GridEntry, NO_FACE, Nearby,
-    VOXEL_BRICK_BYTES, Voxel,
+    BRICK_CELLS, BrickRecord, CELLS_PER_BRICK, FORMAT_OCCUPANCY, FieldRecord, GridEntry, Group, NO_FACE,
+    Nearby, VOXEL_BRICK_BYTES, Voxel,
 };
 use rayon::prelude::*;
 
@@ -145,7 +145,8 @@ fn named(voxels: &Voxels) -> Packed {
         [NO_FACE, ..] => Nearby::Unknown,
         faces if (faces.iter()).any(|&face| face != NO_FACE && face > Nearby::MAX_FACES) => Nearby::Unknown,
         [face, NO_FACE, _] => Nearby::Face(face),
-        faces => Nearby::Convex(faces),
+        [a, b, NO_FACE] => Group::new(&[&[a], &[b]]).map_or(Nearby::Unknown, Nearby::Convex),
+        [a, b, c] => Group::new(&[&[a], &[b], &[c]]).map_or(Nearby::Unknown, Nearby::Convex),
     };
     let mut cells = [Nearby::Unknown; CELLS_PER_BRICK];
     for (cell, faces) in cells.iter_mut().zip(&voxels.faces) {
@@ -325,5 +326,7 @@ fn pack(
         stored_entries,
         sign_disagreements: near.sign_disagreements,
         sign_tests: near.sign_tests,
+        unproven_cells: 0,
+        unproven_at: None,
     }
 }

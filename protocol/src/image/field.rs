@@ -150,7 +150,7 @@ impl<'a> Field<'a> {
     #[inline(always)]
     fn decoded(&self, brick: &BrickRecord, entry: u16) -> Nearby {
         let palette = &self.palette[brick.palette as usize..];
-        Nearby::from_bits(entry, |at| palette.get(usize::from(at)..)?.first_chunk().copied())
+        Nearby::from_bits(entry, |at| Group::read(palette.get(usize::from(at)..)?))
     }
 
     /// Nearest faces of the cell with this index in a brick.

@@ -9,7 +9,7 @@
 //! face that could be nearest.
 
 use glam::Vec3;
-use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Nearby, Shape, surface_kind};
+use mortise_protocol::image::{FaceRecord, Group, Lookup, NO_FACE, Nearby, Shape, surface_kind};
 
 use crate::math::scalar::inverse_sqrt;
 use crate::math::vector::length;
@@ -135,28 +135,43 @@ pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace
 /// distance is to be used. Outside an edge or corner it is a lower bound of the distance. About 50 instructions per face on a Cortex-M7.
 #[inline]
 pub(crate) fn exact(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
-    match nearby {
-        Nearby::Face(face) => distance(faces, face, p).map(|d| (d, face)),
-        Nearby::Convex(group) => extreme(faces, group, p, 1.0),
-        Nearby::Reentrant(group) => extreme(faces, group, p, -1.0),
-        Nearby::Roughly(_) | Nearby::Unknown => None,
-    }
+    let (group, sign) = match nearby {
+        Nearby::Face(face) => return distance(faces, face, p).map(|d| (d, face)),
+        Nearby::Convex(group) => (group, 1.0),
+        Nearby::Reentrant(group) => (group, -1.0),
+        Nearby::Roughly(_) | Nearby::Unknown => return None,
+    };
+    let eval = |face| Some((distance(faces, face, p)?, face));
+    fold(
+        group,
+        sign,
+        eval,
+        |a: (f32, u16), b, sign| {
+            if (b.0 - a.0) * sign > 0.0 { b } else { a }
+        },
+    )
 }
 
-/// The face of a group with the largest distance times `sign`.
-#[inline]
-fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<(f32, u16)> {
-    let mut found = (distance(faces, group[0], p)?, group[0]);
-    for face in [group[1], group[2]] {
-        if face == NO_FACE {
-            break;
-        }
-        let other = distance(faces, face, p)?;
-        if (other - found.0) * sign > 0.0 {
-            found = (other, face);
+/// The value of a group: `extreme` of its clauses with `sign`, each clause `extreme` of its faces with −`sign`. `None` where a face has none.
+#[inline(always)]
+fn fold<T: Copy>(
+    group: Group,
+    sign: f32,
+    mut eval: impl FnMut(u16) -> Option<T>,
+    extreme: impl Fn(T, T, f32) -> T,
+) -> Option<T> {
+    let (mut all, mut clause) = (None, None);
+    for (face, joined) in group.faces() {
+        let own = eval(face)?;
+        let so_far = clause.map_or(own, |clause| extreme(clause, own, -sign));
+        if joined {
+            clause = Some(so_far);
+        } else {
+            clause = None;
+            all = Some(all.map_or(so_far, |all| extreme(all, so_far, sign)));
         }
     }
-    Some(found)
+    all
 }
 
 /// As [`exact`], with the normal of the face found, and the second face if its distance is equal to within [`AT_EDGE_M`]. About 80 instructions per
@@ -169,33 +184,32 @@ pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Op
         Nearby::Reentrant(group) => (group, -1.0),
         Nearby::Roughly(_) | Nearby::Unknown => return None,
     };
-    let mut found = on_face(faces, group[0], p)?;
-    for face in [group[1], group[2]] {
-        if face == NO_FACE {
-            break;
-        }
-        let other = on_face(faces, face, p)?;
-        let ahead = (other.distance - found.distance) * sign;
-        let at_edge = ahead.abs() < AT_EDGE_M;
-        if ahead > 0.0 {
-            let edge_face = if at_edge { found.face } else { NO_FACE };
-            found = OnFace { edge_face, ..other };
-        } else if at_edge && found.edge_face == NO_FACE {
-            found.edge_face = face;
-        }
-    }
-    Some(found)
+    fold(
+        group,
+        sign,
+        |face| on_face(faces, face, p),
+        |mut found, other, sign| {
+            let ahead = (other.distance - found.distance) * sign;
+            let at_edge = ahead.abs() < AT_EDGE_M;
+            if ahead > 0.0 {
+                let edge_face = if at_edge { found.face } else { NO_FACE };
+                found = OnFace { edge_face, ..other };
+            } else if at_edge && found.edge_face == NO_FACE {
+                found.edge_face = other.face;
+            }
+            found
+        },
+    )
 }
 
-/// The result that [`exact_on_face`] would give if every face were farther off by its `allowance_m`, which nowhere exceeds `max_allowance_m`; `found`
-/// is the result without allowances. About 60 instructions per face.
+/// The result that [`exact_on_face`] would give if every face were farther off by its `allowance_m`; `found` is the result without allowances, and
+/// is returned where a face has no closed form. About 60 instructions per face.
 #[inline(never)]
 pub(crate) fn with_allowance(
     found: OnFace,
     faces: &[FaceRecord],
     nearby: Nearby,
     p: Vec3,
-    max_allowance_m: f32,
     mut allowance_m: impl FnMut(u16) -> f32,
 ) -> OnFace {
     let (group, sign) = match nearby {
@@ -203,25 +217,22 @@ pub(crate) fn with_allowance(
         Nearby::Reentrant(group) => (group, -1.0),
         _ => return found,
     };
-    // At a convex edge an allowance makes another face decisive only where it exceeds the difference of their distances.
-    let reach = if sign > 0.0 { max_allowance_m } else { 0.0 };
-    let first = found.face;
-    let (mut chosen, mut gap) = (found, found.distance + allowance_m(first));
-    for face in group {
-        if face == NO_FACE || face == first {
-            continue;
-        }
-        let Some(other) = on_face(faces, face, p) else {
-            continue;
-        };
-        if (other.distance - gap) * sign + reach > 0.0 {
-            let other_gap = other.distance + allowance_m(face);
-            if (other_gap - gap) * sign > 0.0 {
-                (chosen, gap) = (other, other_gap);
-            }
-        }
+    let eval = |face| {
+        let own = on_face(faces, face, p)?;
+        Some((own.distance + allowance_m(face), own))
+    };
+    let chosen = fold(
+        group,
+        sign,
+        eval,
+        |a: (f32, OnFace), b, sign| {
+            if (b.0 - a.0) * sign > 0.0 { b } else { a }
+        },
+    );
+    match chosen {
+        Some((_, other)) if other.face != found.face => other,
+        _ => found,
     }
-    chosen
 }
 
 #[inline]

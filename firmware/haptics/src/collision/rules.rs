@@ -76,9 +76,6 @@ pub(crate) trait FacePairRules {
 
     /// Effect of guidance on contact between these faces. `moving` and `fixed` hold the face, and the second face where the point lies on an edge.
     fn mating(&self, part: u16, moving: [u16; 2], fixed: [u16; 2]) -> Mating;
-
-    /// Upper bound of [`Mating::allowance_m`], m.
-    fn max_allowance_m(&self) -> f32;
 }
 
 /// No constraints.
@@ -95,10 +92,6 @@ impl FacePairRules for NoRules {
 
     fn mating(&self, _: u16, _: [u16; 2], _: [u16; 2]) -> Mating {
         Mating::NONE
-    }
-
-    fn max_allowance_m(&self) -> f32 {
-        0.0
     }
 }
 

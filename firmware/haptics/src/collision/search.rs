@@ -405,9 +405,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 if pair.guided {
                     self.spent += ALLOWANCE;
                     // At the rim of a guided face the adjacent face gets the allowance too; otherwise the part would rest on it.
-                    let max_allowance_m = self.search.rules.max_allowance_m();
                     let allowance_m = |face| self.mating(pair, leaf, point, face).allowance_m;
-                    found = with_allowance(found, pair.faces, nearby, p, max_allowance_m, allowance_m);
+                    found = with_allowance(found, pair.faces, nearby, p, allowance_m);
                 }
                 if !faces_away(pair, nearby, point, found.normal) {
                     self.near(pair, leaf, point, &found);

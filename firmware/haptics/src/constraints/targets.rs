@@ -393,10 +393,6 @@ impl FacePairRules for TargetRules<'_> {
     fn mating(&self, part: u16, moving: [u16; 2], fixed: [u16; 2]) -> Mating {
         self.targets.mating(part, moving, fixed, self.settings)
     }
-
-    fn max_allowance_m(&self) -> f32 {
-        self.settings.allowance_m
-    }
 }
 
 /// Placements and settings at the time springs are made.
