@@ -162,17 +162,18 @@ fn blow(target: &Target, seed: u64) -> Result<Blow, LabError> {
         .then(above.distance(below) / speed_mm, below, turn)
         .then(STAY_S, below, turn);
     let scene = target.image.scene()?;
-    let (mut deepest_mm, mut force_n) = (f64::NEG_INFINITY, 0.0f64);
+    let (mut deepest_mm, mut force_n, mut last_mm) = (f64::NEG_INFINITY, 0.0f64, f64::NAN);
     drive(&scene, 1, &Settings::default(), &path, &mut |seen| {
         let down = seen.object.matrix3.transpose() * -DVec3::Z;
         let lowest = seen.object.transform_point3(target.striker.support(down));
-        deepest_mm = deepest_mm.max(0.5 * target.thick_mm - lowest.z);
+        last_mm = 0.5 * target.thick_mm - lowest.z;
+        deepest_mm = deepest_mm.max(last_mm);
         force_n = force_n.max(f64::from(seen.out.contact.force.length()));
     })?;
     if deepest_mm > target.thick_mm {
         let what = if target.ball { "ball" } else { "block" };
         eprintln!(
-            "{what} through {} mm at {speed_mm:.0} mm/s, flat {flat}, seed {seed}",
+            "{what} through {} mm at {speed_mm:.0} mm/s, flat {flat}, seed {seed}: {deepest_mm:.3} mm, {last_mm:.3} mm at the end",
             target.thick_mm
         );
     }

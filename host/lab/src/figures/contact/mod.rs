@@ -7,6 +7,8 @@ mod blows;
 mod convex_pairs;
 mod errors;
 mod free_form;
+mod ghosts;
+mod hands;
 mod insertion;
 mod limits;
 mod parallel;
@@ -38,6 +40,8 @@ const PARTS: &[(&str, Measure)] = &[
     ("convex-pairs", convex_pairs::measure),
     ("crossing-bars", bars::measure),
     ("blows", blows::measure),
+    ("ghosts", ghosts::measure),
+    ("hands", hands::measure),
     ("planned-pairs", free_form::planned),
     ("random-fits", |plan, out| {
         random_fits::measure(plan, out)?;
