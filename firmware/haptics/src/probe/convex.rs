@@ -14,9 +14,6 @@ use crate::probe::support::Support;
 const EXACT_M: f64 = 1e-6;
 /// Distance from a face within which a nearest point lies on it, m.
 const ON_FACE_M: f32 = 2e-6;
-/// Share of the positions' size that single precision rounds off: poses and records have 2⁻²⁴, summed a few times.
-const ROUNDING: f64 = 4e-7;
-
 /// Distance of two shapes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Separation {
@@ -33,7 +30,7 @@ pub(crate) struct Separation {
 /// Separation of `a` from `b`.
 pub(crate) fn separation(a: &Support<'_>, b: &Support<'_>, epa: &mut Epa) -> Separation {
     let radius = a.radius + b.radius;
-    let fixed = |point: DVec3| a.error + b.error + ROUNDING * (point.length() + radius);
+    let fixed = a.error + b.error;
     match gjk(a, b) {
         Gjk::Apart { a: point, v, lower } => {
             let length = v.length();
@@ -41,7 +38,7 @@ pub(crate) fn separation(a: &Support<'_>, b: &Support<'_>, epa: &mut Epa) -> Sep
             let lower = lower.clamp(0.0, length);
             Separation {
                 distance: 0.5 * (length + lower) - radius,
-                error: 0.5 * (length - lower) + fixed(point),
+                error: 0.5 * (length - lower) + fixed,
                 normal,
                 a: point - normal * a.radius,
             }
@@ -51,7 +48,7 @@ pub(crate) fn separation(a: &Support<'_>, b: &Support<'_>, epa: &mut Epa) -> Sep
             let lower = depth.lower.min(depth.upper);
             Separation {
                 distance: -0.5 * (depth.upper + lower) - radius,
-                error: 0.5 * (depth.upper - lower) + fixed(depth.a),
+                error: 0.5 * (depth.upper - lower) + fixed,
                 normal: depth.out,
                 a: depth.a - depth.out * a.radius,
             }

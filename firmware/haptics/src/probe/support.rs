@@ -12,6 +12,8 @@ use crate::math::pose::Pose;
 
 /// Largest distance of a piece of an edge from the edge, m.
 const PIECE_M: f64 = 0.5e-6;
+/// Share of the positions' size that single precision rounds off: poses and records have 2⁻²⁴, summed a few times.
+const ROUNDING: f64 = 3e-7;
 
 /// A placed convex shape.
 pub(crate) struct Support<'i> {
@@ -37,6 +39,9 @@ impl<'i> Support<'i> {
         let rotation =
             DMat3::from_quat(DQuat::from_array(pose.orientation.to_array().map(f64::from)).normalize());
         let bent = shape.edges.iter().any(|edge| !edge.is_straight());
+        let size = pose.position.as_dvec3().length()
+            + Vec3::from_array(shape.record.center).as_dvec3().length()
+            + f64::from(shape.record.radius);
         Some(Self {
             edges: shape.edges,
             faces: shape.faces,
@@ -44,7 +49,7 @@ impl<'i> Support<'i> {
             offset: pose.position.as_dvec3(),
             ball: ball.map(|f| Vec3::from_array(f.origin).as_dvec3()),
             radius: ball.map_or(0.0, |f| f64::from(f.radius)),
-            error: if bent { 0.1 * PIECE_M } else { 0.0 },
+            error: ROUNDING * size + if bent { 0.1 * PIECE_M } else { 0.0 },
         })
     }
 
