@@ -161,7 +161,8 @@ fn divide(
         })
     };
     let turn = 2.0 * bend.length() / half.length().max(1e-300);
-    if halvings > 0 && half.length() > TOLERANCE_MM && (turn > MOST_TURN || !fits()) {
+    // A closed chain has no chord: its turn is infinite.
+    if halvings > 0 && to - from > TOLERANCE_MM && (turn > MOST_TURN || !fits()) {
         divide(surface, chain, [from, middle], halvings - 1, edge, out);
         divide(surface, chain, [middle, to], halvings - 1, edge, out);
         return;

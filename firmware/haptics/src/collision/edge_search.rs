@@ -6,26 +6,38 @@
 //!
 //! Two edges that cross are offered as a contact at any gap within the margin, so a fast edge is stopped before it passes another. An overlap deeper
 //! than [`DEPTH_SHARE`] of the thinner part is not taken for a contact unless the same edges crossed in the tick before: else the far edges of a
-//! thin bar, which face the other part too, would pull it through.
+//! thin bar, which face the other part too, would pull it through. The same holds for edges at a flat angle, see [`DEPTH_PER_SINE_M`].
 
+use glam::Vec3;
+use heapless::Vec;
 use mortise_protocol::image::{EDGE_ERROR_CELLS, EdgeRecord, NodeRecord};
 
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
 use crate::collision::cost::{CROSSING, EDGE_BOUND, LOOKUP, MATING, NODE, PASSED_OVER};
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::edge_crossing::{Crossing, Piece, crossing};
+use crate::collision::edge_crossing::{Crossing, Piece, crossing, nearest};
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::rules::{FacePairRules, Mating};
 use crate::collision::search::Traversal;
+use crate::math::scalar::smaller;
+use crate::math::vector::length;
 
 /// Deepest overlap of two edges that touch for the first time, as a share of the thinner part's thickness at them: at half of it the far sides are as
 /// near as the near ones.
 const DEPTH_SHARE: f32 = 0.45;
+/// The same for edges that are nearly parallel, m, times the sine of their angle: where two rims cross at a flat angle, a peg that leans on the wall
+/// of its hole lies below the mouth by any depth, and the wall pushes it, not the mouth.
+const DEPTH_PER_SINE_M: f32 = 1e-3;
+/// Edges that overlap by more than this are not found, m: their distance is that far too. A tick that stops a metre a second is a quarter of it deep.
+const DEEPEST_M: f32 = 0.5e-3;
 /// A leaf without near edges is searched this far, m, and as far as [`RESERVE_TICKS`] ticks of the last motion, for a bound that lasts.
 const RESERVE_M: f32 = 1e-3;
 /// See [`RESERVE_M`].
 const RESERVE_TICKS: f32 = 32.0;
+
+/// Pieces of the other part's edges near a leaf; more are compared in groups of this size.
+type Near<'i> = Vec<Piece<'i>, 16>;
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Searches the edges of a forward pair; nodes are numbered on from the pointshell's. Returns where it stopped when the budget ran out.
@@ -79,7 +91,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 ancestors.open(key, node.skip);
                 continue;
             }
-            let distance = self.edge_leaf(pair, here, node);
+            let distance = self.edge_leaf(pair, here, node) - DEEPEST_M;
             ancestors.note(if distance > self.search.margin {
                 self.coherence.set_distance(key, distance)
             } else {
@@ -93,46 +105,50 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Compares the pieces of a leaf with the other part's edges. Returns a lower bound of their distance from those edges, m.
     #[inline(never)]
     fn edge_leaf(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, node: &NodeRecord) -> f32 {
-        let margin = self.search.margin;
+        let reach = self.search.margin + DEEPEST_M;
+        let center = pair.to_field.apply(node.center);
+        let mut near = Near::new();
         let mut least = f32::INFINITY;
-        for record in node.points(pair.edges.pieces) {
-            let center = pair.to_field.apply(record.center);
-            let own = Piece::new(record).placed(pair.to_field.rotation(), center);
-            let mut distance = self.near_edges(pair, &own, margin, |search, other| {
-                search.spent += CROSSING;
-                if let Some(found) = crossing(&own, &Piece::new(other)) {
-                    search.touch(pair, leaf, [record, other], &found);
-                }
-            });
-            if distance > margin {
-                let reserve = margin + RESERVE_M + RESERVE_TICKS * self.search.way;
-                distance = self.near_edges(pair, &own, reserve, |_, _| {});
+        let bound = self.near_edges(pair, (center, node.radius), reach, |search, other| {
+            // Emptied when full, so there is space.
+            let _ = near.push(other);
+            if near.is_full() {
+                least = smaller(least, search.cross(pair, leaf, node, &near));
+                near.clear();
             }
-            if distance < least {
-                least = distance;
-            }
+        });
+        if !near.is_empty() {
+            return smaller(least, self.cross(pair, leaf, node, &near));
         }
-        least
+        if least < f32::INFINITY {
+            return least;
+        }
+        // Nothing is near: the bound is to last for a while.
+        let reserve = reach + RESERVE_M + RESERVE_TICKS * self.search.way;
+        if bound > reserve {
+            return bound;
+        }
+        self.near_edges(pair, (center, node.radius), reserve, |_, _| {})
     }
 
-    /// Passes to `visit` every piece of the other part's edges that may lie within `reach` (m) of the piece `own`. Returns a lower bound of the distance
-    /// of all, m; at most `reach` when a piece was visited.
+    /// Passes to `visit` every piece of the other part's edges that may lie within `reach` (m) of a sphere. Returns a lower bound of the distance of all
+    /// pieces, m.
     #[inline(always)]
     fn near_edges<'i>(
         &mut self,
         pair: &DirectedPair<'i>,
-        own: &Piece,
+        (center, radius): (Vec3, f32),
         reach: f32,
-        mut visit: impl FnMut(&mut Self, &'i EdgeRecord),
+        mut visit: impl FnMut(&mut Self, Piece<'i>),
     ) -> f32 {
         let tree = pair.field_edges;
         let mut least = f32::INFINITY;
         let mut index = 0;
         while let Some(node) = tree.nodes.get(index as usize) {
             self.spent += EDGE_BOUND;
-            let distance = own.distance_to(node.center) - node.radius;
-            if distance > reach {
-                least = if distance < least { distance } else { least };
+            let bound = length(Vec3::from_array(node.center) - center) - (radius + node.radius);
+            if bound > reach {
+                least = smaller(least, bound);
                 index = node.skip;
                 continue;
             }
@@ -140,12 +156,41 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             if node.skip != index {
                 continue;
             }
-            for piece in node.points(tree.pieces) {
+            for piece in node.points(tree.pieces).iter().map(Piece::fixed) {
                 self.spent += EDGE_BOUND;
-                let distance = own.distance_to(piece.center) - Piece::new(piece).reach();
-                least = if distance < least { distance } else { least };
-                if distance <= reach {
+                let bound = piece.distance_to(center, radius);
+                least = smaller(least, bound);
+                if bound <= reach {
                     visit(self, piece);
+                }
+            }
+        }
+        least
+    }
+
+    /// Offers the crossings of the pieces of a leaf with `near` pieces of the other part. Returns a lower bound of their distance, m.
+    fn cross(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        node: &NodeRecord,
+        near: &[Piece<'_>],
+    ) -> f32 {
+        let rotation = pair.to_field.rotation();
+        let reach = self.search.margin + DEEPEST_M;
+        let mut least = f32::INFINITY;
+        for record in node.points(pair.edges.pieces) {
+            let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
+            for other in near {
+                self.spent += EDGE_BOUND;
+                let (from, distance) = nearest(&own, other);
+                least = smaller(least, distance);
+                if distance > reach {
+                    continue;
+                }
+                self.spent += CROSSING;
+                if let Some(found) = crossing(&own, other, rotation, from) {
+                    self.touch(pair, leaf, [record, other.record], &found);
                 }
             }
         }
@@ -161,12 +206,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         found: &Crossing,
     ) {
         let edges = [own.edge as u16, other.edge as u16];
-        let thinner = if own.thickness < other.thickness {
-            own.thickness
-        } else {
-            other.thickness
-        };
-        let too_deep = found.gap < -DEPTH_SHARE * thinner && !self.contacts.crossed(leaf.part(), edges);
+        let thinner = smaller(own.thickness, other.thickness);
+        let deepest = smaller(DEPTH_SHARE * thinner, DEPTH_PER_SINE_M * found.sine);
+        let too_deep = found.gap < -deepest && !self.contacts.crossed(leaf.part(), edges);
         let excluded = || {
             let kept_apart = |of: &[u16; 2]| own.faces.contains(&of[0]) && other.faces.contains(&of[1]);
             pair.excluded.iter().any(kept_apart)
