@@ -48,6 +48,16 @@ impl EdgePiece {
         .map(meters)
     }
 
+    /// Largest coordinate of its points along `n`, mm.
+    pub fn support(&self, n: DVec3) -> f64 {
+        let [center, half, bend] = [self.center, self.half, self.bend].map(|v| v.dot(n));
+        if bend < 0.0 && half.abs() < -2.0 * bend {
+            center - half * half / (4.0 * bend)
+        } else {
+            center + half.abs() + bend
+        }
+    }
+
     /// The piece as stored.
     pub fn record(&self) -> EdgeRecord {
         EdgeRecord {
