@@ -7,6 +7,7 @@ use super::error::ImageError;
 use super::field::Field;
 use super::occupancy::VOXEL_BRICK_BYTES;
 use super::records::*;
+use super::surfaces::Surfaces;
 
 /// The checksum of images and frames.
 pub const CRC: Crc<u32, crc::Table<1>> = Crc::<u32, crc::Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -17,10 +18,11 @@ const SECTION_FIELDS: u8 = 2;
 const SECTION_NODES: u8 = 3;
 const SECTION_POINTS: u8 = 4;
 const SECTION_FACES: u8 = 5;
-const SECTION_BRICKS: u8 = 6;
-const SECTION_PALETTE: u8 = 7;
-const SECTION_GRID: u8 = 8;
-const SECTION_BLOB: u8 = 9;
+const SECTION_PATCHES: u8 = 6;
+const SECTION_BRICKS: u8 = 7;
+const SECTION_PALETTE: u8 = 8;
+const SECTION_GRID: u8 = 9;
+const SECTION_BLOB: u8 = 10;
 
 /// A scene image, read in place.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +34,7 @@ pub struct SceneImage<'a> {
     nodes: &'a [NodeRecord],
     points: &'a [PointRecord],
     faces: &'a [FaceRecord],
+    patches: &'a [PatchRecord],
     bricks: &'a [BrickRecord],
     palette: &'a [u16],
     grid: &'a [u16],
@@ -49,8 +52,21 @@ pub struct Shape<'a> {
     pub points: &'a [PointRecord],
     /// B-rep faces.
     pub faces: &'a [FaceRecord],
+    /// Local patches of faces without closed form.
+    pub patches: &'a [PatchRecord],
     /// Signed distance.
     pub field: Field<'a>,
+}
+
+impl<'a> Shape<'a> {
+    /// Surfaces that the field's palettes name.
+    #[inline(always)]
+    pub fn surfaces(&self) -> Surfaces<'a> {
+        Surfaces {
+            faces: self.faces,
+            patches: self.patches,
+        }
+    }
 }
 
 impl<'a> SceneImage<'a> {
@@ -95,6 +111,7 @@ impl<'a> SceneImage<'a> {
             nodes: section(bytes, header.nodes, SECTION_NODES)?,
             points: section(bytes, header.points, SECTION_POINTS)?,
             faces: section(bytes, header.faces, SECTION_FACES)?,
+            patches: section(bytes, header.patches, SECTION_PATCHES)?,
             bricks: section(bytes, header.bricks, SECTION_BRICKS)?,
             palette: section(bytes, header.palette, SECTION_PALETTE)?,
             grid: section(bytes, header.grid, SECTION_GRID)?,
@@ -129,6 +146,7 @@ impl<'a> SceneImage<'a> {
             nodes: run(self.nodes, record.first_node, record.node_count),
             points: run(self.points, record.first_point, record.point_count),
             faces: run(self.faces, record.first_face, record.face_count),
+            patches: run(self.patches, record.first_patch, record.patch_count),
             field: Field {
                 record: field,
                 grid: &self.grid[field.first_grid as usize..][..entries],
@@ -162,6 +180,7 @@ impl<'a> SceneImage<'a> {
                 && fits(shape.first_point, shape.point_count, self.points.len())
                 && fits(shape.first_face, shape.face_count, self.faces.len())
                 && shape.face_count <= u32::from(NO_FACE)
+                && fits(shape.first_patch, shape.patch_count, self.patches.len())
                 && finite(&shape.center)
                 && finite(&shape.center_of_mass)
                 && finite(&shape.inertia)
@@ -229,6 +248,8 @@ impl<'a> SceneImage<'a> {
                         && u32::from(p.face) < shape.face_count
                         && (p.edge_face == NO_FACE || u32::from(p.edge_face) < shape.face_count)
                 });
+            let patches = run(self.patches, shape.first_patch, shape.patch_count);
+            let good = good && patches.iter().all(|p| u32::from(p.face) < shape.face_count);
             if !good {
                 return Err(ImageError::Record {
                     section: SECTION_SHAPES,
@@ -236,6 +257,9 @@ impl<'a> SceneImage<'a> {
                 });
             }
         }
+        each(self.patches, SECTION_PATCHES, |patch| {
+            finite(&patch.origin) && finite(&patch.x) && finite(&patch.normal) && finite(&patch.height)
+        })?;
         each(self.faces, SECTION_FACES, |face| {
             face.kind <= surface_kind::TORUS
                 && finite(&face.origin)

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// First eight bytes of every scene image.
 pub const MAGIC: [u8; 8] = *b"MORTISE\0";
 /// Version of this layout. Any change to a record or its meaning increments it.
-pub const LAYOUT_VERSION: u32 = 2;
+pub const LAYOUT_VERSION: u32 = 3;
 /// Cells along a brick's edge.
 pub const BRICK_CELLS: usize = 8;
 /// Samples along a brick's edge: the last layer repeats the neighbour's first (shared apron).
@@ -53,9 +53,11 @@ pub struct Header {
     pub points: Section,
     /// [`FaceRecord`]s.
     pub faces: Section,
+    /// [`PatchRecord`]s.
+    pub patches: Section,
     /// [`BrickRecord`]s.
     pub bricks: Section,
-    /// `u16` face ids that bricks refer to.
+    /// `u16` surface indices that bricks refer to.
     pub palette: Section,
     /// `u16` grid entries (see [`GridEntry`]).
     pub grid: Section,
@@ -99,10 +101,14 @@ pub struct ShapeRecord {
     pub first_point: u32,
     /// Number of points.
     pub point_count: u32,
-    /// Its faces; face ids in points and palettes count from here.
+    /// Its faces; face ids in points and surface indices in palettes count from here.
     pub first_face: u32,
     /// Number of faces.
     pub face_count: u32,
+    /// Its patches; surface indices in palettes count its faces, then these.
+    pub first_patch: u32,
+    /// Number of patches.
+    pub patch_count: u32,
     /// Centre of a sphere about the whole shape, m.
     pub center: [f32; 3],
     /// Its radius, m.
@@ -212,27 +218,29 @@ impl GridEntry {
     }
 }
 
-/// A palette entry: the faces nearest to a cell, and whether their exact surfaces give the distance there.
+/// A palette entry: the surfaces nearest to a cell, and whether they give the distance there.
+///
+/// A surface is a face, or a local patch of a face without closed form, by its index in [`super::Surfaces`].
 ///
 /// Of the 16 bits the upper two are the kind: 00 [`Self::Face`], 01 [`Self::Roughly`], 10 [`Self::Convex`], 11 [`Self::Reentrant`]. The others are
-/// the face, or the index in the brick's palette of its three faces ([`NO_FACE`] for none). [`NO_FACE`] as a whole is [`Self::Unknown`].
+/// the surface, or the index in the brick's palette of its three surfaces ([`NO_FACE`] for none). [`NO_FACE`] as a whole is [`Self::Unknown`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Nearby {
     /// Nearest face unknown.
     Unknown,
-    /// The distance to this face's surface is exact all over the cell.
+    /// The distance to this surface is exact all over the cell.
     Face(u16),
     /// This face is nearest; the distance is interpolated.
     Roughly(u16),
-    /// A convex edge or corner of these faces: the largest of the distances to their surfaces has the sign of the true distance and no larger
+    /// A convex edge or corner of these surfaces: the largest of the distances to them has the sign of the true distance and no larger
     /// magnitude; inside, and at the faces, it is exact.
     Convex([u16; 3]),
-    /// A re-entrant edge or corner of these faces: the same for the smallest; outside, and at the faces, it is exact.
+    /// A re-entrant edge or corner of these surfaces: the same for the smallest; outside, and at the faces, it is exact.
     Reentrant([u16; 3]),
 }
 
 impl Nearby {
-    /// Most faces of a shape whose palettes state more than [`Self::Unknown`].
+    /// Most faces and patches of a shape whose palettes state more than [`Self::Unknown`].
     pub const MAX_FACES: u16 = 0x3fff;
     const KIND: u16 = 0xc000;
 
@@ -260,7 +268,7 @@ impl Nearby {
         }
     }
 
-    /// The nearest face and another nearby face, each [`NO_FACE`] if there is none.
+    /// The nearest surface and another nearby one, each [`NO_FACE`] if there is none.
     pub const fn two_faces(self) -> [u16; 2] {
         match self {
             Self::Convex([first, second, _]) | Self::Reentrant([first, second, _]) => [first, second],
@@ -268,7 +276,7 @@ impl Nearby {
         }
     }
 
-    /// One of the nearest faces, or [`NO_FACE`].
+    /// One of the nearest surfaces, or [`NO_FACE`].
     pub const fn face(self) -> u16 {
         match self {
             Self::Unknown => NO_FACE,
@@ -369,6 +377,27 @@ pub struct FaceRecord {
     pub second: f32,
 }
 
+/// A local patch of a face without closed form: a height over a tangent plane, w = h(u, v), in its shape's frame.
+///
+/// A point p has u = (p − `origin`)·`x`, v = (p − `origin`)·(`normal` × `x`), w = (p − `origin`)·`normal`. The patch stands for its face only in cells
+/// that name it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PatchRecord {
+    /// Origin of the tangent plane, m.
+    pub origin: [f32; 3],
+    /// Unit vector in the plane, along u.
+    pub x: [f32; 3],
+    /// Unit normal of the plane, outward.
+    pub normal: [f32; 3],
+    /// Coefficients of h, in powers of metres: 1, u, v, u², uv, v², u³, u²v, uv², v³.
+    pub height: [f32; 10],
+    /// The face that it is a part of, counted from the shape's first.
+    pub face: u16,
+    /// Zero.
+    pub reserved: u16,
+}
+
 /// Unit vector from its octahedral code (Cigolla et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors"):
 /// error at most 6.5·10⁻⁵ rad. Any pattern decodes to a finite, non-zero vector; the result is not normalised.
 #[inline]
@@ -411,14 +440,15 @@ mod tests {
 
     #[test]
     fn records_have_the_documented_sizes() {
-        assert_eq!(size_of::<Header>(), 104);
+        assert_eq!(size_of::<Header>(), 112);
         assert_eq!(size_of::<PartRecord>(), 36);
-        assert_eq!(size_of::<ShapeRecord>(), 88);
+        assert_eq!(size_of::<ShapeRecord>(), 96);
         assert_eq!(size_of::<FieldRecord>(), 44);
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
         assert_eq!(size_of::<PointRecord>(), 20);
         assert_eq!(size_of::<FaceRecord>(), 40);
+        assert_eq!(size_of::<PatchRecord>(), 80);
     }
 
     #[test]

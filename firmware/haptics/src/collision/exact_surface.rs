@@ -5,12 +5,15 @@
 //! the other face's surface is beyond the edge, at a re-entrant edge one inside it. The nearest point of an edge is that of the two surfaces'
 //! intersection, by Newton steps.
 //!
+//! Faces without closed form answer by their local patches ([`super::patch`]), where cells name them.
+//!
 //! Metres, shape frame. Every loop is bounded by the number of faces (squared, for edges). Cost: one projection per face, and a field query for each
 //! face that could be nearest.
 
 use glam::Vec3;
-use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Nearby, Shape, surface_kind};
+use mortise_protocol::image::{FaceRecord, Lookup, NO_FACE, Nearby, Shape, Surface, Surfaces, surface_kind};
 
+use crate::collision::patch::distance_to_patch;
 use crate::math::scalar::inverse_sqrt;
 use crate::math::vector::length;
 
@@ -119,10 +122,14 @@ pub(crate) struct OnFace {
     pub edge_face: u16,
 }
 
-/// Distance and normal of one face's surface at `p`, if it has a closed form. About 60 instructions on a Cortex-M7.
+/// Distance and normal of one surface at `p`, by its surface index, if it is a patch or has a closed form. About 60 instructions on a Cortex-M7, 250
+/// for a patch.
 #[inline(always)]
-pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace> {
-    let (distance, normal) = signed(faces.get(usize::from(face))?, p)?;
+pub(crate) fn on_surface_of(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Option<OnFace> {
+    let (face, (distance, normal)) = match surfaces.get(surface)? {
+        Surface::Face(face) => (surface, signed(face, p)?),
+        Surface::Patch(patch) => (patch.face, distance_to_patch(patch, p)?),
+    };
     Some(OnFace {
         distance,
         normal,
@@ -131,27 +138,27 @@ pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace
     })
 }
 
-/// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and the face it belongs to; `None` where the interpolated
+/// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and the surface it belongs to; `None` where the interpolated
 /// distance is to be used. Outside an edge or corner it is a lower bound of the distance. About 50 instructions per face on a Cortex-M7.
 #[inline]
-pub(crate) fn exact(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
+pub(crate) fn exact(surfaces: Surfaces<'_>, nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
     match nearby {
-        Nearby::Face(face) => distance(faces, face, p).map(|d| (d, face)),
-        Nearby::Convex(group) => extreme(faces, group, p, 1.0),
-        Nearby::Reentrant(group) => extreme(faces, group, p, -1.0),
+        Nearby::Face(face) => distance(surfaces, face, p).map(|d| (d, face)),
+        Nearby::Convex(group) => extreme(surfaces, group, p, 1.0),
+        Nearby::Reentrant(group) => extreme(surfaces, group, p, -1.0),
         Nearby::Roughly(_) | Nearby::Unknown => None,
     }
 }
 
 /// The face of a group with the largest distance times `sign`.
 #[inline]
-fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<(f32, u16)> {
-    let mut found = (distance(faces, group[0], p)?, group[0]);
+fn extreme(surfaces: Surfaces<'_>, group: [u16; 3], p: Vec3, sign: f32) -> Option<(f32, u16)> {
+    let mut found = (distance(surfaces, group[0], p)?, group[0]);
     for face in [group[1], group[2]] {
         if face == NO_FACE {
             break;
         }
-        let other = distance(faces, face, p)?;
+        let other = distance(surfaces, face, p)?;
         if (other - found.0) * sign > 0.0 {
             found = (other, face);
         }
@@ -162,26 +169,26 @@ fn extreme(faces: &[FaceRecord], group: [u16; 3], p: Vec3, sign: f32) -> Option<
 /// As [`exact`], with the normal of the face found, and the second face if its distance is equal to within [`AT_EDGE_M`]. About 80 instructions per
 /// face on a Cortex-M7.
 #[inline]
-pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<OnFace> {
+pub(crate) fn exact_on_face(surfaces: Surfaces<'_>, nearby: Nearby, p: Vec3) -> Option<OnFace> {
     let (group, sign) = match nearby {
-        Nearby::Face(face) => return on_face(faces, face, p),
+        Nearby::Face(face) => return on_surface_of(surfaces, face, p),
         Nearby::Convex(group) => (group, 1.0),
         Nearby::Reentrant(group) => (group, -1.0),
         Nearby::Roughly(_) | Nearby::Unknown => return None,
     };
-    let mut found = on_face(faces, group[0], p)?;
+    let mut found = on_surface_of(surfaces, group[0], p)?;
     for face in [group[1], group[2]] {
         if face == NO_FACE {
             break;
         }
-        let other = on_face(faces, face, p)?;
+        let other = on_surface_of(surfaces, face, p)?;
         let ahead = (other.distance - found.distance) * sign;
         let at_edge = ahead.abs() < AT_EDGE_M;
         if ahead > 0.0 {
             let edge_face = if at_edge { found.face } else { NO_FACE };
             found = OnFace { edge_face, ..other };
         } else if at_edge && found.edge_face == NO_FACE {
-            found.edge_face = face;
+            found.edge_face = other.face;
         }
     }
     Some(found)
@@ -192,7 +199,7 @@ pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Op
 #[inline(never)]
 pub(crate) fn with_allowance(
     found: OnFace,
-    faces: &[FaceRecord],
+    surfaces: Surfaces<'_>,
     nearby: Nearby,
     p: Vec3,
     max_allowance_m: f32,
@@ -208,14 +215,14 @@ pub(crate) fn with_allowance(
     let first = found.face;
     let (mut chosen, mut gap) = (found, found.distance + allowance_m(first));
     for face in group {
-        if face == NO_FACE || face == first {
+        if face == NO_FACE || surfaces.face_of(face) == first {
             continue;
         }
-        let Some(other) = on_face(faces, face, p) else {
+        let Some(other) = on_surface_of(surfaces, face, p) else {
             continue;
         };
         if (other.distance - gap) * sign + reach > 0.0 {
-            let other_gap = other.distance + allowance_m(face);
+            let other_gap = other.distance + allowance_m(other.face);
             if (other_gap - gap) * sign > 0.0 {
                 (chosen, gap) = (other, other_gap);
             }
@@ -225,8 +232,11 @@ pub(crate) fn with_allowance(
 }
 
 #[inline]
-fn distance(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<f32> {
-    let face = faces.get(usize::from(face))?;
+fn distance(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Option<f32> {
+    let face = match surfaces.get(surface)? {
+        Surface::Face(face) => face,
+        Surface::Patch(patch) => return distance_to_patch(patch, p).map(|(distance, _)| distance),
+    };
     let from = p - Vec3::from_array(face.origin);
     let along = from.dot(Vec3::from_array(face.axis));
     match face.kind {
