@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use mortise_brep::{CadModel, Surface};
 use mortise_protocol::image::{
-    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PointRecord, ShapeRecord,
+    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PatchRecord, PointRecord, ShapeRecord,
 };
 use rayon::prelude::*;
 
@@ -106,7 +106,8 @@ impl Made {
 fn field_bytes(field: &BakedField) -> u64 {
     let bricks = field.bricks.len() * size_of::<BrickRecord>();
     // Alignment of the blob and of the grid: less than 8 bytes.
-    (field.blob.len() + 2 * field.grid.len() + bricks + 2 * field.palette.len() + 8) as u64
+    let patches = field.patches.len() * size_of::<PatchRecord>();
+    (field.blob.len() + 2 * field.grid.len() + bricks + 2 * field.palette.len() + patches + 8) as u64
 }
 
 impl Scene {
@@ -238,6 +239,7 @@ impl Scene {
                 cell_mm: *cell_mm,
                 band_cells: options.band_cells,
                 format: options.format,
+                patch_tolerance_mm: options.patch_tolerance_mm,
             };
             let baked = match options.method {
                 Method::DistanceField => bake_field(surface, &field, part, &step),
@@ -437,6 +439,7 @@ fn add(a: &ByteCount, b: &ByteCount) -> ByteCount {
         points: a.points + b.points,
         nodes: a.nodes + b.nodes,
         faces: a.faces + b.faces,
+        patches: a.patches + b.patches,
         records: a.records + b.records,
     }
 }

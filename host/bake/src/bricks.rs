@@ -2,12 +2,15 @@
 
 use glam::DVec3;
 use mortise_brep::Surface;
-use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby};
+use mortise_protocol::image::{
+    BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby, SAMPLES_PER_BRICK,
+};
 
+use crate::cover::{LocalPatches, verify_places};
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
 use crate::grid::Grid;
-use crate::nearby::{CellNearby, ExactSample};
+use crate::nearby::{CellNearby, ExactSample, corner_places, index};
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {
@@ -23,45 +26,49 @@ pub(crate) struct Brick {
     pub palette_len: u16,
 }
 
-/// Samples the brick at place `at` of `grid`.
-pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOptions, at: [u32; 3]) -> Brick {
+/// Exact samples of the brick at place `at` of `grid`, x fastest.
+pub(crate) fn sample_brick(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Vec<ExactSample> {
     let mut scratch = Scratch::default();
-    let units_per_mm = options.units_per_cell() / grid.cell();
-    let mut samples = Vec::with_capacity(brick_bytes(options.format));
-    let unknown = ExactSample {
-        distance: f64::NAN,
-        face: NO_FACE,
-    };
-    let mut exact = [unknown; BRICK_SAMPLES * BRICK_SAMPLES * BRICK_SAMPLES];
-    let mut within = f64::INFINITY;
-    let mut i = 0;
+    let mut exact = Vec::with_capacity(SAMPLES_PER_BRICK);
     for z in 0..BRICK_SAMPLES {
         for y in 0..BRICK_SAMPLES {
+            // A new row starts without a known bound; the next sample along x is one cell away.
+            let mut within = f64::INFINITY;
             for x in 0..BRICK_SAMPLES {
-                let p = grid.sample(at, [x, y, z]);
-                let mut value = options.format.max();
-                if let Some(nearest) = surface.query(p, within, &mut scratch) {
-                    value = quantise(nearest.distance * units_per_mm, options.format);
-                    exact[i] = ExactSample {
-                        distance: nearest.distance,
-                        face: nearest.face as u16,
-                    };
-                    // The next sample along x is one cell away; a new row starts without a known bound.
-                    within = if x + 1 < BRICK_SAMPLES {
-                        nearest.distance.abs() + grid.cell() * (1.0 + 1e-9)
-                    } else {
-                        f64::INFINITY
-                    };
+                let nearest = surface.query(grid.sample(at, [x, y, z]), within, &mut scratch);
+                if let Some(nearest) = nearest {
+                    within = nearest.distance.abs() + grid.cell() * (1.0 + 1e-9);
                 }
-                match options.format {
-                    SampleFormat::Int8 => samples.push(value as i8 as u8),
-                    SampleFormat::Int16 => samples.extend((value as i16).to_le_bytes()),
-                }
-                i += 1;
+                exact.push(nearest.map_or(ExactSample::NONE, ExactSample::of));
             }
         }
     }
-    let cells = cells(surface, grid, at, &exact, &mut scratch);
+    exact
+}
+
+/// The brick with these samples as stored.
+pub(crate) fn bake_brick(
+    surface: &ExactSurface,
+    grid: &Grid,
+    options: &FieldOptions,
+    patches: &LocalPatches,
+    at: [u32; 3],
+    exact: &[ExactSample],
+) -> Brick {
+    let units_per_mm = options.units_per_cell() / grid.cell();
+    let mut samples = Vec::with_capacity(brick_bytes(options.format));
+    for sample in exact {
+        let value = if sample.distance.is_nan() {
+            options.format.max()
+        } else {
+            quantise(sample.distance * units_per_mm, options.format)
+        };
+        match options.format {
+            SampleFormat::Int8 => samples.push(value as i8 as u8),
+            SampleFormat::Int16 => samples.extend((value as i16).to_le_bytes()),
+        }
+    }
+    let cells = cells(surface, grid, patches, options.patch_tolerance_mm, at, exact);
     let Packed {
         palette,
         palette_len,
@@ -89,43 +96,45 @@ fn quantise(units: f64, format: SampleFormat) -> f64 {
 fn cells(
     surface: &ExactSurface,
     grid: &Grid,
+    patches: &LocalPatches,
+    tolerance_mm: f64,
     at: [u32; 3],
     samples: &[ExactSample],
-    scratch: &mut Scratch,
 ) -> [Nearby; CELLS_PER_BRICK] {
     let faces: Vec<(Surface, f64)> = (surface.shape().faces.iter())
         .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
         .collect();
     let nearby = CellNearby {
         faces: &faces,
+        patches,
+        tolerance_mm,
         samples,
         origin: grid.sample(at, [0; 3]),
         cell: grid.cell(),
+        first: at.map(|b| b * BRICK_CELLS as u32),
     };
-    let mut cells = [Nearby::Unknown; CELLS_PER_BRICK];
-    let mut i = 0;
-    for z in 0..BRICK_CELLS {
-        for y in 0..BRICK_CELLS {
-            for x in 0..BRICK_CELLS {
-                let corner = |c: usize| {
-                    let (x, y, z) = (x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
-                    samples[x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)].face
-                };
-                let first = corner(0);
-                let nearest = if (1..8).all(|c| corner(c) == first) {
-                    first
-                } else {
-                    let center = grid.sample(at, [x, y, z]) + DVec3::splat(grid.cell() / 2.0);
-                    surface
-                        .query(center, f64::INFINITY, scratch)
-                        .map_or(NO_FACE, |n| n.face as u16)
-                };
-                cells[i] = nearby.of([x, y, z], nearest);
-                i += 1;
-            }
-        }
-    }
-    cells
+    let mut scratch = Scratch::default();
+    std::array::from_fn(|i| {
+        let cell = [i & 7, i >> 3 & 7, i >> 6];
+        let corner = |c: usize| samples[index(corner_places(cell)[c])].face;
+        let first = corner(0);
+        let lowest = grid.sample(at, cell);
+        let nearest = if (1..8).all(|c| corner(c) == first) {
+            first
+        } else {
+            let center = lowest + DVec3::splat(grid.cell() / 2.0);
+            surface
+                .query(center, f64::INFINITY, &mut scratch)
+                .map_or(NO_FACE, |n| n.face as u16)
+        };
+        nearby.of(cell, nearest, || {
+            let known = patches.verified(std::array::from_fn(|a| nearby.first[a] + cell[a] as u32));
+            known.copied().map_or_else(
+                || verify_places(surface, lowest, grid.cell(), &mut scratch).to_vec(),
+                |places| places.to_vec(),
+            )
+        })
+    })
 }
 
 /// Nearest faces of the cells of a brick, as stored.

@@ -7,15 +7,17 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry};
+use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry, PatchRecord};
 use rayon::prelude::*;
 
 use crate::bounds::{Class, classify};
-use crate::bricks::{Brick, bake_brick};
+use crate::bricks::{Brick, bake_brick, sample_brick};
+use crate::cover::{LocalPatches, Sampled, has_free_forms};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::format::FieldOptions;
 use crate::grid::Grid;
+use crate::nearby::ExactSample;
 
 /// A standalone field: record offsets count from its own arrays.
 #[derive(Clone, Debug)]
@@ -28,6 +30,8 @@ pub struct BakedField {
     pub bricks: Vec<BrickRecord>,
     /// Palette entries.
     pub palette: Vec<u16>,
+    /// Local patches that palettes name.
+    pub patches: Vec<PatchRecord>,
     /// Samples and palette indices.
     pub blob: Vec<u8>,
     /// Number of sample bytes in `blob`; the rest are palette indices and padding.
@@ -63,21 +67,35 @@ pub fn bake_field(
     let near = NearSurface::find(surface, &grid, reach, options.cell_mm, part, progress)?;
     let surface = &*surface;
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let bricks: Option<Vec<Brick>> = near
-        .stored
-        .par_iter()
-        .map(|&at| {
-            let brick = bake_brick(surface, &grid, options, at);
-            let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            progress(n, near.stored.len()).is_continue().then_some(brick)
-        })
-        .collect();
+    let step = || {
+        let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+        progress(n, near.stored.len()).is_continue()
+    };
+    let baked = |patches: &LocalPatches, at, exact: &[ExactSample]| {
+        bake_brick(surface, &grid, options, patches, at, exact)
+    };
+    let (bricks, patches): (Option<Vec<Brick>>, _) = if has_free_forms(surface) {
+        // Patches extend over many bricks: all samples first.
+        let sampled: Option<Vec<Sampled>> = (near.stored.par_iter())
+            .map(|&at| step().then(|| (at, sample_brick(surface, &grid, at))))
+            .collect();
+        let sampled = sampled.ok_or(BakeError::Cancelled)?;
+        let patches = LocalPatches::cover(surface, &grid, &sampled, options.patch_tolerance_mm);
+        let bricks = sampled.par_iter().map(|(at, exact)| Some(baked(&patches, *at, exact)));
+        (bricks.collect(), patches)
+    } else {
+        let none = LocalPatches::default();
+        let bricks = (near.stored.par_iter())
+            .map(|&at| step().then(|| baked(&none, at, &sample_brick(surface, &grid, at))));
+        (bricks.collect(), LocalPatches::default())
+    };
     let bricks = bricks.ok_or(BakeError::Cancelled)?;
     let packed = pack(&grid, options, &near.classes, &near.stored, bricks);
     check_brick_count(packed.bricks.len(), options.cell_mm, part)?;
     Ok(BakedField {
         sign_tests: near.sign_tests,
         sign_disagreements: near.sign_disagreements,
+        patches: patches.records,
         ..packed
     })
 }
@@ -270,6 +288,7 @@ fn pack(
         grid: entries,
         bricks: records,
         palette,
+        patches: Vec::new(),
         blob,
         sample_bytes,
         stored_entries: stored.len(),

@@ -5,7 +5,7 @@ use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE, NodeRecord,
-    PART_GRABBABLE, PartRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode, surface_kind,
+    PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode, surface_kind,
 };
 
 use crate::field::BakedField;
@@ -34,6 +34,7 @@ pub struct ImageBuilder {
     nodes: Vec<NodeRecord>,
     points: Vec<PointRecord>,
     faces: Vec<FaceRecord>,
+    patches: Vec<PatchRecord>,
     bricks: Vec<BrickRecord>,
     palette: Vec<u16>,
     grid: Vec<u16>,
@@ -81,6 +82,8 @@ impl ImageBuilder {
             point_count: positions.len() as u32,
             first_face: self.faces.len() as u32,
             face_count: shape.faces.len() as u32,
+            first_patch: self.patches.len() as u32,
+            patch_count: field.patches.len() as u32,
             center: center.to_array(),
             radius: round_up(radius),
             volume: (shape.volume_mm3 * 1e-9) as f32,
@@ -96,6 +99,7 @@ impl ImageBuilder {
             points: positions.len() * size_of::<PointRecord>(),
             nodes: tree.nodes.len() * size_of::<NodeRecord>(),
             faces: shape.faces.len() * size_of::<FaceRecord>(),
+            patches: field.patches.len() * size_of::<PatchRecord>(),
             records: size_of::<ShapeRecord>() + size_of::<FieldRecord>(),
         };
         self.nodes.extend(tree.nodes);
@@ -109,6 +113,7 @@ impl ImageBuilder {
             }
         }));
         self.faces.extend(shape.faces.iter().map(face_record));
+        self.patches.extend(&field.patches);
         self.add_field(field);
         (number, bytes)
     }
@@ -155,6 +160,7 @@ impl ImageBuilder {
             + padded(size_of_val(self.nodes.as_slice()))
             + padded(size_of_val(self.points.as_slice()))
             + padded(size_of_val(self.faces.as_slice()))
+            + padded(size_of_val(self.patches.as_slice()))
             + padded(size_of_val(self.bricks.as_slice()))
             + padded(2 * (self.palette.len() + PALETTE_PADDING))
             + padded(size_of_val(self.grid.as_slice()))
@@ -179,6 +185,7 @@ impl ImageBuilder {
             nodes: append(&mut bytes, &self.nodes),
             points: append(&mut bytes, &self.points),
             faces: append(&mut bytes, &self.faces),
+            patches: append(&mut bytes, &self.patches),
             bricks: append(&mut bytes, &self.bricks),
             palette: append(&mut bytes, &self.palette),
             grid: append(&mut bytes, &self.grid),

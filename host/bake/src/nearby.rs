@@ -2,12 +2,16 @@
 //!
 //! A cell is *exact* when the distance at all its corners equals that to the unbounded surface of one face. At a convex edge or corner the distance
 //! is the largest of the distances to two or three faces (exact inside and at the faces; outside it is a lower bound of the right sign); at a
-//! re-entrant one it is the smallest. Cells for which the corners do not prove either are interpolated.
+//! re-entrant one it is the smallest. Cells for which the corners do not prove either are interpolated. A free-form face answers by its local patch
+//! in the cell ([`crate::cover`]); where one takes part, places inside the cell must prove it too.
 
 use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_SAMPLES, NO_FACE, Nearby};
 
+use crate::cover::{LocalPatches, Place};
+use crate::distance::Nearest;
+use crate::local_patch::board_distance;
 use crate::surface::to_local;
 
 /// Tolerance of exact distances, mm: rounding, and vertices a tenth of a micrometre off their curves.
@@ -20,65 +24,134 @@ pub(crate) struct ExactSample {
     pub distance: f64,
     /// Nearest face or [`NO_FACE`].
     pub face: u16,
+    /// The nearest point, mm.
+    pub foot: DVec3,
 }
 
-/// Samples and faces from which the nearest faces of a cell are found.
+impl ExactSample {
+    /// A sample that was not computed.
+    pub const NONE: Self = Self {
+        distance: f64::NAN,
+        face: NO_FACE,
+        foot: DVec3::NAN,
+    };
+
+    /// The sample of an exact query.
+    pub fn of(nearest: Nearest) -> Self {
+        Self {
+            distance: nearest.distance,
+            face: nearest.face as u16,
+            foot: nearest.point,
+        }
+    }
+}
+
+/// Samples and surfaces from which the nearest surfaces of the cells of a brick are found.
 pub(crate) struct CellNearby<'a> {
     /// Faces of the shape: surface, and +1 where the outward normal is the natural one, −1 where it is reversed.
     pub faces: &'a [(Surface, f64)],
+    /// Local patches of its free-form faces.
+    pub patches: &'a LocalPatches,
+    /// Largest error of a patch, mm.
+    pub tolerance_mm: f64,
     /// 9³ samples of the brick, x fastest.
     pub samples: &'a [ExactSample],
     /// Position of sample (0, 0, 0), mm, and the sample step.
     pub origin: DVec3,
     pub cell: f64,
+    /// Place of the brick's first cell in the grid.
+    pub first: [u32; 3],
 }
 
 impl CellNearby<'_> {
-    /// Palette entry of the cell with the lowest corner `at`; `nearest` is the face nearest to it.
-    pub fn of(&self, at: [usize; 3], nearest: u16) -> Nearby {
+    /// Palette entry of the cell with the lowest corner `at`; `nearest` is the face nearest to it, and `inside` returns exact samples inside it.
+    pub fn of(&self, at: [usize; 3], nearest: u16, inside: impl FnOnce() -> Vec<Place>) -> Nearby {
         if nearest > Nearby::MAX_FACES {
             return Nearby::Unknown;
         }
-        let corners: [(DVec3, ExactSample); 8] = std::array::from_fn(|c| {
-            let place = [at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)];
-            (self.position(place), self.samples[index(place)])
-        });
-        if corners
-            .iter()
-            .all(|(p, s)| (self.distance(nearest, *p) - s.distance).abs() <= SAME_MM)
-        {
-            return Nearby::Face(nearest);
+        let mut places: Vec<Place> = corner_places(at).map(|place| self.place(place)).to_vec();
+        let alone = self.alternatives(at, nearest);
+        let mut group = self.faces_about(at, nearest);
+        let any_patch = alone.iter().any(|&surface| self.is_patch(surface));
+        for face in &mut group {
+            if *face != NO_FACE {
+                *face = self.alternatives(at, *face).first().copied().unwrap_or(NO_FACE);
+            }
         }
-        let group = self.faces_about(at, nearest);
-        if group[1] != NO_FACE {
-            if self.all(&corners, &group, f64::max, |exact| exact <= SAME_MM) {
+        if any_patch || group.iter().any(|&surface| self.is_patch(surface)) {
+            places.extend(inside());
+        }
+        for surface in alone {
+            let tolerance = self.tolerance(&[surface]);
+            if (places.iter())
+                .all(|p| (self.distance(surface, p.at) - p.exact.distance).abs() <= tolerance)
+            {
+                return Nearby::Face(surface);
+            }
+        }
+        if group[0] != NO_FACE && group[1] != NO_FACE {
+            let tolerance = self.tolerance(&group);
+            if self.all(&places, &group, f64::max, |exact| exact <= tolerance) {
                 return Nearby::Convex(group);
             }
-            if self.all(&corners, &group, f64::min, |exact| exact >= -SAME_MM) {
+            if self.all(&places, &group, f64::min, |exact| exact >= -tolerance) {
                 return Nearby::Reentrant(group);
             }
         }
         Nearby::Roughly(nearest)
     }
 
-    /// Whether `fold` of the distances to the faces of `group` has, at all corners, the sign of the true distance and no larger magnitude, and equals
+    /// Surfaces that can stand for a face in a cell: the face itself, or its patches in the cell and in those around it.
+    fn alternatives(&self, at: [usize; 3], face: u16) -> Vec<u16> {
+        if !matches!(self.faces.get(usize::from(face)), Some((Surface::Spline, _))) {
+            return vec![face];
+        }
+        let cell: [u32; 3] = std::array::from_fn(|a| self.first[a] + at[a] as u32);
+        let mut found: Vec<u16> = Vec::new();
+        // The cell itself first.
+        for i in (0..27).map(|i| (i + 13) % 27) {
+            let step = [i % 3, i / 3 % 3, i / 9];
+            let beside = std::array::from_fn(|a| (cell[a] + step[a]).wrapping_sub(1));
+            let patch = self.patches.patch(beside, face);
+            let surface = patch.map(|patch| self.faces.len() as u16 + patch);
+            found.extend(surface.filter(|surface| !found.contains(surface)));
+        }
+        found
+    }
+
+    fn is_patch(&self, surface: u16) -> bool {
+        surface != NO_FACE && usize::from(surface) >= self.faces.len()
+    }
+
+    /// Tolerance of the distance to a group of surfaces, mm.
+    fn tolerance(&self, group: &[u16]) -> f64 {
+        if group.iter().any(|&surface| self.is_patch(surface)) {
+            self.tolerance_mm + SAME_MM
+        } else {
+            SAME_MM
+        }
+    }
+
+    /// Whether `fold` of the distances to the surfaces of `group` has, at all places, the sign of the true distance and no larger magnitude, and equals
     /// the true distance where `must` requires it.
     fn all(
         &self,
-        corners: &[(DVec3, ExactSample); 8],
+        places: &[Place],
         group: &[u16; 3],
         fold: impl Fn(f64, f64) -> f64,
         must: impl Fn(f64) -> bool,
     ) -> bool {
-        corners.iter().all(|(p, s)| {
-            let found = (group.iter().filter(|&&face| face != NO_FACE))
-                .map(|&face| self.distance(face, *p))
-                .reduce(&fold)
+        let tolerance = self.tolerance(group);
+        places.iter().all(|place| {
+            let exact = place.exact.distance;
+            let found = (group.iter().filter(|&&surface| surface != NO_FACE))
+                .map(|&surface| self.distance(surface, place.at))
+                .reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { fold(a, b) })
                 .unwrap_or(f64::NAN);
-            if must(s.distance) {
-                (found - s.distance).abs() <= SAME_MM
+            if must(exact) {
+                (found - exact).abs() <= tolerance
             } else {
-                found * s.distance > 0.0 && found.abs() <= s.distance.abs() + SAME_MM
+                found * exact > 0.0 && found.abs() <= exact.abs() + tolerance
             }
         })
     }
@@ -87,56 +160,76 @@ impl CellNearby<'_> {
     fn faces_about(&self, at: [usize; 3], nearest: u16) -> [u16; 3] {
         let mut group = [nearest, NO_FACE, NO_FACE];
         let mut count = 1;
-        let range = |a: usize| a.saturating_sub(1)..(a + 3).min(BRICK_SAMPLES);
-        for z in range(at[2]) {
-            for y in range(at[1]) {
-                for x in range(at[0]) {
-                    let face = self.samples[index([x, y, z])].face;
-                    if face == NO_FACE || group[..count].contains(&face) {
-                        continue;
-                    }
-                    if count == 3 || face > Nearby::MAX_FACES {
-                        return [nearest, NO_FACE, NO_FACE];
-                    }
-                    group[count] = face;
-                    count += 1;
-                }
+        for place in about(at) {
+            let face = self.samples[index(place)].face;
+            if face == NO_FACE || group[..count].contains(&face) {
+                continue;
             }
+            if count == 3 || face > Nearby::MAX_FACES {
+                return [nearest, NO_FACE, NO_FACE];
+            }
+            group[count] = face;
+            count += 1;
         }
         group
     }
 
-    fn position(&self, place: [usize; 3]) -> DVec3 {
-        self.origin + DVec3::from_array(place.map(|i| i as f64)) * self.cell
+    /// Exact sample at a place of the brick's lattice.
+    fn place(&self, place: [usize; 3]) -> Place {
+        Place {
+            at: self.origin + DVec3::from_array(place.map(|i| i as f64)) * self.cell,
+            exact: self.samples[index(place)],
+        }
     }
 
-    /// Signed distance to the unbounded surface of a face, mm; NaN where it has no closed form.
-    fn distance(&self, face: u16, p: DVec3) -> f64 {
-        let Some((surface, sense)) = self.faces.get(usize::from(face)) else {
-            return f64::NAN;
-        };
-        let natural = match *surface {
-            Surface::Plane { frame } => to_local(&frame, p).z,
-            Surface::Cylinder { frame, radius } => to_local(&frame, p).truncate().length() - radius,
-            Surface::Cone {
-                frame,
-                radius,
-                half_angle,
-            } => {
-                let q = to_local(&frame, p);
-                (q.truncate().length() - radius) * half_angle.cos() - q.z * half_angle.sin()
-            }
-            Surface::Sphere { frame, radius } => p.distance(frame.origin) - radius,
-            Surface::Torus { frame, major, minor } => {
-                let q = to_local(&frame, p);
-                (q.truncate().length() - major).hypot(q.z) - minor
-            }
-            Surface::Spline => f64::NAN,
-        };
-        natural * sense
+    /// Signed distance to a surface by its index, mm: to the unbounded surface of a face, NaN where it has no closed form, or to a patch.
+    fn distance(&self, surface: u16, p: DVec3) -> f64 {
+        let number = usize::from(surface);
+        match self.faces.get(number) {
+            Some((face, sense)) => unbounded_distance(face, p) * sense,
+            None => (self.patches.records.get(number - self.faces.len()))
+                .map_or(f64::NAN, |patch| board_distance(patch, p)),
+        }
     }
 }
 
-fn index([x, y, z]: [usize; 3]) -> usize {
+/// Signed distance to an unbounded surface on the side of its natural normal, mm; NaN where it has no closed form.
+fn unbounded_distance(surface: &Surface, p: DVec3) -> f64 {
+    match *surface {
+        Surface::Plane { frame } => to_local(&frame, p).z,
+        Surface::Cylinder { frame, radius } => to_local(&frame, p).truncate().length() - radius,
+        Surface::Cone {
+            frame,
+            radius,
+            half_angle,
+        } => {
+            let q = to_local(&frame, p);
+            (q.truncate().length() - radius) * half_angle.cos() - q.z * half_angle.sin()
+        }
+        Surface::Sphere { frame, radius } => p.distance(frame.origin) - radius,
+        Surface::Torus { frame, major, minor } => {
+            let q = to_local(&frame, p);
+            (q.truncate().length() - major).hypot(q.z) - minor
+        }
+        Surface::Spline => f64::NAN,
+    }
+}
+
+/// Places of the corners of the cell with the lowest corner `at`, x fastest.
+pub(crate) fn corner_places(at: [usize; 3]) -> [[usize; 3]; 8] {
+    std::array::from_fn(|c| [at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)])
+}
+
+/// Places of the samples around the cell with the lowest corner `at`, as far as they lie in its brick: its corners and one more in each direction.
+pub(crate) fn about(at: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    let [x, y, z] = at.map(|i| i.saturating_sub(1)..(i + 3).min(BRICK_SAMPLES));
+    z.flat_map(move |z| {
+        let x = x.clone();
+        y.clone().flat_map(move |y| x.clone().map(move |x| [x, y, z]))
+    })
+}
+
+/// Index of a sample in its brick.
+pub(crate) fn index([x, y, z]: [usize; 3]) -> usize {
     x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)
 }

@@ -321,6 +321,7 @@ fn pack(
         sample_bytes,
         bricks,
         palette,
+        patches: Vec::new(),
         blob,
         stored_entries,
         sign_disagreements: near.sign_disagreements,

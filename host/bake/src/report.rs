@@ -24,6 +24,9 @@ pub struct ByteCount {
     pub nodes: usize,
     /// Face records.
     pub faces: usize,
+    /// Local patches of free-form faces.
+    #[serde(default)]
+    pub patches: usize,
     /// Shape and field records.
     pub records: usize,
 }
@@ -39,6 +42,7 @@ impl ByteCount {
             + self.points
             + self.nodes
             + self.faces
+            + self.patches
             + self.records
     }
 }
