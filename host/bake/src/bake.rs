@@ -4,7 +4,8 @@ use std::ops::ControlFlow;
 
 use mortise_brep::{CadModel, Surface};
 use mortise_protocol::image::{
-    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PatchRecord, PointRecord, ShapeRecord,
+    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PatchRecord, PointRecord,
+    ShapeRecord,
 };
 use rayon::prelude::*;
 
@@ -410,6 +411,7 @@ fn shape_report(
             .iter()
             .filter(|f| matches!(f.surface, Surface::Spline))
             .count(),
+        free_form: field.free_form,
     }
 }
 

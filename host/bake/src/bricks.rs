@@ -9,6 +9,7 @@ use mortise_protocol::image::{
 use crate::cover::{LocalPatches, verify_places};
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
+use crate::free_form_error::{FreeFormError, NEAR_CELLS};
 use crate::grid::Grid;
 use crate::nearby::{CellNearby, ExactSample, corner_places, index};
 
@@ -24,6 +25,8 @@ pub(crate) struct Brick {
     pub palette: Vec<u16>,
     /// Number of entries, without groups.
     pub palette_len: u16,
+    /// Error near free-form faces.
+    pub free_form: FreeFormError,
 }
 
 /// Exact samples of the brick at place `at` of `grid`, x fastest.
@@ -68,7 +71,7 @@ pub(crate) fn bake_brick(
             SampleFormat::Int16 => samples.extend((value as i16).to_le_bytes()),
         }
     }
-    let cells = cells(surface, grid, patches, options.patch_tolerance_mm, at, exact);
+    let (cells, free_form) = cells(surface, grid, patches, options.patch_tolerance_mm, at, exact);
     let Packed {
         palette,
         palette_len,
@@ -81,6 +84,7 @@ pub(crate) fn bake_brick(
         indices,
         palette,
         palette_len,
+        free_form,
     }
 }
 
@@ -100,7 +104,7 @@ fn cells(
     tolerance_mm: f64,
     at: [u32; 3],
     samples: &[ExactSample],
-) -> [Nearby; CELLS_PER_BRICK] {
+) -> ([Nearby; CELLS_PER_BRICK], FreeFormError) {
     let faces: Vec<(Surface, f64)> = (surface.shape().faces.iter())
         .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
         .collect();
@@ -114,27 +118,35 @@ fn cells(
         first: at.map(|b| b * BRICK_CELLS as u32),
     };
     let mut scratch = Scratch::default();
-    std::array::from_fn(|i| {
+    let mut error = FreeFormError::default();
+    let cells = std::array::from_fn(|i| {
         let cell = [i & 7, i >> 3 & 7, i >> 6];
         let corner = |c: usize| samples[index(corner_places(cell)[c])].face;
         let first = corner(0);
-        let lowest = grid.sample(at, cell);
         let nearest = if (1..8).all(|c| corner(c) == first) {
             first
         } else {
-            let center = lowest + DVec3::splat(grid.cell() / 2.0);
+            let center = grid.sample(at, cell) + DVec3::splat(grid.cell() / 2.0);
             surface
                 .query(center, f64::INFINITY, &mut scratch)
                 .map_or(NO_FACE, |n| n.face as u16)
         };
-        nearby.of(cell, nearest, || {
-            let known = patches.verified(std::array::from_fn(|a| nearby.first[a] + cell[a] as u32));
+        let known = patches.verified(std::array::from_fn(|a| nearby.first[a] + cell[a] as u32));
+        let named = nearby.of(cell, nearest, || {
             known.copied().map_or_else(
-                || verify_places(surface, lowest, grid.cell(), &mut scratch).to_vec(),
+                || verify_places(surface, nearby.place(cell), grid.cell(), &mut scratch).to_vec(),
                 |places| places.to_vec(),
             )
-        })
-    })
+        });
+        for place in known.into_iter().flatten() {
+            if place.exact.distance.abs() <= NEAR_CELLS * grid.cell() {
+                let interpolated = matches!(named, Nearby::Roughly(_) | Nearby::Unknown);
+                error.add(place, nearby.rendered(cell, named, place), interpolated);
+            }
+        }
+        named
+    });
+    (cells, error)
 }
 
 /// Nearest faces of the cells of a brick, as stored.

@@ -23,7 +23,7 @@ pub(crate) const REACH_CELLS: f64 = 1.5;
 /// Most points of one fit: more of them change a cubic by less than its tolerance.
 const MOST_POINTS: usize = 600;
 /// With fewer cells a patch is fitted to a lattice of points in each instead of its corners alone.
-const FEW_CELLS: usize = 6;
+const FEW_CELLS: usize = 3;
 /// Places in a cell that are verified, and not fitted to.
 pub(crate) const VERIFIED: [[f64; 3]; 5] = [
     [0.5, 0.5, 0.5],
@@ -126,19 +126,27 @@ fn is_free_form(surface: &ExactSurface, face: u16) -> bool {
         && surface.topology.free_forms.patch(u32::from(face)).is_some()
 }
 
-/// Exact samples at [`VERIFIED`] of the cell whose lowest corner is `corner`.
+/// Exact samples at [`VERIFIED`] of the cell with the lowest corner `corner`.
 pub(crate) fn verify_places(
     surface: &ExactSurface,
-    corner: DVec3,
+    corner: Place,
     cell: f64,
     scratch: &mut Scratch,
 ) -> [Place; VERIFIED.len()] {
-    VERIFIED.map(|f| place(surface, corner + DVec3::from_array(f) * cell, scratch))
+    VERIFIED.map(|f| beside(surface, corner, DVec3::from_array(f) * cell, scratch))
 }
 
-fn place(surface: &ExactSurface, at: DVec3, scratch: &mut Scratch) -> Place {
+/// Exact sample at `step` from a place; the place's distance bounds the search.
+fn beside(surface: &ExactSurface, from: Place, step: DVec3, scratch: &mut Scratch) -> Place {
+    let at = from.at + step;
+    let known = from.exact.distance.abs();
+    let within = if known.is_nan() {
+        f64::INFINITY
+    } else {
+        (known + step.length()) * (1.0 + 1e-9)
+    };
     let exact = surface
-        .query(at, f64::INFINITY, scratch)
+        .query(at, within, scratch)
         .map_or(ExactSample::NONE, ExactSample::of);
     Place { at, exact }
 }
@@ -170,7 +178,7 @@ fn near_cells<'a>(
         }
         Some(NearCell {
             cell: std::array::from_fn(|a| brick[a] * BRICK_CELLS as u32 + at[a] as u32),
-            verified: verify_places(surface, corners[0].at, grid.cell(), &mut scratch),
+            verified: verify_places(surface, corners[0], grid.cell(), &mut scratch),
             corners,
             faces,
         })
@@ -232,8 +240,8 @@ impl Fitter<'_> {
             for cell in cells {
                 let lattice = (0..27).map(|i| DVec3::new((i % 3) as f64, (i / 3 % 3) as f64, (i / 9) as f64));
                 all.extend(lattice.filter_map(|i| {
-                    let at = cell.corners[0].at + (i + 0.5) * (self.cell / 3.0);
-                    self.foot(&place(self.surface, at, &mut scratch))
+                    let step = (i + 0.5) * (self.cell / 3.0);
+                    self.foot(&beside(self.surface, cell.corners[0], step, &mut scratch))
                 }));
             }
         }
@@ -270,7 +278,8 @@ impl Fitter<'_> {
     fn is_along_normal(&self, patch: &PatchRecord, foot: &FacePoint, distance: f64) -> bool {
         let at = mortise_haptics::Vec3::from_array((foot.at / 1000.0).as_vec3().to_array());
         mortise_haptics::distance_to_patch(patch, at).is_some_and(|(_, normal)| {
-            foot.outward.dot(DVec3::from_array(normal.to_array().map(f64::from)))
+            foot.outward
+                .dot(DVec3::from_array(normal.to_array().map(f64::from)))
                 >= ALONG_NORMAL * distance.abs()
         })
     }

@@ -16,6 +16,7 @@ use crate::cover::{LocalPatches, Sampled, has_free_forms};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::format::FieldOptions;
+use crate::free_form_error::FreeFormError;
 use crate::grid::Grid;
 use crate::nearby::ExactSample;
 
@@ -32,6 +33,8 @@ pub struct BakedField {
     pub palette: Vec<u16>,
     /// Local patches that palettes name.
     pub patches: Vec<PatchRecord>,
+    /// Measured error near free-form faces.
+    pub free_form: FreeFormError,
     /// Samples and palette indices.
     pub blob: Vec<u8>,
     /// Number of sample bytes in `blob`; the rest are palette indices and padding.
@@ -81,7 +84,9 @@ pub fn bake_field(
             .collect();
         let sampled = sampled.ok_or(BakeError::Cancelled)?;
         let patches = LocalPatches::cover(surface, &grid, &sampled, options.patch_tolerance_mm);
-        let bricks = sampled.par_iter().map(|(at, exact)| Some(baked(&patches, *at, exact)));
+        let bricks = sampled
+            .par_iter()
+            .map(|(at, exact)| Some(baked(&patches, *at, exact)));
         (bricks.collect(), patches)
     } else {
         let none = LocalPatches::default();
@@ -90,12 +95,15 @@ pub fn bake_field(
         (bricks.collect(), LocalPatches::default())
     };
     let bricks = bricks.ok_or(BakeError::Cancelled)?;
+    let free_form =
+        (bricks.iter().map(|brick| brick.free_form)).fold(FreeFormError::default(), FreeFormError::and);
     let packed = pack(&grid, options, &near.classes, &near.stored, bricks);
     check_brick_count(packed.bricks.len(), options.cell_mm, part)?;
     Ok(BakedField {
         sign_tests: near.sign_tests,
         sign_disagreements: near.sign_disagreements,
         patches: patches.records,
+        free_form,
         ..packed
     })
 }
@@ -289,6 +297,7 @@ fn pack(
         bricks: records,
         palette,
         patches: Vec::new(),
+        free_form: FreeFormError::default(),
         blob,
         sample_bytes,
         stored_entries: stored.len(),

@@ -5,7 +5,8 @@ use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE, NodeRecord,
-    PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode, surface_kind,
+    PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode,
+    surface_kind,
 };
 
 use crate::field::BakedField;

@@ -24,7 +24,18 @@ pub(crate) struct FacePoint {
 
 /// Powers of u and v in the order of [`PatchRecord::height`].
 fn terms(u: f64, v: f64) -> [f64; TERMS] {
-    [1.0, u, v, u * u, u * v, v * v, u * u * u, u * u * v, u * v * v, v * v * v]
+    [
+        1.0,
+        u,
+        v,
+        u * u,
+        u * v,
+        v * v,
+        u * u * u,
+        u * u * v,
+        u * v * v,
+        v * v * v,
+    ]
 }
 
 /// Degree of each of the [`terms`].

@@ -83,9 +83,7 @@ impl CellNearby<'_> {
         }
         for surface in alone {
             let tolerance = self.tolerance(&[surface]);
-            if (places.iter())
-                .all(|p| (self.distance(surface, p.at) - p.exact.distance).abs() <= tolerance)
-            {
+            if (places.iter()).all(|p| (self.distance(surface, p.at) - p.exact.distance).abs() <= tolerance) {
                 return Nearby::Face(surface);
             }
         }
@@ -99,6 +97,34 @@ impl CellNearby<'_> {
             }
         }
         Nearby::Roughly(nearest)
+    }
+
+    /// Distance that the board computes at a place of the cell with the lowest corner `at`, before rounding; `None` where it is only a bound.
+    pub fn rendered(&self, at: [usize; 3], nearby: Nearby, place: &Place) -> Option<f64> {
+        let fold = |group: [u16; 3], fold: fn(f64, f64) -> f64| {
+            let each = group.into_iter().filter(|&surface| surface != NO_FACE);
+            each.map(|surface| self.distance(surface, place.at)).reduce(fold)
+        };
+        match nearby {
+            Nearby::Face(surface) => Some(self.distance(surface, place.at)),
+            Nearby::Convex(group) => fold(group, f64::max).filter(|_| place.exact.distance <= 0.0),
+            Nearby::Reentrant(group) => fold(group, f64::min).filter(|_| place.exact.distance >= 0.0),
+            Nearby::Roughly(_) | Nearby::Unknown => {
+                let lowest = self.place(at).at;
+                let fraction = (place.at - lowest) / self.cell;
+                let weighted = corner_places(at).into_iter().enumerate().map(|(c, corner)| {
+                    let along = |a: usize| {
+                        if c >> a & 1 == 1 {
+                            fraction[a]
+                        } else {
+                            1.0 - fraction[a]
+                        }
+                    };
+                    along(0) * along(1) * along(2) * self.samples[index(corner)].distance
+                });
+                Some(weighted.sum())
+            }
+        }
     }
 
     /// Surfaces that can stand for a face in a cell: the face itself, or its patches in the cell and in those around it.
@@ -146,7 +172,13 @@ impl CellNearby<'_> {
             let exact = place.exact.distance;
             let found = (group.iter().filter(|&&surface| surface != NO_FACE))
                 .map(|&surface| self.distance(surface, place.at))
-                .reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { fold(a, b) })
+                .reduce(|a, b| {
+                    if a.is_nan() || b.is_nan() {
+                        f64::NAN
+                    } else {
+                        fold(a, b)
+                    }
+                })
                 .unwrap_or(f64::NAN);
             if must(exact) {
                 (found - exact).abs() <= tolerance
@@ -175,7 +207,7 @@ impl CellNearby<'_> {
     }
 
     /// Exact sample at a place of the brick's lattice.
-    fn place(&self, place: [usize; 3]) -> Place {
+    pub fn place(&self, place: [usize; 3]) -> Place {
         Place {
             at: self.origin + DVec3::from_array(place.map(|i| i as f64)) * self.cell,
             exact: self.samples[index(place)],

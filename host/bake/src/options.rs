@@ -76,7 +76,13 @@ impl BakeOptions {
         }
         // With less than one diagonal not all cells next to the surface would be stored.
         within("band_cells", self.band_cells, 1.0, 64.0, "1 to 64 cells")?;
-        within("patch_tolerance_mm", self.patch_tolerance_mm, 1e-6, 1e3, "0.000001 to 1000 mm")?;
+        within(
+            "patch_tolerance_mm",
+            self.patch_tolerance_mm,
+            1e-6,
+            1e3,
+            "0.000001 to 1000 mm",
+        )?;
         for epsilon in [self.epsilon_mm, self.crossing_epsilon_mm].into_iter().flatten() {
             within("epsilon_mm", epsilon, 1e-6, 1e3, "0.000001 to 1000 mm")?;
         }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::format::SampleFormat;
+use crate::free_form_error::FreeFormError;
 use crate::options::Method;
 
 /// Bytes by kind.
@@ -85,6 +86,9 @@ pub struct ShapeReport {
     pub surface_error_mm: f64,
     /// Number of faces without closed form.
     pub spline_faces: usize,
+    /// Measured error of the field near them.
+    #[serde(default)]
+    pub free_form: FreeFormError,
 }
 
 /// One part of the image.

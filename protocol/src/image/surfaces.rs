@@ -27,10 +27,7 @@ impl<'a> Surfaces<'a> {
         let index = usize::from(surface);
         match self.faces.get(index) {
             Some(face) => Some(Surface::Face(face)),
-            None => self
-                .patches
-                .get(index - self.faces.len())
-                .map(Surface::Patch),
+            None => self.patches.get(index - self.faces.len()).map(Surface::Patch),
         }
     }
 

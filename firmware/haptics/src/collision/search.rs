@@ -368,7 +368,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let in_field = pair.to_field.apply(point.position);
         match pair.field.place(in_field.to_array()) {
             Place::Cell(cell) => {
-                let found = cell.surface().and_then(|surface| on_surface_of(pair.surfaces, surface, in_field));
+                let found = cell
+                    .surface()
+                    .and_then(|surface| on_surface_of(pair.surfaces, surface, in_field));
                 if let Some(found) = found {
                     if found.distance < self.search.margin {
                         self.near(pair, leaf, point, &found);

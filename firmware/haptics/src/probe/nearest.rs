@@ -12,7 +12,9 @@ use mortise_protocol::image::{
 };
 
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::exact_surface::{OnFace, agreeing, closed_form, exact, on_surface_of, unsigned_distance};
+use crate::collision::exact_surface::{
+    OnFace, agreeing, closed_form, exact, on_surface_of, unsigned_distance,
+};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
 use crate::io::Work;

@@ -1,0 +1,52 @@
+//! Measured error of a field near free-form faces.
+
+use serde::{Deserialize, Serialize};
+
+use crate::cover::Place;
+
+/// Distance from the surface up to which the error is measured, cells: contacts and the gaps of fits are nearer than that.
+pub(crate) const NEAR_CELLS: f64 = 0.5;
+
+/// Errors at places near free-form faces that no patch was fitted to: five in each cell near such a face, as far as they are within half a cell of
+/// the surface. Where the board's distance is only a bound (outside a convex edge) there is no error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FreeFormError {
+    /// Places measured.
+    pub places: usize,
+    /// Places where no surface answers, so that the distance is interpolated.
+    pub interpolated: usize,
+    /// Largest error where surfaces answer, mm.
+    pub by_surfaces_mm: f64,
+    /// Largest error where the distance is interpolated, mm.
+    pub interpolated_mm: f64,
+}
+
+impl FreeFormError {
+    /// Adds the error at a place.
+    pub(crate) fn add(&mut self, place: &Place, rendered: Option<f64>, interpolated: bool) {
+        let Some(rendered) = rendered else { return };
+        let error = (rendered - place.exact.distance).abs();
+        self.places += 1;
+        if interpolated {
+            self.interpolated += 1;
+            self.interpolated_mm = self.interpolated_mm.max(error);
+        } else {
+            self.by_surfaces_mm = self.by_surfaces_mm.max(error);
+        }
+    }
+
+    /// Both together.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            places: self.places + other.places,
+            interpolated: self.interpolated + other.interpolated,
+            by_surfaces_mm: self.by_surfaces_mm.max(other.by_surfaces_mm),
+            interpolated_mm: self.interpolated_mm.max(other.interpolated_mm),
+        }
+    }
+
+    /// Largest error, mm.
+    pub fn worst_mm(&self) -> f64 {
+        self.by_surfaces_mm.max(self.interpolated_mm)
+    }
+}
