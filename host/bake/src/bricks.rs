@@ -9,7 +9,7 @@ use mortise_protocol::image::{
 use crate::cover::{LocalPatches, verify_places};
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
-use crate::free_form_error::{FreeFormError, NEAR_CELLS};
+use crate::free_form_error::FreeFormError;
 use crate::grid::Grid;
 use crate::nearby::{CellNearby, ExactSample, corner_places, index};
 
@@ -139,10 +139,13 @@ fn cells(
             )
         });
         for place in known.into_iter().flatten() {
-            if place.exact.distance.abs() <= NEAR_CELLS * grid.cell() {
-                let interpolated = matches!(named, Nearby::Roughly(_) | Nearby::Unknown);
-                error.add(place, nearby.rendered(cell, named, place), interpolated);
-            }
+            let interpolated = matches!(named, Nearby::Roughly(_) | Nearby::Unknown);
+            error.add(
+                place,
+                grid.cell(),
+                nearby.rendered(cell, named, place),
+                interpolated,
+            );
         }
         named
     });

@@ -18,8 +18,11 @@ use crate::grid::Grid;
 use crate::local_patch::{FacePoint, board_distance, fit};
 use crate::nearby::{ExactSample, about, corner_places, index};
 
-/// Cells with a corner this near to the surface must have a patch, cells: these are the ones that the surface crosses, and their neighbours.
-pub(crate) const REACH_CELLS: f64 = 1.5;
+/// Distance from the surface up to which patches are fitted and hold their tolerance, cells. Farther off the feet of a cell spread: a cell deep inside
+/// a sharply curved face would need a patch of half of that face.
+pub(crate) const NEAR_CELLS: f64 = 0.6;
+/// A cell with no corner this near to the surface has no point that near, cells.
+const REACH_CELLS: f64 = NEAR_CELLS + 0.87;
 /// Most points of one fit: more of them change a cubic by less than its tolerance.
 const MOST_POINTS: usize = 600;
 /// With fewer cells a patch is fitted to a lattice of points in each instead of its corners alone.
@@ -248,9 +251,10 @@ impl Fitter<'_> {
         all
     }
 
-    /// Foot of a place if it lies on the face.
+    /// Foot of a place near the surface if it lies on the face.
     fn foot(&self, place: &Place) -> Option<FacePoint> {
-        (place.exact.face == self.face).then_some(FacePoint {
+        let near = place.exact.distance.abs() <= NEAR_CELLS * self.cell;
+        (near && place.exact.face == self.face).then_some(FacePoint {
             at: place.exact.foot,
             outward: (place.at - place.exact.foot) * place.exact.distance.signum(),
         })
@@ -258,19 +262,15 @@ impl Fitter<'_> {
 
     /// Whether the patch passes through the feet of a cell's places, and gives their distances, within the tolerance.
     fn holds(&self, patch: &PatchRecord, cell: &NearCell) -> bool {
-        let normal = DVec3::from_array(patch.normal.map(f64::from));
         cell.corners.iter().chain(&cell.verified).all(|place| {
             let Some(foot) = self.foot(place) else { return true };
             let distance = place.exact.distance;
             // False for NaN.
-            let on = board_distance(patch, foot.at).abs() <= self.tolerance_mm;
-            let near = distance.abs() <= REACH_CELLS * self.cell;
+            let within =
+                |p: DVec3, distance: f64| (board_distance(patch, p) - distance).abs() <= self.tolerance_mm;
             // On the border of the face the cell is decided together with its neighbours.
-            let inside = self.is_along_normal(patch, &foot, distance);
-            on && (!near
-                || !inside
-                || foot.outward.dot(normal) >= 0.0
-                    && (board_distance(patch, place.at) - distance).abs() <= self.tolerance_mm)
+            within(foot.at, 0.0)
+                && (!self.is_along_normal(patch, &foot, distance) || within(place.at, distance))
         })
     }
 

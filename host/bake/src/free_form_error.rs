@@ -2,13 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::cover::Place;
+use crate::cover::{NEAR_CELLS, Place};
 
-/// Distance from the surface up to which the error is measured, cells: contacts and the gaps of fits are nearer than that.
-pub(crate) const NEAR_CELLS: f64 = 0.5;
-
-/// Errors at places near free-form faces that no patch was fitted to: five in each cell near such a face, as far as they are within half a cell of
-/// the surface. Where the board's distance is only a bound (outside a convex edge) there is no error.
+/// Errors at places near free-form faces that no patch was fitted to: five in each cell near such a face, as far as they are within
+/// [`NEAR_CELLS`] of the surface. Where the board's distance is only a bound (outside a convex edge) there is no error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FreeFormError {
     /// Places measured.
@@ -23,8 +20,10 @@ pub struct FreeFormError {
 
 impl FreeFormError {
     /// Adds the error at a place.
-    pub(crate) fn add(&mut self, place: &Place, rendered: Option<f64>, interpolated: bool) {
-        let Some(rendered) = rendered else { return };
+    pub(crate) fn add(&mut self, place: &Place, cell_mm: f64, rendered: Option<f64>, interpolated: bool) {
+        let Some(rendered) = rendered.filter(|_| place.exact.distance.abs() <= NEAR_CELLS * cell_mm) else {
+            return;
+        };
         let error = (rendered - place.exact.distance).abs();
         self.places += 1;
         if interpolated {

@@ -9,13 +9,18 @@ use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_SAMPLES, NO_FACE, Nearby};
 
-use crate::cover::{LocalPatches, Place};
+use crate::cover::{LocalPatches, NEAR_CELLS, Place};
 use crate::distance::Nearest;
 use crate::local_patch::board_distance;
 use crate::surface::to_local;
 
 /// Tolerance of exact distances, mm: rounding, and vertices a tenth of a micrometre off their curves.
 const SAME_MM: f64 = 2e-4;
+
+/// Growth of the tolerance of patches beyond [`NEAR_CELLS`] of the surface, where they were not fitted: share of the distance.
+const FAR_ERROR: f64 = 0.01;
+/// Most patches tried for one face of a group.
+const MOST_CHOICES: usize = 8;
 
 /// A sample of a brick before rounding.
 #[derive(Clone, Copy)]
@@ -71,29 +76,28 @@ impl CellNearby<'_> {
         }
         let mut places: Vec<Place> = corner_places(at).map(|place| self.place(place)).to_vec();
         let alone = self.alternatives(at, nearest);
-        let mut group = self.faces_about(at, nearest);
-        let any_patch = alone.iter().any(|&surface| self.is_patch(surface));
-        for face in &mut group {
-            if *face != NO_FACE {
-                *face = self.alternatives(at, *face).first().copied().unwrap_or(NO_FACE);
-            }
-        }
-        if any_patch || group.iter().any(|&surface| self.is_patch(surface)) {
+        let faces = self.faces_about(at, nearest);
+        let choices = faces.map(|face| match face {
+            NO_FACE => vec![NO_FACE],
+            _ => self.alternatives(at, face),
+        });
+        if (alone.iter().chain(choices.iter().flatten())).any(|&surface| self.is_patch(surface)) {
             places.extend(inside());
         }
         for surface in alone {
-            let tolerance = self.tolerance(&[surface]);
-            if (places.iter()).all(|p| (self.distance(surface, p.at) - p.exact.distance).abs() <= tolerance) {
+            let group = [surface, NO_FACE, NO_FACE];
+            if self.all(&places, &group, f64::max, |_| true) {
                 return Nearby::Face(surface);
             }
         }
-        if group[0] != NO_FACE && group[1] != NO_FACE {
-            let tolerance = self.tolerance(&group);
-            if self.all(&places, &group, f64::max, |exact| exact <= tolerance) {
-                return Nearby::Convex(group);
-            }
-            if self.all(&places, &group, f64::min, |exact| exact >= -tolerance) {
-                return Nearby::Reentrant(group);
+        if faces[1] != NO_FACE {
+            for group in combinations(&choices) {
+                if self.all(&places, &group, f64::max, |exact| exact <= SAME_MM) {
+                    return Nearby::Convex(group);
+                }
+                if self.all(&places, &group, f64::min, |exact| exact >= -SAME_MM) {
+                    return Nearby::Reentrant(group);
+                }
             }
         }
         Nearby::Roughly(nearest)
@@ -149,15 +153,6 @@ impl CellNearby<'_> {
         surface != NO_FACE && usize::from(surface) >= self.faces.len()
     }
 
-    /// Tolerance of the distance to a group of surfaces, mm.
-    fn tolerance(&self, group: &[u16]) -> f64 {
-        if group.iter().any(|&surface| self.is_patch(surface)) {
-            self.tolerance_mm + SAME_MM
-        } else {
-            SAME_MM
-        }
-    }
-
     /// Whether `fold` of the distances to the surfaces of `group` has, at all places, the sign of the true distance and no larger magnitude, and equals
     /// the true distance where `must` requires it.
     fn all(
@@ -167,9 +162,14 @@ impl CellNearby<'_> {
         fold: impl Fn(f64, f64) -> f64,
         must: impl Fn(f64) -> bool,
     ) -> bool {
-        let tolerance = self.tolerance(group);
+        let any_patch = group.iter().any(|&surface| self.is_patch(surface));
         places.iter().all(|place| {
             let exact = place.exact.distance;
+            let beyond = exact.abs() - NEAR_CELLS * self.cell;
+            let tolerance = match any_patch {
+                true => self.tolerance_mm + SAME_MM + FAR_ERROR * beyond.max(0.0),
+                false => SAME_MM,
+            };
             let found = (group.iter().filter(|&&surface| surface != NO_FACE))
                 .map(|&surface| self.distance(surface, place.at))
                 .reduce(|a, b| {
@@ -180,7 +180,10 @@ impl CellNearby<'_> {
                     }
                 })
                 .unwrap_or(f64::NAN);
-            if must(exact) {
+            if found.is_nan() {
+                // Beyond the centre of curvature of a patch the board interpolates.
+                any_patch && beyond > 0.0
+            } else if must(exact) {
                 (found - exact).abs() <= tolerance
             } else {
                 found * exact > 0.0 && found.abs() <= exact.abs() + tolerance
@@ -223,6 +226,14 @@ impl CellNearby<'_> {
                 .map_or(f64::NAN, |patch| board_distance(patch, p)),
         }
     }
+}
+
+/// All groups with one surface of each choice; none where a choice is empty.
+fn combinations(choices: &[Vec<u16>; 3]) -> impl Iterator<Item = [u16; 3]> {
+    let [a, b, c] = choices
+        .each_ref()
+        .map(|choice| &choice[..choice.len().min(MOST_CHOICES)]);
+    (a.iter()).flat_map(move |&a| b.iter().flat_map(move |&b| c.iter().map(move |&c| [a, b, c])))
 }
 
 /// Signed distance to an unbounded surface on the side of its natural normal, mm; NaN where it has no closed form.
