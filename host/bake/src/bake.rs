@@ -95,7 +95,7 @@ pub(crate) struct Made {
 
 impl Made {
     /// Bytes of the shapes in the image, without parts and header.
-    fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         let shells = self.shells.iter().map(|shell| {
             let points = shell.points.len();
             (points * size_of::<PointRecord>() + node_count(points) * size_of::<NodeRecord>()) as u64
@@ -128,6 +128,21 @@ impl Scene {
             shells.push(self.shell(i, &prepared[i], &self.partners[i], cell, options, progress)?);
         }
         Ok(Made { fields, shells })
+    }
+
+    /// Makes field and pointshell of one shape again, with cells of about this size.
+    pub fn again(
+        &self,
+        index: usize,
+        options: &BakeOptions,
+        surface: &mut ExactSurface,
+        mut cell_mm: f64,
+        progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+        made: &mut Made,
+    ) -> Result<(), BakeError> {
+        made.fields[index] = self.field(index, surface, &mut cell_mm, options, progress)?;
+        made.shells[index] = self.shell(index, surface, &self.partners[index], cell_mm, options, progress)?;
+        Ok(())
     }
 
     /// Makes new pointshells for existing fields.

@@ -9,7 +9,7 @@ use mortise_protocol::image::{
 use crate::cover::{LocalPatches, verify_places};
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
-use crate::free_form_error::FreeFormError;
+use crate::free_form_error::{AnsweredBy, FreeFormError};
 use crate::grid::Grid;
 use crate::nearby::{CellNearby, ExactSample, corner_places, index};
 
@@ -138,14 +138,15 @@ fn cells(
                 |places| places.to_vec(),
             )
         });
+        let by = match named {
+            Nearby::Roughly(_) | Nearby::Unknown if nearby.at_edge(cell, nearest) => {
+                AnsweredBy::SamplesAtEdge
+            }
+            Nearby::Roughly(_) | Nearby::Unknown => AnsweredBy::Samples,
+            _ => AnsweredBy::Surfaces,
+        };
         for place in known.into_iter().flatten() {
-            let interpolated = matches!(named, Nearby::Roughly(_) | Nearby::Unknown);
-            error.add(
-                place,
-                grid.cell(),
-                nearby.rendered(cell, named, place),
-                interpolated,
-            );
+            error.add(place, grid.cell(), nearby.rendered(cell, named, place), by);
         }
         named
     });

@@ -18,10 +18,14 @@ use crate::grid::Grid;
 use crate::local_patch::{FacePoint, board_distance, fit};
 use crate::nearby::{ExactSample, about, corner_places, index};
 
-/// Distance from the surface up to which patches are fitted and hold their tolerance, cells. Farther off the feet of a cell spread: a cell deep inside
-/// a sharply curved face would need a patch of half of that face.
+/// Distance from the surface up to which patches hold their tolerance, cells. Farther off the feet of a cell spread: a cell deep inside a sharply
+/// curved face would need a patch of half of that face.
 pub(crate) const NEAR_CELLS: f64 = 0.6;
-/// A cell with no corner this near to the surface has no point that near, cells.
+/// Distance up to which patches are fitted, cells: that of a corner of a cell that the surface crosses.
+const FITTED_CELLS: f64 = 0.9;
+/// Error of patches farther off than [`NEAR_CELLS`], as a share of the distance.
+const FAR_ERROR: f64 = 0.02;
+/// A cell with no corner this near to the surface has no point within [`NEAR_CELLS`], cells.
 const REACH_CELLS: f64 = NEAR_CELLS + 0.87;
 /// Most points of one fit: more of them change a cubic by less than its tolerance.
 const MOST_POINTS: usize = 600;
@@ -37,6 +41,15 @@ pub(crate) const VERIFIED: [[f64; 3]; 5] = [
 ];
 /// A foot whose direction is farther than this from the surface's normal is on the face's border: cosine.
 const ALONG_NORMAL: f64 = 0.9999;
+
+/// Largest error of a patch at this distance from the surface, mm.
+pub(crate) fn tolerance_at(tolerance_mm: f64, cell_mm: f64, distance: f64) -> f64 {
+    if distance.abs() <= NEAR_CELLS * cell_mm {
+        tolerance_mm
+    } else {
+        tolerance_mm + FAR_ERROR * distance.abs()
+    }
+}
 
 /// An exact sample at a place.
 #[derive(Clone, Copy)]
@@ -253,7 +266,7 @@ impl Fitter<'_> {
 
     /// Foot of a place near the surface if it lies on the face.
     fn foot(&self, place: &Place) -> Option<FacePoint> {
-        let near = place.exact.distance.abs() <= NEAR_CELLS * self.cell;
+        let near = place.exact.distance.abs() <= FITTED_CELLS * self.cell;
         (near && place.exact.face == self.face).then_some(FacePoint {
             at: place.exact.foot,
             outward: (place.at - place.exact.foot) * place.exact.distance.signum(),
@@ -265,9 +278,9 @@ impl Fitter<'_> {
         cell.corners.iter().chain(&cell.verified).all(|place| {
             let Some(foot) = self.foot(place) else { return true };
             let distance = place.exact.distance;
+            let tolerance = tolerance_at(self.tolerance_mm, self.cell, distance);
             // False for NaN.
-            let within =
-                |p: DVec3, distance: f64| (board_distance(patch, p) - distance).abs() <= self.tolerance_mm;
+            let within = |p: DVec3, distance: f64| (board_distance(patch, p) - distance).abs() <= tolerance;
             // On the border of the face the cell is decided together with its neighbours.
             within(foot.at, 0.0)
                 && (!self.is_along_normal(patch, &foot, distance) || within(place.at, distance))

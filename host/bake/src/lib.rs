@@ -36,6 +36,7 @@ mod options;
 mod partners;
 mod patch;
 mod piece;
+mod placed_fits;
 mod plan;
 mod planner;
 mod pointshell;

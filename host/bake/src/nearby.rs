@@ -9,7 +9,7 @@ use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_SAMPLES, NO_FACE, Nearby};
 
-use crate::cover::{LocalPatches, NEAR_CELLS, Place};
+use crate::cover::{LocalPatches, NEAR_CELLS, Place, tolerance_at};
 use crate::distance::Nearest;
 use crate::local_patch::board_distance;
 use crate::surface::to_local;
@@ -17,8 +17,6 @@ use crate::surface::to_local;
 /// Tolerance of exact distances, mm: rounding, and vertices a tenth of a micrometre off their curves.
 const SAME_MM: f64 = 2e-4;
 
-/// Growth of the tolerance of patches beyond [`NEAR_CELLS`] of the surface, where they were not fitted: share of the distance.
-const FAR_ERROR: f64 = 0.01;
 /// Most patches tried for one face of a group.
 const MOST_CHOICES: usize = 8;
 
@@ -165,9 +163,8 @@ impl CellNearby<'_> {
         let any_patch = group.iter().any(|&surface| self.is_patch(surface));
         places.iter().all(|place| {
             let exact = place.exact.distance;
-            let beyond = exact.abs() - NEAR_CELLS * self.cell;
             let tolerance = match any_patch {
-                true => self.tolerance_mm + SAME_MM + FAR_ERROR * beyond.max(0.0),
+                true => SAME_MM + tolerance_at(self.tolerance_mm, self.cell, exact),
                 false => SAME_MM,
             };
             let found = (group.iter().filter(|&&surface| surface != NO_FACE))
@@ -182,13 +179,18 @@ impl CellNearby<'_> {
                 .unwrap_or(f64::NAN);
             if found.is_nan() {
                 // Beyond the centre of curvature of a patch the board interpolates.
-                any_patch && beyond > 0.0
+                any_patch && exact.abs() > NEAR_CELLS * self.cell
             } else if must(exact) {
                 (found - exact).abs() <= tolerance
             } else {
                 found * exact > 0.0 && found.abs() <= exact.abs() + tolerance
             }
         })
+    }
+
+    /// Whether a cell has another face about it than `nearest`.
+    pub fn at_edge(&self, at: [usize; 3], nearest: u16) -> bool {
+        about(at).any(|place| self.samples[index(place)].face != nearest)
     }
 
     /// The faces nearest to the samples around a cell, `nearest` first; only `nearest` if there are more than three.
