@@ -54,7 +54,7 @@ fn foot(face: &FaceRecord, p: Vec3) -> Option<Foot> {
 
 /// Signed distance, outside positive, and outward unit normal; `None` as in [`foot`].
 #[inline(always)]
-fn signed(face: &FaceRecord, p: Vec3) -> Option<(f32, Vec3)> {
+pub(crate) fn signed(face: &FaceRecord, p: Vec3) -> Option<(f32, Vec3)> {
     let axis = Vec3::from_array(face.axis);
     let from = p - Vec3::from_array(face.origin);
     if face.kind == surface_kind::SPHERE {

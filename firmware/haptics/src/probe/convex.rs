@@ -25,6 +25,8 @@ pub(crate) struct Separation {
     pub normal: DVec3,
     /// Nearest or deepest point of the first shape, m.
     pub a: DVec3,
+    /// What a negative distance is.
+    pub measure: Measure,
 }
 
 /// Separation of `a` from `b`.
@@ -41,6 +43,7 @@ pub(crate) fn separation(a: &Support<'_>, b: &Support<'_>, epa: &mut Epa) -> Sep
                 error: 0.5 * (length - lower) + fixed,
                 normal,
                 a: point - normal * a.radius,
+                measure: Measure::Translation,
             }
         }
         Gjk::Together(simplex) => {
@@ -51,6 +54,7 @@ pub(crate) fn separation(a: &Support<'_>, b: &Support<'_>, epa: &mut Epa) -> Sep
                 error: 0.5 * (depth.upper - lower) + fixed,
                 normal: depth.out,
                 a: depth.a - depth.out * a.radius,
+                measure: Measure::Translation,
             }
         }
     }
@@ -66,7 +70,7 @@ impl Separation {
             field_distance_m: by_field.field_distance_m,
             error_m: self.error as f32,
             exact: self.error <= EXACT_M,
-            measure: Measure::Translation,
+            measure: self.measure,
             in_band: true,
             arm: (self.a - center.as_dvec3()).as_vec3(),
             moving_face: face_at(held, self.a, -self.normal),

@@ -1,5 +1,6 @@
 //! Probe: gap and contacts at one pose, without motion or budget. For measurement, not for the tick.
 
+mod clearance;
 mod convex;
 mod epa;
 mod gjk;

@@ -29,6 +29,12 @@ pub(crate) struct Support<'i> {
     pub error: f64,
 }
 
+/// Error of positions on a placed shape by single precision, m.
+pub(crate) fn rounding(shape: &Shape<'_>, pose: &Pose) -> f64 {
+    let center = Vec3::from_array(shape.record.center).as_dvec3();
+    ROUNDING * (pose.position.as_dvec3().length() + center.length() + f64::from(shape.record.radius))
+}
+
 impl<'i> Support<'i> {
     /// `shape` placed at `pose`, if it is marked as convex.
     pub fn new(shape: &Shape<'i>, pose: &Pose) -> Option<Self> {
@@ -39,9 +45,6 @@ impl<'i> Support<'i> {
         let rotation =
             DMat3::from_quat(DQuat::from_array(pose.orientation.to_array().map(f64::from)).normalize());
         let bent = shape.edges.iter().any(|edge| !edge.is_straight());
-        let size = pose.position.as_dvec3().length()
-            + Vec3::from_array(shape.record.center).as_dvec3().length()
-            + f64::from(shape.record.radius);
         Some(Self {
             edges: shape.edges,
             faces: shape.faces,
@@ -49,7 +52,7 @@ impl<'i> Support<'i> {
             offset: pose.position.as_dvec3(),
             ball: ball.map(|f| Vec3::from_array(f.origin).as_dvec3()),
             radius: ball.map_or(0.0, |f| f64::from(f.radius)),
-            error: ROUNDING * size + if bent { 0.1 * PIECE_M } else { 0.0 },
+            error: rounding(shape, pose) + if bent { 0.1 * PIECE_M } else { 0.0 },
         })
     }
 

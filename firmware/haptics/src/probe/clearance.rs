@@ -1,0 +1,640 @@
+//! Smallest distance of the surfaces of two parts of any form, with proven bounds.
+//!
+//! Two surfaces are nearest at an edge of one and a face of the other, at two edges, or inside two faces of which one is curved. A face is its
+//! unbounded surface by formula; whether a foot on it belongs to the part is the field's answer there. A piece of an edge is excluded from a face
+//! when a bound of its distance (to second order) exceeds the smallest distance found, or when the foot of its middle is farther from the part than
+//! feet move along the piece; else it is halved. Insides of faces: a sphere, torus or cylinder is all that lies a radius about a point, circle or
+//! line, and that is searched like an edge. Pieces that remain when the budget is used up, or where the field is not proven, bound the result from
+//! below.
+//!
+//! Sources: Johnson & Cohen 2001, "Spatialized normal cone hierarchies" (bounding pairs of features); Lipschitz branch and bound. Metres. Cost: one
+//! formula for a node or piece and a face, a field query for each piece that could be nearest.
+
+use glam::{Mat3, Vec3};
+use mortise_protocol::image::{
+    EDGE_ERROR_CELLS, EdgeRecord, FaceRecord, Place, SHAPE_LEAKY, Shape, surface_kind,
+};
+
+use crate::collision::exact_surface::{exact, signed};
+use crate::math::pose::Pose;
+use crate::math::vector::length;
+use crate::probe::convex::Separation;
+use crate::probe::nearest::Measure;
+use crate::probe::support::rounding;
+
+/// A point is on a surface within this distance, m.
+const ON_SURFACE_M: f32 = 1e-7;
+/// Bounds closer than this are not improved further, m.
+const CLOSE_M: f32 = 0.2e-6;
+/// Pieces shorter than this are not halved, m.
+const SHORT_M: f32 = 0.1e-6;
+/// Largest distance of a piece of a curved edge from the edge, m.
+const PIECE_M: f32 = 0.5e-6;
+/// Evaluations of a piece at most.
+const BUDGET: u32 = 40_000;
+/// Depth of halving: a length of a metre falls below [`SHORT_M`].
+const DEPTH: usize = 48;
+
+/// A curve in the frame of the other shape: p(t) = center + t·half + t²·bend for |t| ≤ 1, or a circle about `center`; the surface searched lies
+/// `radius` from it.
+#[derive(Clone, Copy)]
+struct Curve {
+    center: Vec3,
+    half: Vec3,
+    bend: Vec3,
+    /// For a circle `half` and `bend` are two perpendicular radii, and t is the angle over π.
+    circle: bool,
+    radius: f32,
+    /// Distance of the curve from the true one at most, m.
+    error: f32,
+}
+
+impl Curve {
+    fn at(&self, t: f32) -> Vec3 {
+        if self.circle {
+            let (sin, cos) = libm::sincosf(t * core::f32::consts::PI);
+            self.center + self.half * cos + self.bend * sin
+        } else {
+            self.center + (self.half + self.bend * t) * t
+        }
+    }
+
+    /// First and second derivative.
+    fn derivatives(&self, t: f32) -> (Vec3, Vec3) {
+        if self.circle {
+            const PI: f32 = core::f32::consts::PI;
+            let (sin, cos) = libm::sincosf(t * PI);
+            let (x, y) = (self.half * PI, self.bend * PI);
+            (y * cos - x * sin, (x * cos + y * sin) * -PI)
+        } else {
+            (self.half + self.bend * (2.0 * t), self.bend * 2.0)
+        }
+    }
+
+    /// Largest speed, m per unit of t.
+    fn speed(&self) -> f32 {
+        if self.circle {
+            length(self.half) * core::f32::consts::PI
+        } else {
+            length(self.half) + 2.0 * length(self.bend)
+        }
+    }
+}
+
+/// One of the two shapes, seen from the other.
+struct Side<'s, 'i> {
+    shape: &'s Shape<'i>,
+    /// Its frame to the other's.
+    rotation: Mat3,
+    offset: Vec3,
+}
+
+impl Side<'_, '_> {
+    fn to_other(&self, p: Vec3) -> Vec3 {
+        self.rotation * p + self.offset
+    }
+
+    fn from_other(&self, p: Vec3) -> Vec3 {
+        self.rotation.transpose() * (p - self.offset)
+    }
+}
+
+/// Distance of two surfaces.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Clearance {
+    /// Smallest distance found between points of the two surfaces, m; infinite if none was.
+    pub upper: f32,
+    /// No points of the surfaces are nearer than this, m.
+    pub lower: f32,
+    /// Whether a point of one part was found inside the other.
+    pub overlap: bool,
+    /// Smallest distance of such a point, m, negative.
+    pub deepest: f32,
+    /// The nearest points found: of the first shape and of the second, frame of the second, m.
+    pub nearest: [Vec3; 2],
+}
+
+/// Search state.
+struct Clearing {
+    found: Clearance,
+    spent: u32,
+    /// Whether the first shape's curves are searched, against the second's faces.
+    forward: bool,
+}
+
+/// Clearance of `held` placed at `pose` in the frame of `other`; distances beyond `enough` are of no interest.
+pub(crate) fn clearance(held: &Shape<'_>, other: &Shape<'_>, pose: &Pose, enough: f32) -> Clearance {
+    let rotation = pose.rotation();
+    let back = rotation.transpose();
+    let sides = [
+        Side {
+            shape: held,
+            rotation,
+            offset: pose.position,
+        },
+        Side {
+            shape: other,
+            rotation: back,
+            offset: -(back * pose.position),
+        },
+    ];
+    let mut search = Clearing {
+        found: Clearance {
+            upper: enough,
+            lower: f32::INFINITY,
+            overlap: false,
+            deepest: 0.0,
+            nearest: [Vec3::ZERO; 2],
+        },
+        spent: 0,
+        forward: true,
+    };
+    for forward in [true, false] {
+        search.forward = forward;
+        let [own, against] = if forward { [0, 1] } else { [1, 0] }.map(|i| &sides[i]);
+        search.vertex_inside(own, against);
+        for face in against.shape.faces {
+            search.edges_against(own, against, face);
+            search.insides_against(own, against, face);
+            if search.found.overlap {
+                return search.found;
+            }
+        }
+    }
+    search.forward = true;
+    search.edges_against_edges(&sides[0], &sides[1]);
+    if !insides_are_known(&sides, search.found.upper) {
+        search.found.lower = f32::NEG_INFINITY;
+    }
+    search.found
+}
+
+/// Distance by the field: lower bound of its magnitude with its sign, and whether a value of zero means the surface.
+fn by_field(shape: &Shape<'_>, p: Vec3) -> (f32, bool) {
+    match shape.field.place(p.to_array()) {
+        Place::Far { inside, bound } => (if inside { -bound } else { bound }, false),
+        Place::Cell(cell) => match exact(shape.faces, shape.field.nearby(&cell), p) {
+            Some((distance, _)) => (distance, true),
+            None => {
+                let record = shape.field.record();
+                let found = shape.field.distance(&cell);
+                let error = EDGE_ERROR_CELLS * record.cell;
+                let least = (found.abs() - error).max(0.0).min(record.band);
+                (if found < 0.0 { -least } else { least }, false)
+            }
+        },
+    }
+}
+
+/// Whether a face is curved and bulges outward.
+fn bulges(face: &FaceRecord) -> bool {
+    face.kind != surface_kind::PLANE && face.sense > 0.0
+}
+
+/// Whether every pair of faces that could be nearest inside both is searched: all but cones with cones or with grooves of a torus, unless their edges
+/// show them to be farther apart than `upper`.
+fn insides_are_known(sides: &[Side<'_, '_>; 2], upper: f32) -> bool {
+    let cone = |face: &FaceRecord| face.kind == surface_kind::CONE && bulges(face);
+    let groove = |face: &FaceRecord| face.kind == surface_kind::TORUS && !bulges(face);
+    let all = |side: &Side<'_, '_>| {
+        let closed = side
+            .shape
+            .faces
+            .iter()
+            .all(|face| face.kind != surface_kind::OTHER);
+        closed && side.shape.record.flags & SHAPE_LEAKY == 0
+    };
+    let apart = |i: usize, j: usize| {
+        let sphere = |side: &Side<'_, '_>, face: usize| {
+            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+            for edge in side
+                .shape
+                .edges
+                .iter()
+                .filter(|e| e.faces.contains(&(face as u16)))
+            {
+                let reach =
+                    Vec3::splat(length(Vec3::from_array(edge.half)) + length(Vec3::from_array(edge.bend)));
+                let center = Vec3::from_array(edge.center);
+                (low, high) = (low.min(center - reach), high.max(center + reach));
+            }
+            (0.5 * (low + high), 0.5 * length(high - low))
+        };
+        let (a, ra) = sphere(&sides[0], i);
+        let (b, rb) = sphere(&sides[1], j);
+        ra.is_finite() && rb.is_finite() && length(sides[0].to_other(a) - b) - ra - rb > upper
+    };
+    all(&sides[0])
+        && all(&sides[1])
+        && (sides[0].shape.faces.iter().enumerate()).all(|(i, a)| {
+            (sides[1].shape.faces.iter().enumerate()).all(|(j, b)| {
+                let hidden = cone(a) && (cone(b) || groove(b)) || groove(a) && cone(b);
+                !hidden || apart(i, j)
+            })
+        })
+}
+
+impl Clearing {
+    /// Finds a part that lies wholly inside the other by one point of its surface.
+    fn vertex_inside(&mut self, own: &Side<'_, '_>, against: &Side<'_, '_>) {
+        let vertex = own.shape.edges.first().map(|edge| edge.center);
+        if let Some(p) = vertex.or(own.shape.points.first().map(|p| p.position)) {
+            let (inside, _) = by_field(against.shape, own.to_other(Vec3::from_array(p)));
+            self.overlapping(inside);
+        }
+    }
+
+    /// Pieces of edges against one face.
+    fn edges_against(&mut self, own: &Side<'_, '_>, against: &Side<'_, '_>, face: &FaceRecord) {
+        let mut index = 0;
+        while let Some(node) = own.shape.edge_nodes.get(index) {
+            let center = own.to_other(Vec3::from_array(node.center));
+            let distance = signed(face, center).map_or(0.0, |(d, _)| d.abs());
+            if distance - node.radius > self.found.upper {
+                index = node.skip as usize;
+                continue;
+            }
+            index += 1;
+            if node.skip as usize == index {
+                for edge in node.points(own.shape.edges) {
+                    self.curve_against(own, against, face, &placed(own, edge));
+                }
+            }
+        }
+    }
+
+    /// Points, circles and lines about which the bulging faces lie, against one face.
+    fn insides_against(&mut self, own: &Side<'_, '_>, against: &Side<'_, '_>, face: &FaceRecord) {
+        for bulging in own.shape.faces.iter().filter(|face| bulges(face)) {
+            let origin = Vec3::from_array(bulging.origin);
+            let axis = Vec3::from_array(bulging.axis);
+            let mut curve = Curve {
+                center: own.to_other(origin),
+                half: Vec3::ZERO,
+                bend: Vec3::ZERO,
+                circle: false,
+                radius: bulging.radius,
+                error: 0.0,
+            };
+            match bulging.kind {
+                surface_kind::SPHERE => {}
+                surface_kind::TORUS => {
+                    let x = axis.any_orthonormal_vector();
+                    curve.half = own.rotation * (x * bulging.radius);
+                    curve.bend = own.rotation * (axis.cross(x) * bulging.radius);
+                    curve.circle = true;
+                    curve.radius = bulging.second;
+                }
+                // Ruled faces are nearest at their ends, unless they bulge towards each other.
+                surface_kind::CYLINDER if bulges(face) => {
+                    let middle = Vec3::from_array(own.shape.record.center) - origin;
+                    curve.center = own.to_other(origin + axis * middle.dot(axis));
+                    curve.half = own.rotation * (axis * own.shape.record.radius);
+                }
+                surface_kind::CONE => {
+                    let along = bulging.radius / libm::tanf(bulging.second);
+                    curve.center = own.to_other(origin - axis * along);
+                    curve.radius = 0.0;
+                }
+                _ => continue,
+            }
+            self.curve_against(own, against, face, &curve);
+        }
+    }
+
+    /// One curve against one face.
+    fn curve_against(
+        &mut self,
+        own: &Side<'_, '_>,
+        against: &Side<'_, '_>,
+        face: &FaceRecord,
+        curve: &Curve,
+    ) {
+        let mut stack: heapless::Vec<(f32, f32), DEPTH> = heapless::Vec::new();
+        let _ = stack.push((0.0, 1.0));
+        while let Some((t, h)) = stack.pop() {
+            self.spent += 1;
+            let p = curve.at(t);
+            let reach = curve.speed() * h;
+            let Some((d, n)) = signed(face, p) else {
+                self.split(&mut stack, t, h, reach, 0.0);
+                continue;
+            };
+            let lower = self.least(face, curve, (t, h), (p, d, n)) - curve.radius - curve.error;
+            if lower >= self.found.upper - CLOSE_M {
+                self.note(lower);
+                continue;
+            }
+            let side = if d < 0.0 { -1.0 } else { 1.0 };
+            let foot = p - n * d;
+            let own_foot = p - n * (side * curve.radius);
+            let (at_foot, sure) = by_field(against.shape, foot);
+            let (at_own, own_sure) = if curve.radius > 0.0 {
+                by_field(own.shape, own.from_other(own_foot))
+            } else {
+                (0.0, true)
+            };
+            let moves = reach * foot_speed(face, d, reach);
+            if at_foot.abs() > moves + ON_SURFACE_M
+                || at_own.abs() > reach + turn_of_foot(face, d, reach, curve.radius) + ON_SURFACE_M
+            {
+                continue;
+            }
+            if sure && own_sure && at_foot.abs() <= ON_SURFACE_M && at_own.abs() <= ON_SURFACE_M {
+                self.candidate(against, own_foot, foot);
+                if self.found.overlap {
+                    return;
+                }
+            }
+            if h == 1.0 {
+                self.descend(own, against, face, curve, n.dot(curve.derivatives(t).0) * side);
+            }
+            let unproven = !(sure && own_sure) && reach < 0.05 * against.shape.field.record().cell;
+            if unproven || lower >= self.found.upper - CLOSE_M {
+                self.note(lower);
+            } else {
+                self.split(&mut stack, t, h, reach, lower);
+            }
+        }
+    }
+
+    /// The end of a whole curve towards which the distance falls, as a candidate: straight pieces are nearest there.
+    fn descend(
+        &mut self,
+        own: &Side<'_, '_>,
+        against: &Side<'_, '_>,
+        face: &FaceRecord,
+        curve: &Curve,
+        slope: f32,
+    ) {
+        let p = curve.at(if slope > 0.0 { -1.0 } else { 1.0 });
+        let Some((d, n)) = signed(face, p) else {
+            return;
+        };
+        let own_foot = p - n * if d < 0.0 { -curve.radius } else { curve.radius };
+        let feet = [(against.shape, p - n * d), (own.shape, own.from_other(own_foot))];
+        let count = if curve.radius > 0.0 { 2 } else { 1 };
+        if feet.iter().take(count).all(|&(shape, foot)| {
+            let (at, sure) = by_field(shape, foot);
+            sure && at.abs() <= ON_SURFACE_M
+        }) {
+            self.candidate(against, own_foot, p - n * d);
+        }
+    }
+
+    /// Lower bound of the distance of the part t ± h of a curve from a face's surface, to second order.
+    fn least(
+        &self,
+        face: &FaceRecord,
+        curve: &Curve,
+        (t, h): (f32, f32),
+        (p, d, n): (Vec3, f32, Vec3),
+    ) -> f32 {
+        let reach = curve.speed() * h;
+        let (first, second) = curve.derivatives(t);
+        let slope = n.dot(first) * h;
+        let speed2 = reach * reach;
+        let curl = curl(face, p, reach);
+        let bent = if curve.circle {
+            length(second)
+        } else {
+            n.dot(second).abs() + length(second) * reach * curl
+        };
+        let curving = 0.5 * (speed2 * curl + bent * h * h);
+        let bound = d.abs() - slope.abs() - curving;
+        let plain = d.abs() - reach;
+        if bound > plain { bound } else { plain }
+    }
+
+    /// Points of the two surfaces: `own` of the shape whose curves are searched, `foot` of the other.
+    fn candidate(&mut self, against: &Side<'_, '_>, own: Vec3, foot: Vec3) {
+        let distance = length(own - foot);
+        let (inside, sure) = by_field(against.shape, own);
+        if sure {
+            self.overlapping(inside);
+        }
+        if distance < self.found.upper {
+            self.found.upper = distance;
+            self.found.nearest = if self.forward {
+                [own, foot]
+            } else {
+                [against.to_other(foot), against.to_other(own)]
+            };
+        }
+    }
+
+    fn overlapping(&mut self, inside: f32) {
+        if inside < -10.0 * ON_SURFACE_M {
+            self.found.overlap = true;
+            if inside < self.found.deepest {
+                self.found.deepest = inside;
+            }
+        }
+    }
+
+    fn note(&mut self, lower: f32) {
+        if lower < self.found.lower {
+            self.found.lower = lower;
+        }
+    }
+
+    /// Halves a part of a curve, or notes its bound when it is short or the budget is used up.
+    fn split(
+        &mut self,
+        stack: &mut heapless::Vec<(f32, f32), DEPTH>,
+        t: f32,
+        h: f32,
+        reach: f32,
+        lower: f32,
+    ) {
+        let halves = [(t - 0.5 * h, 0.5 * h), (t + 0.5 * h, 0.5 * h)];
+        if self.spent > BUDGET || reach < SHORT_M || halves.iter().any(|&half| stack.push(half).is_err()) {
+            self.note(lower);
+        }
+    }
+
+    /// Edges of one shape against edges of the other.
+    fn edges_against_edges(&mut self, own: &Side<'_, '_>, against: &Side<'_, '_>) {
+        for edge in own.shape.edges {
+            let curve = placed(own, edge);
+            let reach = length(curve.half) + length(curve.bend);
+            let mut index = 0;
+            while let Some(node) = against.shape.edge_nodes.get(index) {
+                if length(curve.center - Vec3::from_array(node.center)) - reach - node.radius
+                    > self.found.upper
+                {
+                    index = node.skip as usize;
+                    continue;
+                }
+                index += 1;
+                if node.skip as usize == index {
+                    for other in node.points(against.shape.edges) {
+                        let other = placed_at_rest(other);
+                        self.curve_against_curve([(&curve, 0.0, 1.0), (&other, 0.0, 1.0)], DEPTH);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Two parts of curves: the distance of their chords less the bulges; the more bulging one is halved.
+    fn curve_against_curve(&mut self, [a, b]: [(&Curve, f32, f32); 2], depth: usize) {
+        self.spent += 1;
+        let chord = |(curve, t, h): (&Curve, f32, f32)| [curve.at(t - h), curve.at(t + h)];
+        // The chord of a quadratic is h²·bend off its middle.
+        let bulge = |(curve, _, h): (&Curve, f32, f32)| length(curve.bend) * h * h;
+        let ([p, q], [r, s]) = (chord(a), chord(b));
+        let (x, y) = nearest_of_segments([p, q], [r, s]);
+        let distance = length(x - y);
+        let error = a.0.error + b.0.error;
+        let off = bulge(a) + bulge(b);
+        let lower = distance - off - error;
+        if lower >= self.found.upper - CLOSE_M {
+            self.note(lower);
+            return;
+        }
+        if off <= 0.5 * CLOSE_M || depth == 0 || self.spent > BUDGET {
+            if distance < self.found.upper {
+                self.found.upper = distance;
+                self.found.nearest = [x, y];
+            }
+            self.note(lower);
+            return;
+        }
+        for k in [-1.0, 1.0] {
+            let part = |(t, h): (f32, f32)| (t + 0.5 * k * h, 0.5 * h);
+            if bulge(a) >= bulge(b) {
+                let (t, h) = part((a.1, a.2));
+                self.curve_against_curve([(a.0, t, h), b], depth - 1);
+            } else {
+                let (t, h) = part((b.1, b.2));
+                self.curve_against_curve([a, (b.0, t, h)], depth - 1);
+            }
+        }
+    }
+}
+
+/// Largest curvature of a face's surface within `reach` of `p`, 1/m, as it enters the second derivative of the distance.
+fn curl(face: &FaceRecord, p: Vec3, reach: f32) -> f32 {
+    let from = p - Vec3::from_array(face.origin);
+    let axis = Vec3::from_array(face.axis);
+    let radial = from - axis * from.dot(axis);
+    let off = match face.kind {
+        surface_kind::PLANE => return 0.0,
+        surface_kind::SPHERE => length(from),
+        surface_kind::TORUS => {
+            let ring = length(radial);
+            let tube = libm::hypotf(ring - face.radius, from.dot(axis));
+            if ring < tube { ring } else { tube }
+        }
+        _ => length(radial),
+    };
+    if off > 1.001 * reach {
+        1.0 / (off - reach)
+    } else {
+        f32::MAX
+    }
+}
+
+/// How much faster than a point its foot moves on a face, at most, for points within `reach` of one at distance `d`.
+fn foot_speed(face: &FaceRecord, d: f32, reach: f32) -> f32 {
+    let radius = match face.kind {
+        surface_kind::PLANE => return 1.0,
+        surface_kind::TORUS => face.second,
+        surface_kind::CONE => return 4.0,
+        _ => face.radius,
+    };
+    let off = radius + d * face.sense - reach;
+    let ratio = if off > 0.0 { radius / off } else { f32::MAX };
+    if ratio > 1.0 { ratio } else { 1.0 }
+}
+
+/// Way of the own foot relative to its curve, m: the radius times the turn of the normal.
+fn turn_of_foot(face: &FaceRecord, d: f32, reach: f32, radius: f32) -> f32 {
+    if face.kind == surface_kind::PLANE || radius == 0.0 {
+        return 0.0;
+    }
+    let off = face.radius.min(if face.kind == surface_kind::TORUS {
+        face.second
+    } else {
+        f32::MAX
+    }) + d * face.sense
+        - reach;
+    if off > 0.0 {
+        radius * reach / off
+    } else {
+        f32::INFINITY
+    }
+}
+
+/// A piece of an edge in the other shape's frame.
+fn placed(own: &Side<'_, '_>, edge: &EdgeRecord) -> Curve {
+    let piece = placed_at_rest(edge);
+    Curve {
+        center: own.to_other(piece.center),
+        half: own.rotation * piece.half,
+        bend: own.rotation * piece.bend,
+        ..piece
+    }
+}
+
+/// A piece of an edge in its own frame.
+fn placed_at_rest(edge: &EdgeRecord) -> Curve {
+    Curve {
+        center: Vec3::from_array(edge.center),
+        half: Vec3::from_array(edge.half),
+        bend: Vec3::from_array(edge.bend),
+        circle: false,
+        radius: 0.0,
+        error: if edge.is_straight() { 0.0 } else { PIECE_M },
+    }
+}
+
+/// The points of two segments that are nearest to each other (Ericson, "Real-Time Collision Detection", 5.1.9).
+fn nearest_of_segments([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> (Vec3, Vec3) {
+    let (d, e, apart) = (q - p, s - r, p - r);
+    let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
+    let (da, ea) = (d.dot(apart), e.dot(apart));
+    let clamp = |x: f32| {
+        if x > 0.0 {
+            if x < 1.0 { x } else { 1.0 }
+        } else {
+            0.0
+        }
+    };
+    let over = |a: f32, b: f32| if b > f32::MIN_POSITIVE { a / b } else { 0.0 };
+    let sine2 = dd * ee - de * de;
+    let mut t = if sine2 > 1e-6 * dd * ee {
+        clamp((de * ea - da * ee) / sine2)
+    } else {
+        0.0
+    };
+    let u = clamp(over(de * t + ea, ee));
+    t = clamp(over(de * u - da, dd));
+    (p + d * t, r + e * u)
+}
+
+impl Clearance {
+    /// The same as a separation of `held` at `pose` from `other`, where the surfaces were shown to be apart.
+    pub fn separation(&self, pose: &Pose, held: &Shape<'_>, other: &Shape<'_>) -> Option<Separation> {
+        let lower = if self.lower < self.upper {
+            self.lower
+        } else {
+            self.upper
+        };
+        if self.overlap || !(lower > 0.0) || self.upper.is_infinite() {
+            return None;
+        }
+        let [a, b] = self.nearest.map(|p| p.as_dvec3());
+        let [upper, lower] = [self.upper, lower].map(f64::from);
+        // A foot may be off its surface by the tolerance, and moves as far along the surface as that surface is off.
+        let fixed = rounding(held, pose) + rounding(other, &Pose::IDENTITY) + 2.0 * f64::from(ON_SURFACE_M);
+        Some(Separation {
+            distance: 0.5 * (upper + lower),
+            error: 0.5 * (upper - lower) + fixed,
+            normal: (a - b).normalize_or_zero(),
+            a,
+            measure: Measure::DeepestPoint,
+        })
+    }
+}
