@@ -46,7 +46,7 @@ fn page_and_records_agree() {
     record!(page, "Node", NodeRecord, center radius first_point point_count skip);
     record!(page, "Point", PointRecord, position normal face edge_face);
     record!(page, "Face", FaceRecord, kind sense origin axis radius second);
-    record!(page, "Edge", EdgeRecord, center half bend normals faces thickness edge);
+    record!(page, "Edge", EdgeRecord, center half bend normals faces thickness edge radius);
     for limit in [
         BRICK_CELLS,
         BRICK_SAMPLES,

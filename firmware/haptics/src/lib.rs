@@ -46,7 +46,7 @@ pub use io::{FacePair, FacePairs, Flags, GuidanceState, Input, Output, Work};
 pub use math::pose::{Pose, Twist, Wrench};
 pub use math::rotation;
 pub use passivity::tank::Passivity;
-pub use probe::nearest::Nearest;
+pub use probe::nearest::{Measure, Nearest};
 pub use probe::prober::{ContactPoint, Probe, ProbeError, Prober};
 pub use settings::{
     ContactSettings, CouplingSettings, FrictionSettings, GuidanceMethod, GuidanceSettings, Integrator,

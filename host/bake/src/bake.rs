@@ -9,6 +9,7 @@ use mortise_protocol::image::{
 use rayon::prelude::*;
 
 use crate::classic::classic_pointshell;
+use crate::convex::is_convex;
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, bake_field};
@@ -381,7 +382,10 @@ impl Scene {
             let mut entry = shape_report(&self.names[i], &prepared[i], &field, &each[i], &shells[i]);
             report.warnings.extend(doubts(&entry));
             report.warnings.extend(unproven(&entry, &field));
-            (_, entry.bytes) = builder.add_shape(shape, field, &shells[i], &self.edges[i]);
+            (_, entry.bytes) = {
+                let convex = is_convex(&prepared[i], &self.edges[i]);
+                builder.add_shape(shape, field, &shells[i], &self.edges[i], convex)
+            };
             report.bytes = add(&report.bytes, &entry.bytes);
             report.shapes.push(entry);
         }

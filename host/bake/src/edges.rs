@@ -48,6 +48,16 @@ impl EdgePiece {
         .map(meters)
     }
 
+    /// Largest coordinate of its points along `n`, mm.
+    pub fn support(&self, n: DVec3) -> f64 {
+        let [center, half, bend] = [self.center, self.half, self.bend].map(|v| v.dot(n));
+        if bend < 0.0 && half.abs() < -2.0 * bend {
+            center - half * half / (4.0 * bend)
+        } else {
+            center + half.abs() + bend
+        }
+    }
+
     /// The piece as stored.
     pub fn record(&self) -> EdgeRecord {
         EdgeRecord {
@@ -58,6 +68,7 @@ impl EdgePiece {
             faces: self.faces.map(|face| face as u16),
             thickness: round_up(self.thickness / 1000.0),
             edge: self.edge,
+            radius: round_up((self.half.length() + self.bend.length()) / 1000.0),
         }
     }
 }
@@ -151,7 +162,8 @@ fn divide(
         })
     };
     let turn = 2.0 * bend.length() / half.length().max(1e-300);
-    if halvings > 0 && half.length() > TOLERANCE_MM && (turn > MOST_TURN || !fits()) {
+    // A closed chain has no chord: its turn is infinite.
+    if halvings > 0 && to - from > TOLERANCE_MM && (turn > MOST_TURN || !fits()) {
         divide(surface, chain, [from, middle], halvings - 1, edge, out);
         divide(surface, chain, [middle, to], halvings - 1, edge, out);
         return;

@@ -5,8 +5,8 @@ use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
-    NodeRecord, PART_GRABBABLE, PartRecord, PointRecord, SHAPE_LEAKY, Section, ShapeRecord, oct_encode,
-    surface_kind,
+    NodeRecord, PART_GRABBABLE, PartRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY, Section, ShapeRecord,
+    oct_encode, surface_kind,
 };
 
 use crate::edges::EdgePiece;
@@ -57,13 +57,14 @@ impl ImageBuilder {
         Self::default()
     }
 
-    /// Adds a shape with its field, pointshell and edges; returns its number and the bytes it takes.
+    /// Adds a shape with its field, pointshell and edges, and whether it is convex; returns its number and the bytes it takes.
     pub(crate) fn add_shape(
         &mut self,
         shape: &Shape,
         field: BakedField,
         shell: &Pointshell,
         edges: &[EdgePiece],
+        convex: bool,
     ) -> (u32, ByteCount) {
         let positions: Vec<[f32; 3]> = shell
             .points
@@ -90,7 +91,7 @@ impl ImageBuilder {
         let number = self.shapes.len() as u32;
         self.shapes.push(ShapeRecord {
             field: self.fields.len() as u32,
-            flags: if shape.closed { 0 } else { SHAPE_LEAKY },
+            flags: if shape.closed { 0 } else { SHAPE_LEAKY } | if convex { SHAPE_CONVEX } else { 0 },
             first_node: self.nodes.len() as u32,
             node_count: tree.nodes.len() as u32,
             first_point: self.points.len() as u32,

@@ -17,6 +17,7 @@ mod bricks;
 mod chains;
 mod choice;
 mod classic;
+mod convex;
 mod cost;
 mod distance;
 mod edge_samples;

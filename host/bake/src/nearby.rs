@@ -13,7 +13,7 @@ use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, NO_FACE, Nearby};
 
 use crate::distance::{ExactSurface, Scratch};
 use crate::rule::{SAME_MM, Test, find_rule, holds};
-use crate::surface::to_local;
+use crate::surface::signed_distance;
 
 /// Half steps of samples along a brick's edge.
 const HALVES: usize = 2 * BRICK_CELLS + 1;
@@ -227,25 +227,7 @@ impl<'a> CellNearby<'a> {
         let Some((surface, sense)) = self.faces.get(usize::from(face)) else {
             return f64::NAN;
         };
-        let natural = match *surface {
-            Surface::Plane { frame } => to_local(&frame, p).z,
-            Surface::Cylinder { frame, radius } => to_local(&frame, p).truncate().length() - radius,
-            Surface::Cone {
-                frame,
-                radius,
-                half_angle,
-            } => {
-                let q = to_local(&frame, p);
-                (q.truncate().length() - radius) * half_angle.cos() - q.z * half_angle.sin()
-            }
-            Surface::Sphere { frame, radius } => p.distance(frame.origin) - radius,
-            Surface::Torus { frame, major, minor } => {
-                let q = to_local(&frame, p);
-                (q.truncate().length() - major).hypot(q.z) - minor
-            }
-            Surface::Spline => f64::NAN,
-        };
-        natural * sense
+        signed_distance(surface, p) * sense
     }
 }
 

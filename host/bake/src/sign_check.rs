@@ -153,7 +153,7 @@ pub fn check_signs(
     let cell_mm = f64::from(baked.record.cell) * 1000.0;
     let step_mm = f64::from(baked.record.scale) * 1000.0;
     let mut image = ImageBuilder::new();
-    let (number, _) = image.add_shape(shape, baked, &Pointshell::default(), &[]);
+    let (number, _) = image.add_shape(shape, baked, &Pointshell::default(), &[], false);
     image.add_part(&PartPlacement {
         shape: number,
         placement: DAffine3::IDENTITY,

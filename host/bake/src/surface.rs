@@ -209,6 +209,28 @@ pub(crate) fn angle_range(angles: &mut [f64], gap: f64) -> (f64, f64) {
     }
 }
 
+/// Signed distance to an unbounded surface, mm, outside of its natural normal positive; NaN where it has no closed form.
+pub(crate) fn signed_distance(surface: &Surface, p: DVec3) -> f64 {
+    match *surface {
+        Surface::Plane { frame } => to_local(&frame, p).z,
+        Surface::Cylinder { frame, radius } => to_local(&frame, p).truncate().length() - radius,
+        Surface::Cone {
+            frame,
+            radius,
+            half_angle,
+        } => {
+            let q = to_local(&frame, p);
+            (q.truncate().length() - radius) * half_angle.cos() - q.z * half_angle.sin()
+        }
+        Surface::Sphere { frame, radius } => p.distance(frame.origin) - radius,
+        Surface::Torus { frame, major, minor } => {
+            let q = to_local(&frame, p);
+            (q.truncate().length() - major).hypot(q.z) - minor
+        }
+        Surface::Spline => f64::NAN,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -193,8 +193,8 @@ fn the_best_there_is_for_the_flash() {
     assert!(planned.image.len() <= 200 << 10);
     let best = 1000.0 * planned.plan.accuracy_mm;
     assert!(best > 1.0);
-    // A quarter finer no longer fits.
-    let finer = run(&model, &request(best / 1.25, 8192));
+    // Half as fine again no longer fits.
+    let finer = run(&model, &request(best / 1.5, 8192));
     assert!(finer.image.len() > 200 << 10, "{best}: {}", finer.image.len());
     // Only this much is guaranteed: bytes are not a smooth function, because repeating bricks come and go.
     let asked = run(&model, &request(best, 200));

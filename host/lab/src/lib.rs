@@ -26,6 +26,7 @@ mod least_distance;
 pub mod motion;
 pub mod pareto;
 pub mod peer;
+pub mod peers;
 pub mod rate;
 mod row;
 pub mod scene_p;

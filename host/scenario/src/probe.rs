@@ -380,6 +380,12 @@ impl ProbeScene {
                 (false, true) => Resolution::Field,
                 (false, false) => Resolution::Bound,
             },
+            error_um: (nearest.error_m.is_finite()).then(|| 1e6 * f64::from(nearest.error_m)),
+            measure: match nearest.measure {
+                _ if nearest.distance_m >= 0.0 => Measure::Gap,
+                mortise_haptics::Measure::DeepestPoint => Measure::DeepestPoint,
+                mortise_haptics::Measure::Translation => Measure::Translation,
+            },
             nearest_mm: mm(nearest.arm),
             moving_face: face(nearest.moving_face),
             fixed_face: face(nearest.fixed_face),
@@ -424,6 +430,18 @@ pub enum Resolution {
     Bound,
 }
 
+/// What a distance measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measure {
+    /// Smallest distance of two parts that are apart.
+    Gap,
+    /// Smallest translation that separates two convex parts.
+    Translation,
+    /// Depth of the deepest point of one part in the other.
+    DeepestPoint,
+}
+
 /// Result at one pose. Positions and directions in the fixed part's frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProbeRow {
@@ -435,6 +453,10 @@ pub struct ProbeRow {
     pub field_distance_mm: Option<f64>,
     /// Source and accuracy of `distance_mm`.
     pub resolution: Resolution,
+    /// Proven bound of the error of `distance_mm`, µm; absent where the distance is only a bound or has none.
+    pub error_um: Option<f64>,
+    /// What a negative distance is: the smallest translation that separates two convex parts, or the depth of the deepest point.
+    pub measure: Measure,
     /// Position of the nearest point, mm.
     pub nearest_mm: [f64; 3],
     /// Face of the moving part there, if known.

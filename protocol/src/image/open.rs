@@ -272,6 +272,8 @@ fn is_edge(edge: &EdgeRecord, faces: u32) -> bool {
         && finite(&edge.bend)
         && edge.thickness.is_finite()
         && edge.thickness >= 0.0
+        && edge.radius.is_finite()
+        && edge.radius >= 0.0
         && edge.faces.iter().all(|&face| u32::from(face) < faces)
 }
 

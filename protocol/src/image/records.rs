@@ -84,6 +84,8 @@ pub struct PartRecord {
 
 /// The mesh behind the field was not closed: its sign is a best estimate.
 pub const SHAPE_LEAKY: u32 = 1;
+/// The solid is convex: a sphere, or spanned by its edges.
+pub const SHAPE_CONVEX: u32 = 2;
 
 /// Geometry shared by all parts that place it.
 #[repr(C)]
@@ -91,7 +93,7 @@ pub const SHAPE_LEAKY: u32 = 1;
 pub struct ShapeRecord {
     /// Index of its field.
     pub field: u32,
-    /// [`SHAPE_LEAKY`] or 0.
+    /// [`SHAPE_LEAKY`], [`SHAPE_CONVEX`].
     pub flags: u32,
     /// Its nodes, in preorder.
     pub first_node: u32,
@@ -509,7 +511,7 @@ mod tests {
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
         assert_eq!(size_of::<PointRecord>(), 20);
-        assert_eq!(size_of::<super::super::EdgeRecord>(), 56);
+        assert_eq!(size_of::<super::super::EdgeRecord>(), 60);
         assert_eq!(size_of::<FaceRecord>(), 40);
     }
 

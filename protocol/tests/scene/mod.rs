@@ -138,6 +138,7 @@ pub fn bytes() -> Vec<u8> {
         faces: [0, 1],
         thickness: 0.004,
         edge: 0,
+        radius: 0.004_001,
     };
     let plane = |origin: [f32; 3], axis: [f32; 3]| FaceRecord {
         kind: surface_kind::PLANE,

@@ -393,7 +393,7 @@ fn beyond_edge(shape: &Shape<'_>, face: &FaceRecord, other: &FaceRecord, p: Vec3
 
 /// The point nearest to `p` on the intersection of two surfaces: Newton steps, each the point nearest to `p` on the line in which the tangent planes
 /// meet. `None` where the surfaces do not intersect, or hardly.
-fn edge_foot(a: &FaceRecord, b: &FaceRecord, p: Vec3) -> Option<Vec3> {
+pub(crate) fn edge_foot(a: &FaceRecord, b: &FaceRecord, p: Vec3) -> Option<Vec3> {
     let mut x = p;
     let mut residual = f32::INFINITY;
     for _ in 0..EDGE_STEPS {

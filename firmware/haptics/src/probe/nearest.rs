@@ -20,6 +20,15 @@ use crate::io::Work;
 /// Diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
 
+/// What a distance of overlapping parts is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// Depth of the deepest point of one part in the other.
+    DeepestPoint,
+    /// Smallest translation that separates the parts: both are convex.
+    Translation,
+}
+
 /// The smallest gap between two parts, or the largest depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
@@ -29,8 +38,12 @@ pub struct Nearest {
     /// Smallest distance by the field itself among the points queried, m: the distance that the tick uses. Infinite when no point lay where the field
     /// stores distances.
     pub field_distance_m: f32,
-    /// Whether the distance is one to an analytic face or edge, within single precision.
+    /// Error bound of `distance_m`, m; infinite where only `in_band` is known.
+    pub error_m: f32,
+    /// Whether the distance is proven to be the exact surfaces', within a micrometre.
     pub exact: bool,
+    /// What a negative distance is.
+    pub measure: Measure,
     /// Whether the point lies where the field stores distances, or past a tangent plane. When neither this nor `exact`, the distance is only a bound:
     /// the gap or depth is at least this large.
     pub in_band: bool,
@@ -428,7 +441,9 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             progress.best = Nearest {
                 distance_m,
                 field_distance_m: progress.best.field_distance_m,
+                error_m: f32::INFINITY,
                 exact: exact.is_some(),
+                measure: Measure::DeepestPoint,
                 in_band: sample.in_band,
                 arm: self.pair.to_arm.apply(point.position),
                 moving_face,

@@ -5,7 +5,7 @@ use mortise_protocol::image::Voxel;
 use crate::baseline::occupancy::{TangentPlane, inward, shrunk};
 use crate::collision::directed_pair::DirectedPair;
 use crate::io::Flags;
-use crate::probe::nearest::{Nearest, Progress};
+use crate::probe::nearest::{Measure, Nearest, Progress};
 
 /// Deepest point of a pair against a voxmap, by the method's own distances: depth to a tangent plane, else only a lower bound of the gap.
 ///
@@ -49,7 +49,9 @@ pub(crate) fn nearest_voxel(pair: &DirectedPair<'_>, shrunk_m: f32, progress: &m
                 *best = Nearest {
                     distance_m,
                     field_distance_m: best.field_distance_m,
+                    error_m: f32::INFINITY,
                     exact: false,
+                    measure: Measure::DeepestPoint,
                     in_band,
                     arm: pair.to_arm.apply(position),
                     moving_face: point.face,

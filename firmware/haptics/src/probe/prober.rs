@@ -7,19 +7,23 @@
 use core::fmt;
 
 use glam::Vec3;
-use mortise_protocol::image::SceneImage;
+use mortise_protocol::image::{NO_FACE, SceneImage};
 
 use crate::collision::coherence::Coherence;
 use crate::collision::contact::{Contacts, Phase};
 use crate::collision::directed_pair::DirectedPair;
+use crate::collision::node_cursor::NodeCursor;
 use crate::collision::rules::NoRules;
 use crate::collision::search::Search;
 use crate::dynamics::body::Body;
 use crate::dynamics::contact_force::{Stiffness, total_force};
 use crate::io::{Flags, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose};
-use crate::probe::nearest::{Nearest, NearestSearch, Progress};
+use crate::probe::convex::{Separation, separation};
+use crate::probe::epa::Epa;
+use crate::probe::nearest::{Measure, Nearest, NearestSearch, Progress};
 use crate::probe::nearest_voxel::nearest_voxel;
+use crate::probe::support::Support;
 use crate::settings::ContactSettings;
 
 /// Result at one pose.
@@ -84,6 +88,7 @@ impl core::error::Error for ProbeError {}
 pub struct Prober {
     contacts: Contacts,
     coherence: Coherence,
+    epa: Epa,
 }
 
 impl Default for Prober {
@@ -98,6 +103,7 @@ impl Prober {
         Self {
             contacts: Contacts::new(),
             coherence: Coherence::new(),
+            epa: Epa::new(),
         }
     }
 
@@ -135,11 +141,13 @@ impl Prober {
             best: Nearest {
                 distance_m: f32::INFINITY,
                 field_distance_m: f32::INFINITY,
+                error_m: f32::INFINITY,
                 exact: false,
+                measure: Measure::DeepestPoint,
                 in_band: false,
                 arm: Vec3::ZERO,
-                moving_face: mortise_protocol::image::NO_FACE,
-                fixed_face: mortise_protocol::image::NO_FACE,
+                moving_face: NO_FACE,
+                fixed_face: NO_FACE,
             },
             work: Work::default(),
         };
@@ -184,9 +192,18 @@ impl Prober {
             search.finish(&mut progress, &mut touching);
         }
         let Progress {
-            best: nearest,
+            best: mut nearest,
             mut work,
         } = progress;
+        let supports =
+            [(&held, &pose), (&other, &Pose::IDENTITY)].map(|(shape, pose)| Support::new(shape, pose));
+        let proven = match &supports {
+            [Some(a), Some(b)] if !voxmaps => Some(separation(a, b, &mut self.epa)),
+            _ => None,
+        };
+        if let Some(found) = &proven {
+            nearest = found.nearest(&nearest, [(&held, &pose), (&other, &Pose::IDENTITY)], center);
+        }
         if voxmaps && (nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0) {
             for pair in pairs.iter().filter(|pair| pair.field.is_occupancy()) {
                 touching.all(pair);
@@ -196,6 +213,9 @@ impl Prober {
         work.points += touched.points;
         work.candidates = touched.candidates;
         work.flags.insert(touched.flags);
+        if let Some(found) = &proven {
+            self.agree(found, &nearest);
+        }
         work.flags.insert_if(self.contacts.dropped(), Flags::CONTACTS);
         let pushing = self.contacts.as_slice().len();
         let k = settings.shared_stiffness(if pushing == 0 { 1.0 } else { pushing as f32 });
@@ -212,6 +232,30 @@ impl Prober {
             contacts: work.contacts,
             work,
         })
+    }
+
+    /// Makes the contacts agree with a proven distance: none where the parts are apart, at least the nearest point where they overlap.
+    fn agree(&mut self, found: &Separation, nearest: &Nearest) {
+        if found.distance - found.error >= 0.0 {
+            self.contacts.begin(false);
+        }
+        if found.distance + found.error >= 0.0 || !self.contacts.as_slice().is_empty() {
+            return;
+        }
+        let (arm, n) = (nearest.arm, found.normal.as_vec3());
+        let turn = arm.cross(n);
+        if let Some(contact) =
+            (self.contacts).offer(nearest.distance_m, nearest.distance_m, arm.length_squared())
+        {
+            contact.row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
+            contact.arm = arm;
+            contact.rate = 0.0;
+            contact.guided = false;
+            (contact.moving_face, contact.static_face) = (nearest.moving_face, nearest.fixed_face);
+            (contact.moving_edge_face, contact.static_edge_face) = (NO_FACE, NO_FACE);
+            contact.edges = [NO_FACE; 2];
+            contact.leaf = NodeCursor::FIRST;
+        }
     }
 
     /// Points that pushed in the last query, in arbitrary order.
