@@ -8,8 +8,8 @@ use mortise_brep::{CadModel, load_step};
 use mortise_scenario::probe::ProbeScene;
 use mortise_scenario::{Body, ScenarioError};
 
-use super::ABSENT;
 use super::convex_pairs::{placed, rounded};
+use super::limits::ABSENT;
 use super::parallel::trials;
 use crate::figures::{Plan, Row};
 use crate::least_distance::least_distance_mm;
@@ -33,9 +33,9 @@ struct Found {
     /// Files that were refused, and parts without surface.
     refused: usize,
     pairs: usize,
-    /// Contact told of pairs that are clear.
+    /// Contact reported of pairs that are clear.
     ghosts: usize,
-    /// Depths told that exceed the true ones.
+    /// Depths reported that exceed the true ones.
     too_deep: usize,
     /// Pairs that overlap as designed.
     overlapping: usize,
@@ -67,9 +67,12 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         )
     };
     let count = |of: &str, value: usize| Row::exactly(what(of), value as f64, "pairs", 0.0);
-    out(count("contact told where they are over 1 µm apart", found.ghosts));
     out(count(
-        "a depth told over 10 µm more than there is",
+        "contact reported where they are over 1 µm apart",
+        found.ghosts,
+    ));
+    out(count(
+        "a depth reported over 10 µm more than there is",
         found.too_deep,
     ));
     out(Row::within(

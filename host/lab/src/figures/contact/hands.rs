@@ -9,8 +9,8 @@ use mortise_haptics::Settings;
 use mortise_scenario::overlap::penetration_of_poses_mm;
 use mortise_scenario::{PreparedScene, Scenario, ScenarioError};
 
-use super::ABSENT;
 use super::ghosts::files;
+use super::limits::ABSENT;
 use super::parallel::trials;
 use crate::driven::{HandlePath, Image, drive};
 use crate::figures::{Plan, Row};

@@ -20,9 +20,6 @@ mod two_solids;
 use super::{Plan, Row};
 use crate::LabError;
 
-/// Why a row of shared parts is skipped.
-const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to their folder";
-
 /// Measures some rows.
 type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
 
