@@ -5,9 +5,8 @@
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_haptics::observer::{Observer, Place};
-use mortise_haptics::{Input, Output, Settings, State, Twist, Wrench, tick};
+use mortise_haptics::{Input, Output, Settings, State, Twist, tick};
 use mortise_protocol::image::SceneImage;
-use mortise_scenario::port::Port;
 
 use crate::LabError;
 
@@ -115,19 +114,19 @@ impl HandlePath {
 
 /// One tick, as seen from outside.
 pub(crate) struct Seen<'o> {
+    /// Time of the tick, s, and the handle's position in it, mm.
+    pub t_s: f64,
+    pub handle_mm: DVec3,
     /// Pose of the part's shape in the world at the tick's end, mm.
     pub object: DAffine3,
     /// What the tick returned.
     pub out: &'o Output,
 }
 
-/// Energy that was generated in a run: the largest rise over any interval, J.
+/// Energy that the device generated at the handle in a run, beyond what its springs and the object stored: the largest rise over any interval, J.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Made {
-    /// By the device at the handle, beyond what its springs and the object stored.
     pub handle_j: f64,
-    /// By contacts at the object; what their springs store counts as generated.
-    pub contact_j: f64,
 }
 
 /// Plays `path` with part `part` of `scene`; calls `see` after each tick.
@@ -152,7 +151,7 @@ pub(crate) fn drive(
             what: error.to_string(),
         })?;
     let mut observer = Observer::new(scene, &state, settings, &at);
-    let (mut contact, mut last) = (Port::default(), at);
+    let mut last = at;
     for index in 0..(path.duration_s() / period) as u32 {
         let input = Input {
             handle: at.pose(),
@@ -167,21 +166,17 @@ pub(crate) fn drive(
         if let Some(observer) = &mut observer {
             observer.tick(&state, &at, &next, &out.handle);
         }
-        contact.add(period * power(&out.contact, &out.object_twist));
-        (last, at) = (at, next);
         see(&Seen {
+            t_s: period * f64::from(index),
+            handle_mm: 1e3 * at.position,
             object: pose_mm(&out),
             out: &out,
         });
+        (last, at) = (at, next);
     }
     Ok(Made {
         handle_j: observer.as_ref().map_or(f64::NAN, Observer::given_j),
-        contact_j: contact.made(),
     })
-}
-
-fn power(wrench: &Wrench, twist: &Twist) -> f64 {
-    f64::from(wrench.force.dot(twist.linear) + wrench.torque.dot(twist.angular))
 }
 
 fn speed(from: &Place, to: &Place, period: f64) -> Twist {

@@ -8,7 +8,7 @@ use mortise_bake::{BakeError, BakeOptions, Grabbable, Request, SignOptions, bake
 use mortise_brep::{CadModel, LoadOptions, load_step};
 use mortise_scenario::ScenarioError;
 
-use super::ABSENT;
+use super::limits::ABSENT;
 use crate::figures::{Plan, Row};
 use crate::variant::Variant;
 use crate::{LabError, corpus};

@@ -1,20 +1,15 @@
 //! Crossing bars: one laid across another, pressed with 10 N, then slid and rolled.
 
-use std::ops::ControlFlow;
-
 use glam::{DAffine3, DQuat, DVec3};
-use mortise_bake::{BakeOptions, Grabbable, bake};
-use mortise_brep::load_step;
 use mortise_haptics::Settings;
-use mortise_scenario::ScenarioError;
 
 use super::parallel::trials;
+use super::two_solids::{HELD, baked, cuboid};
 use crate::LabError;
-use crate::convex::{Convex, Polytope};
+use crate::convex::Convex;
 use crate::driven::{HandlePath, Image, Made, drive};
 use crate::figures::{Plan, Row};
 use crate::separation::signed_distance_mm;
-use crate::step_text::StepText;
 
 /// Length of the bars, mm, and their widths: square sections.
 const LENGTH_MM: f64 = 200.0;
@@ -51,7 +46,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     } else {
         (&WIDTHS_MM, RUNS)
     };
-    let images: Vec<(f64, Image)> = trials(widths.len(), |index| Ok((widths[index], baked(widths[index])?)))?;
+    let images: Vec<(f64, Image)> = trials(widths.len(), |index| Ok((widths[index], laid(widths[index])?)))?;
     let all = trials(widths.len() * runs, |index| {
         let (width, image) = &images[index / runs];
         crossing(*width, image, index as u64)
@@ -114,12 +109,7 @@ impl Crossing {
 
 /// A bar along x.
 fn bar(width: f64) -> Result<Convex, LabError> {
-    Polytope::cuboid(DVec3::new(0.5 * LENGTH_MM, 0.5 * width, 0.5 * width))
-        .map(Convex::Polytope)
-        .ok_or_else(|| LabError::Input {
-            name: format!("bar of {width} mm"),
-            what: "is no solid".into(),
-        })
+    cuboid(DVec3::new(0.5 * LENGTH_MM, 0.5 * width, 0.5 * width))
 }
 
 /// Turn of the moving bar in the file.
@@ -132,29 +122,10 @@ fn start_mm(width: f64) -> f64 {
     width + START_MM
 }
 
-fn baked(width: f64) -> Result<Image, LabError> {
-    let mut text = StepText::new();
-    let fixed = bar(width)?.write(&mut text);
-    text.part("fixed", fixed, DAffine3::IDENTITY);
-    let moving = bar(width)?.write(&mut text);
-    let above = DVec3::Z * start_mm(width);
-    text.part(
-        "moving",
-        moving,
-        DAffine3::from_rotation_translation(across(), above),
-    );
-    let file = text.file()?;
-    let model = load_step(file.path())?;
-    let options = BakeOptions {
-        grabbable: Grabbable::Named(vec!["moving".into()]),
-        ..BakeOptions::default()
-    };
-    let baked =
-        bake(&model, &options, &|_| ControlFlow::Continue(())).map_err(|source| ScenarioError::Bake {
-            step: "crossing bars".into(),
-            source,
-        })?;
-    Ok(Image::new(&baked.image))
+fn laid(width: f64) -> Result<Image, LabError> {
+    let bar = bar(width)?;
+    let above = DAffine3::from_rotation_translation(across(), DVec3::Z * start_mm(width));
+    baked(&bar, &bar, above)
 }
 
 /// One run: to a random place and angle above the fixed bar, down, slid and rolled.
@@ -185,7 +156,7 @@ fn crossing(width: f64, image: &Image, seed: u64) -> Result<Crossing, LabError> 
     let scene = image.scene()?;
     let solid = bar(width)?;
     let (mut deepest_mm, mut force_n) = (0.0f64, 0.0f64);
-    let made = drive(&scene, 1, &Settings::default(), &path, &mut |seen| {
+    let made = drive(&scene, HELD, &Settings::default(), &path, &mut |seen| {
         // Beyond the corners' reach the bars are apart.
         if seen.object.translation.z < 2.0 * start_mm(width) {
             deepest_mm = deepest_mm.max(-signed_distance_mm(&solid, &solid, &seen.object));

@@ -1,19 +1,14 @@
 //! Blows on thin plates: a ball and a block's corner or face, driven onto a plate and on beyond it.
 
-use std::ops::ControlFlow;
-
 use glam::{DAffine3, DQuat, DVec3};
-use mortise_bake::{BakeOptions, Grabbable, bake};
-use mortise_brep::load_step;
 use mortise_haptics::Settings;
-use mortise_scenario::ScenarioError;
 
 use super::parallel::trials;
+use super::two_solids::{HELD, baked, cuboid};
 use crate::LabError;
-use crate::convex::{Convex, Polytope};
+use crate::convex::Convex;
 use crate::driven::{HandlePath, Image, drive};
 use crate::figures::{Plan, Row};
-use crate::step_text::StepText;
 
 /// Plate: half edges, mm, and thicknesses, mm.
 const PLATE_MM: [f64; 2] = [31.0, 17.0];
@@ -95,41 +90,18 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
 
 impl Target {
     fn baked(thick_mm: f64, ball: bool) -> Result<Self, LabError> {
-        let cuboid = |half: DVec3| {
-            Polytope::cuboid(half)
-                .map(Convex::Polytope)
-                .ok_or_else(|| LabError::Input {
-                    name: "plate and striker".into(),
-                    what: "no solid".into(),
-                })
-        };
         let plate = cuboid(DVec3::new(PLATE_MM[0], PLATE_MM[1], 0.5 * thick_mm))?;
         let striker = if ball {
             Convex::Ball { radius: BALL_MM }
         } else {
             cuboid(DVec3::from_array(BLOCK_MM))?
         };
-        let mut text = StepText::new();
-        for (name, solid, z) in [("plate", &plate, 0.0), ("striker", &striker, START_MM)] {
-            let written = solid.write(&mut text);
-            text.part(name, written, DAffine3::from_translation(DVec3::Z * z));
-        }
-        let file = text.file()?;
-        let options = BakeOptions {
-            grabbable: Grabbable::Named(vec!["striker".into()]),
-            ..BakeOptions::default()
-        };
-        let model = load_step(file.path())?;
-        let baked =
-            bake(&model, &options, &|_| ControlFlow::Continue(())).map_err(|source| ScenarioError::Bake {
-                step: "plate and striker".into(),
-                source,
-            })?;
+        let above = DAffine3::from_translation(DVec3::Z * START_MM);
         Ok(Self {
             thick_mm,
             ball,
+            image: baked(&plate, &striker, above)?,
             striker,
-            image: Image::new(&baked.image),
         })
     }
 }
@@ -163,7 +135,7 @@ fn blow(target: &Target, seed: u64) -> Result<Blow, LabError> {
         .then(STAY_S, below, turn);
     let scene = target.image.scene()?;
     let (mut deepest_mm, mut force_n, mut last_mm) = (f64::NEG_INFINITY, 0.0f64, f64::NAN);
-    drive(&scene, 1, &Settings::default(), &path, &mut |seen| {
+    drive(&scene, HELD, &Settings::default(), &path, &mut |seen| {
         let down = seen.object.matrix3.transpose() * -DVec3::Z;
         let lowest = seen.object.transform_point3(target.striker.support(down));
         last_mm = 0.5 * target.thick_mm - lowest.z;

@@ -10,7 +10,7 @@ use crate::figures::{Plan, Row};
 use crate::separation::{overlap, signed_distance_mm};
 use crate::step_text::StepText;
 
-/// Distance by which a wrong answer is told from a right one, mm.
+/// Distance by which a wrong answer differs from a right one, mm.
 const CLEAR_MM: f64 = 0.01;
 /// Largest error of a distance called exact, mm.
 const EXACT_MM: f64 = 1e-3;
@@ -29,9 +29,9 @@ const NEAR_MM: [f64; 2] = [1e-3, 3.0];
 struct Tally {
     poses: usize,
     overlapping: usize,
-    /// A gap told where they overlap.
+    /// A gap reported where they overlap.
     gaps: usize,
-    /// Contact told where they are apart.
+    /// Contact reported where they are apart.
     ghosts: usize,
     /// Distances called exact that are off.
     inexact: usize,
@@ -81,9 +81,12 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         )
     };
     let count = |of: &str, value: usize| Row::exactly(what(of), value as f64, "poses", 0.0);
-    out(count("a gap told where they overlap by over 10 µm", tally.gaps));
     out(count(
-        "contact told where they are over 10 µm apart",
+        "a gap reported where they overlap by over 10 µm",
+        tally.gaps,
+    ));
+    out(count(
+        "contact reported where they are over 10 µm apart",
         tally.ghosts,
     ));
     out(count(

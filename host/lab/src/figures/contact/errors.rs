@@ -22,7 +22,7 @@ pub(super) struct Errors {
     pub exact: usize,
     pub inexact: usize,
     pub worst_exact: Worst,
-    /// Contact told of poses that are free.
+    /// Contact reported of poses that are free.
     pub ghosts: usize,
     /// Errors above what the plan states.
     pub unstated: usize,
@@ -109,6 +109,9 @@ impl Errors {
         let count =
             |of: &str, value: usize| Row::exactly(format!("{what}: {of}"), value as f64, "poses", 0.0);
         out(count("errors above what the plan states", self.unstated));
-        out(count("contact told where they are over 5 µm apart", self.ghosts));
+        out(count(
+            "contact reported where they are over 5 µm apart",
+            self.ghosts,
+        ));
     }
 }

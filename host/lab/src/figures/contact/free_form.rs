@@ -8,9 +8,9 @@ use mortise_brep::load_step;
 use mortise_scenario::probe::{NamedPose, ProbeScene};
 use mortise_scenario::{Body, ScenarioError};
 
-use super::ABSENT;
 use super::convex_pairs::placed;
 use super::errors::Errors;
+use super::limits::ABSENT;
 use super::parallel::trials;
 use crate::corpus::truths::{TrueCase, TruePair, true_pairs};
 use crate::figures::{Plan, Row};
@@ -185,7 +185,7 @@ pub(super) fn exact(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), Lab
         );
         out(Row::exactly(what(&worst), errors.inexact as f64, "poses", 0.0));
         out(Row::exactly(
-            what("contact told where they are over 5 µm apart"),
+            what("contact reported where they are over 5 µm apart"),
             errors.ghosts as f64,
             "poses",
             0.0,

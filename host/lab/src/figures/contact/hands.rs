@@ -1,4 +1,4 @@
-//! A slow and a fast hand over every shared file: the smallest part is pushed along each axis, and the overlap is measured outside of the tick.
+//! A slow and a fast hand over every shared file: the smallest part is pushed along each axis and towards its neighbour, and the overlap is measured outside of the tick.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use mortise_haptics::Settings;
 use mortise_scenario::overlap::penetration_of_poses_mm;
 use mortise_scenario::{PreparedScene, Scenario, ScenarioError};
 
-use super::ABSENT;
 use super::ghosts::files;
+use super::limits::ABSENT;
 use super::parallel::trials;
 use crate::driven::{HandlePath, Image, drive};
 use crate::figures::{Plan, Row};
@@ -22,6 +22,8 @@ const SLOW: (f64, f64) = (20.0, 0.05);
 const FAST: (f64, f64) = (1000.0, 0.3);
 /// How far the handle goes along each axis, mm: what presses with 10 N, the coupling's limit.
 const PUSH_MM: f64 = 10.0;
+/// Longest way towards the nearest part, mm.
+const MOST_MM: f64 = 60.0;
 /// Time that it stays there, s.
 const STAY_S: f64 = 0.1;
 /// Overlap as designed above which a file is left out, mm.
@@ -120,7 +122,7 @@ fn pushed(path: &Path) -> Result<Option<Pushed>, LabError> {
     for (index, (speed, _)) in [SLOW, FAST].into_iter().enumerate() {
         let image = Image::new(&scene.image);
         let mut poses = Vec::new();
-        let path = strokes(grip, speed);
+        let path = strokes(grip, nearest(&scene), speed);
         let made = drive(
             &image.scene()?,
             scene.part,
@@ -161,14 +163,27 @@ fn pushed(path: &Path) -> Result<Option<Pushed>, LabError> {
     }))
 }
 
-/// To and fro along each axis, from the middle.
-fn strokes(grip: DVec3, mm_per_s: f64) -> HandlePath {
-    let seconds = PUSH_MM / mm_per_s;
-    let ways = [DVec3::X, DVec3::Y, DVec3::Z]
-        .into_iter()
-        .flat_map(|axis| [axis, -axis]);
+/// Middle of the part that is nearest to the held one, mm.
+fn nearest(scene: &PreparedScene) -> DVec3 {
+    let moving = usize::from(scene.part);
+    let middle = |index: usize| {
+        let body = &scene.bodies()[index];
+        body.placement.transform_point3(body.center)
+    };
+    (0..scene.bodies().len())
+        .filter(|&index| index != moving)
+        .map(middle)
+        .min_by(|a, b| a.distance(middle(moving)).total_cmp(&b.distance(middle(moving))))
+        .unwrap_or_default()
+}
+
+/// From the part's place to and fro along each axis, then towards the nearest part's middle, which parts that stand apart meet.
+fn strokes(grip: DVec3, nearest: DVec3, mm_per_s: f64) -> HandlePath {
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| PUSH_MM * axis);
+    let towards = (nearest - grip).clamp_length_max(MOST_MM);
+    let ways = axes.into_iter().flat_map(|way| [way, -way]).chain([towards]);
     ways.fold(HandlePath::from(grip, DQuat::IDENTITY), |path, way| {
-        let end = grip + PUSH_MM * way;
+        let (end, seconds) = (grip + way, (way.length() / mm_per_s).max(1e-3));
         path.then(seconds, end, DQuat::IDENTITY)
             .then(STAY_S, end, DQuat::IDENTITY)
             .then(seconds, grip, DQuat::IDENTITY)

@@ -5,6 +5,7 @@ mod baking;
 mod bars;
 mod blows;
 mod convex_pairs;
+mod direction;
 mod errors;
 mod free_form;
 mod ghosts;
@@ -14,12 +15,10 @@ mod limits;
 mod parallel;
 mod random_fits;
 mod ticks;
+mod two_solids;
 
 use super::{Plan, Row};
 use crate::LabError;
-
-/// Why a row of shared parts is skipped.
-const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to their folder";
 
 /// Measures some rows.
 type Measure = fn(&Plan<'_>, &mut dyn FnMut(Row)) -> Result<(), LabError>;
@@ -42,6 +41,7 @@ const PARTS: &[(&str, Measure)] = &[
     ("blows", blows::measure),
     ("ghosts", ghosts::measure),
     ("hands", hands::measure),
+    ("direction", direction::measure),
     ("planned-pairs", free_form::planned),
     ("random-fits", |plan, out| {
         random_fits::measure(plan, out)?;
