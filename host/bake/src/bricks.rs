@@ -6,12 +6,13 @@ use mortise_protocol::image::{
     BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby, SAMPLES_PER_BRICK,
 };
 
+use crate::cell_samples::{ExactSample, corner_places, index};
 use crate::cover::{LocalPatches, verify_places};
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
 use crate::free_form_error::{AnsweredBy, FreeFormError};
 use crate::grid::Grid;
-use crate::nearby::{CellNearby, ExactSample, corner_places, index};
+use crate::nearby::CellNearby;
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {

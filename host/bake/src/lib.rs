@@ -14,6 +14,7 @@ mod area_curvatures;
 mod bake;
 mod bounds;
 mod bricks;
+mod cell_samples;
 mod choice;
 mod classic;
 mod cost;
