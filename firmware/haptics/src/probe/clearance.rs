@@ -318,13 +318,16 @@ impl Clearing {
             let reach = curve.speed() * h;
             let Some((d, n)) = signed(face, p) else {
                 // On the axis or at the centre, where the surface is a radius away.
-                let lower = radius_at_axis(face) - reach - curve.radius - curve.error;
+                let lower = (radius_at_axis(face) - curve.radius).abs() - reach - curve.error;
                 if lower < self.found.upper {
                     self.split(&mut stack, t, h, reach, if lower > 0.0 { lower } else { 0.0 });
                 }
                 continue;
             };
-            let lower = self.least(face, curve, (t, h), (p, d, n)) - curve.radius - curve.error;
+            let least = self.least(face, curve, (t, h), (p, d, n)) - curve.radius;
+            // The own surface may lie beyond the face: then it is the nearer to it, the farther the curve.
+            let beyond = curve.radius - (d.abs() + reach);
+            let lower = (if least > beyond { least } else { beyond }) - curve.error;
             if lower >= self.found.upper - CLOSE_M - curve.error {
                 self.note(lower);
                 continue;
