@@ -127,6 +127,12 @@ fn golden_scene_reads_back() {
         "{beside} {far}"
     );
 
+    let surfaces = image.shape(1).surfaces();
+    assert!(matches!(surfaces.get(1), Some(Surface::Face(_))));
+    assert!(matches!(surfaces.get(2), Some(Surface::Patch(patch)) if patch.height[9] == 16.0));
+    assert!(surfaces.get(3).is_none() && image.shape(0).surfaces().get(2).is_none());
+    assert_eq!([0, 2, 3].map(|i| surfaces.face_of(i)), [0, 1, NO_FACE]);
+
     let bytes = image.shape(1).field;
     let Lookup::Near(sample) = bytes.lookup([0.0045, 0.001, 0.001]) else {
         panic!("stored");

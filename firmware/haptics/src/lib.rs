@@ -40,6 +40,7 @@ mod state;
 mod tick;
 
 pub use collision::cost;
+pub use collision::patch::distance_to_patch;
 pub use constraints::targets::TargetError;
 pub use glam::{Quat, Vec3};
 pub use io::{FacePair, FacePairs, Flags, GuidanceState, Input, Output, Work};

@@ -60,6 +60,7 @@ pub(crate) fn step_error(cell_mm: f64, band_cells: f64, format: SampleFormat) ->
         cell_mm,
         band_cells,
         format,
+        patch_tolerance_mm: 0.0,
     };
     0.5 * cell_mm / options.units_per_cell()
 }

@@ -4,7 +4,8 @@ use std::ops::ControlFlow;
 
 use mortise_brep::{CadModel, Surface};
 use mortise_protocol::image::{
-    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PointRecord, ShapeRecord,
+    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PatchRecord, PointRecord,
+    ShapeRecord,
 };
 use rayon::prelude::*;
 
@@ -101,7 +102,7 @@ pub(crate) struct Made {
 
 impl Made {
     /// Bytes of the shapes in the image, without parts and header.
-    fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         let shells = self.shells.iter().map(|shell| {
             let points = shell.points.len();
             (points * size_of::<PointRecord>() + node_count(points) * size_of::<NodeRecord>()) as u64
@@ -113,7 +114,8 @@ impl Made {
 fn field_bytes(field: &BakedField) -> u64 {
     let bricks = field.bricks.len() * size_of::<BrickRecord>();
     // Alignment of the blob and of the grid: less than 8 bytes.
-    (field.blob.len() + 2 * field.grid.len() + bricks + 2 * field.palette.len() + 8) as u64
+    let patches = field.patches.len() * size_of::<PatchRecord>();
+    (field.blob.len() + 2 * field.grid.len() + bricks + 2 * field.palette.len() + patches + 8) as u64
 }
 
 impl Scene {
@@ -133,6 +135,21 @@ impl Scene {
             shells.push(self.shell(i, &prepared[i], &self.partners[i], cell, options, progress)?);
         }
         Ok(Made { fields, shells })
+    }
+
+    /// Makes field and pointshell of one shape again, with cells of about this size.
+    pub fn again(
+        &self,
+        index: usize,
+        options: &BakeOptions,
+        surface: &mut ExactSurface,
+        mut cell_mm: f64,
+        progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+        made: &mut Made,
+    ) -> Result<(), BakeError> {
+        made.fields[index] = self.field(index, surface, &mut cell_mm, options, progress)?;
+        made.shells[index] = self.shell(index, surface, &self.partners[index], cell_mm, options, progress)?;
+        Ok(())
     }
 
     /// Makes new pointshells for existing fields.
@@ -292,6 +309,7 @@ impl Scene {
                 cell_mm: *cell_mm,
                 band_cells: options.band_cells,
                 format: options.format,
+                patch_tolerance_mm: options.patch_tolerance_mm,
             };
             let baked = match options.method {
                 Method::DistanceField => bake_field(surface, &field, part, &step),
@@ -466,6 +484,7 @@ fn shape_report(
             .iter()
             .filter(|f| matches!(f.surface, Surface::Spline))
             .count(),
+        free_form: field.free_form,
     }
 }
 
@@ -506,6 +525,7 @@ fn add(a: &ByteCount, b: &ByteCount) -> ByteCount {
         nodes: a.nodes + b.nodes,
         faces: a.faces + b.faces,
         edges: a.edges + b.edges,
+        patches: a.patches + b.patches,
         records: a.records + b.records,
     }
 }

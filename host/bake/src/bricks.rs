@@ -1,12 +1,19 @@
 //! One brick: 9³ exact samples, and the nearest face or faces of each of its 8³ cells.
 
 use glam::DVec3;
-use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby};
+use mortise_brep::Surface;
+use mortise_protocol::image::{
+    BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby, SAMPLES_PER_BRICK,
+};
 
+use crate::cover::LocalPatches;
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
+use crate::free_form_cells::FreeFormCells;
+use crate::free_form_error::{AnsweredBy, FreeFormError};
 use crate::grid::Grid;
-use crate::nearby::{CellNearby, ExactSample, Unproven};
+use crate::nearby::{CellNearby, Unproven};
+use crate::samples::{ExactSample, corner_places, index};
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {
@@ -22,47 +29,53 @@ pub(crate) struct Brick {
     pub palette_len: u16,
     /// Crossed cells without a rule.
     pub unproven: Unproven,
+    /// Error near free-form faces.
+    pub free_form: FreeFormError,
 }
 
-/// Samples the brick at place `at` of `grid`.
-pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOptions, at: [u32; 3]) -> Brick {
+/// Exact samples of the brick at place `at` of `grid`, x fastest.
+pub(crate) fn sample_brick(surface: &ExactSurface, grid: &Grid, at: [u32; 3]) -> Vec<ExactSample> {
     let mut scratch = Scratch::default();
-    let units_per_mm = options.units_per_cell() / grid.cell();
-    let mut samples = Vec::with_capacity(brick_bytes(options.format));
-    let unknown = ExactSample {
-        distance: f64::NAN,
-        face: NO_FACE,
-    };
-    let mut exact = [unknown; BRICK_SAMPLES * BRICK_SAMPLES * BRICK_SAMPLES];
-    let mut within = f64::INFINITY;
-    let mut i = 0;
+    let mut exact = Vec::with_capacity(SAMPLES_PER_BRICK);
     for z in 0..BRICK_SAMPLES {
         for y in 0..BRICK_SAMPLES {
+            // A new row starts without a known bound; the next sample along x is one cell away.
+            let mut within = f64::INFINITY;
             for x in 0..BRICK_SAMPLES {
-                let p = grid.sample(at, [x, y, z]);
-                let mut value = options.format.max();
-                if let Some(nearest) = surface.query(p, within, &mut scratch) {
-                    value = quantise(nearest.distance * units_per_mm, options.format);
-                    exact[i] = ExactSample {
-                        distance: nearest.distance,
-                        face: nearest.face as u16,
-                    };
-                    // The next sample along x is one cell away; a new row starts without a known bound.
-                    within = if x + 1 < BRICK_SAMPLES {
-                        nearest.distance.abs() + grid.cell() * (1.0 + 1e-9)
-                    } else {
-                        f64::INFINITY
-                    };
+                let nearest = surface.query(grid.sample(at, [x, y, z]), within, &mut scratch);
+                if let Some(nearest) = nearest {
+                    within = nearest.distance.abs() + grid.cell() * (1.0 + 1e-9);
                 }
-                match options.format {
-                    SampleFormat::Int8 => samples.push(value as i8 as u8),
-                    SampleFormat::Int16 => samples.extend((value as i16).to_le_bytes()),
-                }
-                i += 1;
+                exact.push(nearest.map_or(ExactSample::NONE, ExactSample::of));
             }
         }
     }
-    let (cells, unproven) = cells(surface, grid, at, &exact, &mut scratch);
+    exact
+}
+
+/// The brick with these samples as stored.
+pub(crate) fn bake_brick(
+    surface: &ExactSurface,
+    grid: &Grid,
+    options: &FieldOptions,
+    patches: &LocalPatches,
+    at: [u32; 3],
+    exact: &[ExactSample],
+) -> Brick {
+    let units_per_mm = options.units_per_cell() / grid.cell();
+    let mut samples = Vec::with_capacity(brick_bytes(options.format));
+    for sample in exact {
+        let value = if sample.distance.is_nan() {
+            options.format.max()
+        } else {
+            quantise(sample.distance * units_per_mm, options.format)
+        };
+        match options.format {
+            SampleFormat::Int8 => samples.push(value as i8 as u8),
+            SampleFormat::Int16 => samples.extend((value as i16).to_le_bytes()),
+        }
+    }
+    let (cells, unproven, free_form) = cells(surface, grid, patches, options.patch_tolerance_mm, at, exact);
     let Packed {
         palette,
         palette_len,
@@ -76,6 +89,7 @@ pub(crate) fn bake_brick(surface: &ExactSurface, grid: &Grid, options: &FieldOpt
         palette,
         palette_len,
         unproven,
+        free_form,
     }
 }
 
@@ -91,34 +105,56 @@ fn quantise(units: f64, format: SampleFormat) -> f64 {
 fn cells(
     surface: &ExactSurface,
     grid: &Grid,
+    patches: &LocalPatches,
+    tolerance_mm: f64,
     at: [u32; 3],
     samples: &[ExactSample],
-    scratch: &mut Scratch,
-) -> ([Nearby; CELLS_PER_BRICK], Unproven) {
+) -> ([Nearby; CELLS_PER_BRICK], Unproven, FreeFormError) {
+    let faces: Vec<(Surface, f64)> = (surface.shape().faces.iter())
+        .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
+        .collect();
     let mut nearby = CellNearby::new(surface, samples, grid.sample(at, [0; 3]), grid.cell());
-    let mut cells = [Nearby::Unknown; CELLS_PER_BRICK];
-    for (i, cell) in cells.iter_mut().enumerate() {
-        let [x, y, z] = [
-            i % BRICK_CELLS,
-            i / BRICK_CELLS % BRICK_CELLS,
-            i / BRICK_CELLS / BRICK_CELLS,
-        ];
-        let corner = |c: usize| {
-            let (x, y, z) = (x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
-            samples[x + BRICK_SAMPLES * (y + BRICK_SAMPLES * z)].face
-        };
+    let free_forms = FreeFormCells {
+        faces: &faces,
+        patches,
+        tolerance_mm,
+        samples,
+        origin: grid.sample(at, [0; 3]),
+        cell: grid.cell(),
+        first: at.map(|b| b * BRICK_CELLS as u32),
+    };
+    let mut scratch = Scratch::default();
+    let mut error = FreeFormError::default();
+    let cells = std::array::from_fn(|i| {
+        let cell = [i & 7, i >> 3 & 7, i >> 6];
+        let corner = |c: usize| samples[index(corner_places(cell)[c])].face;
         let first = corner(0);
         let nearest = if (1..8).all(|c| corner(c) == first) {
             first
         } else {
-            let center = grid.sample(at, [x, y, z]) + DVec3::splat(grid.cell() / 2.0);
+            let center = grid.sample(at, cell) + DVec3::splat(grid.cell() / 2.0);
             surface
-                .query(center, f64::INFINITY, scratch)
+                .query(center, f64::INFINITY, &mut scratch)
                 .map_or(NO_FACE, |n| n.face as u16)
         };
-        *cell = nearby.of([x, y, z], nearest);
-    }
-    (cells, nearby.unproven)
+        let Some(known) = patches.verified(std::array::from_fn(|a| free_forms.first[a] + cell[a] as u32))
+        else {
+            return nearby.of(cell, nearest);
+        };
+        let named = free_forms.of(cell, nearest, || known.to_vec());
+        let by = match named {
+            Nearby::Roughly(_) | Nearby::Unknown if free_forms.at_edge(cell, nearest) => {
+                AnsweredBy::SamplesAtEdge
+            }
+            Nearby::Roughly(_) | Nearby::Unknown => AnsweredBy::Samples,
+            _ => AnsweredBy::Surfaces,
+        };
+        for place in known {
+            error.add(place, grid.cell(), free_forms.rendered(cell, named, place), by);
+        }
+        named
+    });
+    (cells, nearby.unproven, error)
 }
 
 /// Nearest faces of the cells of a brick, as stored.

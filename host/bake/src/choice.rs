@@ -17,7 +17,9 @@ use crate::scene::longest_side;
 /// Factor by which errors may be larger on faces that fit nothing.
 pub const ELSEWHERE: f64 = 10.0;
 /// Share of the requested accuracy in fits that the field may use; the rest is the shell's.
-const FIELD_SHARE: f64 = 0.75;
+pub(crate) const FIELD_SHARE: f64 = 0.75;
+/// Share of the requested accuracy that the local patches of free-form faces may use.
+pub(crate) const PATCH_SHARE: f64 = 0.5;
 /// Share of the accuracy elsewhere that the field may use.
 const FIELD_SHARE_ELSEWHERE: f64 = 0.5;
 /// Largest error bound of the shell, in cells: at sharp edges the field's error is that large in any case.
@@ -40,6 +42,8 @@ pub(crate) struct Demand {
     /// Largest cell that resolves the walls and slots, and its description.
     walls: (f64, String),
     left_out: Vec<u32>,
+    /// Whether any face is free-form.
+    free_form: bool,
 }
 
 impl Demand {
@@ -76,6 +80,7 @@ impl Demand {
             others,
             walls: walls(surface, &words),
             left_out,
+            free_form: shape.faces.iter().any(|f| matches!(f.surface, Surface::Spline)),
         }
     }
 
@@ -128,7 +133,12 @@ impl Demand {
         };
         let resolved = self.others.iter().map(|o| o.1);
         let resolved = resolved.filter(|b| is_resolvable(FIELD_SHARE_ELSEWHERE * elsewhere, *b));
-        let in_fits = worst(&mut self.fits.iter().map(|f| f.1));
+        let patches = if self.free_form {
+            PATCH_SHARE * accuracy
+        } else {
+            0.0
+        };
+        let in_fits = worst(&mut self.fits.iter().map(|f| f.1)).max(patches);
         let field = worst(&mut self.fits.iter().map(|f| f.1).chain(resolved));
         // The shell gets the share that the field leaves.
         let difference = self.fits.iter().map(|f| f.2).fold(0.0, f64::max);
@@ -146,6 +156,7 @@ impl Demand {
             field_error_in_fits_mm: in_fits,
             shell_error_in_fits_mm: epsilon * difference,
             error_elsewhere_mm: field + epsilon,
+            error_at_edges_mm: 0.0,
             faces_that_fit: faces_that_fit(&self.fits),
             faces_taken_as_edges: edges,
             faces_left_out: self.left_out.clone(),

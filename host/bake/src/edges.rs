@@ -68,6 +68,7 @@ impl EdgePiece {
             faces: self.faces.map(|face| face as u16),
             thickness: round_up(self.thickness / 1000.0),
             edge: self.edge,
+            radius: round_up((self.half.length() + self.bend.length()) / 1000.0),
         }
     }
 }

@@ -8,15 +8,18 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry};
+use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry, PatchRecord};
 use rayon::prelude::*;
 
 use crate::bounds::{Class, classify};
-use crate::bricks::{Brick, bake_brick};
+use crate::bricks::{Brick, bake_brick, sample_brick};
+use crate::cover::{LocalPatches, Sampled, has_free_forms};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::format::FieldOptions;
+use crate::free_form_error::FreeFormError;
 use crate::grid::Grid;
+use crate::samples::ExactSample;
 
 /// A standalone field: record offsets count from its own arrays.
 #[derive(Clone, Debug)]
@@ -29,6 +32,10 @@ pub struct BakedField {
     pub bricks: Vec<BrickRecord>,
     /// Palette entries.
     pub palette: Vec<u16>,
+    /// Local patches that palettes name.
+    pub patches: Vec<PatchRecord>,
+    /// Measured error near free-form faces.
+    pub free_form: FreeFormError,
     /// Samples and palette indices.
     pub blob: Vec<u8>,
     /// Number of sample bytes in `blob`; the rest are palette indices and padding.
@@ -68,18 +75,35 @@ pub fn bake_field(
     let near = NearSurface::find(surface, &grid, reach, options.cell_mm, part, progress)?;
     let surface = &*surface;
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let bricks: Option<Vec<Brick>> = near
-        .stored
-        .par_iter()
-        .map(|&at| {
-            let brick = bake_brick(surface, &grid, options, at);
-            let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            progress(n, near.stored.len()).is_continue().then_some(brick)
-        })
-        .collect();
+    let step = || {
+        let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+        progress(n, near.stored.len()).is_continue()
+    };
+    let baked = |patches: &LocalPatches, at, exact: &[ExactSample]| {
+        bake_brick(surface, &grid, options, patches, at, exact)
+    };
+    let (bricks, patches): (Option<Vec<Brick>>, _) = if has_free_forms(surface) {
+        // Patches extend over many bricks: all samples first.
+        let sampled: Option<Vec<Sampled>> = (near.stored.par_iter())
+            .map(|&at| step().then(|| (at, sample_brick(surface, &grid, at))))
+            .collect();
+        let sampled = sampled.ok_or(BakeError::Cancelled)?;
+        let patches = LocalPatches::cover(surface, &grid, &sampled, options.patch_tolerance_mm);
+        let bricks = sampled
+            .par_iter()
+            .map(|(at, exact)| Some(baked(&patches, *at, exact)));
+        (bricks.collect(), patches)
+    } else {
+        let none = LocalPatches::default();
+        let bricks = (near.stored.par_iter())
+            .map(|&at| step().then(|| baked(&none, at, &sample_brick(surface, &grid, at))));
+        (bricks.collect(), LocalPatches::default())
+    };
     let bricks = bricks.ok_or(BakeError::Cancelled)?;
     let unproven_cells = bricks.iter().map(|brick| brick.unproven.cells).sum();
     let unproven_at = bricks.iter().find_map(|brick| brick.unproven.at);
+    let free_form =
+        (bricks.iter().map(|brick| brick.free_form)).fold(FreeFormError::default(), FreeFormError::and);
     let packed = pack(&grid, options, &near.classes, &near.stored, bricks);
     check_brick_count(packed.bricks.len(), options.cell_mm, part)?;
     Ok(BakedField {
@@ -87,6 +111,8 @@ pub fn bake_field(
         sign_disagreements: near.sign_disagreements,
         unproven_cells,
         unproven_at,
+        patches: patches.records,
+        free_form,
         ..packed
     })
 }
@@ -279,6 +305,8 @@ fn pack(
         grid: entries,
         bricks: records,
         palette,
+        patches: Vec::new(),
+        free_form: FreeFormError::default(),
         blob,
         sample_bytes,
         stored_entries: stored.len(),

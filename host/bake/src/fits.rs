@@ -1,6 +1,6 @@
 //! Pairs of faces of two shapes that can fit into one another: a convex one in a concave one of nearly the same radius.
 //!
-//! Fits follow from the shapes alone, independent of their placement. In a fit the surfaces run along each other, so the smallest errors are felt
+//! Fits of round faces follow from the shapes alone, independent of their placement; those of other faces are in [`crate::placed_fits`]. In a fit the surfaces run along each other, so the smallest errors are felt
 //! there. Flats that fit flats are exact in any field and need no rule.
 
 use mortise_brep::Surface;
@@ -46,7 +46,15 @@ enum Round {
     Cone,
 }
 
-/// All fits between two shapes.
+/// Whether a surface takes part in fits by radii.
+pub(crate) fn is_round(surface: &Surface) -> bool {
+    matches!(
+        surface,
+        Surface::Cylinder { .. } | Surface::Sphere { .. } | Surface::Cone { .. }
+    )
+}
+
+/// All fits of round faces between two shapes.
 pub(crate) fn fits(a: &ExactSurface, b: &ExactSurface) -> Vec<Fit> {
     let of = |s: &ExactSurface| -> Vec<(u32, (Round, f64, f64))> {
         (0..s.shape().faces.len() as u32)

@@ -49,6 +49,8 @@ pub struct FieldOptions {
     pub band_cells: f64,
     /// Number format.
     pub format: SampleFormat,
+    /// Largest error of the local patches of free-form faces, mm.
+    pub patch_tolerance_mm: f64,
 }
 
 impl FieldOptions {

@@ -5,8 +5,8 @@ use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
-    NodeRecord, PART_GRABBABLE, PartRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY, Section, ShapeRecord,
-    oct_encode, surface_kind,
+    NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY, Section,
+    ShapeRecord, oct_encode, surface_kind,
 };
 
 use crate::edges::EdgePiece;
@@ -36,6 +36,7 @@ pub struct ImageBuilder {
     nodes: Vec<NodeRecord>,
     points: Vec<PointRecord>,
     faces: Vec<FaceRecord>,
+    patches: Vec<PatchRecord>,
     bricks: Vec<BrickRecord>,
     palette: Vec<u16>,
     grid: Vec<u16>,
@@ -98,6 +99,8 @@ impl ImageBuilder {
             point_count: positions.len() as u32,
             first_face: self.faces.len() as u32,
             face_count: shape.faces.len() as u32,
+            first_patch: self.patches.len() as u32,
+            patch_count: field.patches.len() as u32,
             center: center.to_array(),
             radius: round_up(radius),
             volume: (shape.volume_mm3 * 1e-9) as f32,
@@ -118,6 +121,7 @@ impl ImageBuilder {
             nodes: tree.nodes.len() * size_of::<NodeRecord>(),
             faces: shape.faces.len() * size_of::<FaceRecord>(),
             edges: edge_bytes(edges.len()),
+            patches: field.patches.len() * size_of::<PatchRecord>(),
             records: size_of::<ShapeRecord>() + size_of::<FieldRecord>(),
         };
         self.nodes.extend(tree.nodes);
@@ -134,6 +138,7 @@ impl ImageBuilder {
             }
         }));
         self.faces.extend(shape.faces.iter().map(face_record));
+        self.patches.extend(&field.patches);
         self.add_field(field);
         (number, bytes)
     }
@@ -180,6 +185,7 @@ impl ImageBuilder {
             + padded(size_of_val(self.nodes.as_slice()))
             + padded(size_of_val(self.points.as_slice()))
             + padded(size_of_val(self.faces.as_slice()))
+            + padded(size_of_val(self.patches.as_slice()))
             + padded(size_of_val(self.bricks.as_slice()))
             + padded(2 * (self.palette.len() + PALETTE_PADDING))
             + padded(size_of_val(self.grid.as_slice()))
@@ -205,6 +211,7 @@ impl ImageBuilder {
             nodes: append(&mut bytes, &self.nodes),
             points: append(&mut bytes, &self.points),
             faces: append(&mut bytes, &self.faces),
+            patches: append(&mut bytes, &self.patches),
             bricks: append(&mut bytes, &self.bricks),
             palette: append(&mut bytes, &self.palette),
             grid: append(&mut bytes, &self.grid),

@@ -13,6 +13,7 @@ use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, NO_FACE, Nearby};
 
 use crate::distance::{ExactSurface, Scratch};
 use crate::rule::{SAME_MM, Test, find_rule, holds};
+use crate::samples::ExactSample;
 use crate::surface::signed_distance;
 
 /// Half steps of samples along a brick's edge.
@@ -23,15 +24,6 @@ const ATTEMPTS: usize = 4;
 const MOST_TOUCHES: usize = 24;
 /// Points along a cell's edge at which the rule of a crossed cell is verified.
 const VERIFIED: usize = 4;
-
-/// A sample of a brick before rounding.
-#[derive(Clone, Copy)]
-pub(crate) struct ExactSample {
-    /// Distance, mm, outside positive; NaN where it was not computed.
-    pub distance: f64,
-    /// Nearest face or [`NO_FACE`].
-    pub face: u16,
-}
 
 /// Cells crossed by the surface that have no rule although all near faces have a closed form.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

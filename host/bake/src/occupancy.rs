@@ -29,6 +29,7 @@ use crate::bricks::{self, Packed};
 use crate::distance::{ExactSurface, Nearest, Scratch};
 use crate::error::BakeError;
 use crate::field::{BakedField, NearSurface, append_aligned, check_brick_count};
+use crate::free_form_error::FreeFormError;
 use crate::grid::Grid;
 
 /// Layers of proximity voxels around the surface voxels, as in the paper.
@@ -322,6 +323,8 @@ fn pack(
         sample_bytes,
         bricks,
         palette,
+        patches: Vec::new(),
+        free_form: FreeFormError::default(),
         blob,
         stored_entries,
         sign_disagreements: near.sign_disagreements,

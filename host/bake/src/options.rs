@@ -20,6 +20,8 @@ pub struct BakeOptions {
     pub band_cells: f64,
     /// Number format of samples.
     pub format: SampleFormat,
+    /// Largest error of the local patches that free-form faces are divided into, mm.
+    pub patch_tolerance_mm: f64,
     /// Kind of the pointshells.
     pub shell: PointshellKind,
     /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a twentieth of the cell.
@@ -43,6 +45,7 @@ impl Default for BakeOptions {
             part_cells_mm: Vec::new(),
             band_cells: 2.0,
             format: SampleFormat::Int16,
+            patch_tolerance_mm: 2e-3,
             shell: PointshellKind::ErrorBounded,
             epsilon_mm: None,
             crossing_epsilon_mm: None,
@@ -73,6 +76,13 @@ impl BakeOptions {
         }
         // With less than one diagonal not all cells next to the surface would be stored.
         within("band_cells", self.band_cells, 1.0, 64.0, "1 to 64 cells")?;
+        within(
+            "patch_tolerance_mm",
+            self.patch_tolerance_mm,
+            1e-6,
+            1e3,
+            "0.000001 to 1000 mm",
+        )?;
         for epsilon in [self.epsilon_mm, self.crossing_epsilon_mm].into_iter().flatten() {
             within("epsilon_mm", epsilon, 1e-6, 1e3, "0.000001 to 1000 mm")?;
         }

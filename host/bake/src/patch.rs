@@ -15,6 +15,9 @@ const MAX_HALVINGS: usize = 10;
 /// Step length that ends the search, mm: Newton steps double the number of correct digits, so the foot is then exact to rounding.
 const SHORT_MM: f64 = 1e-9;
 
+/// Sides nearer to each other than this are one, mm: rounding of poles in files.
+const CLOSED_MM: f64 = 1e-6;
+
 /// A (rational) B-spline surface over its parameter box.
 pub(crate) struct Patch {
     degrees: [usize; 2],
@@ -24,7 +27,7 @@ pub(crate) struct Patch {
     /// Number of poles along v.
     row: usize,
     bounds: [[f64; 2]; 2],
-    /// Whether first and last line of poles coincide, so that the parameter wraps round.
+    /// Whether the sides across the parameter coincide, so that it wraps round.
     closed: [bool; 2],
     /// Largest distance from the face's own surface, mm.
     pub deviation: f64,
@@ -65,14 +68,7 @@ impl Patch {
         if counts[0] * counts[1] != surface.poles.len() || surface.poles.is_empty() {
             return None;
         }
-        let row = counts[1];
-        let pole = |i: usize, j: usize| surface.poles[i * row + j];
-        let same = |a: [f64; 4], b: [f64; 4]| (0..4).all(|k| (a[k] - b[k]).abs() < 1e-7);
-        let closed = [
-            (0..row).all(|j| same(pole(0, j), pole(counts[0] - 1, j))),
-            (0..counts[0]).all(|i| same(pole(i, 0), pole(i, row - 1))),
-        ];
-        Some(Self {
+        let mut patch = Self {
             degrees,
             knots: surface.knots.clone(),
             poles: surface
@@ -80,10 +76,27 @@ impl Patch {
                 .iter()
                 .map(|&[x, y, z, w]| [x * w, y * w, z * w, w])
                 .collect(),
-            row,
+            row: counts[1],
             bounds,
-            closed,
+            closed: [false; 2],
             deviation: surface.deviation_mm,
+        };
+        patch.closed = [0, 1].map(|k| patch.closes(k));
+        Some(patch)
+    }
+
+    /// Whether the two sides across parameter `k` coincide. Poles do not tell: those of a surface that was periodic repeat by its degree.
+    fn closes(&self, k: usize) -> bool {
+        let at = |end: usize, along: f64| {
+            let mut uv = [along; 2];
+            uv[k] = self.bounds[k][end];
+            self.jet(uv).s
+        };
+        let [lo, hi] = self.bounds[1 - k];
+        let count = 2 * self.knots[1 - k].len();
+        (0..=count).all(|i| {
+            let along = lo + (hi - lo) * i as f64 / count as f64;
+            at(0, along).distance(at(1, along)) < CLOSED_MM
         })
     }
 

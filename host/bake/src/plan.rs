@@ -41,6 +41,9 @@ pub struct ShapePlan {
     pub shell_error_in_fits_mm: f64,
     /// Largest combined error of field and shell elsewhere, mm; within a cell of sharp edges the field's error is up to half a cell.
     pub error_elsewhere_mm: f64,
+    /// Largest error measured where free-form faces meet other faces and the distance is interpolated, mm.
+    #[serde(default)]
+    pub error_at_edges_mm: f64,
     /// Faces that fit another part's.
     pub faces_that_fit: Vec<u32>,
     /// Faces too sharply curved to resolve: the field's error there is that at sharp edges.

@@ -7,16 +7,18 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
+use glam::DAffine3;
 use mortise_brep::{CadModel, Surface};
 use rayon::prelude::*;
 
 use crate::bake::{Baked, Made};
-use crate::choice::Demand;
+use crate::choice::{Demand, FIELD_SHARE, PATCH_SHARE};
 use crate::cost::TickCost;
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::fits::{Fit, fits};
 use crate::options::{BakeOptions, Progress};
+use crate::placed_fits::placed_fits;
 use crate::plan::{PartTick, Plan, Planned, Request, ShapePlan};
 use crate::scene::Scene;
 use crate::shell::Pointshell;
@@ -29,6 +31,11 @@ const REFINEMENTS: usize = 3;
 const SCOUT: f64 = 16.0;
 /// Number of times the bound of crossings may be quadrupled.
 const COARSER_CROSSINGS: usize = 4;
+/// Most pairs of placed parts in which the fits of two shapes are looked for.
+const MOST_PLACEMENTS: usize = 16;
+/// Attempts with a finer cell for a shape with free-form faces, and the factor between their cells.
+const FINER_CELLS: usize = 5;
+const FINER: f64 = 0.7;
 /// Coarsest accuracy tried.
 const COARSEST_MM: f64 = 2.0;
 
@@ -59,7 +66,11 @@ pub fn plan(
     {
         over = planner.over(&asked);
         if over.fits() {
-            return Ok(asked.into_planned(true, true));
+            let met = asked.plan.shapes.iter().all(|shape| {
+                shape.field_error_in_fits_mm + shape.shell_error_in_fits_mm
+                    <= request.accuracy_mm * (1.0 + 1e-9)
+            });
+            return Ok(asked.into_planned(met, true));
         }
         last = Some(asked);
     }
@@ -191,7 +202,14 @@ impl<'a> Planner<'a> {
         let mut all = Vec::new();
         for a in 0..prepared.len() {
             for b in scene.met_by(a) {
-                let found = fits(&prepared[a], &prepared[b]);
+                let mut found = fits(&prepared[a], &prepared[b]);
+                for to_b in placements(model, &scene, a, b) {
+                    for fit in placed_fits(&prepared[a], &prepared[b], &to_b) {
+                        if !found.iter().any(|other| other.faces == fit.faces) {
+                            found.push(fit);
+                        }
+                    }
+                }
                 if !found.is_empty() {
                     all.push(((a, b), found));
                 }
@@ -226,7 +244,10 @@ impl<'a> Planner<'a> {
     /// Bakes for `accuracy_mm`; `None` when the layout cannot hold the result.
     fn attempt(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
         let mut shapes: Vec<ShapePlan> = self.demands.iter().map(|d| d.choose(accuracy_mm)).collect();
-        let mut each: Vec<BakeOptions> = shapes.iter().map(|shape| self.options(shape)).collect();
+        let mut each: Vec<BakeOptions> = shapes
+            .iter()
+            .map(|shape| self.options(shape, accuracy_mm))
+            .collect();
         let cells: Vec<f64> = shapes.iter().map(|shape| shape.cell_mm).collect();
         if cells.iter().any(|&cell| cell < 1e-3) {
             return Ok(None);
@@ -238,6 +259,7 @@ impl<'a> Planner<'a> {
             Err(BakeError::CellTooSmall { .. }) => return Ok(None),
             made => made?,
         };
+        self.refine_free_forms(accuracy_mm, &mut shapes, &each, &mut made)?;
         let mut ticks = self.ticks(&made);
         // Points inside cylinders and cones serve crossed shafts only, and are most of the points in a fit: they are reduced first.
         for _ in 0..COARSER_CROSSINGS {
@@ -268,11 +290,43 @@ impl<'a> Planner<'a> {
         Ok(Some(Attempt { baked, plan }))
     }
 
-    fn options(&self, shape: &ShapePlan) -> BakeOptions {
+    /// Makes the cells of free-form shapes smaller until their field is as accurate as asked, or the flash is full; states the measured error.
+    fn refine_free_forms(
+        &mut self,
+        accuracy_mm: f64,
+        shapes: &mut [ShapePlan],
+        each: &[BakeOptions],
+        made: &mut Made,
+    ) -> Result<(), BakeError> {
+        for (i, shape) in shapes.iter_mut().enumerate() {
+            for _ in 0..FINER_CELLS {
+                let full = made.bytes() > self.request.flash_bytes;
+                if full || made.fields[i].free_form.worst_mm() <= FIELD_SHARE * accuracy_mm {
+                    break;
+                }
+                let cell = shape.cell_mm * FINER;
+                let surface = &mut self.prepared[i];
+                match self.scene.again(i, &each[i], surface, cell, self.progress, made) {
+                    Err(BakeError::CellTooSmall { .. }) => break,
+                    done => done?,
+                }
+                shape.cell_mm = cell;
+                "its free-form faces".clone_into(&mut shape.why);
+            }
+            let measured = made.fields[i].free_form;
+            shape.field_error_in_fits_mm = shape.field_error_in_fits_mm.max(measured.worst_mm());
+            shape.error_elsewhere_mm = shape.error_elsewhere_mm.max(shape.field_error_in_fits_mm);
+            shape.error_at_edges_mm = measured.at_edges_mm;
+        }
+        Ok(())
+    }
+
+    fn options(&self, shape: &ShapePlan, accuracy_mm: f64) -> BakeOptions {
         BakeOptions {
             cell_mm: Some(shape.cell_mm),
             band_cells: shape.band_cells,
             format: shape.format,
+            patch_tolerance_mm: PATCH_SHARE * accuracy_mm,
             epsilon_mm: Some(shape.epsilon_mm),
             crossing_epsilon_mm: Some(shape.crossing_epsilon_mm),
             grabbable: self.request.grabbable.clone(),
@@ -374,6 +428,16 @@ impl<'a> Planner<'a> {
             .max()
             .unwrap_or(0)
     }
+}
+
+/// Transforms from parts of shape `a` to parts of shape `b` as placed in the model.
+fn placements(model: &CadModel, scene: &Scene, a: usize, b: usize) -> Vec<DAffine3> {
+    let of = |shape: usize| scene.parts.iter().filter(move |part| part.1 == shape);
+    (of(a).flat_map(|own| of(b).map(move |other| (own.0, other.0))))
+        .filter(|(own, other)| own != other)
+        .take(MOST_PLACEMENTS)
+        .map(|(own, other)| model.parts[other].placement.inverse() * model.parts[own].placement)
+        .collect()
 }
 
 fn points_on(shell: &Pointshell, face: u32) -> usize {

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::format::SampleFormat;
+use crate::free_form_error::FreeFormError;
 use crate::options::Method;
 
 /// Bytes by kind.
@@ -27,6 +28,9 @@ pub struct ByteCount {
     /// Pieces of edges and their tree.
     #[serde(default)]
     pub edges: usize,
+    /// Local patches of free-form faces.
+    #[serde(default)]
+    pub patches: usize,
     /// Shape and field records.
     pub records: usize,
 }
@@ -43,6 +47,7 @@ impl ByteCount {
             + self.nodes
             + self.faces
             + self.edges
+            + self.patches
             + self.records
     }
 }
@@ -85,6 +90,9 @@ pub struct ShapeReport {
     pub surface_error_mm: f64,
     /// Number of faces without closed form.
     pub spline_faces: usize,
+    /// Measured error of the field near them.
+    #[serde(default)]
+    pub free_form: FreeFormError,
 }
 
 /// One part of the image.

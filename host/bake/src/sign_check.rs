@@ -148,6 +148,7 @@ pub fn check_signs(
         cell_mm,
         band_cells: 2.0,
         format: SampleFormat::Int16,
+        patch_tolerance_mm: 2e-3,
     };
     let baked = bake_field(&mut surface, &field, "part", &|_, _| ControlFlow::Continue(()))?;
     let cell_mm = f64::from(baked.record.cell) * 1000.0;

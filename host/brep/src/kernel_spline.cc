@@ -81,10 +81,12 @@ RawSpline describe_spline(const TopoDS_Face& face, std::uint32_t number) {
   raw.degrees = {std::uint32_t(spline->UDegree()), std::uint32_t(spline->VDegree())};
   append_knots(spline->UKnotSequence(), raw.knots_u);
   append_knots(spline->VKnotSequence(), raw.knots_v);
+  // The weights of a polynomial surface are undefined (zero) once it was periodic.
+  const bool rational = spline->IsURational() || spline->IsVRational();
   for (int i = 1; i <= spline->NbUPoles(); ++i) {
     for (int j = 1; j <= spline->NbVPoles(); ++j) {
       for (int k = 1; k <= 3; ++k) raw.poles.push_back(spline->Pole(i, j).Coord(k));
-      raw.poles.push_back(spline->Weight(i, j));
+      raw.poles.push_back(rational ? spline->Weight(i, j) : 1.0);
     }
   }
   raw.deviation = deviation_of(face, spline);

@@ -12,6 +12,7 @@ use mortise_brep::{BrepError, CadModel, load_step};
 use mortise_rig::RigSpec;
 use serde::Deserialize;
 
+pub(crate) mod truths;
 pub(crate) mod written;
 use mortise_scenario::{Bounds, Hand, Key, Run, Scenario, ScenarioError, Scene, Shell};
 

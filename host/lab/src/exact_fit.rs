@@ -199,7 +199,7 @@ fn round(of: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Largest value of a function with one peak.
-fn golden(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
+pub(crate) fn golden(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
     let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
     let mut values = inner.map(&of);
     for _ in 0..SECTIONS {

@@ -5,6 +5,7 @@ use crate::clearance::Clearance;
 use crate::experiment::Experiment;
 use crate::hybrid::Hybrid;
 use crate::pareto::Pareto;
+use crate::peers::Peers;
 use crate::rate::Rate;
 use crate::stability::Stability;
 use crate::study::feature_size::FeatureSize;
@@ -14,6 +15,7 @@ use crate::study::shrink::Shrink;
 pub const ALL: &[&dyn Experiment] = &[
     &Clearance,
     &Pareto,
+    &Peers,
     &Blend,
     &Stability,
     &Rate,

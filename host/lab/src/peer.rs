@@ -8,12 +8,13 @@ use std::time::Instant;
 
 use glam::{DQuat, DVec3};
 use mortise_brep::{CadModel, LoadOptions, Shape};
+use mortise_scenario::probe::NamedPose;
 use parry3d_f64::math::{Pose, Rotation, Vector};
 use parry3d_f64::query;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
 use crate::error::LabError;
-use crate::scene_p::{self, Case, median};
+use crate::scene_p::{self, median};
 
 /// Repetitions of each query: other load on the computer only lengthens it, so the shortest time is used.
 const REPEATS: usize = 5;
@@ -61,7 +62,7 @@ pub fn ask(deflection_mm: f64) -> Result<Answers, LabError> {
     };
     let (mut gaps, mut depths) = (Vec::new(), Vec::new());
     for case in scene_p::cases() {
-        let (found, ns) = timed(&case, &block, &peg);
+        let (found, ns) = timed(&case.pose, &block, &peg);
         let error = (found - case.exact_mm).abs();
         if case.exact_mm >= 0.0 {
             answers.gap_error_mm = answers.gap_error_mm.max(error);
@@ -77,22 +78,26 @@ pub fn ask(deflection_mm: f64) -> Result<Answers, LabError> {
     Ok(answers)
 }
 
-fn mesh(model: &CadModel, name: &str) -> Result<TriMesh, LabError> {
+/// A part's mesh in its own frame.
+///
+/// # Errors
+/// `Input` when there is no such part, or parry refuses its mesh.
+pub fn mesh(model: &CadModel, name: &str) -> Result<TriMesh, LabError> {
     let bad = |what: String| LabError::Input {
-        name: format!("scene P, {name}"),
+        name: format!("part `{name}`"),
         what,
     };
     let part =
         (model.parts.iter().find(|part| part.name == name)).ok_or_else(|| bad("there is none".into()))?;
     let Shape { mesh, .. } = &model.shapes[part.shape];
-    // Both parts lie at the origin in the file, so the shape's frame is the part's.
     let vertices = mesh.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
     TriMesh::with_flags(vertices, mesh.triangles.clone(), TriMeshFlags::ORIENTED)
         .map_err(|error| bad(error.to_string()))
 }
 
-fn timed(case: &Case, block: &TriMesh, peg: &TriMesh) -> (f64, f64) {
-    let at = pose(case.pose.position_mm, case.pose.orientation);
+/// Signed distance, mm, of `peg` at a pose in the frame of `block`, and the shortest time of the query, ns.
+pub fn timed(named: &NamedPose, block: &TriMesh, peg: &TriMesh) -> (f64, f64) {
+    let at = pose(named.position_mm, named.orientation);
     let (mut least, mut found) = (f64::INFINITY, f64::NAN);
     for _ in 0..REPEATS {
         let start = Instant::now();

@@ -17,6 +17,7 @@ fn main() {
         quick: std::env::var_os("PROMISES_FULL").is_none(),
         program: Path::new("not asked for"),
         pair,
+        only: None,
     };
     let mut rows = Vec::new();
     let mut keep = |row: Row| {

@@ -16,6 +16,7 @@ fn main() {
         quick: true,
         program: Path::new("not asked for"),
         pair,
+        only: None,
     };
     let mut rows = Vec::new();
     let mut keep = |row: Row| {

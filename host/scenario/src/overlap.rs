@@ -62,6 +62,12 @@ pub fn penetration_mm(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
 
 /// The same by sample points on either part's surface, mm: penetration between the points is not seen.
 pub fn penetration_by_points_mm(scene: &PreparedScene, samples: &[Telemetry]) -> f64 {
+    let poses = samples.iter().filter_map(|sample| sample.object.as_ref());
+    penetration_of_poses_mm(scene, poses.map(|(_, pose)| pose_mm(pose)))
+}
+
+/// The same over poses of the moving part's shape in the world, mm.
+pub fn penetration_of_poses_mm(scene: &PreparedScene, poses: impl Iterator<Item = DAffine3>) -> f64 {
     let bodies = scene.bodies();
     let moving = usize::from(scene.part);
     let Some(part) = bodies.get(moving) else {
@@ -71,8 +77,7 @@ pub fn penetration_by_points_mm(scene: &PreparedScene, samples: &[Telemetry]) ->
         .map(|other| [Known::nothing(&part.points), Known::nothing(&other.points)])
         .collect();
     let mut most = 0.0;
-    for (_, pose) in samples.iter().filter_map(|sample| sample.object.as_ref()) {
-        let pose = pose_mm(pose);
+    for pose in poses {
         let here = pose.transform_point3(part.center);
         for (index, (other, [forward, backward])) in bodies.iter().zip(&mut known).enumerate() {
             let there = other.placement.transform_point3(other.center);

@@ -236,6 +236,15 @@ impl ProbeScene {
         Ok(Self { name, image, parts })
     }
 
+    /// The scene of an image that the baker wrote, with the names of its parts; `name` is used in messages.
+    pub fn of_image(name: String, image: &[u8], parts: Vec<String>) -> Self {
+        Self {
+            name,
+            image: words(image),
+            parts,
+        }
+    }
+
     /// Reads the STEP file at `path` and bakes it with `options`.
     ///
     /// # Errors
@@ -249,11 +258,7 @@ impl ProbeScene {
                 source,
             })?;
         let parts = baked.report.parts.into_iter().map(|part| part.name).collect();
-        Ok(Self {
-            name,
-            image: words(&baked.image),
-            parts,
-        })
+        Ok(Self::of_image(name, &baked.image, parts))
     }
 
     /// Size of the image in bytes, rounded up to a multiple of four.
@@ -303,24 +308,50 @@ impl ProbeScene {
     /// # Errors
     /// `Input` when the force law refuses the pose.
     pub fn probe(&self, pair: Pair, named: &NamedPose) -> Result<ProbeRow, ScenarioError> {
+        self.answer(&self.scene()?, &mut Box::new(Prober::new()), pair, named, REPEATS)
+    }
+
+    /// Probes many poses, each once.
+    ///
+    /// # Errors
+    /// As [`Self::probe`].
+    pub fn probe_all(&self, pair: Pair, poses: &[NamedPose]) -> Result<Vec<ProbeRow>, ScenarioError> {
+        let (scene, mut prober) = (self.scene()?, Box::new(Prober::new()));
+        (poses.iter())
+            .map(|named| self.answer(&scene, &mut prober, pair, named, 1))
+            .collect()
+    }
+
+    fn scene(&self) -> Result<SceneImage<'_>, ScenarioError> {
+        // The image was opened before, so this fails only by a bug, which is then reported.
+        SceneImage::open(bytemuck::cast_slice(&self.image)).map_err(|error| ScenarioError::Input {
+            name: self.name.clone(),
+            what: error.to_string(),
+        })
+    }
+
+    fn answer(
+        &self,
+        scene: &SceneImage<'_>,
+        prober: &mut Prober,
+        pair: Pair,
+        named: &NamedPose,
+        repeats: usize,
+    ) -> Result<ProbeRow, ScenarioError> {
         let bad = |what: String| ScenarioError::Input {
             name: format!("{}, pose `{}`", self.name, named.name),
             what,
         };
-        // The image was opened before, so this fails only by a bug, which is then reported.
-        let scene =
-            SceneImage::open(bytemuck::cast_slice(&self.image)).map_err(|error| bad(error.to_string()))?;
         let [x, y, z, w] = named.orientation.as_quat().to_array();
         let pose = Pose::new(
             Vec3::from_array((1e-3 * named.position_mm).as_vec3().to_array()),
             Quat::from_xyzw(x, y, z, w),
         );
         let settings = Settings::default().contact;
-        let mut prober = Box::new(Prober::new());
         let (mut least_ns, mut result) = (u64::MAX, None);
-        for _ in 0..REPEATS {
+        for _ in 0..repeats {
             let start = Instant::now();
-            let found = prober.probe(&scene, pair.moving, pair.fixed, black_box(&pose), &settings);
+            let found = prober.probe(scene, pair.moving, pair.fixed, black_box(&pose), &settings);
             let taken = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
             result = Some(black_box(found).map_err(|error| bad(error.to_string()))?);
             least_ns = least_ns.min(taken);

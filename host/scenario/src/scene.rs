@@ -97,7 +97,7 @@ impl PreparedScene {
             });
         };
         let bodies = (baked.report.parts.iter())
-            .map(|baked| body(&model, baked.model_part))
+            .map(|baked| Body::of(&model, baked.model_part))
             .collect();
         Ok(Self {
             image: baked.image,
@@ -145,26 +145,29 @@ impl PreparedScene {
     }
 }
 
-fn body(model: &CadModel, part: usize) -> Body {
-    let part = &model.parts[part];
-    let surface = ExactSurface::new(&model.shapes[part.shape]);
-    let vertices = &surface.shape().mesh.vertices;
-    let (low, high) = vertices
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &vertex| {
-            (low.min(vertex), high.max(vertex))
-        });
-    let center = 0.5 * (low + high);
-    let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f64::max);
-    let options = PointshellOptions::everywhere(EPSILON * radius, SPACING * radius);
-    let points: Vec<DVec3> = (sample_pointshell(&surface, &options).points.iter())
-        .map(|point| point.position)
-        .collect();
-    Body {
-        surface,
-        points,
-        center,
-        radius,
-        placement: part.placement,
+impl Body {
+    /// Part `part` of `model`.
+    pub fn of(model: &CadModel, part: usize) -> Self {
+        let part = &model.parts[part];
+        let surface = ExactSurface::new(&model.shapes[part.shape]);
+        let vertices = &surface.shape().mesh.vertices;
+        let (low, high) = vertices
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &vertex| {
+                (low.min(vertex), high.max(vertex))
+            });
+        let center = 0.5 * (low + high);
+        let radius = vertices.iter().map(|v| v.distance(center)).fold(0.0, f64::max);
+        let options = PointshellOptions::everywhere(EPSILON * radius, SPACING * radius);
+        let points: Vec<DVec3> = (sample_pointshell(&surface, &options).points.iter())
+            .map(|point| point.position)
+            .collect();
+        Self {
+            surface,
+            points,
+            center,
+            radius,
+            placement: part.placement,
+        }
     }
 }

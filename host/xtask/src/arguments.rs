@@ -21,6 +21,8 @@ pub enum Command {
     Test(Test),
     /// Measure the figures NAME and write them to docs/figures/NAME.md
     Figures(Figures),
+    /// Time and error of a distance query beside other libraries, which are installed below target/
+    Peers(Peers),
     /// Random bytes, guided by coverage, for what reads frames, scenes, rigs and STEP files
     Fuzz(Fuzz),
     /// Build the firmware of every board, or of BOARD, and print its flash and RAM use
@@ -100,6 +102,22 @@ pub struct Figures {
     /// Take NAMEs in docs/figures, made by hand, for what is made now
     #[arg(long, requires = "names")]
     pub record: bool,
+}
+
+/// Arguments of `peers`.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Peers {
+    #[command(flatten)]
+    pub installing: Installing,
+    /// Two scenes on one mesh each
+    #[arg(long)]
+    pub quick: bool,
+    /// Print one JSON object for each method and scene, instead of the table
+    #[arg(long)]
+    pub json: bool,
+    /// Write docs/figures/peers.md, its table and its charts
+    #[arg(long)]
+    pub write: bool,
 }
 
 /// Arguments of `fuzz`.

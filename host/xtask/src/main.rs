@@ -11,6 +11,7 @@ mod figures;
 mod firmware;
 mod fuzz;
 mod memory_map;
+mod peers;
 mod program;
 mod rust_source;
 mod setup;
@@ -41,6 +42,7 @@ fn run(command: &Command) -> Result<ExitCode> {
         Command::Demo(arguments) => demo::command(arguments),
         Command::Test(arguments) => test::command(arguments),
         Command::Figures(arguments) => figures::command(arguments),
+        Command::Peers(arguments) => peers::command(arguments),
         Command::Fuzz(arguments) => fuzz::command(arguments),
         Command::Firmware(arguments) => firmware::command(arguments),
         Command::Tidy => tidy::command(),

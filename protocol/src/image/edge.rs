@@ -21,6 +21,8 @@ pub struct EdgeRecord {
     pub thickness: f32,
     /// Number of the edge within the shape: equal for all pieces of one edge.
     pub edge: u32,
+    /// Radius of a sphere about `center` that contains the piece, m.
+    pub radius: f32,
 }
 
 impl EdgeRecord {

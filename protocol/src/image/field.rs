@@ -67,9 +67,9 @@ pub struct FieldSample {
     pub distance: f32,
     /// Gradient (points outward), close to unit length within the band.
     pub gradient: [f32; 3],
-    /// Nearest face, counted from the shape's first, or [`NO_FACE`].
+    /// Nearest surface (see [`super::Surfaces`]), or [`NO_FACE`].
     pub face: u16,
-    /// The nearest faces, and how they give the distance.
+    /// The nearest surfaces, and how they give the distance.
     pub nearby: Nearby,
 }
 
@@ -261,9 +261,9 @@ impl<'a> Field<'a> {
 }
 
 impl Cell<'_> {
-    /// The face whose surface gives the distance all over the cell, if there is one: a faster test for [`Nearby::Face`].
+    /// The surface that gives the distance all over the cell, if there is one: a faster test for [`Nearby::Face`].
     #[inline(always)]
-    pub fn face(&self) -> Option<u16> {
+    pub fn surface(&self) -> Option<u16> {
         (self.entry <= Nearby::MAX_FACES).then_some(self.entry)
     }
 }

@@ -4,12 +4,12 @@
 //! offset, index and number once; after that the accessors cannot go out of bounds, for any input bytes. `docs/scene-image.md` is the specification.
 //!
 //! ```text
-//! header | parts | shapes | fields | nodes | points | faces | bricks | palette | grid | blob | edges
+//! header | parts | shapes | fields | nodes | points | faces | patches | bricks | palette | grid | blob | edges
 //! ```
 //!
 //! A **shape** is geometry in its own frame: a signed-distance **field** or voxmap (dense grid of bricks, sparse brick
-//! data), a **pointshell** (points under a preorder sphere tree of nodes), its B-rep **faces**, and its sharp convex **edges** in pieces under a tree of
-//! their own. A **part** places a shape.
+//! data), a **pointshell** (points under a preorder sphere tree of nodes) and its B-rep **faces**, those without closed form with
+//! local **patches**, and its sharp convex **edges** in pieces under a tree of their own. A **part** places a shape.
 
 mod edge;
 mod error;
@@ -18,6 +18,7 @@ mod occupancy;
 mod open;
 mod records;
 mod region;
+mod surfaces;
 
 pub use edge::EdgeRecord;
 pub use error::ImageError;
@@ -25,3 +26,4 @@ pub use field::{Cell, EDGE_ERROR_CELLS, Field, FieldSample, Lookup, Place};
 pub use occupancy::{VOXEL_BRICK_BYTES, Voxel, VoxelSample};
 pub use open::{CRC, SceneImage, Shape};
 pub use records::*;
+pub use surfaces::{Surface, Surfaces};

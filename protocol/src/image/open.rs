@@ -8,6 +8,7 @@ use super::error::ImageError;
 use super::field::Field;
 use super::occupancy::VOXEL_BRICK_BYTES;
 use super::records::*;
+use super::surfaces::Surfaces;
 
 /// The checksum of images and frames.
 pub const CRC: Crc<u32, crc::Table<1>> = Crc::<u32, crc::Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -18,11 +19,12 @@ const SECTION_FIELDS: u8 = 2;
 const SECTION_NODES: u8 = 3;
 const SECTION_POINTS: u8 = 4;
 const SECTION_FACES: u8 = 5;
-const SECTION_BRICKS: u8 = 6;
-const SECTION_PALETTE: u8 = 7;
-const SECTION_GRID: u8 = 8;
-const SECTION_BLOB: u8 = 9;
-const SECTION_EDGES: u8 = 10;
+const SECTION_PATCHES: u8 = 6;
+const SECTION_BRICKS: u8 = 7;
+const SECTION_PALETTE: u8 = 8;
+const SECTION_GRID: u8 = 9;
+const SECTION_BLOB: u8 = 10;
+const SECTION_EDGES: u8 = 11;
 
 /// A scene image, read in place.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +36,7 @@ pub struct SceneImage<'a> {
     nodes: &'a [NodeRecord],
     points: &'a [PointRecord],
     faces: &'a [FaceRecord],
+    patches: &'a [PatchRecord],
     bricks: &'a [BrickRecord],
     palette: &'a [u16],
     grid: &'a [u16],
@@ -56,8 +59,21 @@ pub struct Shape<'a> {
     pub edge_nodes: &'a [NodeRecord],
     /// Pieces of sharp convex edges.
     pub edges: &'a [EdgeRecord],
+    /// Local patches of faces without closed form.
+    pub patches: &'a [PatchRecord],
     /// Signed distance.
     pub field: Field<'a>,
+}
+
+impl<'a> Shape<'a> {
+    /// Surfaces that the field's palettes name.
+    #[inline(always)]
+    pub fn surfaces(&self) -> Surfaces<'a> {
+        Surfaces {
+            faces: self.faces,
+            patches: self.patches,
+        }
+    }
 }
 
 impl<'a> SceneImage<'a> {
@@ -102,6 +118,7 @@ impl<'a> SceneImage<'a> {
             nodes: section(bytes, header.nodes, SECTION_NODES)?,
             points: section(bytes, header.points, SECTION_POINTS)?,
             faces: section(bytes, header.faces, SECTION_FACES)?,
+            patches: section(bytes, header.patches, SECTION_PATCHES)?,
             bricks: section(bytes, header.bricks, SECTION_BRICKS)?,
             palette: section(bytes, header.palette, SECTION_PALETTE)?,
             grid: section(bytes, header.grid, SECTION_GRID)?,
@@ -139,6 +156,7 @@ impl<'a> SceneImage<'a> {
             faces: run(self.faces, record.first_face, record.face_count),
             edge_nodes: run(self.nodes, record.first_edge_node, record.edge_node_count),
             edges: run(self.edges, record.first_edge, record.edge_count),
+            patches: run(self.patches, record.first_patch, record.patch_count),
             field: Field {
                 record: field,
                 grid: &self.grid[field.first_grid as usize..][..entries],
@@ -174,6 +192,7 @@ impl<'a> SceneImage<'a> {
                 && fits(shape.first_edge_node, shape.edge_node_count, self.nodes.len())
                 && fits(shape.first_edge, shape.edge_count, self.edges.len())
                 && shape.face_count <= u32::from(NO_FACE)
+                && fits(shape.first_patch, shape.patch_count, self.patches.len())
                 && finite(&shape.center)
                 && finite(&shape.center_of_mass)
                 && finite(&shape.inertia)
@@ -237,6 +256,8 @@ impl<'a> SceneImage<'a> {
                 });
             let edges = run(self.edges, shape.first_edge, shape.edge_count);
             let good = good && edges.iter().all(|e| is_edge(e, shape.face_count));
+            let patches = run(self.patches, shape.first_patch, shape.patch_count);
+            let good = good && patches.iter().all(|p| u32::from(p.face) < shape.face_count);
             if !good {
                 return Err(ImageError::Record {
                     section: SECTION_SHAPES,
@@ -244,6 +265,9 @@ impl<'a> SceneImage<'a> {
                 });
             }
         }
+        each(self.patches, SECTION_PATCHES, |patch| {
+            finite(&patch.origin) && finite(&patch.x) && finite(&patch.normal) && finite(&patch.height)
+        })?;
         each(self.faces, SECTION_FACES, |face| {
             face.kind <= surface_kind::TORUS
                 && finite(&face.origin)
@@ -272,6 +296,8 @@ fn is_edge(edge: &EdgeRecord, faces: u32) -> bool {
         && finite(&edge.bend)
         && edge.thickness.is_finite()
         && edge.thickness >= 0.0
+        && edge.radius.is_finite()
+        && edge.radius >= 0.0
         && edge.faces.iter().all(|&face| u32::from(face) < faces)
 }
 

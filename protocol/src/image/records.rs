@@ -53,9 +53,11 @@ pub struct Header {
     pub points: Section,
     /// [`FaceRecord`]s.
     pub faces: Section,
+    /// [`PatchRecord`]s.
+    pub patches: Section,
     /// [`BrickRecord`]s.
     pub bricks: Section,
-    /// `u16` face ids that bricks refer to.
+    /// `u16` surface indices that bricks refer to.
     pub palette: Section,
     /// `u16` grid entries (see [`GridEntry`]).
     pub grid: Section,
@@ -103,10 +105,14 @@ pub struct ShapeRecord {
     pub first_point: u32,
     /// Number of points.
     pub point_count: u32,
-    /// Its faces; face ids in points and palettes count from here.
+    /// Its faces; face ids in points and surface indices in palettes count from here.
     pub first_face: u32,
     /// Number of faces.
     pub face_count: u32,
+    /// Its patches; surface indices in palettes count its faces, then these.
+    pub first_patch: u32,
+    /// Number of patches.
+    pub patch_count: u32,
     /// Centre of a sphere about the whole shape, m.
     pub center: [f32; 3],
     /// Its radius, m.
@@ -307,7 +313,7 @@ impl Group {
 pub enum Nearby {
     /// Nearest face unknown.
     Unknown,
-    /// The distance to this face's surface is exact all over the cell.
+    /// The distance to this surface is exact all over the cell.
     Face(u16),
     /// This face is nearest; the distance is interpolated.
     Roughly(u16),
@@ -321,7 +327,7 @@ pub enum Nearby {
 }
 
 impl Nearby {
-    /// Most faces of a shape whose palettes state more than [`Self::Unknown`].
+    /// Most faces and patches of a shape whose palettes state more than [`Self::Unknown`].
     pub const MAX_FACES: u16 = 0x3fff;
     const KIND: u16 = 0xc000;
 
@@ -462,6 +468,27 @@ pub struct FaceRecord {
     pub second: f32,
 }
 
+/// A local patch of a face without closed form: a height over a tangent plane, w = h(u, v), in its shape's frame.
+///
+/// A point p has u = (p − `origin`)·`x`, v = (p − `origin`)·(`normal` × `x`), w = (p − `origin`)·`normal`. The patch stands for its face only in cells
+/// that name it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PatchRecord {
+    /// Origin of the tangent plane, m.
+    pub origin: [f32; 3],
+    /// Unit vector in the plane, along u.
+    pub x: [f32; 3],
+    /// Unit normal of the plane, outward.
+    pub normal: [f32; 3],
+    /// Coefficients of h, in powers of metres: 1, u, v, u², uv, v², u³, u²v, uv², v³.
+    pub height: [f32; 10],
+    /// The face that it is a part of, counted from the shape's first.
+    pub face: u16,
+    /// Zero.
+    pub reserved: u16,
+}
+
 /// Unit vector from its octahedral code (Cigolla et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors"):
 /// error at most 6.5·10⁻⁵ rad. Any pattern decodes to a finite, non-zero vector; the result is not normalised.
 #[inline]
@@ -504,15 +531,16 @@ mod tests {
 
     #[test]
     fn records_have_the_documented_sizes() {
-        assert_eq!(size_of::<Header>(), 112);
+        assert_eq!(size_of::<Header>(), 120);
         assert_eq!(size_of::<PartRecord>(), 36);
-        assert_eq!(size_of::<ShapeRecord>(), 104);
+        assert_eq!(size_of::<ShapeRecord>(), 112);
         assert_eq!(size_of::<FieldRecord>(), 44);
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
         assert_eq!(size_of::<PointRecord>(), 20);
-        assert_eq!(size_of::<super::super::EdgeRecord>(), 56);
+        assert_eq!(size_of::<super::super::EdgeRecord>(), 60);
         assert_eq!(size_of::<FaceRecord>(), 40);
+        assert_eq!(size_of::<PatchRecord>(), 80);
     }
 
     #[test]

@@ -138,6 +138,7 @@ pub fn bytes() -> Vec<u8> {
         faces: [0, 1],
         thickness: 0.004,
         edge: 0,
+        radius: 0.004_001,
     };
     let plane = |origin: [f32; 3], axis: [f32; 3]| FaceRecord {
         kind: surface_kind::PLANE,
@@ -160,6 +161,14 @@ pub fn bytes() -> Vec<u8> {
             second: 0.0,
         },
     ];
+    let patches = [PatchRecord {
+        origin: [0.002, 0.0, 0.0],
+        x: [0.0, 1.0, 0.0],
+        normal: [1.0, 0.0, 0.0],
+        height: [0.0, 0.0, 0.0, 4.0, 0.0, -2.0, 0.0, 8.0, 0.0, 16.0],
+        face: 1,
+        reserved: 0,
+    }];
     let shapes = [
         ShapeRecord {
             field: 0,
@@ -170,6 +179,8 @@ pub fn bytes() -> Vec<u8> {
             point_count: 3,
             first_face: 0,
             face_count: 2,
+            first_patch: 0,
+            patch_count: 0,
             center: [0.004, 0.004, 0.002],
             radius: 0.01,
             volume: 2.56e-7,
@@ -189,6 +200,7 @@ pub fn bytes() -> Vec<u8> {
             point_count: 1,
             first_face: 2,
             face_count: 2,
+            patch_count: 1,
             radius: 0.02,
             ..ShapeRecord::zeroed()
         },
@@ -213,6 +225,7 @@ pub fn bytes() -> Vec<u8> {
         nodes: &nodes,
         points: &points,
         faces: &faces,
+        patches: &patches,
         bricks: &bricks,
         palette: &palette,
         grid: &grid,
@@ -281,6 +294,7 @@ pub fn occupancy_bytes() -> Vec<u8> {
             axis: [0.0, 0.0, 1.0],
             ..FaceRecord::zeroed()
         }],
+        patches: &[],
         bricks: &[brick],
         palette: &[0],
         grid: &grid,
@@ -297,6 +311,7 @@ struct Sections<'a> {
     nodes: &'a [NodeRecord],
     points: &'a [PointRecord],
     faces: &'a [FaceRecord],
+    patches: &'a [PatchRecord],
     bricks: &'a [BrickRecord],
     palette: &'a [u16],
     grid: &'a [u16],
@@ -316,6 +331,7 @@ impl Sections<'_> {
             nodes: section(&mut bytes, self.nodes),
             points: section(&mut bytes, self.points),
             faces: section(&mut bytes, self.faces),
+            patches: section(&mut bytes, self.patches),
             bricks: section(&mut bytes, self.bricks),
             palette: section(&mut bytes, self.palette),
             grid: section(&mut bytes, self.grid),

@@ -58,6 +58,7 @@ pub fn parts(count: usize, tag: u8) -> Vec<u8> {
     header.nodes = section(&[], 0);
     header.points = section(&[], 0);
     header.faces = section(&[], 0);
+    header.patches = section(&[], 0);
     header.bricks = section(&[], 0);
     header.palette = section(&[], 0);
     header.grid = section(bytes_of(&grid), 1);

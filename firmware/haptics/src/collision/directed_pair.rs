@@ -1,7 +1,7 @@
 //! Directed pair: the tree of one part against the field of the other, with the transforms between their frames.
 
 use glam::{Mat3, Vec3};
-use mortise_protocol::image::{EdgeRecord, FaceRecord, Field, NodeRecord, Place, PointRecord, Shape};
+use mortise_protocol::image::{EdgeRecord, Field, NodeRecord, Place, PointRecord, Shape, Surfaces};
 
 use crate::collision::exact_surface::exact;
 use crate::collision::node_key::Keys;
@@ -28,7 +28,7 @@ pub(crate) struct DirectedPair<'i> {
     pub field_edges: EdgeTree<'i>,
     pub field: Field<'i>,
     /// Exact surfaces of the field's shape.
-    pub faces: &'i [FaceRecord],
+    pub surfaces: Surfaces<'i>,
     /// Tree frame to field frame.
     pub to_field: Affine,
     /// Tree frame to lever arm (from the held part's centre of mass, world axes).
@@ -99,7 +99,7 @@ impl<'i> DirectedPair<'i> {
         self.field.in_cells(in_field.to_array())
     }
 
-    /// The one face named by every cell within `clearance_m` of any of these points of the tree, if there is only one; at most `reads` reads, counted
+    /// The one surface named by every cell within `clearance_m` of any of these points of the tree, if there is only one; at most `reads` reads, counted
     /// as in [`Field::all_at`].
     pub fn only_face_near<'p>(
         &self,
@@ -115,7 +115,7 @@ impl<'i> DirectedPair<'i> {
                 let Place::Cell(cell) = self.field.place(in_field.to_array()) else {
                     return None;
                 };
-                face = Some(cell.face()?);
+                face = Some(cell.surface()?);
             }
             (low, high) = (low.min(in_field), high.max(in_field));
         }
@@ -130,7 +130,7 @@ impl<'i> DirectedPair<'i> {
     pub fn distance(&self, p: [f32; 3]) -> f32 {
         let in_field = self.to_field.apply(p);
         match self.field.place(in_field.to_array()) {
-            Place::Cell(cell) => match exact(self.faces, self.field.nearby(&cell), in_field) {
+            Place::Cell(cell) => match exact(self.surfaces, self.field.nearby(&cell), in_field) {
                 Some((distance, _)) => distance,
                 None => self.field.distance(&cell),
             },
@@ -162,7 +162,7 @@ impl<'i> DirectedPair<'i> {
             edges: EdgeTree::of(tree),
             field_edges: EdgeTree::of(field),
             field: field.field,
-            faces: field.faces,
+            surfaces: field.surfaces(),
             to_field,
             to_arm: Affine {
                 linear: rotation,

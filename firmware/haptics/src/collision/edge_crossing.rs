@@ -12,11 +12,13 @@ use glam::{Mat3, Vec3};
 use mortise_protocol::image::{EdgeRecord, oct_decode};
 
 use crate::math::scalar::inverse_sqrt;
-use crate::math::vector::length;
+use crate::math::vector::quick_length;
 
 /// Sine of the smallest angle between edges that cross. Points along the edges find those more nearly parallel: halfway between two points 5 mm apart
 /// they err by 13 µm.
 const LEAST_SINE: f32 = 0.005;
+/// The same for two curved pieces: rims of nearly one radius run along each other, and their points are as dense as the accuracy asks.
+const LEAST_SINE_OF_CURVES: f32 = 0.1;
 /// Sine of the angle by which a normal may lie outside of a cone: rounding, and the change of a face's normal along a piece.
 const CONE_SINE: f32 = 0.02;
 /// How far past its ends a piece still counts, as a share of its half length: consecutive pieces leave no gap.
@@ -30,10 +32,7 @@ pub(crate) struct Piece<'a> {
     center: Vec3,
     half: Vec3,
     bend: Vec3,
-    /// Largest distance of the piece from the segment `center` ± `half`, m.
-    bulge: f32,
-    /// Radius of a sphere about `center` that contains the piece, m.
-    radius: f32,
+    straight: bool,
 }
 
 impl<'a> Piece<'a> {
@@ -53,14 +52,21 @@ impl<'a> Piece<'a> {
 
     #[inline]
     fn new(record: &'a EdgeRecord, center: Vec3, half: Vec3, bend: Vec3) -> Self {
-        let bulge = if record.is_straight() { 0.0 } else { length(bend) };
         Self {
             record,
             center,
             half,
             bend,
-            bulge,
-            radius: length(half) + bulge,
+            straight: record.is_straight(),
+        }
+    }
+
+    /// Largest distance of the piece from the segment `center` ± `half`, m.
+    fn bulge(&self) -> f32 {
+        if self.straight {
+            0.0
+        } else {
+            quick_length(self.bend)
         }
     }
 
@@ -72,10 +78,17 @@ impl<'a> Piece<'a> {
         self.half + self.bend * (2.0 * t)
     }
 
-    /// Lower bound of the distance from a sphere, m.
+    /// Whether its sphere and another one (centre, radius, m) are at most `reach` apart.
     #[inline]
-    pub fn distance_to(&self, center: Vec3, radius: f32) -> f32 {
-        length(self.center - center) - radius - self.radius
+    pub fn is_within(&self, center: Vec3, radius: f32, reach: f32) -> bool {
+        let farthest = self.record.radius + radius + reach;
+        (self.center - center).length_squared() <= farthest * farthest
+    }
+
+    /// Centre and radius of a sphere that contains it, m.
+    #[inline]
+    pub fn sphere(&self) -> (Vec3, f32) {
+        (self.center, self.record.radius)
     }
 
     /// Outward normals of its two faces, turned by `rotation`; not normalised.
@@ -97,6 +110,31 @@ fn in_cone(normals: [Vec3; 2], along: Vec3, n: Vec3) -> bool {
     past_a > -CONE_SINE && before_b > -CONE_SINE && n.dot(a + b) > 0.0
 }
 
+/// `above`/`below`, at least −1 and at most 1; `below` is not negative.
+#[inline]
+fn share(above: f32, below: f32) -> f32 {
+    if above >= below {
+        1.0
+    } else if above <= -below {
+        -1.0
+    } else {
+        above / below
+    }
+}
+
+/// Whether two curved pieces run along each other where their segments are nearest to each other's middles.
+#[inline]
+pub(crate) fn run_along(own: &Piece<'_>, other: &Piece<'_>) -> bool {
+    if own.straight || other.straight {
+        return false;
+    }
+    let apart = other.center - own.center;
+    let d = own.tangent(share(apart.dot(own.half), own.half.length_squared()));
+    let e = other.tangent(share(-apart.dot(other.half), other.half.length_squared()));
+    let squared = d.cross(e).length_squared();
+    squared <= LEAST_SINE_OF_CURVES * LEAST_SINE_OF_CURVES * d.length_squared() * e.length_squared()
+}
+
 /// Nearest points of the segments of two pieces, by their parameters, and a lower bound of the distance of the pieces, m (Ericson 2005, "Real-Time
 /// Collision Detection", section 5.1.9).
 #[inline]
@@ -105,15 +143,6 @@ pub(crate) fn nearest(own: &Piece<'_>, other: &Piece<'_>) -> ([f32; 2], f32) {
     let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
     let (da, ea) = (d.dot(apart), e.dot(apart));
     let sine2 = dd * ee - de * de;
-    let share = |above: f32, below: f32| {
-        if above >= below {
-            1.0
-        } else if above <= -below {
-            -1.0
-        } else {
-            above / below
-        }
-    };
     let first = if sine2 > 1e-6 * dd * ee {
         share(de * ea - ee * da, sine2)
     } else {
@@ -121,7 +150,7 @@ pub(crate) fn nearest(own: &Piece<'_>, other: &Piece<'_>) -> ([f32; 2], f32) {
     };
     let s = share(de * first + ea, ee);
     let t = share(de * s - da, dd);
-    let distance = length(apart + d * t - e * s) - (own.bulge + other.bulge);
+    let distance = quick_length(apart + d * t - e * s) - (own.bulge() + other.bulge());
     ([t, s], distance)
 }
 
@@ -147,12 +176,17 @@ pub(crate) fn crossing(
     from: [f32; 2],
 ) -> Option<Crossing> {
     let [mut t, mut s] = from;
-    let steps = if own.bulge + other.bulge > 0.0 { STEPS } else { 1 };
+    let steps = if own.straight && other.straight { 1 } else { STEPS };
+    let least = if own.straight || other.straight {
+        LEAST_SINE * LEAST_SINE
+    } else {
+        LEAST_SINE_OF_CURVES * LEAST_SINE_OF_CURVES
+    };
     for _ in 0..steps {
         let (d, e) = (own.tangent(t), other.tangent(s));
         let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
         let sine2 = dd * ee - de * de;
-        if sine2 <= LEAST_SINE * LEAST_SINE * dd * ee {
+        if sine2 <= least * dd * ee {
             return None;
         }
         let apart = own.at(t) - other.at(s);
@@ -171,10 +205,10 @@ pub(crate) fn crossing(
     let (d, e) = (own.tangent(t), other.tangent(s));
     let across = d.cross(e);
     let (squared, lengths2) = (across.length_squared(), d.length_squared() * e.length_squared());
-    if squared <= LEAST_SINE * LEAST_SINE * lengths2 {
+    if squared <= least * lengths2 {
         return None;
     }
-    let unit = across * (1.0 / libm::sqrtf(squared));
+    let unit = across * inverse_sqrt(squared);
     let cones = [own.normals(rotation), other.normals(&Mat3::IDENTITY)];
     let faces = |n: Vec3| in_cone(cones[1], e, n) && in_cone(cones[0], d, -n);
     let normal = [unit, -unit].into_iter().find(|&n| faces(n))?;
@@ -183,7 +217,7 @@ pub(crate) fn crossing(
         gap: normal.dot(point - other.at(s)),
         normal,
         point,
-        sine: libm::sqrtf(squared / lengths2),
+        sine: squared * inverse_sqrt(squared) * inverse_sqrt(lengths2),
     })
 }
 

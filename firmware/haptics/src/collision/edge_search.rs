@@ -16,12 +16,12 @@ use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
 use crate::collision::cost::{CROSSING, EDGE_BOUND, LOOKUP, MATING, NODE, PASSED_OVER};
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::edge_crossing::{Crossing, Piece, crossing, nearest};
+use crate::collision::edge_crossing::{Crossing, Piece, crossing, nearest, run_along};
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::rules::{FacePairRules, Mating};
 use crate::collision::search::Traversal;
 use crate::math::scalar::smaller;
-use crate::math::vector::length;
+use crate::math::vector::quick_length;
 
 /// Deepest overlap of two edges that touch for the first time, as a share of the thinner part's thickness at them: at half of it the far sides are as
 /// near as the near ones.
@@ -106,10 +106,10 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     #[inline(never)]
     fn edge_leaf(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, node: &NodeRecord) -> f32 {
         let reach = self.search.margin + DEEPEST_M;
-        let center = pair.to_field.apply(node.center);
+        let sphere = (pair.to_field.apply(node.center), node.radius);
         let mut near = Near::new();
         let mut least = f32::INFINITY;
-        let bound = self.near_edges(pair, (center, node.radius), reach, |search, other| {
+        self.near_edges(pair, sphere, reach, |search, other| {
             // Emptied when full, so there is space.
             let _ = near.push(other);
             if near.is_full() {
@@ -118,21 +118,22 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
         });
         if !near.is_empty() {
-            return smaller(least, self.cross(pair, leaf, node, &near));
+            least = smaller(least, self.cross(pair, leaf, node, &near));
         }
         if least < f32::INFINITY {
             return least;
         }
         // Nothing is near: the bound is to last for a while.
         let reserve = reach + RESERVE_M + RESERVE_TICKS * self.search.way;
-        if bound > reserve {
-            return bound;
-        }
-        self.near_edges(pair, (center, node.radius), reserve, |_, _| {})
+        least = reserve;
+        self.near_edges(pair, sphere, reserve, |_, other| {
+            let (center, radius) = other.sphere();
+            least = smaller(least, quick_length(center - sphere.0) - (radius + sphere.1));
+        });
+        least
     }
 
-    /// Passes to `visit` every piece of the other part's edges that may lie within `reach` (m) of a sphere. Returns a lower bound of the distance of all
-    /// pieces, m.
+    /// Passes to `visit` every piece of the other part's edges whose sphere lies within `reach` (m) of a sphere.
     #[inline(always)]
     fn near_edges<'i>(
         &mut self,
@@ -140,15 +141,13 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         (center, radius): (Vec3, f32),
         reach: f32,
         mut visit: impl FnMut(&mut Self, Piece<'i>),
-    ) -> f32 {
+    ) {
         let tree = pair.field_edges;
-        let mut least = f32::INFINITY;
         let mut index = 0;
         while let Some(node) = tree.nodes.get(index as usize) {
             self.spent += EDGE_BOUND;
-            let bound = length(Vec3::from_array(node.center) - center) - (radius + node.radius);
-            if bound > reach {
-                least = smaller(least, bound);
+            let farthest = radius + node.radius + reach;
+            if (Vec3::from_array(node.center) - center).length_squared() > farthest * farthest {
                 index = node.skip;
                 continue;
             }
@@ -158,14 +157,11 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
             for piece in node.points(tree.pieces).iter().map(Piece::fixed) {
                 self.spent += EDGE_BOUND;
-                let bound = piece.distance_to(center, radius);
-                least = smaller(least, bound);
-                if bound <= reach {
+                if piece.is_within(center, radius, reach) {
                     visit(self, piece);
                 }
             }
         }
-        least
     }
 
     /// Offers the crossings of the pieces of a leaf with `near` pieces of the other part. Returns a lower bound of their distance, m.
@@ -181,8 +177,17 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let mut least = f32::INFINITY;
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
+            let (center, radius) = own.sphere();
             for other in near {
+                if !other.is_within(center, radius, reach) {
+                    least = smaller(least, reach);
+                    continue;
+                }
                 self.spent += EDGE_BOUND;
+                if run_along(&own, other) {
+                    least = f32::NEG_INFINITY;
+                    continue;
+                }
                 let (from, distance) = nearest(&own, other);
                 least = smaller(least, distance);
                 if distance > reach {

@@ -5,12 +5,17 @@
 //! the other face's surface is beyond the edge, at a re-entrant edge one inside it. The nearest point of an edge is that of the two surfaces'
 //! intersection, by Newton steps.
 //!
+//! Faces without closed form answer by their local patches ([`super::patch`]), where cells name them.
+//!
 //! Metres, shape frame. Every loop is bounded by the number of faces (squared, for edges). Cost: one projection per face, and a field query for each
 //! face that could be nearest.
 
 use glam::Vec3;
-use mortise_protocol::image::{FaceRecord, Group, Lookup, NO_FACE, Nearby, Shape, surface_kind};
+use mortise_protocol::image::{
+    FaceRecord, Group, Lookup, NO_FACE, Nearby, Shape, Surface, Surfaces, surface_kind,
+};
 
+use crate::collision::patch::distance_to_patch;
 use crate::math::scalar::inverse_sqrt;
 use crate::math::vector::length;
 
@@ -119,10 +124,14 @@ pub(crate) struct OnFace {
     pub edge_face: u16,
 }
 
-/// Distance and normal of one face's surface at `p`, if it has a closed form. About 60 instructions on a Cortex-M7.
+/// Distance and normal of one surface at `p`, by its surface index, if it is a patch or has a closed form. About 60 instructions on a Cortex-M7, 250
+/// for a patch.
 #[inline(always)]
-pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace> {
-    let (distance, normal) = signed(faces.get(usize::from(face))?, p)?;
+pub(crate) fn on_surface_of(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Option<OnFace> {
+    let (face, (distance, normal)) = match surfaces.get(surface)? {
+        Surface::Face(face) => (surface, signed(face, p)?),
+        Surface::Patch(patch) => (patch.face, distance_to_patch(patch, p)?),
+    };
     Some(OnFace {
         distance,
         normal,
@@ -131,17 +140,17 @@ pub(crate) fn on_face(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<OnFace
     })
 }
 
-/// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and the face it belongs to; `None` where the interpolated
+/// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and the surface it belongs to; `None` where the interpolated
 /// distance is to be used. Outside an edge or corner it is a lower bound of the distance. About 50 instructions per face on a Cortex-M7.
 #[inline]
-pub(crate) fn exact(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
+pub(crate) fn exact(surfaces: Surfaces<'_>, nearby: Nearby, p: Vec3) -> Option<(f32, u16)> {
     let (group, sign) = match nearby {
-        Nearby::Face(face) => return distance(faces, face, p).map(|d| (d, face)),
+        Nearby::Face(face) => return distance(surfaces, face, p).map(|d| (d, face)),
         Nearby::Convex(group) => (group, 1.0),
         Nearby::Reentrant(group) => (group, -1.0),
         Nearby::Roughly(_) | Nearby::Unknown => return None,
     };
-    let eval = |face| Some((distance(faces, face, p)?, face));
+    let eval = |face| Some((distance(surfaces, face, p)?, face));
     fold(
         group,
         sign,
@@ -177,9 +186,9 @@ fn fold<T: Copy>(
 /// As [`exact`], with the normal of the face found, and the second face if its distance is equal to within [`AT_EDGE_M`]. About 80 instructions per
 /// face on a Cortex-M7.
 #[inline]
-pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Option<OnFace> {
+pub(crate) fn exact_on_face(surfaces: Surfaces<'_>, nearby: Nearby, p: Vec3) -> Option<OnFace> {
     let (group, sign) = match nearby {
-        Nearby::Face(face) => return on_face(faces, face, p),
+        Nearby::Face(face) => return on_surface_of(surfaces, face, p),
         Nearby::Convex(group) => (group, 1.0),
         Nearby::Reentrant(group) => (group, -1.0),
         Nearby::Roughly(_) | Nearby::Unknown => return None,
@@ -187,7 +196,7 @@ pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Op
     fold(
         group,
         sign,
-        |face| on_face(faces, face, p),
+        |face| on_surface_of(surfaces, face, p),
         |mut found, other, sign| {
             let ahead = (other.distance - found.distance) * sign;
             let at_edge = ahead.abs() < AT_EDGE_M;
@@ -207,7 +216,7 @@ pub(crate) fn exact_on_face(faces: &[FaceRecord], nearby: Nearby, p: Vec3) -> Op
 #[inline(never)]
 pub(crate) fn with_allowance(
     found: OnFace,
-    faces: &[FaceRecord],
+    surfaces: Surfaces<'_>,
     nearby: Nearby,
     p: Vec3,
     mut allowance_m: impl FnMut(u16) -> f32,
@@ -218,8 +227,8 @@ pub(crate) fn with_allowance(
         _ => return found,
     };
     let eval = |face| {
-        let own = on_face(faces, face, p)?;
-        Some((own.distance + allowance_m(face), own))
+        let own = on_surface_of(surfaces, face, p)?;
+        Some((own.distance + allowance_m(own.face), own))
     };
     let chosen = fold(
         group,
@@ -236,8 +245,11 @@ pub(crate) fn with_allowance(
 }
 
 #[inline]
-fn distance(faces: &[FaceRecord], face: u16, p: Vec3) -> Option<f32> {
-    let face = faces.get(usize::from(face))?;
+fn distance(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Option<f32> {
+    let face = match surfaces.get(surface)? {
+        Surface::Face(face) => face,
+        Surface::Patch(patch) => return distance_to_patch(patch, p).map(|(distance, _)| distance),
+    };
     let from = p - Vec3::from_array(face.origin);
     let along = from.dot(Vec3::from_array(face.axis));
     match face.kind {

@@ -49,7 +49,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let mut left = MAX_READS;
         let mut only = |[low, high]: [Vec3; 2], reach: f32, mates: &[u16]| {
             let (low, high) = ((low - reach).to_array(), (high + reach).to_array());
-            (pair.field).only(low, high, &mut left, |face| mates.contains(&face))
+            (pair.field).only(low, high, &mut left, |surface| {
+                mates.contains(&pair.surfaces.face_of(surface))
+            })
         };
         // All points at once by their bricks, or else each point by the cells around it.
         if !common.is_empty() && only(bounds(pair, points)?, FAR_CELLS, &common) {

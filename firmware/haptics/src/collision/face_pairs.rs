@@ -5,11 +5,11 @@
 
 use glam::Vec3;
 use heapless::Vec;
-use mortise_protocol::image::{FaceRecord, NO_FACE, SceneImage, surface_kind};
+use mortise_protocol::image::{NO_FACE, SceneImage, Surfaces, surface_kind};
 use mortise_protocol::limits::MAX_PAIRS;
 
 use crate::collision::contact::{Contact, Phase};
-use crate::collision::exact_surface::on_face;
+use crate::collision::exact_surface::on_surface_of;
 use crate::collision::placement::Placed;
 use crate::io::{FacePair, FacePairs};
 use crate::math::pose::Pose;
@@ -187,21 +187,21 @@ impl Gathered {
 
 impl Scenery<'_, '_> {
     /// Exact surfaces and placement of a part.
-    fn surfaces(&self, part: u16) -> Option<(&[FaceRecord], Pose)> {
+    fn surfaces(&self, part: u16) -> Option<(Surfaces<'_>, Pose)> {
         let index = usize::from(part);
         let pose = if part == self.held {
             self.object
         } else {
             self.parts.get(index)?.pose
         };
-        (index < self.scene.parts().len()).then(|| (self.scene.shape_of_part(index).faces, pose))
+        (index < self.scene.parts().len()).then(|| (self.scene.shape_of_part(index).surfaces(), pose))
     }
 
     /// Axis (world) of the first of these static faces that is a cylinder or cone, else of the first such moving face, else zero.
     fn axis(&self, static_part: u16, fixed: &[u16], moving: &[u16]) -> Vec3 {
         let of = |part: u16, face: u16| {
-            let (faces, pose) = self.surfaces(part)?;
-            let face = faces.get(usize::from(face))?;
+            let (surfaces, pose) = self.surfaces(part)?;
+            let face = surfaces.faces.get(usize::from(face))?;
             let round = matches!(face.kind, surface_kind::CYLINDER | surface_kind::CONE);
             round.then(|| pose.transform_vector(Vec3::from_array(face.axis)))
         };
@@ -213,9 +213,9 @@ impl Scenery<'_, '_> {
     /// Orders the two faces at an edge: first the one whose outward normal at `point` (world) points more along `direction`. Both need a closed form.
     fn faces_along(&self, part: u16, [a, b]: [u16; 2], point: Vec3, direction: Vec3) -> [u16; 2] {
         let along = |face: u16| {
-            let (faces, pose) = self.surfaces(part)?;
+            let (surfaces, pose) = self.surfaces(part)?;
             let back = pose.inverse();
-            let normal = on_face(faces, face, back.transform_point(point))?.normal;
+            let normal = on_surface_of(surfaces, face, back.transform_point(point))?.normal;
             Some(normal.dot(back.transform_vector(direction)))
         };
         match (b != NO_FACE).then(|| along(a).zip(along(b))).flatten() {

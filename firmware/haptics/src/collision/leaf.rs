@@ -5,7 +5,7 @@ use mortise_protocol::image::PointRecord;
 use crate::collision::coherence::Bound;
 use crate::collision::cost::{CACHED_POINT, FIND_FACE, LOOKUP, NOTED};
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::exact_surface::on_face;
+use crate::collision::exact_surface::on_surface_of;
 use crate::collision::face_cache::CachedFace;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Key, Points};
@@ -145,7 +145,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         face: u16,
     ) -> f32 {
         let in_field = pair.to_field.apply(point.position);
-        match on_face(pair.faces, face, in_field) {
+        match on_surface_of(pair.surfaces, face, in_field) {
             Some(found) => {
                 if found.distance < self.search.margin {
                     self.near(pair, leaf, point, &found);

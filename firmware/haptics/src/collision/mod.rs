@@ -5,7 +5,7 @@
 //! | `search`, `leaf` | traversal of all trees within a work budget; the points of one leaf |
 //! | `edge_search`, `edge_crossing` | edges of one part against edges of the other; contact of two edges |
 //! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
-//! | `exact_surface`, `facing` | distance to exact surfaces; normals that rule out a contact |
+//! | `exact_surface`, `patch`, `facing` | distance to exact surfaces, and to local patches of free-form ones; normals that rule out a contact |
 //! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
 //! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
 //! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
@@ -28,6 +28,7 @@ mod facing;
 mod leaf;
 pub(crate) mod node_cursor;
 pub(crate) mod node_key;
+pub mod patch;
 pub(crate) mod placement;
 pub(crate) mod rules;
 pub(crate) mod search;

@@ -25,7 +25,7 @@ use crate::collision::cost::{
 };
 use crate::collision::decimation::mask;
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::exact_surface::{OnFace, exact_on_face, on_face, with_allowance};
+use crate::collision::exact_surface::{OnFace, exact_on_face, on_surface_of, with_allowance};
 use crate::collision::facing::faces_away;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, SHORTEST_SHARE};
@@ -370,7 +370,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let in_field = pair.to_field.apply(point.position);
         match pair.field.place(in_field.to_array()) {
             Place::Cell(cell) => {
-                let found = cell.face().and_then(|face| on_face(pair.faces, face, in_field));
+                let found = cell
+                    .surface()
+                    .and_then(|surface| on_surface_of(pair.surfaces, surface, in_field));
                 if let Some(found) = found {
                     if found.distance < self.search.margin {
                         self.near(pair, leaf, point, &found);
@@ -399,14 +401,14 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     ) -> f32 {
         self.spent += EDGE;
         let nearby = pair.field.nearby(cell);
-        if let Some(mut found) = exact_on_face(pair.faces, nearby, p) {
+        if let Some(mut found) = exact_on_face(pair.surfaces, nearby, p) {
             let distance = found.distance;
             if distance < self.search.margin {
                 if pair.guided {
                     self.spent += ALLOWANCE;
                     // At the rim of a guided face the adjacent face gets the allowance too; otherwise the part would rest on it.
                     let allowance_m = |face| self.mating(pair, leaf, point, face).allowance_m;
-                    found = with_allowance(found, pair.faces, nearby, p, allowance_m);
+                    found = with_allowance(found, pair.surfaces, nearby, p, allowance_m);
                 }
                 if !faces_away(pair, nearby, point, found.normal) {
                     self.near(pair, leaf, point, &found);
@@ -428,7 +430,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             let found = OnFace {
                 distance,
                 normal: gradient * inverse_sqrt(squared),
-                face: sample.face,
+                face: pair.surfaces.face_of(sample.face),
                 edge_face: NO_FACE,
             };
             self.near(pair, leaf, point, &found);

@@ -173,7 +173,7 @@ pub(crate) fn clearance(held: &Shape<'_>, other: &Shape<'_>, pose: &Pose, enough
 fn by_field(shape: &Shape<'_>, p: Vec3) -> (f32, bool) {
     match shape.field.place(p.to_array()) {
         Place::Far { inside, bound } => (if inside { -bound } else { bound }, false),
-        Place::Cell(cell) => match exact(shape.faces, shape.field.nearby(&cell), p) {
+        Place::Cell(cell) => match exact(shape.surfaces(), shape.field.nearby(&cell), p) {
             Some((distance, _)) => (distance, true),
             None => {
                 let record = shape.field.record();

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use mortise_protocol::image::{NO_FACE, Shape};
 
-use crate::collision::exact_surface::on_face;
+use crate::collision::exact_surface::on_surface_of;
 use crate::math::pose::Pose;
 use crate::probe::epa::Epa;
 use crate::probe::gjk::{Gjk, gjk};
@@ -86,7 +86,7 @@ fn face_at((shape, pose): (&Shape<'_>, &Pose), p: DVec3, out: DVec3) -> u16 {
     let out = back.transform_vector(out.as_vec3());
     let (mut found, mut most) = (NO_FACE, f32::NEG_INFINITY);
     for face in 0..shape.faces.len().min(usize::from(NO_FACE)) {
-        if let Some(on) = on_face(shape.faces, face as u16, p)
+        if let Some(on) = on_surface_of(shape.surfaces(), face as u16, p)
             && on.distance.abs() <= ON_FACE_M
             && on.normal.dot(out) > most
         {

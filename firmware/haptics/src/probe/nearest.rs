@@ -12,7 +12,9 @@ use mortise_protocol::image::{
 };
 
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::exact_surface::{OnFace, agreeing, closed_form, exact, on_face, unsigned_distance};
+use crate::collision::exact_surface::{
+    OnFace, agreeing, closed_form, exact, on_surface_of, unsigned_distance,
+};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
 use crate::io::Work;
@@ -117,8 +119,8 @@ struct PointSample {
     /// Whether the tick may make it push.
     overlaps: bool,
     inside: bool,
-    /// Nearest face, if known.
-    face: u16,
+    /// Nearest surface, if known.
+    surface: u16,
     in_band: bool,
     /// Whether an edge itself is nearest: then the surfaces give only a bound.
     edge_nearest: bool,
@@ -134,7 +136,7 @@ impl PointSample {
         rendered: f32::INFINITY,
         overlaps: false,
         inside: false,
-        face: NO_FACE,
+        surface: NO_FACE,
         in_band: false,
         edge_nearest: false,
         settled: false,
@@ -318,8 +320,10 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         match self.pair.field.place(p.to_array()) {
             Place::Cell(cell) => {
                 let nearby = self.pair.field.nearby(&cell);
-                let exact = exact(self.shape.faces, nearby, p);
-                if let Some((distance, face)) = exact
+                let exact = exact(self.shape.surfaces(), nearby, p);
+                if let Some((distance, surface)) = exact
+                    // A patch is exact within the baker's tolerance only.
+                    && usize::from(surface) < self.shape.faces.len()
                     && distance.abs() <= self.resolved
                     && match nearby {
                         Nearby::Convex(_) => distance <= 0.0,
@@ -333,7 +337,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                         rendered: distance,
                         overlaps: distance < 0.0,
                         inside: distance < 0.0,
-                        face,
+                        surface,
                         in_band: true,
                         edge_nearest: false,
                         settled: true,
@@ -361,10 +365,10 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             distance: interpolated,
             lower: interpolated - self.edge_error,
             rendered: interpolated,
-            face: nearby.face(),
+            surface: nearby.face(),
             ..PointSample::NOTHING
         };
-        if let Some((distance, face)) = exact {
+        if let Some((distance, surface)) = exact {
             sample.rendered = distance;
             sample.edge_nearest = match nearby {
                 Nearby::Convex(_) => distance > 0.0,
@@ -372,7 +376,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                 _ => false,
             };
             if !sample.edge_nearest {
-                (sample.distance, sample.lower, sample.face) = (distance, distance, face);
+                (sample.distance, sample.lower, sample.surface) = (distance, distance, surface);
             } else if distance > sample.lower && distance > 0.0 {
                 // Outside a convex edge the surfaces give a lower bound.
                 sample.lower = distance;
@@ -380,7 +384,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
         sample.overlaps = sample.rendered < 0.0;
         sample.inside = sample.distance < 0.0;
-        sample.in_band = sample.face != NO_FACE && sample.distance.abs() <= self.resolved;
+        sample.in_band = sample.surface != NO_FACE && sample.distance.abs() <= self.resolved;
         if sample.distance < -self.resolved {
             sample.lower = f32::NEG_INFINITY;
         }
@@ -392,7 +396,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         if !sample.settled {
             return None;
         }
-        let found = on_face(self.shape.faces, sample.face, self.in_field(point))?;
+        let found = on_surface_of(self.shape.surfaces(), sample.surface, self.in_field(point))?;
         Some(OnFace {
             distance: sample.distance,
             ..found
@@ -433,10 +437,11 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     ) {
         let distance_m = exact.unwrap_or(sample.distance);
         if distance_m < progress.best.distance_m {
+            let face = self.shape.surfaces().face_of(sample.surface);
             let (moving_face, fixed_face) = if self.pair.backward {
-                (sample.face, point.face)
+                (face, point.face)
             } else {
-                (point.face, sample.face)
+                (point.face, face)
             };
             progress.best = Nearest {
                 distance_m,
@@ -459,7 +464,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             return Some(sample.distance);
         }
         if sample.in_band && !sample.edge_nearest {
-            return agreeing(self.shape, sample.face, self.in_field(point), sample.distance);
+            return agreeing(self.shape, sample.surface, self.in_field(point), sample.distance);
         }
         None
     }

@@ -116,6 +116,8 @@ impl Writer {
             point_count: points.len() as u32,
             first_face,
             face_count: solid.face_count(),
+            first_patch: 0,
+            patch_count: 0,
             center: [0.0; 3],
             radius: norm(half) as f32,
             volume: mass.0 as f32,
@@ -312,6 +314,7 @@ impl Writer {
         header.nodes = section(&mut bytes, &self.nodes);
         header.points = section(&mut bytes, &self.points);
         header.faces = section(&mut bytes, &self.faces);
+        header.patches = section::<PatchRecord>(&mut bytes, &[]);
         header.bricks = section(&mut bytes, &self.bricks);
         header.palette = section(&mut bytes, &self.palette);
         header.grid = section(&mut bytes, &self.grid);

@@ -239,6 +239,12 @@ fn print_plan(
             count(", taken as edges", shape.faces_taken_as_edges.len()),
             count(", out of reach, omitted", shape.faces_left_out.len()),
         ))?;
+        if shape.error_at_edges_mm > shape.error_elsewhere_mm {
+            lines::text(&format!(
+                "    {:.1} µm at some edges of free-form faces",
+                um(shape.error_at_edges_mm)
+            ))?;
+        }
     }
     for tick in plan.ticks.iter().take(3) {
         let cost = tick.cost;

@@ -19,6 +19,9 @@ pub struct Args {
     /// Shorter form; each row states its scope
     #[arg(long)]
     quick: bool,
+    /// One part of the table alone; only `contact` has parts
+    #[arg(long, value_name = "PART")]
+    only: Option<String>,
     /// One JSON object a row
     #[arg(long)]
     json: bool,
@@ -48,6 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         quick: args.quick,
         program: &program,
         pair: sample.path(),
+        only: args.only.as_deref(),
     };
     let claims = match args.claims {
         ClaimSource::Kept => Claims::kept()?,

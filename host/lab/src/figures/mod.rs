@@ -62,7 +62,13 @@ fn measure(name: &str, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), 
         name: name.to_owned(),
         known: names().join(", "),
     })?;
-    measure(plan, out)
+    match plan.only {
+        Some(only) if name != "contact" => Err(LabError::NoSuchFigures {
+            name: only.to_owned(),
+            known: format!("{name} as a whole"),
+        }),
+        _ => measure(plan, out),
+    }
 }
 
 #[cfg(test)]

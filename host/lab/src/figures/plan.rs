@@ -11,4 +11,6 @@ pub struct Plan<'a> {
     pub program: &'a Path,
     /// The thesis pair with 1 mm clearance.
     pub pair: &'a Path,
+    /// One part of the table alone, where it has parts.
+    pub only: Option<&'a str>,
 }

@@ -30,6 +30,8 @@ pub enum Made {
     Page { quick: bool },
     /// A sweep: `mortise-lab NAME --out docs/figures`.
     Sweep { quick: bool },
+    /// A page with its sweep: `cargo xtask NAME --write`, which installs packages and is therefore started by a person.
+    Compared,
     /// By a person at the window.
     ByHand,
 }
@@ -204,6 +206,21 @@ pub const ARTEFACTS: &[Artefact] = &[
         sources: &[LAW, SCENARIO, TRIAL, GUIDED, CHART, &["host/lab/src/stability"]],
     },
     Artefact {
+        name: "peers",
+        made: Made::Compared,
+        sources: &[
+            LAW,
+            CHART,
+            &[
+                "host/lab/src/peers",
+                "host/lab/src/peer.rs",
+                "host/lab/peers",
+                "host/lab/src/scene_p.rs",
+                "host/scenario/src/probe.rs",
+            ],
+        ],
+    },
+    Artefact {
         name: "window",
         made: Made::ByHand,
         sources: &[&["host/app/src/ui", "host/app/src/viewport"]],
@@ -229,13 +246,20 @@ impl Artefact {
                 self.experiment(),
                 option(quick)
             ),
+            Made::Compared => format!(
+                "cargo xtask {} --write, then cargo xtask figures --record {}",
+                self.name, self.name
+            ),
             Made::ByHand => format!("by hand, then cargo xtask figures --record {}", self.name),
         }
     }
 
     fn owns(&self, file: &str) -> bool {
-        if let Made::Page { .. } = self.made {
-            return file.strip_suffix(".md") == Some(self.name);
+        let is_page = file.strip_suffix(".md") == Some(self.name);
+        match self.made {
+            Made::Page { .. } => return is_page,
+            Made::Compared if is_page => return true,
+            _ => {}
         }
         let stem = file.split('.').next().unwrap_or(file);
         let rest = stem.strip_prefix(self.experiment());

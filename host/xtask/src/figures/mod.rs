@@ -20,6 +20,7 @@ use anyhow::{Context, Result, bail};
 
 use self::claims::Claims;
 use self::measure::{By, measure};
+pub use self::page::today;
 pub use self::row::{Row, count};
 use self::write::{page_is_quick, write_page};
 use crate::arguments::Figures;

@@ -29,7 +29,7 @@ pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
         else {
             continue;
         };
-        if artefact.made == Made::ByHand {
+        if matches!(artefact.made, Made::ByHand | Made::Compared) {
             said.push(format!("{} {why}: made {}", artefact.name, artefact.command()));
             continue;
         }
@@ -94,7 +94,7 @@ fn make(root: &Path, program: &Path, artefact: &Artefact) -> Result<bool> {
                 .with_context(|| format!("`{}` made nothing", artefact.command()))?;
             Ok(true)
         }
-        // Never reached: artefacts made by hand are not selected.
-        Made::ByHand => Ok(true),
+        // Never reached: artefacts that a person starts are not selected.
+        Made::Compared | Made::ByHand => Ok(true),
     }
 }

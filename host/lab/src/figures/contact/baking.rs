@@ -8,11 +8,11 @@ use mortise_bake::{BakeError, BakeOptions, Grabbable, Request, SignOptions, bake
 use mortise_brep::{CadModel, LoadOptions, load_step};
 use mortise_scenario::ScenarioError;
 
+use super::limits::ABSENT;
 use crate::figures::{Plan, Row};
 use crate::variant::Variant;
 use crate::{LabError, corpus};
 
-const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to their folder";
 const MOTOR: &str = "05_motor/motor_nested.step";
 /// Accuracy of the motor, mm.
 const ACCURACY_MM: f64 = 0.01;

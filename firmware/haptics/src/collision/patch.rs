@@ -1,0 +1,170 @@
+//! Distance from a point to a local patch of a free-form face: a cubic height over a tangent plane.
+//!
+//! The foot (s, t) of a point (u, v, w) minimises (s − u)² + (t − v)² + (h(s, t) − w)²; from s = u, t = v it is reached by [`STEPS`] Newton steps. The
+//! distance is taken along the normal there, so its error is of second order in that of the foot.
+//!
+//! Metres, shape frame. The baker verifies each cell that names a patch with this very function, so that its error includes the steps and the
+//! rounding here. Cost: about 250 instructions on a Cortex-M7.
+
+use glam::Vec3;
+use mortise_protocol::image::PatchRecord;
+
+use crate::math::scalar::inverse_sqrt;
+
+/// Newton steps to the foot: each squares the error.
+const STEPS: usize = 2;
+/// Least determinant of the Hessian, which is 1 on a plane: below it the point is at the centre of curvature and has no unique foot.
+const LEAST_DETERMINANT: f32 = 1e-3;
+
+/// Height and its derivatives at a point of the tangent plane.
+struct Jet {
+    h: f32,
+    /// ∂h/∂u, ∂h/∂v.
+    slope: [f32; 2],
+    /// ∂²h/∂u², ∂²h/∂u∂v, ∂²h/∂v².
+    bend: [f32; 3],
+}
+
+/// Height and derivatives of a patch at (u, v), m.
+#[inline(always)]
+fn jet(c: &[f32; 10], u: f32, v: f32) -> Jet {
+    // h = a₀(v) + u·(a₁(v) + u·(a₂(v) + u·a₃)).
+    let a0 = c[0] + v * (c[2] + v * (c[5] + v * c[9]));
+    let a1 = c[1] + v * (c[4] + v * c[8]);
+    let a2 = c[3] + v * c[7];
+    let a3 = c[6];
+    let d0 = c[2] + v * (2.0 * c[5] + 3.0 * v * c[9]);
+    let d1 = c[4] + 2.0 * v * c[8];
+    Jet {
+        h: a0 + u * (a1 + u * (a2 + u * a3)),
+        slope: [a1 + u * (2.0 * a2 + 3.0 * u * a3), d0 + u * (d1 + u * c[7])],
+        bend: [
+            2.0 * a2 + 6.0 * u * a3,
+            d1 + 2.0 * u * c[7],
+            2.0 * c[5] + 6.0 * v * c[9] + 2.0 * u * c[8],
+        ],
+    }
+}
+
+/// Signed distance from `p` (m, shape frame), outward positive, and outward unit normal; `None` where the foot is not unique.
+#[inline(never)]
+pub fn distance_to_patch(patch: &PatchRecord, p: Vec3) -> Option<(f32, Vec3)> {
+    let (x, normal) = (Vec3::from_array(patch.x), Vec3::from_array(patch.normal));
+    let y = normal.cross(x);
+    let q = p - Vec3::from_array(patch.origin);
+    let (u, v, w) = (q.dot(x), q.dot(y), q.dot(normal));
+    let (mut s, mut t) = (u, v);
+    let mut at = jet(&patch.height, s, t);
+    for _ in 0..STEPS {
+        let over = at.h - w;
+        let [hs, ht] = at.slope;
+        let (gs, gt) = (s - u + over * hs, t - v + over * ht);
+        let ss = 1.0 + hs * hs + over * at.bend[0];
+        let st = hs * ht + over * at.bend[1];
+        let tt = 1.0 + ht * ht + over * at.bend[2];
+        let determinant = ss * tt - st * st;
+        // False for NaN too.
+        if !(determinant > LEAST_DETERMINANT && ss > 0.0) {
+            return None;
+        }
+        let inverse = 1.0 / determinant;
+        s -= (tt * gs - st * gt) * inverse;
+        t -= (ss * gt - st * gs) * inverse;
+        at = jet(&patch.height, s, t);
+    }
+    let [hs, ht] = at.slope;
+    let scale = inverse_sqrt(1.0 + hs * hs + ht * ht);
+    let distance = (w - at.h - (u - s) * hs - (v - t) * ht) * scale;
+    Some((distance, (normal - x * hs - y * ht) * scale))
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A patch of about 4 mm over which a curved sheet has slopes up to 0.3 and radii of 5 mm and more.
+    fn patch(k: [f32; 7], turn: f32) -> PatchRecord {
+        let (sin, cos) = (libm::sinf(turn), libm::cosf(turn));
+        PatchRecord {
+            origin: [0.02, -0.01, 0.03],
+            x: [cos, sin, 0.0],
+            normal: [-sin * 0.6, cos * 0.6, 0.8],
+            height: [
+                0.0,
+                0.0,
+                0.0,
+                100.0 * k[0],
+                100.0 * k[1],
+                100.0 * k[2],
+                8e3 * k[3],
+                8e3 * k[4],
+                8e3 * k[5],
+                8e3 * k[6],
+            ],
+            face: 3,
+            reserved: 0,
+        }
+    }
+
+    /// Point and unit normal of a patch at (s, t), in double precision.
+    fn surface(patch: &PatchRecord, s: f64, t: f64) -> ([f64; 3], [f64; 3]) {
+        let c = patch.height.map(f64::from);
+        let h = c[0]
+            + c[1] * s
+            + c[2] * t
+            + c[3] * s * s
+            + c[4] * s * t
+            + c[5] * t * t
+            + c[6] * s * s * s
+            + c[7] * s * s * t
+            + c[8] * s * t * t
+            + c[9] * t * t * t;
+        let hs = c[1] + 2.0 * c[3] * s + c[4] * t + 3.0 * c[6] * s * s + 2.0 * c[7] * s * t + c[8] * t * t;
+        let ht = c[2] + c[4] * s + 2.0 * c[5] * t + c[7] * s * s + 2.0 * c[8] * s * t + 3.0 * c[9] * t * t;
+        let [x, n, o] = [patch.x, patch.normal, patch.origin].map(|v| v.map(f64::from));
+        let y = [
+            n[1] * x[2] - n[2] * x[1],
+            n[2] * x[0] - n[0] * x[2],
+            n[0] * x[1] - n[1] * x[0],
+        ];
+        let scale = 1.0 / libm::sqrt(1.0 + hs * hs + ht * ht);
+        (
+            core::array::from_fn(|k| o[k] + x[k] * s + y[k] * t + n[k] * h),
+            core::array::from_fn(|k| (n[k] - x[k] * hs - y[k] * ht) * scale),
+        )
+    }
+
+    proptest! {
+        /// A point placed on the normal over a point of the patch has that distance and that normal. Within 0.3 mm of a sheet with radii of at least
+        /// 2 mm (both kinds of curvature together) the two steps leave less than 0.05 µm, most of it rounding at 40 mm from the origin.
+        #[test]
+        fn a_point_over_the_patch_has_its_height(
+            k in prop::array::uniform7(-1.0f32..1.0),
+            turn in -3.0f32..3.0,
+            foot in prop::array::uniform2(-0.002f64..0.002),
+            distance in -0.0003f64..0.0003,
+        ) {
+            let patch = patch(k, turn);
+            let (at, normal) = surface(&patch, foot[0], foot[1]);
+            let p = Vec3::from_array(core::array::from_fn(|i| (at[i] + normal[i] * distance) as f32));
+            let (found, direction) = distance_to_patch(&patch, p).expect("nearer than the radius");
+            prop_assert!((f64::from(found) - distance).abs() < 5e-8, "{found} {distance}");
+            let cosine: f64 = (0..3).map(|i| f64::from(direction[i]) * normal[i]).sum();
+            prop_assert!(cosine > 1.0 - 1e-5, "{cosine}");
+        }
+    }
+
+    #[test]
+    fn at_the_centre_of_curvature_there_is_no_foot() {
+        let bowl = patch([1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 0.0);
+        let normal = Vec3::from_array(bowl.normal);
+        let origin = Vec3::from_array(bowl.origin);
+        assert!(distance_to_patch(&bowl, origin + normal * 0.0051).is_none());
+        assert!(distance_to_patch(&bowl, origin + Vec3::splat(f32::NAN)).is_none());
+        assert!(distance_to_patch(&bowl, origin + normal * 0.001).is_some());
+    }
+}
