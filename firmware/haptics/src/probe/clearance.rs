@@ -317,11 +317,18 @@ impl Clearing {
             let p = curve.at(t);
             let reach = curve.speed() * h;
             let Some((d, n)) = signed(face, p) else {
-                self.split(&mut stack, t, h, reach, 0.0);
+                // On the axis or at the centre, where the surface is a radius away.
+                let lower = (radius_at_axis(face) - curve.radius).abs() - reach - curve.error;
+                if lower < self.found.upper {
+                    self.split(&mut stack, t, h, reach, if lower > 0.0 { lower } else { 0.0 });
+                }
                 continue;
             };
-            let lower = self.least(face, curve, (t, h), (p, d, n)) - curve.radius - curve.error;
-            if lower >= self.found.upper - CLOSE_M {
+            let least = self.least(face, curve, (t, h), (p, d, n)) - curve.radius;
+            // The own surface may lie beyond the face: then it is the nearer to it, the farther the curve.
+            let beyond = curve.radius - (d.abs() + reach);
+            let lower = (if least > beyond { least } else { beyond }) - curve.error;
+            if lower >= self.found.upper - CLOSE_M - curve.error {
                 self.note(lower);
                 continue;
             }
@@ -350,7 +357,7 @@ impl Clearing {
                 self.descend(own, against, face, curve, n.dot(curve.derivatives(t).0) * side);
             }
             let unproven = !(sure && own_sure) && reach < 0.05 * against.shape.field.record().cell;
-            if unproven || lower >= self.found.upper - CLOSE_M {
+            if unproven || lower >= self.found.upper - CLOSE_M - curve.error {
                 self.note(lower);
             } else {
                 self.split(&mut stack, t, h, reach, lower);
@@ -382,7 +389,7 @@ impl Clearing {
         }
     }
 
-    /// Lower bound of the distance of the part t ± h of a curve from a face's surface, to second order.
+    /// Lower bound of the distance of the part t ± h of a curve from a face's surface: to second order, less a bound of the third.
     fn least(
         &self,
         face: &FaceRecord,
@@ -391,18 +398,28 @@ impl Clearing {
         (p, d, n): (Vec3, f32, Vec3),
     ) -> f32 {
         let reach = curve.speed() * h;
-        let (first, second) = curve.derivatives(t);
-        let slope = n.dot(first) * h;
-        let speed2 = reach * reach;
-        let curl = curl(face, p, reach);
-        let bent = if curve.circle {
-            length(second)
-        } else {
-            n.dot(second).abs() + length(second) * reach * curl
-        };
-        let curving = 0.5 * (speed2 * curl + bent * h * h);
-        let bound = d.abs() - slope.abs() - curving;
         let plain = d.abs() - reach;
+        let sign = if d < 0.0 { -1.0 } else { 1.0 };
+        let (first, second) = curve.derivatives(t);
+        let (first, second) = (first * h, second * (h * h));
+        let (bending, curl) = bending(face, p, n, first, reach);
+        if curl == f32::MAX {
+            return plain;
+        }
+        let turning = if curve.circle {
+            length(second) * core::f32::consts::PI * h
+        } else {
+            0.0
+        };
+        let turn = length(second) + turning;
+        let third = 3.0 * reach * curl * (reach * reach * curl + turn) + turning;
+        let (slope, curving) = (n.dot(first).abs(), sign * (bending + n.dot(second)));
+        let least = if curving > slope {
+            -0.5 * slope * slope / curving
+        } else {
+            0.5 * curving - slope
+        };
+        let bound = d.abs() + least - third * (1.0 / 6.0);
         if bound > plain { bound } else { plain }
     }
 
@@ -489,7 +506,7 @@ impl Clearing {
         let error = a.0.error + b.0.error;
         let off = bulge(a) + bulge(b);
         let lower = distance - off - error;
-        if lower >= self.found.upper - CLOSE_M {
+        if lower >= self.found.upper - CLOSE_M - error {
             self.note(lower);
             return;
         }
@@ -514,25 +531,47 @@ impl Clearing {
     }
 }
 
-/// Largest curvature of a face's surface within `reach` of `p`, 1/m, as it enters the second derivative of the distance.
-fn curl(face: &FaceRecord, p: Vec3, reach: f32) -> f32 {
+/// Second derivative of the distance from a face's surface at `p` along a line of velocity `v`, m; and a bound of the distance's curvature within
+/// `reach` of `p`, 1/m: of its second derivative, and the root of half of that of its third. `n` is the normal.
+fn bending(face: &FaceRecord, p: Vec3, n: Vec3, v: Vec3, reach: f32) -> (f32, f32) {
     let from = p - Vec3::from_array(face.origin);
     let axis = Vec3::from_array(face.axis);
     let radial = from - axis * from.dot(axis);
-    let off = match face.kind {
-        surface_kind::PLANE => return 0.0,
-        surface_kind::SPHERE => length(from),
-        surface_kind::TORUS => {
-            let ring = length(radial);
-            let tube = libm::hypotf(ring - face.radius, from.dot(axis));
-            if ring < tube { ring } else { tube }
+    let ring = length(radial);
+    let around = |v: Vec3| axis.cross(radial).dot(v) / ring;
+    let (bending, off) = match face.kind {
+        surface_kind::PLANE => return (0.0, 0.0),
+        surface_kind::SPHERE => {
+            let across = v - n * v.dot(n);
+            (across.length_squared() / length(from), length(from))
         }
-        _ => length(radial),
+        surface_kind::CYLINDER => (around(v) * around(v) / ring, ring),
+        surface_kind::CONE => (around(v) * around(v) * libm::cosf(face.second) / ring, ring),
+        _ => {
+            let tube = libm::hypotf(ring - face.radius, from.dot(axis));
+            let along = around(v);
+            let outward = n.dot(radial) / ring * face.sense;
+            let across = v.length_squared() - v.dot(n) * v.dot(n) - along * along;
+            let bending = along * along * outward / ring + across / tube;
+            (bending, if ring < tube { ring } else { tube })
+        }
     };
-    if off > 1.001 * reach {
+    let curl = if off > 1.001 * reach {
         1.0 / (off - reach)
     } else {
         f32::MAX
+    };
+    (bending * face.sense, curl)
+}
+
+/// Distance of a face's surface from the points at which its foot is not unique, m.
+fn radius_at_axis(face: &FaceRecord) -> f32 {
+    let inner = face.radius - face.second;
+    match face.kind {
+        surface_kind::CYLINDER | surface_kind::SPHERE => face.radius,
+        surface_kind::TORUS if inner < face.second => inner,
+        surface_kind::TORUS => face.second,
+        _ => 0.0,
     }
 }
 
