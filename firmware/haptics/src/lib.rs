@@ -3,7 +3,8 @@
 //! [`tick()`] is called at 1 kHz. It pulls the grabbed part (the *object*) towards the handle through a virtual coupling, finds where the object
 //! meets the other parts (points of one in the signed distance field of the other, in both directions), moves the object by one implicit step, and
 //! returns the wrench for the handle. No I/O, no allocation, no clock. The same source runs on a PC and on a Cortex-M7 and gives the same bits:
-//! single precision only, `libm` instead of the standard library, no fused multiply-add, one order of summation.
+//! single precision only, `libm` instead of the standard library, no fused multiply-add, one order of summation. Only the probe, which no tick calls, measures convex shapes in
+//! double precision.
 //!
 //! | module | what |
 //! |---|---|

@@ -504,10 +504,16 @@ impl fmt::Display for ProbeRow {
             Resolution::TangentPlane => "to a tangent plane",
             Resolution::Bound => "at least",
         };
+        let bound = self.error_um.map_or(String::new(), |um| format!(" ± {um:.2} µm"));
+        let kind = match self.measure {
+            Measure::Gap => "",
+            Measure::Translation => ", smallest translation",
+            Measure::DeepestPoint => ", deepest point",
+        };
         let [x, y, z] = self.force_n;
         write!(
             f,
-            "{}: {:+.4} mm ({worth}), {} contacts, force {x:.3} {y:.3} {z:.3} N, {} points, {} ns",
+            "{}: {:+.4} mm ({worth}{bound}{kind}), {} contacts, force {x:.3} {y:.3} {z:.3} N, {} points, {} ns",
             self.name, self.distance_mm, self.contacts, self.points, self.least_ns
         )
     }

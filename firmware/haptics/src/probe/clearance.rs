@@ -10,15 +10,15 @@
 //! Sources: Johnson & Cohen 2001, "Spatialized normal cone hierarchies" (bounding pairs of features); Lipschitz branch and bound. Metres. Cost: one
 //! formula for a node or piece and a face, a field query for each piece that could be nearest.
 
-use glam::{Mat3, Vec3};
-use mortise_protocol::image::{
-    EDGE_ERROR_CELLS, EdgeRecord, FaceRecord, Place, SHAPE_LEAKY, Shape, surface_kind,
-};
+use glam::Vec3;
+use mortise_protocol::image::{EDGE_ERROR_CELLS, FaceRecord, Place, SHAPE_LEAKY, Shape, surface_kind};
 
 use crate::collision::exact_surface::{exact, signed};
 use crate::math::pose::Pose;
 use crate::math::vector::length;
 use crate::probe::convex::Separation;
+use crate::probe::curve::{Curve, Side, nearest_of_segments, placed, placed_at_rest};
+use crate::probe::face_bounds::{bending, foot_speed, radius_at_axis, turn_of_foot};
 use crate::probe::nearest::Measure;
 use crate::probe::support::rounding;
 
@@ -28,76 +28,10 @@ const ON_SURFACE_M: f32 = 1e-7;
 const CLOSE_M: f32 = 0.2e-6;
 /// Pieces shorter than this are not halved, m.
 const SHORT_M: f32 = 0.1e-6;
-/// Largest distance of a piece of a curved edge from the edge, m.
-const PIECE_M: f32 = 0.5e-6;
 /// Evaluations of a piece at most.
 const BUDGET: u32 = 40_000;
 /// Depth of halving: a length of a metre falls below [`SHORT_M`].
 const DEPTH: usize = 48;
-
-/// A curve in the frame of the other shape: p(t) = center + t·half + t²·bend for |t| ≤ 1, or a circle about `center`; the surface searched lies
-/// `radius` from it.
-#[derive(Clone, Copy)]
-struct Curve {
-    center: Vec3,
-    half: Vec3,
-    bend: Vec3,
-    /// For a circle `half` and `bend` are two perpendicular radii, and t is the angle over π.
-    circle: bool,
-    radius: f32,
-    /// Distance of the curve from the true one at most, m.
-    error: f32,
-}
-
-impl Curve {
-    fn at(&self, t: f32) -> Vec3 {
-        if self.circle {
-            let (sin, cos) = libm::sincosf(t * core::f32::consts::PI);
-            self.center + self.half * cos + self.bend * sin
-        } else {
-            self.center + (self.half + self.bend * t) * t
-        }
-    }
-
-    /// First and second derivative.
-    fn derivatives(&self, t: f32) -> (Vec3, Vec3) {
-        if self.circle {
-            const PI: f32 = core::f32::consts::PI;
-            let (sin, cos) = libm::sincosf(t * PI);
-            let (x, y) = (self.half * PI, self.bend * PI);
-            (y * cos - x * sin, (x * cos + y * sin) * -PI)
-        } else {
-            (self.half + self.bend * (2.0 * t), self.bend * 2.0)
-        }
-    }
-
-    /// Largest speed, m per unit of t.
-    fn speed(&self) -> f32 {
-        if self.circle {
-            length(self.half) * core::f32::consts::PI
-        } else {
-            length(self.half) + 2.0 * length(self.bend)
-        }
-    }
-}
-
-/// One of the two shapes, seen from the other.
-struct Side<'s, 'i> {
-    shape: &'s Shape<'i>,
-    /// Its frame to the other's.
-    rotation: Mat3,
-    offset: Vec3,
-}
-
-impl Side<'_, '_> {
-    fn to_other(&self, p: Vec3) -> Vec3 {
-        self.rotation * p + self.offset
-    }
-
-    fn from_other(&self, p: Vec3) -> Vec3 {
-        self.rotation.transpose() * (p - self.offset)
-    }
-}
 
 /// Distance of two surfaces.
 #[derive(Clone, Copy, Debug)]
@@ -337,7 +271,7 @@ impl Clearing {
             let own_foot = p - n * (side * curve.radius);
             let (at_foot, sure) = by_field(against.shape, foot);
             let (at_own, own_sure) = if curve.radius > 0.0 {
-                by_field(own.shape, own.from_other(own_foot))
+                by_field(own.shape, own.bring_back(own_foot))
             } else {
                 (0.0, true)
             };
@@ -379,7 +313,7 @@ impl Clearing {
             return;
         };
         let own_foot = p - n * if d < 0.0 { -curve.radius } else { curve.radius };
-        let feet = [(against.shape, p - n * d), (own.shape, own.from_other(own_foot))];
+        let feet = [(against.shape, p - n * d), (own.shape, own.bring_back(own_foot))];
         let count = if curve.radius > 0.0 { 2 } else { 1 };
         if feet.iter().take(count).all(|&(shape, foot)| {
             let (at, sure) = by_field(shape, foot);
@@ -531,128 +465,6 @@ impl Clearing {
     }
 }
 
-/// Second derivative of the distance from a face's surface at `p` along a line of velocity `v`, m; and a bound of the distance's curvature within
-/// `reach` of `p`, 1/m: of its second derivative, and the root of half of that of its third. `n` is the normal.
-fn bending(face: &FaceRecord, p: Vec3, n: Vec3, v: Vec3, reach: f32) -> (f32, f32) {
-    let from = p - Vec3::from_array(face.origin);
-    let axis = Vec3::from_array(face.axis);
-    let radial = from - axis * from.dot(axis);
-    let ring = length(radial);
-    let around = |v: Vec3| axis.cross(radial).dot(v) / ring;
-    let (bending, off) = match face.kind {
-        surface_kind::PLANE => return (0.0, 0.0),
-        surface_kind::SPHERE => {
-            let across = v - n * v.dot(n);
-            (across.length_squared() / length(from), length(from))
-        }
-        surface_kind::CYLINDER => (around(v) * around(v) / ring, ring),
-        surface_kind::CONE => (around(v) * around(v) * libm::cosf(face.second) / ring, ring),
-        _ => {
-            let tube = libm::hypotf(ring - face.radius, from.dot(axis));
-            let along = around(v);
-            let outward = n.dot(radial) / ring * face.sense;
-            let across = v.length_squared() - v.dot(n) * v.dot(n) - along * along;
-            let bending = along * along * outward / ring + across / tube;
-            (bending, if ring < tube { ring } else { tube })
-        }
-    };
-    let curl = if off > 1.001 * reach {
-        1.0 / (off - reach)
-    } else {
-        f32::MAX
-    };
-    (bending * face.sense, curl)
-}
-
-/// Distance of a face's surface from the points at which its foot is not unique, m.
-fn radius_at_axis(face: &FaceRecord) -> f32 {
-    let inner = face.radius - face.second;
-    match face.kind {
-        surface_kind::CYLINDER | surface_kind::SPHERE => face.radius,
-        surface_kind::TORUS if inner < face.second => inner,
-        surface_kind::TORUS => face.second,
-        _ => 0.0,
-    }
-}
-
-/// How much faster than a point its foot moves on a face, at most, for points within `reach` of one at distance `d`.
-fn foot_speed(face: &FaceRecord, d: f32, reach: f32) -> f32 {
-    let radius = match face.kind {
-        surface_kind::PLANE => return 1.0,
-        surface_kind::TORUS => face.second,
-        surface_kind::CONE => return 4.0,
-        _ => face.radius,
-    };
-    let off = radius + d * face.sense - reach;
-    let ratio = if off > 0.0 { radius / off } else { f32::MAX };
-    if ratio > 1.0 { ratio } else { 1.0 }
-}
-
-/// Way of the own foot relative to its curve, m: the radius times the turn of the normal.
-fn turn_of_foot(face: &FaceRecord, d: f32, reach: f32, radius: f32) -> f32 {
-    if face.kind == surface_kind::PLANE || radius == 0.0 {
-        return 0.0;
-    }
-    let off = face.radius.min(if face.kind == surface_kind::TORUS {
-        face.second
-    } else {
-        f32::MAX
-    }) + d * face.sense
-        - reach;
-    if off > 0.0 {
-        radius * reach / off
-    } else {
-        f32::INFINITY
-    }
-}
-
-/// A piece of an edge in the other shape's frame.
-fn placed(own: &Side<'_, '_>, edge: &EdgeRecord) -> Curve {
-    let piece = placed_at_rest(edge);
-    Curve {
-        center: own.to_other(piece.center),
-        half: own.rotation * piece.half,
-        bend: own.rotation * piece.bend,
-        ..piece
-    }
-}
-
-/// A piece of an edge in its own frame.
-fn placed_at_rest(edge: &EdgeRecord) -> Curve {
-    Curve {
-        center: Vec3::from_array(edge.center),
-        half: Vec3::from_array(edge.half),
-        bend: Vec3::from_array(edge.bend),
-        circle: false,
-        radius: 0.0,
-        error: if edge.is_straight() { 0.0 } else { PIECE_M },
-    }
-}
-
-/// The points of two segments that are nearest to each other (Ericson, "Real-Time Collision Detection", 5.1.9).
-fn nearest_of_segments([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> (Vec3, Vec3) {
-    let (d, e, apart) = (q - p, s - r, p - r);
-    let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
-    let (da, ea) = (d.dot(apart), e.dot(apart));
-    let clamp = |x: f32| {
-        if x > 0.0 {
-            if x < 1.0 { x } else { 1.0 }
-        } else {
-            0.0
-        }
-    };
-    let over = |a: f32, b: f32| if b > f32::MIN_POSITIVE { a / b } else { 0.0 };
-    let sine2 = dd * ee - de * de;
-    let mut t = if sine2 > 1e-6 * dd * ee {
-        clamp((de * ea - da * ee) / sine2)
-    } else {
-        0.0
-    };
-    let u = clamp(over(de * t + ea, ee));
-    t = clamp(over(de * u - da, dd));
-    (p + d * t, r + e * u)
-}
-
 impl Clearance {
     /// The same as a separation of `held` at `pose` from `other`, where the surfaces were shown to be apart.
     pub fn separation(&self, pose: &Pose, held: &Shape<'_>, other: &Shape<'_>) -> Option<Separation> {
@@ -661,7 +473,7 @@ impl Clearance {
         } else {
             self.upper
         };
-        if self.overlap || !(lower > 0.0) || self.upper.is_infinite() {
+        if self.overlap || lower <= 0.0 || self.upper.is_infinite() {
             return None;
         }
         let [a, b] = self.nearest.map(|p| p.as_dvec3());

@@ -132,8 +132,8 @@ fn foot_of_origin(face: &Simplex) -> Option<Vertex> {
     };
     let mut point = Vertex::default();
     for (weight, vertex) in weights.iter().zip(&face.points).take(face.count) {
-        // Also false for NaN, of points that do not span the face.
-        if !(*weight >= 0.0) {
+        // NaN: the points do not span the face.
+        if *weight < 0.0 || weight.is_nan() {
             return None;
         }
         point.w += vertex.w * *weight;

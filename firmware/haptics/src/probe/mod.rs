@@ -2,7 +2,9 @@
 
 mod clearance;
 mod convex;
+mod curve;
 mod epa;
+mod face_bounds;
 mod gjk;
 pub(crate) mod nearest;
 mod nearest_voxel;

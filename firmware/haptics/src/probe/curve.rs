@@ -1,0 +1,119 @@
+//! Curves of a shape in the frame of another: pieces of edges, and the points, circles and lines about which bulging faces lie.
+
+use glam::{Mat3, Vec3};
+use mortise_protocol::image::{EdgeRecord, Shape};
+
+use crate::math::vector::length;
+
+/// Largest distance of a piece of a curved edge from the edge, m.
+const PIECE_M: f32 = 0.5e-6;
+/// A curve in the frame of the other shape: p(t) = center + t·half + t²·bend for |t| ≤ 1, or a circle about `center`; the surface searched lies
+/// `radius` from it.
+#[derive(Clone, Copy)]
+pub(crate) struct Curve {
+    pub center: Vec3,
+    pub half: Vec3,
+    pub bend: Vec3,
+    /// For a circle `half` and `bend` are two perpendicular radii, and t is the angle over π.
+    pub circle: bool,
+    pub radius: f32,
+    /// Distance of the curve from the true one at most, m.
+    pub error: f32,
+}
+
+impl Curve {
+    pub fn at(&self, t: f32) -> Vec3 {
+        if self.circle {
+            let (sin, cos) = libm::sincosf(t * core::f32::consts::PI);
+            self.center + self.half * cos + self.bend * sin
+        } else {
+            self.center + (self.half + self.bend * t) * t
+        }
+    }
+
+    /// First and second derivative.
+    pub fn derivatives(&self, t: f32) -> (Vec3, Vec3) {
+        if self.circle {
+            const PI: f32 = core::f32::consts::PI;
+            let (sin, cos) = libm::sincosf(t * PI);
+            let (x, y) = (self.half * PI, self.bend * PI);
+            (y * cos - x * sin, (x * cos + y * sin) * -PI)
+        } else {
+            (self.half + self.bend * (2.0 * t), self.bend * 2.0)
+        }
+    }
+
+    /// Largest speed, m per unit of t.
+    pub fn speed(&self) -> f32 {
+        if self.circle {
+            length(self.half) * core::f32::consts::PI
+        } else {
+            length(self.half) + 2.0 * length(self.bend)
+        }
+    }
+}
+
+/// One of the two shapes, seen from the other.
+pub(crate) struct Side<'s, 'i> {
+    pub shape: &'s Shape<'i>,
+    /// Its frame to the other's.
+    pub rotation: Mat3,
+    pub offset: Vec3,
+}
+
+impl Side<'_, '_> {
+    pub fn to_other(&self, p: Vec3) -> Vec3 {
+        self.rotation * p + self.offset
+    }
+
+    pub fn bring_back(&self, p: Vec3) -> Vec3 {
+        self.rotation.transpose() * (p - self.offset)
+    }
+}
+
+/// A piece of an edge in the other shape's frame.
+pub(crate) fn placed(own: &Side<'_, '_>, edge: &EdgeRecord) -> Curve {
+    let piece = placed_at_rest(edge);
+    Curve {
+        center: own.to_other(piece.center),
+        half: own.rotation * piece.half,
+        bend: own.rotation * piece.bend,
+        ..piece
+    }
+}
+
+/// A piece of an edge in its own frame.
+pub(crate) fn placed_at_rest(edge: &EdgeRecord) -> Curve {
+    Curve {
+        center: Vec3::from_array(edge.center),
+        half: Vec3::from_array(edge.half),
+        bend: Vec3::from_array(edge.bend),
+        circle: false,
+        radius: 0.0,
+        error: if edge.is_straight() { 0.0 } else { PIECE_M },
+    }
+}
+
+/// The points of two segments that are nearest to each other (Ericson, "Real-Time Collision Detection", 5.1.9).
+pub(crate) fn nearest_of_segments([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> (Vec3, Vec3) {
+    let (d, e, apart) = (q - p, s - r, p - r);
+    let (dd, ee, de) = (d.length_squared(), e.length_squared(), d.dot(e));
+    let (da, ea) = (d.dot(apart), e.dot(apart));
+    let clamp = |x: f32| {
+        if x > 0.0 {
+            if x < 1.0 { x } else { 1.0 }
+        } else {
+            0.0
+        }
+    };
+    let over = |a: f32, b: f32| if b > f32::MIN_POSITIVE { a / b } else { 0.0 };
+    let sine2 = dd * ee - de * de;
+    let mut t = if sine2 > 1e-6 * dd * ee {
+        clamp((de * ea - da * ee) / sine2)
+    } else {
+        0.0
+    };
+    let u = clamp(over(de * t + ea, ee));
+    t = clamp(over(de * u - da, dd));
+    (p + d * t, r + e * u)
+}
