@@ -140,7 +140,9 @@ fn cells(
             )
         });
         let by = match named {
-            Nearby::Roughly(_) | Nearby::Unknown if nearby.at_edge(cell, nearest) => {
+            Nearby::Roughly(_) | Nearby::Unknown
+                if known.is_some_and(|inside| nearby.at_edge(cell, nearest, inside)) =>
+            {
                 AnsweredBy::SamplesAtEdge
             }
             Nearby::Roughly(_) | Nearby::Unknown => AnsweredBy::Samples,
