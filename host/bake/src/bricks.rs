@@ -6,6 +6,7 @@ use mortise_protocol::image::{
     BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, NO_FACE, Nearby, SAMPLES_PER_BRICK,
 };
 
+use crate::cell_samples::{ExactSample, corner_places, index};
 use crate::cover::LocalPatches;
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, brick_bytes};
@@ -13,7 +14,6 @@ use crate::free_form_cells::FreeFormCells;
 use crate::free_form_error::{AnsweredBy, FreeFormError};
 use crate::grid::Grid;
 use crate::nearby::{CellNearby, Unproven};
-use crate::samples::{ExactSample, corner_places, index};
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {

@@ -13,10 +13,10 @@ use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_CELLS, CELLS_PER_BRICK, NO_FACE, Nearby, PatchRecord};
 use rayon::prelude::*;
 
+use crate::cell_samples::{ExactSample, Place, about, corner_places, index};
 use crate::distance::{ExactSurface, Scratch};
 use crate::grid::Grid;
 use crate::local_patch::{FacePoint, board_distance, fit};
-use crate::samples::{ExactSample, about, corner_places, index};
 
 /// Distance from the surface up to which patches hold their tolerance, cells. Farther off the feet of a cell spread: a cell deep inside a sharply
 /// curved face would need a patch of half of that face.
@@ -49,13 +49,6 @@ pub(crate) fn tolerance_at(tolerance_mm: f64, cell_mm: f64, distance: f64) -> f6
     } else {
         tolerance_mm + FAR_ERROR * distance.abs()
     }
-}
-
-/// An exact sample at a place.
-#[derive(Clone, Copy)]
-pub(crate) struct Place {
-    pub at: DVec3,
-    pub exact: ExactSample,
 }
 
 /// A brick's place in the grid and its exact samples.

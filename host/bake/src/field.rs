@@ -13,13 +13,13 @@ use rayon::prelude::*;
 
 use crate::bounds::{Class, classify};
 use crate::bricks::{Brick, bake_brick, sample_brick};
+use crate::cell_samples::ExactSample;
 use crate::cover::{LocalPatches, Sampled, has_free_forms};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::format::FieldOptions;
 use crate::free_form_error::FreeFormError;
 use crate::grid::Grid;
-use crate::samples::ExactSample;
 
 /// A standalone field: record offsets count from its own arrays.
 #[derive(Clone, Debug)]

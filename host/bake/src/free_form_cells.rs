@@ -8,10 +8,10 @@ use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::{Group, NO_FACE, Nearby};
 
-use crate::cover::{LocalPatches, NEAR_CELLS, Place, tolerance_at};
+use crate::cell_samples::{ExactSample, Place, about, corner_places, index};
+use crate::cover::{LocalPatches, NEAR_CELLS, tolerance_at};
 use crate::local_patch::board_distance;
 use crate::rule::SAME_MM;
-use crate::samples::{ExactSample, about, corner_places, index};
 use crate::surface::signed_distance;
 
 /// Most patches tried for one face of a group.

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::cover::{NEAR_CELLS, Place};
+use crate::cell_samples::Place;
+use crate::cover::NEAR_CELLS;
 
 /// Errors at places near free-form faces that no patch was fitted to: five in each cell near such a face, as far as they are within
 /// [`NEAR_CELLS`] of the surface. Where the board's distance is only a bound (outside a convex edge) there is no error.

@@ -11,9 +11,9 @@ use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, NO_FACE, Nearby};
 
+use crate::cell_samples::ExactSample;
 use crate::distance::{ExactSurface, Scratch};
 use crate::rule::{SAME_MM, Test, find_rule, holds};
-use crate::samples::ExactSample;
 use crate::surface::signed_distance;
 
 /// Half steps of samples along a brick's edge.

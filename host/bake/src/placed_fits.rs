@@ -104,11 +104,11 @@ fn distance(b: &ExactSurface, to_b: &DAffine3, p: DVec3) -> f64 {
         .map_or(f64::NAN, |n| n.distance)
 }
 
-/// Largest ratio of the relative curvature to the own one, at most 1; and whether the own face is hollow where most curved.
+/// Ratio of the relative curvature to the own one, at most 1, that four fifths of the points keep; and whether the own face is hollow where most curved.
 fn compare(a: &ExactSurface, b: &ExactSurface, to_b: &DAffine3, along: &[Along], size: f64) -> (f64, bool) {
     let step = STEP * size;
     let stride = along.len().div_ceil(MOST_CURVATURES).max(1);
-    let (mut worst, mut sharpest) = (0.0f64, 0.0f64);
+    let mut sharpest = 0.0f64;
     let mut each: Vec<(f64, f64)> = Vec::new();
     for point in along.iter().step_by(stride) {
         let x = point.normal.any_orthonormal_vector();
@@ -137,9 +137,14 @@ fn compare(a: &ExactSurface, b: &ExactSurface, to_b: &DAffine3, along: &[Along],
         }
         each.push((own.abs(), relative));
     }
-    for (own, relative) in each {
-        // Where the face is nearly flat its samples are as far apart as those of a tenth of its curvature.
-        worst = worst.max(relative / own.max(0.1 * sharpest.abs()).max(1e-9));
-    }
+    // Where the face is nearly flat its samples are as far apart as those of a tenth of its curvature.
+    let least = (0.1 * sharpest.abs()).max(1e-9);
+    let mut ratios: Vec<f64> = each
+        .iter()
+        .map(|(own, relative)| relative / own.max(least))
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    // Points at the border of a face meet an edge, which has samples of its own.
+    let worst = ratios.get(ratios.len() * 4 / 5).copied().unwrap_or(1.0);
     (worst.min(1.0), sharpest < 0.0)
 }

@@ -300,7 +300,8 @@ impl<'a> Planner<'a> {
     ) -> Result<(), BakeError> {
         for (i, shape) in shapes.iter_mut().enumerate() {
             for _ in 0..FINER_CELLS {
-                let full = made.bytes() > self.request.flash_bytes;
+                // Bytes grow at most with the inverse square of the cell.
+                let full = made.bytes() as f64 > FINER * FINER * self.request.flash_bytes as f64;
                 if full || made.fields[i].free_form.worst_mm() <= FIELD_SHARE * accuracy_mm {
                     break;
                 }

@@ -49,6 +49,9 @@ impl Tally {
         if row.resolution == Resolution::Exact {
             let error = (row.distance_mm - truth_mm).abs();
             self.inexact += usize::from(error > EXACT_MM);
+            if error > EXACT_MM {
+                eprintln!("true distance {truth_mm:+.6} mm: {row}");
+            }
             self.worst_mm = self.worst_mm.max(error);
         }
     }

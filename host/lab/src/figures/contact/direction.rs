@@ -44,6 +44,8 @@ const STEP_N: f64 = 0.05;
 struct Errors {
     judged: usize,
     direction_deg: f64,
+    /// Place of the handle where the direction is worst, mm.
+    worst_mm: DVec3,
     magnitude_percent: f64,
     step_n: f64,
     torque_deg: Option<f64>,
@@ -70,7 +72,10 @@ pub(super) fn measure(_: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
         let errors = played(&slide)?;
         let what = |what: &str| format!("{}, {} mm/s, pressed with 4 N: {what}", slide.what, slide.speed);
         out(Row::at_most(
-            what("direction of the force on the handle"),
+            what(&format!(
+                "direction of the force on the handle (worst at {:.2} mm)",
+                errors.worst_mm
+            )),
             errors.direction_deg,
             "°",
             DIRECTION_DEG,
@@ -217,7 +222,10 @@ fn played(slide: &Slide<'_>) -> Result<Errors, LabError> {
             return;
         }
         errors.judged += 1;
-        errors.direction_deg = errors.direction_deg.max(degrees(force, expected));
+        let off = degrees(force, expected);
+        if off > errors.direction_deg {
+            (errors.direction_deg, errors.worst_mm) = (off, seen.handle_mm);
+        }
         let share = (force.length() / expected.length() - 1.0).abs();
         errors.magnitude_percent = errors.magnitude_percent.max(100.0 * share);
         if let (Some(arm), Some(worst)) = (&slide.arm, &mut errors.torque_deg) {

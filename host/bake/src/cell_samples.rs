@@ -1,4 +1,4 @@
-//! Exact samples of a brick, and the places around its cells.
+//! Exact samples of a brick and the places of a cell's corners among them.
 
 use glam::DVec3;
 use mortise_protocol::image::{BRICK_SAMPLES, NO_FACE};
@@ -32,6 +32,13 @@ impl ExactSample {
             foot: nearest.point,
         }
     }
+}
+
+/// An exact sample at a place.
+#[derive(Clone, Copy)]
+pub(crate) struct Place {
+    pub at: DVec3,
+    pub exact: ExactSample,
 }
 
 /// Places of the corners of the cell with the lowest corner `at`, x fastest.
