@@ -47,9 +47,11 @@ fn scene_p_against_closed_form() {
             GAP_TOLERANCE_MM
         };
         assert!(off <= tolerance, "{exact} mm: {row}");
-        assert_eq!(row.resolution, Resolution::Exact, "{row}");
         // Poses clearly apart have no contact; clearly penetrating ones have.
         if *exact > GAP_TOLERANCE_MM {
+            // A gap is proven by bounds from both sides; the depth of a part that is not convex is not.
+            assert_eq!(row.resolution, Resolution::Exact, "{row}");
+            assert!(row.error_um.is_some_and(|um| 1e3 * off <= um), "{row}");
             assert_eq!(row.contacts, 0, "{row}");
             assert_eq!(row.force_n, [0.0; 3], "{row}");
         }

@@ -17,7 +17,7 @@ use crate::collision::exact_surface::{exact, signed};
 use crate::math::pose::Pose;
 use crate::math::vector::length;
 use crate::probe::convex::Separation;
-use crate::probe::curve::{Curve, Side, nearest_of_segments, placed, placed_at_rest};
+use crate::probe::curve::{Curve, Side, nearest_of_segments, on_edge, placed, placed_at_rest};
 use crate::probe::face_bounds::{bending, foot_speed, radius_at_axis, turn_of_foot};
 use crate::probe::nearest::Measure;
 use crate::probe::support::rounding;
@@ -96,7 +96,7 @@ pub(crate) fn clearance(held: &Shape<'_>, other: &Shape<'_>, pose: &Pose, enough
         }
     }
     search.forward = true;
-    search.edges_against_edges(&sides[0], &sides[1]);
+    search.edges_against_edges(&sides);
     if !insides_are_known(&sides, search.found.upper) {
         search.found.lower = f32::NEG_INFINITY;
     }
@@ -208,6 +208,7 @@ impl Clearing {
                 bend: Vec3::ZERO,
                 circle: false,
                 radius: bulging.radius,
+                faces: None,
                 error: 0.0,
             };
             match bulging.kind {
@@ -282,7 +283,7 @@ impl Clearing {
                 continue;
             }
             if sure && own_sure && at_foot.abs() <= ON_SURFACE_M && at_own.abs() <= ON_SURFACE_M {
-                self.candidate(against, own_foot, foot);
+                self.candidate([own, against], face, curve, own_foot);
                 if self.found.overlap {
                     return;
                 }
@@ -319,7 +320,7 @@ impl Clearing {
             let (at, sure) = by_field(shape, foot);
             sure && at.abs() <= ON_SURFACE_M
         }) {
-            self.candidate(against, own_foot, p - n * d);
+            self.candidate([own, against], face, curve, own_foot);
         }
     }
 
@@ -357,19 +358,23 @@ impl Clearing {
         if bound > plain { bound } else { plain }
     }
 
-    /// Points of the two surfaces: `own` of the shape whose curves are searched, `foot` of the other.
-    fn candidate(&mut self, against: &Side<'_, '_>, own: Vec3, foot: Vec3) {
-        let distance = length(own - foot);
-        let (inside, sure) = by_field(against.shape, own);
+    /// A point `p` of the own surface at a curve, and its foot on a face, which is known to be part of the other surface there.
+    fn candidate(&mut self, [own, against]: [&Side<'_, '_>; 2], face: &FaceRecord, curve: &Curve, p: Vec3) {
+        let (p, error) = on_edge(own, curve, p);
+        let Some((d, n)) = signed(face, p) else {
+            return;
+        };
+        let (inside, sure) = by_field(against.shape, p);
         if sure {
-            self.overlapping(inside);
+            self.overlapping(inside + error);
         }
-        if distance < self.found.upper {
-            self.found.upper = distance;
+        if d.abs() + error < self.found.upper {
+            self.found.upper = d.abs() + error;
+            let foot = p - n * d;
             self.found.nearest = if self.forward {
-                [own, foot]
+                [p, foot]
             } else {
-                [against.to_other(foot), against.to_other(own)]
+                [against.to_other(foot), against.to_other(p)]
             };
         }
     }
@@ -405,7 +410,8 @@ impl Clearing {
     }
 
     /// Edges of one shape against edges of the other.
-    fn edges_against_edges(&mut self, own: &Side<'_, '_>, against: &Side<'_, '_>) {
+    fn edges_against_edges(&mut self, sides: &[Side<'_, '_>; 2]) {
+        let [own, against] = sides;
         for edge in own.shape.edges {
             let curve = placed(own, edge);
             let reach = length(curve.half) + length(curve.bend);
@@ -421,7 +427,7 @@ impl Clearing {
                 if node.skip as usize == index {
                     for other in node.points(against.shape.edges) {
                         let other = placed_at_rest(other);
-                        self.curve_against_curve([(&curve, 0.0, 1.0), (&other, 0.0, 1.0)], DEPTH);
+                        self.curve_against_curve(sides, [(&curve, 0.0, 1.0), (&other, 0.0, 1.0)], DEPTH);
                     }
                 }
             }
@@ -429,7 +435,12 @@ impl Clearing {
     }
 
     /// Two parts of curves: the distance of their chords less the bulges; the more bulging one is halved.
-    fn curve_against_curve(&mut self, [a, b]: [(&Curve, f32, f32); 2], depth: usize) {
+    fn curve_against_curve(
+        &mut self,
+        sides: &[Side<'_, '_>; 2],
+        [a, b]: [(&Curve, f32, f32); 2],
+        depth: usize,
+    ) {
         self.spent += 1;
         let chord = |(curve, t, h): (&Curve, f32, f32)| [curve.at(t - h), curve.at(t + h)];
         // The chord of a quadratic is h²·bend off its middle.
@@ -445,6 +456,9 @@ impl Clearing {
             return;
         }
         if off <= 0.5 * CLOSE_M || depth == 0 || self.spent > BUDGET {
+            let (x, off_x) = on_edge(&sides[0], a.0, x);
+            let (y, off_y) = on_edge(&sides[1], b.0, y);
+            let distance = length(x - y) + off_x + off_y;
             if distance < self.found.upper {
                 self.found.upper = distance;
                 self.found.nearest = [x, y];
@@ -456,10 +470,10 @@ impl Clearing {
             let part = |(t, h): (f32, f32)| (t + 0.5 * k * h, 0.5 * h);
             if bulge(a) >= bulge(b) {
                 let (t, h) = part((a.1, a.2));
-                self.curve_against_curve([(a.0, t, h), b], depth - 1);
+                self.curve_against_curve(sides, [(a.0, t, h), b], depth - 1);
             } else {
                 let (t, h) = part((b.1, b.2));
-                self.curve_against_curve([a, (b.0, t, h)], depth - 1);
+                self.curve_against_curve(sides, [a, (b.0, t, h)], depth - 1);
             }
         }
     }
@@ -481,8 +495,8 @@ impl Clearance {
         // A foot may be off its surface by the tolerance, and moves as far along the surface as that surface is off.
         let fixed = rounding(held, pose) + rounding(other, &Pose::IDENTITY) + 2.0 * f64::from(ON_SURFACE_M);
         Some(Separation {
-            distance: 0.5 * (upper + lower),
-            error: 0.5 * (upper - lower) + fixed,
+            distance: upper,
+            error: upper - lower + fixed,
             normal: (a - b).normalize_or_zero(),
             a,
             measure: Measure::DeepestPoint,

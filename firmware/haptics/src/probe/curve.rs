@@ -3,6 +3,7 @@
 use glam::{Mat3, Vec3};
 use mortise_protocol::image::{EdgeRecord, Shape};
 
+use crate::collision::exact_surface::edge_foot;
 use crate::math::vector::length;
 
 /// Largest distance of a piece of a curved edge from the edge, m.
@@ -17,6 +18,8 @@ pub(crate) struct Curve {
     /// For a circle `half` and `bend` are two perpendicular radii, and t is the angle over π.
     pub circle: bool,
     pub radius: f32,
+    /// Faces of the own shape that meet in it, for a piece of an edge.
+    pub faces: Option<[u16; 2]>,
     /// Distance of the curve from the true one at most, m.
     pub error: f32,
 }
@@ -90,8 +93,22 @@ pub(crate) fn placed_at_rest(edge: &EdgeRecord) -> Curve {
         bend: Vec3::from_array(edge.bend),
         circle: false,
         radius: 0.0,
+        faces: Some(edge.faces),
         error: if edge.is_straight() { 0.0 } else { PIECE_M },
     }
+}
+
+/// The point of the exact edge nearest to the point `p` of a curve of `own`, and how far off it may be, m.
+pub(crate) fn on_edge(own: &Side<'_, '_>, curve: &Curve, p: Vec3) -> (Vec3, f32) {
+    let faces = curve.faces.filter(|_| curve.error > 0.0);
+    let exact = faces.and_then(|faces| {
+        let [a, b] = faces.map(|face| own.shape.faces.get(usize::from(face)));
+        edge_foot(a?, b?, own.bring_back(p))
+    });
+    let exact = exact
+        .map(|q| own.to_other(q))
+        .filter(|&q| length(q - p) <= 2.0 * curve.error);
+    exact.map_or((p, curve.error), |q| (q, 0.0))
 }
 
 /// The points of two segments that are nearest to each other (Ericson, "Real-Time Collision Detection", 5.1.9).
