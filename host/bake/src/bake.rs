@@ -66,7 +66,7 @@ pub fn bake(
         .map(|&s| ExactSurface::new(&model.shapes[s]))
         .collect();
     scene.find_partners(&prepared);
-    scene.find_edges(&prepared, options.method);
+    scene.find_edges(&prepared, options);
     let first = scene.cells(model, options);
     let each = vec![options.clone(); scene.shapes.len()];
     let made = match options.cell_mm {

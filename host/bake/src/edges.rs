@@ -12,6 +12,31 @@ use crate::distance::{ExactSurface, Scratch};
 use crate::piece::{Link, Piece};
 use crate::tree::round_up;
 
+/// Fineness of the division of edges into pieces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Fineness {
+    /// Largest distance of a piece from the exact edge across its direction, mm.
+    pub tolerance_mm: f64,
+    /// Largest angle by which a piece's tangent turns from its middle to an end, rad.
+    most_turn: f64,
+}
+
+impl Fineness {
+    /// As fine as the exact edges are known.
+    pub const FINEST: Self = Self {
+        tolerance_mm: TOLERANCE_MM,
+        most_turn: MOST_TURN,
+    };
+
+    /// Half as many pieces: the error grows with the fourth power of their length.
+    pub fn coarser(self) -> Self {
+        Self {
+            tolerance_mm: 16.0 * self.tolerance_mm,
+            most_turn: 2.0 * self.most_turn,
+        }
+    }
+}
+
 /// Largest distance of a piece from the exact edge, mm, across its direction. Twice the tolerance of edges that are neither lines nor circles.
 const TOLERANCE_MM: f64 = 2.0 * mortise_brep::EDGE_TOLERANCE_MM;
 /// Largest angle by which a piece's tangent turns from its middle to an end, rad.
@@ -78,10 +103,10 @@ fn meters(mm: DVec3) -> [f32; 3] {
 }
 
 /// The sharp convex edges of a shape, in pieces. Borders of open shells, and edges of more than two faces, are left out.
-pub(crate) fn edge_pieces(surface: &ExactSurface) -> Vec<EdgePiece> {
+pub(crate) fn edge_pieces(surface: &ExactSurface, fineness: Fineness) -> Vec<EdgePiece> {
     let mut all = Vec::new();
     for (edge, links) in edge_chains(surface).into_iter().enumerate() {
-        let chain = Chain::new(&surface.topology.pieces, links);
+        let chain = Chain::new(&surface.topology.pieces, links, fineness);
         if chain.length <= 0.0 {
             continue;
         }
@@ -108,10 +133,11 @@ struct Chain<'a> {
     links: Vec<Link>,
     starts: Vec<f64>,
     length: f64,
+    fineness: Fineness,
 }
 
 impl<'a> Chain<'a> {
-    fn new(pieces: &'a [Piece], links: Vec<Link>) -> Self {
+    fn new(pieces: &'a [Piece], links: Vec<Link>, fineness: Fineness) -> Self {
         let mut length = 0.0;
         let starts = (links.iter())
             .map(|&(i, _)| {
@@ -125,6 +151,7 @@ impl<'a> Chain<'a> {
             links,
             starts,
             length,
+            fineness,
         }
     }
 
@@ -158,12 +185,12 @@ fn divide(
         [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75].iter().all(|&t| {
             let exact = chain.at(middle + t * (to - middle)).1;
             let off = center + half * t + bend * (t * t) - exact;
-            off.reject_from(half + 2.0 * t * bend).length() <= TOLERANCE_MM
+            off.reject_from(half + 2.0 * t * bend).length() <= chain.fineness.tolerance_mm
         })
     };
     let turn = 2.0 * bend.length() / half.length().max(1e-300);
     // A closed chain has no chord: its turn is infinite.
-    if halvings > 0 && to - from > TOLERANCE_MM && (turn > MOST_TURN || !fits()) {
+    if halvings > 0 && to - from > TOLERANCE_MM && (turn > chain.fineness.most_turn || !fits()) {
         divide(surface, chain, [from, middle], halvings - 1, edge, out);
         divide(surface, chain, [middle, to], halvings - 1, edge, out);
         return;

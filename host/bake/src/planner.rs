@@ -198,7 +198,7 @@ impl<'a> Planner<'a> {
             .collect();
         let (prepared, left_out): (Vec<_>, Vec<_>) = reached.into_iter().unzip();
         scene.find_partners(&prepared);
-        scene.find_edges(&prepared, options.method);
+        scene.find_edges(&prepared, &options);
         let mut all = Vec::new();
         for a in 0..prepared.len() {
             for b in scene.met_by(a) {

@@ -16,8 +16,8 @@
 //! of the two curvatures, and on a flat at tilt α it is ε·sin α.
 //!
 //! No such bound holds where two sharp edges cross: a sample s/2 from the crossing is up to (s/2)·sin(θ/2) less deep, where θ is the angle between
-//! the edge and the partner's face it passes under. So edges are never sampled more sparsely than `max_spacing_mm`, and two strips of flat narrower
-//! than that can miss each other when they cross.
+//! the edge and the partner's face it passes under. Contact there is found from the edges themselves ([`crate::edges`]) but for edges nearly
+//! parallel, for which edges are never sampled more sparsely than `max_spacing_mm`.
 
 use mortise_protocol::image::NO_FACE;
 

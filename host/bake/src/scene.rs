@@ -8,11 +8,17 @@ use mortise_protocol::limits::MAX_PARTS;
 use rayon::prelude::*;
 
 use crate::distance::ExactSurface;
-use crate::edges::{EdgePiece, edge_pieces};
+use crate::edges::{EdgePiece, Fineness, edge_pieces};
 use crate::error::BakeError;
 use crate::grid::bounding_box;
+use crate::image::edge_bytes;
 use crate::options::{BakeOptions, Grabbable, Method};
 use crate::partners::{Met, Partners};
+
+/// Largest share of the image that pieces of edges may take.
+const MOST_OF_IMAGE: f64 = 1.0 / 3.0;
+/// Times that edges are divided into half as many pieces at most: then they are within a tenth of a millimetre.
+const COARSER: usize = 2;
 
 /// Shapes and parts of a model that go into the image.
 pub(crate) struct Scene {
@@ -100,13 +106,30 @@ impl Scene {
         self.partners = (0..self.shapes.len()).map(of).collect();
     }
 
-    /// Finds the pieces of edges for contact of edges with edges.
-    pub fn find_edges(&mut self, prepared: &[ExactSurface], method: Method) {
-        let of = |surface: &ExactSurface| match method {
-            Method::DistanceField => edge_pieces(surface),
-            Method::Occupancy => Vec::new(),
-        };
-        self.edges = prepared.par_iter().map(of).collect();
+    /// Finds the pieces of edges for contact of edges with edges: as fine as the exact edges are known, or coarser, with a warning, where they would
+    /// take more than [`MOST_OF_IMAGE`] of the image.
+    pub fn find_edges(&mut self, prepared: &[ExactSurface], options: &BakeOptions) {
+        if options.method == Method::Occupancy {
+            self.edges = prepared.iter().map(|_| Vec::new()).collect();
+            return;
+        }
+        let mut fineness = Fineness::FINEST;
+        for attempt in 0..=COARSER {
+            self.edges = (prepared.par_iter())
+                .map(|surface| edge_pieces(surface, fineness))
+                .collect();
+            let bytes: usize = self.edges.iter().map(|pieces| edge_bytes(pieces.len())).sum();
+            if attempt == COARSER || bytes as f64 <= MOST_OF_IMAGE * options.image_limit_bytes as f64 {
+                break;
+            }
+            fineness = fineness.coarser();
+        }
+        if fineness != Fineness::FINEST {
+            self.warnings.push(format!(
+                "edges are stored within {:.0} µm only, so that they leave space for the rest: allow a larger image",
+                1000.0 * fineness.tolerance_mm
+            ));
+        }
     }
 
     /// Shapes whose parts can meet a part of this shape.
