@@ -143,7 +143,7 @@ fn cells(
         };
         let named = free_forms.of(cell, nearest, || known.to_vec());
         let by = match named {
-            Nearby::Roughly(_) | Nearby::Unknown if free_forms.at_edge(cell, nearest) => {
+            Nearby::Roughly(_) | Nearby::Unknown if free_forms.at_edge(cell, nearest, known) => {
                 AnsweredBy::SamplesAtEdge
             }
             Nearby::Roughly(_) | Nearby::Unknown => AnsweredBy::Samples,

@@ -91,7 +91,12 @@ impl Demand {
         let bytes =
             |m: &ShapePlan| (8.0 + 2.0 * m.band_cells) * m.format.bytes() as f64 / (m.cell_mm * m.cell_mm);
         let [a, b] = models;
-        if bytes(&b) < bytes(&a) { b } else { a }
+        // Beside free-form faces the wider band is needed: gaps there have no other source than the field.
+        if bytes(&b) < bytes(&a) && !self.free_form {
+            b
+        } else {
+            a
+        }
     }
 
     fn with_format(&self, accuracy: f64, format: SampleFormat, band: f64) -> ShapePlan {
@@ -183,7 +188,8 @@ fn walls(surface: &ExactSurface, words: &dyn Fn(u32) -> String) -> (f64, String)
     );
     let total: f64 = shape.faces.iter().map(|f| f.area_mm2).sum();
     for (face, of) in shape.faces.iter().enumerate() {
-        if of.area_mm2 < WALL_AREA * total {
+        // Beside free-form faces the field's error is measured.
+        if of.area_mm2 < WALL_AREA * total || matches!(of.surface, Surface::Spline) {
             continue;
         }
         let area = |t: usize| {

@@ -42,13 +42,19 @@ impl FreeFormCells<'_> {
         }
         let mut places: Vec<Place> = corner_places(at).map(|place| self.place(place)).to_vec();
         let alone = self.alternatives(at, nearest);
-        let faces = self.faces_about(at, nearest);
-        let choices = faces.map(|face| match face {
-            NO_FACE => vec![NO_FACE],
-            _ => self.alternatives(at, face),
-        });
+        let choices_of = |faces: [u16; 3]| {
+            faces.map(|face| match face {
+                NO_FACE => vec![NO_FACE],
+                _ => self.alternatives(at, face),
+            })
+        };
+        let mut faces = self.faces_about(at, nearest, &[]);
+        let mut choices = choices_of(faces);
         if (alone.iter().chain(choices.iter().flatten())).any(|&surface| self.is_patch(surface)) {
-            places.extend(inside());
+            let inside = inside();
+            faces = self.faces_about(at, nearest, &inside);
+            choices = choices_of(faces);
+            places.extend(inside);
         }
         for surface in alone {
             let group = [surface, NO_FACE, NO_FACE];
@@ -156,17 +162,25 @@ impl FreeFormCells<'_> {
         })
     }
 
-    /// Whether a cell has another face about it than `nearest`.
-    pub fn at_edge(&self, at: [usize; 3], nearest: u16) -> bool {
-        about(at).any(|place| self.samples[index(place)].face != nearest)
+    /// Whether a cell has another face about it, or at a place `inside` it, than `nearest`.
+    pub fn at_edge(&self, at: [usize; 3], nearest: u16, inside: &[Place]) -> bool {
+        let inside = inside.iter().map(|place| place.exact.face);
+        (about(at)
+            .map(|place| self.samples[index(place)].face)
+            .chain(inside))
+        .any(|face| face != nearest)
     }
 
-    /// The faces nearest to the samples around a cell, `nearest` first; only `nearest` if there are more than three.
-    fn faces_about(&self, at: [usize; 3], nearest: u16) -> [u16; 3] {
+    /// The faces nearest to the samples around a cell and to the places `inside` it, `nearest` first; only `nearest` if there are more than three. At
+    /// the brick's border the samples beyond it are not seen, and the edge of another face that just enters the cell shows inside only.
+    fn faces_about(&self, at: [usize; 3], nearest: u16, inside: &[Place]) -> [u16; 3] {
         let mut group = [nearest, NO_FACE, NO_FACE];
         let mut count = 1;
-        for place in about(at) {
-            let face = self.samples[index(place)].face;
+        let inside = inside.iter().map(|place| place.exact.face);
+        for face in about(at)
+            .map(|place| self.samples[index(place)].face)
+            .chain(inside)
+        {
             if face == NO_FACE || group[..count].contains(&face) {
                 continue;
             }

@@ -43,6 +43,7 @@ pub fn image(filling: usize, seed: u8) -> Vec<u8> {
         bricks: none,
         palette: none,
         grid: none,
+        patches: none,
         edges: none,
         blob: Section {
             offset: head as u32,

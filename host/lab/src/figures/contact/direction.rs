@@ -53,17 +53,21 @@ struct Errors {
     last: Option<DVec3>,
 }
 
-/// A scene: fixed and held solid, the held one's placement, the path, and the force expected at a place of the handle and a pose of the part, N, and
-/// the arm of the contact from the part's centre, mm, where its torque is judged.
-struct Slide<'a> {
-    what: &'a str,
+/// Force by closed form, mm of the coupling's stretch, at a place of the handle, mm, and a pose of the part.
+type Expected = Box<dyn Fn(DVec3, &DAffine3) -> DVec3>;
+/// Arm of the contact from the part's centre at a pose, mm.
+type Arm = Box<dyn Fn(&DAffine3) -> DVec3>;
+
+/// A scene: fixed and held solid, the held one's placement, the path, the expected force, and the arm of the contact where its torque is judged.
+struct Slide {
+    what: &'static str,
     speed: f64,
     fixed: Convex,
     held: Convex,
     start: DAffine3,
     path: HandlePath,
-    expected: Box<dyn Fn(DVec3, &DAffine3) -> DVec3 + 'a>,
-    arm: Option<Box<dyn Fn(&DAffine3) -> DVec3 + 'a>>,
+    expected: Expected,
+    arm: Option<Arm>,
 }
 
 /// Measures the rows.
@@ -110,7 +114,7 @@ pub(super) fn measure(_: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabE
 }
 
 /// The cylinder's axis is along the edge, which is at the cube's upper right.
-fn over_an_edge() -> Result<Slide<'static>, LabError> {
+fn over_an_edge() -> Result<Slide, LabError> {
     let edge = DVec3::new(CUBE_MM, 0.0, CUBE_MM);
     let lying = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     let from = edge + DVec3::new(-6.0, 0.0, RADIUS_MM);
@@ -140,7 +144,7 @@ fn over_an_edge() -> Result<Slide<'static>, LabError> {
 }
 
 /// The ball goes round the post at half of its height.
-fn about_a_post() -> Slide<'static> {
+fn about_a_post() -> Slide {
     let near = POST_MM + RADIUS_MM;
     let path = HandlePath::from(DVec3::X * (near + START_MM), DQuat::IDENTITY)
         .ease(SETTLE_S, DVec3::X * (near - PRESS_MM), DQuat::IDENTITY)
@@ -170,7 +174,7 @@ fn about_a_post() -> Slide<'static> {
 }
 
 /// A block turned so that one of its corners is lowest; the coupling's angular spring lets it turn on, so the contact's arm is that of its pose.
-fn corner_on_a_plate() -> Result<Slide<'static>, LabError> {
+fn corner_on_a_plate() -> Result<Slide, LabError> {
     let block = cuboid(DVec3::new(9.0, 6.0, 4.0))?;
     let turn = DQuat::from_scaled_axis(DVec3::new(0.5, 0.4, 0.0));
     let lowest = {
@@ -200,7 +204,7 @@ fn corner_on_a_plate() -> Result<Slide<'static>, LabError> {
     })
 }
 
-fn played(slide: &Slide<'_>) -> Result<Errors, LabError> {
+fn played(slide: &Slide) -> Result<Errors, LabError> {
     let image: Image = baked(&slide.fixed, &slide.held, slide.start)?;
     let settings = Settings::default();
     // N/mm is kN/m.
