@@ -10,14 +10,15 @@
 //! Sources: Johnson & Cohen 2001, "Spatialized normal cone hierarchies" (bounding pairs of features); Lipschitz branch and bound. Metres. Cost: one
 //! formula for a node or piece and a face, a field query for each piece that could be nearest.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use mortise_protocol::image::{EDGE_ERROR_CELLS, FaceRecord, Place, SHAPE_LEAKY, Shape, surface_kind};
 
 use crate::collision::exact_surface::{exact, signed};
 use crate::math::pose::Pose;
+use crate::math::scalar::{larger, smaller};
 use crate::math::vector::length;
 use crate::probe::convex::Separation;
-use crate::probe::curve::{Curve, Side, nearest_of_segments, on_edge, placed, placed_at_rest};
+use crate::probe::curve::{Curve, Side, nearest_of_segments, on_edge, placed, refined};
 use crate::probe::face_bounds::{bending, foot_speed, radius_at_axis, turn_of_foot};
 use crate::probe::nearest::Measure;
 use crate::probe::support::rounding;
@@ -25,7 +26,7 @@ use crate::probe::support::rounding;
 /// A point is on a surface within this distance, m.
 const ON_SURFACE_M: f32 = 1e-7;
 /// Bounds closer than this are not improved further, m.
-const CLOSE_M: f32 = 0.2e-6;
+const CLOSE_M: f32 = 0.1e-6;
 /// Pieces shorter than this are not halved, m.
 const SHORT_M: f32 = 0.1e-6;
 /// Evaluations of a piece at most.
@@ -118,6 +119,12 @@ fn by_field(shape: &Shape<'_>, p: Vec3) -> (f32, bool) {
             }
         },
     }
+}
+
+/// Whether `p` is proven to lie inside the shape.
+pub(crate) fn is_inside(shape: &Shape<'_>, p: Vec3) -> bool {
+    let (distance, sure) = by_field(shape, p);
+    sure && distance < -10.0 * ON_SURFACE_M
 }
 
 /// Whether a face is curved and bulges outward.
@@ -245,6 +252,19 @@ impl Clearing {
         face: &FaceRecord,
         curve: &Curve,
     ) {
+        let far = signed(face, curve.center).map_or(0.0, |(d, _)| (d.abs() - curve.radius).abs());
+        let far = far - curve.speed() - curve.error;
+        if far > self.found.upper {
+            self.note(far);
+            return;
+        }
+        for curve in refined(own, curve) {
+            self.search(own, against, face, &curve);
+        }
+    }
+
+    /// One curve whose error is known against one face.
+    fn search(&mut self, own: &Side<'_, '_>, against: &Side<'_, '_>, face: &FaceRecord, curve: &Curve) {
         let mut stack: heapless::Vec<(f32, f32), DEPTH> = heapless::Vec::new();
         let _ = stack.push((0.0, 1.0));
         while let Some((t, h)) = stack.pop() {
@@ -263,7 +283,7 @@ impl Clearing {
             // The own surface may lie beyond the face: then it is the nearer to it, the farther the curve.
             let beyond = curve.radius - (d.abs() + reach);
             let lower = (if least > beyond { least } else { beyond }) - curve.error;
-            if lower >= self.found.upper - CLOSE_M - curve.error {
+            if lower >= self.found.upper - CLOSE_M - 2.0 * curve.error {
                 self.note(lower);
                 continue;
             }
@@ -292,7 +312,7 @@ impl Clearing {
                 self.descend(own, against, face, curve, n.dot(curve.derivatives(t).0) * side);
             }
             let unproven = !(sure && own_sure) && reach < 0.05 * against.shape.field.record().cell;
-            if unproven || lower >= self.found.upper - CLOSE_M - curve.error {
+            if unproven || lower >= self.found.upper - CLOSE_M - 2.0 * curve.error {
                 self.note(lower);
             } else {
                 self.split(&mut stack, t, h, reach, lower);
@@ -412,23 +432,43 @@ impl Clearing {
     /// Edges of one shape against edges of the other.
     fn edges_against_edges(&mut self, sides: &[Side<'_, '_>; 2]) {
         let [own, against] = sides;
+        let resting = Side {
+            shape: against.shape,
+            rotation: Mat3::IDENTITY,
+            offset: Vec3::ZERO,
+        };
         for edge in own.shape.edges {
-            let curve = placed(own, edge);
-            let reach = length(curve.half) + length(curve.bend);
-            let mut index = 0;
-            while let Some(node) = against.shape.edge_nodes.get(index) {
-                if length(curve.center - Vec3::from_array(node.center)) - reach - node.radius
-                    > self.found.upper
-                {
-                    index = node.skip as usize;
+            for curve in refined(own, &placed(own, edge)) {
+                self.near_edges(own, &resting, &curve);
+            }
+        }
+    }
+
+    /// One piece of an edge against the edges of the other shape, which are at rest.
+    fn near_edges(&mut self, own: &Side<'_, '_>, resting: &Side<'_, '_>, curve: &Curve) {
+        let reach = length(curve.half) + length(curve.bend);
+        let mut index = 0;
+        while let Some(node) = resting.shape.edge_nodes.get(index) {
+            let far = length(curve.center - Vec3::from_array(node.center)) - reach - node.radius;
+            if far > self.found.upper {
+                index = node.skip as usize;
+                continue;
+            }
+            index += 1;
+            if node.skip as usize != index {
+                continue;
+            }
+            for other in node.points(resting.shape.edges) {
+                let other = placed(resting, other);
+                let ends = |curve: &Curve| [curve.center - curve.half, curve.center + curve.half];
+                let [t, u] = nearest_of_segments(ends(curve), ends(&other)).map(|share| 2.0 * share - 1.0);
+                let apart = (curve.center + curve.half * t) - (other.center + other.half * u);
+                let bulges = length(curve.bend) + length(other.bend) + curve.error + other.error;
+                if length(apart) - bulges > self.found.upper {
                     continue;
                 }
-                index += 1;
-                if node.skip as usize == index {
-                    for other in node.points(against.shape.edges) {
-                        let other = placed_at_rest(other);
-                        self.curve_against_curve(sides, [(&curve, 0.0, 1.0), (&other, 0.0, 1.0)], DEPTH);
-                    }
+                for other in refined(resting, &other) {
+                    self.curve_against_curve([own, resting], [(curve, 0.0, 1.0), (&other, 0.0, 1.0)], DEPTH);
                 }
             }
         }
@@ -437,38 +477,42 @@ impl Clearing {
     /// Two parts of curves: the distance of their chords less the bulges; the more bulging one is halved.
     fn curve_against_curve(
         &mut self,
-        sides: &[Side<'_, '_>; 2],
+        sides: [&Side<'_, '_>; 2],
         [a, b]: [(&Curve, f32, f32); 2],
         depth: usize,
     ) {
         self.spent += 1;
         let chord = |(curve, t, h): (&Curve, f32, f32)| [curve.at(t - h), curve.at(t + h)];
-        // The chord of a quadratic is h²·bend off its middle.
-        let bulge = |(curve, _, h): (&Curve, f32, f32)| length(curve.bend) * h * h;
         let ([p, q], [r, s]) = (chord(a), chord(b));
-        let (x, y) = nearest_of_segments([p, q], [r, s]);
-        let distance = length(x - y);
+        let [along, beside] = nearest_of_segments([p, q], [r, s]);
+        let apart = (p + (q - p) * along) - (r + (s - r) * beside);
+        let n = apart * (1.0 / (length(apart) + f32::MIN_POSITIVE));
+        // A quadratic bulges by h²·bend to one side of its chord: that matters as far as it is towards the other curve.
+        let towards = |(curve, _, h): (&Curve, f32, f32), n: Vec3| larger(curve.bend.dot(n) * h * h, 0.0);
+        let own = smaller(p.dot(n), q.dot(n)) - towards(a, n);
+        let others = larger(r.dot(n), s.dot(n)) + towards(b, -n);
         let error = a.0.error + b.0.error;
-        let off = bulge(a) + bulge(b);
-        let lower = distance - off - error;
-        if lower >= self.found.upper - CLOSE_M - error {
+        let lower = own - others - error;
+        if lower >= self.found.upper - CLOSE_M - 2.0 * error {
             self.note(lower);
             return;
         }
-        if off <= 0.5 * CLOSE_M || depth == 0 || self.spent > BUDGET {
-            let (x, off_x) = on_edge(&sides[0], a.0, x);
-            let (y, off_y) = on_edge(&sides[1], b.0, y);
-            let distance = length(x - y) + off_x + off_y;
-            if distance < self.found.upper {
-                self.found.upper = distance;
-                self.found.nearest = [x, y];
-            }
+        let [t, u] = [(a, along), (b, beside)].map(|((_, t, h), share)| t + h * (2.0 * share - 1.0));
+        let (x, off_x) = on_edge(sides[0], a.0, a.0.at(t));
+        let (y, off_y) = on_edge(sides[1], b.0, b.0.at(u));
+        let distance = length(x - y) + off_x + off_y;
+        if distance < self.found.upper {
+            self.found.upper = distance;
+            self.found.nearest = [x, y];
+        }
+        if lower >= self.found.upper - CLOSE_M - 2.0 * error || depth == 0 || self.spent > BUDGET {
             self.note(lower);
             return;
         }
+        let size = |(curve, _, h): (&Curve, f32, f32)| (length(curve.half) + length(curve.bend)) * h;
         for k in [-1.0, 1.0] {
             let part = |(t, h): (f32, f32)| (t + 0.5 * k * h, 0.5 * h);
-            if bulge(a) >= bulge(b) {
+            if size(a) >= size(b) {
                 let (t, h) = part((a.1, a.2));
                 self.curve_against_curve(sides, [(a.0, t, h), b], depth - 1);
             } else {

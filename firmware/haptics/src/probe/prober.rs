@@ -19,7 +19,7 @@ use crate::dynamics::body::Body;
 use crate::dynamics::contact_force::{Stiffness, total_force};
 use crate::io::{Flags, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose};
-use crate::probe::clearance::clearance;
+use crate::probe::clearance::{clearance, is_inside};
 use crate::probe::convex::{Separation, separation};
 use crate::probe::epa::Epa;
 use crate::probe::nearest::{Measure, Nearest, NearestSearch, Progress};
@@ -203,7 +203,7 @@ impl Prober {
         let proven = if voxmaps {
             None
         } else {
-            Self::proven(&mut self.epa, shapes, &mut nearest)
+            Self::proven(&mut self.epa, center, shapes, &mut nearest)
         };
         if let Some(found) = &proven {
             nearest = found.nearest(&nearest, shapes, center);
@@ -239,12 +239,24 @@ impl Prober {
     }
 
     /// Proven separation of two shapes, where there is one; else `nearest` is no longer called exact, and no gap where the shapes overlap.
-    fn proven(epa: &mut Epa, shapes: [(&Shape<'_>, &Pose); 2], nearest: &mut Nearest) -> Option<Separation> {
+    fn proven(
+        epa: &mut Epa,
+        center: Vec3,
+        shapes: [(&Shape<'_>, &Pose); 2],
+        nearest: &mut Nearest,
+    ) -> Option<Separation> {
         if let [Some(a), Some(b)] = shapes.map(|(shape, pose)| Support::new(shape, pose)) {
             return Some(separation(&a, &b, epa));
         }
         nearest.exact = false;
         let [(held, pose), (other, _)] = shapes;
+        let point = (
+            center + nearest.arm,
+            pose.inverse().transform_point(center + nearest.arm),
+        );
+        if nearest.distance_m < 0.0 && (is_inside(other, point.0) || is_inside(held, point.1)) {
+            return None;
+        }
         let guess = if nearest.distance_m > 0.0 {
             1.001 * nearest.distance_m + GUESS_M
         } else {
