@@ -1,10 +1,7 @@
 //! Probe: gap and contacts at one pose, without motion or budget. For measurement, not for the tick.
 
-mod clearance;
 mod convex;
-mod curve;
 mod epa;
-mod face_bounds;
 mod gjk;
 pub(crate) mod nearest;
 mod nearest_voxel;

@@ -7,7 +7,7 @@
 use core::fmt;
 
 use glam::Vec3;
-use mortise_protocol::image::{NO_FACE, SceneImage, Shape};
+use mortise_protocol::image::{NO_FACE, SceneImage};
 
 use crate::collision::coherence::Coherence;
 use crate::collision::contact::{Contacts, Phase};
@@ -19,7 +19,6 @@ use crate::dynamics::body::Body;
 use crate::dynamics::contact_force::{Stiffness, total_force};
 use crate::io::{Flags, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose};
-use crate::probe::clearance::{clearance, is_inside};
 use crate::probe::convex::{Separation, separation};
 use crate::probe::epa::Epa;
 use crate::probe::nearest::{Measure, Nearest, NearestSearch, Progress};
@@ -83,9 +82,6 @@ impl fmt::Display for ProbeError {
 }
 
 impl core::error::Error for ProbeError {}
-
-/// A first guess of the gap is enlarged by this, m.
-const GUESS_M: f32 = 2e-6;
 
 /// Memory for one query. About 60 KiB; create it once.
 #[derive(Clone, Debug)]
@@ -199,14 +195,14 @@ impl Prober {
             best: mut nearest,
             mut work,
         } = progress;
-        let shapes = [(&held, &pose), (&other, &Pose::IDENTITY)];
-        let proven = if voxmaps {
-            None
-        } else {
-            Self::proven(&mut self.epa, center, shapes, &mut nearest)
+        let supports =
+            [(&held, &pose), (&other, &Pose::IDENTITY)].map(|(shape, pose)| Support::new(shape, pose));
+        let proven = match &supports {
+            [Some(a), Some(b)] if !voxmaps => Some(separation(a, b, &mut self.epa)),
+            _ => None,
         };
         if let Some(found) = &proven {
-            nearest = found.nearest(&nearest, shapes, center);
+            nearest = found.nearest(&nearest, [(&held, &pose), (&other, &Pose::IDENTITY)], center);
         }
         if voxmaps && (nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0) {
             for pair in pairs.iter().filter(|pair| pair.field.is_occupancy()) {
@@ -236,41 +232,6 @@ impl Prober {
             contacts: work.contacts,
             work,
         })
-    }
-
-    /// Proven separation of two shapes, where there is one; else `nearest` is no longer called exact, and no gap where the shapes overlap.
-    fn proven(
-        epa: &mut Epa,
-        center: Vec3,
-        shapes: [(&Shape<'_>, &Pose); 2],
-        nearest: &mut Nearest,
-    ) -> Option<Separation> {
-        if let [Some(a), Some(b)] = shapes.map(|(shape, pose)| Support::new(shape, pose)) {
-            return Some(separation(&a, &b, epa));
-        }
-        nearest.exact = false;
-        let [(held, pose), (other, _)] = shapes;
-        let point = (
-            center + nearest.arm,
-            pose.inverse().transform_point(center + nearest.arm),
-        );
-        if nearest.distance_m < 0.0 && (is_inside(other, point.0) || is_inside(held, point.1)) {
-            return None;
-        }
-        let guess = if nearest.distance_m > 0.0 {
-            1.001 * nearest.distance_m + GUESS_M
-        } else {
-            f32::INFINITY
-        };
-        let mut found = clearance(held, other, pose, guess);
-        if found.upper == guess && !found.overlap {
-            found = clearance(held, other, pose, f32::INFINITY);
-        }
-        if found.overlap && nearest.distance_m > found.deepest {
-            nearest.distance_m = found.deepest;
-            nearest.in_band = true;
-        }
-        found.separation(pose, held, other)
     }
 
     /// Makes the contacts agree with a proven distance: none where the parts are apart, at least the nearest point where they overlap.
