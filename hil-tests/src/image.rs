@@ -2,8 +2,10 @@
 
 use mortise_protocol::image::{CRC, Header, LAYOUT_VERSION, MAGIC};
 
-/// Sections in a header; the last is the blob.
-const SECTIONS: usize = 10;
+/// Sections in a header, and the place of the blob among them.
+const SECTIONS: usize = 12;
+/// See [`SECTIONS`].
+const BLOB: usize = 10;
 
 /// A valid scene image without parts: a header and `filling` bytes (rounded up to 4) that depend on `seed`.
 pub fn image(filling: usize, seed: u8) -> Vec<u8> {
@@ -14,11 +16,7 @@ pub fn image(filling: usize, seed: u8) -> Vec<u8> {
     // The header is little-endian `u32`s: layout, length, CRC, reserved, then offset and count of each section.
     let words = [LAYOUT_VERSION, length as u32, 0, 0];
     let sections = (0..SECTIONS).flat_map(|section| {
-        let count = if section + 1 == SECTIONS {
-            filling as u32
-        } else {
-            0
-        };
+        let count = if section == BLOB { filling as u32 } else { 0 };
         [head as u32, count]
     });
     bytes.extend(words.into_iter().chain(sections).flat_map(u32::to_le_bytes));
