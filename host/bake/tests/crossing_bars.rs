@@ -35,7 +35,8 @@ fn separation(half: DVec3, [a, b]: [DAffine3; 2]) -> f64 {
     };
     let crossed = axes(ra).into_iter().flat_map(|x| axes(rb).map(|y| x.cross(y)));
     let all = axes(ra).into_iter().chain(axes(rb)).chain(crossed);
-    all.filter_map(|n| (n.length() > 1e-6).then(|| n.normalize()))
+    all.filter(|n| n.length() > 1e-6)
+        .map(DVec3::normalize)
         .map(|n| apart.dot(n).abs() - reach(ra, n) - reach(rb, n))
         .fold(f64::NEG_INFINITY, f64::max)
 }
