@@ -6,7 +6,7 @@ use crate::cell_samples::Place;
 use crate::cover::NEAR_CELLS;
 
 /// Errors at places near free-form faces that no patch was fitted to: five in each cell near such a face, as far as they are within
-/// [`NEAR_CELLS`] of the surface. Where the board's distance is only a bound (outside a convex edge) there is no error.
+/// 0.6 cells of the surface. Where the board's distance is only a bound (outside a convex edge) there is no error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FreeFormError {
     /// Places measured.

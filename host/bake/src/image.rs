@@ -19,7 +19,7 @@ use crate::tree::{build_edge_tree, build_tree, edge_node_count, round_up};
 /// Placement of a part in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartPlacement {
-    /// Number returned by [`ImageBuilder::add_shape`].
+    /// Number of its shape, in the order in which shapes were added.
     pub shape: u32,
     /// Shape to world, mm.
     pub placement: DAffine3,

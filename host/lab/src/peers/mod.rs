@@ -2,7 +2,7 @@
 //!
 //! Scenes: the thesis pair ([`crate::scene_p`]), crossing bars, and the pairs of free-form and planar fits of the shared test parts where this
 //! machine has them. Ours is [`mortise_scenario::probe`], which answers with the contacts as well; parry runs in this process, the others through
-//! their Python packages ([`python`]). Meshes are the kernel's tessellation at a stated deflection. Each query is repeated and its shortest time
+//! their Python packages (`python.rs`). Meshes are the kernel's tessellation at a stated deflection. Each query is repeated and its shortest time
 //! counts, since other load on the computer only lengthens it; median and worst are over the poses. One thread.
 
 mod charts;
