@@ -13,7 +13,7 @@ use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{CostUnit, ResetReason};
 
 /// Bytes of a slot, erased at once: one record and one small scene.
-const SLOT: usize = 512;
+const SLOT: usize = 640;
 const WORDS: usize = SLOTS * SLOT / WRITE_SIZE;
 
 pub(crate) const IDENTITY: Identity = Identity {
