@@ -86,6 +86,12 @@ impl Bound {
     pub const NOW: Self = Self(0);
     /// Never expires: the neutral element when bounds are combined.
     pub const NEVER: Self = Self(u32::MAX);
+
+    /// Whether it expires within `distance` m past the `horizon` (see [`Coherence::horizon`]).
+    #[inline]
+    pub fn expires_within(self, horizon: u32, distance: f32) -> bool {
+        self.0 <= horizon.saturating_add(up_nm(distance))
+    }
 }
 
 impl Coherence {
@@ -148,7 +154,7 @@ impl Coherence {
         if slot.near == 0 && !reached {
             return Known::Far(Bound(slot.bound_nm));
         }
-        let requery = self.round.wrapping_add(key.0).is_multiple_of(QUERY_AGAIN);
+        let requery = self.is_turn_of(key, QUERY_AGAIN);
         match (leaf, slot.near) {
             (false, _) if requery => Known::Nothing,
             (false, _) => Known::Near(ALL),
@@ -158,6 +164,12 @@ impl Coherence {
             (true, _) if requery => Known::Expired,
             (true, near) => Known::Near(if reached { ALL } else { near }),
         }
+    }
+
+    /// Whether it is this node's turn, which each node has once in `ticks` (a power of two); consecutive nodes have theirs in consecutive ticks.
+    #[inline]
+    pub fn is_turn_of(&self, key: Key, ticks: u32) -> bool {
+        self.round.wrapping_add(key.0).is_multiple_of(ticks)
     }
 
     /// Stores that no point of the node is nearer than `distance` m, by its sphere.

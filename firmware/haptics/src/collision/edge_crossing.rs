@@ -122,17 +122,64 @@ fn share(above: f32, below: f32) -> f32 {
     }
 }
 
-/// Whether two curved pieces run along each other where their segments are nearest to each other's middles.
+/// Circle that osculates a curved piece at its middle.
+pub(crate) struct Circle {
+    center: Vec3,
+    /// Unit vector across its plane.
+    axis: Vec3,
+    /// 1/√radius, m^-½.
+    inverse_root: f32,
+}
+
+impl Circle {
+    /// Circle of a piece, `None` for a straight one.
+    pub fn of(piece: &Piece<'_>) -> Option<Self> {
+        if piece.straight {
+            return None;
+        }
+        let (half, bend) = (piece.half, piece.bend);
+        let across = half.cross(bend);
+        // Curvature κ = 2·|half × bend|/|half|³, towards the part of `bend` across `half`.
+        let inverse_half = inverse_sqrt(half.length_squared());
+        let curvature = 2.0 * quick_length(across) * inverse_half * inverse_half * inverse_half;
+        let inward = across.cross(half);
+        Some(Self {
+            center: piece.center
+                + inward * (inverse_sqrt(inward.length_squared()) / (curvature + f32::MIN_POSITIVE)),
+            axis: across * inverse_sqrt(across.length_squared()),
+            inverse_root: root(curvature),
+        })
+    }
+
+    /// What a part can travel, m, until two pieces with these circles can cross, at most 0 when they may cross now; `turn` is the most by which it turns
+    /// over any way, 1/m.
+    ///
+    /// Circles of radii R and r in parallel planes whose axes are e apart cross, seen along the axes, at an angle ψ with
+    /// e² = R² + r² − 2·R·r·cos ψ, so 2·sin(ψ/2) ≤ e/√(R·r). A tilt adds its angle. Below [`LEAST_SINE_OF_CURVES`] they run along each other.
+    pub fn travel(&self, other: &Self, turn: f32) -> f32 {
+        let apart = self.center - other.center;
+        let aside = apart - other.axis * apart.dot(other.axis);
+        let per_m = self.inverse_root * other.inverse_root;
+        let sine = quick_length(aside) * per_m + quick_length(self.axis.cross(other.axis));
+        (LEAST_SINE_OF_CURVES - sine) / (per_m + turn)
+    }
+}
+
+/// Square root of a number that is not negative.
 #[inline]
-pub(crate) fn run_along(own: &Piece<'_>, other: &Piece<'_>) -> bool {
+fn root(x: f32) -> f32 {
+    x * inverse_sqrt(x + f32::MIN_POSITIVE)
+}
+
+/// Whether two curved pieces run along each other at the [`nearest`] points of their segments.
+#[inline]
+pub(crate) fn run_along(own: &Piece<'_>, other: &Piece<'_>, [t, s]: [f32; 2]) -> bool {
     if own.straight || other.straight {
         return false;
     }
-    let apart = other.center - own.center;
-    let d = own.tangent(share(apart.dot(own.half), own.half.length_squared()));
-    let e = other.tangent(share(-apart.dot(other.half), other.half.length_squared()));
-    let squared = d.cross(e).length_squared();
-    squared <= LEAST_SINE_OF_CURVES * LEAST_SINE_OF_CURVES * d.length_squared() * e.length_squared()
+    let (d, e) = (own.tangent(t), other.tangent(s));
+    let lengths2 = d.length_squared() * e.length_squared();
+    d.cross(e).length_squared() <= LEAST_SINE_OF_CURVES * LEAST_SINE_OF_CURVES * lengths2
 }
 
 /// Nearest points of the segments of two pieces, by their parameters, and a lower bound of the distance of the pieces, m (Ericson 2005, "Real-Time

@@ -16,12 +16,12 @@ use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Known};
 use crate::collision::cost::{CROSSING, EDGE_BOUND, LOOKUP, MATING, NODE, PASSED_OVER};
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::edge_crossing::{Crossing, Piece, crossing, nearest, run_along};
+use crate::collision::edge_crossing::{Circle, Crossing, Piece, crossing, nearest, run_along};
 use crate::collision::node_cursor::NodeCursor;
+use crate::collision::node_key::Key;
 use crate::collision::rules::{FacePairRules, Mating};
 use crate::collision::search::Traversal;
-use crate::math::scalar::smaller;
-use crate::math::vector::quick_length;
+use crate::math::scalar::{larger, smaller};
 
 /// Deepest overlap of two edges that touch for the first time, as a share of the thinner part's thickness at them: at half of it the far sides are as
 /// near as the near ones.
@@ -34,10 +34,17 @@ const DEEPEST_M: f32 = 0.5e-3;
 /// A leaf without near edges is searched this far, m, and as far as [`RESERVE_TICKS`] ticks of the last motion, for a bound that lasts.
 const RESERVE_M: f32 = 1e-3;
 /// See [`RESERVE_M`].
-const RESERVE_TICKS: f32 = 32.0;
+const RESERVE_TICKS: f32 = 16.0;
+/// Leaves whose bound expires within this travel, m, and twice [`EARLY_TICKS`] ticks of the last motion, are compared anew in turn, one tick in
+/// [`EARLY_TICKS`] each: else all pieces of a rim would be compared in the same tick.
+const EARLY_M: f32 = 0.25e-3;
+/// See [`EARLY_M`]; a power of two.
+const EARLY_TICKS: u32 = 8;
 
 /// Pieces of the other part's edges near a leaf; more are compared in groups of this size.
-type Near<'i> = Vec<Piece<'i>, 16>;
+type Near<'i> = Vec<Piece<'i>, NEAR_PIECES>;
+/// See [`Near`].
+const NEAR_PIECES: usize = 16;
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     /// Searches the edges of a forward pair; nodes are numbered on from the pointshell's. Returns where it stopped when the budget ran out.
@@ -51,6 +58,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let to = to.saturating_sub(first);
         let edge_error = EDGE_ERROR_CELLS * pair.field.record().cell;
         let limit = LOOKUP.saturating_mul(self.search.budget);
+        let early = EARLY_M + 2.0 * EARLY_TICKS as f32 * self.search.way;
+        // End of the subtree whose bound still holds although it is visited, and that bound.
+        let (mut covered, mut cover) = (0, Bound::NOW);
         let mut ancestors = Ancestors::new();
         let mut index = from.saturating_sub(first);
         while index < to {
@@ -66,19 +76,39 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
             ancestors.close(index, self.coherence);
             let key = pair.keys.of(here.node);
-            match self.coherence.query(key, self.horizon, false) {
-                Known::Far(bound) => {
+            let leaf = node.skip == index + 1;
+            let known = self.coherence.query(key, self.horizon, false);
+            let mut distance = f32::NEG_INFINITY;
+            match known {
+                Known::Far(bound) if !self.due(key, bound, leaf, early) => {
                     self.spent += PASSED_OVER;
                     ancestors.note(bound);
                     index = node.skip;
                     continue;
                 }
+                Known::Nothing if index < covered && !self.coherence.is_turn_of(key, EARLY_TICKS) => {
+                    self.spent += PASSED_OVER;
+                    ancestors.note(cover);
+                    index = node.skip;
+                    continue;
+                }
+                Known::Far(bound) if !leaf => {
+                    self.spent += PASSED_OVER;
+                    if index >= covered {
+                        (covered, cover) = (node.skip, bound);
+                    }
+                }
                 Known::Near(_) | Known::Expired => self.spent += PASSED_OVER,
-                Known::Nothing => {
+                Known::Far(_) | Known::Nothing => {
                     self.spent += NODE;
                     self.work.nodes += 1;
-                    let distance = pair.distance(node.center) - (node.radius + edge_error);
-                    if distance > self.search.margin {
+                    distance = pair.distance(node.center) - (node.radius + edge_error);
+                    let far = if leaf {
+                        self.search.margin + early
+                    } else {
+                        self.search.margin
+                    };
+                    if distance > far {
                         ancestors.note(self.coherence.set_distance(key, distance));
                         index = node.skip;
                         continue;
@@ -87,11 +117,18 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                 }
             }
             index += 1;
-            if node.skip != index {
+            if !leaf {
                 ancestors.open(key, node.skip);
                 continue;
             }
-            let distance = self.edge_leaf(pair, here, node) - DEEPEST_M;
+            // As long as its bound holds, none of its pieces can touch.
+            let holds = distance > self.search.margin || matches!(known, Known::Far(_));
+            let travel = if holds {
+                self.travel_to_edges(pair, node)
+            } else {
+                self.edge_leaf(pair, here, node)
+            };
+            let distance = larger(distance, travel);
             ancestors.note(if distance > self.search.margin {
                 self.coherence.set_distance(key, distance)
             } else {
@@ -102,46 +139,65 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         None
     }
 
-    /// Compares the pieces of a leaf with the other part's edges. Returns a lower bound of their distance from those edges, m.
+    /// Whether a node whose bound has not expired is visited all the same, see [`EARLY_M`].
+    #[inline]
+    fn due(&self, key: Key, bound: Bound, leaf: bool, early: f32) -> bool {
+        let soon = bound.expires_within(self.horizon, early);
+        soon && (!leaf || self.coherence.is_turn_of(key, EARLY_TICKS))
+    }
+
+    /// Compares the pieces of a leaf with the other part's edges and offers their contacts. Returns what the object must travel until two of them can
+    /// touch, m: 0 where they may touch in this tick.
     #[inline(never)]
     fn edge_leaf(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, node: &NodeRecord) -> f32 {
         let reach = self.search.margin + DEEPEST_M;
-        let sphere = (pair.to_field.apply(node.center), node.radius);
         let mut near = Near::new();
-        let mut least = f32::INFINITY;
-        self.near_edges(pair, sphere, reach, |search, other| {
+        let mut any_near = false;
+        self.near_edges(pair, node, reach, |search, other| {
             // Emptied when full, so there is space.
             let _ = near.push(other);
             if near.is_full() {
-                least = smaller(least, search.cross(pair, leaf, node, &near));
+                any_near |= search.cross(pair, leaf, node, &near);
                 near.clear();
             }
         });
         if !near.is_empty() {
-            least = smaller(least, self.cross(pair, leaf, node, &near));
+            any_near |= self.cross(pair, leaf, node, &near);
         }
-        if least < f32::INFINITY {
-            return least;
+        if any_near {
+            0.0
+        } else {
+            self.travel_to_edges(pair, node)
         }
-        // Nothing is near: the bound is to last for a while.
-        let reserve = reach + RESERVE_M + RESERVE_TICKS * self.search.way;
-        least = reserve;
-        self.near_edges(pair, sphere, reserve, |_, other| {
-            let (center, radius) = other.sphere();
-            least = smaller(least, quick_length(center - sphere.0) - (radius + sphere.1));
-        });
-        least
     }
 
-    /// Passes to `visit` every piece of the other part's edges whose sphere lies within `reach` (m) of a sphere.
+    /// What the object must travel until the pieces of a leaf can touch an edge of the other part, m: a lower bound that is to last for a while, at most
+    /// [`RESERVE_M`] and [`RESERVE_TICKS`].
+    #[inline(never)]
+    fn travel_to_edges(&mut self, pair: &DirectedPair<'_>, node: &NodeRecord) -> f32 {
+        let reserve = self.search.margin + DEEPEST_M + RESERVE_M + RESERVE_TICKS * self.search.way;
+        let mut near = Near::new();
+        let mut least = reserve;
+        self.near_edges(pair, node, reserve, |search, other| {
+            let _ = near.push(other);
+            if near.is_full() {
+                least = search.clear(pair, node, &near, least);
+                near.clear();
+            }
+        });
+        self.clear(pair, node, &near, least) - DEEPEST_M
+    }
+
+    /// Passes to `visit` every piece of the other part's edges whose sphere lies within `reach` (m) of a leaf's sphere.
     #[inline(always)]
     fn near_edges<'i>(
         &mut self,
         pair: &DirectedPair<'i>,
-        (center, radius): (Vec3, f32),
+        leaf: &NodeRecord,
         reach: f32,
         mut visit: impl FnMut(&mut Self, Piece<'i>),
     ) {
+        let (center, radius) = (pair.to_field.apply(leaf.center), leaf.radius);
         let tree = pair.field_edges;
         let mut index = 0;
         while let Some(node) = tree.nodes.get(index as usize) {
@@ -164,39 +220,72 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         }
     }
 
-    /// Offers the crossings of the pieces of a leaf with `near` pieces of the other part. Returns a lower bound of their distance, m.
+    /// Offers the crossings of the pieces of a leaf with `near` pieces of the other part. Returns whether any may touch before long.
     fn cross(
         &mut self,
         pair: &DirectedPair<'_>,
         leaf: NodeCursor,
         node: &NodeRecord,
         near: &[Piece<'_>],
-    ) -> f32 {
+    ) -> bool {
         let rotation = pair.to_field.rotation();
         let reach = self.search.margin + DEEPEST_M;
-        let mut least = f32::INFINITY;
+        let mut any_near = false;
         for record in node.points(pair.edges.pieces) {
             let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
             let (center, radius) = own.sphere();
             for other in near {
                 if !other.is_within(center, radius, reach) {
-                    least = smaller(least, reach);
                     continue;
                 }
                 self.spent += EDGE_BOUND;
-                if run_along(&own, other) {
-                    least = f32::NEG_INFINITY;
-                    continue;
-                }
                 let (from, distance) = nearest(&own, other);
-                least = smaller(least, distance);
-                if distance > reach {
+                if distance > reach || run_along(&own, other, from) {
                     continue;
                 }
+                any_near = true;
                 self.spent += CROSSING;
                 if let Some(found) = crossing(&own, other, rotation, from) {
                     self.touch(pair, leaf, [record, other.record], &found);
                 }
+            }
+        }
+        any_near
+    }
+
+    /// The smaller of `least` and what the pieces of a leaf can travel until they come to cross one of `near`, and [`DEEPEST_M`], m.
+    fn clear(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        node: &NodeRecord,
+        near: &[Piece<'_>],
+        mut least: f32,
+    ) -> f32 {
+        let rotation = pair.to_field.rotation();
+        let circles: Vec<Option<Circle>, NEAR_PIECES> = near.iter().map(Circle::of).collect();
+        // Long enough that the distance, which costs more, is not asked for.
+        let lasting = self.search.margin + DEEPEST_M + EARLY_M;
+        // A part that turns by an angle travels at least that times its radius.
+        let held = self.search.parts.get(usize::from(self.search.held));
+        let turn = held.map_or(0.0, |part| 1.0 / part.radius);
+        for record in node.points(pair.edges.pieces) {
+            let own = Piece::placed(record, pair.to_field.apply(record.center), rotation);
+            let (center, radius) = own.sphere();
+            let circle = Circle::of(&own);
+            for (other, other_circle) in near.iter().zip(&circles) {
+                if !other.is_within(center, radius, least) {
+                    continue;
+                }
+                self.spent += EDGE_BOUND;
+                let along = match (&circle, other_circle) {
+                    (Some(own), Some(other)) => DEEPEST_M + own.travel(other, turn),
+                    _ => 0.0,
+                };
+                least = if along > lasting {
+                    smaller(least, along)
+                } else {
+                    smaller(least, larger(along, nearest(&own, other).1))
+                };
             }
         }
         least
