@@ -203,10 +203,7 @@ fn solve<T: ForceTerm>(
         }
         Integrator::Implicit => {
             let point = contact.shared_stiffness(memory.sharing);
-            let k = Stiffness {
-                point,
-                guided: point * guided_share,
-            };
+            let k = Stiffness::new(point, guided_share);
             let scale = (farthest, step.length);
             let mut force = ContactForce::new(contacts, k, step.period_s, contact.damping_s, scale);
             step.with_contacts(free, terms, &mut force, solves)

@@ -1,8 +1,10 @@
 //! Contacts of one tick: a bounded store that keeps the deepest contacts and the ones with the longest lever arms.
 
 use glam::Vec3;
+use mortise_protocol::image::NO_FACE;
 
 use crate::collision::node_cursor::NodeCursor;
+use crate::collision::side::Sides;
 use crate::math::symmetric6::dot;
 
 /// Capacity for contacts per tick.
@@ -29,11 +31,11 @@ pub(crate) struct Contact {
     pub moving_face: u16,
     /// Face of the other part.
     pub static_face: u16,
-    /// The held part's second face where the point lies on an edge of it, else [`mortise_protocol::image::NO_FACE`].
+    /// The held part's second face where the point lies on an edge of it, else [`NO_FACE`].
     pub moving_edge_face: u16,
     /// The other part's second face, likewise.
     pub static_edge_face: u16,
-    /// Numbers of the edges of the held part and of the other part that cross, else [`mortise_protocol::image::NO_FACE`].
+    /// Numbers of the edges of the held part and of the other part that cross, else [`NO_FACE`].
     pub edges: [u16; 2],
     /// Leaf in which it was found; identifies the other part.
     pub leaf: NodeCursor,
@@ -56,6 +58,12 @@ impl Contact {
         edges: [0; 2],
         leaf: NodeCursor::FIRST,
     };
+
+    /// Whether two edges cross in it.
+    #[inline]
+    pub fn is_crossing(&self) -> bool {
+        self.edges[0] != NO_FACE
+    }
 }
 
 /// Branch of a contact's piecewise linear force.
@@ -99,6 +107,8 @@ pub(crate) struct Contacts {
     previous_len: usize,
     /// Number of the last tick's contacts that can be carried over.
     carried_len: usize,
+    /// Sides from which leaves came to what they touch.
+    pub sides: Sides,
 }
 
 /// Heap of the indices of half a list, the largest key on top. Keys are stored side by side, not a contact's size apart.
@@ -180,11 +190,13 @@ impl Contacts {
             farthest2: 0.0,
             previous_len: 0,
             carried_len: 0,
+            sides: Sides::new(),
         }
     }
 
     /// Empties the store.
     pub fn clear(&mut self) {
+        self.sides.clear();
         self.len = 0;
         self.dropped = false;
         self.lost = 0;
@@ -195,6 +207,7 @@ impl Contacts {
 
     /// Empties the store for the next tick. With `keep_previous` the contacts it held can be restored by [`Self::carry`].
     pub fn begin(&mut self, keep_previous: bool) {
+        self.sides.begin();
         self.previous_len = self.len;
         self.carried_len = if keep_previous { self.len } else { 0 };
         self.current = 1 - self.current;

@@ -9,7 +9,7 @@
 //! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
 //! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
 //! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
-//! | `contact`, `face_pairs` | bounded store of contacts; touching face pairs |
+//! | `contact`, `side`, `face_pairs` | bounded store of contacts; side from which a leaf came to a thin part; touching face pairs |
 //! | `placement`, `node_cursor` | placement of a part; position of the search in all trees |
 
 pub(crate) mod ancestors;
@@ -32,3 +32,4 @@ pub mod patch;
 pub(crate) mod placement;
 pub(crate) mod rules;
 pub(crate) mod search;
+pub(crate) mod side;

@@ -31,6 +31,7 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
+use crate::collision::side::Sides;
 use crate::io::{Flags, Work};
 use crate::math::pose::Pose;
 use crate::math::scalar::inverse_sqrt;
@@ -410,6 +411,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
                     let allowance_m = |face| self.mating(pair, leaf, point, face).allowance_m;
                     found = with_allowance(found, pair.surfaces, nearby, p, allowance_m);
                 }
+                if self.contacts.sides.any() {
+                    found = self.contacts.sides.surface(leaf, p, found);
+                }
                 if !faces_away(pair, nearby, point, found.normal) {
                     self.near(pair, leaf, point, &found);
                 }
@@ -443,6 +447,10 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
     pub fn near(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord, found: &OnFace) {
         self.near += 1;
         self.spent += NEAR;
+        let mut found = *found;
+        if Sides::concerns(found.distance, self.search.way) || self.contacts.sides.any() {
+            found = self.on_side(pair, leaf, point, found);
+        }
         let n = pair.to_push * found.normal;
         let (moving, fixed) = sides(pair, point, found.face);
         let mating = if pair.guided {
@@ -465,6 +473,23 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         };
         contact.edges = [NO_FACE; 2];
         contact.leaf = leaf;
+    }
+
+    /// The surface of a point on the side from which its leaf came, which is kept for the next tick.
+    #[inline(never)]
+    fn on_side(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        found: OnFace,
+    ) -> OnFace {
+        let p = pair.to_field.apply(point.position);
+        let found = self.contacts.sides.surface(leaf, p, found);
+        if Sides::concerns(found.distance, self.search.way) {
+            self.contacts.sides.keep(leaf, p, &found);
+        }
+        found
     }
 
     /// Slot for a contact at lever arm `arm` with a `gap` along the world normal `n`, if it is a candidate and is kept. The caller fills in faces,

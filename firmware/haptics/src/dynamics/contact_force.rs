@@ -33,6 +33,9 @@ const LANDING_SHARE: f32 = 0.8;
 /// Solves after which only [`RATE_BAND_M_PER_S`] applies, since a contact that has not settled by then at the finer bands may never do so.
 const ROUGH_SOLVES: u8 = 4;
 
+/// Stiffness of two edges that cross, as a multiple of a point's: they meet in one place, where faces meet in many points.
+const CROSSING: f32 = 2.0;
+
 /// Stiffness of contacts, N/m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stiffness {
@@ -40,12 +43,29 @@ pub(crate) struct Stiffness {
     pub point: f32,
     /// Stiffness of one point between guided faces.
     pub guided: f32,
+    /// Stiffness of two edges that cross.
+    pub crossing: f32,
 }
 
 impl Stiffness {
+    /// Stiffnesses where one point has stiffness `point`, N/m, and one between guided faces this share of it.
+    pub fn new(point: f32, guided_share: f32) -> Self {
+        Self {
+            point,
+            guided: point * guided_share,
+            crossing: CROSSING * point,
+        }
+    }
+
     #[inline]
     fn of(&self, c: &Contact) -> f32 {
-        if c.guided { self.guided } else { self.point }
+        if c.guided {
+            self.guided
+        } else if c.is_crossing() {
+            self.crossing
+        } else {
+            self.point
+        }
     }
 }
 

@@ -170,6 +170,7 @@ mod tests {
     use crate::dynamics::coupling::{Coupling, CouplingForce};
     use crate::math::symmetric6::{add_scaled, dot};
     use glam::Vec3;
+    use mortise_protocol::image::NO_FACE;
     use proptest::prelude::*;
 
     proptest! {
@@ -200,12 +201,12 @@ mod tests {
                 let turn = arm.cross(n) / step.length;
                 c.row = [n.x, n.y, n.z, turn.x, turn.y, turn.z];
                 c.arm = arm;
-                (c.rate, c.phase, c.guided) = (0.0, Phase::Free, false);
+                (c.rate, c.phase, c.guided, c.edges) = (0.0, Phase::Free, false, [NO_FACE; 2]);
             }
             let farthest = contacts.farthest();
             let (h, damping) = (settings.period_s, settings.contact.damping_s);
             let stiffness = settings.contact.stiffness_n_per_m;
-            let k = Stiffness { point: stiffness, guided: stiffness };
+            let k = Stiffness::new(stiffness, 1.0);
             let mut coupling_force = CouplingForce::new(&coupling, &settings.coupling, h, step.length);
             let terms = &mut coupling_force;
             let free = step.free(terms);

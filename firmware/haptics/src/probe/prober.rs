@@ -223,7 +223,7 @@ impl Prober {
             // At rest: no rate, so neither period nor damping has an effect.
             contact.phase = Phase::Parting;
         }
-        let k = Stiffness { point: k, guided: k };
+        let k = Stiffness::new(k, 1.0);
         let wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0, 1.0);
         work.contacts = pushing as u16;
         Ok(Probe {
