@@ -27,6 +27,7 @@ mod edges;
 mod error;
 mod face_samples;
 mod field;
+mod field_error;
 mod fits;
 mod format;
 mod free_form;
