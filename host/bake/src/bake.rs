@@ -299,6 +299,7 @@ impl Scene {
                 band_cells: options.band_cells,
                 format: options.format,
                 patch_tolerance_mm: options.patch_tolerance_mm,
+                samples: options.samples,
             };
             let baked = match options.method {
                 Method::DistanceField => bake_field(surface, &field, part, &step),

@@ -68,7 +68,7 @@ pub use cost::{FIXED, TickCost};
 pub use distance::{ExactSurface, Nearest};
 pub use error::BakeError;
 pub use field::{BakedField, bake_field};
-pub use format::{FieldOptions, SampleFormat};
+pub use format::{FieldOptions, SampleFormat, Samples};
 pub use free_form_error::FreeFormError;
 pub use image::{ImageBuilder, PartPlacement};
 pub use occupancy::{CROSSING_TOLERANCE_CELLS, PROXIMITY_LAYERS, bake_occupancy};

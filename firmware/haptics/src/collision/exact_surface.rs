@@ -12,7 +12,7 @@
 
 use glam::Vec3;
 use mortise_protocol::image::{
-    FaceRecord, Group, Lookup, NO_FACE, Nearby, Place, Shape, Surface, Surfaces, surface_kind,
+    FaceRecord, Group, NO_FACE, Nearby, Place, Shape, Surface, Surfaces, surface_kind,
 };
 
 use crate::collision::patch::distance_to_patch;
@@ -21,6 +21,8 @@ use crate::math::vector::length;
 
 /// A foot counts when the field's distance there is below this many cells: interpolation errs by 0.2 cells next to a right angle.
 const ON_SURFACE_CELLS: f32 = 0.3;
+/// The same by exact surfaces, m: single precision, and the micrometre within which surfaces are verified.
+const ON_SURFACE_M: f32 = 2e-6;
 /// Within this many cells of an edge the other face decides whether a foot is beyond it.
 const NEAR_EDGE_CELLS: f32 = 2.0;
 /// Sine of the smallest angle between faces that form an edge: below it one face continues the other.
@@ -409,12 +411,27 @@ fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
     best
 }
 
-/// Whether the field has the surface at `p`, within its resolution.
+/// Whether the field has the surface at `p`: within its resolution where it stores samples, else by the surfaces that it names.
 fn on_surface(shape: &Shape<'_>, p: Vec3) -> bool {
-    match shape.field.lookup(p.to_array()) {
-        Lookup::Near(sample) => sample.distance.abs() <= ON_SURFACE_CELLS * shape.field.record().cell,
-        Lookup::Far { .. } => false,
+    let Place::Cell(cell) = shape.field.place(p.to_array()) else {
+        return false;
+    };
+    if cell.has_samples() {
+        return shape.field.distance(&cell).abs() <= ON_SURFACE_CELLS * shape.field.record().cell;
     }
+    exact(shape.surfaces(), shape.field.nearby(&cell), p)
+        .is_some_and(|(distance, _)| distance.abs() <= ON_SURFACE_M)
+}
+
+/// Signed distance at `p` by the field, by the surfaces that it names where it stores no samples, or a signed lower bound of its magnitude, m.
+pub(crate) fn field_bound(shape: &Shape<'_>, p: Vec3) -> f32 {
+    if let Place::Cell(cell) = shape.field.place(p.to_array())
+        && !cell.has_samples()
+        && let Some((distance, _)) = exact(shape.surfaces(), shape.field.nearby(&cell), p)
+    {
+        return distance;
+    }
+    shape.field.bound(p.to_array())
 }
 
 /// Whether `p` on the surface of face `of[0]` lies beyond its edge with another near face; `of[1]` is ignored.
@@ -445,7 +462,7 @@ fn beyond_edge(shape: &Shape<'_>, face: &FaceRecord, other: &FaceRecord, p: Vec3
     let Some(across) = unit(across, length(across)) else {
         return false;
     };
-    let convex = shape.field.bound((edge + across * near_edge).to_array()) > 0.0;
+    let convex = field_bound(shape, edge + across * near_edge) > 0.0;
     let side = foot(other, p).map_or(0.0, |f| f.distance);
     if convex { side > 0.0 } else { side < 0.0 }
 }
