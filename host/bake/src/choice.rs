@@ -33,6 +33,8 @@ const SAFETY: f64 = 1.5;
 /// Cells along a shape's longest side from which larger cells are tried, and the factor from one to the next.
 const FEWEST_CELLS: f64 = 4.0;
 const LADDER: f64 = 1.5;
+/// The same for a shape with many faces, times the root of their number.
+const CELLS_PER_FACE: f64 = 1.5;
 /// Fewest cells along a shape's longest side.
 const LEAST_CELLS: f64 = 20.0;
 /// Faces with a smaller share of the shape's area are not walls: where they are thin they are treated as edges.
@@ -73,6 +75,8 @@ pub(crate) struct Demand {
     walls: (f64, String),
     left_out: Vec<u32>,
     flats: Vec<u32>,
+    /// Number of faces.
+    faces: usize,
     /// Whether any face is free-form.
     free_form: bool,
 }
@@ -111,6 +115,7 @@ impl Demand {
             others,
             walls: walls(surface, &words),
             left_out,
+            faces: shape.faces.len(),
             flats: (0..)
                 .zip(&shape.faces)
                 .filter(|(_, face)| matches!(face.surface, Surface::Plane { .. }))
@@ -139,7 +144,9 @@ impl Demand {
     pub fn coarser(&self, finest: &Choice) -> Vec<Choice> {
         // Few samples are interpolated in such cells, so the shorter format costs no accuracy.
         let (format, band_cells) = FORMATS[usize::from(!self.free_form)];
-        let cells = std::iter::successors(Some(self.size_mm / FEWEST_CELLS), |cell| Some(cell / LADDER));
+        // Faces are typically as far apart as one over the root of their number: larger cells would meet more of them than a group names.
+        let along = (CELLS_PER_FACE * (self.faces as f64).sqrt()).max(FEWEST_CELLS);
+        let cells = std::iter::successors(Some(self.size_mm / along), |cell| Some(cell / LADDER));
         cells
             .take_while(|&cell| cell > finest.cell_mm * 1.05)
             .map(|cell_mm| Choice {

@@ -12,7 +12,7 @@ use common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{ExactSurface, Grabbable, Planned, Request, plan};
 use mortise_brep::{CadModel, Surface, load_step};
-use mortise_haptics::{Vec3, rendered_distance};
+use mortise_haptics::{Pose, Prober, Settings, Vec3, rendered_distance};
 use mortise_protocol::image::{Lookup, Nearby, SceneImage};
 
 fn request(accuracy_um: f64, flash_kib: u64) -> Request {
@@ -183,6 +183,61 @@ fn scene_p_is_as_accurate_as_asked() {
         println!("{accuracy} µm: {} bytes, {found:?}", planned.image.len());
         assert!(found.points > 5_000);
     }
+}
+
+/// Random pegs in holes: the gap at random offsets errs by no more than the plan states, and the plan states little more than that.
+#[test]
+fn stated_errors_bound_those_of_random_fits() {
+    let mut over = Vec::new();
+    for i in 0..24 {
+        let r = |k: f64| ((i as f64 + 0.5) * k).fract();
+        let radius = 3.0 + 15.0 * r(0.898_654);
+        let clearance = 0.01 * 30f64.powf(r(0.807_578));
+        let accuracy = 2.0 * 25f64.powf(r(0.725_732));
+        let (height, beside) = (10.0 + 40.0 * r(0.652_182), 5.0 + 20.0 * r(0.586_086));
+        let block = block_with_hole(
+            [radius + beside, radius + 0.7 * beside],
+            height,
+            radius + clearance,
+            48,
+        );
+        let scene = model(vec![
+            ("block", block, DAffine3::IDENTITY),
+            (
+                "peg",
+                peg(radius, 2.0 * height, 48),
+                DAffine3::from_translation(DVec3::Z * 200.0),
+            ),
+        ]);
+        let planned = run(&scene, &request(accuracy, 512));
+        assert!(planned.met, "{i}");
+        check_promise(&scene, &planned, 1_000);
+        let aligned = AlignedBytes::new(&planned.image);
+        let image = SceneImage::open(aligned.bytes()).unwrap();
+        let stated = 1000.0 * planned.plan.error_in_fits_mm();
+        let mut prober = Prober::new();
+        let mut worst = 0.0f64;
+        for k in 0..80 {
+            let u = |step: f64| ((f64::from(k) + 0.5) * step).fract();
+            let (by, angle) = (clearance * u(0.754_878), 6.283 * u(0.569_840));
+            let at = DVec3::new(by * angle.cos(), by * angle.sin(), -0.5 * height) / 1000.0;
+            let pose = Pose::from_arrays(at.as_vec3().to_array(), [0.0, 0.0, 0.0, 1.0]);
+            let found = prober
+                .probe(&image, 1, 0, &pose, &Settings::default().contact)
+                .unwrap();
+            let gap = 1000.0 * f64::from(found.nearest.distance_m);
+            worst = worst.max(1000.0 * (gap - (clearance - by)).abs());
+        }
+        // Positions are rounded to single precision.
+        assert!(
+            worst <= stated + 0.05,
+            "{i}: gap errs by {worst} µm, stated {stated}"
+        );
+        over.push(stated / (2.0 * worst + 1.0));
+    }
+    over.sort_by(f64::total_cmp);
+    println!("stated over twice the measured error and a micrometre: {over:.2?}");
+    assert!(over[over.len() / 2] <= 1.0, "{over:?}");
 }
 
 /// A coarser request gives a smaller image.

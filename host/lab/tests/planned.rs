@@ -26,25 +26,28 @@ fn scene_p_errs_by_no_more_than_its_plan_states() {
         let parts = planned.plan.report.parts.iter().map(|part| part.name.clone());
         let scene = ProbeScene::of_image("scene P".into(), &planned.image, parts.collect());
         let pair = scene.pair("peg", Some("block")).expect("both are there");
+        let (fits, elsewhere) = (planned.plan.error_in_fits_mm(), planned.plan.error_elsewhere_mm());
         let mut worst = [0.0f64; 2];
         for case in scene_p::cases() {
             let row = scene.probe(pair, &case.pose).expect("a pose");
             let error = (row.distance_mm - case.exact_mm).abs();
-            let at = &mut worst[usize::from(case.exact_mm < 0.0)];
+            // Parallel in the hole, with the gap still open.
+            let fitted = case.pose.name.contains("aside at") && case.exact_mm >= 0.0;
+            let (at, stated) = if fitted {
+                (&mut worst[0], fits)
+            } else {
+                (&mut worst[1], elsewhere)
+            };
             *at = at.max(error);
-            if error > 0.001 {
-                println!(
-                    "{} {} {} {:?} {:?}",
-                    case.pose.name, case.exact_mm, row.distance_mm, row.field_distance_mm, row.least_ns
-                );
-            }
+            assert!(
+                error <= stated,
+                "{}: errs by {error} mm, stated {stated}",
+                case.pose.name
+            );
         }
         println!(
-            "{accuracy_um} µm: {} bytes, gaps and depths err by {worst:?} mm, stated {} and {}",
-            planned.image.len(),
-            planned.plan.error_in_fits_mm(),
-            planned.plan.error_elsewhere_mm()
+            "{accuracy_um} µm: {} bytes; in the hole and elsewhere errors up to {worst:?} mm, stated {fits} and {elsewhere}",
+            planned.image.len()
         );
-        assert!(worst[0].max(worst[1]) <= planned.plan.error_elsewhere_mm());
     }
 }

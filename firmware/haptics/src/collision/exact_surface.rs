@@ -283,22 +283,23 @@ fn distance(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Option<f32> {
         surface_kind::PLANE => Some(along * face.sense),
         surface_kind::CYLINDER => {
             let squared = from.length_squared() - along * along;
-            // On the axis, or within rounding of it, the direction is undefined, but the distance is not.
-            let r = if squared > 1e-12 {
-                squared * inverse_sqrt(squared)
-            } else {
-                0.0
-            };
-            Some((r - face.radius) * face.sense)
+            if squared > 1e-12 {
+                return Some((squared * inverse_sqrt(squared) - face.radius) * face.sense);
+            }
+            off_center(face, p)
         }
-        surface_kind::OTHER => None,
-        _ => Some(signed(face, p).map_or_else(|| off_center(face, p), |(distance, _)| distance)),
+        _ => match foot(face, p) {
+            Some(foot) => Some(foot.distance),
+            None => off_center(face, p),
+        },
     }
 }
 
-/// Signed distance where the foot is not unique: on the axis of a cone or torus, on the circle within a torus, at the centre of a sphere.
+/// Signed distance where the foot is not unique: on the axis of a cylinder, cone or torus, on the circle within a torus, at the centre of a sphere.
+/// `None` for a face without closed form.
 #[cold]
-fn off_center(face: &FaceRecord, p: Vec3) -> f32 {
+#[inline(never)]
+fn off_center(face: &FaceRecord, p: Vec3) -> Option<f32> {
     let from = p - Vec3::from_array(face.origin);
     let along = from.dot(Vec3::from_array(face.axis));
     let natural = match face.kind {
@@ -307,9 +308,10 @@ fn off_center(face: &FaceRecord, p: Vec3) -> f32 {
             let out = length(from - Vec3::from_array(face.axis) * along) - face.radius;
             libm::sqrtf(out * out + along * along) - face.second
         }
-        _ => -face.radius,
+        surface_kind::CYLINDER | surface_kind::SPHERE => -face.radius,
+        _ => return None,
     };
-    natural * face.sense
+    Some(natural * face.sense)
 }
 
 /// Distance to the surface of `face` when it agrees with the field's `distance` at `p` within the error of interpolation: twice cell²·κ/8 in each of
