@@ -167,6 +167,12 @@ impl Fielded {
     }
 }
 
+/// Whether a field with this cell takes more than `room` bytes, to judge by the field of a larger one.
+fn is_hopeless(coarser: Option<&Fielded>, cell_mm: f64, room: u64) -> bool {
+    let bytes = |field: &Fielded| field.bytes() as f64 * (field.choice.cell_mm / cell_mm).powf(LEAST_GROWTH);
+    coarser.is_some_and(|field| bytes(field) > room as f64)
+}
+
 struct Attempt {
     baked: Baked,
     plan: Plan,
@@ -256,9 +262,11 @@ impl<'a> Planner<'a> {
 
     /// Bakes for `accuracy_mm`; `None` when the layout or the flash cannot hold the result.
     fn attempt(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
-        let mut fields = Vec::new();
+        let mut fields: Vec<Fielded> = Vec::new();
         for shape in 0..self.prepared.len() {
-            match self.field(shape, accuracy_mm)? {
+            let used: u64 = fields.iter().map(Fielded::bytes).sum();
+            let room = self.request.flash_bytes.saturating_sub(used);
+            match self.field(shape, accuracy_mm, room)? {
                 Some(field) => fields.push(field),
                 None => return Ok(None),
             }
@@ -288,15 +296,15 @@ impl<'a> Planner<'a> {
         self.assemble(accuracy_mm, fields)
     }
 
-    /// The smallest field of a shape found that is as accurate as `accuracy_mm` requires; `None` when it would not fit the flash.
-    fn field(&mut self, shape: usize, accuracy_mm: f64) -> Result<Option<Fielded>, BakeError> {
+    /// The smallest field of a shape found that is as accurate as `accuracy_mm` requires; `None` when it would take more than `room` bytes.
+    fn field(&mut self, shape: usize, accuracy_mm: f64, room: u64) -> Result<Option<Fielded>, BakeError> {
         let finest = self.demands[shape].choose(accuracy_mm);
         let met = |planner: &Self, field: &Fielded| {
             planner.demands[shape].is_met(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
         };
         let mut before: Option<Fielded> = None;
         for choice in self.demands[shape].coarser(&finest) {
-            if self.is_hopeless(before.as_ref(), choice.cell_mm) {
+            if is_hopeless(before.as_ref(), choice.cell_mm, room) {
                 return Ok(None);
             }
             let Some(field) = self.tried(shape, &choice, accuracy_mm)? else {
@@ -311,7 +319,7 @@ impl<'a> Planner<'a> {
         if let Some(coarser) = before.as_ref().filter(|coarser| met(self, coarser)) {
             return Ok(Some(coarser.clone()));
         }
-        if self.is_hopeless(before.as_ref(), finest.cell_mm) {
+        if is_hopeless(before.as_ref(), finest.cell_mm, room) {
             return Ok(None);
         }
         let Some(mut field) = self.tried(shape, &finest, accuracy_mm)? else {
@@ -319,7 +327,7 @@ impl<'a> Planner<'a> {
         };
         for _ in 0..FINER_CELLS {
             // Bytes grow at most with the inverse square of the cell.
-            let full = field.bytes() as f64 > FINER * FINER * self.request.flash_bytes as f64;
+            let full = field.bytes() as f64 > FINER * FINER * room as f64;
             if full || field.baked.free_form.worst_mm() <= FIELD_SHARE * accuracy_mm {
                 break;
             }
@@ -334,13 +342,6 @@ impl<'a> Planner<'a> {
             }
         }
         Ok(Some(field))
-    }
-
-    /// Whether a field with this cell does not fit the flash, to judge by the field of a larger one.
-    fn is_hopeless(&self, coarser: Option<&Fielded>, cell_mm: f64) -> bool {
-        let bytes =
-            |field: &Fielded| field.bytes() as f64 * (field.choice.cell_mm / cell_mm).powf(LEAST_GROWTH);
-        coarser.is_some_and(|field| bytes(field) > self.request.flash_bytes as f64)
     }
 
     /// The field of a shape by this choice and its errors; `None` when the layout cannot hold it.
