@@ -219,7 +219,7 @@ fn stated_errors_bound_those_of_random_fits() {
         let mut worst = 0.0f64;
         for k in 0..80 {
             let u = |step: f64| ((f64::from(k) + 0.5) * step).fract();
-            let (by, angle) = (clearance * u(0.754_878), 6.283 * u(0.569_840));
+            let (by, angle) = (clearance * u(0.754_878), std::f64::consts::TAU * u(0.569_840));
             let at = DVec3::new(by * angle.cos(), by * angle.sin(), -0.5 * height) / 1000.0;
             let pose = Pose::from_arrays(at.as_vec3().to_array(), [0.0, 0.0, 0.0, 1.0]);
             let found = prober
