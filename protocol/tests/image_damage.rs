@@ -146,6 +146,43 @@ fn sealed_damage(good: &[u8]) {
     );
 }
 
+/// A brick without samples is opened only where every cell names a surface that gives the distance.
+#[test]
+fn a_brick_without_samples_needs_surfaces() {
+    let good = scene::bytes();
+    let aligned = Aligned::new(&good);
+    let image = SceneImage::open(aligned.bytes()).unwrap();
+    let shape = image.shape(1);
+    // Over the brick without samples: the queries that know no surfaces give a bound that excludes nothing.
+    let p = [0.020, 0.001, 0.001];
+    let Place::Cell(cell) = shape.field.place(p) else {
+        panic!("no cell");
+    };
+    assert!(!cell.has_samples());
+    assert_eq!(shape.field.nearby(&cell), Nearby::Face(1));
+    assert_eq!((shape.field.bound(p), shape.field.distance(&cell)), (0.0, 0.0));
+    let header = image.header();
+    let brick = header.bricks.offset as usize + 3 * size_of::<BrickRecord>();
+    let entry = header.palette.offset as usize + 2 * 5;
+    let kind = header.faces.offset as usize + 3 * size_of::<FaceRecord>();
+    let refused = |change: &dyn Fn(&mut [u8])| {
+        let mut other = Aligned::new(&good);
+        change(other.bytes_mut());
+        other.seal();
+        SceneImage::open(other.bytes()).is_err()
+    };
+    assert!(!refused(&|_| {}));
+    // A patch answers too; there is one.
+    assert!(!refused(&|bytes| bytes[entry] = 2));
+    // No such surface; a face that is only the nearest; none; a face without closed form.
+    assert!(refused(&|bytes| bytes[entry] = 3));
+    assert!(refused(&|bytes| bytes[entry + 1] |= 0x40));
+    assert!(refused(&|bytes| bytes[entry..entry + 2].fill(0xff)));
+    assert!(refused(&|bytes| bytes[kind] = surface_kind::OTHER as u8));
+    // Indices beyond the palette.
+    assert!(refused(&|bytes| bytes[brick + 14] = 4));
+}
+
 /// The order of checks determines the remedy: a different layout is reported before damage.
 #[test]
 fn refusals_name_the_reason() {

@@ -14,7 +14,7 @@
 use mortise_brep::Surface;
 
 use crate::distance::ExactSurface;
-use crate::format::{FieldOptions, SampleFormat};
+use crate::format::{FieldOptions, SampleFormat, Samples};
 use crate::surface::{parameters, principal_curvatures};
 
 /// Distance from the surface, in cells, up to which the bounds hold: touching parts are nearer than that.
@@ -61,6 +61,7 @@ pub(crate) fn step_error(cell_mm: f64, band_cells: f64, format: SampleFormat) ->
         band_cells,
         format,
         patch_tolerance_mm: 0.0,
+        samples: Samples::Everywhere,
     };
     0.5 * cell_mm / options.units_per_cell()
 }

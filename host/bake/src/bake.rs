@@ -111,7 +111,8 @@ impl Made {
     }
 }
 
-fn field_bytes(field: &BakedField) -> u64 {
+/// Bytes of a field in the image.
+pub(crate) fn field_bytes(field: &BakedField) -> u64 {
     let bricks = field.bricks.len() * size_of::<BrickRecord>();
     // Alignment of the blob and of the grid: less than 8 bytes.
     let patches = field.patches.len() * size_of::<PatchRecord>();
@@ -137,31 +138,18 @@ impl Scene {
         Ok(Made { fields, shells })
     }
 
-    /// Makes field and pointshell of one shape again, with cells of about this size.
-    pub fn again(
+    /// Makes new pointshells for existing fields; `sizes` are the smallest sizes that each resolves, mm.
+    pub fn shells_again(
         &self,
-        index: usize,
-        options: &BakeOptions,
-        surface: &mut ExactSurface,
-        mut cell_mm: f64,
-        progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+        each: &[BakeOptions],
+        prepared: &[ExactSurface],
+        sizes: &[f64],
         made: &mut Made,
-    ) -> Result<(), BakeError> {
-        made.fields[index] = self.field(index, surface, &mut cell_mm, options, progress)?;
-        made.shells[index] = self.shell(index, surface, &self.partners[index], cell_mm, options, progress)?;
-        Ok(())
-    }
-
-    /// Makes new pointshells for existing fields.
-    pub fn shells_again(&self, each: &[BakeOptions], prepared: &[ExactSurface], made: &mut Made) {
-        let cells = made
-            .fields
-            .iter()
-            .map(|field| f64::from(field.record.cell) * 1000.0);
-        let shells = cells.zip(each).enumerate();
+    ) {
+        let shells = sizes.iter().zip(each).enumerate();
         made.shells = shells
-            .map(|(i, (cell, options))| {
-                sample_pointshell(&prepared[i], &shell_options(options, cell, &self.partners[i]))
+            .map(|(i, (&size, options))| {
+                sample_pointshell(&prepared[i], &shell_options(options, size, &self.partners[i]))
             })
             .collect();
     }
@@ -287,7 +275,8 @@ impl Scene {
         Ok(made)
     }
 
-    fn field(
+    /// Makes the field of a shape, with cells of about this size (see [`Self::fields_and_shells`]).
+    pub fn field(
         &self,
         index: usize,
         surface: &mut ExactSurface,
@@ -310,6 +299,7 @@ impl Scene {
                 band_cells: options.band_cells,
                 format: options.format,
                 patch_tolerance_mm: options.patch_tolerance_mm,
+                samples: options.samples,
             };
             let baked = match options.method {
                 Method::DistanceField => bake_field(surface, &field, part, &step),

@@ -9,7 +9,7 @@ use mortise_protocol::image::{
 use crate::cell_samples::{ExactSample, corner_places, index};
 use crate::cover::LocalPatches;
 use crate::distance::{ExactSurface, Scratch};
-use crate::format::{FieldOptions, SampleFormat, brick_bytes};
+use crate::format::{FieldOptions, SampleFormat, Samples, brick_bytes};
 use crate::free_form_cells::FreeFormCells;
 use crate::free_form_error::{AnsweredBy, FreeFormError};
 use crate::grid::Grid;
@@ -17,7 +17,7 @@ use crate::nearby::{CellNearby, Unproven};
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {
-    /// Samples as stored, x fastest.
+    /// Samples as stored, x fastest; empty where none is needed.
     pub samples: Vec<u8>,
     /// 0, 4 or 8.
     pub index_bits: u16,
@@ -62,9 +62,17 @@ pub(crate) fn bake_brick(
     at: [u32; 3],
     exact: &[ExactSample],
 ) -> Brick {
+    let (cells, unproven, free_form) = cells(surface, grid, patches, options.patch_tolerance_mm, at, exact);
     let units_per_mm = options.units_per_cell() / grid.cell();
-    let mut samples = Vec::with_capacity(brick_bytes(options.format));
-    for sample in exact {
+    let interpolates =
+        options.samples == Samples::Everywhere || interpolates(surface, grid, patches, at, &cells);
+    let stored = if interpolates { exact } else { &[] };
+    let mut samples = Vec::with_capacity(if interpolates {
+        brick_bytes(options.format)
+    } else {
+        0
+    });
+    for sample in stored {
         let value = if sample.distance.is_nan() {
             options.format.max()
         } else {
@@ -75,7 +83,6 @@ pub(crate) fn bake_brick(
             SampleFormat::Int16 => samples.extend((value as i16).to_le_bytes()),
         }
     }
-    let (cells, unproven, free_form) = cells(surface, grid, patches, options.patch_tolerance_mm, at, exact);
     let Packed {
         palette,
         palette_len,
@@ -91,6 +98,30 @@ pub(crate) fn bake_brick(
         unproven,
         free_form,
     }
+}
+
+/// Whether a reader interpolates in some cell of the brick at place `at`. With faces without closed form the gaps of edges have no other source than
+/// the samples.
+fn interpolates(
+    surface: &ExactSurface,
+    grid: &Grid,
+    patches: &LocalPatches,
+    at: [u32; 3],
+    cells: &[Nearby; CELLS_PER_BRICK],
+) -> bool {
+    let faces = &surface.shape().faces;
+    let closed = faces.iter().all(|face| !matches!(face.surface, Surface::Spline));
+    cells.iter().enumerate().any(|(i, cell)| match *cell {
+        Nearby::Face(number) if usize::from(number) < faces.len() => {
+            matches!(faces[usize::from(number)].surface, Surface::Spline)
+        }
+        Nearby::Face(number) => {
+            let low = grid.sample(at, [i & 7, i >> 3 & 7, i >> 6]);
+            !patches.answers(usize::from(number) - faces.len(), low, grid.cell())
+        }
+        Nearby::Convex(_) | Nearby::Reentrant(_) => !closed,
+        Nearby::Roughly(_) | Nearby::Unknown => true,
+    })
 }
 
 /// Rounds to the format's range, halves away from zero. A hundred-thousandth of a unit is rounded off first, so that the same distance computed at

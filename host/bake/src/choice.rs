@@ -1,16 +1,20 @@
-//! The coarsest model of one shape that meets the requested accuracy.
+//! What the requested accuracy demands of one shape's field, and the cells that meet it.
 //!
 //! The requested accuracy applies where parts fit into one another. Everywhere else, where parts merely collide, errors may be [`ELSEWHERE`] times
-//! larger. The cell is the largest one that satisfies every face that fits, every other curved face, and every wall or slot; of the two number
-//! formats, the one that then takes fewer bytes is chosen.
+//! larger. Interpolation alone allows the largest cell that satisfies every face that fits, every other curved face, and every wall or slot; of the
+//! two number formats, the one that then takes fewer bytes is chosen. Where exact surfaces answer nothing is interpolated, and larger cells may do:
+//! they are accepted by the measured error of their field ([`crate::field_error`]).
 
 use mortise_brep::Surface;
 
 use crate::accuracy::{
-    REACH_CELLS, face_bend, interpolation_error, is_resolvable, largest_cell, rounding_error, step_error,
+    NEAR_CELLS, REACH_CELLS, face_bend, interpolation_error, is_resolvable, largest_cell, rounding_error,
+    step_error,
 };
 use crate::distance::ExactSurface;
+use crate::field_error::FaceError;
 use crate::format::SampleFormat;
+use crate::free_form_error::FreeFormError;
 use crate::plan::ShapePlan;
 use crate::scene::longest_side;
 
@@ -22,14 +26,42 @@ pub(crate) const FIELD_SHARE: f64 = 0.75;
 pub(crate) const PATCH_SHARE: f64 = 0.5;
 /// Share of the accuracy elsewhere that the field may use.
 const FIELD_SHARE_ELSEWHERE: f64 = 0.5;
-/// Largest error bound of the shell, in cells: at sharp edges the field's error is that large in any case.
+/// Largest error bound of the shell, in cells of interpolation alone: at sharp edges the field's error is that large in any case.
 const MOST_EPSILON_CELLS: f64 = 0.5;
+/// Measured errors are stated with this margin: between the places measured they may be larger.
+const SAFETY: f64 = 1.5;
+/// Cells along a shape's longest side from which larger cells are tried, and the factor from one to the next.
+const FEWEST_CELLS: f64 = 4.0;
+const LADDER: f64 = 1.5;
+/// The same for a shape with many faces, times the root of their number.
+const CELLS_PER_FACE: f64 = 1.5;
 /// Fewest cells along a shape's longest side.
 const LEAST_CELLS: f64 = 20.0;
 /// Faces with a smaller share of the shape's area are not walls: where they are thin they are treated as edges.
 const WALL_AREA: f64 = 0.02;
 /// Formats to choose from, with the band used for each, cells.
 const FORMATS: [(SampleFormat, f64); 2] = [(SampleFormat::Int16, 2.0), (SampleFormat::Int8, 1.0)];
+
+/// Cells and number format of a shape's field.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Choice {
+    pub cell_mm: f64,
+    pub format: SampleFormat,
+    pub band_cells: f64,
+    /// Smallest size that the shell resolves, mm: the cell of interpolation alone.
+    pub resolution_mm: f64,
+    /// Reason why the cell cannot be larger.
+    pub why: String,
+    /// Faces too sharply curved for the cell.
+    pub edges: Vec<u32>,
+}
+
+impl Choice {
+    /// Distance from the surface up to which errors are bounded, mm.
+    pub fn reach_mm(&self) -> f64 {
+        NEAR_CELLS * self.resolution_mm
+    }
+}
 
 /// Requirements of a shape, collected before its model is chosen.
 pub(crate) struct Demand {
@@ -42,6 +74,9 @@ pub(crate) struct Demand {
     /// Largest cell that resolves the walls and slots, and its description.
     walls: (f64, String),
     left_out: Vec<u32>,
+    flats: Vec<u32>,
+    /// Number of faces.
+    faces: usize,
     /// Whether any face is free-form.
     free_form: bool,
 }
@@ -80,16 +115,22 @@ impl Demand {
             others,
             walls: walls(surface, &words),
             left_out,
+            faces: shape.faces.len(),
+            flats: (0..)
+                .zip(&shape.faces)
+                .filter(|(_, face)| matches!(face.surface, Surface::Plane { .. }))
+                .map(|(number, _)| number)
+                .collect(),
             free_form: shape.faces.iter().any(|f| matches!(f.surface, Surface::Spline)),
         }
     }
 
-    /// The model for an accuracy of `accuracy_mm` in fits.
-    pub fn choose(&self, accuracy_mm: f64) -> ShapePlan {
+    /// The coarsest cell of which the interpolation error alone stays within the bounds for an accuracy of `accuracy_mm` in fits.
+    pub fn choose(&self, accuracy_mm: f64) -> Choice {
         let models = FORMATS.map(|(format, band)| self.with_format(accuracy_mm, format, band));
         // The number of bricks in the band over the surface is proportional to (8 + 2·band)/cell², and so are their bytes.
         let bytes =
-            |m: &ShapePlan| (8.0 + 2.0 * m.band_cells) * m.format.bytes() as f64 / (m.cell_mm * m.cell_mm);
+            |m: &Choice| (8.0 + 2.0 * m.band_cells) * m.format.bytes() as f64 / (m.cell_mm * m.cell_mm);
         let [a, b] = models;
         // Beside free-form faces the wider band is needed: gaps there have no other source than the field.
         if bytes(&b) < bytes(&a) && !self.free_form {
@@ -99,8 +140,28 @@ impl Demand {
         }
     }
 
-    fn with_format(&self, accuracy: f64, format: SampleFormat, band: f64) -> ShapePlan {
-        let base = |h: f64| step_error(h, band, format) + rounding_error(self.size_mm);
+    /// Cells to try that are larger than those of `finest`, the largest first: where exact surfaces answer, no interpolation limits them.
+    pub fn coarser(&self, finest: &Choice) -> Vec<Choice> {
+        // Few samples are interpolated in such cells, so the shorter format costs no accuracy.
+        let (format, band_cells) = FORMATS[usize::from(!self.free_form)];
+        // Faces are typically as far apart as one over the root of their number: larger cells would meet more of them than a group names.
+        let along = (CELLS_PER_FACE * (self.faces as f64).sqrt()).max(FEWEST_CELLS);
+        let cells = std::iter::successors(Some(self.size_mm / along), |cell| Some(cell / LADDER));
+        cells
+            .take_while(|&cell| cell > finest.cell_mm * 1.05)
+            .map(|cell_mm| Choice {
+                cell_mm,
+                format,
+                band_cells,
+                resolution_mm: finest.cell_mm,
+                why: "its faces, which answer in every cell".to_owned(),
+                edges: finest.edges.clone(),
+            })
+            .collect()
+    }
+
+    fn with_format(&self, accuracy: f64, format: SampleFormat, band_cells: f64) -> Choice {
+        let base = |h: f64| step_error(h, band_cells, format) + rounding_error(self.size_mm);
         let mut cell = self.walls.0;
         let mut why = self.walls.1.clone();
         let mut take = |most: f64, reason: &dyn Fn() -> String| {
@@ -132,40 +193,119 @@ impl Demand {
                 &|| format!("{words}, which fits nothing"),
             );
         }
-        let worst = |bends: &mut dyn Iterator<Item = [f64; 2]>| {
-            let errors = bends.map(|bend| interpolation_error(cell, bend));
-            errors.filter(|e| e.is_finite()).fold(0.0, f64::max) + base(cell)
-        };
-        let resolved = self.others.iter().map(|o| o.1);
-        let resolved = resolved.filter(|b| is_resolvable(FIELD_SHARE_ELSEWHERE * elsewhere, *b));
-        let patches = if self.free_form {
-            PATCH_SHARE * accuracy
+        Choice {
+            cell_mm: cell,
+            format,
+            band_cells,
+            resolution_mm: cell,
+            why,
+            edges,
+        }
+    }
+
+    /// Whether parts can touch this face: it is neither left out nor too sharp for the cells of `choice`.
+    fn counts(&self, face: u32, choice: &Choice) -> bool {
+        !self.left_out.contains(&face) && !choice.edges.contains(&face)
+    }
+
+    /// Whether the face fits another part's. Flats fit flats.
+    fn is_fit(&self, face: u32) -> bool {
+        self.flats.contains(&face) || self.fits.iter().any(|fit| fit.0 == face)
+    }
+
+    /// Largest field error that an accuracy in fits allows at a face, mm.
+    fn allowed_mm(&self, face: u32, accuracy_mm: f64) -> f64 {
+        if self.is_fit(face) {
+            FIELD_SHARE * accuracy_mm
         } else {
-            0.0
+            FIELD_SHARE_ELSEWHERE * ELSEWHERE * accuracy_mm
+        }
+    }
+
+    /// Bound of the field's error at a face away from other faces, mm: of the surfaces' rounding, where they answer, and of interpolation only where
+    /// it takes place.
+    fn bound_mm(&self, face: u32, choice: &Choice, found: &FaceError) -> f64 {
+        let rounding = rounding_error(self.size_mm);
+        let by_surfaces = SAFETY * found.by_surfaces_mm + rounding;
+        let Some(measured) = found.interpolated_mm else {
+            return by_surfaces;
         };
-        let in_fits = worst(&mut self.fits.iter().map(|f| f.1)).max(patches);
-        let field = worst(&mut self.fits.iter().map(|f| f.1).chain(resolved));
-        // The shell gets the share that the field leaves.
+        let bend = (self.fits.iter().map(|fit| (fit.0, fit.1)))
+            .chain(self.others.iter().map(|other| (other.0, other.1)))
+            .find(|(other, _)| *other == face)
+            .map_or([0.0; 2], |(_, bend)| bend);
+        let by_curvature = interpolation_error(choice.cell_mm, bend)
+            + step_error(choice.cell_mm, choice.band_cells, choice.format)
+            + rounding;
+        let interpolated = if by_curvature.is_finite() && measured <= by_curvature {
+            by_curvature
+        } else {
+            SAFETY * measured
+        };
+        by_surfaces.max(interpolated)
+    }
+
+    /// Whether a field with these measured errors is as accurate as `accuracy_mm` in fits requires at every face, edges included.
+    pub fn is_met(
+        &self,
+        accuracy_mm: f64,
+        choice: &Choice,
+        found: &[FaceError],
+        free_form: &FreeFormError,
+    ) -> bool {
+        free_form.worst_mm() <= FIELD_SHARE * accuracy_mm
+            && free_form.at_edges_mm <= FIELD_SHARE_ELSEWHERE * ELSEWHERE * accuracy_mm
+            && (0..).zip(found).all(|(face, error)| {
+                let at_edges = SAFETY * error.at_edges_mm.unwrap_or(0.0);
+                self.left_out.contains(&face)
+                    || self.bound_mm(face, choice, error).max(at_edges) <= self.allowed_mm(face, accuracy_mm)
+            })
+    }
+
+    /// The model of `choice` with the errors measured of its field, and the shell that they leave room for.
+    pub fn state(
+        &self,
+        accuracy_mm: f64,
+        choice: &Choice,
+        found: &[FaceError],
+        free_form: &FreeFormError,
+    ) -> ShapePlan {
+        let elsewhere = ELSEWHERE * accuracy_mm;
+        let bounds: Vec<(u32, f64)> = ((0..).zip(found))
+            .filter(|(face, _)| self.counts(*face, choice))
+            .map(|(face, error)| (face, self.bound_mm(face, choice, error)))
+            .collect();
+        let most = |of: &dyn Fn(u32) -> bool| {
+            let of = bounds.iter().filter(|(face, _)| of(*face));
+            of.map(|(_, bound)| *bound).fold(free_form.worst_mm(), f64::max)
+        };
+        let (in_fits, field) = (most(&|face| self.is_fit(face)), most(&|_| true));
+        let at_edges = found.iter().filter_map(|error| error.at_edges_mm);
+        let at_edges = SAFETY * at_edges.fold(0.0, f64::max);
+        // The shell gets the share that the field leaves, and half of it at least where the field needs more than its own.
+        let left = (elsewhere - field).max(FIELD_SHARE_ELSEWHERE * elsewhere);
         let difference = self.fits.iter().map(|f| f.2).fold(0.0, f64::max);
-        let mut epsilon = (elsewhere - field).min(MOST_EPSILON_CELLS * cell);
+        let mut epsilon = left.min(MOST_EPSILON_CELLS * choice.resolution_mm);
         if difference > 0.0 {
-            epsilon = epsilon.min((accuracy - in_fits) / difference);
+            epsilon =
+                epsilon.min((accuracy_mm - in_fits).max((1.0 - FIELD_SHARE) * accuracy_mm) / difference);
         }
         ShapePlan {
             name: self.name.clone(),
-            cell_mm: cell,
-            format,
-            band_cells: band,
+            cell_mm: choice.cell_mm,
+            format: choice.format,
+            band_cells: choice.band_cells,
+            reach_mm: choice.reach_mm(),
             epsilon_mm: epsilon,
             crossing_epsilon_mm: epsilon,
             field_error_in_fits_mm: in_fits,
             shell_error_in_fits_mm: epsilon * difference,
             error_elsewhere_mm: field + epsilon,
-            error_at_edges_mm: 0.0,
+            error_at_edges_mm: at_edges.max(free_form.at_edges_mm),
             faces_that_fit: faces_that_fit(&self.fits),
-            faces_taken_as_edges: edges,
+            faces_taken_as_edges: choice.edges.clone(),
             faces_left_out: self.left_out.clone(),
-            why,
+            why: choice.why.clone(),
         }
     }
 }

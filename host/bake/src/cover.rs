@@ -39,6 +39,8 @@ pub(crate) const VERIFIED: [[f64; 3]; 5] = [
     [0.25, 0.75, 0.8],
     [0.7, 0.2, 0.75],
 ];
+/// Points along a cell's edge at which a patch must have a foot.
+const ANSWERED: usize = 4;
 /// A foot whose direction is farther than this from the surface's normal is on the face's border: cosine.
 const ALONG_NORMAL: f64 = 0.9999;
 
@@ -115,6 +117,19 @@ impl LocalPatches {
     /// Patch of `face` in a cell.
     pub fn patch(&self, cell: [u32; 3], face: u16) -> Option<u16> {
         self.cells.get(&(cell, face)).copied()
+    }
+
+    /// Whether a patch has a unique foot all over the cell with the lowest corner `low`, by a lattice of its points.
+    pub fn answers(&self, patch: usize, low: DVec3, cell: f64) -> bool {
+        let Some(patch) = self.records.get(patch) else {
+            return false;
+        };
+        let steps = 0..ANSWERED * ANSWERED * ANSWERED;
+        steps.into_iter().all(|i| {
+            let place = [i % ANSWERED, i / ANSWERED % ANSWERED, i / ANSWERED / ANSWERED];
+            let share = DVec3::from_array(place.map(|i| i as f64)) / (ANSWERED - 1) as f64;
+            !board_distance(patch, low + share * cell).is_nan()
+        })
     }
 
     /// Exact samples at [`VERIFIED`] of a cell, for cells near a free-form face.

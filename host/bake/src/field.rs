@@ -1,6 +1,6 @@
 //! Sampling the exact distance into sparse bricks.
 //!
-//! Only bricks with a point within the band of the surface are stored. Trilinear interpolation of exact samples has an error of about cell²/(8R) on
+//! Only bricks with a point within the band of the surface are stored, and samples only in those in which some cell is interpolated. Trilinear interpolation of exact samples has an error of about cell²/(8R) on
 //! a cylinder of radius R and is exact on planes; samples are rounded to `scale`, which adds at most scale/2. Cost: one exact query for
 //! each of 729 samples of a stored brick, in parallel; a few queries for each empty one.
 
@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry, PatchRecord};
+use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry, NO_SAMPLES, PatchRecord};
 use rayon::prelude::*;
 
 use crate::bounds::{Class, classify};
@@ -262,10 +262,14 @@ fn pack(
             palette.extend_from_slice(run);
             (palette.len() - run.len()) as u32
         });
-        let samples = *by_bytes.entry(brick.samples).or_insert_with_key(|bytes| {
-            sample_bytes += bytes.len();
-            append_aligned(&mut blob, bytes)
-        });
+        let samples = if brick.samples.is_empty() {
+            NO_SAMPLES
+        } else {
+            *by_bytes.entry(brick.samples).or_insert_with_key(|bytes| {
+                sample_bytes += bytes.len();
+                append_aligned(&mut blob, bytes)
+            })
+        };
         let indices = if brick.index_bits == 0 {
             0
         } else {

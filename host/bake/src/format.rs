@@ -40,6 +40,17 @@ impl SampleFormat {
     }
 }
 
+/// Bricks that store samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Samples {
+    /// Those in which a reader interpolates: elsewhere it evaluates surfaces.
+    #[default]
+    WhereInterpolated,
+    /// All, so that the samples alone give the distance.
+    Everywhere,
+}
+
 /// How to sample a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOptions {
@@ -51,6 +62,8 @@ pub struct FieldOptions {
     pub format: SampleFormat,
     /// Largest error of the local patches of free-form faces, mm.
     pub patch_tolerance_mm: f64,
+    /// Bricks that store samples.
+    pub samples: Samples,
 }
 
 impl FieldOptions {

@@ -5,8 +5,8 @@ use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
-    NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY, Section,
-    ShapeRecord, oct_encode, surface_kind,
+    NO_SAMPLES, NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY,
+    Section, ShapeRecord, oct_encode, surface_kind,
 };
 
 use crate::edges::EdgePiece;
@@ -153,7 +153,10 @@ impl ImageBuilder {
             ..field.record
         });
         self.bricks.extend(field.bricks.iter().map(|b| BrickRecord {
-            samples: b.samples + blob_at,
+            samples: match b.samples {
+                NO_SAMPLES => NO_SAMPLES,
+                at => at + blob_at,
+            },
             indices: if b.index_bits == 0 { 0 } else { b.indices + blob_at },
             palette: b.palette + palette_at,
             ..*b

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::BakeError;
-use crate::format::SampleFormat;
+use crate::format::{SampleFormat, Samples};
 
 /// What to bake and how finely.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,6 +22,8 @@ pub struct BakeOptions {
     pub format: SampleFormat,
     /// Largest error of the local patches that free-form faces are divided into, mm.
     pub patch_tolerance_mm: f64,
+    /// Bricks that store samples.
+    pub samples: Samples,
     /// Kind of the pointshells.
     pub shell: PointshellKind,
     /// Bound on how much deeper a contact can be than its deepest sample, mm. `None`: a twentieth of the cell.
@@ -46,6 +48,7 @@ impl Default for BakeOptions {
             band_cells: 2.0,
             format: SampleFormat::Int16,
             patch_tolerance_mm: 2e-3,
+            samples: Samples::WhereInterpolated,
             shell: PointshellKind::ErrorBounded,
             epsilon_mm: None,
             crossing_epsilon_mm: None,

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::choice::ELSEWHERE;
 use crate::cost::TickCost;
 use crate::format::SampleFormat;
 use crate::options::Grabbable;
@@ -31,6 +32,8 @@ pub struct ShapePlan {
     pub format: SampleFormat,
     /// Depth and height to which the surface's neighbourhood is stored, cells.
     pub band_cells: f64,
+    /// Distance from the surface up to which the stated errors of the field hold, mm: touching parts are nearer than that.
+    pub reach_mm: f64,
     /// Error bound of the shell, mm.
     pub epsilon_mm: f64,
     /// Error bound of the shell where convex faces touch each other away from every edge, mm: larger only where the requested tick requires it.
@@ -41,7 +44,7 @@ pub struct ShapePlan {
     pub shell_error_in_fits_mm: f64,
     /// Largest combined error of field and shell elsewhere, mm; within a cell of sharp edges the field's error is up to half a cell.
     pub error_elsewhere_mm: f64,
-    /// Largest error measured where free-form faces meet other faces and the distance is interpolated, mm.
+    /// Largest error where the distance is interpolated within a cell of another face, mm, by measurement; 0 where surfaces answer everywhere.
     #[serde(default)]
     pub error_at_edges_mm: f64,
     /// Faces that fit another part's.
@@ -76,10 +79,31 @@ pub struct Plan {
     pub report: BakeReport,
 }
 
+impl Plan {
+    /// Largest error of field and shell where parts fit into one another, mm.
+    pub fn error_in_fits_mm(&self) -> f64 {
+        let shapes = self.shapes.iter();
+        let errors = shapes.map(|shape| shape.field_error_in_fits_mm + shape.shell_error_in_fits_mm);
+        errors.fold(0.0, f64::max)
+    }
+
+    /// Largest error of field and shell elsewhere, mm.
+    pub fn error_elsewhere_mm(&self) -> f64 {
+        let shapes = self.shapes.iter().map(|shape| shape.error_elsewhere_mm);
+        shapes.fold(0.0, f64::max)
+    }
+
+    /// Whether the stated errors are within an accuracy in fits, and [`ELSEWHERE`] times that elsewhere.
+    pub fn meets(&self, accuracy_mm: f64) -> bool {
+        let most = accuracy_mm * (1.0 + 1e-9);
+        self.error_in_fits_mm() <= most && self.error_elsewhere_mm() <= ELSEWHERE * most
+    }
+}
+
 /// Result of a request.
 #[derive(Clone, Debug)]
 pub struct Planned {
-    /// Whether the request is met: if not, this is the finest plan that fits, or, if nothing fits, the last one tried.
+    /// Whether the request is met: if not, this is the finest plan found that fits, or, if nothing fits, the smallest one.
     pub met: bool,
     /// Whether it fits flash and tick.
     pub fits: bool,

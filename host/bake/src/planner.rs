@@ -1,21 +1,26 @@
 //! The coarsest scene image that meets a request, the choices made with their reasons, and its cost.
 //!
-//! For each shape the cell, number format and shell bound follow from the requested accuracy in closed form ([`crate::accuracy`], [`crate::choice`]).
-//! The image is then made and measured. When it does not fit the flash, or the worst-case tick exceeds its budget, the accuracy is lowered until both
-//! fit, and the result is reported as the best possible. Cost: one bake; a few coarser ones when the request cannot be met.
+//! For each shape the cells of interpolation alone follow from the requested accuracy in closed form ([`crate::accuracy`], [`crate::choice`]). Where
+//! exact surfaces answer, larger cells may do: they are tried from coarse to fine, and the first whose measured error ([`crate::field_error`]) is
+//! within the bounds is compared with the next. When the image does not fit the flash, or the worst-case tick exceeds its budget, the accuracy is
+//! lowered until both fit; at last the coarsest fields are taken, whatever their error. The result is reported as the best possible. Cost: a bake of
+//! each cell tried, the finest of which takes most of the time.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use glam::DAffine3;
 use mortise_brep::{CadModel, Surface};
+use mortise_haptics::LEAST_CROSSING_SINE;
 use rayon::prelude::*;
 
-use crate::bake::{Baked, Made};
-use crate::choice::{Demand, FIELD_SHARE, PATCH_SHARE};
+use crate::bake::{Baked, Made, field_bytes};
+use crate::choice::{Choice, Demand, FIELD_SHARE, PATCH_SHARE};
 use crate::cost::TickCost;
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
+use crate::field::BakedField;
+use crate::field_error::{FaceError, field_errors};
 use crate::fits::{Fit, fits};
 use crate::options::{BakeOptions, Progress};
 use crate::placed_fits::placed_fits;
@@ -27,8 +32,8 @@ use crate::voids::{others, without_hollows};
 /// Attempts to find an accuracy that fits, and then one between that and the last that did not fit.
 const ATTEMPTS: usize = 12;
 const REFINEMENTS: usize = 3;
-/// Factor by which a scout is coarser in accuracy: it costs a sixteenth, and its bytes show whether the attempt itself cannot succeed.
-const SCOUT: f64 = 16.0;
+/// Bytes of a field grow at least with this power of the inverse cell: the bricks of a prism repeat along it.
+const LEAST_GROWTH: f64 = 1.0;
 /// Number of times the bound of crossings may be quadrupled.
 const COARSER_CROSSINGS: usize = 4;
 /// Most pairs of placed parts in which the fits of two shapes are looked for.
@@ -36,6 +41,8 @@ const MOST_PLACEMENTS: usize = 16;
 /// Attempts with a finer cell for a shape with free-form faces, and the factor between their cells.
 const FINER_CELLS: usize = 5;
 const FINER: f64 = 0.7;
+/// Smallest cell tried, mm.
+const LEAST_CELL_MM: f64 = 1e-3;
 /// Coarsest accuracy tried.
 const COARSEST_MM: f64 = 2.0;
 
@@ -56,45 +63,21 @@ pub fn plan(
         });
     }
     let mut planner = Planner::new(model, request, progress)?;
-    let scout = planner.attempt(SCOUT * request.accuracy_mm)?;
-    let mut over = scout
-        .as_ref()
-        .map_or(HOPELESS, |s| planner.expected(s, request.accuracy_mm));
-    let mut last = None;
-    if over.bytes <= 1.0
-        && let Some(asked) = planner.attempt(request.accuracy_mm)?
-    {
-        over = planner.over(&asked);
-        if over.fits() {
-            let met = asked.plan.shapes.iter().all(|shape| {
-                shape.field_error_in_fits_mm + shape.shell_error_in_fits_mm
-                    <= request.accuracy_mm * (1.0 + 1e-9)
-            });
-            return Ok(asked.into_planned(met, true));
-        }
-        last = Some(asked);
-    }
     let (mut failed, mut accuracy) = (request.accuracy_mm, request.accuracy_mm);
-    let mut best = None;
-    for _ in 0..ATTEMPTS {
-        failed = accuracy;
-        accuracy *= over.coarser();
+    let (mut best, mut last) = (None, None);
+    for _ in 0..=ATTEMPTS {
         let attempt = planner.attempt(accuracy)?;
-        over = attempt.as_ref().map_or(HOPELESS, |a| planner.over(a));
+        let over = attempt.as_ref().map_or(HOPELESS, |a| planner.over(a));
         if over.fits() {
             best = attempt;
             break;
         }
-        let cells = |a: &Attempt| a.plan.shapes.iter().map(|s| s.cell_mm).collect::<Vec<_>>();
-        // Walls and slots limit the cells: a lower accuracy does not make them larger.
-        let stuck = attempt
-            .as_ref()
-            .zip(last.as_ref())
-            .is_some_and(|(a, b)| cells(a) == cells(b));
         last = attempt.or(last);
-        if stuck || accuracy > COARSEST_MM {
+        if accuracy > COARSEST_MM {
             break;
         }
+        failed = accuracy;
+        accuracy *= over.coarser();
     }
     for _ in 0..REFINEMENTS {
         if best.is_none() || accuracy < 1.1 * failed {
@@ -108,13 +91,22 @@ pub fn plan(
             failed = between;
         }
     }
+    if best.is_none() {
+        let smallest = planner.smallest(COARSEST_MM)?;
+        if smallest.as_ref().is_some_and(|a| planner.over(a).fits()) {
+            best = smallest;
+        } else {
+            last = smallest.or(last);
+        }
+    }
     let fits = best.is_some();
-    let reported = best.or(last).or(scout).ok_or(BakeError::TooLarge {
+    let reported = best.or(last).ok_or(BakeError::TooLarge {
         bytes: u64::from(u32::MAX),
         limit: request.flash_bytes,
         enough_mm: accuracy,
     })?;
-    Ok(reported.into_planned(false, fits))
+    let met = fits && reported.plan.meets(request.accuracy_mm);
+    Ok(reported.into_planned(met, fits))
 }
 
 /// Size and cost of an attempt as multiples of their limits.
@@ -151,8 +143,34 @@ struct Planner<'a> {
     scene: Scene,
     prepared: Vec<ExactSurface>,
     demands: Vec<Demand>,
+    /// Fields baked so far of each shape.
+    known: Vec<Vec<Fielded>>,
     /// Fits of shapes that can meet.
     fits: Vec<((usize, usize), Vec<Fit>)>,
+}
+
+/// A field with its errors.
+#[derive(Clone)]
+struct Fielded {
+    choice: Choice,
+    /// Tolerance of its local patches, mm.
+    tolerance_mm: f64,
+    /// Reach of the places at which its errors were measured, mm.
+    reach_mm: f64,
+    errors: Vec<FaceError>,
+    baked: BakedField,
+}
+
+impl Fielded {
+    fn bytes(&self) -> u64 {
+        field_bytes(&self.baked)
+    }
+}
+
+/// Whether a field with this cell takes more than `room` bytes, to judge by the field of a larger one.
+fn is_hopeless(coarser: Option<&Fielded>, cell_mm: f64, room: u64) -> bool {
+    let bytes = |field: &Fielded| field.bytes() as f64 * (field.choice.cell_mm / cell_mm).powf(LEAST_GROWTH);
+    coarser.is_some_and(|field| bytes(field) > room as f64)
 }
 
 struct Attempt {
@@ -235,31 +253,165 @@ impl<'a> Planner<'a> {
             request,
             progress,
             scene,
+            known: vec![Vec::new(); prepared.len()],
             prepared,
             demands,
             fits: all,
         })
     }
 
-    /// Bakes for `accuracy_mm`; `None` when the layout cannot hold the result.
+    /// Bakes for `accuracy_mm`; `None` when the layout or the flash cannot hold the result.
     fn attempt(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
-        let mut shapes: Vec<ShapePlan> = self.demands.iter().map(|d| d.choose(accuracy_mm)).collect();
-        let mut each: Vec<BakeOptions> = shapes
-            .iter()
-            .map(|shape| self.options(shape, accuracy_mm))
-            .collect();
-        let cells: Vec<f64> = shapes.iter().map(|shape| shape.cell_mm).collect();
-        if cells.iter().any(|&cell| cell < 1e-3) {
+        let mut fields: Vec<Fielded> = Vec::new();
+        for shape in 0..self.prepared.len() {
+            let used: u64 = fields.iter().map(Fielded::bytes).sum();
+            let room = self.request.flash_bytes.saturating_sub(used);
+            match self.field(shape, accuracy_mm, room)? {
+                Some(field) => fields.push(field),
+                None => return Ok(None),
+            }
+        }
+        self.assemble(accuracy_mm, fields)
+    }
+
+    /// The smallest field found of each shape, whatever its error.
+    fn smallest(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
+        let mut fields = Vec::new();
+        for shape in 0..self.prepared.len() {
+            let finest = self.demands[shape].choose(accuracy_mm);
+            let mut smallest: Option<Fielded> = None;
+            for choice in self.demands[shape].coarser(&finest) {
+                let Some(next) = self.tried(shape, &choice, accuracy_mm)? else {
+                    break;
+                };
+                if smallest.as_ref().is_none_or(|s| next.bytes() < s.bytes()) {
+                    smallest = Some(next);
+                }
+            }
+            match smallest {
+                Some(field) => fields.push(field),
+                None => return Ok(None),
+            }
+        }
+        self.assemble(accuracy_mm, fields)
+    }
+
+    /// The smallest field of a shape found that is as accurate as `accuracy_mm` requires; `None` when it would take more than `room` bytes.
+    fn field(&mut self, shape: usize, accuracy_mm: f64, room: u64) -> Result<Option<Fielded>, BakeError> {
+        let finest = self.demands[shape].choose(accuracy_mm);
+        let met = |planner: &Self, field: &Fielded| {
+            planner.demands[shape].is_met(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
+        };
+        let mut before: Option<Fielded> = None;
+        for choice in self.demands[shape].coarser(&finest) {
+            if is_hopeless(before.as_ref(), choice.cell_mm, room) {
+                return Ok(None);
+            }
+            let Some(field) = self.tried(shape, &choice, accuracy_mm)? else {
+                return Ok(None);
+            };
+            if let Some(coarser) = before.take().filter(|coarser| met(self, coarser)) {
+                let smaller = field.bytes() < coarser.bytes() && met(self, &field);
+                return Ok(Some(if smaller { field } else { coarser }));
+            }
+            before = Some(field);
+        }
+        if let Some(coarser) = before.as_ref().filter(|coarser| met(self, coarser)) {
+            return Ok(Some(coarser.clone()));
+        }
+        if is_hopeless(before.as_ref(), finest.cell_mm, room) {
             return Ok(None);
         }
-        let mut made = match self
+        let Some(mut field) = self.tried(shape, &finest, accuracy_mm)? else {
+            return Ok(None);
+        };
+        for _ in 0..FINER_CELLS {
+            // Bytes grow at most with the inverse square of the cell.
+            let full = field.bytes() as f64 > FINER * FINER * room as f64;
+            if full || field.baked.free_form.worst_mm() <= FIELD_SHARE * accuracy_mm {
+                break;
+            }
+            let choice = Choice {
+                cell_mm: field.choice.cell_mm * FINER,
+                why: "its free-form faces".to_owned(),
+                ..field.choice.clone()
+            };
+            match self.tried(shape, &choice, accuracy_mm)? {
+                Some(finer) => field = finer,
+                None => break,
+            }
+        }
+        Ok(Some(field))
+    }
+
+    /// The field of a shape by this choice and its errors; `None` when the layout cannot hold it.
+    fn tried(
+        &mut self,
+        shape: usize,
+        choice: &Choice,
+        accuracy_mm: f64,
+    ) -> Result<Option<Fielded>, BakeError> {
+        let tolerance_mm = PATCH_SHARE * accuracy_mm;
+        let reach_mm = choice.reach_mm();
+        let same = |field: &&mut Fielded| {
+            field.choice.cell_mm == choice.cell_mm
+                && field.choice.format == choice.format
+                && (field.tolerance_mm == tolerance_mm || field.baked.patches.is_empty())
+        };
+        if let Some(known) = self.known[shape].iter_mut().find(same) {
+            if known.reach_mm < reach_mm {
+                known.errors = field_errors(&self.prepared[shape], &known.baked, reach_mm);
+                known.reach_mm = reach_mm;
+            }
+            return Ok(Some(Fielded {
+                choice: choice.clone(),
+                ..known.clone()
+            }));
+        }
+        if choice.cell_mm < LEAST_CELL_MM {
+            return Ok(None);
+        }
+        let options = BakeOptions {
+            cell_mm: Some(choice.cell_mm),
+            band_cells: choice.band_cells,
+            format: choice.format,
+            patch_tolerance_mm: tolerance_mm,
+            ..BakeOptions::default()
+        };
+        let surface = &mut self.prepared[shape];
+        let mut cell_mm = choice.cell_mm;
+        let baked = match self
             .scene
-            .fields_and_shells(&each, &mut self.prepared, cells, self.progress)
+            .field(shape, surface, &mut cell_mm, &options, self.progress)
         {
             Err(BakeError::CellTooSmall { .. }) => return Ok(None),
-            made => made?,
+            done => done?,
         };
-        self.refine_free_forms(accuracy_mm, &mut shapes, &each, &mut made)?;
+        let field = Fielded {
+            choice: choice.clone(),
+            tolerance_mm,
+            reach_mm,
+            errors: field_errors(surface, &baked, reach_mm),
+            baked,
+        };
+        self.known[shape].push(field.clone());
+        Ok(Some(field))
+    }
+
+    /// The image with these fields, and shells as fine as the fields leave room for; `None` when the layout cannot hold it.
+    fn assemble(&self, accuracy_mm: f64, fielded: Vec<Fielded>) -> Result<Option<Attempt>, BakeError> {
+        let mut shapes: Vec<ShapePlan> = (self.demands.iter().zip(&fielded))
+            .map(|(demand, field)| {
+                demand.state(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
+            })
+            .collect();
+        let mut each: Vec<BakeOptions> = shapes.iter().map(|shape| self.options(shape)).collect();
+        let sizes: Vec<f64> = fielded.iter().map(|field| field.choice.resolution_mm).collect();
+        let mut made = Made {
+            fields: fielded.into_iter().map(|field| field.baked).collect(),
+            shells: Vec::new(),
+        };
+        self.scene.shells_again(&each, &self.prepared, &sizes, &mut made);
         let mut ticks = self.ticks(&made);
         // Points inside cylinders and cones serve crossed shafts only, and are most of the points in a fit: they are reduced first.
         for _ in 0..COARSER_CROSSINGS {
@@ -273,7 +425,7 @@ impl<'a> Planner<'a> {
                 shape.crossing_epsilon_mm *= 4.0;
                 options.crossing_epsilon_mm = Some(shape.crossing_epsilon_mm);
             }
-            self.scene.shells_again(&each, &self.prepared, &mut made);
+            self.scene.shells_again(&each, &self.prepared, &sizes, &mut made);
             ticks = self.ticks(&made);
         }
         let baked = match self.scene.assemble(self.model, &each, &self.prepared, made) {
@@ -290,46 +442,15 @@ impl<'a> Planner<'a> {
         Ok(Some(Attempt { baked, plan }))
     }
 
-    /// Makes the cells of free-form shapes smaller until their field is as accurate as asked, or the flash is full; states the measured error.
-    fn refine_free_forms(
-        &mut self,
-        accuracy_mm: f64,
-        shapes: &mut [ShapePlan],
-        each: &[BakeOptions],
-        made: &mut Made,
-    ) -> Result<(), BakeError> {
-        for (i, shape) in shapes.iter_mut().enumerate() {
-            for _ in 0..FINER_CELLS {
-                // Bytes grow at most with the inverse square of the cell.
-                let full = made.bytes() as f64 > FINER * FINER * self.request.flash_bytes as f64;
-                if full || made.fields[i].free_form.worst_mm() <= FIELD_SHARE * accuracy_mm {
-                    break;
-                }
-                let cell = shape.cell_mm * FINER;
-                let surface = &mut self.prepared[i];
-                match self.scene.again(i, &each[i], surface, cell, self.progress, made) {
-                    Err(BakeError::CellTooSmall { .. }) => break,
-                    done => done?,
-                }
-                shape.cell_mm = cell;
-                "its free-form faces".clone_into(&mut shape.why);
-            }
-            let measured = made.fields[i].free_form;
-            shape.field_error_in_fits_mm = shape.field_error_in_fits_mm.max(measured.worst_mm());
-            shape.error_elsewhere_mm = shape.error_elsewhere_mm.max(shape.field_error_in_fits_mm);
-            shape.error_at_edges_mm = measured.at_edges_mm;
-        }
-        Ok(())
-    }
-
-    fn options(&self, shape: &ShapePlan, accuracy_mm: f64) -> BakeOptions {
+    fn options(&self, shape: &ShapePlan) -> BakeOptions {
         BakeOptions {
             cell_mm: Some(shape.cell_mm),
             band_cells: shape.band_cells,
             format: shape.format,
-            patch_tolerance_mm: PATCH_SHARE * accuracy_mm,
             epsilon_mm: Some(shape.epsilon_mm),
             crossing_epsilon_mm: Some(shape.crossing_epsilon_mm),
+            // Halfway between two points, an edge that crosses at less than this angle is off by half of their distance times its sine.
+            max_spacing_mm: Some(2.0 * shape.epsilon_mm / f64::from(LEAST_CROSSING_SINE)),
             grabbable: self.request.grabbable.clone(),
             ..BakeOptions::default()
         }
@@ -341,24 +462,6 @@ impl<'a> Planner<'a> {
         Over {
             bytes: attempt.baked.image.len() as f64 / self.request.flash_bytes.max(1) as f64,
             instructions: allowed.map_or(0.0, |most| worst as f64 / most.max(1) as f64),
-        }
-    }
-
-    /// Minimum requirement of an attempt at `accuracy_mm`, extrapolated from a coarser one: the bricks of a prism repeat along it, so bytes grow at
-    /// least with the inverse of the cell. A fifth is subtracted as a margin.
-    fn expected(&self, coarser: &Attempt, accuracy_mm: f64) -> Over {
-        let shapes = coarser.plan.report.shapes.iter().zip(&coarser.plan.shapes);
-        let bytes: f64 = shapes
-            .zip(&self.demands)
-            .map(|((made, before), demand)| {
-                let after = demand.choose(accuracy_mm);
-                let samples = made.bytes.samples as f64 * (before.cell_mm / after.cell_mm).max(1.0);
-                samples * after.format.bytes() as f64 / before.format.bytes() as f64
-            })
-            .sum();
-        Over {
-            bytes: 0.8 * bytes / self.request.flash_bytes.max(1) as f64,
-            ..self.over(coarser)
         }
     }
 

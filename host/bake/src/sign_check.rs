@@ -30,7 +30,7 @@ use serde::Serialize;
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::bake_field;
-use crate::format::{FieldOptions, SampleFormat};
+use crate::format::{FieldOptions, SampleFormat, Samples};
 use crate::grid::bounding_box;
 use crate::image::{ImageBuilder, PartPlacement};
 use crate::shell::Pointshell;
@@ -149,6 +149,7 @@ pub fn check_signs(
         band_cells: 2.0,
         format: SampleFormat::Int16,
         patch_tolerance_mm: 2e-3,
+        samples: Samples::Everywhere,
     };
     let baked = bake_field(&mut surface, &field, "part", &|_, _| ControlFlow::Continue(()))?;
     let cell_mm = f64::from(baked.record.cell) * 1000.0;

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use common::*;
 use glam::{DAffine3, DVec3};
-use mortise_bake::{BakeOptions, BakeReport, SampleFormat, bake};
+use mortise_bake::{BakeOptions, BakeReport, SampleFormat, Samples, bake};
 use mortise_brep::Shape;
 use mortise_protocol::image::{Field, Lookup, SceneImage};
 use proptest::prelude::*;
@@ -25,6 +25,7 @@ impl Baked {
             cell_mm: Some(cell_mm),
             format,
             band_cells,
+            samples: Samples::Everywhere,
             image_limit_bytes: 16 << 20,
             ..BakeOptions::default()
         };

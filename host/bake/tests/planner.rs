@@ -1,7 +1,7 @@
 //! The planner meets the accuracy it states, and gives no more than requested.
 //!
-//! Accuracy: the image's own query, as the board runs it, is compared with the exact surface at random points near faces, farther from any edge than
-//! a cell. Near edges the documented half cell is checked instead.
+//! Accuracy: the image's own query, as the board runs it, is compared with the exact surface at random points near faces. Where a distance is
+//! interpolated next to an edge, the documented half cell is checked instead.
 
 mod common;
 
@@ -12,7 +12,8 @@ use common::*;
 use glam::{DAffine3, DVec3};
 use mortise_bake::{ExactSurface, Grabbable, Planned, Request, plan};
 use mortise_brep::{CadModel, Surface, load_step};
-use mortise_protocol::image::{Lookup, SceneImage};
+use mortise_haptics::{Pose, Prober, Settings, Vec3, rendered_distance};
+use mortise_protocol::image::{Lookup, Nearby, SceneImage};
 
 fn request(accuracy_um: f64, flash_kib: u64) -> Request {
     Request {
@@ -42,7 +43,7 @@ fn pair() -> CadModel {
     ])
 }
 
-/// Number of points compared; worst error over the stated one where the shape fits and elsewhere; near edges the worst error in cells.
+/// Number of points compared; worst error over the stated one where the shape fits and elsewhere; interpolated next to edges the worst error in cells.
 #[derive(Debug, Default)]
 struct Found {
     points: usize,
@@ -65,8 +66,7 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
             .unwrap();
         let shape = &model.shapes[model.parts[part.model_part].shape];
         let surface = ExactSurface::new(shape);
-        let field = image.shape(number).field;
-        let cell = own.cell_mm;
+        let board = image.shape(number);
         let triangles = &shape.mesh.triangles;
         for i in 0..tries {
             let r = |k: f64| (i as f64 * k + 0.37).fract();
@@ -80,34 +80,43 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
                 r(0.819_172_513) - 0.5,
                 r(0.671_043_607) - 0.5,
                 r(0.549_700_478) - 0.5,
-            ) * 0.28
-                * cell;
+            ) * 1.12
+                * own.reach_mm;
             // Position as the board receives it.
             let at = ((a + (b - a) * x + (c - a) * y + aside) / 1000.0).as_vec3();
             let p = at.as_dvec3() * 1000.0;
             let exact = surface.nearest(p).unwrap();
-            if exact.distance.abs() > 0.25 * cell || own.faces_left_out.contains(&exact.face) {
+            if exact.distance.abs() > own.reach_mm || own.faces_left_out.contains(&exact.face) {
                 continue;
             }
-            let Lookup::Near(sample) = field.lookup(at.to_array()) else {
+            let Some(answer) = rendered_distance(&board, Vec3::from_array(at.to_array())) else {
                 panic!(
-                    "{}: no samples at {p}, {} mm from the surface",
+                    "{}: nothing stored at {p}, {} mm from the surface",
                     own.name, exact.distance
                 );
             };
-            let error = (f64::from(sample.distance) * 1000.0 - exact.distance).abs();
+            let distance = f64::from(answer.distance) * 1000.0;
+            let error = match answer.nearby {
+                // Beside an edge surfaces give a bound: of the right sign, and no larger.
+                Nearby::Convex(_) | Nearby::Reentrant(_)
+                    if !answer.interpolated && distance * exact.distance > 0.0 =>
+                {
+                    (distance.abs() - exact.distance.abs()).max(0.0)
+                }
+                _ => (distance - exact.distance).abs(),
+            };
             let kind = &shape.faces[exact.face as usize].surface;
             let corners = (0..8).map(|k| {
                 let side = DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0;
-                surface.nearest(p + side * cell).unwrap()
+                surface.nearest(p + side * own.cell_mm).unwrap()
             });
-            let one_face = corners.into_iter().all(|n| n.face == exact.face);
-            let clear = one_face
-                && !matches!(kind, Surface::Spline)
-                && !own.faces_taken_as_edges.contains(&exact.face)
-                && edge_distance(shape, p) > 2.0 * cell;
+            let clear = !answer.interpolated
+                || (corners.into_iter().all(|n| n.face == exact.face)
+                    && !matches!(kind, Surface::Spline)
+                    && !own.faces_taken_as_edges.contains(&exact.face)
+                    && edge_distance(shape, p) > 2.0 * own.cell_mm);
             if !clear {
-                found.edges_cells = found.edges_cells.max(error / cell);
+                found.edges_cells = found.edges_cells.max(error / own.cell_mm);
                 continue;
             }
             found.points += 1;
@@ -119,9 +128,10 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
             };
             assert!(
                 error <= bound + 1e-9,
-                "{}: {error} mm at {p} on face {} ({kind:?}), promised {bound}",
+                "{}: {error} mm at {p} on face {} ({kind:?}), promised {bound}, {answer:?}, exact {}",
                 own.name,
-                exact.face
+                exact.face,
+                exact.distance
             );
             let ratio = error / bound;
             if fits {
@@ -154,12 +164,11 @@ fn a_pair_is_as_accurate_as_asked() {
         for shape in &planned.plan.shapes {
             assert!(shape.field_error_in_fits_mm + shape.shell_error_in_fits_mm <= accuracy / 1000.0 + 1e-12);
             assert!(shape.error_elsewhere_mm <= 10.0 * accuracy / 1000.0 + 1e-12);
-            assert!(shape.why.contains("fits"), "{}", shape.why);
         }
         let found = check_promise(&model, &planned, 10_000);
         println!("{accuracy} µm: {} bytes, {found:?}", planned.image.len());
         // The stated accuracy is not trivially loose: a good part of it is used.
-        assert!(found.points > 4_000 && found.in_fits > 0.5, "{found:?}");
+        assert!(found.points > 4_000 && found.in_fits > 0.2, "{found:?}");
     }
 }
 
@@ -167,37 +176,92 @@ fn a_pair_is_as_accurate_as_asked() {
 fn scene_p_is_as_accurate_as_asked() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../lab/data/scene_p.step");
     let model = load_step(file).unwrap();
-    let planned = run(&model, &request(5.0, 1024));
-    assert!(planned.met && planned.image.len() <= 512 << 10);
-    let found = check_promise(&model, &planned, 10_000);
-    println!("{} bytes, {found:?}", planned.image.len());
-    assert!(found.points > 5_000);
+    for (accuracy, kib) in [(5.0, 32), (20.0, 20)] {
+        let planned = run(&model, &request(accuracy, 512));
+        assert!(planned.met && planned.image.len() <= kib << 10);
+        let found = check_promise(&model, &planned, 10_000);
+        println!("{accuracy} µm: {} bytes, {found:?}", planned.image.len());
+        assert!(found.points > 5_000);
+    }
 }
 
-/// A coarser request gives a smaller image, no finer than requested.
+/// Random pegs in holes: the gap at random offsets errs by no more than the plan states, and the plan states little more than that.
+#[test]
+fn stated_errors_bound_those_of_random_fits() {
+    let mut over = Vec::new();
+    for i in 0..24 {
+        let r = |k: f64| ((i as f64 + 0.5) * k).fract();
+        let radius = 3.0 + 15.0 * r(0.898_654);
+        let clearance = 0.01 * 30f64.powf(r(0.807_578));
+        let accuracy = 2.0 * 25f64.powf(r(0.725_732));
+        let (height, beside) = (10.0 + 40.0 * r(0.652_182), 5.0 + 20.0 * r(0.586_086));
+        let block = block_with_hole(
+            [radius + beside, radius + 0.7 * beside],
+            height,
+            radius + clearance,
+            48,
+        );
+        let scene = model(vec![
+            ("block", block, DAffine3::IDENTITY),
+            (
+                "peg",
+                peg(radius, 2.0 * height, 48),
+                DAffine3::from_translation(DVec3::Z * 200.0),
+            ),
+        ]);
+        let planned = run(&scene, &request(accuracy, 512));
+        assert!(planned.met, "{i}");
+        check_promise(&scene, &planned, 1_000);
+        let aligned = AlignedBytes::new(&planned.image);
+        let image = SceneImage::open(aligned.bytes()).unwrap();
+        let stated = 1000.0 * planned.plan.error_in_fits_mm();
+        let mut prober = Prober::new();
+        let mut worst = 0.0f64;
+        for k in 0..80 {
+            let u = |step: f64| ((f64::from(k) + 0.5) * step).fract();
+            let (by, angle) = (clearance * u(0.754_878), std::f64::consts::TAU * u(0.569_840));
+            let at = DVec3::new(by * angle.cos(), by * angle.sin(), -0.5 * height) / 1000.0;
+            let pose = Pose::from_arrays(at.as_vec3().to_array(), [0.0, 0.0, 0.0, 1.0]);
+            let found = prober
+                .probe(&image, 1, 0, &pose, &Settings::default().contact)
+                .unwrap();
+            let gap = 1000.0 * f64::from(found.nearest.distance_m);
+            worst = worst.max(1000.0 * (gap - (clearance - by)).abs());
+        }
+        // Positions are rounded to single precision.
+        assert!(
+            worst <= stated + 0.05,
+            "{i}: gap errs by {worst} µm, stated {stated}"
+        );
+        over.push(stated / (2.0 * worst + 1.0));
+    }
+    over.sort_by(f64::total_cmp);
+    println!("stated over twice the measured error and a micrometre: {over:.2?}");
+    assert!(over[over.len() / 2] <= 1.0, "{over:?}");
+}
+
+/// A coarser request gives a smaller image.
 #[test]
 fn bytes_follow_the_accuracy() {
     let bytes = |accuracy: f64| run(&pair(), &request(accuracy, 8192)).image.len();
     let [fine, middle, coarse] = [2.0, 8.0, 32.0].map(bytes);
     assert!(coarse < middle && middle < fine, "{fine} {middle} {coarse}");
-    // A quarter of the accuracy is half the cell: between twice and four times the bricks.
-    assert!(fine as f64 > 1.7 * middle as f64 && (fine as f64) < 4.5 * middle as f64);
 }
 
 /// An impossible request returns the best possible plan.
 #[test]
 fn the_best_there_is_for_the_flash() {
     let model = pair();
-    let planned = run(&model, &request(1.0, 200));
+    let planned = run(&model, &request(1.0, 16));
     assert!(!planned.met && planned.fits);
-    assert!(planned.image.len() <= 200 << 10);
+    assert!(planned.image.len() <= 16 << 10);
     let best = 1000.0 * planned.plan.accuracy_mm;
     assert!(best > 1.0);
     // Half as fine again no longer fits.
     let finer = run(&model, &request(best / 1.5, 8192));
-    assert!(finer.image.len() > 200 << 10, "{best}: {}", finer.image.len());
+    assert!(finer.image.len() > 16 << 10, "{best}: {}", finer.image.len());
     // Only this much is guaranteed: bytes are not a smooth function, because repeating bricks come and go.
-    let asked = run(&model, &request(best, 200));
+    let asked = run(&model, &request(best, 16));
     assert!(asked.met, "{best}");
 }
 
@@ -255,10 +319,11 @@ fn hollows_are_left_out() {
         ]);
         let planned = run(&model, &request(20.0, 4096));
         let aligned = AlignedBytes::new(&planned.image);
-        let field = SceneImage::open(aligned.bytes()).unwrap().shape(0).field;
-        let inside = match field.lookup([0.0, 0.0, 0.03]) {
+        let case = SceneImage::open(aligned.bytes()).unwrap().shape(0);
+        let center = Vec3::new(0.0, 0.0, 0.03);
+        let inside = match case.field.lookup(center.to_array()) {
             Lookup::Far { inside, .. } => inside,
-            Lookup::Near(sample) => sample.distance < 0.0,
+            Lookup::Near(_) => rendered_distance(&case, center).is_some_and(|found| found.distance < 0.0),
         };
         (
             planned.plan.shapes[0].faces_left_out.clone(),

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::*;
 use glam::{DAffine3, DQuat, DVec3};
-use mortise_bake::{BakeError, BakeOptions, Baked, Grabbable, SampleFormat, Stage, bake};
+use mortise_bake::{BakeError, BakeOptions, Baked, Grabbable, SampleFormat, Samples, Stage, bake};
 use mortise_brep::{CadModel, Shape};
 use mortise_protocol::image::{PART_GRABBABLE, SHAPE_LEAKY, SceneImage};
 
@@ -78,7 +78,7 @@ fn the_pair_fits_half_a_megabyte() {
 /// A smaller limit gives coarser cells, and most of the allowed bytes are used.
 #[test]
 fn free_cells_fill_the_room_there_is() {
-    for limit in [100 << 10, 220 << 10] {
+    for limit in [48 << 10, 90 << 10] {
         let options = BakeOptions {
             image_limit_bytes: limit,
             ..BakeOptions::default()
@@ -239,10 +239,10 @@ fn what_cannot_be_baked_is_refused_in_one_line() {
         (
             BakeOptions {
                 cell_mm: Some(0.5),
-                image_limit_bytes: 100_000,
+                image_limit_bytes: 50_000,
                 ..BakeOptions::default()
             },
-            "does not fit into 100000",
+            "does not fit into 50000",
         ),
         (
             BakeOptions {
@@ -286,7 +286,11 @@ fn progress_is_reported_and_can_stop() {
 #[test]
 fn bytes_go_with_the_format() {
     let bytes = |format: SampleFormat| {
-        let options = BakeOptions { format, ..coarse() };
+        let options = BakeOptions {
+            format,
+            samples: Samples::Everywhere,
+            ..coarse()
+        };
         run(&pair(), &options).unwrap().report.shapes[0].bytes.samples as f64
     };
     let ratio = bytes(SampleFormat::Int16) / bytes(SampleFormat::Int8);

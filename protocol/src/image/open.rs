@@ -225,9 +225,11 @@ impl<'a> SceneImage<'a> {
                 && run(self.bricks, field.first_brick, field.brick_count)
                     .iter()
                     .all(|b| {
-                        b.samples.is_multiple_of(4)
-                            && brick_bytes(field.format)
-                                .is_some_and(|n| fits(b.samples, n as u32, self.blob.len()))
+                        let needs_none = b.samples == NO_SAMPLES && field.format != FORMAT_OCCUPANCY;
+                        needs_none
+                            || b.samples.is_multiple_of(4)
+                                && brick_bytes(field.format)
+                                    .is_some_and(|n| fits(b.samples, n as u32, self.blob.len()))
                     })
         })?;
         each(self.bricks, SECTION_BRICKS, |brick| {
@@ -264,6 +266,7 @@ impl<'a> SceneImage<'a> {
                     index: index as u32,
                 });
             }
+            self.check_bricks_without_samples(shape)?;
         }
         each(self.patches, SECTION_PATCHES, |patch| {
             finite(&patch.origin) && finite(&patch.x) && finite(&patch.normal) && finite(&patch.height)
@@ -274,6 +277,49 @@ impl<'a> SceneImage<'a> {
                 && finite(&face.axis)
                 && finite(&[face.sense, face.radius, face.second])
         })
+    }
+
+    /// Whether every cell of a brick without samples names surfaces of `shape` that give its distance: faces with a closed form, or patches.
+    fn check_bricks_without_samples(&self, shape: &ShapeRecord) -> Result<(), ImageError> {
+        let field = &self.fields[shape.field as usize];
+        let bricks = run(self.bricks, field.first_brick, field.brick_count);
+        let faces = run(self.faces, shape.first_face, shape.face_count);
+        let gives = |surface: u16| match faces.get(usize::from(surface)) {
+            Some(face) => face.kind != surface_kind::OTHER,
+            None => u32::from(surface) - shape.face_count < shape.patch_count,
+        };
+        for (number, brick) in bricks.iter().enumerate() {
+            if brick.samples != NO_SAMPLES {
+                continue;
+            }
+            let palette = &self.palette[brick.palette as usize..];
+            let answers = |index: u8| {
+                let entry = palette.get(usize::from(index));
+                let entry = entry.filter(|_| u16::from(index) < brick.palette_len);
+                let group = |at: u16| Group::read(palette.get(usize::from(at)..)?);
+                match entry.map(|&bits| Nearby::from_bits(bits, group)) {
+                    Some(Nearby::Face(surface)) => gives(surface),
+                    Some(Nearby::Convex(group) | Nearby::Reentrant(group)) => {
+                        group.faces().all(|(surface, _)| gives(surface))
+                    }
+                    Some(Nearby::Unknown | Nearby::Roughly(_)) | None => false,
+                }
+            };
+            let indices = self.blob.get(brick.indices as usize..).unwrap_or(&[]);
+            let good = match brick.index_bits {
+                0 => answers(0),
+                4 => (indices.iter().take(CELLS_PER_BRICK / 2))
+                    .all(|pair| answers(pair & 15) && answers(pair >> 4)),
+                _ => indices.iter().take(CELLS_PER_BRICK).all(|&index| answers(index)),
+            };
+            if !good {
+                return Err(ImageError::Record {
+                    section: SECTION_BRICKS,
+                    index: field.first_brick + number as u32,
+                });
+            }
+        }
+        Ok(())
     }
 }
 

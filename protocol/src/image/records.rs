@@ -184,7 +184,7 @@ impl FieldRecord {
 /// lower bound of the distance to the surface (in a voxmap: to a surface voxel) from anywhere in the brick's volume, in cells, rounded down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridEntry {
-    /// Samples are stored.
+    /// The surface may be near.
     Brick(u16),
     /// No surface nearby.
     Empty {
@@ -376,11 +376,14 @@ impl Nearby {
     }
 }
 
+/// [`BrickRecord::samples`] of a brick without samples.
+pub const NO_SAMPLES: u32 = u32::MAX;
+
 /// One brick of a field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BrickRecord {
-    /// Byte offset in the blob of its 9³ samples, or 8³ voxels; a multiple of 4.
+    /// Byte offset in the blob of its 9³ samples, or 8³ voxels; a multiple of 4. [`NO_SAMPLES`]: none, because surfaces answer in every cell.
     pub samples: u32,
     /// Byte offset in the blob of its 8³ palette indices (`index_bits` each, low nibble first); unused when `index_bits` is 0.
     pub indices: u32,

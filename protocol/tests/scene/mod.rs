@@ -34,7 +34,8 @@ impl Aligned {
 /// The scene's bytes.
 ///
 /// Shape 0: the half-space z < 4 mm in one 16-bit brick of 1 mm cells, under an empty one; face 0 for x < 4 mm, face 1 beyond.
-/// Shape 1: a plane at x = 2 mm in two 8-bit bricks, one with a single face, one with a byte for each cell.
+/// Shape 1: a plane at x = 2 mm in two 8-bit bricks, one with a single face, one with a byte for each cell; beyond them a brick without samples, in
+/// which a cylinder answers.
 /// Three parts: two place shape 0, one of them turned a quarter about z and grabbable; one places shape 1.
 pub fn bytes() -> Vec<u8> {
     let mut blob = Vec::new();
@@ -76,6 +77,13 @@ pub fn bytes() -> Vec<u8> {
             index_bits: if number == 1 { 8 } else { 0 },
         });
     }
+    bricks.push(BrickRecord {
+        samples: NO_SAMPLES,
+        indices: 0,
+        palette: 5,
+        palette_len: 1,
+        index_bits: 0,
+    });
     let mut palette = vec![0, 1, 0, 1, NO_FACE, 1];
     palette.resize(6 + 256, NO_FACE);
     let empty = GridEntry::Empty {
@@ -87,6 +95,7 @@ pub fn bytes() -> Vec<u8> {
         empty,
         GridEntry::Brick(0),
         GridEntry::Brick(1),
+        GridEntry::Brick(2),
     ]
     .map(GridEntry::to_bits);
     let field = |format: u16, scale: f32, band: f32, dims: [u16; 3], first: u32, count: u32| FieldRecord {
@@ -102,7 +111,7 @@ pub fn bytes() -> Vec<u8> {
     };
     let fields = [
         field(FORMAT_I16, 0.001 / 4096.0, 0.0079, [1, 1, 2], 0, 1),
-        field(FORMAT_I8, 0.0001, 0.0127, [2, 1, 1], 1, 2),
+        field(FORMAT_I8, 0.0001, 0.0127, [3, 1, 1], 1, 3),
     ];
     let point = |position: [f32; 3], face: u16, edge_face: u16| PointRecord {
         position,

@@ -16,7 +16,7 @@ use crate::math::vector::quick_length;
 
 /// Sine of the smallest angle between edges that cross. Points along the edges find those more nearly parallel: halfway between two points 5 mm apart
 /// they err by 13 µm.
-const LEAST_SINE: f32 = 0.005;
+pub const LEAST_SINE: f32 = 0.005;
 /// The same for two curved pieces: rims of nearly one radius run along each other, and their points are as dense as the accuracy asks.
 const LEAST_SINE_OF_CURVES: f32 = 0.1;
 /// Sine of the angle by which a normal may lie outside of a cone: rounding, and the change of a face's normal along a piece.

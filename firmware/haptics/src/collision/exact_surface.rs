@@ -12,7 +12,7 @@
 
 use glam::Vec3;
 use mortise_protocol::image::{
-    FaceRecord, Group, Lookup, NO_FACE, Nearby, Shape, Surface, Surfaces, surface_kind,
+    FaceRecord, Group, NO_FACE, Nearby, Place, Shape, Surface, Surfaces, surface_kind,
 };
 
 use crate::collision::patch::distance_to_patch;
@@ -21,6 +21,8 @@ use crate::math::vector::length;
 
 /// A foot counts when the field's distance there is below this many cells: interpolation errs by 0.2 cells next to a right angle.
 const ON_SURFACE_CELLS: f32 = 0.3;
+/// The same by exact surfaces, m: single precision, and the micrometre within which surfaces are verified.
+const ON_SURFACE_M: f32 = 2e-6;
 /// Within this many cells of an edge the other face decides whether a foot is beyond it.
 const NEAR_EDGE_CELLS: f32 = 2.0;
 /// Sine of the smallest angle between faces that form an edge: below it one face continues the other.
@@ -140,6 +142,31 @@ pub(crate) fn on_surface_of(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Op
     })
 }
 
+/// Distance of a shape at a point as the tick computes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rendered {
+    /// Signed distance, outside positive, m.
+    pub distance: f32,
+    /// Surfaces that the point's cell names.
+    pub nearby: Nearby,
+    /// Whether the distance is interpolated, because the surfaces do not give it.
+    pub interpolated: bool,
+}
+
+/// Distance of `shape` at `p` (m, shape frame) as the tick computes it; `None` outside of all cells. For measurement, not for the tick.
+pub fn rendered_distance(shape: &Shape<'_>, p: Vec3) -> Option<Rendered> {
+    let Place::Cell(cell) = shape.field.place(p.to_array()) else {
+        return None;
+    };
+    let nearby = shape.field.nearby(&cell);
+    let by_surfaces = exact(shape.surfaces(), nearby, p);
+    Some(Rendered {
+        distance: by_surfaces.map_or_else(|| shape.field.distance(&cell), |(distance, _)| distance),
+        nearby,
+        interpolated: by_surfaces.is_none(),
+    })
+}
+
 /// Signed distance (outside positive, m) at `p` by the surfaces that `nearby` names, and the surface it belongs to; `None` where the interpolated
 /// distance is to be used. Outside an edge or corner it is a lower bound of the distance. About 50 instructions per face on a Cortex-M7.
 #[inline]
@@ -256,11 +283,35 @@ fn distance(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Option<f32> {
         surface_kind::PLANE => Some(along * face.sense),
         surface_kind::CYLINDER => {
             let squared = from.length_squared() - along * along;
-            // On the axis, or within rounding of it, the direction is undefined and so is the foot.
-            (squared > 1e-12).then(|| (squared * inverse_sqrt(squared) - face.radius) * face.sense)
+            if squared > 1e-12 {
+                return Some((squared * inverse_sqrt(squared) - face.radius) * face.sense);
+            }
+            off_center(face, p)
         }
-        _ => foot(face, p).map(|foot| foot.distance),
+        _ => match foot(face, p) {
+            Some(foot) => Some(foot.distance),
+            None => off_center(face, p),
+        },
     }
+}
+
+/// Signed distance where the foot is not unique: on the axis of a cylinder, cone or torus, on the circle within a torus, at the centre of a sphere.
+/// `None` for a face without closed form.
+#[cold]
+#[inline(never)]
+fn off_center(face: &FaceRecord, p: Vec3) -> Option<f32> {
+    let from = p - Vec3::from_array(face.origin);
+    let along = from.dot(Vec3::from_array(face.axis));
+    let natural = match face.kind {
+        surface_kind::CONE => -face.radius * libm::cosf(face.second) - along * libm::sinf(face.second),
+        surface_kind::TORUS => {
+            let out = length(from - Vec3::from_array(face.axis) * along) - face.radius;
+            libm::sqrtf(out * out + along * along) - face.second
+        }
+        surface_kind::CYLINDER | surface_kind::SPHERE => -face.radius,
+        _ => return None,
+    };
+    Some(natural * face.sense)
 }
 
 /// Distance to the surface of `face` when it agrees with the field's `distance` at `p` within the error of interpolation: twice cell²·κ/8 in each of
@@ -362,12 +413,27 @@ fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
     best
 }
 
-/// Whether the field has the surface at `p`, within its resolution.
+/// Whether the field has the surface at `p`: within its resolution where it stores samples, else by the surfaces that it names.
 fn on_surface(shape: &Shape<'_>, p: Vec3) -> bool {
-    match shape.field.lookup(p.to_array()) {
-        Lookup::Near(sample) => sample.distance.abs() <= ON_SURFACE_CELLS * shape.field.record().cell,
-        Lookup::Far { .. } => false,
+    let Place::Cell(cell) = shape.field.place(p.to_array()) else {
+        return false;
+    };
+    if cell.has_samples() {
+        return shape.field.distance(&cell).abs() <= ON_SURFACE_CELLS * shape.field.record().cell;
     }
+    exact(shape.surfaces(), shape.field.nearby(&cell), p)
+        .is_some_and(|(distance, _)| distance.abs() <= ON_SURFACE_M)
+}
+
+/// Signed distance at `p` by the field, by the surfaces that it names where it stores no samples, or a signed lower bound of its magnitude, m.
+pub(crate) fn field_bound(shape: &Shape<'_>, p: Vec3) -> f32 {
+    if let Place::Cell(cell) = shape.field.place(p.to_array())
+        && !cell.has_samples()
+        && let Some((distance, _)) = exact(shape.surfaces(), shape.field.nearby(&cell), p)
+    {
+        return distance;
+    }
+    shape.field.bound(p.to_array())
 }
 
 /// Whether `p` on the surface of face `of[0]` lies beyond its edge with another near face; `of[1]` is ignored.
@@ -398,7 +464,7 @@ fn beyond_edge(shape: &Shape<'_>, face: &FaceRecord, other: &FaceRecord, p: Vec3
     let Some(across) = unit(across, length(across)) else {
         return false;
     };
-    let convex = shape.field.bound((edge + across * near_edge).to_array()) > 0.0;
+    let convex = field_bound(shape, edge + across * near_edge) > 0.0;
     let side = foot(other, p).map_or(0.0, |f| f.distance);
     if convex { side > 0.0 } else { side < 0.0 }
 }
@@ -461,6 +527,38 @@ mod tests {
             ..top
         };
         assert!(edge_foot(&parallel, &top, p).is_none());
+    }
+
+    /// Where the foot is not unique the distance is that of the places beside it, to a micrometre aside.
+    #[test]
+    fn distances_are_continuous_at_centers() {
+        let plain = cylinder(-1.0);
+        let of = |kind| FaceRecord {
+            kind,
+            second: 0.3,
+            ..plain
+        };
+        let tube = FaceRecord {
+            second: 0.002,
+            ..of(surface_kind::TORUS)
+        };
+        let on_axis = Vec3::new(0.0, 0.0, 0.004);
+        for (face, center) in [
+            (plain, on_axis),
+            (of(surface_kind::CONE), on_axis),
+            (of(surface_kind::SPHERE), Vec3::ZERO),
+            (tube, on_axis),
+            (tube, Vec3::new(0.01, 0.0, 0.0)),
+        ] {
+            let faces = [face];
+            let surfaces = Surfaces {
+                faces: &faces,
+                patches: &[],
+            };
+            let at = |p: Vec3| distance(surfaces, 0, p).expect("a closed form");
+            let beside = at(center + Vec3::new(1.5e-6, 1.5e-6, 0.0));
+            assert!((at(center) - beside).abs() < 3e-6, "{} at {center}", face.kind);
+        }
     }
 
     #[test]

@@ -25,7 +25,7 @@ use crate::collision::cost::{
 };
 use crate::collision::decimation::mask;
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::exact_surface::{OnFace, exact_on_face, on_surface_of, with_allowance};
+use crate::collision::exact_surface::{OnFace, exact, exact_on_face, on_surface_of, with_allowance};
 use crate::collision::facing::faces_away;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, SHORTEST_SHARE};
@@ -420,7 +420,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
             return distance;
         }
-        let distance = pair.field.distance(cell);
+        // At the centre of a surface the distance is known, but the normal is not.
+        let distance = exact(pair.surfaces, nearby, p)
+            .map_or_else(|| pair.field.distance(cell), |(distance, _)| distance);
         if distance >= self.search.margin {
             return distance;
         }

@@ -124,6 +124,8 @@ struct PointSample {
     in_band: bool,
     /// Whether an edge itself is nearest: then the surfaces give only a bound.
     edge_nearest: bool,
+    /// Whether `distance` is a bound by surfaces at an edge, without an interpolated one beside it.
+    is_bound: bool,
     /// Whether `distance` is that to an analytic face.
     settled: bool,
 }
@@ -139,6 +141,7 @@ impl PointSample {
         surface: NO_FACE,
         in_band: false,
         edge_nearest: false,
+        is_bound: false,
         settled: false,
     };
 }
@@ -297,7 +300,11 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
     fn bound(&self, node: &NodeRecord, progress: &mut Progress) -> (f32, bool) {
         progress.work.nodes += 1;
         let center = self.pair.to_field.apply(node.center);
-        let distance = self.pair.field.bound(center.to_array());
+        let (distance, is_bound) = self.node_distance(center);
+        // Inside, a bound says how deep at least, not at most.
+        if is_bound && distance < 0.0 {
+            return (f32::NEG_INFINITY, false);
+        }
         // Inside, a clamped distance and a bound beyond the band say how deep at least, not at most.
         if distance < -self.resolved {
             return (f32::NEG_INFINITY, false);
@@ -306,6 +313,20 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         let beyond = distance > self.band + self.edge_error;
         let error = if beyond { 0.0 } else { self.edge_error };
         (distance - (node.radius + error), beyond)
+    }
+
+    /// Signed distance of a node's centre, m, and whether surfaces at an edge give only a bound of it.
+    #[inline(always)]
+    fn node_distance(&self, center: Vec3) -> (f32, bool) {
+        match self.pair.field.place(center.to_array()) {
+            Place::Cell(cell) if !cell.has_samples() => {
+                let nearby = self.pair.field.nearby(&cell);
+                let by_surfaces = exact(self.shape.surfaces(), nearby, center);
+                let is_bound = !matches!(nearby, Nearby::Face(_));
+                by_surfaces.map_or((f32::NEG_INFINITY, true), |(distance, _)| (distance, is_bound))
+            }
+            _ => (self.pair.field.bound(center.to_array()), false),
+        }
     }
 
     #[inline(always)]
@@ -340,6 +361,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                         surface,
                         in_band: true,
                         edge_nearest: false,
+                        is_bound: false,
                         settled: true,
                     };
                 }
@@ -360,11 +382,16 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
 
     /// Distance where the cell's faces do not settle it; `exact` is what they give.
     fn interpolated(&self, cell: &Cell<'_>, nearby: Nearby, exact: Option<(f32, u16)>) -> PointSample {
-        let interpolated = self.pair.field.distance(cell);
+        let interpolated = match exact {
+            // Without samples surfaces answer, at an edge by a bound.
+            Some((distance, _)) if !cell.has_samples() => distance,
+            _ => self.pair.field.distance(cell),
+        };
         let mut sample = PointSample {
             distance: interpolated,
             lower: interpolated - self.edge_error,
             rendered: interpolated,
+            is_bound: !cell.has_samples(),
             surface: nearby.face(),
             ..PointSample::NOTHING
         };
@@ -487,7 +514,13 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         if sample.in_band {
             // Next to an edge the field determines the sign only where it is certain.
             let signed = if field < 0.0 { -distance } else { distance };
-            ((signed - field).abs() <= self.edge_error).then_some(signed)
+            let off = if sample.is_bound && sample.edge_nearest {
+                // The surfaces give no more than the distance.
+                field.abs() - distance
+            } else {
+                (signed - field).abs()
+            };
+            (off <= self.edge_error).then_some(signed)
         } else if sample.inside {
             (distance >= -field - self.edge_error).then_some(-distance)
         } else {

@@ -169,7 +169,7 @@ fn print_warnings(model: &[String], report: &BakeReport) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints the plan as text or JSON; writes the image when the request is met.
+/// Prints the plan as text or JSON; writes the image when it fits, as accurate as asked or as there is room for.
 fn print_plan(
     args: &Args,
     target: &Output,
@@ -178,10 +178,10 @@ fn print_plan(
     warnings: &[String],
 ) -> anyhow::Result<ExitCode> {
     let plan = &planned.plan;
-    if planned.met {
+    if planned.fits {
         target.write(&planned.image)?;
     }
-    let code = if planned.met {
+    let code = if planned.fits {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
@@ -196,28 +196,11 @@ fn print_plan(
         return Ok(code);
     }
     let um = |mm: f64| 1000.0 * mm;
-    if planned.met {
+    if planned.fits {
         print_image(args, &plan.report)?;
-    } else {
-        let verdict = if planned.fits {
-            format!(
-                "the best that fits is about {:.1} µm where parts fit, with {} bytes",
-                um(plan.accuracy_mm),
-                plan.report.image_bytes
-            )
-        } else {
-            format!(
-                "no model fits: even at {:.1} µm it needs {} bytes and about {} instructions",
-                um(plan.accuracy_mm),
-                plan.report.image_bytes,
-                plan.ticks.first().map_or(0, |tick| tick.cost.instructions)
-            )
-        };
-        lines::text(&format!(
-            "{}: {:.3} µm cannot be met; {verdict}. Nothing was written.",
-            args.file.display(),
-            um(request.accuracy_mm)
-        ))?;
+    }
+    if !planned.met {
+        lines::text(&reached(args, request, planned))?;
     }
     for (shape, made) in plan.shapes.iter().zip(&plan.report.shapes) {
         lines::text(&format!(
@@ -241,7 +224,7 @@ fn print_plan(
         ))?;
         if shape.error_at_edges_mm > shape.error_elsewhere_mm {
             lines::text(&format!(
-                "    {:.1} µm at some edges of free-form faces",
+                "    {:.1} µm at some edges",
                 um(shape.error_at_edges_mm)
             ))?;
         }
@@ -255,6 +238,37 @@ fn print_plan(
     }
     print_warnings(warnings, &plan.report)?;
     Ok(code)
+}
+
+/// What was reached of a request that is not met, and what limits it.
+fn reached(args: &Args, request: &Request, planned: &Planned) -> String {
+    let (plan, um) = (&planned.plan, |mm: f64| 1000.0 * mm);
+    let cost = plan.ticks.first().map_or(0, |tick| tick.cost.instructions);
+    let errors = format!(
+        "{:.1} µm where parts fit and {:.1} µm elsewhere",
+        um(plan.error_in_fits_mm()),
+        um(plan.error_elsewhere_mm())
+    );
+    let file = args.file.display();
+    if !planned.fits {
+        return format!(
+            "{file}: no model fits: the smallest found, with {errors}, takes {} bytes of {} and about {cost} instructions{}. Nothing was written.",
+            plan.report.image_bytes,
+            request.flash_bytes,
+            request
+                .tick_instructions
+                .map_or_else(String::new, |most| format!(" of {most}")),
+        );
+    }
+    let limit = match request.tick_instructions {
+        Some(most) => format!("{} bytes and {most} instructions", request.flash_bytes),
+        None => format!("{} bytes", request.flash_bytes),
+    };
+    format!(
+        "  {:.3} µm where parts fit, and {:.0} times that elsewhere, was asked; reached are {errors}: the best found within {limit}",
+        um(request.accuracy_mm),
+        mortise_bake::ELSEWHERE,
+    )
 }
 
 fn count(what: &str, faces: usize) -> String {
