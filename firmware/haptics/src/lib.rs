@@ -3,8 +3,8 @@
 //! [`tick()`] is called at 1 kHz. It pulls the grabbed part (the *object*) towards the handle through a virtual coupling, finds where the object
 //! meets the other parts (points of one in the signed distance field of the other, in both directions), moves the object by one implicit step, and
 //! returns the wrench for the handle. No I/O, no allocation, no clock. The same source runs on a PC and on a Cortex-M7 and gives the same bits:
-//! single precision only, `libm` instead of the standard library, no fused multiply-add, one order of summation. Only the probe, which no tick calls, measures convex shapes in
-//! double precision.
+//! single precision only, `libm` instead of the standard library, no fused multiply-add, one order of summation. Only the probe, which no tick calls, measures in double
+//! precision.
 //!
 //! | module | what |
 //! |---|---|
@@ -18,7 +18,7 @@
 //! | `passivity` | energy tank of the coupling, and the energy bound on what targets deliver to the operator |
 //! | `baseline` | the textbook's methods for comparison: voxmap contact, explicit Newton–Euler step |
 //! | `observer` | energy delivered to the operator beyond what the operator supplied, observed from outside: for measurement, not for the tick |
-//! | `probe` | gap and contacts at one pose, without motion: for measurement, not for the tick |
+//! | `probe` | gap and contacts at one pose, first touch along a motion: for measurement, not for the tick |
 //!
 //! Symbols are those of `docs/notation.md`.
 #![no_std]
@@ -52,6 +52,7 @@ pub use math::rotation;
 pub use passivity::tank::Passivity;
 pub use probe::nearest::{Measure, Nearest};
 pub use probe::prober::{ContactPoint, Probe, ProbeError, Prober};
+pub use probe::sweep::{Course, Motion, Sweep};
 pub use settings::{
     ContactSettings, CouplingSettings, FrictionSettings, GuidanceMethod, GuidanceSettings, Integrator,
     LimitSettings, ObjectSettings, PassivitySettings, Range, Settings, SettingsError,

@@ -46,6 +46,39 @@ fn a_row_a_pose() {
     );
 }
 
+/// From above its hole the peg goes down it, from beside it onto the block's top, 20 mm over the middle, with its end 25 mm below its middle.
+#[test]
+fn first_touch_along_a_motion() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let poses = directory.path().join("poses.csv");
+    let text = "name,x,y,z,qw,qx,qy,qz\nover,0,0,46,1,0,0,0\nbeside,3,0,46,1,0,0,0\n";
+    std::fs::write(&poses, text).expect("written");
+    let output = Command::new(env!("CARGO_BIN_EXE_mortise"))
+        .arg("probe")
+        .arg(scene())
+        .args([
+            "--cell", "2", "--json", "--moving", "peg", "--along", "0,0,-4", "--poses",
+        ])
+        .arg(&poses)
+        .output()
+        .expect("the program runs");
+    assert!(output.status.success(), "{output:?}");
+    let rows: Vec<serde_json::Value> = String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("one JSON object a line"))
+        .collect();
+    let number = |row: &serde_json::Value, key: &str| row[key].as_f64().expect("a number");
+    assert_eq!(rows[0]["happens"], "free");
+    assert!((number(&rows[0], "gap_mm") - 0.1).abs() < 1e-3, "{}", rows[0]);
+    assert_eq!(rows[1]["happens"], "touch");
+    let (share, error) = (number(&rows[1], "share"), number(&rows[1], "share_error"));
+    assert!(
+        share <= 0.25 + 1e-4 && share + error >= 0.25 - 1e-4 && error < 0.01,
+        "{}",
+        rows[1]
+    );
+}
+
 #[test]
 fn mistakes_end_with_2_and_one_line() {
     let directory = tempfile::tempdir().expect("a temporary directory");

@@ -16,6 +16,9 @@ const GAP_TOLERANCE_MM: f64 = 0.005;
 /// Tolerance of depths, mm.
 const DEPTH_TOLERANCE_MM: f64 = 0.010;
 
+/// Largest error of a distance called exact, mm.
+const EXACT_MM: f64 = 0.001;
+
 fn file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data/scene_p.step")
 }
@@ -47,7 +50,16 @@ fn scene_p_against_closed_form() {
             GAP_TOLERANCE_MM
         };
         assert!(off <= tolerance, "{exact} mm: {row}");
-        assert_eq!(row.resolution, Resolution::Exact, "{row}");
+        // What is called exact is, and every stated error holds.
+        assert!(row.error_um.is_none_or(|um| 1e3 * off <= um), "{off} mm: {row}");
+        if row.resolution == Resolution::Exact {
+            assert!(off <= EXACT_MM, "{off} mm: {row}");
+        }
+        // Every gap is proven; the depth of a part that is not convex is that of a sample.
+        assert!(
+            *exact < EXACT_MM || row.resolution == Resolution::Exact,
+            "{exact} mm: {row}"
+        );
         // Poses clearly apart have no contact; clearly penetrating ones have.
         if *exact > GAP_TOLERANCE_MM {
             assert_eq!(row.contacts, 0, "{row}");

@@ -2,7 +2,7 @@
 //!
 //! A [`Scenario`] is TOML: a STEP file, a part to grab, the motion of the simulated hand, and the bounds. [`run`] bakes, uploads, plays it on a rig
 //! in lockstep, and measures; `mortise demo --headless`, the hardware-in-the-loop tests and the experiments of `mortise-lab` all use this one
-//! function. [`probe`] finds gap and contacts of a scene at given poses. [`measure`], [`port`] and [`wire`] serve the computation of figures.
+//! function. [`probe`] finds gap and contacts of a scene at given poses, [`sweep`] the first touch along a motion. [`measure`], [`port`] and [`wire`] serve the computation of figures.
 
 mod error;
 mod hand;
@@ -16,6 +16,7 @@ mod run;
 pub mod sample;
 mod scenario;
 mod scene;
+pub mod sweep;
 #[cfg(test)]
 mod tests;
 mod truth;

@@ -322,7 +322,15 @@ impl ProbeScene {
             .collect()
     }
 
-    fn scene(&self) -> Result<SceneImage<'_>, ScenarioError> {
+    /// Refusal of a pose.
+    pub(crate) fn refused(&self, named: &NamedPose, why: &str) -> ScenarioError {
+        ScenarioError::Input {
+            name: format!("{}, pose `{}`", self.name, named.name),
+            what: why.to_owned(),
+        }
+    }
+
+    pub(crate) fn scene(&self) -> Result<SceneImage<'_>, ScenarioError> {
         // The image was opened before, so this fails only by a bug, which is then reported.
         SceneImage::open(bytemuck::cast_slice(&self.image)).map_err(|error| ScenarioError::Input {
             name: self.name.clone(),
@@ -338,10 +346,6 @@ impl ProbeScene {
         named: &NamedPose,
         repeats: usize,
     ) -> Result<ProbeRow, ScenarioError> {
-        let bad = |what: String| ScenarioError::Input {
-            name: format!("{}, pose `{}`", self.name, named.name),
-            what,
-        };
         let [x, y, z, w] = named.orientation.as_quat().to_array();
         let pose = Pose::new(
             Vec3::from_array((1e-3 * named.position_mm).as_vec3().to_array()),
@@ -353,13 +357,13 @@ impl ProbeScene {
             let start = Instant::now();
             let found = prober.probe(scene, pair.moving, pair.fixed, black_box(&pose), &settings);
             let taken = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
-            result = Some(black_box(found).map_err(|error| bad(error.to_string()))?);
+            result = Some(black_box(found).map_err(|error| self.refused(named, &error.to_string()))?);
             least_ns = least_ns.min(taken);
             if taken > LONG_NS {
                 break;
             }
         }
-        let found = result.ok_or_else(|| bad("nothing was asked".into()))?;
+        let found = result.ok_or_else(|| self.refused(named, "nothing was asked"))?;
         let com = scene
             .shape_of_part(usize::from(pair.moving))
             .record
@@ -420,9 +424,9 @@ fn words(bytes: &[u8]) -> Vec<u32> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Resolution {
-    /// To an analytic face or edge.
+    /// Proven to be that of the exact surfaces, within a micrometre.
     Exact,
-    /// Interpolated in the field.
+    /// Of the exact surfaces within the stated error; without one, that of samples in the field.
     Field,
     /// To the tangent plane through a voxel's centre: the accuracy of a voxmap.
     TangentPlane,
@@ -447,13 +451,13 @@ pub enum Measure {
 pub struct ProbeRow {
     /// Name of the pose.
     pub name: String,
-    /// Distance, mm: gap positive, deepest penetration negative.
+    /// Distance, mm: gap positive, penetration as `measure` says negative.
     pub distance_mm: f64,
     /// Distance interpolated in the field, or from the voxmap's tangent planes, mm, on which the force law acts; absent beyond their range.
     pub field_distance_mm: Option<f64>,
     /// Source and accuracy of `distance_mm`.
     pub resolution: Resolution,
-    /// Proven bound of the error of `distance_mm`, µm; absent where the distance is only a bound or has none.
+    /// Proven bound of the error of `distance_mm`, µm; absent where it is that of samples, whose error is not known.
     pub error_um: Option<f64>,
     /// What a negative distance is: the smallest translation that separates two convex parts, or the depth of the deepest point.
     pub measure: Measure,
@@ -500,6 +504,7 @@ impl fmt::Display for ProbeRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let worth = match self.resolution {
             Resolution::Exact => "exact",
+            _ if self.error_um.is_some() => "within",
             Resolution::Field => "by the field",
             Resolution::TangentPlane => "to a tangent plane",
             Resolution::Bound => "at least",

@@ -1,14 +1,11 @@
 //! Distance from a point to a baked shape by its analytic faces: exact where the field interpolates or has ended.
 //!
-//! A face record is an unbounded surface; the field determines which piece of it belongs to the shape: a foot of the perpendicular counts when the
-//! field has the shape's surface there. Near an edge the field is not sharp enough, so there the other face decides: at a convex edge a foot outside
-//! the other face's surface is beyond the edge, at a re-entrant edge one inside it. The nearest point of an edge is that of the two surfaces'
-//! intersection, by Newton steps.
+//! A face record is an unbounded surface; the cells of the field name those that give the distance there. The nearest point of an edge is that of the
+//! two surfaces' intersection, by Newton steps.
 //!
 //! Faces without closed form answer by their local patches ([`super::patch`]), where cells name them.
 //!
-//! Metres, shape frame. Every loop is bounded by the number of faces (squared, for edges). Cost: one projection per face, and a field query for each
-//! face that could be nearest.
+//! Metres, shape frame. Every loop is bounded by the number of faces of a cell. Cost: one projection per face.
 
 use glam::Vec3;
 use mortise_protocol::image::{
@@ -19,16 +16,12 @@ use crate::collision::patch::distance_to_patch;
 use crate::math::scalar::inverse_sqrt;
 use crate::math::vector::length;
 
-/// A foot counts when the field's distance there is below this many cells: interpolation errs by 0.2 cells next to a right angle.
-const ON_SURFACE_CELLS: f32 = 0.3;
-/// The same by exact surfaces, m: single precision, and the micrometre within which surfaces are verified.
-const ON_SURFACE_M: f32 = 2e-6;
-/// Within this many cells of an edge the other face decides whether a foot is beyond it.
-const NEAR_EDGE_CELLS: f32 = 2.0;
 /// Sine of the smallest angle between faces that form an edge: below it one face continues the other.
 const LEAST_EDGE_SINE: f32 = 0.05;
 /// A touching point within this distance of an edge touches the edge, m: several times the depth of a contact.
 const AT_EDGE_M: f32 = 10e-6;
+/// A foot is on a face's side of an edge within this distance, m: rounding.
+const BESIDE_M: f32 = 0.1e-6;
 /// Newton steps to an edge: each squares the error, which starts below the radius of curvature.
 const EDGE_STEPS: usize = 6;
 
@@ -91,11 +84,6 @@ fn polar(v: Vec3) -> Option<(f32, Vec3)> {
         let inverse = inverse_sqrt(squared);
         (squared * inverse, v * inverse)
     })
-}
-
-/// `v` over its length, unless that is zero.
-fn unit(v: Vec3, length: f32) -> Option<Vec3> {
-    (length > 1e-9).then(|| v * (1.0 / length))
 }
 
 /// Largest curvature of a face's surface near `p`, 1/m.
@@ -271,6 +259,43 @@ pub(crate) fn with_allowance(
     }
 }
 
+/// Signed distance (outside positive, m) at `p` where an edge or corner of a cell may be nearest: outside a convex one, inside a re-entrant one. It is
+/// that of the extreme face where the foot on it is on the other faces' side, else that of the edge with the face it is farthest beyond; at least the
+/// faces' distance in magnitude. `None` for groups with clauses, and where neither point belongs to all faces.
+pub(crate) fn beside_edge(surfaces: Surfaces<'_>, nearby: Nearby, p: Vec3) -> Option<f32> {
+    let (group, sign) = match nearby {
+        Nearby::Convex(group) => (group, 1.0),
+        Nearby::Reentrant(group) => (group, -1.0),
+        _ => return None,
+    };
+    if !group.is_plain() {
+        return None;
+    }
+    let all = || group.faces().map(|(face, _)| face);
+    // Of all faces but two the one that a point is farthest beyond, and by how much.
+    let farthest = |p: Vec3, but: [u16; 2]| {
+        let mut most = (f32::NEG_INFINITY, NO_FACE);
+        for face in all().filter(|face| !but.contains(face)) {
+            let beyond = sign * distance(surfaces, face, p)?;
+            if beyond > most.0 {
+                most = (beyond, face);
+            }
+        }
+        Some(most)
+    };
+    let (_, first) = farthest(p, [NO_FACE; 2])?;
+    let on = on_surface_of(surfaces, first, p)?;
+    let (beyond, second) = farthest(p - on.normal * on.distance, [first, NO_FACE])?;
+    if beyond <= BESIDE_M {
+        return Some(on.distance);
+    }
+    let (Surface::Face(a), Surface::Face(b)) = (surfaces.get(first)?, surfaces.get(second)?) else {
+        return None;
+    };
+    let edge = edge_foot(a, b, p)?;
+    (farthest(edge, [first, second])?.0 <= BESIDE_M).then(|| sign * length(p - edge))
+}
+
 #[inline]
 fn distance(surfaces: Surfaces<'_>, surface: u16, p: Vec3) -> Option<f32> {
     let face = match surfaces.get(surface)? {
@@ -324,149 +349,9 @@ pub(crate) fn agreeing(shape: &Shape<'_>, face: u16, p: Vec3, distance: f32) -> 
     ((exact - distance).abs() <= tolerance).then_some(exact)
 }
 
-/// Whether every face has a closed form, the condition for [`unsigned_distance`].
+/// Whether every face has a closed form.
 pub(crate) fn closed_form(shape: &Shape<'_>) -> bool {
     shape.faces.iter().all(|face| face.kind != surface_kind::OTHER)
-}
-
-/// Distance from `p` to a shape's faces and edges, never negative; `None` when nothing was found. All faces must have a [`closed_form`]. Samples of
-/// edges and corners are included where an edge ends before its foot, where there is no foot at all, or with `corners`: one corner against another is
-/// found in no other way.
-///
-/// Distances of `enough` or more are returned as `enough`.
-pub(crate) fn unsigned_distance(shape: &Shape<'_>, p: Vec3, mut corners: bool, enough: f32) -> Option<f32> {
-    let near_edge = NEAR_EDGE_CELLS * shape.field.record().cell;
-    let mut best = enough;
-    // Faces that may be near, including those whose foot is not unique.
-    let mut near = 0;
-    for (a, face) in shape.faces.iter().enumerate() {
-        let Some(foot_a) = foot(face, p) else {
-            near += 1;
-            continue;
-        };
-        let distance = foot_a.distance.abs();
-        near += usize::from(distance < enough);
-        if distance < best
-            && on_surface(shape, foot_a.point)
-            && !beyond(shape, [a; 2], foot_a.point, near_edge)
-        {
-            best = distance;
-        }
-    }
-    // An edge or corner lies on at least two faces, and is no nearer than they are.
-    if near < 2 {
-        return best.is_finite().then_some(best);
-    }
-    for (a, face) in shape.faces.iter().enumerate() {
-        let nearer = |face, best| foot(face, p).is_some_and(|f| f.distance.abs() < best);
-        if !nearer(face, best) {
-            continue;
-        }
-        for (b, other) in shape.faces.iter().enumerate().skip(a + 1) {
-            if nearer(other, best)
-                && let Some(edge) = edge_foot(face, other, p)
-                && on_surface(shape, edge)
-            {
-                let distance = length(p - edge);
-                if distance < best {
-                    // Past a corner the two surfaces still intersect, but the edge has ended.
-                    if [[a, b], [b, a]]
-                        .iter()
-                        .any(|&of| beyond(shape, of, edge, near_edge))
-                    {
-                        corners = true;
-                    } else {
-                        best = distance;
-                    }
-                }
-            }
-        }
-    }
-    if corners || best.is_infinite() {
-        best = nearest_edge_point(shape, p, best);
-    }
-    best.is_finite().then_some(best)
-}
-
-/// Distance from `p` to the nearest sample of an edge or corner, an upper bound of the distance to the surface; `enough` when all are farther.
-fn nearest_edge_point(shape: &Shape<'_>, p: Vec3, enough: f32) -> f32 {
-    let mut best = enough;
-    let mut index = 0;
-    while let Some(node) = shape.nodes.get(index) {
-        let reach = best + node.radius;
-        if (Vec3::from_array(node.center) - p).length_squared() > reach * reach {
-            index = node.skip as usize;
-            continue;
-        }
-        index += 1;
-        if node.skip as usize != index {
-            continue;
-        }
-        let edges = node.points(shape.points).iter();
-        for point in edges.filter(|point| point.edge_face != NO_FACE) {
-            let squared = (Vec3::from_array(point.position) - p).length_squared();
-            if squared < best * best {
-                best = libm::sqrtf(squared);
-            }
-        }
-    }
-    best
-}
-
-/// Whether the field has the surface at `p`: within its resolution where it stores samples, else by the surfaces that it names.
-fn on_surface(shape: &Shape<'_>, p: Vec3) -> bool {
-    let Place::Cell(cell) = shape.field.place(p.to_array()) else {
-        return false;
-    };
-    if cell.has_samples() {
-        return shape.field.distance(&cell).abs() <= ON_SURFACE_CELLS * shape.field.record().cell;
-    }
-    exact(shape.surfaces(), shape.field.nearby(&cell), p)
-        .is_some_and(|(distance, _)| distance.abs() <= ON_SURFACE_M)
-}
-
-/// Signed distance at `p` by the field, by the surfaces that it names where it stores no samples, or a signed lower bound of its magnitude, m.
-pub(crate) fn field_bound(shape: &Shape<'_>, p: Vec3) -> f32 {
-    if let Place::Cell(cell) = shape.field.place(p.to_array())
-        && !cell.has_samples()
-        && let Some((distance, _)) = exact(shape.surfaces(), shape.field.nearby(&cell), p)
-    {
-        return distance;
-    }
-    shape.field.bound(p.to_array())
-}
-
-/// Whether `p` on the surface of face `of[0]` lies beyond its edge with another near face; `of[1]` is ignored.
-fn beyond(shape: &Shape<'_>, of: [usize; 2], p: Vec3, near_edge: f32) -> bool {
-    let Some(face) = shape.faces.get(of[0]) else {
-        return false;
-    };
-    shape.faces.iter().enumerate().any(|(b, other)| {
-        !of.contains(&b)
-            && foot(other, p).is_some_and(|o| o.distance.abs() < near_edge)
-            && beyond_edge(shape, face, other, p, near_edge)
-    })
-}
-
-/// Whether `p` on the surface of `face` lies beyond its edge with `other`, if there is one within `near_edge`.
-fn beyond_edge(shape: &Shape<'_>, face: &FaceRecord, other: &FaceRecord, p: Vec3, near_edge: f32) -> bool {
-    let Some(edge) = edge_foot(face, other, p) else {
-        return false;
-    };
-    if length(edge - p) > near_edge || !on_surface(shape, edge) {
-        return false;
-    }
-    let (Some(a), Some(b)) = (foot(face, edge), foot(other, edge)) else {
-        return false;
-    };
-    // From the edge along the first normal and against the second: outside at a convex edge, inside at a re-entrant one.
-    let across = a.normal - b.normal;
-    let Some(across) = unit(across, length(across)) else {
-        return false;
-    };
-    let convex = field_bound(shape, edge + across * near_edge) > 0.0;
-    let side = foot(other, p).map_or(0.0, |f| f.distance);
-    if convex { side > 0.0 } else { side < 0.0 }
 }
 
 /// The point nearest to `p` on the intersection of two surfaces: Newton steps, each the point nearest to `p` on the line in which the tangent planes

@@ -1,10 +1,11 @@
 //! Smallest gap or largest depth of two parts: branch and bound over the trees and fields of the contact search.
 //!
 //! A sphere whose lower bound exceeds the smallest gap found so far is skipped. One traversal in each direction takes all points whose distance a
-//! field query settles by an analytic face, and offers overlapping points as contacts. Until it has found a point in the band, leaves beyond the band
-//! are deferred, for their bounds are loose and seldom needed afterwards. A last traversal in each direction takes the deferred leaves, and measures
-//! against all faces the remaining points that could still be nearest. When the band held no point, it first descends by the nearer child, for an
-//! initial gap to compare with.
+//! field query places nearer than that, by the exact surfaces of their cells, and offers overlapping points as contacts. Until it has found a point in
+//! the band, leaves beyond the band are deferred, for their bounds are loose and seldom needed afterwards. A last traversal in each direction takes the
+//! deferred leaves. When the band held no point, it first descends by the nearer child, for an initial gap to compare with.
+//!
+//! The result is that of the samples: [`super::clearance`] proves the gap of the surfaces.
 
 use glam::Vec3;
 use mortise_protocol::image::{
@@ -12,12 +13,11 @@ use mortise_protocol::image::{
 };
 
 use crate::collision::directed_pair::DirectedPair;
-use crate::collision::exact_surface::{
-    OnFace, agreeing, closed_form, exact, on_surface_of, unsigned_distance,
-};
+use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
 use crate::io::Work;
+use crate::math::scalar::larger;
 
 /// Diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
@@ -34,8 +34,8 @@ pub enum Measure {
 /// The smallest gap between two parts, or the largest depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// Signed distance, m: positive for a gap, negative for a depth. By the analytic faces when `exact`, else by the field or the voxmap's tangent
-    /// planes.
+    /// Signed distance, m: positive for a gap, negative for a depth. Of the analytic surfaces where an error is stated, else of samples in the field or
+    /// the voxmap's tangent planes.
     pub distance_m: f32,
     /// Smallest distance by the field itself among the points queried, m: the distance that the tick uses. Infinite when no point lay where the field
     /// stores distances.
@@ -88,10 +88,6 @@ pub(crate) struct NearestSearch<'s, 'i> {
     resolved: f32,
     /// Largest overestimate by interpolation, m.
     edge_error: f32,
-    /// Whether all faces of the shape have a closed form, so that points the field does not settle can be measured.
-    measurable: bool,
-    /// Lower bound of the distances of points not settled, m.
-    open_bound: f32,
     /// Leaves beyond the band are deferred before this node.
     deferred_end: u32,
     /// Lower bound of the distances in deferred leaves, m.
@@ -124,8 +120,6 @@ struct PointSample {
     in_band: bool,
     /// Whether an edge itself is nearest: then the surfaces give only a bound.
     edge_nearest: bool,
-    /// Whether `distance` is a bound by surfaces at an edge, without an interpolated one beside it.
-    is_bound: bool,
     /// Whether `distance` is that to an analytic face.
     settled: bool,
 }
@@ -141,7 +135,6 @@ impl PointSample {
         surface: NO_FACE,
         in_band: false,
         edge_nearest: false,
-        is_bound: false,
         settled: false,
     };
 }
@@ -156,14 +149,12 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             band: record.band,
             resolved: record.band - DIAGONAL_CELLS * record.cell,
             edge_error: EDGE_ERROR_CELLS * record.cell,
-            measurable: closed_form(shape),
-            open_bound: f32::INFINITY,
             deferred_end: 0,
             deferred_bound: f32::INFINITY,
         }
     }
 
-    /// Evaluates all leaves that could hold the nearest point or an overlapping one, as far as a field query settles their points. Overlapping points
+    /// Evaluates all leaves that could hold the nearest point or an overlapping one, and their points. Overlapping points
     /// go to `contacts`. Leaves beyond the band are deferred until a point in the band is found.
     pub fn traverse(
         &mut self,
@@ -183,15 +174,13 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                 if sample.overlaps {
                     contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
                 }
-                if !search.settle(&sample, point, progress) {
-                    search.open_bound = search.open_bound.min(sample.lower);
-                }
+                search.take(&sample, point, progress);
             }
             progress.work.points += leaf.points.len() as u32;
         });
     }
 
-    /// Evaluates what [`Self::traverse`] left open: deferred leaves, and points to be measured.
+    /// Evaluates the leaves that [`Self::traverse`] deferred.
     pub fn finish(
         &mut self,
         progress: &mut Progress,
@@ -201,31 +190,25 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         if needed(self.deferred_bound, progress.limit()) && progress.best.distance_m > self.band {
             self.descend(progress);
         }
-        let measure = needed(self.open_bound, progress.best.distance_m);
-        let end = match (measure, needed(self.deferred_bound, progress.limit())) {
-            (true, _) => u32::MAX,
-            (false, true) => self.deferred_end,
-            (false, false) => return,
-        };
-        self.leaves(progress, end, |search, progress, leaf| {
-            let deferred = leaf.beyond && leaf.node < search.deferred_end;
-            if !deferred && !measure {
+        if !needed(self.deferred_bound, progress.limit()) {
+            return;
+        }
+        self.leaves(progress, self.deferred_end, |search, progress, leaf| {
+            if !leaf.beyond {
                 return;
             }
             for point in leaf.points {
                 let sample = search.sample(point);
-                if deferred && sample.overlaps {
+                if sample.overlaps {
                     contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
                 }
-                if deferred || !sample.settled {
-                    search.measure(&sample, point, progress);
-                }
+                search.take(&sample, point, progress);
             }
             progress.work.points += leaf.points.len() as u32;
         });
     }
 
-    /// Descends by the nearer child to one leaf, and measures the point of it that seems nearest. Terminates because every step goes forward.
+    /// Descends by the nearer child to one leaf, and takes the point of it that seems nearest. Terminates because every step goes forward.
     fn descend(&mut self, progress: &mut Progress) {
         let nodes = self.pair.nodes;
         let mut index = 0;
@@ -243,7 +226,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                     }
                 }
                 if let Some((sample, point)) = nearest {
-                    self.measure(&sample, point, progress);
+                    self.take(&sample, point, progress);
                 }
                 return;
             }
@@ -361,11 +344,10 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                         surface,
                         in_band: true,
                         edge_nearest: false,
-                        is_bound: false,
                         settled: true,
                     };
                 }
-                self.interpolated(&cell, nearby, exact)
+                self.interpolated(&cell, nearby, exact, p)
             }
             Place::Far { inside, bound } => {
                 // Inside a bound says how deep at least, not at most.
@@ -380,8 +362,14 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
     }
 
-    /// Distance where the cell's faces do not settle it; `exact` is what they give.
-    fn interpolated(&self, cell: &Cell<'_>, nearby: Nearby, exact: Option<(f32, u16)>) -> PointSample {
+    /// Distance at `p` where the cell's faces do not settle it; `exact` is what they give.
+    fn interpolated(
+        &self,
+        cell: &Cell<'_>,
+        nearby: Nearby,
+        exact: Option<(f32, u16)>,
+        p: Vec3,
+    ) -> PointSample {
         let interpolated = match exact {
             // Without samples surfaces answer, at an edge by a bound.
             Some((distance, _)) if !cell.has_samples() => distance,
@@ -391,7 +379,6 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             distance: interpolated,
             lower: interpolated - self.edge_error,
             rendered: interpolated,
-            is_bound: !cell.has_samples(),
             surface: nearby.face(),
             ..PointSample::NOTHING
         };
@@ -404,9 +391,13 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             };
             if !sample.edge_nearest {
                 (sample.distance, sample.lower, sample.surface) = (distance, distance, surface);
-            } else if distance > sample.lower && distance > 0.0 {
-                // Outside a convex edge the surfaces give a lower bound.
-                sample.lower = distance;
+            } else {
+                let beside = beside_edge(self.shape.surfaces(), nearby, p);
+                // The faces' distance is a lower bound of the right sign.
+                sample.distance = beside.unwrap_or(distance);
+                if distance > 0.0 {
+                    sample.lower = larger(sample.lower, distance);
+                }
             }
         }
         sample.overlaps = sample.rendered < 0.0;
@@ -430,39 +421,16 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         })
     }
 
-    /// Uses a point if its sample settles it. Returns whether the point needs no measuring.
+    /// Uses a point by its most accurate distance.
     #[inline(always)]
-    fn settle(&self, sample: &PointSample, point: &PointRecord, progress: &mut Progress) -> bool {
+    fn take(&self, sample: &PointSample, point: &PointRecord, progress: &mut Progress) {
         if sample.rendered < progress.best.field_distance_m {
             progress.best.field_distance_m = sample.rendered;
         }
         if sample.lower > progress.best.distance_m {
-            return true;
+            return;
         }
-        let exact = self.at_face(sample, point);
-        if exact.is_none() && self.measurable {
-            return false;
-        }
-        self.update_best(sample, exact, point, progress);
-        true
-    }
-
-    /// Uses a point by its most accurate distance.
-    fn measure(&self, sample: &PointSample, point: &PointRecord, progress: &mut Progress) {
-        if !self.settle(sample, point, progress) {
-            let exact = self.measured(sample, point, progress.best.distance_m);
-            self.update_best(sample, exact, point, progress);
-        }
-    }
-
-    fn update_best(
-        &self,
-        sample: &PointSample,
-        exact: Option<f32>,
-        point: &PointRecord,
-        progress: &mut Progress,
-    ) {
-        let distance_m = exact.unwrap_or(sample.distance);
+        let distance_m = self.at_face(sample, point).unwrap_or(sample.distance);
         if distance_m < progress.best.distance_m {
             let face = self.shape.surfaces().face_of(sample.surface);
             let (moving_face, fixed_face) = if self.pair.backward {
@@ -474,7 +442,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                 distance_m,
                 field_distance_m: progress.best.field_distance_m,
                 error_m: f32::INFINITY,
-                exact: exact.is_some(),
+                exact: false,
                 measure: Measure::DeepestPoint,
                 in_band: sample.in_band,
                 arm: self.pair.to_arm.apply(point.position),
@@ -494,37 +462,5 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             return agreeing(self.shape, sample.surface, self.in_field(point), sample.distance);
         }
         None
-    }
-
-    /// Distance by all faces, if available and consistent with the field; `best` or more where it is at least `best`.
-    fn measured(&self, sample: &PointSample, point: &PointRecord, best: f32) -> Option<f32> {
-        let field = sample.distance;
-        // Outside, a distance of at least the smallest so far need not be exact.
-        let outside = if sample.in_band {
-            field >= 0.0
-        } else {
-            !sample.inside
-        };
-        let enough = if outside { best } else { f32::INFINITY };
-        let edge = point.edge_face != NO_FACE;
-        let distance = unsigned_distance(self.shape, self.in_field(point), edge, enough)?;
-        if outside && distance >= enough {
-            return Some(distance);
-        }
-        if sample.in_band {
-            // Next to an edge the field determines the sign only where it is certain.
-            let signed = if field < 0.0 { -distance } else { distance };
-            let off = if sample.is_bound && sample.edge_nearest {
-                // The surfaces give no more than the distance.
-                field.abs() - distance
-            } else {
-                (signed - field).abs()
-            };
-            (off <= self.edge_error).then_some(signed)
-        } else if sample.inside {
-            (distance >= -field - self.edge_error).then_some(-distance)
-        } else {
-            (distance >= field - self.edge_error).then_some(distance)
-        }
     }
 }

@@ -7,7 +7,7 @@
 use core::fmt;
 
 use glam::Vec3;
-use mortise_protocol::image::{NO_FACE, SceneImage};
+use mortise_protocol::image::{NO_FACE, SceneImage, Shape};
 
 use crate::collision::coherence::Coherence;
 use crate::collision::contact::{Contacts, Phase};
@@ -19,11 +19,14 @@ use crate::dynamics::body::Body;
 use crate::dynamics::contact_force::{Stiffness, total_force};
 use crate::io::{Flags, Work};
 use crate::math::pose::{Pose, Wrench, usable_pose};
+use crate::math::scalar::smaller;
+use crate::probe::clearance::{BUDGET, clearance, is_inside};
 use crate::probe::convex::{Separation, separation};
 use crate::probe::epa::Epa;
 use crate::probe::nearest::{Measure, Nearest, NearestSearch, Progress};
 use crate::probe::nearest_voxel::nearest_voxel;
 use crate::probe::support::Support;
+use crate::probe::sweep::{Course, Motion, Sweep, Sweeping};
 use crate::settings::ContactSettings;
 
 /// Result at one pose.
@@ -83,6 +86,9 @@ impl fmt::Display for ProbeError {
 
 impl core::error::Error for ProbeError {}
 
+/// A first guess of the gap is enlarged by this, m.
+const GUESS_M: f64 = 2e-6;
+
 /// Memory for one query. About 60 KiB; create it once.
 #[derive(Clone, Debug)]
 pub struct Prober {
@@ -109,8 +115,8 @@ impl Prober {
 
     /// Gap and contacts of part `moving`, placed at `pose` in the frame of part `fixed`.
     ///
-    /// Cost: a field query for every tree node and point that could be nearest or overlaps, in both directions; one or two projections per face for
-    /// every point next to an edge or beyond the band that could be nearest. Unbounded by a budget: not for the tick.
+    /// Cost: a field query for every tree node and point that could be nearest or overlaps, in both directions, and the search of the surfaces' gap. Not
+    /// for the tick.
     ///
     /// # Errors
     /// [`ProbeError`].
@@ -179,6 +185,8 @@ impl Prober {
         if voxmaps {
             self.coherence.invalidate();
         }
+        // A pose is measured by itself, whatever touched in the last one.
+        self.contacts.clear();
         let mut touching = search.traverse(false, &mut self.coherence, &mut self.contacts, &mut touched);
         let mut searches = [0, 1].map(|way| NearestSearch::new(&pairs[way], [&other, &held][way]));
         for (search, pair) in searches.iter_mut().zip(&pairs) {
@@ -195,14 +203,14 @@ impl Prober {
             best: mut nearest,
             mut work,
         } = progress;
-        let supports =
-            [(&held, &pose), (&other, &Pose::IDENTITY)].map(|(shape, pose)| Support::new(shape, pose));
-        let proven = match &supports {
-            [Some(a), Some(b)] if !voxmaps => Some(separation(a, b, &mut self.epa)),
-            _ => None,
+        let shapes = [(&held, &pose), (&other, &Pose::IDENTITY)];
+        let proven = if voxmaps {
+            None
+        } else {
+            Self::proven(&mut self.epa, center, shapes, &mut nearest)
         };
         if let Some(found) = &proven {
-            nearest = found.nearest(&nearest, [(&held, &pose), (&other, &Pose::IDENTITY)], center);
+            nearest = found.nearest(&nearest, shapes, center);
         }
         if voxmaps && (nearest.distance_m < 0.0 || nearest.field_distance_m < 0.0) {
             for pair in pairs.iter().filter(|pair| pair.field.is_occupancy()) {
@@ -232,6 +240,90 @@ impl Prober {
             contacts: work.contacts,
             work,
         })
+    }
+
+    /// First touch of part `moving` with part `fixed` along `motion` from `start`, in the frame of part `fixed`.
+    ///
+    /// # Errors
+    /// [`ProbeError`]; `BadPose` also for a motion that does not end at a usable pose.
+    pub fn sweep(
+        &mut self,
+        scene: &SceneImage<'_>,
+        [moving, fixed]: [u16; 2],
+        start: &Pose,
+        motion: &Motion,
+        settings: &ContactSettings,
+    ) -> Result<Sweep, ProbeError> {
+        let found = self.probe(scene, moving, fixed, start, settings)?;
+        let start = usable_pose(start).ok_or(ProbeError::BadPose)?;
+        if !motion.turn.is_finite() || usable_pose(&motion.at(&start, 1.0)).is_none() {
+            return Err(ProbeError::BadPose);
+        }
+        let [held, other] = [moving, fixed].map(|part| scene.shape_of_part(usize::from(part)));
+        if found.nearest.distance_m < 0.0 || held.field.is_occupancy() || other.field.is_occupancy() {
+            let center = start.transform_point(Body::of(&held).center_of_mass);
+            let overlap = found.nearest.distance_m < 0.0;
+            return Ok(Sweep {
+                course: if overlap { Course::Touch } else { Course::Unknown },
+                share: 0.0,
+                error: if overlap { 0.0 } else { f64::INFINITY },
+                pose: start,
+                gap_m: f64::from(found.nearest.distance_m),
+                nearest: center + found.nearest.arm,
+                steps: 0,
+            });
+        }
+        let mut sweeping = Sweeping {
+            held: &held,
+            other: &other,
+            epa: &mut self.epa,
+        };
+        Ok(sweeping.sweep(&start, motion, f64::from(found.nearest.distance_m)))
+    }
+
+    /// Separation of two shapes with proven bounds, where they are both convex or shown to be apart; else `nearest` is not called exact, and negative
+    /// where they were found to overlap.
+    fn proven(
+        epa: &mut Epa,
+        center: Vec3,
+        shapes: [(&Shape<'_>, &Pose); 2],
+        nearest: &mut Nearest,
+    ) -> Option<Separation> {
+        if let [Some(a), Some(b)] = shapes.map(|(shape, pose)| Support::new(shape, pose)) {
+            return Some(separation(&a, &b, epa));
+        }
+        nearest.exact = false;
+        let [(held, pose), (other, _)] = shapes;
+        let point = center + nearest.arm;
+        let back = pose.inverse().transform_point(point);
+        if nearest.distance_m < 0.0
+            && (is_inside(other, point.as_dvec3()) || is_inside(held, back.as_dvec3()))
+        {
+            return None;
+        }
+        let guess = if nearest.distance_m > 0.0 {
+            1.001 * f64::from(nearest.distance_m) + GUESS_M
+        } else {
+            f64::INFINITY
+        };
+        let mut found = clearance(held, other, pose, guess, BUDGET)?;
+        if found.upper == guess && !found.overlap {
+            found = clearance(held, other, pose, f64::INFINITY, BUDGET)?;
+        }
+        if found.overlap {
+            if f64::from(nearest.distance_m) > found.deepest {
+                nearest.distance_m = found.deepest as f32;
+                nearest.in_band = false;
+            }
+        } else if found.upper.is_finite() {
+            // No point was found inside: what interpolation tells to be a depth is a gap.
+            nearest.distance_m = if nearest.distance_m < 0.0 {
+                smaller(found.upper as f32, -nearest.distance_m)
+            } else {
+                found.upper as f32
+            };
+        }
+        found.separation(pose, held, other)
     }
 
     /// Makes the contacts agree with a proven distance: none where the parts are apart, at least the nearest point where they overlap.

@@ -1,4 +1,4 @@
-//! `mortise probe`: gap, depth and contact forces at given poses.
+//! `mortise probe`: gap, depth and contact forces at given poses, or first touch along a motion from each.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use mortise_bake::{Method, PointshellKind};
 use mortise_output::lines;
 use mortise_scenario::probe::{self, Model, ProbeScene};
+use mortise_scenario::sweep::Along;
 
 use super::reading::Reading;
 
@@ -23,6 +24,9 @@ pub struct Args {
     /// CSV with the columns name,x,y,z,qw,qx,qy,qz: mm, moving part in the fixed part's frame
     #[arg(long, value_name = "CSV")]
     poses: PathBuf,
+    /// Motion of the moving part from each pose, instead of measuring there: first touch along dx,dy,dz, mm, and rx,ry,rz, degrees about its origin
+    #[arg(long, value_name = "DX,DY,DZ[,RX,RY,RZ]", allow_hyphen_values = true)]
+    along: Option<Along>,
     /// Cell edge of a STEP file's scene, mm [default: chosen so that the image fits]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     cell: Option<f64>,
@@ -66,6 +70,15 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = ProbeScene::load_by(&args.scene, &model)?;
     let pair = scene.pair(&args.moving, args.against.as_deref())?;
     for pose in &poses {
+        if let Some(along) = &args.along {
+            let row = scene.sweep(pair, pose, along)?;
+            if args.json {
+                lines::json(&row)?;
+            } else {
+                lines::text(&row.to_string())?;
+            }
+            continue;
+        }
         let row = scene.probe(pair, pose)?;
         if args.json {
             lines::json(&row)?;
