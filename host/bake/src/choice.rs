@@ -15,11 +15,9 @@ use crate::distance::ExactSurface;
 use crate::field_error::FaceError;
 use crate::format::SampleFormat;
 use crate::free_form_error::FreeFormError;
-use crate::plan::ShapePlan;
+use crate::plan::{ELSEWHERE, ShapePlan};
 use crate::scene::longest_side;
 
-/// Factor by which errors may be larger on faces that fit nothing.
-pub const ELSEWHERE: f64 = 10.0;
 /// Share of the requested accuracy in fits that the field may use; the rest is the shell's.
 pub(crate) const FIELD_SHARE: f64 = 0.75;
 /// Share of the requested accuracy that the local patches of free-form faces may use.

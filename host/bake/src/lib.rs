@@ -62,7 +62,6 @@ mod voids;
 mod winding;
 
 pub use bake::{Baked, bake};
-pub use choice::ELSEWHERE;
 pub use classic::classic_pointshell;
 pub use cost::{FIXED, TickCost};
 pub use distance::{ExactSurface, Nearest};
@@ -74,6 +73,7 @@ pub use image::{ImageBuilder, PartPlacement};
 pub use occupancy::{CROSSING_TOLERANCE_CELLS, PROXIMITY_LAYERS, bake_occupancy};
 pub use options::{BakeOptions, Grabbable, Method, PointshellKind, Progress, Stage};
 pub use partners::{CurvatureRange, Met, Partners};
+pub use plan::ELSEWHERE;
 pub use plan::{PartTick, Plan, Planned, Request, ShapePlan};
 pub use planner::plan;
 pub use pointshell::sample_pointshell;

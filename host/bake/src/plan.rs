@@ -2,16 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::choice::ELSEWHERE;
 use crate::cost::TickCost;
 use crate::format::SampleFormat;
 use crate::options::Grabbable;
 use crate::report::BakeReport;
 
+/// Factor by which errors may be larger on faces that fit nothing.
+pub const ELSEWHERE: f64 = 10.0;
+
 /// Request for a scene image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Request {
-    /// Largest error of gaps and depths where parts fit into one another, mm; elsewhere [`crate::choice::ELSEWHERE`] times that.
+    /// Largest error of gaps and depths where parts fit into one another, mm; elsewhere [`ELSEWHERE`] times that.
     pub accuracy_mm: f64,
     /// Largest size of the image in bytes.
     pub flash_bytes: u64,

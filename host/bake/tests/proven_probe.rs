@@ -16,7 +16,7 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
 /// Error allowed of an exact answer, mm: a micrometre.
 const EXACT_MM: f64 = 1e-3;
-/// Overlaps that are shallower may be told as unproven gaps, mm: edges are searched for deeper ones.
+/// Overlaps that are shallower may be stated as unproven gaps, mm: edges are searched for deeper ones.
 const SHALLOW_MM: f64 = 3e-3;
 /// Gap at which a sweep ends, mm.
 const TOUCH_MM: f64 = 1e-3;

@@ -13,23 +13,17 @@
 //! precision. Cost: one formula for a piece of a near edge and a face, a field query for each piece that could be nearest.
 
 use glam::DVec3;
-use mortise_protocol::image::{
-    EDGE_ERROR_CELLS, EdgeRecord, FaceRecord, Place, SHAPE_LEAKY, Shape, surface_kind,
-};
+use mortise_protocol::image::{EdgeRecord, FaceRecord, Shape, surface_kind};
 
-use crate::collision::exact_surface::{closed_form, exact};
 use crate::math::pose::Pose;
 use crate::probe::conforming::{least_conforming, least_to_circle};
 use crate::probe::convex::Separation;
 use crate::probe::face_distance::{FaceDistance, THIRD, face_distance, wide};
 use crate::probe::feature_curve::{Curve, Side, apex, bulges, exact_curve, nearest_of_segments, spine};
 use crate::probe::nearest::Measure;
+use crate::probe::on_surface::{ON_SURFACE_M, covered, foot, locate, on_surface};
 use crate::probe::support::rounding;
 
-/// A point is on a surface within this distance and rounding, m.
-const ON_SURFACE_M: f64 = 1e-7;
-/// Share of a shape's size that the field's single precision rounds off.
-const ROUNDING: f64 = 3e-7;
 /// Bounds closer than this are not improved further, m.
 const CLOSE_M: f64 = 0.1e-6;
 /// Pieces shorter than this are not halved, m.
@@ -62,90 +56,6 @@ pub(crate) struct Clearance {
     pub deepest: f64,
     /// The nearest points found: of the first shape and of the second, frame of the second, m.
     nearest: [DVec3; 2],
-}
-
-/// Answer of a field at a point.
-#[derive(Clone, Copy)]
-struct Located {
-    /// Signed distance of no larger magnitude than the true one, m; zero where the sign is not known.
-    least: f64,
-    /// Whether it comes from exact surfaces.
-    sure: bool,
-}
-
-/// Whether a point of a face's unbounded surface belongs to a shape.
-#[derive(Clone, Copy)]
-struct Foot {
-    /// Lower bound of its distance from the shape's surface, m.
-    off: f64,
-    /// Whether it is proven to lie on the surface.
-    on: bool,
-    /// Whether the field is exact there.
-    sure: bool,
-}
-
-/// `p` on a face of outward normal `n`: on the shape's surface where the shape is inside behind it and outside before it, closer than `tolerance`. Exactly
-/// on a border of cells a bound of zero would prove nothing.
-fn foot(shape: &Shape<'_>, p: DVec3, n: DVec3, tolerance: f64) -> Foot {
-    let here = locate(shape, p);
-    let off = here.least.abs();
-    if off > tolerance {
-        return Foot {
-            off,
-            on: false,
-            sure: here.sure,
-        };
-    }
-    let [behind, before] = [-tolerance, tolerance].map(|by| locate(shape, p + n * by));
-    let sure = behind.sure && before.sure;
-    Foot {
-        off,
-        on: sure && behind.least < 0.0 && before.least > 0.0,
-        sure,
-    }
-}
-
-fn locate(shape: &Shape<'_>, p: DVec3) -> Located {
-    let p = p.as_vec3();
-    match shape.field.place(p.to_array()) {
-        Place::Far { inside, bound } => Located {
-            least: f64::from(if inside { -bound } else { bound }),
-            sure: false,
-        },
-        Place::Cell(cell) => match exact(shape.surfaces(), shape.field.nearby(&cell), p) {
-            Some((distance, _)) => Located {
-                least: f64::from(distance),
-                sure: true,
-            },
-            None => {
-                let record = shape.field.record();
-                let found = shape.field.distance(&cell);
-                let least = found.abs().min(record.band) - EDGE_ERROR_CELLS * record.cell;
-                let least = f64::from(least.max(0.0));
-                Located {
-                    least: if found < 0.0 { -least } else { least },
-                    sure: false,
-                }
-            }
-        },
-    }
-}
-
-/// Whether the search covers all of a shape: analytic faces that close.
-fn covered(shape: &Shape<'_>) -> bool {
-    closed_form(shape) && shape.record.flags & SHAPE_LEAKY == 0
-}
-
-/// Whether `p` is proven to lie inside the shape.
-pub(crate) fn is_inside(shape: &Shape<'_>, p: DVec3) -> bool {
-    let found = locate(shape, p);
-    found.least < -on_surface(shape)
-}
-
-/// Distance within which a point is on a shape's surface, m.
-fn on_surface(shape: &Shape<'_>) -> f64 {
-    let size = f64::from(shape.record.radius) + wide(shape.record.center).length();
-    ON_SURFACE_M + ROUNDING * size
 }
 
 /// Which of the first 64 faces of a shape are planes with the whole shape behind them: it is spanned by its sharp convex edges and its balls and rings.
