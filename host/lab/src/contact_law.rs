@@ -1,7 +1,8 @@
 //! The contact law evaluated on the exact surfaces: the force on the moving part that both pointshells would produce if every distance were that of
 //! the exact surface.
 //!
-//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell; φ is its signed distance from the other part's exact surface at the end of the
+//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, and twice that for each two edges that cross
+//! ([`crate::crossing_law`]); φ is its signed distance from the other part's exact surface at the end of the
 //! tick (f64, CAD faces; no field; of the image only the positions of the points), φ̇ its change over the tick, along the exact surface's normal. The
 //! sum is compared with the contact force that the board reports for the same tick.
 //!
@@ -10,12 +11,13 @@
 
 use glam::{DAffine3, DVec3};
 use mortise_haptics::Settings;
-use mortise_protocol::image::SceneImage;
+use mortise_protocol::image::{SceneImage, Shape};
 use mortise_protocol::message::Telemetry;
 
 use mortise_scenario::wire::{pose_mm, vector};
 use mortise_scenario::{Body, PreparedScene};
 
+use crate::crossing_law::{Piece, STIFFNESS, crossings};
 use crate::error::LabError;
 
 /// Distance, mm, beyond which a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.
@@ -36,6 +38,7 @@ pub(crate) struct Pushed {
 /// `Input`, never for images that the baker wrote.
 pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec<Pushed>, LabError> {
     let shells = shells(scene)?;
+    let edges = edges(scene)?;
     let bodies = scene.bodies();
     let moving = usize::from(scene.part);
     let mut clear: Vec<[Clear; 2]> = (bodies.iter().enumerate())
@@ -53,12 +56,17 @@ pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec
             let to_part = to_other.map(|to| to.inverse());
             let [forward, backward] = &mut clear[index];
             forward.touching(&shells[moving], &to_other, other, &mut |gap, rate, normal| {
-                exact.push((gap, rate, other.placement.transform_vector3(normal)));
+                exact.push((1.0, gap, rate, other.placement.transform_vector3(normal)));
             });
             let part = &bodies[moving];
             backward.touching(&shells[index], &to_part, part, &mut |gap, rate, normal| {
-                exact.push((gap, rate, -poses[1].transform_vector3(normal)));
+                exact.push((1.0, gap, rate, -poses[1].transform_vector3(normal)));
             });
+            let hertz = 1.0 / f64::from(Settings::default().period_s);
+            for found in crossings(&edges[moving], &to_other, &edges[index], REACH_MM) {
+                let normal = other.placement.transform_vector3(found.normal);
+                exact.push((STIFFNESS, found.gap, hertz * found.change, normal));
+            }
         }
         all.push(Pushed {
             reported: vector(sample.contact.force),
@@ -68,19 +76,33 @@ pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec
     Ok(all)
 }
 
-/// Sum over points given by gap (mm), rate (mm/s) and direction.
-fn force(points: &[(f64, f64, DVec3)]) -> DVec3 {
+/// Sum over contacts given by their share of the stiffness, gap (mm), rate (mm/s) and direction.
+fn force(contacts: &[(f64, f64, f64, DVec3)]) -> DVec3 {
     let law = Settings::default().contact;
-    let touching = points.iter().filter(|(gap, ..)| *gap < 0.0).count().max(1);
+    let touching = contacts.iter().filter(|(_, gap, ..)| *gap < 0.0).count().max(1);
     let each = f64::from(law.stiffness_n_per_m);
     let k = 1e-3 * each.min(f64::from(law.total_stiffness_n_per_m) / touching as f64);
-    (points.iter())
-        .map(|&(gap, rate, normal)| k * (-(gap + f64::from(law.damping_s) * rate.min(0.0))).max(0.0) * normal)
+    (contacts.iter())
+        .map(|&(share, gap, rate, normal)| {
+            share * k * (-(gap + f64::from(law.damping_s) * rate.min(0.0))).max(0.0) * normal
+        })
         .sum()
 }
 
 /// Points of each part's shell, mm, in its shape's frame.
 fn shells(scene: &PreparedScene) -> Result<Vec<Vec<DVec3>>, LabError> {
+    of_parts(scene, |shape| {
+        let points = shape.points.iter();
+        points.map(|point| 1e3 * vector(point.position)).collect()
+    })
+}
+
+/// Pieces of each part's sharp convex edges, in its shape's frame.
+fn edges(scene: &PreparedScene) -> Result<Vec<Vec<Piece>>, LabError> {
+    of_parts(scene, |shape| shape.edges.iter().map(Piece::of).collect())
+}
+
+fn of_parts<T>(scene: &PreparedScene, read: impl Fn(&Shape<'_>) -> T) -> Result<Vec<T>, LabError> {
     let mut words = vec![0u32; scene.image.len().div_ceil(4)];
     bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..scene.image.len()].copy_from_slice(&scene.image);
     let image = SceneImage::open(bytemuck::cast_slice(&words)).map_err(|error| LabError::Input {
@@ -88,10 +110,7 @@ fn shells(scene: &PreparedScene) -> Result<Vec<Vec<DVec3>>, LabError> {
         what: error.to_string(),
     })?;
     Ok((0..image.parts().len())
-        .map(|part| {
-            let points = image.shape_of_part(part).points.iter();
-            points.map(|point| 1e3 * vector(point.position)).collect()
-        })
+        .map(|part| read(&image.shape_of_part(part)))
         .collect())
 }
 

@@ -12,6 +12,7 @@ mod contact_law;
 pub mod contacts;
 mod convex;
 pub mod corpus;
+mod crossing_law;
 mod driven;
 pub mod endurance;
 mod error;
