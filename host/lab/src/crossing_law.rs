@@ -18,6 +18,8 @@ const CONE_SINE: f64 = 0.02;
 /// Points of a piece from which the search starts, and its steps.
 const STARTS: [f64; 5] = [-0.8, -0.4, 0.0, 0.4, 0.8];
 const STEPS: usize = 12;
+/// Distance between the feet across the normal beyond which the steps have not converged, mm.
+const BESIDE_MM: f64 = 1e-6;
 
 /// Piece of a sharp convex edge: p(t) = center + t·half + t²·bend, mm.
 pub(crate) struct Piece {

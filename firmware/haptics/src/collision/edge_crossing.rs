@@ -23,6 +23,8 @@ const LEAST_SINE_OF_CURVES: f32 = 0.1;
 const CONE_SINE: f32 = 0.02;
 /// How far past its ends a piece still counts, as a share of its half length: consecutive pieces leave no gap.
 const PAST_END: f32 = 0.01;
+/// Distance between the feet across the normal, m, beyond which the steps have not converged: rounding at the flattest angle is a fifth of it.
+const BESIDE_M: f32 = 10e-6;
 /// Steps to the common perpendicular of curved pieces: the first starts from tangents at most 0.2 rad off, each later one squares the error.
 const STEPS: usize = 4;
 
@@ -260,8 +262,14 @@ pub(crate) fn crossing(
     let faces = |n: Vec3| in_cone(cones[1], e, n) && in_cone(cones[0], d, -n);
     let normal = [unit, -unit].into_iter().find(|&n| faces(n))?;
     let point = own.at(t);
+    let apart = point - other.at(s);
+    let gap = normal.dot(apart);
+    // Curves that pass beside each other have no common perpendicular here, and the steps do not converge.
+    if (apart - normal * gap).length_squared() > BESIDE_M * BESIDE_M {
+        return None;
+    }
     Some(Crossing {
-        gap: normal.dot(point - other.at(s)),
+        gap,
         normal,
         point,
         sine: squared * inverse_sqrt(squared) * inverse_sqrt(lengths2),
@@ -328,6 +336,39 @@ mod tests {
             [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
         );
         assert!(crossing(&beside, &other).is_none());
+    }
+
+    /// Rims in one plane, one outside of the other, do not touch, however near they are.
+    #[test]
+    fn rims_side_by_side_do_not_cross() {
+        let arc = |center: Vec3, from: f32, normals: [[f32; 3]; 2]| {
+            let at = |phi: f32| center + Vec3::new(libm::cosf(phi), libm::sinf(phi), 0.0) * 0.01;
+            let (p, m, q) = (at(from - 0.2), at(from), at(from + 0.2));
+            edge(
+                m.to_array(),
+                ((q - p) * 0.5).to_array(),
+                ((p + q) * 0.5 - m).to_array(),
+                normals,
+            )
+        };
+        for beside in [0.05e-3f32, 0.2e-3, 0.5e-3] {
+            for step in -20..=20 {
+                let turn = 0.01 * step as f32;
+                let own = arc(
+                    Vec3::ZERO,
+                    turn,
+                    [[0.0, 0.0, -1.0], [libm::cosf(turn), libm::sinf(turn), 0.0]],
+                );
+                let center = Vec3::new(0.02 + beside, 0.0, -1e-6);
+                let other = arc(center, 3.0, [[0.0, 0.0, 1.0], [-0.99, 0.14, 0.0]]);
+                let [own, other] = [&own, &other].map(Piece::fixed);
+                let (from, _) = nearest(&own, &other);
+                assert!(
+                    super::crossing(&own, &other, &Mat3::IDENTITY, from).is_none(),
+                    "{beside} {turn}"
+                );
+            }
+        }
     }
 
     proptest! {
