@@ -147,7 +147,9 @@ fn cross(own: &Piece, other: &Piece) -> Option<(f64, f64, DVec3)> {
     let normal = [unit, -unit]
         .into_iter()
         .find(|&n| other.faces(s, n) && own.faces(t, -n))?;
-    Some((t, s, normal))
+    // Curves that pass beside each other have no common perpendicular here.
+    let beside = (own.at(t) - other.at(s)).reject_from_normalized(normal);
+    (beside.length() < BESIDE_MM).then_some((t, s, normal))
 }
 
 #[cfg(test)]
