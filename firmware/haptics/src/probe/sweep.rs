@@ -59,7 +59,7 @@ impl Motion {
 pub enum Course {
     /// The parts touch.
     Touch,
-    /// They come within [`TOUCH_M`], and no overlap is proven after that.
+    /// They come within a micrometre, and no overlap is proven after that.
     Near,
     /// They are proven to stay apart all the way.
     Free,
