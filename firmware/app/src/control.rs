@@ -20,7 +20,7 @@ use mortise_protocol::message::{ConstraintTarget, Fault, Refusal, Statistics};
 
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
 use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Epoch, Event, Reply};
-use crate::parameters::{ControlSettings, Parameters};
+use crate::parameters::ControlSettings;
 use crate::safety::{Action, AfterSoftStop, Event as SafetyEvent, Motors, Safety};
 use crate::statistics::{StateHash, count_tick};
 
@@ -496,7 +496,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
     fn restrained(&self, wrench: Wrench) -> Wrench {
         let bounds = self
             .ceilings
-            .with(self.settings.power_limit_w, self.settings.workspace_m);
+            .with(self.settings.safety.power_w, self.settings.safety.workspace_m);
         restrain(wrench, self.sensed.handle.position, &self.sensed.twist, &bounds)
     }
 
@@ -570,22 +570,5 @@ fn scaled(wrench: Wrench, factor: f32) -> Wrench {
     Wrench {
         force: wrench.force * factor,
         torque: wrench.torque * factor,
-    }
-}
-
-impl ControlSettings {
-    /// The defaults of every parameter on a rig with these hardware limits.
-    pub fn at_start(ceilings: Ceilings) -> Self {
-        let parameters = Parameters::within(ceilings);
-        // The defaults pass their own checks (tested), so the fallback is never used; with its speed limit of 0 nothing could stay armed.
-        parameters.settings().unwrap_or_else(|_| Self {
-            law: haptics::Settings::default(),
-            speed_limit_m_per_s: 0.0,
-            angular_speed_limit_rad_per_s: 0.0,
-            power_limit_w: 0.0,
-            workspace_m: 0.0,
-            host_timeout_ticks: 0,
-            parameters,
-        })
     }
 }

@@ -284,7 +284,7 @@ impl<'c, 's> World<'c, 's> {
     }
 
     fn acting(&self) -> f32 {
-        self.control.settings().workspace_m
+        self.control.settings().safety.workspace_m
     }
 
     /// Processes the board's output.

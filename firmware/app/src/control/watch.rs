@@ -5,6 +5,7 @@ use mortise_protocol::message::Fault;
 
 use super::ControlPlane;
 use crate::board::{Clock, DriverFaultKind, Mechanism};
+use crate::parameters::Ticks;
 use crate::safety::{Event as SafetyEvent, Motors, Safety};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
@@ -79,15 +80,15 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         if let Some(axis) = self.sensed.encoder_stuck {
             return Some(Fault::EncoderStuck { axis });
         }
-        let limit = self.settings.speed_limit_m_per_s;
+        let limit = self.settings.safety.speed_m_per_s;
         if self.sensed.twist.linear.length_squared() > limit * limit {
             return Some(Fault::OverSpeed);
         }
-        let limit = self.settings.angular_speed_limit_rad_per_s;
+        let limit = self.settings.safety.angular_speed_rad_per_s;
         if self.sensed.twist.angular.length_squared() > limit * limit {
             return Some(Fault::AngularOverSpeed);
         }
-        if is_outside(self.sensed.handle.position, self.settings.workspace_m) {
+        if is_outside(self.sensed.handle.position, self.settings.safety.workspace_m) {
             return Some(Fault::Workspace);
         }
         let overrun = u32::from(self.overrun_ticks);
@@ -95,8 +96,8 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             return Some(Fault::TickOverrun);
         }
         // Not while fading: a host that disarmed may disconnect before the fade is over.
-        let silent =
-            self.silent_ticks > self.settings.host_timeout_ticks && self.safety.motors() != Motors::Fading;
+        let silent = Ticks(self.silent_ticks) > self.settings.safety.host_timeout
+            && self.safety.motors() != Motors::Fading;
         silent.then_some(Fault::HostSilent {
             silent_ms: self.silent_ticks.min(u32::from(u16::MAX)) as u16,
         })
