@@ -14,7 +14,7 @@ mod simulation;
 mod watch;
 
 use mortise_haptics::{self as haptics, GrabError, Input, Output, TargetError, Twist, Wrench};
-use mortise_mechanism::ceilings::{Ceilings, restrain};
+use mortise_mechanism::hardware_limits::{HardwareLimits, restrain};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{ConstraintTarget, Fault, Refusal, Statistics};
 
@@ -57,7 +57,7 @@ pub struct ControlPlane<'c, 's, M, C> {
     mechanism: M,
     clock: C,
     overrun_ticks: u8,
-    ceilings: Ceilings,
+    hardware_limits: HardwareLimits,
     safety: Safety,
     settings: ControlSettings,
     scene: Option<SceneImage<'s>>,
@@ -108,7 +108,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             mechanism,
             clock,
             overrun_ticks: identity.overrun_ticks,
-            ceilings: identity.ceilings,
+            hardware_limits: identity.hardware_limits,
             safety: Safety::Boot,
             settings,
             scene: None,
@@ -495,7 +495,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
     /// The wrench after the last limit before the motors.
     fn restrained(&self, wrench: Wrench) -> Wrench {
         let bounds = self
-            .ceilings
+            .hardware_limits
             .with(self.settings.safety.power_w, self.settings.safety.workspace_m);
         restrain(wrench, self.sensed.handle.position, &self.sensed.twist, &bounds)
     }

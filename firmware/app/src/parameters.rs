@@ -1,7 +1,7 @@
 //! The parameters' values, and the tick's settings, which are derived from them at low priority.
 
 use mortise_haptics::{FromParameter, Settings, each_parameter_drives_one_setting, settings_group};
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::message::Refusal;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
@@ -64,8 +64,8 @@ impl SafetySettings {
 
 impl ControlSettings {
     /// The defaults of every parameter on a rig with these hardware limits.
-    pub fn at_start(ceilings: Ceilings) -> Self {
-        let parameters = Parameters::within(ceilings);
+    pub fn at_start(hardware_limits: HardwareLimits) -> Self {
+        let parameters = Parameters::within(hardware_limits);
         // The defaults pass their own checks (tested), so the fallback is never used.
         parameters.settings().unwrap_or_else(|_| Self {
             law: Settings::default(),
@@ -79,24 +79,27 @@ impl ControlSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     values: [f32; PARAMETERS.len()],
-    ceilings: Ceilings,
+    hardware_limits: HardwareLimits,
 }
 
 impl Default for Parameters {
     /// The defaults on a rig with the largest limits a board accepts.
     fn default() -> Self {
-        Self::within(Ceilings::LARGEST)
+        Self::within(HardwareLimits::LARGEST)
     }
 }
 
 impl Parameters {
     /// The defaults, none above this rig's hardware limit.
-    pub fn within(ceilings: Ceilings) -> Self {
+    pub fn within(hardware_limits: HardwareLimits) -> Self {
         let mut values = [0.0; PARAMETERS.len()];
         for (value, row) in values.iter_mut().zip(PARAMETERS) {
-            *value = row.default.min(ceilings.most(row.id));
+            *value = row.default.min(hardware_limits.most(row.id));
         }
-        Self { values, ceilings }
+        Self {
+            values,
+            hardware_limits,
+        }
     }
 
     /// A parameter's value, in its unit.
@@ -107,7 +110,7 @@ impl Parameters {
     /// This set with one value changed. A value outside its range, above the rig's hardware limit or not a number is refused with the range valid
     /// here.
     pub fn with(mut self, id: ParameterId, value: f32) -> Result<Self, Refusal> {
-        let (min, max) = (id.row().min, self.ceilings.most(id));
+        let (min, max) = (id.row().min, self.hardware_limits.most(id));
         // A comparison with NaN is false, so NaN is refused too.
         if !(value >= min && value <= max) {
             return Err(Refusal::OutOfRange { id, min, max });
@@ -164,15 +167,15 @@ mod tests {
     }
 
     #[test]
-    fn a_rigs_ceiling_is_the_range_that_holds() {
-        let ceilings = Ceilings {
+    fn a_rigs_hardware_limit_is_the_range_that_holds() {
+        let hardware_limits = HardwareLimits {
             force_n: 6.0,
             speed_m_per_s: 1.0,
             angular_speed_rad_per_s: 30.0,
             workspace_m: 0.1,
-            ..Ceilings::LARGEST
+            ..HardwareLimits::LARGEST
         };
-        let weak = Parameters::within(ceilings);
+        let weak = Parameters::within(hardware_limits);
         let default = ParameterId::ForceLimit.row().default;
         assert!(default > 6.0, "the default itself must be cut");
         for (id, most) in [

@@ -15,7 +15,7 @@ use mortise_firmware::control::Ticked;
 use mortise_firmware::device;
 use mortise_firmware::link::OUTBOUND_MIN;
 use mortise_firmware::store;
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::message::{CostUnit, ResetReason};
 use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 use mortise_simulation::simulated_rig::SimulatedRig;
@@ -120,7 +120,7 @@ fn power_on(
         reset,
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
-        ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
+        hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
         // A count suffices: frames for this board cannot reach boards of other processes.
         entropy: STARTS.fetch_add(1, Ordering::Relaxed),
     };

@@ -1,6 +1,6 @@
 //! Sensor readings, and the faults found in them.
 
-use mortise_mechanism::ceilings::is_outside;
+use mortise_mechanism::hardware_limits::is_outside;
 use mortise_protocol::message::Fault;
 
 use super::ControlPlane;

@@ -32,7 +32,7 @@ mod app {
     use mortise_firmware::control::{ControlPlane, Ticked};
     use mortise_firmware::device::start;
     use mortise_firmware::store;
-    use mortise_mechanism::ceilings::Ceilings;
+    use mortise_mechanism::hardware_limits::HardwareLimits;
     use mortise_protocol::message::{CostUnit, ResetReason};
     use mps2::Interrupt;
     use mps2::link::{self, Link};
@@ -75,7 +75,7 @@ mod app {
             reset: last_crash.map_or(ResetReason::PowerOn, Crash::reason),
             // The simulated mechanism stands still between ticks: late ticks are counted and do no harm.
             overrun_ticks: 0,
-            ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
+            hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
             // QEMU's chip has no random numbers; each of its runs has a line of its own, on which frames of another run cannot come.
             entropy: memory::starts().into(),
         };

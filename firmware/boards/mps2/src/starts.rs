@@ -1,6 +1,6 @@
 //! How often the board has started since power-on, in memory that a reset leaves alone.
 
-/// A count and its complement, by which memory that was never written is told apart.
+/// A count and its complement, by which memory that was never written is recognised.
 pub type Counted = [u32; 2];
 
 /// The count after one more start; 1 where there is none yet.

@@ -57,7 +57,7 @@ mod app {
     use mortise_firmware::control::ControlPlane;
     use mortise_firmware::device::start;
     use mortise_firmware::store;
-    use mortise_mechanism::ceilings::Ceilings;
+    use mortise_mechanism::hardware_limits::HardwareLimits;
     use mortise_protocol::message::CostUnit;
     use static_cell::{ConstStaticCell, StaticCell};
     use stm32h743::boot::reset_reason;
@@ -137,7 +137,7 @@ mod app {
             cost_budget: core_hz / 1000,
             reset: reset_reason(flags, last_crash),
             overrun_ticks: OVERRUN_TICKS,
-            ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
+            hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
             entropy: entropy::entropy(),
         };
         let (plane, control) = start(

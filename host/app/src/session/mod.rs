@@ -33,7 +33,7 @@ use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
 
 use self::document::Document;
-use self::guidance::Wish;
+use self::guidance::GuidanceCommand;
 use self::history::History;
 pub use self::intent::{Intent, obstacle};
 use self::link::{Connection, Link};
@@ -215,16 +215,16 @@ impl Session {
                     }
                 }
             }
-            Intent::PinTarget(id, pinned) => self.command_guidance(Wish::Pin(id, pinned)),
-            Intent::SwitchTargetOff(id, off) => self.command_guidance(Wish::SwitchOff(id, off)),
+            Intent::PinTarget(id, pinned) => self.command_guidance(GuidanceCommand::Pin(id, pinned)),
+            Intent::SwitchTargetOff(id, off) => self.command_guidance(GuidanceCommand::SwitchOff(id, off)),
             Intent::GuideWhen(when) => {
                 self.guide.when = when;
-                self.command_guidance(Wish::Set(self.guide));
+                self.command_guidance(GuidanceCommand::Set(self.guide));
             }
             Intent::GuideCap(newton) => {
                 if newton.is_finite() {
                     self.guide.force_cap_n = newton.clamp(*GUIDE_CAP_N.start(), *GUIDE_CAP_N.end());
-                    self.command_guidance(Wish::Set(self.guide));
+                    self.command_guidance(GuidanceCommand::Set(self.guide));
                 }
             }
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
@@ -353,8 +353,8 @@ impl Session {
         self.parameters[ParameterId::Guidance as usize] >= 0.5
     }
 
-    fn command_guidance(&mut self, wish: Wish) {
-        let taken = self.connection().is_none_or(|c| c.tap.wish(wish));
+    fn command_guidance(&mut self, command: GuidanceCommand) {
+        let taken = self.connection().is_none_or(|c| c.tap.command(command));
         if !taken && self.scene_is_on_board() {
             self.notes.add(Severity::Warning, "Guidance is busy: try again");
         }
@@ -408,7 +408,7 @@ impl Session {
         }
         if id == ParameterId::Guidance {
             self.guide.sending = self.guides();
-            self.command_guidance(Wish::Set(self.guide));
+            self.command_guidance(GuidanceCommand::Set(self.guide));
         }
     }
 

@@ -9,7 +9,7 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
 use super::document::Document;
-use super::guidance::{Tap, Wish};
+use super::guidance::{GuidanceCommand, Tap};
 use super::history::Sample;
 use super::insertion::Wall;
 use super::link::{Command, Connection, Link, LinkUpdate};
@@ -361,7 +361,7 @@ fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String
     if let (ToDevice::ResetScene, Some(document)) = (message, &mut session.document) {
         document.reset_poses();
         session.verdict = None;
-        session.command_guidance(Wish::PutBack);
+        session.command_guidance(GuidanceCommand::PutBack);
     }
 }
 
