@@ -42,12 +42,12 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
 
     /// Checks for faults, most severe first, and steps the safety state machine.
     pub(super) fn watch(&mut self, missed: u32) {
-        self.missed_total = self.missed_total.saturating_add(missed);
-        self.statistics.missed_ticks = self.statistics.missed_ticks.saturating_add(missed);
-        self.missed_in_row = if missed == 0 {
+        self.late.missed_total = self.late.missed_total.saturating_add(missed);
+        self.reports.statistics.missed_ticks = self.reports.statistics.missed_ticks.saturating_add(missed);
+        self.late.missed_in_row = if missed == 0 {
             0
         } else {
-            self.missed_in_row.saturating_add(missed)
+            self.late.missed_in_row.saturating_add(missed)
         };
         self.listen();
         if self.safety == Safety::Boot {
@@ -92,24 +92,24 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             return Some(Fault::Workspace);
         }
         let overrun = u32::from(self.overrun_ticks);
-        if overrun > 0 && self.missed_in_row >= overrun {
+        if overrun > 0 && self.late.missed_in_row >= overrun {
             return Some(Fault::TickOverrun);
         }
         // Not while fading: a host that disarmed may disconnect before the fade is over.
-        let silent = Ticks(self.silent_ticks) > self.settings.safety.host_timeout
+        let silent = Ticks(self.late.silent_ticks) > self.settings.safety.host_timeout
             && self.safety.motors() != Motors::Fading;
         silent.then_some(Fault::HostSilent {
-            silent_ms: self.silent_ticks.min(u32::from(u16::MAX)) as u16,
+            silent_ms: self.late.silent_ticks.min(u32::from(u16::MAX)) as u16,
         })
     }
 
     fn listen(&mut self) {
         let heard = self.ends.shared.heard();
-        if heard != self.heard || self.lockstep || !self.safety.live() {
-            self.heard = heard;
-            self.silent_ticks = 0;
+        if heard != self.late.heard || self.lockstep.on || !self.safety.live() {
+            self.late.heard = heard;
+            self.late.silent_ticks = 0;
         } else {
-            self.silent_ticks = self.silent_ticks.saturating_add(1);
+            self.late.silent_ticks = self.late.silent_ticks.saturating_add(1);
         }
     }
 }

@@ -48,7 +48,6 @@ fn mortise_cut_motors() {
 #[rtic::app(device = embassy_stm32::pac, peripherals = false)]
 mod app {
     use embassy_stm32::interrupt::{InterruptExt, Priority};
-    use embassy_stm32::pac;
     use mortise_board::device::Device;
     use mortise_board::start::announce;
     use mortise_board::{crash, executor, stack};
@@ -58,7 +57,8 @@ mod app {
     use mortise_firmware::device::start;
     use mortise_firmware::store;
     use mortise_mechanism::hardware_limits::HardwareLimits;
-    use mortise_protocol::message::CostUnit;
+    use mortise_protocol::message::{CostUnit, ResetReason};
+    use mortise_protocol::rig::Rig;
     use static_cell::{ConstStaticCell, StaticCell};
     use stm32h743::boot::reset_reason;
     use stm32h743::critical::{STOP_PRIORITY, TICK_PRIORITY};
@@ -104,9 +104,7 @@ mod app {
         clocks::lock_usb_clock();
         // HAL interrupts start at the highest priority.
         embassy_stm32::interrupt::OTG_FS.set_priority(Priority::P14);
-        // While a debugger halts the processor the watchdog stands, and the motor timer with all its outputs low.
-        pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
-        pac::DBGMCU.apb2fzr1().modify(|w| w.set_tim1(true));
+        clocks::stand_still_under_a_debugger();
 
         let timer = MotorTimer::new(p.TIM1);
         let lines = Lines {
@@ -129,17 +127,7 @@ mod app {
         let kept = store::rig::kept(&flash);
         let rig = kept.rig();
 
-        let identity = Identity {
-            board: BOARD,
-            force_axes: rig.map_or(0, |rig| rig.joints.len() as u8),
-            torque_axes: 0,
-            cost_unit: CostUnit::Cycles,
-            cost_budget: core_hz / 1000,
-            reset: reset_reason(flags, last_crash),
-            overrun_ticks: OVERRUN_TICKS,
-            hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
-            entropy: entropy::entropy(),
-        };
+        let identity = identity(rig, core_hz, reset_reason(flags, last_crash));
         let (plane, control) = start(
             CHANNELS.take(),
             flash,
@@ -161,6 +149,20 @@ mod app {
                 link: Some((plane, port)),
             },
         )
+    }
+
+    fn identity(rig: Option<&Rig>, core_hz: u32, reset: ResetReason) -> Identity {
+        Identity {
+            board: BOARD,
+            force_axes: rig.map_or(0, |rig| rig.joints.len() as u8),
+            torque_axes: 0,
+            cost_unit: CostUnit::Cycles,
+            cost_budget: core_hz / 1000,
+            reset,
+            overrun_ticks: OVERRUN_TICKS,
+            hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
+            entropy: entropy::entropy(),
+        }
     }
 
     /// One millisecond. Budget 480,000 cycles; a longer tick is counted as missed ones, two in a row with live motors are a fault, five reset the board.
