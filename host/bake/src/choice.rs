@@ -19,7 +19,7 @@ use crate::plan::{ELSEWHERE, ShapePlan};
 use crate::scene::longest_side;
 
 /// Share of the requested accuracy in fits that the field may use; the rest is the shell's.
-pub(crate) const FIELD_SHARE: f64 = 0.75;
+const FIELD_SHARE: f64 = 0.75;
 /// Share of the requested accuracy that the local patches of free-form faces may use.
 pub(crate) const PATCH_SHARE: f64 = 0.5;
 /// Share of the accuracy elsewhere that the field may use.
@@ -263,24 +263,30 @@ impl Demand {
         by_surfaces.max(interpolated)
     }
 
-    /// Largest measured error of a field over what `accuracy_mm` in fits allows it there, edges included: at most 1 where it is accurate enough.
+    /// Largest measured error of a field over what `accuracy_mm` in fits allows it there, away from edges and at them: both at most 1 where it is
+    /// accurate enough.
     pub fn excess(
         &self,
         accuracy_mm: f64,
         choice: &Choice,
         found: &[FaceError],
         free_form: &FreeFormError,
-    ) -> f64 {
+    ) -> [f64; 2] {
         let elsewhere = FIELD_SHARE_ELSEWHERE * ELSEWHERE * accuracy_mm;
-        let free_form =
-            (free_form.worst_mm() / (FIELD_SHARE * accuracy_mm)).max(free_form.at_edges_mm / elsewhere);
-        let faces = (0..).zip(found).filter(|(face, _)| !self.left_out.contains(face));
-        faces
-            .map(|(face, error)| {
-                let at_edges = SAFETY * error.at_edges_mm.unwrap_or(0.0);
-                self.bound_mm(face, choice, error).max(at_edges) / self.allowed_mm(face, accuracy_mm)
-            })
-            .fold(free_form, f64::max)
+        let mut away = free_form.worst_mm() / (FIELD_SHARE * accuracy_mm);
+        let mut at_edges = free_form.at_edges_mm / elsewhere;
+        for (face, error) in (0..).zip(found) {
+            if self.left_out.contains(&face) {
+                continue;
+            }
+            let allowed = self.allowed_mm(face, accuracy_mm);
+            if self.counts(face, choice) {
+                away = away.max(self.bound_mm(face, choice, error) / allowed);
+            }
+            let edge = SAFETY * error.at_edges_mm.unwrap_or(0.0);
+            at_edges = at_edges.max(edge.max(self.bound_mm(face, choice, error)) / allowed);
+        }
+        [away, at_edges]
     }
 
     /// The model of `choice` with the errors measured of its field, and the shell that they leave room for.

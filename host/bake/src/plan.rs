@@ -111,6 +111,16 @@ impl Plan {
         shapes.fold(0.0, f64::max)
     }
 
+    /// The shape with the largest error, by what is allowed in fits and elsewhere.
+    pub(crate) fn least_accurate(&self) -> String {
+        let error = |shape: &ShapePlan| {
+            let in_fits = shape.field_error_in_fits_mm + shape.shell_error_in_fits_mm;
+            in_fits.max(shape.error_elsewhere_mm / ELSEWHERE)
+        };
+        let worst = (self.shapes.iter()).max_by(|a, b| error(a).total_cmp(&error(b)));
+        worst.map(|shape| shape.name.clone()).unwrap_or_default()
+    }
+
     /// Whether the stated errors are within an accuracy in fits, and [`ELSEWHERE`] times that elsewhere.
     pub fn meets(&self, accuracy_mm: f64) -> bool {
         let most = accuracy_mm * (1.0 + 1e-9);

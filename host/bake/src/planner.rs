@@ -41,7 +41,7 @@ const COARSEST_MM: f64 = 2.0;
 /// Most work of all trials together, in triangles examined: about half a minute on two cores.
 const MOST_WORK: u64 = 1_500_000_000;
 /// Time after which no further field is tried.
-const MOST_TIME: Duration = Duration::from_secs(35);
+const MOST_TIME: Duration = Duration::from_secs(40);
 
 /// Plans and bakes `model`. `progress` as for [`crate::bake`]; it restarts with each attempt.
 ///
@@ -289,7 +289,7 @@ impl<'a> Planner<'a> {
         } else if self.clock.is_over() {
             Limit::Time
         } else {
-            over.or(found.limit).unwrap_or(Limit::Bytes)
+            (over.or(found.limit)).unwrap_or_else(|| Limit::Shape(found.plan.least_accurate()))
         };
         Planned {
             met,
@@ -303,7 +303,7 @@ impl<'a> Planner<'a> {
     /// Bakes for `accuracy_mm`.
     fn attempt(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
         let room = self.request.flash_bytes;
-        let found = self.each(|shape, bench| shape.find(bench, accuracy_mm, room))?;
+        let found = self.find(accuracy_mm)?;
         let (mut fields, mut limit, mut too_large) = (Vec::new(), None, false);
         for (found, name) in found.into_iter().zip(&self.scene.names) {
             let field = match found {
@@ -320,6 +320,7 @@ impl<'a> Planner<'a> {
                     too_large = true;
                     field
                 }
+                Found::Pending => None,
             };
             fields.extend(field);
         }
@@ -335,6 +336,20 @@ impl<'a> Planner<'a> {
             limit = Some(Limit::Bytes);
         }
         self.assemble(accuracy_mm, fields, limit)
+    }
+
+    /// The field of each shape for an accuracy. All shapes take one step after the other from coarse to fine, so that none is left behind when planning
+    /// ends early.
+    fn find(&mut self, accuracy_mm: f64) -> Result<Vec<Found>, BakeError> {
+        let room = self.request.flash_bytes;
+        let mut steps = 1;
+        loop {
+            let found = self.each(|shape, bench| shape.find(bench, accuracy_mm, room, steps))?;
+            if !found.iter().any(|found| matches!(found, Found::Pending)) {
+                return Ok(found);
+            }
+            steps += 1;
+        }
     }
 
     /// The smallest field found of each shape, whatever its error.

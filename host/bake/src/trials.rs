@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use crate::bake::field_bytes;
 use crate::cache::{Cache, KeptField, field_name};
-use crate::choice::{Choice, Demand, FIELD_SHARE, PATCH_SHARE};
+use crate::choice::{Choice, Demand, PATCH_SHARE};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::BakedField;
@@ -25,7 +25,7 @@ use crate::scene::Scene;
 
 /// Bytes of a field grow at least with this power of the inverse cell: the bricks of a prism repeat along it.
 const LEAST_GROWTH: f64 = 1.0;
-/// Attempts with a finer cell for a shape with free-form faces, and the factor between their cells.
+/// Attempts with a cell finer than interpolation needs, where the measured error is larger than expected, and the factor between their cells.
 const FINER_CELLS: usize = 5;
 const FINER: f64 = 0.7;
 /// Least improvement for which a still finer cell is tried.
@@ -98,6 +98,8 @@ pub(crate) enum Found {
     Best(Fielded),
     /// The most accurate one found in the share of work.
     OutOfWork(Fielded),
+    /// The steps allowed do not suffice.
+    Pending,
     /// It would take more bytes than there are; with the most accurate field that does not, if any.
     TooLarge(Option<Fielded>),
 }
@@ -134,11 +136,20 @@ impl Trials {
         }
     }
 
-    /// The smallest field found that is as accurate as `accuracy_mm` requires, of at most about `room` bytes.
-    pub fn find(&mut self, bench: &Bench<'_>, accuracy_mm: f64, room: u64) -> Result<Found, BakeError> {
+    /// The smallest field found that is as accurate as `accuracy_mm` requires, of at most about `room` bytes, within so many steps from coarse to fine.
+    pub fn find(
+        &mut self,
+        bench: &Bench<'_>,
+        accuracy_mm: f64,
+        room: u64,
+        steps: usize,
+    ) -> Result<Found, BakeError> {
         let finest = self.demand.choose(accuracy_mm);
         let mut tried: Vec<Fielded> = Vec::new();
         for choice in self.demand.coarser(&finest) {
+            if tried.len() >= steps {
+                return Ok(Found::Pending);
+            }
             if is_hopeless(tried.last(), choice.cell_mm, room) {
                 return Ok(Found::TooLarge(self.best(accuracy_mm, tried, room)));
             }
@@ -150,15 +161,26 @@ impl Trials {
                 let smaller = is_met && field.bytes() < coarser.bytes();
                 return Ok(Found::Met(if smaller { field } else { coarser.clone() }));
             }
+            // Where bytes grow already, the next field would be larger, and takes as long as all before.
+            if is_met
+                && tried
+                    .last()
+                    .is_some_and(|coarser| coarser.bytes() <= field.bytes())
+            {
+                return Ok(Found::Met(field));
+            }
             tried.push(field);
         }
         if let Some(field) = tried.last().filter(|f| self.excess(accuracy_mm, f) <= 1.0) {
             return Ok(Found::Met(field.clone()));
         }
+        if tried.len() >= steps {
+            return Ok(Found::Pending);
+        }
         self.finest(bench, accuracy_mm, room, finest, tried)
     }
 
-    /// The field of interpolation alone, or finer ones where free-form faces need them.
+    /// The field of interpolation alone, or finer ones where its measured error needs them.
     fn finest(
         &mut self,
         bench: &Bench<'_>,
@@ -174,8 +196,8 @@ impl Trials {
             return Ok(self.unfinished(accuracy_mm, tried, room));
         };
         for _ in 0..FINER_CELLS {
-            let error = field.baked.free_form.worst_mm();
-            if error <= FIELD_SHARE * accuracy_mm {
+            let error = self.excess_away(accuracy_mm, &field);
+            if error <= 1.0 {
                 return Ok(Found::Met(field));
             }
             tried.push(field.clone());
@@ -185,19 +207,19 @@ impl Trials {
             }
             let choice = Choice {
                 cell_mm: field.choice.cell_mm * FINER,
-                why: "its free-form faces".to_owned(),
+                why: "the error measured at its faces".to_owned(),
                 ..field.choice.clone()
             };
             let Some(finer) = self.tried(bench, &choice, accuracy_mm)? else {
                 return Ok(self.unfinished(accuracy_mm, tried, room));
             };
-            let helped = finer.baked.free_form.worst_mm() <= HELPS * error;
+            let helped = self.excess_away(accuracy_mm, &finer) <= HELPS * error;
             field = finer;
             if !helped {
                 break;
             }
         }
-        if field.baked.free_form.worst_mm() <= FIELD_SHARE * accuracy_mm {
+        if self.excess_away(accuracy_mm, &field) <= 1.0 {
             return Ok(Found::Met(field));
         }
         tried.push(field);
@@ -215,7 +237,17 @@ impl Trials {
             self.tried(bench, &choice, accuracy_mm)?;
         }
         let smallest = self.known.iter().min_by_key(|field| field.bytes()).cloned();
-        Ok(smallest.map(|field| self.restated(field, finest)))
+        // Its shell resolves no more than its cells, so that it has few points.
+        Ok(smallest.map(|field| {
+            let resolution_mm = field.choice.cell_mm.max(finest.resolution_mm);
+            self.restated(
+                field,
+                Choice {
+                    resolution_mm,
+                    ..finest
+                },
+            )
+        }))
     }
 
     /// A known field, stated for another accuracy with the errors near enough for it.
@@ -248,10 +280,19 @@ impl Trials {
         }
     }
 
-    /// Largest error over what an accuracy allows.
+    /// Largest error over what an accuracy allows, edges included.
     fn excess(&self, accuracy_mm: f64, field: &Fielded) -> f64 {
-        self.demand
-            .excess(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
+        let [away, at_edges] = self.excesses(accuracy_mm, field);
+        away.max(at_edges)
+    }
+
+    /// The same away from edges, for cells of interpolation, which never give the distance at edges.
+    fn excess_away(&self, accuracy_mm: f64, field: &Fielded) -> f64 {
+        self.excesses(accuracy_mm, field)[0]
+    }
+
+    fn excesses(&self, accuracy_mm: f64, field: &Fielded) -> [f64; 2] {
+        (self.demand).excess(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
     }
 
     /// The field by this choice and its errors; `None` when the layout cannot hold it, or there is no work left for it.
