@@ -13,7 +13,8 @@ use mortise_scenario::ScenarioError;
 use mortise_scenario::probe::{NamedPose, ProbeScene, Resolution};
 
 use super::{Plan, Row};
-use crate::fit::{Fit, median};
+use crate::fit::Fit;
+use crate::scene_p::median;
 use crate::{LabError, corpus, scene_p};
 
 const ABSENT: &str = "the shared parts are not there; set MORTISE_SHARED to their folder";
