@@ -130,8 +130,10 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
 fn sending_the_scene_can_be_cancelled_and_begun_again() {
     let mut harness = harness();
     open_sample(&mut harness);
+    // A voxmap is as large as fits, so that a repeated upload takes long enough to be cancelled.
+    (harness.state_mut().session).act(Intent::ChooseMethod(Method::Occupancy));
+    until(&mut harness, "baked again", |s| !s.is_busy());
     connect(&mut harness);
-    // The model is as large as fits, so that a repeated upload takes long enough to be cancelled.
     let session = &mut harness.state_mut().session;
     session.act(Intent::Upload);
     assert_eq!(obstacle(session, &Intent::CancelUpload), None);

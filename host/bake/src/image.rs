@@ -1,7 +1,7 @@
 //! Assembly of the scene image.
 
 use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
@@ -137,7 +137,8 @@ impl ImageBuilder {
                 edge_face: p.edge_face,
             }
         }));
-        self.faces.extend(shape.faces.iter().map(face_record));
+        self.faces
+            .extend(shape.faces.iter().map(|face| face_record(face, (lo, hi))));
         self.patches.extend(&field.patches);
         self.add_field(field);
         (number, bytes)
@@ -243,8 +244,8 @@ fn append<T: Pod>(bytes: &mut Vec<u8>, records: &[T]) -> Section {
     section
 }
 
-/// Record of the exact surface of a face, in metres. `sense` is the B-rep's.
-fn face_record(face: &Face) -> FaceRecord {
+/// Record of the exact surface of a face, in metres. `sense` is the B-rep's; `bounds` are the corners of the shape's bounding box, mm.
+fn face_record(face: &Face, bounds: (DVec3, DVec3)) -> FaceRecord {
     let sense = if face.reversed { -1.0 } else { 1.0 };
     let of = |kind: u32, frame: &mortise_brep::Frame, radius: f64, second: f64| FaceRecord {
         kind,
@@ -254,7 +255,7 @@ fn face_record(face: &Face) -> FaceRecord {
         radius: radius as f32,
         second: second as f32,
     };
-    match face.surface {
+    match near_the_shape(face.surface, bounds) {
         Surface::Plane { frame } => of(surface_kind::PLANE, &frame, 0.0, 0.0),
         Surface::Cylinder { frame, radius } => of(surface_kind::CYLINDER, &frame, radius / 1000.0, 0.0),
         Surface::Cone {
@@ -271,4 +272,30 @@ fn face_record(face: &Face) -> FaceRecord {
             ..FaceRecord::zeroed()
         },
     }
+}
+
+/// The same surface with its origin beside the shape, where the file's is farther from the shape's middle than the shape is long. The board computes
+/// in single precision, of which an origin half a kilometre away leaves no tenth of a millimetre; files with such planes and axes exist.
+fn near_the_shape(mut surface: Surface, (low, high): (DVec3, DVec3)) -> Surface {
+    let middle = (low + high) / 2.0;
+    let far = |origin: DVec3| origin.distance(middle) > (high - low).length();
+    match &mut surface {
+        Surface::Plane { frame } if far(frame.origin) => {
+            frame.origin = middle - frame.z * (middle - frame.origin).dot(frame.z);
+        }
+        Surface::Cylinder { frame, .. } if far(frame.origin) => {
+            frame.origin += frame.z * (middle - frame.origin).dot(frame.z);
+        }
+        Surface::Cone {
+            frame,
+            radius,
+            half_angle,
+        } if far(frame.origin) => {
+            let along = (middle - frame.origin).dot(frame.z);
+            frame.origin += frame.z * along;
+            *radius += along * half_angle.tan();
+        }
+        _ => {}
+    }
+    surface
 }
