@@ -37,7 +37,10 @@ fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
                 if p.edge_face != NO_FACE {
                     sum += shape.faces[usize::from(p.edge_face)].sense;
                 }
-                sum += oct_decode(p.normal)[0];
+                sum += oct_decode(p.normal)[0] + p.span()[0];
+                if p.piece != NO_PIECE {
+                    sum += shape.edges[usize::from(p.piece)].thickness;
+                }
             }
             node = if random.below(2) == 0 {
                 node + 1

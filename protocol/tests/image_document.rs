@@ -44,7 +44,7 @@ fn page_and_records_agree() {
     record!(page, "Field", FieldRecord, origin cell scale band brick_dims format first_grid first_brick brick_count);
     record!(page, "Brick", BrickRecord, samples indices palette palette_len index_bits);
     record!(page, "Node", NodeRecord, center radius first_point point_count skip);
-    record!(page, "Point", PointRecord, position normal face edge_face);
+    record!(page, "Point", PointRecord, position normal face edge_face piece reserved ends);
     record!(page, "Face", FaceRecord, kind sense origin axis radius second);
     record!(page, "Edge", EdgeRecord, center half bend normals faces thickness edge radius);
     record!(page, "Patch", PatchRecord, origin x normal height face reserved);

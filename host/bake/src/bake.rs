@@ -19,7 +19,7 @@ use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::partners::Partners;
-use crate::pointshell::sample_pointshell;
+use crate::pointshell::sample_with_spans;
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
 use crate::scene::Scene;
 use crate::shell::{Pointshell, PointshellOptions};
@@ -149,7 +149,11 @@ impl Scene {
         let shells = sizes.iter().zip(each).enumerate();
         made.shells = shells
             .map(|(i, (&size, options))| {
-                sample_pointshell(&prepared[i], &shell_options(options, size, &self.partners[i]))
+                sample_with_spans(
+                    &prepared[i],
+                    &self.edges[i],
+                    &shell_options(options, size, &self.partners[i]),
+                )
             })
             .collect();
     }
@@ -335,8 +339,9 @@ impl Scene {
             return Err(BakeError::Cancelled);
         }
         match options.shell {
-            PointshellKind::ErrorBounded => Ok(sample_pointshell(
+            PointshellKind::ErrorBounded => Ok(sample_with_spans(
                 surface,
+                &self.edges[index],
                 &shell_options(options, cell_mm, partners),
             )),
             PointshellKind::Classic {

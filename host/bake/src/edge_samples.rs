@@ -11,6 +11,8 @@ use mortise_protocol::image::NO_FACE;
 
 use crate::chains::edge_chains;
 use crate::distance::ExactSurface;
+use crate::edge_spans::spans;
+use crate::edges::{Chain, EdgePiece};
 use glam::DVec3;
 use mortise_brep::Surface;
 
@@ -33,9 +35,11 @@ struct Demand {
     away_only: bool,
 }
 
-/// Appends points strictly inside each chain of boundary pieces; returns the vertices where chains end.
+/// Appends points strictly inside each chain of boundary pieces, or the spans of its `edges` where they are fewer; returns the vertices where chains
+/// end.
 pub(crate) fn sample_edges(
     surface: &ExactSurface,
+    edges: &[EdgePiece],
     options: &PointshellOptions,
     out: &mut Vec<ShellPoint>,
 ) -> BTreeSet<u32> {
@@ -44,7 +48,7 @@ pub(crate) fn sample_edges(
     let convex: Vec<f64> = (0..surface.shape().faces.len() as u32)
         .map(|face| face_range(surface, face).map_or(0.0, |[_, high]| high))
         .collect();
-    for chain in edge_chains(surface) {
+    for (number, chain) in edge_chains(surface).into_iter().enumerate() {
         let demands = chain
             .iter()
             .filter_map(|&(i, _)| demand(surface, &pieces[i as usize], &convex, options));
@@ -55,7 +59,14 @@ pub(crate) fn sample_edges(
         }) else {
             continue;
         };
+        let before = out.len();
         sample_chain(surface, &chain, &demand, options, out);
+        if let Some(spans) = spans_of(surface, edges, (number as u32, &chain), options)
+            && spans.len() < out.len() - before
+        {
+            out.truncate(before);
+            out.extend(spans);
+        }
         sample_ring(surface, &chain, options, out);
         if let (Some(&(first, from)), Some(&(last, to))) = (chain.first(), chain.last()) {
             let start = pieces[first as usize].ends[usize::from(!from)];
@@ -66,6 +77,23 @@ pub(crate) fn sample_edges(
         }
     }
     corners
+}
+
+/// The spans of chain `number`, where its pieces are among `edges` and the partners are known.
+fn spans_of(
+    surface: &ExactSurface,
+    edges: &[EdgePiece],
+    (number, chain): (u32, &[Link]),
+    options: &PointshellOptions,
+) -> Option<Vec<ShellPoint>> {
+    if options.partners == Partners::Unknown {
+        return None;
+    }
+    let first = edges.partition_point(|piece| piece.edge() < number);
+    let end = edges.partition_point(|piece| piece.edge() <= number);
+    let chain = Chain::new(&surface.topology.pieces, chain.to_vec());
+    let sharpest = options.partners.sharpest();
+    spans(surface, &chain, edges, (first, end), sharpest, options)
 }
 
 /// Whether a vertex is an end of any edges other than a single closed one.
@@ -119,6 +147,7 @@ fn sample_chain(
                     .map(|s| s.face)
                     .find(|&f| f != piece.sides[0].face)
                     .map_or(NO_FACE, |f| f as u16),
+                span: None,
             });
         }
     }

@@ -60,9 +60,48 @@ pub(crate) struct EdgePiece {
     faces: [u32; 2],
     thickness: f64,
     edge: u32,
+    /// Arc lengths of its ends along the chain, mm.
+    range: [f64; 2],
 }
 
 impl EdgePiece {
+    /// Number of its edge within the shape, the index of its chain.
+    pub fn edge(&self) -> u32 {
+        self.edge
+    }
+
+    /// Its two faces.
+    pub fn faces(&self) -> [u32; 2] {
+        self.faces
+    }
+
+    /// Its length, mm.
+    pub fn length(&self) -> f64 {
+        self.range[1] - self.range[0]
+    }
+
+    /// Arc length along the chain at a parameter from −1 to 1, mm.
+    pub fn arc_length(&self, t: f64) -> f64 {
+        0.5 * (self.range[0] + self.range[1] + t * self.length())
+    }
+
+    /// Curvature away from what touches the edge, 1/mm: where it bends away from a normal in the cone of its faces'.
+    pub fn curvature_outward(&self) -> f64 {
+        let curvature = self.bend * (2.0 / self.half.length_squared().max(1e-300));
+        let middle = (self.normals[0] + self.normals[1]).normalize_or_zero();
+        let outward = [self.normals[0], self.normals[1], middle].map(|n| -curvature.dot(n));
+        outward.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Ends and middle control point of the stretch between two parameters, moved so that its middle is at `middle`, mm: their convex hull contains
+    /// it.
+    pub fn hull_between(&self, [from, to]: [f64; 2], middle: DVec3) -> [DVec3; 3] {
+        let (t, share) = (0.5 * (from + to), 0.5 * (to - from));
+        let along = (self.half + self.bend * (2.0 * t)) * share;
+        let bend = self.bend * (share * share);
+        [middle - along + bend, middle - bend, middle + along + bend]
+    }
+
     /// Points whose convex hull contains the piece, m: its ends and its middle control point.
     pub fn hull(&self) -> [[f32; 3]; 3] {
         [
@@ -106,14 +145,14 @@ fn meters(mm: DVec3) -> [f32; 3] {
 pub(crate) fn edge_pieces(surface: &ExactSurface, fineness: Fineness) -> Vec<EdgePiece> {
     let mut all = Vec::new();
     for (edge, links) in edge_chains(surface).into_iter().enumerate() {
-        let chain = Chain::new(&surface.topology.pieces, links, fineness);
+        let chain = Chain::new(&surface.topology.pieces, links);
         if chain.length <= 0.0 {
             continue;
         }
         let first = all.len();
         divide(
             surface,
-            &chain,
+            (&chain, fineness),
             [0.0, chain.length],
             MOST_HALVINGS,
             edge as u32,
@@ -128,16 +167,15 @@ pub(crate) fn edge_pieces(surface: &ExactSurface, fineness: Fineness) -> Vec<Edg
 }
 
 /// A chain and the arc length at which each of its pieces begins, mm.
-struct Chain<'a> {
+pub(crate) struct Chain<'a> {
     pieces: &'a [Piece],
     links: Vec<Link>,
     starts: Vec<f64>,
     length: f64,
-    fineness: Fineness,
 }
 
 impl<'a> Chain<'a> {
-    fn new(pieces: &'a [Piece], links: Vec<Link>, fineness: Fineness) -> Self {
+    pub fn new(pieces: &'a [Piece], links: Vec<Link>) -> Self {
         let mut length = 0.0;
         let starts = (links.iter())
             .map(|&(i, _)| {
@@ -151,12 +189,16 @@ impl<'a> Chain<'a> {
             links,
             starts,
             length,
-            fineness,
         }
     }
 
+    /// Its length, mm.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
     /// The boundary piece at arc length `s`, and the point there.
-    fn at(&self, s: f64) -> (&'a Piece, DVec3) {
+    pub fn at(&self, s: f64) -> (&'a Piece, DVec3) {
         let k = self.starts.partition_point(|&start| start <= s).max(1) - 1;
         let (i, forward) = self.links[k];
         let piece = &self.pieces[i as usize];
@@ -168,7 +210,7 @@ impl<'a> Chain<'a> {
 /// Appends the pieces of a chain between two arc lengths.
 fn divide(
     surface: &ExactSurface,
-    chain: &Chain<'_>,
+    (chain, fineness): (&Chain<'_>, Fineness),
     [from, to]: [f64; 2],
     halvings: u32,
     edge: u32,
@@ -185,14 +227,14 @@ fn divide(
         [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75].iter().all(|&t| {
             let exact = chain.at(middle + t * (to - middle)).1;
             let off = center + half * t + bend * (t * t) - exact;
-            off.reject_from(half + 2.0 * t * bend).length() <= chain.fineness.tolerance_mm
+            off.reject_from(half + 2.0 * t * bend).length() <= fineness.tolerance_mm
         })
     };
     let turn = 2.0 * bend.length() / half.length().max(1e-300);
     // A closed chain has no chord: its turn is infinite.
-    if halvings > 0 && to - from > TOLERANCE_MM && (turn > chain.fineness.most_turn || !fits()) {
-        divide(surface, chain, [from, middle], halvings - 1, edge, out);
-        divide(surface, chain, [middle, to], halvings - 1, edge, out);
+    if halvings > 0 && to - from > TOLERANCE_MM && (turn > fineness.most_turn || !fits()) {
+        divide(surface, (chain, fineness), [from, middle], halvings - 1, edge, out);
+        divide(surface, (chain, fineness), [middle, to], halvings - 1, edge, out);
         return;
     }
     let (piece, at) = chain.at(middle);
@@ -205,6 +247,7 @@ fn divide(
             faces,
             thickness: 0.0,
             edge,
+            range: [from, to],
         });
     }
 }

@@ -5,7 +5,7 @@ use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
-    NO_SAMPLES, NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY,
+    NO_PIECE, NO_SAMPLES, NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY,
     Section, ShapeRecord, oct_encode, surface_kind,
 };
 
@@ -73,9 +73,20 @@ impl ImageBuilder {
             .map(|p| (p.position / 1000.0).as_vec3().to_array())
             .collect();
         let offsets: Vec<f32> = shell.offsets.iter().map(|mm| (mm / 1000.0) as f32).collect();
-        let tree = build_tree(&positions, &offsets);
+        let spans: Vec<_> = (shell.points.iter().zip(&positions))
+            .map(|(point, &at)| match &point.span {
+                Some(span) => span.hull.map(|p| (p / 1000.0).as_vec3().to_array()),
+                None => [at; 3],
+            })
+            .collect();
+        let tree = build_tree(&spans, &offsets);
         let hulls: Vec<_> = edges.iter().map(EdgePiece::hull).collect();
         let edge_tree = build_edge_tree(&hulls);
+        // Where each piece lies among the stored ones.
+        let mut stored = vec![NO_PIECE; edges.len()];
+        for (new, &old) in edge_tree.order.iter().enumerate() {
+            stored[old as usize] = new.min(usize::from(NO_PIECE)) as u16;
+        }
         let (lo, hi) = bounding_box(shape);
         let center = ((lo + hi) / 2000.0).as_vec3();
         // Half the diagonal contains the tessellation; the exact surface can bulge past it, by less than the grid's own margin of a cell.
@@ -130,11 +141,15 @@ impl ImageBuilder {
             .extend(edge_tree.order.iter().map(|&old| edges[old as usize].record()));
         self.points.extend(tree.order.iter().map(|&old| {
             let p = &shell.points[old as usize];
+            let end = |t: f64| (t * 32767.0).round() as i16;
             PointRecord {
                 position: positions[old as usize],
                 normal: oct_encode(p.normal.as_vec3().to_array()),
                 face: p.face,
                 edge_face: p.edge_face,
+                piece: p.span.map_or(NO_PIECE, |span| stored[usize::from(span.piece)]),
+                reserved: 0,
+                ends: p.span.map_or([0; 2], |span| span.ends.map(end)),
             }
         }));
         self.faces.extend(shape.faces.iter().map(face_record));

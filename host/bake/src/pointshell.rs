@@ -7,7 +7,8 @@
 //! |---|---|
 //! | inside planes, concave faces, along concave edges | none |
 //! | inside faces convex in some direction | √(4ε/(κᵢ + κ')) in each principal direction i; none where κᵢ + κ' ≤ 0 |
-//! | along convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from the touching partner |
+//! | along sharp convex edges | spans, on which the tick finds the deepest place, see [`crate::edge_spans`]; points as below where they are fewer |
+//! | along other convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from the touching partner |
 //! | on shafts that fit a bore, beside their rims | a ring, see [`crate::ring_samples`] |
 //!
 //! The two directions of a face share ε; an edge uses all of it. Inside faces that are not convex in both directions, mainly cylinders, samples serve
@@ -22,6 +23,7 @@
 use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
+use crate::edges::EdgePiece;
 use crate::grid::bounding_box;
 use crate::partners::Partners;
 use crate::shell::{Pointshell, PointshellOptions, ShellPoint};
@@ -29,11 +31,21 @@ use crate::shell::{Pointshell, PointshellOptions, ShellPoint};
 /// Fewest points of a useful shell: with fewer, the shape is sampled without relying on partners.
 const FEWEST: usize = 8;
 
-/// Samples `surface`. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: proportional to area over spacing².
+/// Samples `surface` by points alone. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: proportional to area over
+/// spacing².
 pub fn sample_pointshell(surface: &ExactSurface, options: &PointshellOptions) -> Pointshell {
+    sample_with_spans(surface, &[], options)
+}
+
+/// As [`sample_pointshell`], with spans of the pieces of `edges` instead of points where they are fewer.
+pub(crate) fn sample_with_spans(
+    surface: &ExactSurface,
+    edges: &[EdgePiece],
+    options: &PointshellOptions,
+) -> Pointshell {
     let (low, high) = bounding_box(surface.shape());
     let tenth = ((high - low).max_element() / 10.0).max(1e-3);
-    let shell = sample(surface, options, tenth);
+    let shell = sample(surface, edges, options, tenth);
     if shell.points.len() >= FEWEST || options.partners == Partners::Unknown {
         return shell;
     }
@@ -42,17 +54,22 @@ pub fn sample_pointshell(surface: &ExactSurface, options: &PointshellOptions) ->
         partners: Partners::Unknown,
         ..options.clone()
     };
-    sample(surface, &alone, tenth)
+    sample(surface, &[], &alone, tenth)
 }
 
 /// `flat_mm`: largest spacing inside spline faces of which the partners are known.
-fn sample(surface: &ExactSurface, options: &PointshellOptions, flat_mm: f64) -> Pointshell {
+fn sample(
+    surface: &ExactSurface,
+    edges: &[EdgePiece],
+    options: &PointshellOptions,
+    flat_mm: f64,
+) -> Pointshell {
     let mut points = Vec::new();
     for face in 0..surface.shape().faces.len() as u32 {
         crate::face_samples::sample_face(surface, face, options, flat_mm, &mut points);
     }
     let face_points = points.len();
-    let corners = crate::edge_samples::sample_edges(surface, options, &mut points);
+    let corners = crate::edge_samples::sample_edges(surface, edges, options, &mut points);
     let edge_points = points.len() - face_points;
     for vertex in corners {
         points.extend(corner_point(surface, vertex));
@@ -82,5 +99,6 @@ fn corner_point(surface: &ExactSurface, vertex: u32) -> Option<ShellPoint> {
         normal: topology.vertex_normals[vertex as usize].try_normalize()?,
         face: *faces.first()? as u16,
         edge_face: faces.get(1).map_or(NO_FACE, |&f| f as u16),
+        span: None,
     })
 }

@@ -72,6 +72,19 @@ pub struct ShellPoint {
     pub face: u16,
     /// Second face of an edge or corner, else [`NO_FACE`](mortise_protocol::image::NO_FACE).
     pub edge_face: u16,
+    /// Stretch of an edge that the point is the middle of; the tick finds the place on it that is deepest.
+    pub span: Option<ShellSpan>,
+}
+
+/// A stretch of a piece of an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellSpan {
+    /// The piece, an index into the shape's pieces.
+    pub piece: u16,
+    /// Parameters of its ends on the piece, −1 to 1.
+    pub ends: [f64; 2],
+    /// Its ends and its middle control point, mm: their convex hull contains it.
+    pub hull: [DVec3; 3],
 }
 
 /// Points of a shape, ordered: faces, then edges, then corners.

@@ -255,6 +255,7 @@ impl<'a> SceneImage<'a> {
                     finite(&p.position)
                         && u32::from(p.face) < shape.face_count
                         && (p.edge_face == NO_FACE || u32::from(p.edge_face) < shape.face_count)
+                        && (p.piece == NO_PIECE || u32::from(p.piece) < shape.edge_count)
                 });
             let edges = run(self.edges, shape.first_edge, shape.edge_count);
             let good = good && edges.iter().all(|e| is_edge(e, shape.face_count));

@@ -423,11 +423,14 @@ impl NodeRecord {
     }
 }
 
-/// A sample of the exact surface.
+/// [`PointRecord::piece`] of a point that stands for itself alone.
+pub const NO_PIECE: u16 = 0xffff;
+
+/// A sample of the exact surface: a point, or a span of a sharp convex edge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PointRecord {
-    /// Position, m, shape frame.
+    /// Position, m, shape frame; the middle of a span.
     pub position: [f32; 3],
     /// Outward unit normal, octahedral (see [`oct_decode`]).
     pub normal: [i16; 2],
@@ -435,6 +438,21 @@ pub struct PointRecord {
     pub face: u16,
     /// The second face if the point is on an edge, else [`NO_FACE`].
     pub edge_face: u16,
+    /// Piece of an edge that the span lies on, counted from the shape's first; [`NO_PIECE`]: no span.
+    pub piece: u16,
+    /// Zero.
+    pub reserved: u16,
+    /// Parameters of the span's ends on its piece, from −1 to 1, in units of 1/32767.
+    pub ends: [i16; 2],
+}
+
+impl PointRecord {
+    /// Parameter on the piece of the span's middle, and the half of the span's length there.
+    #[inline]
+    pub fn span(&self) -> [f32; 2] {
+        let [from, to] = self.ends.map(|end| f32::from(end) * (1.0 / 32767.0));
+        [0.5 * (from + to), 0.5 * (to - from)]
+    }
 }
 
 /// Kinds of surface in [`FaceRecord::kind`].
@@ -540,7 +558,7 @@ mod tests {
         assert_eq!(size_of::<FieldRecord>(), 44);
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
-        assert_eq!(size_of::<PointRecord>(), 20);
+        assert_eq!(size_of::<PointRecord>(), 28);
         assert_eq!(size_of::<super::super::EdgeRecord>(), 60);
         assert_eq!(size_of::<FaceRecord>(), 40);
         assert_eq!(size_of::<PatchRecord>(), 80);

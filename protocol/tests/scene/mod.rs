@@ -118,11 +118,19 @@ pub fn bytes() -> Vec<u8> {
         normal: oct_encode([0.0, 0.0, 1.0]),
         face,
         edge_face,
+        piece: NO_PIECE,
+        reserved: 0,
+        ends: [0; 2],
     };
     let points = [
         point([0.001, 0.001, 0.004], 0, NO_FACE),
         point([0.007, 0.001, 0.004], 1, NO_FACE),
-        point([0.004, 0.001, 0.004], 0, 1),
+        // The middle half of the edge.
+        PointRecord {
+            piece: 0,
+            ends: [-16384, 16384],
+            ..point([0.004, 0.0, 0.004], 0, 1)
+        },
         point([0.002, 0.0, 0.0], 0, 1),
     ];
     let node = |center: [f32; 3], radius: f32, first_point: u32, point_count: u32, skip: u32| NodeRecord {
@@ -135,7 +143,7 @@ pub fn bytes() -> Vec<u8> {
     let nodes = [
         node([0.004, 0.001, 0.004], 0.0031, 0, 3, 3),
         node([0.001, 0.001, 0.004], 0.0001, 0, 1, 2),
-        node([0.0055, 0.001, 0.004], 0.0016, 1, 2, 3),
+        node([0.0045, 0.001, 0.004], 0.0028, 1, 2, 3),
         node([0.002, 0.0, 0.0], 0.0001, 0, 1, 1),
         node([0.004, 0.0, 0.004], 0.0041, 0, 1, 1),
     ];

@@ -6,6 +6,7 @@ use mortise_protocol::image::{EdgeRecord, Field, NodeRecord, Place, PointRecord,
 use crate::collision::exact_surface::exact;
 use crate::collision::node_key::Keys;
 use crate::collision::rules::ExcludedPairs;
+use crate::collision::span::Span;
 use crate::math::pose::Pose;
 
 /// Rounding error of a position in a field, relative to the lengths summed: eight roundings of 2⁻²⁴ at most.
@@ -93,10 +94,11 @@ impl<'i> DirectedPair<'i> {
         self.to_field.unapply(p).to_array()
     }
 
-    /// Position of a point of the tree in cells from the corner of the field's grid.
-    pub fn in_cells(&self, point: &PointRecord) -> [f32; 3] {
+    /// Corners of a box that contains a point of the tree, or its span, in cells from the corner of the field's grid.
+    pub fn in_cells(&self, point: &PointRecord) -> [Vec3; 2] {
         let in_field = self.to_field.apply(point.position);
-        self.field.in_cells(in_field.to_array())
+        let half = Span::of(self, point).map_or(Vec3::ZERO, |span| span.half_size());
+        [in_field - half, in_field + half].map(|p| Vec3::from_array(self.field.in_cells(p.to_array())))
     }
 
     /// The one surface named by every cell within `clearance_m` of any of these points of the tree, if there is only one; at most `reads` reads, counted
@@ -117,7 +119,8 @@ impl<'i> DirectedPair<'i> {
                 };
                 face = Some(cell.surface()?);
             }
-            (low, high) = (low.min(in_field), high.max(in_field));
+            let half = Span::of(self, point).map_or(Vec3::ZERO, |span| span.half_size());
+            (low, high) = (low.min(in_field - half), high.max(in_field + half));
         }
         let extent = self.field.extent_m() + self.to_field.offset.abs().element_sum();
         let clearance = Vec3::splat(clearance_m + ROUNDING * extent);

@@ -15,13 +15,15 @@
 //! Cost: see [`crate::tick()`]; field queries are two thirds of it.
 
 use glam::Vec3;
-use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage, Shape};
+use mortise_protocol::image::{
+    Cell, EDGE_ERROR_CELLS, NO_FACE, NO_PIECE, Place, PointRecord, SceneImage, Shape,
+};
 
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
-    ALLOWANCE, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, Used,
+    ALLOWANCE, CACHED_POINT, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, SPAN, Used,
 };
 use crate::collision::decimation::mask;
 use crate::collision::directed_pair::DirectedPair;
@@ -32,6 +34,7 @@ use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
+use crate::collision::span::{Parabola, Span, surface_at};
 use crate::io::{Flags, Work};
 use crate::math::pose::Pose;
 use crate::math::scalar::inverse_sqrt;
@@ -368,6 +371,66 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         if pair.field.is_occupancy() {
             return self.voxel(pair, leaf, point);
         }
+        if point.piece != NO_PIECE {
+            return self.span(pair, leaf, point, None);
+        }
+        self.place(pair, leaf, point)
+    }
+
+    /// As [`Self::point`], for a span of an edge: its lowest place is offered. `face`: the only one near the span, if known.
+    #[inline(never)]
+    pub fn span(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        face: Option<u16>,
+    ) -> f32 {
+        let Some(span) = Span::of(pair, point) else {
+            return self.place(pair, leaf, point);
+        };
+        self.spent += SPAN;
+        let price = if face.is_some() { CACHED_POINT } else { LOOKUP };
+        let eval = |p: Vec3| match face {
+            Some(face) => on_surface_of(pair.surfaces, face, p),
+            None => surface_at(pair, p),
+        };
+        let Some(first) = eval(span.middle()) else {
+            let bound = pair.distance(point.position) - span.reach();
+            return if bound > self.search.margin {
+                bound
+            } else {
+                self.place(pair, leaf, point)
+            };
+        };
+        let parabola = Parabola::new(pair, &span, first);
+        let bound = parabola.lower_bound(&span);
+        if bound > self.search.margin {
+            return bound;
+        }
+        let u = parabola.lowest(&span, |p| {
+            self.spent += price;
+            eval(p)
+        });
+        self.spent += price;
+        let lowest = span.moved(point, u);
+        let found = face.and_then(|face| {
+            on_surface_of(pair.surfaces, face, pair.to_field.apply(lowest.position))
+        });
+        match found {
+            Some(found) => {
+                if found.distance < self.search.margin {
+                    self.near(pair, leaf, &lowest, &found);
+                }
+                found.distance
+            }
+            None => self.place(pair, leaf, &lowest),
+        }
+    }
+
+    /// As [`Self::point`], for one place.
+    #[inline(always)]
+    fn place(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         let in_field = pair.to_field.apply(point.position);
         match pair.field.place(in_field.to_array()) {
             Place::Cell(cell) => {

@@ -9,13 +9,14 @@
 
 use glam::Vec3;
 use mortise_protocol::image::{
-    Cell, EDGE_ERROR_CELLS, NO_FACE, Nearby, NodeRecord, Place, PointRecord, Shape,
+    Cell, EDGE_ERROR_CELLS, NO_FACE, NO_PIECE, Nearby, NodeRecord, Place, PointRecord, Shape,
 };
 
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
+use crate::collision::span::{Parabola, Span, surface_at};
 use crate::io::Work;
 use crate::math::scalar::larger;
 
@@ -169,14 +170,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                     return;
                 }
             }
-            for point in leaf.points {
-                let sample = search.sample(point);
-                if sample.overlaps {
-                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
-                }
-                search.take(&sample, point, progress);
-            }
-            progress.work.points += leaf.points.len() as u32;
+            search.evaluate(&leaf, progress, contacts);
         });
     }
 
@@ -197,15 +191,50 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             if !leaf.beyond {
                 return;
             }
-            for point in leaf.points {
-                let sample = search.sample(point);
-                if sample.overlaps {
-                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
-                }
-                search.take(&sample, point, progress);
-            }
-            progress.work.points += leaf.points.len() as u32;
+            search.evaluate(&leaf, progress, contacts);
         });
+    }
+
+    /// Takes the points of a leaf, spans at their lowest place, and offers the overlapping ones.
+    fn evaluate(
+        &self,
+        leaf: &PendingLeaf<'i>,
+        progress: &mut Progress,
+        contacts: &mut Traversal<'_, '_, '_, impl FacePairRules>,
+    ) {
+        for point in leaf.points {
+            let point = &self.lowest(point, progress.limit());
+            let sample = self.sample(point);
+            if sample.overlaps {
+                contacts.one(self.pair, leaf.node, point, self.found(&sample, point));
+            }
+            self.take(&sample, point, progress);
+        }
+        progress.work.points += leaf.points.len() as u32;
+    }
+
+    /// The point, or the lowest place of its span, if that can be nearer than `limit`, m.
+    #[inline]
+    fn lowest(&self, point: &PointRecord, limit: f32) -> PointRecord {
+        let alone = PointRecord {
+            piece: NO_PIECE,
+            ..*point
+        };
+        if point.piece == NO_PIECE {
+            return alone;
+        }
+        let Some(span) = Span::of(self.pair, point) else {
+            return alone;
+        };
+        let Some(first) = surface_at(self.pair, span.middle()) else {
+            return alone;
+        };
+        let parabola = Parabola::new(self.pair, &span, first);
+        if parabola.lower_bound(&span) > limit {
+            return alone;
+        }
+        let u = parabola.lowest(&span, |p| surface_at(self.pair, p));
+        span.moved(point, u)
     }
 
     /// Descends by the nearer child to one leaf, and takes the point of it that seems nearest. Terminates because every step goes forward.

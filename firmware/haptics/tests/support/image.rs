@@ -98,6 +98,9 @@ impl Writer {
             normal: oct_encode(p.normal.map(|x| x as f32)),
             face: p.face,
             edge_face: p.edge_face.unwrap_or(NO_FACE),
+            piece: NO_PIECE,
+            reserved: 0,
+            ends: [0; 2],
         }));
         let first_face = self.faces.len() as u32;
         let surfaces = self.surfaces;
