@@ -19,7 +19,7 @@ use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::partners::Partners;
-use crate::pointshell::sample_with_spans;
+use crate::pointshell::sample_with_edges;
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
 use crate::scene::Scene;
 use crate::shell::{Pointshell, PointshellOptions};
@@ -149,7 +149,7 @@ impl Scene {
         let shells = sizes.iter().zip(each).enumerate();
         made.shells = shells
             .map(|(i, (&size, options))| {
-                sample_with_spans(
+                sample_with_edges(
                     &prepared[i],
                     &self.edges[i],
                     &shell_options(options, size, &self.partners[i]),
@@ -339,7 +339,7 @@ impl Scene {
             return Err(BakeError::Cancelled);
         }
         match options.shell {
-            PointshellKind::ErrorBounded => Ok(sample_with_spans(
+            PointshellKind::ErrorBounded => Ok(sample_with_edges(
                 surface,
                 &self.edges[index],
                 &shell_options(options, cell_mm, partners),

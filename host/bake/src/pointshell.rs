@@ -23,7 +23,7 @@
 use mortise_protocol::image::NO_FACE;
 
 use crate::distance::ExactSurface;
-use crate::edges::EdgePiece;
+use crate::edges::{EdgePiece, Fineness, edge_pieces};
 use crate::grid::bounding_box;
 use crate::partners::Partners;
 use crate::shell::{Pointshell, PointshellOptions, ShellPoint};
@@ -31,14 +31,17 @@ use crate::shell::{Pointshell, PointshellOptions, ShellPoint};
 /// Fewest points of a useful shell: with fewer, the shape is sampled without relying on partners.
 const FEWEST: usize = 8;
 
-/// Samples `surface` by points alone. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: proportional to area over
-/// spacing².
+/// Samples `surface`. Spline faces are sampled on their tessellation, by their own curvature alone. Cost: proportional to area over spacing².
 pub fn sample_pointshell(surface: &ExactSurface, options: &PointshellOptions) -> Pointshell {
-    sample_with_spans(surface, &[], options)
+    let edges = match options.partners {
+        Partners::Unknown => Vec::new(),
+        Partners::Known(_) => edge_pieces(surface, Fineness::FINEST),
+    };
+    sample_with_edges(surface, &edges, options)
 }
 
-/// As [`sample_pointshell`], with spans of the pieces of `edges` instead of points where they are fewer.
-pub(crate) fn sample_with_spans(
+/// As [`sample_pointshell`]; `edges` are the pieces of its sharp convex edges.
+pub(crate) fn sample_with_edges(
     surface: &ExactSurface,
     edges: &[EdgePiece],
     options: &PointshellOptions,

@@ -87,6 +87,15 @@ pub struct ShellSpan {
     pub hull: [DVec3; 3],
 }
 
+impl ShellSpan {
+    /// The place at `u`, from −1 to 1, mm.
+    pub fn at(&self, u: f64) -> DVec3 {
+        let s = 0.5 * (1.0 + u);
+        let [a, control, b] = self.hull;
+        a * (1.0 - s) * (1.0 - s) + control * (2.0 * s * (1.0 - s)) + b * s * s
+    }
+}
+
 /// Points of a shape, ordered: faces, then edges, then corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pointshell {

@@ -1,10 +1,10 @@
 //! The contact law evaluated on the exact surfaces: the force on the moving part that both pointshells would produce if every distance were that of
 //! the exact surface.
 //!
-//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, and twice that for each two edges that cross
-//! ([`crate::crossing_law`]); φ is its signed distance from the other part's exact surface at the end of the
-//! tick (f64, CAD faces; no field; of the image only the positions of the points), φ̇ its change over the tick, along the exact surface's normal. The
-//! sum is compared with the contact force that the board reports for the same tick.
+//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell and for the deepest place of each span of an edge, found by a search of its own,
+//! and twice that for each two edges that cross ([`crate::crossing_law`]); φ is its signed distance from the other part's exact surface at the end of
+//! the tick (f64, CAD faces; no field; of the image only the positions of points and spans), φ̇ its change over the tick, along the exact surface's
+//! normal. The sum is compared with the contact force that the board reports for the same tick.
 //!
 //! Poses are reported in single precision: half a unit in the last place of 0.05 m and of a quaternion is 2 nm each at the peg's rim, 0.8 mN a point
 //! at 200 kN/m.
@@ -18,6 +18,7 @@ use mortise_scenario::wire::{pose_mm, vector};
 use mortise_scenario::{Body, PreparedScene};
 
 use crate::crossing_law::{Piece, STIFFNESS, crossings};
+use crate::span::Span;
 use crate::error::LabError;
 
 /// Distance, mm, beyond which a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.
@@ -89,12 +90,9 @@ fn force(contacts: &[(f64, f64, f64, DVec3)]) -> DVec3 {
         .sum()
 }
 
-/// Points of each part's shell, mm, in its shape's frame.
-fn shells(scene: &PreparedScene) -> Result<Vec<Vec<DVec3>>, LabError> {
-    of_parts(scene, |shape| {
-        let points = shape.points.iter();
-        points.map(|point| 1e3 * vector(point.position)).collect()
-    })
+/// Points and spans of each part's shell, in its shape's frame.
+fn shells(scene: &PreparedScene) -> Result<Vec<Vec<Span>>, LabError> {
+    of_parts(scene, |shape| shape.points.iter().map(|point| Span::of(point, shape.edges)).collect())
 }
 
 /// Pieces of each part's sharp convex edges, in its shape's frame.
@@ -132,21 +130,31 @@ impl Clear {
     /// tick.
     fn touching(
         &mut self,
-        points: &[DVec3],
+        points: &[Span],
         to_body: &[DAffine3; 2],
         body: &Body,
         out: &mut dyn FnMut(f64, f64, DVec3),
     ) {
         let hertz = 1.0 / f64::from(Settings::default().period_s);
-        for (i, &point) in points.iter().enumerate() {
-            let [before, after] = to_body.map(|to| to.transform_point3(point));
-            if self.distance[i] - after.distance(self.at[i]) > REACH_MM {
+        for (i, span) in points.iter().enumerate() {
+            let middle = to_body[1].transform_point3(span.at(0.0));
+            let reach = REACH_MM + span.reach();
+            if self.distance[i] - middle.distance(self.at[i]) > reach {
                 continue;
             }
+            let Some(nearest) = body.surface.nearest(middle) else {
+                continue;
+            };
+            (self.at[i], self.distance[i]) = (middle, nearest.distance);
+            if nearest.distance > reach {
+                continue;
+            }
+            let gap = |p: DVec3| body.surface.nearest(to_body[1].transform_point3(p)).map_or(f64::INFINITY, |n| n.distance);
+            let deepest = span.at(span.deepest(gap));
+            let [before, after] = to_body.map(|to| to.transform_point3(deepest));
             let Some(nearest) = body.surface.nearest(after) else {
                 continue;
             };
-            (self.at[i], self.distance[i]) = (after, nearest.distance);
             if nearest.distance > REACH_MM {
                 continue;
             }
