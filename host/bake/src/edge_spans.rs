@@ -2,7 +2,7 @@
 //!
 //! Within a span the distance to a partner's surface must be nearly a parabola. A piece turns little, so a rim takes as many spans as it has pieces,
 //! whatever its size and the accuracy; against a partner of radius r a span is no longer than [`SHARE_OF_RADIUS`]·r, so that its middle is near the
-//! same face. Two spans never lie farther apart than points would, `max_spacing_mm`.
+//! same face; no span is longer than [`SPACINGS`] times `max_spacing_mm`, so that its middle's cell names what is near it.
 
 use mortise_protocol::image::{NO_FACE, NO_PIECE};
 
@@ -12,6 +12,8 @@ use crate::shell::{PointshellOptions, ShellPoint, ShellSpan};
 
 /// Length of a span as a share of the smallest radius of a partner's convex face.
 const SHARE_OF_RADIUS: f64 = 0.8;
+/// Longest span, in largest spacings of points: between points there is nothing, but a span is looked at all along.
+const SPACINGS: f64 = 2.0;
 /// Share of a chain's length that its pieces must cover to stand for it.
 const COVER: f64 = 0.99;
 
@@ -66,7 +68,7 @@ fn count(piece: &EdgePiece, sharpest: f64, options: &PointshellOptions) -> usize
         f64::INFINITY
     };
     (by_partner.min(by_points).min(least) - 1e-9)
-        .max(length / options.max_spacing_mm - 1e-9)
+        .max(length / (SPACINGS * options.max_spacing_mm) - 1e-9)
         .ceil()
         .clamp(1.0, 4000.0) as usize
 }

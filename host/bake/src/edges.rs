@@ -9,7 +9,7 @@ use mortise_protocol::image::oct_encode;
 
 use crate::chains::edge_chains;
 use crate::distance::{ExactSurface, Scratch};
-use crate::piece::{Link, Piece};
+use crate::piece::{Link, Piece, PieceCurve};
 use crate::tree::round_up;
 
 /// Fineness of the division of edges into pieces.
@@ -150,14 +150,11 @@ pub(crate) fn edge_pieces(surface: &ExactSurface, fineness: Fineness) -> Vec<Edg
             continue;
         }
         let first = all.len();
-        divide(
-            surface,
-            (&chain, fineness),
-            [0.0, chain.length],
-            MOST_HALVINGS,
-            edge as u32,
-            &mut all,
-        );
+        let parts = chain.even_parts(fineness);
+        for part in 0..parts {
+            let ends = [part, part + 1].map(|k| chain.length * k as f64 / parts as f64);
+            divide(surface, (&chain, fineness), ends, MOST_HALVINGS, edge as u32, &mut all);
+        }
         let thickness = thickness(surface, &all[first..]);
         for piece in &mut all[first..] {
             piece.thickness = thickness;
@@ -195,6 +192,20 @@ impl<'a> Chain<'a> {
     /// Its length, mm.
     pub fn length(&self) -> f64 {
         self.length
+    }
+
+    /// Number of equal parts in which to begin: of a circle, or an arc, as many as its pieces, since halves would be up to twice as many.
+    fn even_parts(&self, fineness: Fineness) -> usize {
+        let arcs = || self.links.iter().map(|&(i, _)| &self.pieces[i as usize]);
+        if !arcs().all(|piece| matches!(piece.curve, PieceCurve::Arc { .. })) {
+            return 1;
+        }
+        let turn: f64 = arcs().map(Piece::turn).sum();
+        let radius = self.length / turn.max(1e-9);
+        // A parabola through the ends and the middle of an arc of half angle θ and radius r is off by at most r·θ⁴/32.
+        let by_error = (32.0 * 0.9 * fineness.tolerance_mm / radius).powf(0.25);
+        let half_angle = by_error.min(2.0 * (0.5 * fineness.most_turn).atan());
+        (turn / (2.0 * half_angle) - 1e-9).ceil().clamp(1.0, 4096.0) as usize
     }
 
     /// The boundary piece at arc length `s`, and the point there.

@@ -34,7 +34,7 @@ use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
-use crate::collision::span::{Parabola, Span, surface_at};
+use crate::collision::span::{Parabola, Span, moved, near_at};
 use crate::io::{Flags, Work};
 use crate::math::pose::Pose;
 use crate::math::scalar::inverse_sqrt;
@@ -46,6 +46,8 @@ const LEAST_GRADIENT2: f32 = 0.01;
 /// Safety factor on the approach predicted by either motion. The motion at the tick's end lies between the last motion and the one without contacts,
 /// or is turned by the contacts: the end of a rod struck at the other end moves half as fast again.
 pub(crate) const APPROACH: f32 = 2.0;
+/// Angle by which the normal of a surface turns along half a span, rad: as far as a piece of an edge turns.
+const SPAN_TURN: f32 = 0.2;
 /// Points whose bound would expire within this many more ticks like the last one count as near and are queried every tick: evaluating the whole leaf
 /// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
@@ -108,6 +110,15 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             }
         }
         APPROACH * fastest
+    }
+
+    /// Whether a place of the span of `point` at least `gap` (m) from a surface of normal `normal` (field frame, at the span's middle) may be a candidate.
+    #[inline]
+    fn may_touch(&self, pair: &DirectedPair<'_>, point: &PointRecord, gap: f32, normal: Vec3) -> bool {
+        let (n, arm) = (pair.to_push * normal, pair.to_arm.apply(point.position));
+        let turn = arm.cross(n) * self.inverse_length;
+        let approach = self.approach(&[n.x, n.y, n.z, turn.x, turn.y, turn.z]);
+        gap < self.slack + approach + APPROACH * SPAN_TURN * (self.margin - self.slack)
     }
 
     /// Fills `contacts`, starting at `start` and wrapping round. Returns where to resume if the budget ran out, and the cost.
@@ -387,45 +398,55 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         face: Option<u16>,
     ) -> f32 {
         let Some(span) = Span::of(pair, point) else {
-            return self.place(pair, leaf, point);
+            return self.alone(pair, leaf, point);
         };
         self.spent += SPAN;
-        let price = if face.is_some() { CACHED_POINT } else { LOOKUP };
-        let eval = |p: Vec3| match face {
-            Some(face) => on_surface_of(pair.surfaces, face, p),
-            None => surface_at(pair, p),
-        };
-        let Some(first) = eval(span.middle()) else {
+        let Some(first) = near_at(pair, face, span.middle()) else {
             let bound = pair.distance(point.position) - span.reach();
             return if bound > self.search.margin {
                 bound
             } else {
-                self.place(pair, leaf, point)
+                self.alone(pair, leaf, point)
             };
         };
         let parabola = Parabola::new(pair, &span, first);
         let bound = parabola.lower_bound(&span);
-        if bound > self.search.margin {
+        if bound > self.search.margin || !self.search.may_touch(pair, point, bound, first.found.normal) {
             return bound;
         }
-        let u = parabola.lowest(&span, |p| {
+        self.lowest(pair, leaf, point, (&span, &parabola), face)
+    }
+
+    /// Offers the lowest place of a span.
+    #[inline(never)]
+    fn lowest(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        (span, parabola): (&Span, &Parabola),
+        face: Option<u16>,
+    ) -> f32 {
+        let price = if face.is_some() { CACHED_POINT } else { LOOKUP };
+        let (u, lowest) = parabola.lowest(span, |p| {
             self.spent += price;
-            eval(p)
+            near_at(pair, face, p)
         });
-        self.spent += price;
-        let lowest = span.moved(point, u);
-        let found = face.and_then(|face| {
-            on_surface_of(pair.surfaces, face, pair.to_field.apply(lowest.position))
-        });
-        match found {
-            Some(found) => {
-                if found.distance < self.search.margin {
-                    self.near(pair, leaf, &lowest, &found);
-                }
-                found.distance
-            }
-            None => self.place(pair, leaf, &lowest),
+        let at = moved(pair, point, u);
+        if !lowest.alone {
+            self.spent += LOOKUP;
+            return self.alone(pair, leaf, &at);
         }
+        if lowest.found.distance < self.search.margin {
+            self.near(pair, leaf, &at, &lowest.found);
+        }
+        lowest.found.distance
+    }
+
+    /// As [`Self::place`], out of line.
+    #[inline(never)]
+    fn alone(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
+        self.place(pair, leaf, point)
     }
 
     /// As [`Self::point`], for one place.

@@ -9,50 +9,66 @@
 //! Cost: about 90 instructions, and a field query for each place evaluated, two in most spans that are near.
 
 use glam::Vec3;
-use mortise_protocol::image::{NO_PIECE, Place, PointRecord, Surface};
+use mortise_protocol::image::{Cell, NO_FACE, NO_PIECE, Place, PointRecord, Surface};
 
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, bending, exact_on_face, on_surface_of};
-use crate::math::scalar::{inverse_sqrt, larger, smaller};
+use crate::math::scalar::{inverse_sqrt, smaller};
 use crate::math::vector::quick_length;
 
+/// Squared length of the field's gradient below which it gives no direction.
+const LEAST_GRADIENT2: f32 = 0.01;
 /// Places evaluated beside the middle, at most.
 const STEPS: usize = 3;
-/// A step that lowers the distance by less is not taken, m.
-const LEAST_GAIN_M: f32 = 0.1e-6;
+/// A step that lowers the distance by less is not taken, m: as much as a piece of an edge may be off the edge.
+const LEAST_GAIN_M: f32 = 0.5e-6;
 /// Share of a span's length by which third derivatives can lower its least distance below the parabola's: a sixth of its turn, 0.2 rad, squared.
 const BEYOND_PARABOLA: f32 = 0.01;
 /// Share of the middle's distance that a bound from its surface alone may use: another surface may come nearer along the span.
 const BOUND_SHARE: f32 = 0.5;
 
-/// A span in the frame of the field, and in that of its tree.
+/// A span in the frame of the field.
 pub(crate) struct Span {
     middle: Vec3,
     along: Vec3,
     bend: Vec3,
-    own_along: Vec3,
-    own_bend: Vec3,
+}
+
+/// First and half of the second derivative of a span in the frame of its tree, m; `None` for a point that stands for itself alone.
+#[inline(always)]
+fn derivatives(pair: &DirectedPair<'_>, point: &PointRecord) -> Option<[Vec3; 2]> {
+    let piece = pair.edges.pieces.get(usize::from(point.piece))?;
+    let [t, half] = point.span();
+    let bend = Vec3::from_array(piece.bend);
+    let along = (Vec3::from_array(piece.half) + bend * (2.0 * t)) * half;
+    Some([along, bend * (half * half)])
+}
+
+/// The `point`, which is the middle of a span, moved to `u` on it.
+pub(crate) fn moved(pair: &DirectedPair<'_>, point: &PointRecord, u: f32) -> PointRecord {
+    let [along, bend] = derivatives(pair, point).unwrap_or([Vec3::ZERO; 2]);
+    let at = Vec3::from_array(point.position) + (along + bend * u) * u;
+    PointRecord {
+        position: at.to_array(),
+        piece: NO_PIECE,
+        ..*point
+    }
 }
 
 impl Span {
     /// The span of a point of the tree; `None` for a point that stands for itself alone.
-    #[inline]
+    #[inline(always)]
     pub fn of(pair: &DirectedPair<'_>, point: &PointRecord) -> Option<Self> {
-        let piece = pair.edges.pieces.get(usize::from(point.piece))?;
-        let [t, half] = point.span();
-        let bend = Vec3::from_array(piece.bend);
-        let own_along = (Vec3::from_array(piece.half) + bend * (2.0 * t)) * half;
-        let own_bend = bend * (half * half);
+        let [along, bend] = derivatives(pair, point)?;
         Some(Self {
             middle: pair.to_field.apply(point.position),
-            along: pair.to_field.turn(own_along),
-            bend: pair.to_field.turn(own_bend),
-            own_along,
-            own_bend,
+            along: pair.to_field.turn(along),
+            bend: pair.to_field.turn(bend),
         })
     }
 
     /// Its middle in the frame of the field, m.
+    #[inline(always)]
     pub fn middle(&self) -> Vec3 {
         self.middle
     }
@@ -68,54 +84,67 @@ impl Span {
         self.along.abs() + self.bend.abs()
     }
 
+    #[inline(always)]
     fn at(&self, u: f32) -> Vec3 {
         self.middle + (self.along + self.bend * u) * u
     }
 
     /// Slope of the distance at `u` where the surface has this normal, m.
+    #[inline(always)]
     fn slope(&self, u: f32, normal: Vec3) -> f32 {
         normal.dot(self.along + self.bend * (2.0 * u))
     }
-
-    /// The span's `point`, which is its middle, moved to `u`.
-    pub fn moved(&self, point: &PointRecord, u: f32) -> PointRecord {
-        let at = Vec3::from_array(point.position) + (self.own_along + self.own_bend * u) * u;
-        PointRecord {
-            position: at.to_array(),
-            piece: NO_PIECE,
-            ..*point
-        }
-    }
 }
 
-/// Surface of the field's shape nearest to `p`, by exact surfaces, or by the field's gradient where they do not answer; `None` outside of all cells and
-/// where there is no direction.
-#[inline]
-pub(crate) fn surface_at(pair: &DirectedPair<'_>, p: Vec3) -> Option<OnFace> {
+/// Surface nearest to a place, and whether its cell names no other.
+#[derive(Clone, Copy)]
+pub(crate) struct Near {
+    pub found: OnFace,
+    pub alone: bool,
+}
+
+/// Surface of the field's shape nearest to `p`: the `face`, if that is known to be the only one near; else by the exact surfaces that the cell names, or by
+/// the field's gradient where they do not answer. `None` outside of all cells and where there is no direction.
+#[inline(always)]
+pub(crate) fn near_at(pair: &DirectedPair<'_>, face: Option<u16>, p: Vec3) -> Option<Near> {
+    if let Some(face) = face
+        && let Some(found) = on_surface_of(pair.surfaces, face, p)
+    {
+        return Some(Near { found, alone: true });
+    }
     let Place::Cell(cell) = pair.field.place(p.to_array()) else {
         return None;
     };
     if let Some(found) = (cell.surface()).and_then(|surface| on_surface_of(pair.surfaces, surface, p)) {
-        return Some(found);
+        return Some(Near { found, alone: true });
     }
-    if let Some(found) = exact_on_face(pair.surfaces, pair.field.nearby(&cell), p) {
-        return Some(found);
+    near_in(pair, &cell, p)
+}
+
+/// As [`near_at`], in a cell that names several faces, or none with a closed form.
+#[inline(never)]
+fn near_in(pair: &DirectedPair<'_>, cell: &Cell<'_>, p: Vec3) -> Option<Near> {
+    if let Some(found) = exact_on_face(pair.surfaces, pair.field.nearby(cell), p) {
+        return Some(Near { found, alone: false });
     }
-    let sample = pair.field.sample(&cell);
+    let sample = pair.field.sample(cell);
     let gradient = Vec3::from_array(sample.gradient);
     let squared = gradient.length_squared();
-    (squared > 0.01).then(|| OnFace {
-        distance: pair.field.distance(&cell),
-        normal: gradient * inverse_sqrt(squared),
-        face: pair.surfaces.face_of(sample.face),
-        edge_face: mortise_protocol::image::NO_FACE,
+    (squared > LEAST_GRADIENT2).then(|| Near {
+        found: OnFace {
+            distance: pair.field.distance(cell),
+            normal: gradient * inverse_sqrt(squared),
+            face: pair.surfaces.face_of(sample.face),
+            edge_face: NO_FACE,
+        },
+        alone: false,
     })
 }
 
 /// The parabola of the distance along a span, from its middle.
 pub(crate) struct Parabola {
     /// Surface nearest to the middle.
-    first: OnFace,
+    first: Near,
     slope: f32,
     /// Second derivative, m; `None` where the surface has no closed form.
     second: Option<f32>,
@@ -123,36 +152,41 @@ pub(crate) struct Parabola {
 
 impl Parabola {
     /// Of a span whose middle is nearest to `first`.
-    #[inline]
-    pub fn new(pair: &DirectedPair<'_>, span: &Span, first: OnFace) -> Self {
-        let own = 2.0 * first.normal.dot(span.bend);
-        let second = match pair.surfaces.get(first.face) {
-            Some(Surface::Face(face)) => bending(face, span.middle, span.along).map(|by_surface| own + by_surface),
+    #[inline(always)]
+    pub fn new(pair: &DirectedPair<'_>, span: &Span, first: Near) -> Self {
+        let found = &first.found;
+        let own = 2.0 * found.normal.dot(span.bend);
+        let second = match pair.surfaces.get(found.face) {
+            Some(Surface::Face(face)) => {
+                bending(face, span.middle, found, span.along).map(|by_surface| own + by_surface)
+            }
             _ => None,
         };
         Self {
-            first,
-            slope: span.slope(0.0, first.normal),
+            slope: span.slope(0.0, found.normal),
             second,
+            first,
         }
     }
 
     /// Lower bound of the distance along the span, m, which is tight where one surface is near.
-    #[inline]
+    #[inline(always)]
     pub fn lower_bound(&self, span: &Span) -> f32 {
-        let (distance, reach) = (self.first.distance, span.reach());
-        let anyhow = distance - reach;
+        let distance = self.first.found.distance;
         let Some(second) = self.second else {
-            return anyhow;
+            return distance - span.reach();
         };
         let sinks = if second < 0.0 { -0.5 * second } else { 0.0 };
-        let by_surface = distance - self.slope.abs() - sinks - BEYOND_PARABOLA * reach;
-        larger(anyhow, smaller(by_surface, BOUND_SHARE * distance))
+        let length = span.along.abs().element_sum();
+        let by_surface = distance - self.slope.abs() - sinks - BEYOND_PARABOLA * length;
+        smaller(by_surface, BOUND_SHARE * distance)
     }
 
-    /// Parameter of the lowest place, from −1 to 1: 0 where no other place is lower by [`LEAST_GAIN_M`]. `eval`: surface nearest to a point.
-    #[inline]
-    pub fn lowest(&self, span: &Span, mut eval: impl FnMut(Vec3) -> Option<OnFace>) -> f32 {
+    /// Parameter of the lowest place, from −1 to 1, and the surface there: 0 where no other place is lower by [`LEAST_GAIN_M`]. `eval`: surface nearest
+    /// to a point.
+    #[inline(always)]
+    pub fn lowest(&self, span: &Span, mut eval: impl FnMut(Vec3) -> Option<Near>) -> (f32, Near) {
+        let mut lowest = (0.0, self.first);
         let second = self.second.unwrap_or(0.0);
         let downward = if self.slope > 0.0 { -1.0 } else { 1.0 };
         let mut u = if second > self.slope.abs() {
@@ -161,24 +195,23 @@ impl Parabola {
             downward
         };
         if (self.slope + 0.5 * second * u) * u > -LEAST_GAIN_M {
-            return 0.0;
+            return lowest;
         }
-        let mut lowest = (0.0, self.first.distance);
-        let mut last = (0.0, self.first, self.slope);
+        let mut last = (0.0, self.first.found, self.slope);
         for _ in 0..STEPS {
             let Some(here) = eval(span.at(u)) else { break };
-            if here.distance < lowest.1 {
-                lowest = (u, here.distance);
+            if here.found.distance < lowest.1.found.distance {
+                lowest = (u, here);
             }
-            let slope = span.slope(u, here.normal);
-            let next = next_place(last, (u, here, slope));
+            let slope = span.slope(u, here.found.normal);
+            let next = next_place(last, (u, here.found, slope));
             if ((next - u) * slope).abs() < LEAST_GAIN_M {
                 break;
             }
-            last = (u, here, slope);
+            last = (u, here.found, slope);
             u = next;
         }
-        lowest.0
+        lowest
     }
 }
 
@@ -210,8 +243,6 @@ mod tests {
             middle,
             along,
             bend,
-            own_along: along,
-            own_bend: bend,
         }
     }
 
@@ -226,13 +257,15 @@ mod tests {
 
     fn find(span: &Span, second: Option<f32>, eval: impl Fn(Vec3) -> OnFace) -> (f32, f32) {
         let first = eval(span.middle);
+        let near = |found| Near { found, alone: true };
         let parabola = Parabola {
             slope: span.slope(0.0, first.normal),
-            first,
+            first: near(first),
             second,
         };
-        let u = parabola.lowest(span, |p| Some(eval(p)));
-        (eval(span.at(u)).distance, parabola.lower_bound(span))
+        let (u, lowest) = parabola.lowest(span, |p| Some(near(eval(p))));
+        assert_eq!(lowest.found.distance, eval(span.at(u)).distance);
+        (lowest.found.distance, parabola.lower_bound(span))
     }
 
     /// Least distance by dense samples.
@@ -252,7 +285,7 @@ mod tests {
             let second = 2.0 * normal.dot(span.bend);
             let (found, bound) = find(&span, Some(second), &eval);
             let least = dense(&span, &eval);
-            prop_assert!(found <= least + 0.15e-6 + 1e-6 * r && bound <= least + 1e-7, "{found} {least} {bound}");
+            prop_assert!(found <= least + 0.55e-6 && bound <= least + 1e-7, "{found} {least} {bound}");
         }
 
         /// Two planes that form a ridge: the lowest place is at the kink, which no parabola shows.
@@ -266,7 +299,7 @@ mod tests {
             let eval = |p: Vec3| { let (a, b) = (a(p), b(p)); if a.distance > b.distance { a } else { b } };
             let (found, _) = find(&span, Some(0.0), eval);
             let least = dense(&span, eval);
-            prop_assert!(found <= least + 0.3e-6, "{found} {least}");
+            prop_assert!(found <= least + 0.7e-6, "{found} {least}");
         }
 
         /// A straight edge across a cylinder, of which the second derivative is not known.
@@ -279,7 +312,7 @@ mod tests {
             };
             let (found, bound) = find(&span, None, eval);
             let least = dense(&span, eval);
-            prop_assert!(found <= least + 0.3e-6 && bound <= least + 1e-7, "{found} {least} {bound}");
+            prop_assert!(found <= least + 0.7e-6 && bound <= least + 1e-7, "{found} {least} {bound}");
         }
     }
 }

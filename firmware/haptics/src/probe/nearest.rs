@@ -16,7 +16,7 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
-use crate::collision::span::{Parabola, Span, surface_at};
+use crate::collision::span::{Parabola, Span, moved, near_at};
 use crate::io::Work;
 use crate::math::scalar::larger;
 
@@ -226,15 +226,15 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         let Some(span) = Span::of(self.pair, point) else {
             return alone;
         };
-        let Some(first) = surface_at(self.pair, span.middle()) else {
+        let Some(first) = near_at(self.pair, None, span.middle()) else {
             return alone;
         };
         let parabola = Parabola::new(self.pair, &span, first);
         if parabola.lower_bound(&span) > limit {
             return alone;
         }
-        let u = parabola.lowest(&span, |p| surface_at(self.pair, p));
-        span.moved(point, u)
+        let (u, _) = parabola.lowest(&span, |p| near_at(self.pair, None, p));
+        moved(self.pair, point, u)
     }
 
     /// Descends by the nearer child to one leaf, and takes the point of it that seems nearest. Terminates because every step goes forward.
