@@ -3,7 +3,7 @@
 //! The application ([`crate::control`], [`crate::link`]) is the same on every board and in the simulated rig on a PC; a board crate wires
 //! pins, clocks and interrupts to these traits and nothing more.
 
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 pub use mortise_mechanism::interface::{
     Drive, DriverFault, DriverFaultKind, Mechanism, Sensed, Simulation, TICK_HZ, TICK_S,
 };
@@ -94,7 +94,7 @@ pub struct Identity {
     /// Consecutive missed ticks, motors live, that are a fault; 0: overruns are only counted, because the mechanism stands still meanwhile.
     pub overrun_ticks: u8,
     /// Limits of this rig's motors and links, whatever the parameters say.
-    pub ceilings: Ceilings,
+    pub hardware_limits: HardwareLimits,
     /// Differs at every start, from the chip's random number generator where it has one: session names are derived from it. Nothing else may depend
     /// on it.
     pub entropy: u64,

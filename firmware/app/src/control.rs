@@ -9,18 +9,20 @@
 //! rig and the emulated board therefore compute the same bits. The host timeout is not applied there, since time waits for the host.
 
 mod fingerprint;
+mod parts;
 mod report;
 mod simulation;
 mod watch;
 
-use mortise_haptics::{self as haptics, GrabError, Input, Output, TargetError, Twist, Wrench};
-use mortise_mechanism::ceilings::{Ceilings, restrain};
+use mortise_haptics::{self as haptics, GrabError, Input, TargetError, Twist, Wrench};
+use mortise_mechanism::hardware_limits::{HardwareLimits, restrain};
 use mortise_protocol::image::SceneImage;
-use mortise_protocol::message::{ConstraintTarget, Fault, Refusal, Statistics};
+use mortise_protocol::message::{ConstraintTarget, Fault, Refusal};
 
+use self::parts::{Host, Lateness, Lockstep, Rendered, Reports, Sampling};
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
 use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Epoch, Event, Reply};
-use crate::parameters::{ControlSettings, Parameters};
+use crate::parameters::ControlSettings;
 use crate::safety::{Action, AfterSoftStop, Event as SafetyEvent, Motors, Safety};
 use crate::statistics::{StateHash, count_tick};
 
@@ -57,7 +59,7 @@ pub struct ControlPlane<'c, 's, M, C> {
     mechanism: M,
     clock: C,
     overrun_ticks: u8,
-    ceilings: Ceilings,
+    hardware_limits: HardwareLimits,
     safety: Safety,
     settings: ControlSettings,
     scene: Option<SceneImage<'s>>,
@@ -66,31 +68,13 @@ pub struct ControlPlane<'c, 's, M, C> {
     sensed: Sensed,
     /// A reading of this tick was not finite and was replaced by the last valid one.
     replaced: bool,
-    output: Option<Output>,
-    commanded: Wrench,
-    /// Ticks since the coupling's limit began to rise.
-    ramp: u16,
-    /// Ticks since the soft stop began, and the wrench at its start.
-    fade: (u16, Wrench),
+    rendered: Rendered,
     tick: u32,
-    lockstep: bool,
-    /// Lockstep ticks still to run, and the sequence number of the message that released them.
-    credit: u32,
-    run_seq: u16,
-    telemetry_every: u16,
-    telemetry_left: u16,
-    statistics: Statistics,
-    hash: StateHash,
-    missed_total: u32,
-    missed_in_row: u32,
-    heard: u32,
-    silent_ticks: u32,
-    stops: u32,
-    session: u32,
-    /// A restart was granted in this session.
-    restarting: bool,
-    reported: Safety,
-    unreported_fault: Option<(u32, Fault)>,
+    lockstep: Lockstep,
+    telemetry: Sampling,
+    late: Lateness,
+    host: Host,
+    reports: Reports,
 }
 
 impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
@@ -108,34 +92,20 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             mechanism,
             clock,
             overrun_ticks: identity.overrun_ticks,
-            ceilings: identity.ceilings,
+            hardware_limits: identity.hardware_limits,
             safety: Safety::Boot,
             settings,
             scene: None,
             scene_number: 0,
             sensed: Sensed::AT_REST,
             replaced: false,
-            output: None,
-            commanded: Wrench::ZERO,
-            ramp: 0,
-            fade: (0, Wrench::ZERO),
+            rendered: Rendered::NOTHING,
             tick: 0,
-            lockstep: false,
-            credit: 0,
-            run_seq: 0,
-            telemetry_every: 0,
-            telemetry_left: 0,
-            statistics: Statistics::default(),
-            hash: StateHash::new(),
-            missed_total: 0,
-            missed_in_row: 0,
-            heard: 0,
-            silent_ticks: 0,
-            stops: 0,
-            session: 0,
-            restarting: false,
-            reported: Safety::Boot,
-            unreported_fault: None,
+            lockstep: Lockstep::default(),
+            telemetry: Sampling::default(),
+            late: Lateness::default(),
+            host: Host::default(),
+            reports: Reports::new(),
         }
     }
 
@@ -156,7 +126,12 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     /// See [`Statistics::state_hash`].
     pub fn state_hash(&self) -> u64 {
-        self.hash.value()
+        self.reports.hash.value()
+    }
+
+    /// Work of the force law in the last tick; `None` when it did not run. For measurement.
+    pub fn work(&self) -> Option<haptics::Work> {
+        self.rendered.output.as_ref().map(|output| output.work)
     }
 
     /// The mechanism, so that a test can press its stop input.
@@ -171,7 +146,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         // The first tick reads the sensors and belongs to no session.
         if self.safety != Safety::Boot {
             self.take_commands();
-            if self.lockstep && (self.credit == 0 || !self.lockstep_has_room()) {
+            if self.lockstep.on && (self.lockstep.credit == 0 || !self.lockstep_has_room()) {
                 self.report();
                 return Ticked::Waiting;
             }
@@ -184,19 +159,24 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.sense();
         self.watch(missed);
         self.render();
-        self.hash.tick(
+        self.reports.hash.tick(
             &self.sensed.handle,
             self.ends.law.object().as_ref(),
-            &self.commanded,
+            &self.rendered.commanded,
         );
         self.tick = self.tick.wrapping_add(1);
         self.report();
         self.sample();
-        let points = self.output.as_ref().map_or(0, |o| o.work.points);
-        count_tick(&mut self.statistics, self.clock.cost(), points, &self.commanded);
-        if self.credit > 0 {
-            self.credit -= 1;
-            if self.credit == 0 {
+        let points = self.rendered.output.as_ref().map_or(0, |o| o.work.points);
+        count_tick(
+            &mut self.reports.statistics,
+            self.clock.cost(),
+            points,
+            &self.rendered.commanded,
+        );
+        if self.lockstep.credit > 0 {
+            self.lockstep.credit -= 1;
+            if self.lockstep.credit == 0 {
                 self.ran();
             }
         }
@@ -204,17 +184,17 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     fn take_stop_and_session(&mut self) {
         let stops = self.ends.shared.stops();
-        if stops != self.stops {
-            self.stops = stops;
+        if stops != self.host.stops {
+            self.host.stops = stops;
             self.apply(SafetyEvent::Stop);
         }
         let session = self.ends.shared.sessions();
-        if session != self.session {
-            self.session = session;
-            self.telemetry_every = 0;
-            self.lockstep = false;
-            self.credit = 0;
-            self.restarting = false;
+        if session != self.host.session {
+            self.host.session = session;
+            self.telemetry.every = 0;
+            self.lockstep.on = false;
+            self.lockstep.credit = 0;
+            self.host.restarting = false;
             self.apply(SafetyEvent::Disarm);
         }
     }
@@ -223,7 +203,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         // Takes at most the commands that were queued when the tick began.
         for _ in 0..self.ends.commands.len() {
             let full = self.ends.events.capacity() - self.ends.events.len() < EVENTS_AT_ONCE;
-            if self.credit > 0 || full {
+            if self.lockstep.credit > 0 || full {
                 return;
             }
             let Some(command) = self.ends.commands.dequeue() else {
@@ -234,7 +214,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 command.kind,
                 CommandKind::UseScene { .. } | CommandKind::SceneDamaged | CommandKind::Settings(_)
             );
-            if every_session || command.session == self.session {
+            if every_session || command.session == self.host.session {
                 self.carry_out(command);
             }
             if arm {
@@ -251,15 +231,34 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             kind,
         } = command;
         let now = Epoch {
-            stops: self.stops,
+            stops: self.host.stops,
             halts: self.ends.shared.halts(),
         };
-        let result = match kind {
+        let enabling = matches!(
+            kind,
             CommandKind::Arm(_) | CommandKind::ClearFault | CommandKind::Grab(_) | CommandKind::Home
-                if epoch != now =>
-            {
-                Err(Refusal::Outdated)
-            }
+        );
+        let result = if enabling && epoch != now {
+            Err(Refusal::Outdated)
+        } else if let Some(result) = self.execute(seq, session, kind) {
+            result
+        } else {
+            return;
+        };
+        self.report();
+        self.reply(
+            seq,
+            session,
+            match result {
+                Ok(()) => Reply::Done,
+                Err(reason) => Reply::Refused(reason),
+            },
+        );
+    }
+
+    /// Executes a command. `None`: it has its own answer, now or later.
+    fn execute(&mut self, seq: u16, session: u32, kind: CommandKind<'s>) -> Option<Result<(), Refusal>> {
+        Some(match kind {
             CommandKind::Arm(number) => self.arm(number),
             CommandKind::Disarm => self.request(SafetyEvent::Disarm),
             CommandKind::ClearFault => {
@@ -281,60 +280,55 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             CommandKind::Parameter(id) => {
                 let value = self.settings.parameters.get(id);
                 self.reply(seq, session, Reply::Parameter { id, value });
-                return;
+                return None;
             }
             CommandKind::UseScene { image, number } => {
                 let taken = self.use_scene(image, number);
                 self.send(Event::SceneTaken(taken));
-                return;
+                return None;
             }
             CommandKind::SceneDamaged => {
                 self.apply(SafetyEvent::Fault(Fault::SceneDamaged));
-                return;
+                return None;
             }
             CommandKind::Telemetry(every) => {
-                self.telemetry_every = every;
-                self.telemetry_left = every;
+                (self.telemetry.every, self.telemetry.left) = (every, every);
                 Ok(())
             }
             CommandKind::Statistics { reset } => {
                 self.send_statistics(seq, reset);
-                return;
+                return None;
             }
             CommandKind::Home => self.home(),
             CommandKind::Hand(script) => self.set_hand(&script),
             CommandKind::InputFaults(faults) => self.set_input_faults(&faults),
             CommandKind::Lockstep(on) => self.set_lockstep(on),
-            CommandKind::Run(_) if !self.lockstep => Err(Refusal::Lockstep),
+            CommandKind::Run(_) if !self.lockstep.on => Err(Refusal::Lockstep),
             CommandKind::Run(ticks) => {
-                self.run_seq = seq;
-                self.credit = ticks;
-                if ticks == 0 {
-                    self.ran();
-                }
-                return;
+                self.release_ticks(seq, ticks);
+                return None;
             }
             CommandKind::Restart if self.safety.live() => Err(Refusal::State(self.safety.reported())),
             CommandKind::Restart => {
-                self.restarting = true;
+                self.host.restarting = true;
                 self.reply(seq, session, Reply::MayRestart);
-                return;
+                return None;
             }
-        };
-        self.report();
-        self.reply(
-            seq,
-            session,
-            match result {
-                Ok(()) => Reply::Done,
-                Err(reason) => Reply::Refused(reason),
-            },
-        );
+        })
+    }
+
+    /// Lets ticks run in lockstep; the end is reported in answer to `seq`.
+    fn release_ticks(&mut self, seq: u16, ticks: u32) {
+        self.lockstep.run_seq = seq;
+        self.lockstep.credit = ticks;
+        if ticks == 0 {
+            self.ran();
+        }
     }
 
     /// Drives the motors if all conditions hold now; `number` identifies the scene whose checksum was verified.
     fn arm(&mut self, number: u32) -> Result<(), Refusal> {
-        if self.restarting {
+        if self.host.restarting {
             return Err(Refusal::Busy);
         }
         if self.scene.is_some() && number != self.scene_number {
@@ -417,9 +411,9 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             self.sensed.handle = handle;
             self.sensed.twist = Twist::ZERO;
         }
-        self.output = None;
-        self.commanded = Wrench::ZERO;
-        self.hash = StateHash::new();
+        self.rendered.output = None;
+        self.rendered.commanded = Wrench::ZERO;
+        self.reports.hash = StateHash::new();
     }
 
     fn home(&mut self) -> Result<(), Refusal> {
@@ -432,7 +426,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     /// Computes this tick's wrench and applies it to the motors.
     fn render(&mut self) {
-        self.output = None;
+        self.rendered.output = None;
         let motors = self.safety.motors();
         if let (Motors::Zero | Motors::Rendered, Some(scene)) = (motors, &self.scene) {
             let input = Input {
@@ -440,15 +434,18 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 handle_twist: self.sensed.twist,
                 enabled: true,
             };
-            self.ramp = self.ramp.saturating_add(1).min(RAMP_TICKS);
-            let ramping = self.ramp < RAMP_TICKS;
+            self.rendered.ramp = self.rendered.ramp.saturating_add(1).min(RAMP_TICKS);
+            let ramping = self.rendered.ramp < RAMP_TICKS;
             let [position, angle] = self.mechanism.count();
             let passivity = &mut self.settings.law.passivity;
             (passivity.position_count_m, passivity.angle_count_rad) = (position, angle);
             self.ends.law.set_slipping(ramping);
             let ramped;
             let law = if ramping {
-                ramped = loosened(&self.settings.law, f32::from(self.ramp) / f32::from(RAMP_TICKS));
+                ramped = loosened(
+                    &self.settings.law,
+                    f32::from(self.rendered.ramp) / f32::from(RAMP_TICKS),
+                );
                 &ramped
             } else {
                 &self.settings.law
@@ -460,27 +457,27 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             if output.work.flags.intersects(haptics::Flags::NON_FINITE) || !output.handle.is_finite() {
                 self.apply(SafetyEvent::Fault(Fault::NonFinite));
             }
-            self.output = Some(output);
+            self.rendered.output = Some(output);
         }
         // The state may have changed earlier in this tick.
-        let wanted = match (self.safety.motors(), &self.output) {
+        let wanted = match (self.safety.motors(), &self.rendered.output) {
             (Motors::Off, _) => None,
             (Motors::Fading, _) => Some(self.fading()),
             (Motors::Zero | Motors::Rendered, Some(output)) => Some(output.handle),
             (Motors::Zero | Motors::Rendered, None) => Some(Wrench::ZERO),
         };
         let allowed = wanted.map(|wrench| self.restrained(wrench));
-        self.commanded = allowed.unwrap_or(Wrench::ZERO);
+        self.rendered.commanded = allowed.unwrap_or(Wrench::ZERO);
         self.mechanism
             .watch_encoders(self.safety.motors() == Motors::Rendered);
         self.mechanism.drive(allowed.map_or(Drive::Off, Drive::Wrench));
-        if self.safety.motors() == Motors::Fading && self.fade.0 >= SOFT_STOP_TICKS {
+        if self.safety.motors() == Motors::Fading && self.rendered.fade.0 >= SOFT_STOP_TICKS {
             self.apply(SafetyEvent::SoftStopOver);
         }
     }
 
     fn fading(&mut self) -> Wrench {
-        let (ticks, start) = &mut self.fade;
+        let (ticks, start) = &mut self.rendered.fade;
         *ticks = ticks.saturating_add(1);
         let left = FADE_TICKS.saturating_sub(*ticks);
         let fade = scaled(*start, f32::from(left) / f32::from(FADE_TICKS));
@@ -495,8 +492,8 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
     /// The wrench after the last limit before the motors.
     fn restrained(&self, wrench: Wrench) -> Wrench {
         let bounds = self
-            .ceilings
-            .with(self.settings.power_limit_w, self.settings.workspace_m);
+            .hardware_limits
+            .with(self.settings.safety.power_w, self.settings.safety.workspace_m);
         restrain(wrench, self.sensed.handle.position, &self.sensed.twist, &bounds)
     }
 
@@ -515,9 +512,9 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         let (next, action) = self.safety.step(event);
         if let SafetyEvent::Fault(fault) = event
             && next != self.safety
-            && self.unreported_fault.is_none()
+            && self.reports.fault.is_none()
         {
-            self.unreported_fault = Some((self.tick, fault));
+            self.reports.fault = Some((self.tick, fault));
         }
         let halted = matches!(
             next,
@@ -531,20 +528,20 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             Action::None | Action::Refuse(_) => {}
             Action::Enable => {
                 self.ends.law.restart_slew();
-                self.ramp = 0;
-                self.silent_ticks = 0;
-                self.missed_in_row = 0;
+                self.rendered.ramp = 0;
+                self.late.silent_ticks = 0;
+                self.late.missed_in_row = 0;
             }
-            Action::Couple => self.ramp = 0,
+            Action::Couple => self.rendered.ramp = 0,
             Action::Uncouple => self.ends.law.release(),
             Action::Fade => {
                 self.ends.law.release();
-                self.fade = (0, self.commanded);
+                self.rendered.fade = (0, self.rendered.commanded);
             }
             Action::Off => {
                 // Off at once, not at the next tick: in lockstep that may be far away.
                 self.mechanism.drive(Drive::Off);
-                self.commanded = Wrench::ZERO;
+                self.rendered.commanded = Wrench::ZERO;
                 self.ends.law.release();
                 self.ends.law.restart_slew();
             }
@@ -570,22 +567,5 @@ fn scaled(wrench: Wrench, factor: f32) -> Wrench {
     Wrench {
         force: wrench.force * factor,
         torque: wrench.torque * factor,
-    }
-}
-
-impl ControlSettings {
-    /// The defaults of every parameter on a rig with these hardware limits.
-    pub fn at_start(ceilings: Ceilings) -> Self {
-        let parameters = Parameters::within(ceilings);
-        // The defaults pass their own checks (tested), so the fallback is never used; with its speed limit of 0 nothing could stay armed.
-        parameters.settings().unwrap_or_else(|_| Self {
-            law: haptics::Settings::default(),
-            speed_limit_m_per_s: 0.0,
-            angular_speed_limit_rad_per_s: 0.0,
-            power_limit_w: 0.0,
-            workspace_m: 0.0,
-            host_timeout_ticks: 0,
-            parameters,
-        })
     }
 }

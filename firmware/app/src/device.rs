@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use mortise_firmware::board::{Clock, Identity, Outbound};
-//! use mortise_mechanism::ceilings::Ceilings;
+//! use mortise_mechanism::hardware_limits::HardwareLimits;
 //! use mortise_firmware::channel::Channels;
 //! use mortise_firmware::control::Ticked;
 //! use mortise_firmware::device::start;
@@ -26,7 +26,7 @@
 //! let mut channels = Box::new(Channels::new());
 //! let identity = Identity {
 //!     board: "simulated", force_axes: 3, torque_axes: 3, cost_unit: CostUnit::Nanoseconds, cost_budget: 0,
-//!     reset: ResetReason::PowerOn, overrun_ticks: 0, ceilings: Ceilings::LARGEST, entropy: 1,
+//!     reset: ResetReason::PowerOn, overrun_ticks: 0, hardware_limits: HardwareLimits::LARGEST, entropy: 1,
 //! };
 //! let (mut link, mut control) = start(&mut channels, RamFlash::new(&mut flash), Simulated::new(), NoClock, identity);
 //! let mut out = Wire(Vec::new());
@@ -56,7 +56,7 @@ pub fn start<'c, 's, F: Flash<'s>, M: Mechanism, C: Clock>(
         mechanism,
         clock,
         &identity,
-        ControlSettings::at_start(identity.ceilings),
+        ControlSettings::at_start(identity.hardware_limits),
     );
     let link = LinkPlane::new(link_ends, flash, identity, simulated, M::DESCRIBED);
     (link, control)

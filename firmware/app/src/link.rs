@@ -75,7 +75,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
     ) -> Self {
         let store = Store::open(flash);
         let rig = if described { store.rig() } else { Kept::Nothing };
-        let parameters = Parameters::within(identity.ceilings);
+        let parameters = Parameters::within(identity.hardware_limits);
         let mut plane = Self {
             ends,
             store,

@@ -1,7 +1,7 @@
 //! The parameters' values, and the tick's settings, which are derived from them at low priority.
 
-use mortise_haptics::{GuidanceMethod, Integrator, Settings};
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_haptics::{FromParameter, Settings, each_parameter_drives_one_setting, settings_group};
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::message::Refusal;
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 
@@ -12,42 +12,94 @@ use crate::board::{TICK_HZ, TICK_S};
 pub struct ControlSettings {
     /// Settings of the force law.
     pub law: Settings,
-    /// Handle speed above which a fault is raised, m/s.
-    pub speed_limit_m_per_s: f32,
-    /// Handle rotation above which a fault is raised, rad/s.
-    pub angular_speed_limit_rad_per_s: f32,
-    /// Power limit into the handle, W.
-    pub power_limit_w: f32,
-    /// Distance of the handle from the world's origin above which a fault is raised, m.
-    pub workspace_m: f32,
-    /// Ticks without a frame from the host, motors live, after which a fault is raised.
-    pub host_timeout_ticks: u32,
+    /// Limits beyond which the control plane raises a fault or weakens a wrench.
+    pub safety: SafetySettings,
     /// The values these settings were derived from, which a host reads back.
     pub parameters: Parameters,
+}
+
+settings_group! {
+    /// Limits beyond which the control plane raises a fault or weakens a wrench.
+    SafetySettings: "safety" {
+        /// Handle speed above which a fault is raised, m/s.
+        speed_m_per_s: f32 <- SpeedLimit;
+        /// Handle rotation above which a fault is raised, rad/s.
+        angular_speed_rad_per_s: f32 <- AngularSpeedLimit;
+        /// Power limit into the handle, W.
+        power_w: f32 <- PowerLimit;
+        /// Distance of the handle from the world's origin above which a fault is raised, m.
+        workspace_m: f32 <- WorkspaceRadius;
+        /// Ticks without a frame from the host, motors live, after which a fault is raised.
+        host_timeout: Ticks <- HostTimeout;
+    }
+}
+
+/// A number of ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Ticks(pub u32);
+
+impl FromParameter for Ticks {
+    /// The whole ticks in this many seconds.
+    fn from_parameter(value: f32) -> Self {
+        Self((value * f32::from(TICK_HZ)) as u32)
+    }
+}
+
+// A parameter without a setting, or with two, does not compile.
+const _: () = assert!(each_parameter_drives_one_setting(&[
+    Settings::PARAMETERS,
+    &[SafetySettings::PARAMETERS]
+]));
+
+impl SafetySettings {
+    /// With these nothing could stay armed.
+    const NOTHING_ALLOWED: Self = Self {
+        speed_m_per_s: 0.0,
+        angular_speed_rad_per_s: 0.0,
+        power_w: 0.0,
+        workspace_m: 0.0,
+        host_timeout: Ticks(0),
+    };
+}
+
+impl ControlSettings {
+    /// The defaults of every parameter on a rig with these hardware limits.
+    pub fn at_start(hardware_limits: HardwareLimits) -> Self {
+        let parameters = Parameters::within(hardware_limits);
+        // The defaults pass their own checks (tested), so the fallback is never used.
+        parameters.settings().unwrap_or_else(|_| Self {
+            law: Settings::default(),
+            safety: SafetySettings::NOTHING_ALLOWED,
+            parameters,
+        })
+    }
 }
 
 /// The value of every parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     values: [f32; PARAMETERS.len()],
-    ceilings: Ceilings,
+    hardware_limits: HardwareLimits,
 }
 
 impl Default for Parameters {
     /// The defaults on a rig with the largest limits a board accepts.
     fn default() -> Self {
-        Self::within(Ceilings::LARGEST)
+        Self::within(HardwareLimits::LARGEST)
     }
 }
 
 impl Parameters {
     /// The defaults, none above this rig's hardware limit.
-    pub fn within(ceilings: Ceilings) -> Self {
+    pub fn within(hardware_limits: HardwareLimits) -> Self {
         let mut values = [0.0; PARAMETERS.len()];
         for (value, row) in values.iter_mut().zip(PARAMETERS) {
-            *value = row.default.min(ceilings.most(row.id));
+            *value = row.default.min(hardware_limits.most(row.id));
         }
-        Self { values, ceilings }
+        Self {
+            values,
+            hardware_limits,
+        }
     }
 
     /// A parameter's value, in its unit.
@@ -58,7 +110,7 @@ impl Parameters {
     /// This set with one value changed. A value outside its range, above the rig's hardware limit or not a number is refused with the range valid
     /// here.
     pub fn with(mut self, id: ParameterId, value: f32) -> Result<Self, Refusal> {
-        let (min, max) = (id.row().min, self.ceilings.most(id));
+        let (min, max) = (id.row().min, self.hardware_limits.most(id));
         // A comparison with NaN is false, so NaN is refused too.
         if !(value >= min && value <= max) {
             return Err(Refusal::OutOfRange { id, min, max });
@@ -69,54 +121,38 @@ impl Parameters {
 
     /// The settings for these values; fields without a parameter keep the force law's default.
     pub fn settings(&self) -> Result<ControlSettings, Refusal> {
-        use ParameterId as P;
-        let mut law = Settings::default();
-        law.coupling.k_t_n_per_m = self.get(P::CouplingStiffness);
-        law.coupling.b_t = self.get(P::CouplingDamping);
-        law.coupling.k_r = self.get(P::CouplingAngularStiffness);
-        law.coupling.b_r = self.get(P::CouplingAngularDamping);
-        law.coupling.force_max_n = self.get(P::CouplingForce);
-        law.coupling.torque_max_nm = self.get(P::CouplingTorque);
-        law.contact.stiffness_n_per_m = self.get(P::ContactStiffness);
-        law.contact.damping_s = self.get(P::ContactDamping);
-        law.contact.point_budget = self.get(P::PointBudget) as u32;
-        law.contact.shrinking = self.get(P::Shrinking);
-        law.object.mass_kg = self.get(P::ObjectMass);
-        law.limits.force_n = self.get(P::ForceLimit);
-        law.limits.torque_nm = self.get(P::TorqueLimit);
-        law.limits.force_slew_n_per_s = self.get(P::ForceSlew);
-        law.limits.torque_slew_nm_per_s = self.get(P::TorqueSlew);
-        law.period_s = TICK_S;
-        law.integrator = if self.get(P::Integrator) < 0.5 {
-            Integrator::Implicit
-        } else {
-            Integrator::Explicit
-        };
-        let guidance = self.get(P::Guidance);
-        law.guidance.method = if guidance < 0.5 {
-            GuidanceMethod::Off
-        } else if guidance < 1.5 {
-            GuidanceMethod::Capped
-        } else {
-            GuidanceMethod::Thesis
-        };
-        law.guidance.exclusions = self.get(P::Joints) >= 0.5;
-        law.validate().map_err(|_| Refusal::BadNumber)?;
-        Ok(ControlSettings {
-            law,
-            speed_limit_m_per_s: self.get(P::SpeedLimit),
-            angular_speed_limit_rad_per_s: self.get(P::AngularSpeedLimit),
-            power_limit_w: self.get(P::PowerLimit),
-            workspace_m: self.get(P::WorkspaceRadius),
-            host_timeout_ticks: (self.get(P::HostTimeout) * f32::from(TICK_HZ)) as u32,
+        let mut settings = ControlSettings {
+            law: Settings {
+                period_s: TICK_S,
+                ..Settings::default()
+            },
+            safety: SafetySettings::default(),
             parameters: *self,
-        })
+        };
+        settings.law.adopt(&|id| self.get(id));
+        settings.safety.adopt(&|id| self.get(id));
+        settings.law.validate().map_err(|_| Refusal::BadNumber)?;
+        Ok(settings)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use mortise_haptics::Integrator;
+
     use super::*;
+
+    #[test]
+    fn every_parameter_changes_the_settings() {
+        let at = |id, value| {
+            let parameters = Parameters::default().with(id, value);
+            parameters.and_then(|parameters| parameters.settings()).unwrap()
+        };
+        for row in PARAMETERS {
+            let (low, high) = (at(row.id, row.min), at(row.id, row.max));
+            assert_ne!((low.law, low.safety), (high.law, high.safety), "{}", row.name);
+        }
+    }
 
     #[test]
     fn every_corner_of_every_range_makes_valid_settings() {
@@ -131,15 +167,15 @@ mod tests {
     }
 
     #[test]
-    fn a_rigs_ceiling_is_the_range_that_holds() {
-        let ceilings = Ceilings {
+    fn a_rigs_hardware_limit_is_the_range_that_holds() {
+        let hardware_limits = HardwareLimits {
             force_n: 6.0,
             speed_m_per_s: 1.0,
             angular_speed_rad_per_s: 30.0,
             workspace_m: 0.1,
-            ..Ceilings::LARGEST
+            ..HardwareLimits::LARGEST
         };
-        let weak = Parameters::within(ceilings);
+        let weak = Parameters::within(hardware_limits);
         let default = ParameterId::ForceLimit.row().default;
         assert!(default > 6.0, "the default itself must be cut");
         for (id, most) in [

@@ -63,7 +63,7 @@ fn what_is_read_behind_a_greeting_is_in_force() {
         panic!("no value");
     };
     assert_eq!(value, 0.05);
-    assert_eq!(bench.control.settings().workspace_m, value);
+    assert_eq!(bench.control.settings().safety.workspace_m, value);
 }
 
 /// Frames that armed once do not arm again behind a STOP, nor in another session.

@@ -1,4 +1,4 @@
-//! Gives the linker this board's memory map, interrupt names and scripts.
+//! Gives the linker this board's memory map and scripts.
 
 use std::env;
 use std::error::Error;
@@ -6,11 +6,9 @@ use std::fs;
 use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn Error>> {
+    println!("cargo:rerun-if-changed=memory.x");
     let out = PathBuf::from(env::var("OUT_DIR")?);
-    for script in ["memory.x", "device.x"] {
-        println!("cargo:rerun-if-changed={script}");
-        fs::copy(script, out.join(script))?;
-    }
+    fs::copy("memory.x", out.join("memory.x"))?;
     println!("cargo:rustc-link-search={}", out.display());
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo:rustc-link-arg-bins={argument}");

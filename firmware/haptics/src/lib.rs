@@ -37,6 +37,7 @@ pub mod observer;
 mod passivity;
 mod probe;
 mod settings;
+mod settings_group;
 mod state;
 mod tick;
 
@@ -49,13 +50,15 @@ pub use glam::{Quat, Vec3};
 pub use io::{FacePair, FacePairs, Flags, GuidanceState, Input, Output, Work};
 pub use math::pose::{Pose, Twist, Wrench};
 pub use math::rotation;
+pub use mortise_protocol::parameter::ParameterId;
 pub use passivity::tank::Passivity;
 pub use probe::nearest::{Measure, Nearest};
 pub use probe::prober::{ContactPoint, Probe, ProbeError, Prober};
 pub use probe::sweep::{Course, Motion, Sweep};
 pub use settings::{
     ContactSettings, CouplingSettings, FrictionSettings, GuidanceMethod, GuidanceSettings, Integrator,
-    LimitSettings, ObjectSettings, PassivitySettings, Range, Settings, SettingsError,
+    LimitSettings, ObjectSettings, PassivitySettings, Settings,
 };
+pub use settings_group::{FromParameter, Range, SettingsError, each_parameter_drives_one_setting};
 pub use state::{GrabError, State};
 pub use tick::tick;

@@ -1,52 +1,13 @@
-//! Settings of the force law: each with its meaning, unit, default and range, in one place.
+//! Settings of the force law: each with its meaning, unit, default and range, and the parameter of the protocol that drives it, in one place.
 //!
-//! Made and checked at low priority, passed to the tick as finished values. A default that a host can change comes from the parameter table of the
-//! protocol ([`mortise_protocol::parameter`]). The defaults suit a hand-held part and a handle of about 0.15 kg: an object of 0.1 kg on a coupling of
-//! 1 kN/m is critically damped at b = 2·√(k·m) = 20 N s/m. Ranges cover the values tested, not the limits of stability.
-
-use core::fmt;
+//! Made and checked at low priority, passed to the tick as finished values. A setting that a host can change names its row of the parameter table
+//! ([`mortise_protocol::parameter`]) and has its default from there. The defaults suit a hand-held part and a handle of about 0.15 kg: an object of
+//! 0.1 kg on a coupling of 1 kN/m is critically damped at b = 2·√(k·m) = 20 N s/m. Ranges cover the values tested, not the limits of stability.
 
 use mortise_protocol::parameter::ParameterId;
 
-/// Default of a setting that a host can change.
-const fn host(parameter: ParameterId) -> f32 {
-    parameter.row().default
-}
-
-/// Declares a group of settings: `field: type = default, min => max;`, without the range where any value is accepted.
-macro_rules! group {
-    ($(#[$about:meta])* $group:ident: $path:literal {
-        $($(#[$doc:meta])* $field:ident: $type:ty = $default:expr $(, $min:expr => $max:expr)?;)+
-    }) => {
-        $(#[$about])*
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct $group {
-            $(
-                $(#[$doc])*
-                ///
-                #[doc = concat!("Default `", stringify!($default), "`" $(, ", from `", stringify!($min), "` to `", stringify!($max), "`")?, ".")]
-                pub $field: $type,
-            )+
-        }
-
-        impl Default for $group {
-            fn default() -> Self {
-                Self { $($field: $default,)+ }
-            }
-        }
-
-        impl $group {
-            fn validate(&self) -> Result<(), SettingsError> {
-                $($(check(
-                    concat!($path, ".", stringify!($field)),
-                    self.$field as f32,
-                    Range { min: $min as f32, max: $max as f32 },
-                )?;)?)+
-                Ok(())
-            }
-        }
-    };
-}
+use crate::settings_group;
+use crate::settings_group::{FromParameter, Range, SettingsError};
 
 /// All settings of the force law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,45 +43,55 @@ pub enum Integrator {
     Explicit,
 }
 
-group! {
-    /// Virtual coupling, eqs. 1–2 of Faas 2010: F = k_T·d − b_T·v, τ = k_R·θ − b_R·ω, with v and ω of the object relative to the handle.
-    CouplingSettings: "coupling" {
-        /// k_T, N/m. A stiffer coupling feels crisper and needs more damping of the handle (Colgate–Schenkel: b > k_T·h/2).
-        k_t_n_per_m: f32 = host(ParameterId::CouplingStiffness), 0.0 => 20e3;
-        /// b_T, N s/m.
-        b_t: f32 = host(ParameterId::CouplingDamping), 0.0 => 500.0;
-        /// k_R, N m/rad.
-        k_r: f32 = host(ParameterId::CouplingAngularStiffness), 0.0 => 50.0;
-        /// b_R, N m s/rad.
-        b_r: f32 = host(ParameterId::CouplingAngularDamping), 0.0 => 5.0;
-        /// Force at which the coupling saturates, N: beyond it the object lags and the handle feels no more.
-        force_max_n: f32 = host(ParameterId::CouplingForce), 0.1 => 100.0;
-        /// Torque at which the coupling saturates, N m.
-        torque_max_nm: f32 = host(ParameterId::CouplingTorque), 0.001 => 10.0;
+impl FromParameter for Integrator {
+    fn from_parameter(value: f32) -> Self {
+        if value < 0.5 {
+            Self::Implicit
+        } else {
+            Self::Explicit
+        }
     }
 }
 
-group! {
+settings_group! {
+    /// Virtual coupling, eqs. 1–2 of Faas 2010: F = k_T·d − b_T·v, τ = k_R·θ − b_R·ω, with v and ω of the object relative to the handle.
+    CouplingSettings: "coupling" {
+        /// k_T, N/m. A stiffer coupling feels crisper and needs more damping of the handle (Colgate–Schenkel: b > k_T·h/2).
+        k_t_n_per_m: f32 <- CouplingStiffness, 0.0 => 20e3;
+        /// b_T, N s/m.
+        b_t: f32 <- CouplingDamping, 0.0 => 500.0;
+        /// k_R, N m/rad.
+        k_r: f32 <- CouplingAngularStiffness, 0.0 => 50.0;
+        /// b_R, N m s/rad.
+        b_r: f32 <- CouplingAngularDamping, 0.0 => 5.0;
+        /// Force at which the coupling saturates, N: beyond it the object lags and the handle feels no more.
+        force_max_n: f32 <- CouplingForce, 0.1 => 100.0;
+        /// Torque at which the coupling saturates, N m.
+        torque_max_nm: f32 <- CouplingTorque, 0.001 => 10.0;
+    }
+}
+
+settings_group! {
     /// Contact between points of one part and the field of another.
     ContactSettings: "contact" {
         /// k of one point, N/m. The implicit step carries 20 kN/m to 2 MN/m and more.
-        stiffness_n_per_m: f32 = host(ParameterId::ContactStiffness), 100.0 => 10e6;
+        stiffness_n_per_m: f32 <- ContactStiffness, 100.0 => 10e6;
         /// Limit of the sum of k over all points that touch, N/m: with more points each gets less. It bounds the condition number of the step's matrix
         /// (h²·limit/mass) and is better left high, because a part that lies on many points shares it with the one point at its side. The default is
         /// a hundred points at the default stiffness.
         total_stiffness_n_per_m: f32 = 20e6, 1000.0 => 1e9;
         /// Damping on approach as a ratio of stiffness, s: λ = k·(depth + damping_s · approach speed).
-        damping_s: f32 = host(ParameterId::ContactDamping), 0.0 => 0.01;
+        damping_s: f32 <- ContactDamping, 0.0 => 0.01;
         /// Distance within which points enter the step, m: by the end of a tick with twice the motion so far, or twice the motion without contacts.
         margin_m: f32 = 5e-6, 1e-6 => 1e-3;
         /// Largest work of a tick, in field queries of about 190 instructions: a tree node queried counts 1½, a point out of reach 1, one within the margin
         /// 1¾, one that may touch 3⅛, a solve 8 and 5 more for each target ([`crate::cost`]). With the default, of the motions measured with up to four targets none takes
         /// more than about 136,000 instructions a tick: 121,880 with four targets, 128,300 guided and 119,840 unguided into a fit of 0.02 mm were
         /// measured before ticks became up to 6 % longer.
-        point_budget: u32 = host(ParameterId::PointBudget) as u32, 16 => 100_000;
+        point_budget: u32 <- PointBudget, 16 => 100_000;
         /// Distance by which points of the held part are moved inward along their normals for voxmap queries, in voxels of that part: the textbook's
         /// pointshell shrinking. Distance fields have no shrinking. Beyond a voxel points lie outside of their own voxels, on the wrong side.
-        shrinking: f32 = host(ParameterId::Shrinking), 0.0 => 1.0;
+        shrinking: f32 <- Shrinking, 0.0 => 1.0;
     }
 }
 
@@ -136,7 +107,7 @@ impl ContactSettings {
     }
 }
 
-group! {
+settings_group! {
     /// Dry friction at contacts; see `dynamics::friction` in the sources. Off by default: both coefficients are 0.
     FrictionSettings: "friction" {
         /// μ_k, kinetic coefficient.
@@ -157,11 +128,11 @@ impl FrictionSettings {
     }
 }
 
-group! {
+settings_group! {
     /// The simulated object: its mass is chosen for the feel, not taken from the CAD part.
     ObjectSettings: "object" {
         /// Mass, kg.
-        mass_kg: f32 = host(ParameterId::ObjectMass), 0.01 => 10.0;
+        mass_kg: f32 <- ObjectMass, 0.01 => 10.0;
         /// Lower bound of its radius of gyration, m: keeps slivers from spinning. At most the upper one.
         gyration_min_m: f32 = 3e-3, 1e-3 => 1.0;
         /// Upper bound of its largest radius of gyration, m: the inertia of a larger part is scaled down as a whole, so that the rotational
@@ -172,17 +143,17 @@ group! {
     }
 }
 
-group! {
+settings_group! {
     /// How constraint targets guide; see `constraints` in the sources.
     GuidanceSettings: "guidance" {
         /// Force law of targets.
-        method: GuidanceMethod = GuidanceMethod::Capped;
+        method: GuidanceMethod <- Guidance;
         /// Allowance added to gaps between guided faces, m.
         allowance_m: f32 = 0.1e-3, 0.0 => 1e-3;
         /// τ: time in which the remaining distance falls to 1/e, s.
         time_s: f32 = 20e-3, 1e-3 => 1.0;
         /// Whether mating faces that an engaged target keeps apart are excluded from contact: the forces are the same.
-        exclusions: bool = true;
+        exclusions: bool <- Joints;
     }
 }
 
@@ -197,7 +168,19 @@ pub enum GuidanceMethod {
     Thesis,
 }
 
-group! {
+impl FromParameter for GuidanceMethod {
+    fn from_parameter(value: f32) -> Self {
+        if value < 0.5 {
+            Self::Off
+        } else if value < 1.5 {
+            Self::Capped
+        } else {
+            Self::Thesis
+        }
+    }
+}
+
+settings_group! {
     /// How much energy the coupling may generate; see `passivity` in the sources.
     PassivitySettings: "passivity" {
         /// Largest generated energy of the coupling in excess of its dissipation, J; above half of it the wrench is reduced. 0 switches observer and
@@ -222,17 +205,17 @@ group! {
 /// Largest [`PassivitySettings::delay_ticks`].
 pub const MAX_DELAY_TICKS: usize = 4;
 
-group! {
+settings_group! {
     /// Last limits before the mechanism.
     LimitSettings: "limits" {
         /// Length of the force vector, N.
-        force_n: f32 = host(ParameterId::ForceLimit), 0.0 => 100.0;
+        force_n: f32 <- ForceLimit, 0.0 => 100.0;
         /// Length of the torque vector about the handle's origin, N m.
-        torque_nm: f32 = host(ParameterId::TorqueLimit), 0.0 => 10.0;
+        torque_nm: f32 <- TorqueLimit, 0.0 => 10.0;
         /// Change of force, N/s.
-        force_slew_n_per_s: f32 = host(ParameterId::ForceSlew), 1.0 => 1e6;
+        force_slew_n_per_s: f32 <- ForceSlew, 1.0 => 1e6;
         /// Change of torque, N m/s.
-        torque_slew_nm_per_s: f32 = host(ParameterId::TorqueSlew), 0.01 => 1e5;
+        torque_slew_nm_per_s: f32 <- TorqueSlew, 0.01 => 1e5;
     }
 }
 
@@ -250,44 +233,36 @@ impl Default for Settings {
             passivity: PassivitySettings::default(),
             limits: LimitSettings::default(),
             period_s: 1e-3,
-            integrator: Integrator::Implicit,
+            integrator: FromParameter::from_parameter(ParameterId::Integrator.row().default),
         }
     }
 }
 
-/// Inclusive range of a setting, in the setting's unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    /// Smallest value accepted.
-    pub min: f32,
-    /// Largest value accepted.
-    pub max: f32,
-}
-
-/// A setting that was refused.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SettingsError {
-    /// Its path in [`Settings`], e.g. `coupling.k_t_n_per_m`.
-    pub name: &'static str,
-    /// The value refused.
-    pub value: f32,
-    /// The accepted range.
-    pub range: Range,
-}
-
-impl fmt::Display for SettingsError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} is {}: choose a value from {} to {}",
-            self.name, self.value, self.range.min, self.range.max
-        )
-    }
-}
-
-impl core::error::Error for SettingsError {}
-
 impl Settings {
+    /// Parameters that drive settings, group by group.
+    pub const PARAMETERS: &'static [&'static [ParameterId]] = &[
+        CouplingSettings::PARAMETERS,
+        ContactSettings::PARAMETERS,
+        FrictionSettings::PARAMETERS,
+        ObjectSettings::PARAMETERS,
+        GuidanceSettings::PARAMETERS,
+        PassivitySettings::PARAMETERS,
+        LimitSettings::PARAMETERS,
+        &[ParameterId::Integrator],
+    ];
+
+    /// Sets every setting that a parameter drives to that parameter's value; the others stay.
+    pub fn adopt(&mut self, value: &impl Fn(ParameterId) -> f32) {
+        self.coupling.adopt(value);
+        self.contact.adopt(value);
+        self.friction.adopt(value);
+        self.object.adopt(value);
+        self.guidance.adopt(value);
+        self.passivity.adopt(value);
+        self.limits.adopt(value);
+        self.integrator = FromParameter::from_parameter(value(ParameterId::Integrator));
+    }
+
     /// Checks every number against its range.
     ///
     /// # Errors
@@ -300,27 +275,14 @@ impl Settings {
         self.guidance.validate()?;
         self.passivity.validate()?;
         self.limits.validate()?;
-        check("period_s", self.period_s, PERIOD_S)?;
+        PERIOD_S.check("period_s", self.period_s)?;
         let at_least = |min: f32| Range {
             min,
             max: f32::INFINITY,
         };
         let (friction, object) = (&self.friction, &self.object);
-        check("friction.fixed", friction.fixed, at_least(friction.kinetic))?;
-        check(
-            "object.gyration_max_m",
-            object.gyration_max_m,
-            at_least(object.gyration_min_m),
-        )
-    }
-}
-
-fn check(name: &'static str, value: f32, range: Range) -> Result<(), SettingsError> {
-    // A comparison with NaN is false, so NaN is refused too.
-    if value >= range.min && value <= range.max {
-        Ok(())
-    } else {
-        Err(SettingsError { name, value, range })
+        at_least(friction.kinetic).check("friction.fixed", friction.fixed)?;
+        at_least(object.gyration_min_m).check("object.gyration_max_m", object.gyration_max_m)
     }
 }
 
@@ -337,5 +299,19 @@ mod tests {
         let mut s = Settings::default();
         s.object.gyration_max_m = 0.5 * s.object.gyration_min_m;
         assert_eq!(s.validate().map_err(|e| e.name), Err("object.gyration_max_m"));
+    }
+    #[test]
+    fn choices_are_the_nearest_number() {
+        for (value, integrator) in [(0.4, Integrator::Implicit), (0.6, Integrator::Explicit)] {
+            assert_eq!(Integrator::from_parameter(value), integrator);
+        }
+        for (value, method) in [
+            (0.4, GuidanceMethod::Off),
+            (0.6, GuidanceMethod::Capped),
+            (1.4, GuidanceMethod::Capped),
+            (1.6, GuidanceMethod::Thesis),
+        ] {
+            assert_eq!(GuidanceMethod::from_parameter(value), method);
+        }
     }
 }

@@ -121,25 +121,30 @@ struct Moved {
     guidance: GuidanceState,
 }
 
-/// Moves the object by one step under coupling, constraints and contact. `None` when the step is not finite.
-fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: &mut Work) -> Option<Moved> {
-    let settings = given.settings;
-    let (period_s, mass_kg) = (settings.period_s, settings.object.mass_kg);
-    let (mut grabbed, coupling) = (coupled.grabbed, &coupled.coupling);
+/// The implicit step of the held part from where it is.
+fn step_of(grabbed: &Grabbed, settings: &Settings) -> Step {
     let (gyration2, length) = (grabbed.body).gyration2_in_world(grabbed.orientation, &settings.object);
-    let step = Step {
-        period_s,
-        mass_kg,
+    Step {
+        period_s: settings.period_s,
+        mass_kg: settings.object.mass_kg,
         gyration2,
         length,
         twist: grabbed.twist,
-    };
+    }
+}
+
+/// Moves the object by one step under coupling, constraints and contact. `None` when the step is not finite.
+fn move_object(hand: &mut Hand, given: &Given<'_, '_>, coupled: &Coupled, work: &mut Work) -> Option<Moved> {
+    let settings = given.settings;
+    let (mut grabbed, coupling) = (coupled.grabbed, &coupled.coupling);
+    let step = step_of(&grabbed, settings);
+    let (period_s, length) = (step.period_s, step.length);
 
     hand.targets.step(&settings.guidance);
     let situation = situation(given, &grabbed, length);
     let mut springs = Vec::new();
     hand.targets.add_springs(&situation, &mut springs);
-    let turning_j = grabbed.turning_energy(mass_kg, gyration2);
+    let turning_j = grabbed.turning_energy(step.mass_kg, step.gyration2);
     hand.tank.keep(coupled.moving_j + turning_j);
     let constrained = (
         CouplingForce::new(coupling, &settings.coupling, period_s, length),

@@ -38,7 +38,7 @@ pub struct Joints {
     current_limit: [f32; MAX_JOINTS],
     coulomb: [f32; MAX_JOINTS],
     range: [[f32; 2]; MAX_JOINTS],
-    force_ceiling: f32,
+    force_max: f32,
     posture: Posture,
     /// Joint angles of the last reading.
     angles: [f32; MAX_JOINTS],
@@ -103,7 +103,7 @@ impl Joints {
             current_limit,
             coulomb,
             range,
-            force_ceiling: rig.ceilings.force,
+            force_max: rig.ceilings.force,
             posture,
             angles: [home[0], home[1], home[2]],
         };
@@ -206,7 +206,7 @@ impl Joints {
     /// The force is limited to the rig's hardware limit, fades near singular postures ([`Posture::share`]), and when a motor would exceed its limit
     /// all are scaled by one factor: the force weakens but keeps its direction. A force that is not a number gives no current.
     pub fn currents(&self, force: Vec3) -> [f32; MAX_JOINTS] {
-        let given = force.clamp_length_max(self.force_ceiling) * self.posture.share();
+        let given = force.clamp_length_max(self.force_max) * self.posture.share();
         let torques = self.posture.torques(given);
         let mut currents = [0.0; MAX_JOINTS];
         let mut scale = 1.0f32;

@@ -7,7 +7,7 @@ use mortise_firmware::board::{
     WRITE_SIZE,
 };
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::image::CRC;
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{CostUnit, ResetReason};
@@ -24,7 +24,7 @@ pub(crate) const IDENTITY: Identity = Identity {
     cost_budget: 0,
     reset: ResetReason::PowerOn,
     overrun_ticks: 0,
-    ceilings: Ceilings::LARGEST,
+    hardware_limits: HardwareLimits::LARGEST,
     entropy: 0,
 };
 

@@ -131,15 +131,7 @@ impl<'c, 's> World<'c, 's> {
                     self.sent[order as usize] = Some(sent);
                 }
             }
-            Event::Read => {
-                let coming = self.link.parameters().get(PARAMETER);
-                // A second query before the answer to the first: either answer may come, in the order of the queries.
-                let acting = self.acting();
-                self.in_force.get_or_insert_default().extend([acting, coming]);
-                self.questions += 1;
-                let bytes = frame(None, &ToDevice::GetParameter(PARAMETER));
-                self.receive(&bytes);
-            }
+            Event::Read => self.query(),
             Event::Stop => {
                 self.oracle.stop();
                 let bytes = frame(None, &ToDevice::Stop);
@@ -175,6 +167,17 @@ impl<'c, 's> World<'c, 's> {
             broken = broken.or(Some(Broken::FlashWhileLive));
         }
         broken
+    }
+
+    /// A host queries the parameter.
+    fn query(&mut self) {
+        let coming = self.link.parameters().get(PARAMETER);
+        // A second query before the answer to the first: either answer may come, in the order of the queries.
+        let acting = self.acting();
+        self.in_force.get_or_insert_default().extend([acting, coming]);
+        self.questions += 1;
+        let bytes = frame(None, &ToDevice::GetParameter(PARAMETER));
+        self.receive(&bytes);
     }
 
     fn greet(&mut self, host: Host) {
@@ -284,7 +287,7 @@ impl<'c, 's> World<'c, 's> {
     }
 
     fn acting(&self) -> f32 {
-        self.control.settings().workspace_m
+        self.control.settings().safety.workspace_m
     }
 
     /// Processes the board's output.

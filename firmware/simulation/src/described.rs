@@ -20,7 +20,7 @@ use mortise_protocol::limits::MAX_JOINTS;
 use mortise_protocol::message::{HandScript, InputFault};
 use mortise_protocol::rig::{Rig, RigFault};
 
-use crate::hand::{Grip, Hand, Wish};
+use crate::hand::{Hand, HandCommand, HandImpedance};
 use crate::input_faults::{AXES, InputScript, Wiring};
 use crate::simulated::SUBSTEPS;
 use mortise_mechanism::described::DescribedMechanism;
@@ -132,7 +132,7 @@ impl Described {
     }
 
     fn advance(&mut self) {
-        let held = self.hand.as_mut().map(|hand| (hand.grip, hand.advance()));
+        let held = self.hand.as_mut().map(|hand| (hand.impedance, hand.advance()));
         let joints = self.mechanism.joints();
         let motors = joints.torques(&self.currents);
         let mut sum = Wrench::ZERO;
@@ -187,28 +187,31 @@ impl Links {
     }
 
     /// One backward-Euler step; returns the hand's wrench in it.
-    fn step(&mut self, motors: Vec3, held: Option<&(Grip, Wish)>, joints: &Joints) -> Wrench {
+    fn step(&mut self, motors: Vec3, held: Option<&(HandImpedance, HandCommand)>, joints: &Joints) -> Wrench {
         const H: f32 = TICK_S / SUBSTEPS as f32;
         // Without an operator the stiffness is zero.
-        let (grip, wish) = held.copied().unwrap_or((Grip::NONE, Wish::at(self.pose())));
+        let (impedance, command) = held
+            .copied()
+            .unwrap_or((HandImpedance::NONE, HandCommand::at(self.pose())));
         let jacobian = self.posture.jacobian;
         let back = jacobian.transpose();
-        let pull = (wish.pose.position - self.posture.position) * grip.stiffness
-            + wish.twist.linear * grip.damping
-            + wish.push;
-        let yields = grip.damping + H * grip.stiffness;
+        let pull = (command.pose.position - self.posture.position) * impedance.stiffness
+            + command.twist.linear * impedance.damping
+            + command.push;
+        let yields = impedance.damping + H * impedance.stiffness;
         let system = self.mass_matrix() + (Mat3::from_diagonal(self.viscous) + back * jacobian * yields) * H;
         let momentum = self.mass_matrix() * self.rates + (motors + back * pull) * H;
         self.rates = solve(system, momentum - friction(system, momentum, self.coulomb * H));
 
         let axes = self.posture.wrist_axes;
         let turn = rotation::log_continuous(
-            wish.pose.orientation * self.posture.orientation.conjugate(),
+            command.pose.orientation * self.posture.orientation.conjugate(),
             Vec3::ZERO,
         );
         let carried = self.posture.joint_axes * self.rates;
-        let twist = turn * grip.angular_stiffness + (wish.twist.angular - carried) * grip.angular_damping;
-        let angular_yields = grip.angular_damping + H * grip.angular_stiffness;
+        let twist = turn * impedance.angular_stiffness
+            + (command.twist.angular - carried) * impedance.angular_damping;
+        let angular_yields = impedance.angular_damping + H * impedance.angular_stiffness;
         let has_wrist = joints.model().has_wrist();
         if has_wrist {
             let across = axes.transpose() * axes;

@@ -15,7 +15,7 @@ use mortise_protocol::message::HandScript;
 
 /// Desired motion of the hand in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub struct HandCommand {
     /// Desired pose of the handle.
     pub pose: Pose,
     /// Velocity of that pose.
@@ -26,7 +26,7 @@ pub struct Wish {
 
 /// Spring and damper between desired pose and handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grip {
+pub struct HandImpedance {
     /// N/m.
     pub stiffness: f32,
     /// N·s/m.
@@ -37,7 +37,7 @@ pub struct Grip {
     pub angular_damping: f32,
 }
 
-impl Grip {
+impl HandImpedance {
     /// No hand on the handle.
     pub const NONE: Self = Self {
         stiffness: 0.0,
@@ -47,7 +47,7 @@ impl Grip {
     };
 }
 
-impl Wish {
+impl HandCommand {
     /// The desire to stay at `pose`.
     pub const fn at(pose: Pose) -> Self {
         Self {
@@ -71,7 +71,7 @@ struct Frame {
 #[derive(Clone, Debug)]
 pub struct Hand {
     /// Its springs.
-    pub grip: Grip,
+    pub impedance: HandImpedance,
     tremor: f32,
     /// Turns of the tremor in a tick, and so far, in 2⁻³² turns: exact, and wraps without error.
     phase_step: u32,
@@ -79,7 +79,7 @@ pub struct Hand {
     tick: u32,
     segment: usize,
     frames: Vec<Frame, MAX_KEYFRAMES>,
-    last: Option<Wish>,
+    last: Option<HandCommand>,
 }
 
 impl Hand {
@@ -102,7 +102,7 @@ impl Hand {
             frames[i - 1].turn = rotation::log_continuous(to * from.conjugate(), Vec3::ZERO);
         }
         Some(Self {
-            grip: Grip {
+            impedance: HandImpedance {
                 stiffness: script.stiffness,
                 damping: script.damping,
                 angular_stiffness: script.angular_stiffness,
@@ -120,7 +120,7 @@ impl Hand {
     }
 
     /// Advances to the next tick and returns its desired motion.
-    pub fn advance(&mut self) -> Wish {
+    pub fn advance(&mut self) -> HandCommand {
         let (mut pose, push) = self.scripted();
         let third = u32::MAX / 3;
         pose.position += self.tremor
@@ -135,9 +135,9 @@ impl Hand {
         });
         self.tick = self.tick.saturating_add(1);
         self.phase = self.phase.wrapping_add(self.phase_step);
-        let wish = Wish { pose, twist, push };
-        self.last = Some(wish);
-        wish
+        let command = HandCommand { pose, twist, push };
+        self.last = Some(command);
+        command
     }
 
     fn scripted(&mut self) -> (Pose, Vec3) {
@@ -230,27 +230,27 @@ mod tests {
     fn holds_before_and_after_and_goes_straight_between() {
         let mut hand = Hand::new(&script(&[frame(10, 0.0, 0.0), frame(110, 0.1, 1.0)])).unwrap();
         for tick in 0..200u32 {
-            let wish = hand.advance();
+            let command = hand.advance();
             let part = (tick.clamp(10, 110) - 10) as f32 / 100.0;
             // Two roundings of 6·10⁻⁸ relative.
-            assert!((wish.pose.position.x - 0.1 * part).abs() < 2e-8, "{tick}");
-            assert!((wish.push.z - part).abs() < 2e-7, "{tick}");
-            let angle = 2.0 * libm::atan2f(wish.pose.orientation.z, wish.pose.orientation.w);
+            assert!((command.pose.position.x - 0.1 * part).abs() < 2e-8, "{tick}");
+            assert!((command.push.z - part).abs() < 2e-7, "{tick}");
+            let angle = 2.0 * libm::atan2f(command.pose.orientation.z, command.pose.orientation.w);
             assert!((angle - part).abs() < 2e-6, "{tick}: {angle}");
             let moving = tick > 10 && tick <= 110;
             // Difference of positions near 0.1 with 24 bits, a thousand times.
             let speed = if moving { 1.0 } else { 0.0 };
             assert!(
-                (wish.twist.linear.x - speed).abs() < 2e-5,
+                (command.twist.linear.x - speed).abs() < 2e-5,
                 "{tick}: {:?}",
-                wish.twist
+                command.twist
             );
             // sin instead of angle for 0.01 rad: 2·10⁻⁵ relative; rounding 10⁻⁷ a thousand times.
             let rate = if moving { 10.0 } else { 0.0 };
             assert!(
-                (wish.twist.angular.z - rate).abs() < 1e-3,
+                (command.twist.angular.z - rate).abs() < 1e-3,
                 "{tick}: {:?}",
-                wish.twist
+                command.twist
             );
         }
     }

@@ -13,7 +13,7 @@ use mortise_mechanism::encoder_watch::{
 };
 use mortise_protocol::message::{HandScript, InputFault};
 
-use crate::hand::{Grip, Hand, Wish, small_turn};
+use crate::hand::{Hand, HandCommand, HandImpedance, small_turn};
 use crate::input_faults::{AXES, InputScript, Wiring};
 use mortise_mechanism::interface::{Drive, Mechanism, Sensed, Simulation, TICK_HZ, TICK_S};
 use mortise_mechanism::velocity::{Estimator, InUse};
@@ -145,7 +145,7 @@ impl Simulated {
     }
 
     fn advance(&mut self) {
-        let held = self.hand.as_mut().map(|hand| (hand.grip, hand.advance()));
+        let held = self.hand.as_mut().map(|hand| (hand.impedance, hand.advance()));
         let mut sum = Wrench::ZERO;
         for _ in 0..SUBSTEPS {
             let hand = self.body.step(&self.motors, held.as_ref());
@@ -161,13 +161,15 @@ impl Simulated {
 
 impl Body {
     /// One backward-Euler step; returns the hand's wrench in it.
-    fn step(&mut self, motors: &Wrench, held: Option<&(Grip, Wish)>) -> Wrench {
+    fn step(&mut self, motors: &Wrench, held: Option<&(HandImpedance, HandCommand)>) -> Wrench {
         const H: f32 = TICK_S / SUBSTEPS as f32;
         // Without an operator the stiffness is zero.
-        let (grip, wish) = held.copied().unwrap_or((Grip::NONE, Wish::at(self.pose)));
+        let (impedance, command) = held
+            .copied()
+            .unwrap_or((HandImpedance::NONE, HandCommand::at(self.pose)));
 
-        let apart = wish.pose.position - self.pose.position;
-        let pull = apart * grip.stiffness + wish.twist.linear * grip.damping + wish.push;
+        let apart = command.pose.position - self.pose.position;
+        let pull = apart * impedance.stiffness + command.twist.linear * impedance.damping + command.push;
         let linear = implicit_velocity(
             self.twist.linear,
             motors.force + pull,
@@ -175,16 +177,16 @@ impl Body {
                 inertia: MASS,
                 viscous: VISCOUS,
                 coulomb: COULOMB,
-                damping: grip.damping,
-                stiffness: grip.stiffness,
+                damping: impedance.damping,
+                stiffness: impedance.stiffness,
             },
             H,
         );
         let turn = rotation::log_continuous(
-            wish.pose.orientation * self.pose.orientation.conjugate(),
+            command.pose.orientation * self.pose.orientation.conjugate(),
             Vec3::ZERO,
         );
-        let twisting = turn * grip.angular_stiffness + wish.twist.angular * grip.angular_damping;
+        let twisting = turn * impedance.angular_stiffness + command.twist.angular * impedance.angular_damping;
         let angular = implicit_velocity(
             self.twist.angular,
             motors.torque + twisting,
@@ -192,8 +194,8 @@ impl Body {
                 inertia: INERTIA,
                 viscous: ANGULAR_VISCOUS,
                 coulomb: ANGULAR_COULOMB,
-                damping: grip.angular_damping,
-                stiffness: grip.angular_stiffness,
+                damping: impedance.angular_damping,
+                stiffness: impedance.angular_stiffness,
             },
             H,
         );
@@ -205,8 +207,8 @@ impl Body {
             ),
         };
         Wrench {
-            force: pull - linear * (grip.damping + H * grip.stiffness),
-            torque: twisting - angular * (grip.angular_damping + H * grip.angular_stiffness),
+            force: pull - linear * (impedance.damping + H * impedance.stiffness),
+            torque: twisting - angular * (impedance.angular_damping + H * impedance.angular_stiffness),
         }
     }
 }

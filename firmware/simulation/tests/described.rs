@@ -17,7 +17,7 @@ fn any_rig() -> impl Strategy<Value = Rig> {
     prop_oneof![Just(arm()), Just(pantograph()), Just(paddle())]
 }
 
-fn script(stiffness: f32, wishes: &[(u32, Vec3, Vec3)]) -> HandScript {
+fn script(stiffness: f32, poses: &[(u32, Vec3, Vec3)]) -> HandScript {
     HandScript {
         stiffness,
         damping: 0.01 * stiffness,
@@ -25,7 +25,7 @@ fn script(stiffness: f32, wishes: &[(u32, Vec3, Vec3)]) -> HandScript {
         angular_damping: 0.01,
         tremor: 0.0,
         tremor_hz: 0.0,
-        keyframes: (wishes.iter())
+        keyframes: (poses.iter())
             .map(|&(tick, place, turn)| Keyframe {
                 tick,
                 pose: WirePose {
@@ -61,8 +61,8 @@ proptest! {
         force in vector(30.0),
     ) {
         let mut mechanism = Described::new(&rig).unwrap();
-        let wishes: Vec<_> = places.iter().enumerate().map(|(i, &(place, turn))| (40 * i as u32, place, turn)).collect();
-        mechanism.set_hand(Some(&script(stiffness, &wishes)));
+        let poses: Vec<_> = places.iter().enumerate().map(|(i, &(place, turn))| (40 * i as u32, place, turn)).collect();
+        mechanism.set_hand(Some(&script(stiffness, &poses)));
         for tick in 0..300u32 {
             mechanism.drive(if tick % 50 < 25 { push(force) } else { Drive::Off });
             let sensed = mechanism.sense();
@@ -149,15 +149,15 @@ fn a_wrist_follows_the_hand_and_is_sensed() {
     let mut mechanism = Described::new(&arm()).unwrap();
     let home = mechanism.true_pose();
     let turn = glam::Quat::from_scaled_axis(Vec3::new(0.3, -0.2, 0.4));
-    let wish = turn * home.orientation;
+    let commanded = turn * home.orientation;
     let mut hand = script(500.0, &[(0, home.position, Vec3::ZERO)]);
-    hand.keyframes[0].pose.orientation = wish.to_array();
+    hand.keyframes[0].pose.orientation = commanded.to_array();
     mechanism.set_hand(Some(&hand));
     let mut sensed = mechanism.sense();
     for _ in 0..2_000 {
         sensed = mechanism.sense();
     }
-    let away = (wish * sensed.handle.orientation.conjugate())
+    let away = (commanded * sensed.handle.orientation.conjugate())
         .to_scaled_axis()
         .length();
     // No Coulomb friction at the wrist: the remainder is half a count of each encoder, and the arm's own error, held by its friction.

@@ -39,7 +39,7 @@ impl Rig for Described {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Grip {
+struct Held {
     stiffness: f32,
     /// Damping over stiffness, s.
     damping_s: f32,
@@ -47,17 +47,17 @@ struct Grip {
     tremor_hz: f32,
 }
 
-const STEADY: Grip = Grip {
+const STEADY: Held = Held {
     stiffness: 400.0,
     damping_s: 0.01,
     tremor: 0.0,
     tremor_hz: 0.0,
 };
 
-fn any_grip() -> impl Strategy<Value = Grip> {
+fn any_grip() -> impl Strategy<Value = Held> {
     let tremor = prop_oneof![Just(0.0f32), 1e-6f32..2e-4];
     (1.7f32..3.7, 0.003f32..0.02, tremor, 6.0f32..12.0).prop_map(|(decades, damping_s, tremor, tremor_hz)| {
-        Grip {
+        Held {
             stiffness: libm::powf(10.0, decades),
             damping_s,
             tremor,
@@ -66,7 +66,7 @@ fn any_grip() -> impl Strategy<Value = Grip> {
     })
 }
 
-fn hand(grip: Grip, frames: &[(u32, Pose, Vec3)]) -> HandScript {
+fn hand(grip: Held, frames: &[(u32, Pose, Vec3)]) -> HandScript {
     HandScript {
         stiffness: grip.stiffness,
         damping: grip.damping_s * grip.stiffness,
@@ -98,7 +98,7 @@ fn held(sensed: &Sensed, anchor: Pose, most: f32) -> Drive {
 }
 
 /// Number of ticks, out of `ticks`, in which an encoder is reported dead, while `push` newtons press the handle into the spring.
-fn press(mut rig: impl Rig, grip: Grip, push: Vec3, ticks: u32, mut each: impl FnMut(Pose)) -> u32 {
+fn press(mut rig: impl Rig, grip: Held, push: Vec3, ticks: u32, mut each: impl FnMut(Pose)) -> u32 {
     let home = rig.truth();
     rig.set_hand(Some(&hand(grip, &[(0, home, Vec3::ZERO), (500, home, push)])));
     let mut dead = 0;
@@ -154,7 +154,7 @@ fn a_still_hand_that_presses_for_a_minute_is_no_dead_encoder() {
 fn probes_give_a_resting_hand_less_than_ten_microjoules() {
     for stiffness in [50.0, 100.0, 200.0, 400.0, 1_000.0, 5_000.0] {
         for damping_s in [0.003, 0.01, 0.02] {
-            let grip = Grip {
+            let grip = Held {
                 stiffness,
                 damping_s,
                 ..STEADY
@@ -210,7 +210,7 @@ fn a_still_hand_on_a_described_rig_is_no_dead_encoder() {
         (paddle(), Vec3::new(4.0, 0.0, 0.0)),
     ] {
         for stiffness in [100.0, 400.0, 1_500.0] {
-            let grip = Grip { stiffness, ..STEADY };
+            let grip = Held { stiffness, ..STEADY };
             let dead = press(Described::new(&rig).unwrap(), grip, push, 60_000, |_| {});
             assert_eq!(dead, 0, "{} {push} {stiffness}", rig.name);
         }
@@ -235,7 +235,7 @@ fn a_joint_at_its_stop_is_not_judged() {
 /// Ticks from the freeze of `axis` to the verdict; the hand visits `places` (m, rad) in steps of 250 ms, held by a spring to the first.
 fn frozen(
     mut rig: impl Rig,
-    grip: Grip,
+    grip: Held,
     places: &[(Vec3, Vec3)],
     axis: usize,
     at: u32,
@@ -298,7 +298,7 @@ proptest! {
         for (rig, joints) in [(arm(), 3), (pantograph(), 2)] {
             let axis = axis % joints;
             let near: Vec<_> = places.iter().map(|&(place, turn)| (0.4 * place, turn)).collect();
-            let soft = Grip { stiffness: grip.stiffness.min(1_500.0), ..grip };
+            let soft = Held { stiffness: grip.stiffness.min(1_500.0), ..grip };
             let found = frozen(Described::new(&rig).unwrap(), soft, &near, axis, at, push);
             let in_time = found.is_some_and(|(dead, after)| {
                 let silent_before = joints == 2 && after < u32::from(VERDICT_TICKS) - 1;
@@ -336,7 +336,7 @@ fn a_moving_hand_on_a_described_rig_is_hardly_ever_taken_for_a_dead_encoder() {
     let mut alarms = [0u32; 2];
     for _ in 0..cases {
         for (rig, alarms) in [arm(), pantograph()].iter().zip(&mut alarms) {
-            let grip = Grip {
+            let grip = Held {
                 stiffness: libm::powf(10.0, between(1.7, 3.17)),
                 damping_s: between(0.003, 0.02),
                 tremor: between(-2e-4, 2e-4).max(0.0),

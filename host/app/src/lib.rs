@@ -4,6 +4,7 @@
 //! window, and the whole program in a build without the feature `window`.
 
 pub mod cli;
+pub mod folder_cache;
 #[cfg(feature = "window")]
 pub mod session;
 #[cfg(feature = "window")]

@@ -14,6 +14,15 @@ fn mortise(arguments: &[&str]) -> Output {
         .expect("the program starts")
 }
 
+/// The program with a cache of its own.
+fn mortise_with_cache(cache: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_mortise"))
+        .env("XDG_CACHE_HOME", cache)
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
 fn json(output: &Output) -> Value {
     assert!(output.status.success(), "{output:?}");
     let text = std::str::from_utf8(&output.stdout).expect("UTF-8");
@@ -156,12 +165,20 @@ fn bake_writes_an_image_a_board_would_take() {
     let report = json(&mortise(&[
         "bake",
         SAMPLE,
+        "--no-cache",
         "-o",
         &out.to_string_lossy(),
         "--json",
     ]));
     let bytes = std::fs::read(&out).expect("written");
-    assert_eq!(report["image_bytes"], bytes.len());
+    assert_eq!(report["plan"]["report"]["image_bytes"], bytes.len());
+    // Without options 10 µm are planned for a slot of the board.
+    assert_eq!(report["request"]["accuracy_mm"], 0.01);
+    assert_eq!(report["request"]["flash_bytes"], 512 << 10);
+    assert_eq!(
+        (&report["met"], &report["limit"]),
+        (&true.into(), &"accuracy".into())
+    );
     // Reading in place requires the alignment of flash; a byte vector has none.
     let words: Vec<u32> = (bytes.chunks_exact(4))
         .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
@@ -195,7 +212,7 @@ fn bake_plans_for_an_accuracy() {
     let out = folder.path().join("pair.image");
     let path = out.to_string_lossy().into_owned();
     let ask = |more: &[&str]| {
-        let arguments = ["bake", SAMPLE, "-o", &path, "--accuracy", "5um"];
+        let arguments = ["bake", SAMPLE, "--no-cache", "-o", &path, "--accuracy", "5um"];
         mortise(&[&arguments[..], more].concat())
     };
     let met = json(&ask(&["--flash", "1MiB", "--tick", "120000", "--json"]));
@@ -211,7 +228,7 @@ fn bake_plans_for_an_accuracy() {
     let best = ask(&["--flash", "16KiB", "--force"]);
     let text = String::from_utf8_lossy(&best.stdout);
     assert!(
-        best.status.success() && text.contains("was asked; reached are"),
+        best.status.success() && text.contains("5.0 µm was asked; limited by the size"),
         "{text}"
     );
     assert!(std::fs::read(&out).expect("written").len() <= 16 << 10);
@@ -223,6 +240,43 @@ fn bake_plans_for_an_accuracy() {
     assert!(!out.exists(), "nothing is written");
     assert_eq!(ask(&["--cell", "0.5"]).status.code(), Some(2));
     assert_eq!(ask(&["--flash", "1MB"]).status.code(), Some(2));
+}
+
+#[test]
+fn an_unchanged_file_is_planned_from_the_cache() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let cache = folder.path().join("cache");
+    let bake = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name).to_string_lossy().into_owned();
+        let arguments = [&["bake", SAMPLE, "-o", &out, "--json"][..], more].concat();
+        let output = mortise_with_cache(&cache, &arguments);
+        let plan = json(&output)["plan"].clone();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (std::fs::read(out).expect("written"), plan, said)
+    };
+    let (image, plan, said) = bake("without", &["--no-cache"]);
+    assert!(said.is_empty() && !cache.exists(), "{said}");
+    assert_eq!(bake("first", &[]), (image.clone(), plan.clone(), String::new()));
+    assert_eq!(bake("again", &[]), (image.clone(), plan.clone(), String::new()));
+    let files = || -> Vec<PathBuf> {
+        let files = std::fs::read_dir(cache.join("mortise/bake")).expect("kept");
+        files.map(|file| file.expect("file").path()).collect()
+    };
+    assert!(files().len() > 2, "{:?}", files());
+    // Damage is reported, ignored and repaired.
+    for file in files() {
+        let mut bytes = std::fs::read(&file).expect("kept");
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        std::fs::write(&file, bytes).expect("written");
+    }
+    let (same_image, same_plan, said) = bake("damaged", &[]);
+    assert!(
+        said.starts_with("warning: ") && said.contains("damaged file"),
+        "{said}"
+    );
+    assert_eq!((same_image, same_plan), (image.clone(), plan.clone()));
+    assert_eq!(bake("repaired", &[]), (image, plan, String::new()));
 }
 
 #[test]

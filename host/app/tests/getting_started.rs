@@ -213,7 +213,10 @@ const COMMANDS: [(&str, Run); 19] = [
     ),
     (
         "mortise bake",
-        Run::Here(&["bake", SAMPLE, "-o", "OUT", "--json"], "\"image_bytes\""),
+        Run::Here(
+            &["bake", SAMPLE, "--no-cache", "-o", "OUT", "--json"],
+            "\"image_bytes\"",
+        ),
     ),
     (
         "mortise probe",

@@ -97,8 +97,8 @@ fn guidance_off_and_on_while_running() {
     click(&mut harness, "Play insertion");
     until(&mut harness, "guided", |s| guided(s) == 1);
     let act = |harness: &mut Harness<'_, Window>, value| {
-        let wish = Intent::SetParameter(ParameterId::Guidance, value);
-        harness.state_mut().session.act(wish);
+        let intent = Intent::SetParameter(ParameterId::Guidance, value);
+        harness.state_mut().session.act(intent);
     };
     act(&mut harness, 0.0);
     until(&mut harness, "off: recognised, not sent", |s| {

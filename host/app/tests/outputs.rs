@@ -42,7 +42,7 @@ fn bake_destroys_nothing() {
     std::fs::create_dir(at("folder")).expect("folder");
     let _socket = std::os::unix::net::UnixListener::bind(at("socket")).expect("socket");
     let bake = |out: &str, force: bool| {
-        let mut arguments = vec!["bake", "x.step", "-o", out];
+        let mut arguments = vec!["bake", "x.step", "--no-cache", "-o", out];
         arguments.extend(force.then_some("--force"));
         mortise(place.path(), &arguments)
     };
@@ -75,14 +75,14 @@ fn bake_destroys_nothing() {
 #[test]
 fn a_killed_bake_leaves_no_half_of_a_file() {
     let place = tempfile::tempdir().expect("temporary folder");
-    let whole = mortise(place.path(), &["bake", SAMPLE, "-o", "whole.image"]);
+    let whole = mortise(place.path(), &["bake", SAMPLE, "--no-cache", "-o", "whole.image"]);
     assert!(whole.status.success(), "{whole:?}");
     let whole = std::fs::read(place.path().join("whole.image")).expect("written");
     let out = place.path().join("x.image");
     for milliseconds in [50, 300, 800, 1200, 1600, 2000] {
         let mut child = program()
             .current_dir(place.path())
-            .args(["bake", SAMPLE, "-o", "x.image", "--force"])
+            .args(["bake", SAMPLE, "--no-cache", "-o", "x.image", "--force"])
             .stdout(Stdio::null())
             .spawn()
             .expect("the program starts");
@@ -129,6 +129,11 @@ fn every_bad_option_value_is_one_line() {
             "--tick",
         ),
         (&["bake", SAMPLE, "-o", "q", "--flash", "0"], "--flash"),
+        (
+            &["bake", SAMPLE, "-o", "q", "--cell", "1", "--tick", "9000"],
+            "--tick",
+        ),
+        (&["bake", SAMPLE, "-o", "q", "--voxel", "1"], "--shell"),
         (
             &["bake", SAMPLE, "-o", "q", "--shell", "round"],
             "error-bounded, classic",

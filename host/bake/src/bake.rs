@@ -76,7 +76,8 @@ pub fn bake(
             scene.resolve(model, &each, &mut prepared, made, progress)?
         }
     };
-    let baked = scene.assemble(model, &each, &prepared, made)?;
+    let surfaces: Vec<&ExactSurface> = prepared.iter().collect();
+    let baked = scene.assemble(model, &each, &surfaces, made)?;
     let bytes = baked.image.len() as u64;
     if bytes > options.image_limit_bytes {
         let cell = baked.report.shapes.iter().map(|s| s.cell_mm).fold(0.0, f64::max);
@@ -142,15 +143,15 @@ impl Scene {
     pub fn shells_again(
         &self,
         each: &[BakeOptions],
-        prepared: &[ExactSurface],
+        prepared: &[&ExactSurface],
         sizes: &[f64],
         made: &mut Made,
     ) {
-        let shells = sizes.iter().zip(each).enumerate();
+        let shells = sizes.par_iter().zip(each).enumerate();
         made.shells = shells
             .map(|(i, (&size, options))| {
                 sample_with_edges(
-                    &prepared[i],
+                    prepared[i],
                     &self.edges[i],
                     &shell_options(options, size, &self.partners[i]),
                 )
@@ -382,7 +383,7 @@ impl Scene {
         &self,
         model: &CadModel,
         each: &[BakeOptions],
-        prepared: &[ExactSurface],
+        prepared: &[&ExactSurface],
         Made { fields, shells }: Made,
     ) -> Result<Baked, BakeError> {
         let mut builder = ImageBuilder::new();
@@ -392,11 +393,11 @@ impl Scene {
         };
         for (i, field) in fields.into_iter().enumerate() {
             let shape = prepared[i].shape();
-            let mut entry = shape_report(&self.names[i], &prepared[i], &field, &each[i], &shells[i]);
+            let mut entry = shape_report(&self.names[i], prepared[i], &field, &each[i], &shells[i]);
             report.warnings.extend(doubts(&entry));
             report.warnings.extend(unproven(&entry, &field));
             (_, entry.bytes) = {
-                let convex = is_convex(&prepared[i], &self.edges[i]);
+                let convex = is_convex(prepared[i], &self.edges[i]);
                 builder.add_shape(shape, field, &shells[i], &self.edges[i], convex)
             };
             report.bytes = add(&report.bytes, &entry.bytes);

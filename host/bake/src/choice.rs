@@ -19,7 +19,7 @@ use crate::plan::{ELSEWHERE, ShapePlan};
 use crate::scene::longest_side;
 
 /// Share of the requested accuracy in fits that the field may use; the rest is the shell's.
-pub(crate) const FIELD_SHARE: f64 = 0.75;
+const FIELD_SHARE: f64 = 0.75;
 /// Share of the requested accuracy that the local patches of free-form faces may use.
 pub(crate) const PATCH_SHARE: f64 = 0.5;
 /// Share of the accuracy elsewhere that the field may use.
@@ -140,22 +140,42 @@ impl Demand {
 
     /// Cells to try that are larger than those of `finest`, the largest first: where exact surfaces answer, no interpolation limits them.
     pub fn coarser(&self, finest: &Choice) -> Vec<Choice> {
-        // Few samples are interpolated in such cells, so the shorter format costs no accuracy.
-        let (format, band_cells) = FORMATS[usize::from(!self.free_form)];
-        // Faces are typically as far apart as one over the root of their number: larger cells would meet more of them than a group names.
-        let along = (CELLS_PER_FACE * (self.faces as f64).sqrt()).max(FEWEST_CELLS);
-        let cells = std::iter::successors(Some(self.size_mm / along), |cell| Some(cell / LADDER));
+        let cells = std::iter::successors(Some(self.size_mm / self.cells_along()), |cell| {
+            Some(cell / LADDER)
+        });
         cells
             .take_while(|&cell| cell > finest.cell_mm * 1.05)
-            .map(|cell_mm| Choice {
-                cell_mm,
-                format,
-                band_cells,
-                resolution_mm: finest.cell_mm,
-                why: "its faces, which answer in every cell".to_owned(),
-                edges: finest.edges.clone(),
-            })
+            .map(|cell_mm| self.larger(cell_mm, finest))
             .collect()
+    }
+
+    /// Still larger cells, for the smallest field whatever its error, and the largest of [`Self::coarser`].
+    pub fn coarsest(&self, finest: &Choice) -> Vec<Choice> {
+        let ends = self.size_mm / self.cells_along();
+        let cells = std::iter::successors(Some(ends), |cell| Some(cell * LADDER));
+        cells
+            .take_while(|&cell| cell <= self.size_mm / FEWEST_CELLS * (1.0 + 1e-9))
+            .map(|cell_mm| self.larger(cell_mm, finest))
+            .collect()
+    }
+
+    /// Cells along the longest side from which fields are tried: faces are typically as far apart as one over the root of their number, and larger
+    /// cells would meet more of them than a group names.
+    fn cells_along(&self) -> f64 {
+        (CELLS_PER_FACE * (self.faces as f64).sqrt()).max(FEWEST_CELLS)
+    }
+
+    /// A cell larger than the finest. Few samples are interpolated in it, so the shorter format costs no accuracy.
+    fn larger(&self, cell_mm: f64, finest: &Choice) -> Choice {
+        let (format, band_cells) = FORMATS[usize::from(!self.free_form)];
+        Choice {
+            cell_mm,
+            format,
+            band_cells,
+            resolution_mm: finest.cell_mm,
+            why: "its faces, which answer in every cell".to_owned(),
+            edges: finest.edges.clone(),
+        }
     }
 
     fn with_format(&self, accuracy: f64, format: SampleFormat, band_cells: f64) -> Choice {
@@ -243,21 +263,30 @@ impl Demand {
         by_surfaces.max(interpolated)
     }
 
-    /// Whether a field with these measured errors is as accurate as `accuracy_mm` in fits requires at every face, edges included.
-    pub fn is_met(
+    /// Largest measured error of a field over what `accuracy_mm` in fits allows it there, away from edges and at them: both at most 1 where it is
+    /// accurate enough.
+    pub fn excess(
         &self,
         accuracy_mm: f64,
         choice: &Choice,
         found: &[FaceError],
         free_form: &FreeFormError,
-    ) -> bool {
-        free_form.worst_mm() <= FIELD_SHARE * accuracy_mm
-            && free_form.at_edges_mm <= FIELD_SHARE_ELSEWHERE * ELSEWHERE * accuracy_mm
-            && (0..).zip(found).all(|(face, error)| {
-                let at_edges = SAFETY * error.at_edges_mm.unwrap_or(0.0);
-                self.left_out.contains(&face)
-                    || self.bound_mm(face, choice, error).max(at_edges) <= self.allowed_mm(face, accuracy_mm)
-            })
+    ) -> [f64; 2] {
+        let elsewhere = FIELD_SHARE_ELSEWHERE * ELSEWHERE * accuracy_mm;
+        let mut away = free_form.worst_mm() / (FIELD_SHARE * accuracy_mm);
+        let mut at_edges = free_form.at_edges_mm / elsewhere;
+        for (face, error) in (0..).zip(found) {
+            if self.left_out.contains(&face) {
+                continue;
+            }
+            let allowed = self.allowed_mm(face, accuracy_mm);
+            if self.counts(face, choice) {
+                away = away.max(self.bound_mm(face, choice, error) / allowed);
+            }
+            let edge = SAFETY * error.at_edges_mm.unwrap_or(0.0);
+            at_edges = at_edges.max(edge.max(self.bound_mm(face, choice, error)) / allowed);
+        }
+        [away, at_edges]
     }
 
     /// The model of `choice` with the errors measured of its field, and the shell that they leave room for.

@@ -77,9 +77,17 @@ struct NearCell {
 }
 
 impl LocalPatches {
-    /// Patches for all faces of `surface` that have an exact free-form surface.
-    pub fn cover(surface: &ExactSurface, grid: &Grid, bricks: &[Sampled], tolerance_mm: f64) -> Self {
+    /// Patches for all faces of `surface` that have an exact free-form surface. `alive` is polled regularly; when it returns false the work ends early
+    /// with some of them.
+    pub fn cover(
+        surface: &ExactSurface,
+        grid: &Grid,
+        bricks: &[Sampled],
+        tolerance_mm: f64,
+        alive: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
         let near: Vec<NearCell> = (bricks.par_iter())
+            .filter(|_| alive())
             .flat_map_iter(|(at, samples)| near_cells(surface, grid, *at, samples))
             .collect();
         let mut by_face: HashMap<u16, Vec<&NearCell>> = HashMap::new();
@@ -97,6 +105,7 @@ impl LocalPatches {
                     face,
                     cell: grid.cell(),
                     tolerance_mm,
+                    alive,
                 };
                 fitter.divide(&mut cells)
             })
@@ -222,11 +231,15 @@ struct Fitter<'a> {
     /// Cell edge, mm.
     cell: f64,
     tolerance_mm: f64,
+    alive: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Fitter<'_> {
     /// Patches for these cells: one for all, or those of two halves.
     fn divide<'c>(&self, cells: &mut [&'c NearCell]) -> Vec<Part<'c>> {
+        if !(self.alive)() {
+            return Vec::new();
+        }
         let patch = fit(&self.points(cells), self.face);
         if let Some(patch) = patch.filter(|patch| cells.iter().all(|cell| self.holds(patch, cell))) {
             let cells = cells.to_vec();

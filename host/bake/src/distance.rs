@@ -13,6 +13,9 @@
 //! Cost: about 1.5 µs near the surface of a simple part (the 1.2 million samples of the 50 mm pair take 0.9 s on two cores, November 2026,
 //! `cargo run --release -p mortise-bake --example bake`), more where many triangles are equally near.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::DVec3;
 use mortise_brep::{Shape, Surface};
 
@@ -53,7 +56,22 @@ pub struct ExactSurface {
     error: f64,
     /// Whether the winding number decides signs away from the surface.
     by_winding: bool,
+    work: Work,
 }
+
+/// Count of the work that queries of a surface took, in triangles examined. The sum does not depend on the order of the queries.
+#[derive(Clone, Default)]
+pub(crate) struct Work(Arc<AtomicU64>);
+
+impl Work {
+    /// Triangles examined so far.
+    pub fn so_far(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Work of a query beside the triangles that it examines.
+const QUERY_WORK: u64 = 16;
 
 /// Buffers reused between queries: one set for each thread.
 #[derive(Default)]
@@ -91,8 +109,14 @@ impl ExactSurface {
             topology,
             chord,
             by_winding,
+            work: Work::default(),
             shape,
         }
+    }
+
+    /// Its count of work.
+    pub(crate) fn work(&self) -> Work {
+        self.work.clone()
     }
 
     /// The shape it was made from (its triangles wind outward here).
@@ -168,6 +192,8 @@ impl ExactSurface {
                     .filter(|&&i| i != NONE),
             );
         });
+        let examined = QUERY_WORK + near.len() as u64;
+        self.work.0.fetch_add(examined, Ordering::Relaxed);
         faces.sort_unstable();
         faces.dedup();
         pieces.sort_unstable();

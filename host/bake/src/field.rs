@@ -88,10 +88,11 @@ pub fn bake_field(
             .map(|&at| step().then(|| (at, sample_brick(surface, &grid, at))))
             .collect();
         let sampled = sampled.ok_or(BakeError::Cancelled)?;
-        let patches = LocalPatches::cover(surface, &grid, &sampled, options.patch_tolerance_mm);
+        let alive = || progress(near.stored.len(), near.stored.len()).is_continue();
+        let patches = LocalPatches::cover(surface, &grid, &sampled, options.patch_tolerance_mm, &alive);
         let bricks = sampled
             .par_iter()
-            .map(|(at, exact)| Some(baked(&patches, *at, exact)));
+            .map(|(at, exact)| alive().then(|| baked(&patches, *at, exact)));
         (bricks.collect(), patches)
     } else {
         let none = LocalPatches::default();

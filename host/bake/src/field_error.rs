@@ -10,6 +10,7 @@ use glam::{DAffine3, DVec3};
 use mortise_haptics::{Rendered, Vec3, rendered_distance};
 use mortise_protocol::image::{Nearby, SceneImage, Shape};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::distance::{ExactSurface, Scratch};
 use crate::field::BakedField;
@@ -27,7 +28,7 @@ const MOST: f64 = 20_000.0;
 const MOST_OF_ONE: f64 = 4_000.0;
 
 /// Largest errors near one face, mm.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FaceError {
     /// Where surfaces give the distance.
     pub by_surfaces_mm: f64,

@@ -48,6 +48,8 @@ pub(crate) struct CellNearby<'a> {
     alone: bool,
     /// Distances on the lattice of half steps, NaN where not yet computed.
     halves: Vec<f64>,
+    /// Distances on the lattice by which the present cell's rules are verified; empty where not yet computed.
+    lattice: Vec<f64>,
     scratch: Scratch,
     /// Crossed cells without a rule so far.
     pub unproven: Unproven,
@@ -66,6 +68,7 @@ impl<'a> CellNearby<'a> {
             cell,
             alone: false,
             halves: vec![f64::NAN; HALVES * HALVES * HALVES],
+            lattice: Vec::new(),
             scratch: Scratch::default(),
             unproven: Unproven::default(),
         };
@@ -102,6 +105,7 @@ impl<'a> CellNearby<'a> {
             };
         }
         let crossed = !touches.is_empty();
+        self.lattice.clear();
         let mut tests = self.tests(at, &candidates, touches);
         for _ in 0..ATTEMPTS {
             let Some(rule) = find_rule(&tests, &candidates, nearest) else {
@@ -178,8 +182,11 @@ impl<'a> CellNearby<'a> {
             let place = [i % VERIFIED, i / VERIFIED % VERIFIED, i / VERIFIED / VERIFIED];
             let share = DVec3::from_array(place.map(|i| (i as f64 + 0.5) / VERIFIED as f64));
             let p = low + share * self.cell;
-            let distance = self.exact(at, p);
-            let test = self.test(p, distance, candidates);
+            if self.lattice.len() == i {
+                let distance = self.exact(at, p);
+                self.lattice.push(distance);
+            }
+            let test = self.test(p, self.lattice[i], candidates);
             if !holds(rule, &test, candidates) {
                 failed.push(test);
             }

@@ -213,8 +213,18 @@ impl Patch {
     }
 
     fn jet(&self, uv: [f64; 2]) -> Jet {
+        // Rows no longer than needed: most surfaces are cubic, and rows for the highest degree take most of the time to copy.
+        match self.degrees[0].max(self.degrees[1]) {
+            0..4 => self.jet_in::<4>(uv),
+            4..8 => self.jet_in::<8>(uv),
+            _ => self.jet_in::<{ MAX_DEGREE + 1 }>(uv),
+        }
+    }
+
+    /// [`Self::jet`] for degrees below `N`.
+    fn jet_in<const N: usize>(&self, uv: [f64; 2]) -> Jet {
         let spans = [0, 1].map(|k| self.span(k, uv[k]));
-        let [bu, bv] = [0, 1].map(|k| basis(&self.knots[k], self.degrees[k], spans[k], uv[k]));
+        let [bu, bv] = [0, 1].map(|k| basis::<N>(&self.knots[k], self.degrees[k], spans[k], uv[k]));
         let [p, q] = self.degrees;
         // Homogeneous sums for derivatives (0,0), (1,0), (0,1), (2,0), (1,1), (0,2).
         let mut a = [[0.0f64; 4]; 6];
@@ -299,9 +309,9 @@ fn newton_step(jet: &Jet, r: DVec3, g: [f64; 2], free: [bool; 2]) -> [f64; 2] {
 /// The `degree + 1` basis functions that are not zero in `span`, and their first and second derivatives at `t`.
 ///
 /// Cox–de Boor up the degrees; a k-th derivative is degree · (N⁽ᵏ⁻¹⁾ᵢ / (tᵢ₊ₚ − tᵢ) − N⁽ᵏ⁻¹⁾ᵢ₊₁ / (tᵢ₊ₚ₊₁ − tᵢ₊₁)) of one degree less.
-fn basis(knots: &[f64], degree: usize, span: usize, t: f64) -> [[f64; MAX_DEGREE + 1]; 3] {
-    type Row = [f64; MAX_DEGREE + 1];
-    let zero = [0.0; MAX_DEGREE + 1];
+/// `degree` is less than `N`.
+fn basis<const N: usize>(knots: &[f64], degree: usize, span: usize, t: f64) -> [[f64; N]; 3] {
+    let zero = [0.0; N];
     // Recurrence from functions of degree d − 1 (local index j − 1 and j are functions i and i + 1) to one of degree d, i = span − d + j.
     let over = |d: usize, j: usize| {
         let i = span + j - d;
@@ -313,7 +323,7 @@ fn basis(knots: &[f64], degree: usize, span: usize, t: f64) -> [[f64; MAX_DEGREE
             if right > 0.0 { 1.0 / right } else { 0.0 },
         )
     };
-    let raise = |lower: &Row, d: usize| {
+    let raise = |lower: &[f64; N], d: usize| {
         let mut row = zero;
         for j in 0..=d {
             let (i, left, right) = over(d, j);
@@ -331,7 +341,7 @@ fn basis(knots: &[f64], degree: usize, span: usize, t: f64) -> [[f64; MAX_DEGREE
         }
         row
     };
-    let derive = |lower: &Row, d: usize| {
+    let derive = |lower: &[f64; N], d: usize| {
         let mut row = zero;
         for j in 0..=d {
             let (_, left, right) = over(d, j);

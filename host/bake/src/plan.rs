@@ -10,7 +10,12 @@ use crate::report::BakeReport;
 /// Factor by which errors may be larger on faces that fit nothing.
 pub const ELSEWHERE: f64 = 10.0;
 
-/// Request for a scene image.
+/// Bytes of a scene slot of the smallest board.
+pub const SLOT_BYTES: u64 = 512 << 10;
+/// Accuracy in fits where none is requested, mm.
+const DEFAULT_ACCURACY_MM: f64 = 0.01;
+
+/// Request for a scene image. By default 10 µm in fits, in a slot of the board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Request {
     /// Largest error of gaps and depths where parts fit into one another, mm; elsewhere [`ELSEWHERE`] times that.
@@ -21,6 +26,17 @@ pub struct Request {
     pub tick_instructions: Option<u64>,
     /// Parts that may be grabbed.
     pub grabbable: Grabbable,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            accuracy_mm: DEFAULT_ACCURACY_MM,
+            flash_bytes: SLOT_BYTES,
+            tick_instructions: None,
+            grabbable: Grabbable::default(),
+        }
+    }
 }
 
 /// Model chosen for a shape.
@@ -95,6 +111,16 @@ impl Plan {
         shapes.fold(0.0, f64::max)
     }
 
+    /// The shape with the largest error, by what is allowed in fits and elsewhere.
+    pub(crate) fn least_accurate(&self) -> String {
+        let error = |shape: &ShapePlan| {
+            let in_fits = shape.field_error_in_fits_mm + shape.shell_error_in_fits_mm;
+            in_fits.max(shape.error_elsewhere_mm / ELSEWHERE)
+        };
+        let worst = (self.shapes.iter()).max_by(|a, b| error(a).total_cmp(&error(b)));
+        worst.map(|shape| shape.name.clone()).unwrap_or_default()
+    }
+
     /// Whether the stated errors are within an accuracy in fits, and [`ELSEWHERE`] times that elsewhere.
     pub fn meets(&self, accuracy_mm: f64) -> bool {
         let most = accuracy_mm * (1.0 + 1e-9);
@@ -102,15 +128,75 @@ impl Plan {
     }
 }
 
+/// What keeps a plan from being more accurate.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Limit {
+    /// The requested accuracy is met: nothing more was asked.
+    Accuracy,
+    /// The size of the image.
+    Bytes,
+    /// The instructions of a tick.
+    Tick,
+    /// The surface of this part: finer cells did not help.
+    Shape(String),
+    /// The time for planning.
+    Time,
+}
+
 /// Result of a request.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Planned {
     /// Whether the request is met: if not, this is the finest plan found that fits, or, if nothing fits, the smallest one.
     pub met: bool,
     /// Whether it fits flash and tick.
     pub fits: bool,
+    /// What keeps it from being more accurate.
+    pub limit: Limit,
     /// The plan.
     pub plan: Plan,
     /// Image of the plan.
     pub image: Vec<u8>,
+}
+
+impl Planned {
+    /// What was reached and what limits it, in one line.
+    pub fn reached(&self, request: &Request) -> String {
+        let um = |mm: f64| {
+            let um = 1000.0 * mm;
+            if um < 100.0 {
+                format!("{um:.1} µm")
+            } else {
+                format!("{um:.0} µm")
+            }
+        };
+        let plan = &self.plan;
+        let errors = format!(
+            "{} where parts fit and {} elsewhere",
+            um(plan.error_in_fits_mm()),
+            um(plan.error_elsewhere_mm())
+        );
+        let of = match request.tick_instructions {
+            Some(most) => {
+                let cost = plan.ticks.first().map_or(0, |tick| tick.cost.instructions);
+                format!(
+                    "{} of {} bytes and about {cost} of {most} instructions",
+                    plan.report.image_bytes, request.flash_bytes
+                )
+            }
+            None => format!("{} of {} bytes", plan.report.image_bytes, request.flash_bytes),
+        };
+        if !self.fits {
+            return format!("no model fits: the smallest found, with {errors}, takes {of}");
+        }
+        let asked = um(request.accuracy_mm);
+        let why = match &self.limit {
+            Limit::Accuracy => format!("{asked} was asked"),
+            Limit::Bytes => format!("{asked} was asked; limited by the size"),
+            Limit::Tick => format!("{asked} was asked; limited by the tick"),
+            Limit::Shape(part) => format!("{asked} was asked; limited by the surface of \"{part}\""),
+            Limit::Time => format!("{asked} was asked; limited by the time for planning"),
+        };
+        format!("{errors} in {of}: {why}")
+    }
 }

@@ -1,50 +1,47 @@
-//! The coarsest scene image that meets a request, the choices made with their reasons, and its cost.
+//! The smallest scene image that meets a request, the choices made with their reasons, and its cost.
 //!
-//! For each shape the cells of interpolation alone follow from the requested accuracy in closed form ([`crate::accuracy`], [`crate::choice`]). Where
-//! exact surfaces answer, larger cells may do: they are tried from coarse to fine, and the first whose measured error ([`crate::field_error`]) is
-//! within the bounds is compared with the next. When the image does not fit the flash, or the worst-case tick exceeds its budget, the accuracy is
-//! lowered until both fit; at last the coarsest fields are taken, whatever their error. The result is reported as the best possible. Cost: a bake of
-//! each cell tried, the finest of which takes most of the time.
+//! Each shape gets the smallest field found that is accurate enough ([`crate::trials`]), all shapes at the same time. When the image does not fit the
+//! flash, or the worst-case tick exceeds its budget, the accuracy is lowered until both fit; at last the smallest fields are taken, whatever their
+//! error. The result is reported as the best possible, with what limits it.
+//!
+//! Cost: a bake of each cell tried, the finest of which takes most of the time; bounded by [`MOST_WORK`], and at last by [`MOST_TIME`].
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 use glam::DAffine3;
-use mortise_brep::{CadModel, Surface};
+use mortise_brep::CadModel;
 use mortise_haptics::LEAST_CROSSING_SINE;
 use rayon::prelude::*;
 
-use crate::bake::{Baked, Made, field_bytes};
-use crate::choice::{Choice, Demand, FIELD_SHARE, PATCH_SHARE};
-use crate::cost::TickCost;
+use crate::bake::{Baked, Made};
+use crate::cache::{Cache, NoCache, plan_from_bytes, plan_name, plan_to_bytes, shape_name};
+use crate::choice::{Demand, PATCH_SHARE};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::BakedField;
-use crate::field_error::{FaceError, field_errors};
 use crate::fits::{Fit, fits};
 use crate::options::{BakeOptions, Progress};
 use crate::placed_fits::placed_fits;
-use crate::plan::{PartTick, Plan, Planned, Request, ShapePlan};
+use crate::plan::{ELSEWHERE, Limit, PartTick, Plan, Planned, Request, ShapePlan};
 use crate::scene::Scene;
-use crate::shell::Pointshell;
+use crate::ticks::Ticks;
+use crate::trials::{Bench, Clock, Fielded, Found, Trials};
 use crate::voids::{others, without_hollows};
 
 /// Attempts to find an accuracy that fits, and then one between that and the last that did not fit.
 const ATTEMPTS: usize = 12;
 const REFINEMENTS: usize = 3;
-/// Bytes of a field grow at least with this power of the inverse cell: the bricks of a prism repeat along it.
-const LEAST_GROWTH: f64 = 1.0;
 /// Number of times the bound of crossings may be quadrupled.
 const COARSER_CROSSINGS: usize = 4;
 /// Most pairs of placed parts in which the fits of two shapes are looked for.
 const MOST_PLACEMENTS: usize = 16;
-/// Attempts with a finer cell for a shape with free-form faces, and the factor between their cells.
-const FINER_CELLS: usize = 5;
-const FINER: f64 = 0.7;
-/// Smallest cell tried, mm.
-const LEAST_CELL_MM: f64 = 1e-3;
 /// Coarsest accuracy tried.
 const COARSEST_MM: f64 = 2.0;
+/// Most work of all trials together, in triangles examined: about half a minute on two cores.
+const MOST_WORK: u64 = 1_500_000_000;
+/// Time after which no further field is tried.
+const MOST_TIME: Duration = Duration::from_secs(40);
 
 /// Plans and bakes `model`. `progress` as for [`crate::bake`]; it restarts with each attempt.
 ///
@@ -55,6 +52,19 @@ pub fn plan(
     request: &Request,
     progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
 ) -> Result<Planned, BakeError> {
+    plan_with(model, request, &NoCache, progress)
+}
+
+/// As [`plan`], with results of other plans from `cache`, which keeps those of this one.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_with(
+    model: &CadModel,
+    request: &Request,
+    cache: &dyn Cache,
+    progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+) -> Result<Planned, BakeError> {
     if !(request.accuracy_mm >= 1e-5 && request.accuracy_mm <= 100.0) {
         return Err(BakeError::Option {
             option: "accuracy",
@@ -62,51 +72,22 @@ pub fn plan(
             expected: "0.01 µm to 100 mm",
         });
     }
-    let mut planner = Planner::new(model, request, progress)?;
-    let (mut failed, mut accuracy) = (request.accuracy_mm, request.accuracy_mm);
-    let (mut best, mut last) = (None, None);
-    for _ in 0..=ATTEMPTS {
-        let attempt = planner.attempt(accuracy)?;
-        let over = attempt.as_ref().map_or(HOPELESS, |a| planner.over(a));
-        if over.fits() {
-            best = attempt;
-            break;
-        }
-        last = attempt.or(last);
-        if accuracy > COARSEST_MM {
-            break;
-        }
-        failed = accuracy;
-        accuracy *= over.coarser();
+    let shapes: Vec<Option<String>> = model.shapes.par_iter().map(shape_name).collect();
+    let name = plan_name(&shapes, model, request);
+    let kept = (name.as_ref())
+        .and_then(|name| cache.get(name))
+        .and_then(|bytes| plan_from_bytes(&bytes));
+    if let Some(planned) = kept {
+        return Ok(planned);
     }
-    for _ in 0..REFINEMENTS {
-        if best.is_none() || accuracy < 1.1 * failed {
-            break;
-        }
-        let between = (accuracy * failed).sqrt();
-        let attempt = planner.attempt(between)?;
-        if attempt.as_ref().is_some_and(|a| planner.over(a).fits()) {
-            (accuracy, best) = (between, attempt);
-        } else {
-            failed = between;
-        }
+    let planned = Planner::new(model, request, cache, progress)?.search()?;
+    // What the clock ended may be better another time.
+    if planned.limit != Limit::Time
+        && let Some((name, bytes)) = name.zip(plan_to_bytes(&planned))
+    {
+        cache.put(&name, &bytes);
     }
-    if best.is_none() {
-        let smallest = planner.smallest(COARSEST_MM)?;
-        if smallest.as_ref().is_some_and(|a| planner.over(a).fits()) {
-            best = smallest;
-        } else {
-            last = smallest.or(last);
-        }
-    }
-    let fits = best.is_some();
-    let reported = best.or(last).ok_or(BakeError::TooLarge {
-        bytes: u64::from(u32::MAX),
-        limit: request.flash_bytes,
-        enough_mm: accuracy,
-    })?;
-    let met = fits && reported.plan.meets(request.accuracy_mm);
-    Ok(reported.into_planned(met, fits))
+    Ok(planned)
 }
 
 /// Size and cost of an attempt as multiples of their limits.
@@ -133,6 +114,48 @@ impl Over {
             .max(1.1 * self.instructions * self.instructions)
             .clamp(1.25, 8.0)
     }
+
+    fn limit(self) -> Limit {
+        if self.bytes >= self.instructions {
+            Limit::Bytes
+        } else {
+            Limit::Tick
+        }
+    }
+}
+
+/// An image for an accuracy.
+struct Attempt {
+    baked: Baked,
+    plan: Plan,
+    over: Over,
+    /// What keeps a shape from the accuracy, if anything.
+    limit: Option<Limit>,
+}
+
+impl Attempt {
+    /// The accuracy in fits that it reaches, mm.
+    fn reached_mm(&self) -> f64 {
+        let plan = &self.plan;
+        plan.error_in_fits_mm().max(plan.error_elsewhere_mm() / ELSEWHERE)
+    }
+}
+
+/// Result of trying an accuracy.
+enum Tried {
+    /// An image, which may not fit.
+    Image(Box<Attempt>),
+    /// The fields alone are too large.
+    Over(Over),
+}
+
+impl Tried {
+    fn over(&self) -> Over {
+        match self {
+            Self::Image(attempt) => attempt.over,
+            Self::Over(over) => *over,
+        }
+    }
 }
 
 /// State that does not change between attempts.
@@ -140,306 +163,280 @@ struct Planner<'a> {
     model: &'a CadModel,
     request: &'a Request,
     progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    cache: &'a dyn Cache,
+    clock: Clock,
     scene: Scene,
-    prepared: Vec<ExactSurface>,
-    demands: Vec<Demand>,
-    /// Fields baked so far of each shape.
-    known: Vec<Vec<Fielded>>,
+    shapes: Vec<Trials>,
     /// Fits of shapes that can meet.
     fits: Vec<((usize, usize), Vec<Fit>)>,
-}
-
-/// A field with its errors.
-#[derive(Clone)]
-struct Fielded {
-    choice: Choice,
-    /// Tolerance of its local patches, mm.
-    tolerance_mm: f64,
-    /// Reach of the places at which its errors were measured, mm.
-    reach_mm: f64,
-    errors: Vec<FaceError>,
-    baked: BakedField,
-}
-
-impl Fielded {
-    fn bytes(&self) -> u64 {
-        field_bytes(&self.baked)
-    }
-}
-
-/// Whether a field with this cell takes more than `room` bytes, to judge by the field of a larger one.
-fn is_hopeless(coarser: Option<&Fielded>, cell_mm: f64, room: u64) -> bool {
-    let bytes = |field: &Fielded| field.bytes() as f64 * (field.choice.cell_mm / cell_mm).powf(LEAST_GROWTH);
-    coarser.is_some_and(|field| bytes(field) > room as f64)
-}
-
-struct Attempt {
-    baked: Baked,
-    plan: Plan,
-}
-
-impl Attempt {
-    fn into_planned(self, met: bool, fits: bool) -> Planned {
-        Planned {
-            met,
-            fits,
-            plan: self.plan,
-            image: self.baked.image,
-        }
-    }
 }
 
 impl<'a> Planner<'a> {
     fn new(
         model: &'a CadModel,
         request: &'a Request,
+        cache: &'a dyn Cache,
         progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
     ) -> Result<Self, BakeError> {
+        let clock = Clock::new(MOST_TIME);
         let options = BakeOptions {
             grabbable: request.grabbable.clone(),
+            image_limit_bytes: request.flash_bytes,
             ..BakeOptions::default()
         };
         let mut scene = Scene::new(model, &options)?;
         let reached: Vec<(ExactSurface, Vec<u32>)> = (0..scene.shapes.len())
             .into_par_iter()
-            .map(|number| {
-                let shape = &model.shapes[scene.shapes[number]];
-                let beside = || {
-                    let own = scene.parts.iter().filter(|part| part.1 == number);
-                    own.flat_map(|part| others(model, part.0)).collect()
-                };
-                match without_hollows(shape, beside) {
-                    Some((filled, left_out)) => (ExactSurface::new(&filled), left_out),
-                    None => (ExactSurface::new(shape), Vec::new()),
-                }
-            })
+            .map(|number| reached_surface(model, &scene, number))
             .collect();
         let (prepared, left_out): (Vec<_>, Vec<_>) = reached.into_iter().unzip();
         scene.find_partners(&prepared);
         scene.find_edges(&prepared, &options);
-        let mut all = Vec::new();
-        for a in 0..prepared.len() {
-            for b in scene.met_by(a) {
-                let mut found = fits(&prepared[a], &prepared[b]);
-                for to_b in placements(model, &scene, a, b) {
-                    for fit in placed_fits(&prepared[a], &prepared[b], &to_b) {
-                        if !found.iter().any(|other| other.faces == fit.faces) {
-                            found.push(fit);
-                        }
-                    }
-                }
-                if !found.is_empty() {
-                    all.push(((a, b), found));
-                }
-            }
-        }
-        let demands = (left_out.into_iter().enumerate())
-            .map(|(i, left_out)| {
-                let own: Vec<(u32, f64, String)> = all
-                    .iter()
-                    .filter(|((a, _), _)| *a == i)
-                    .flat_map(|((_, b), found)| {
-                        let name = &scene.names[*b];
-                        found
-                            .iter()
-                            .map(move |fit| (fit.faces[0], fit.difference, name.clone()))
-                    })
-                    .collect();
-                Demand::new(&scene.names[i], &prepared[i], &own, left_out)
+        let fits = all_fits(model, &scene, &prepared);
+        let faces: usize = prepared.iter().map(|surface| surface.shape().faces.len()).sum();
+        let shapes = (prepared.into_iter().zip(left_out).enumerate())
+            .map(|(i, (surface, left_out))| {
+                let demand = demand(&scene, i, &surface, &fits, left_out);
+                // By the number of faces, and half of an equal share at least.
+                let share = surface.shape().faces.len() as f64 / faces.max(1) as f64;
+                let share = share.max(0.5 / scene.shapes.len() as f64);
+                let name = shape_name(surface.shape());
+                Trials::new(i, surface, demand, name, (share * MOST_WORK as f64) as u64)
             })
             .collect();
         Ok(Self {
             model,
             request,
             progress,
+            cache,
+            clock,
             scene,
-            known: vec![Vec::new(); prepared.len()],
-            prepared,
-            demands,
-            fits: all,
+            shapes,
+            fits,
         })
     }
 
-    /// Bakes for `accuracy_mm`; `None` when the layout or the flash cannot hold the result.
-    fn attempt(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
-        let mut fields: Vec<Fielded> = Vec::new();
-        for shape in 0..self.prepared.len() {
-            let used: u64 = fields.iter().map(Fielded::bytes).sum();
-            let room = self.request.flash_bytes.saturating_sub(used);
-            match self.field(shape, accuracy_mm, room)? {
-                Some(field) => fields.push(field),
-                None => return Ok(None),
+    /// The best plan found.
+    fn search(mut self) -> Result<Planned, BakeError> {
+        let asked = self.request.accuracy_mm;
+        let (mut failed, mut accuracy) = (asked, asked);
+        let mut best: Option<Box<Attempt>> = None;
+        let mut last: Option<Box<Attempt>> = None;
+        let mut over = None;
+        for _ in 0..=ATTEMPTS {
+            let tried = self.attempt(accuracy)?;
+            let found = tried.over();
+            match tried {
+                Tried::Image(attempt) if found.fits() => {
+                    let enough = attempt.limit.is_none();
+                    best = better(best, attempt);
+                    // Coarser fields can only be smaller, not better, once one of the shapes is what limits it.
+                    if enough
+                        || best
+                            .as_ref()
+                            .is_some_and(|best| 2.0 * accuracy >= best.reached_mm())
+                    {
+                        break;
+                    }
+                    accuracy *= 2.0;
+                    continue;
+                }
+                Tried::Image(attempt) => last = Some(attempt),
+                Tried::Over(_) => {}
+            }
+            over = Some(found.limit());
+            if accuracy > COARSEST_MM || best.is_some() {
+                break;
+            }
+            failed = accuracy;
+            accuracy *= found.coarser();
+        }
+        for _ in 0..REFINEMENTS {
+            if best.is_none() || accuracy < 1.1 * failed || self.clock.is_over() {
+                break;
+            }
+            let between = (accuracy * failed).sqrt();
+            match self.attempt(between)? {
+                Tried::Image(attempt) if attempt.over.fits() => {
+                    accuracy = between;
+                    best = better(best, attempt);
+                }
+                _ => failed = between,
             }
         }
-        self.assemble(accuracy_mm, fields)
+        if best.is_none()
+            && let Tried::Image(smallest) = self.smallest(COARSEST_MM)?
+        {
+            if smallest.over.fits() {
+                best = Some(smallest);
+            } else if (last.as_ref()).is_none_or(|last| last.baked.image.len() > smallest.baked.image.len()) {
+                last = Some(smallest);
+            }
+        }
+        let fits = best.is_some();
+        let found = best.or(last).ok_or(BakeError::TooLarge {
+            bytes: u64::from(u32::MAX),
+            limit: self.request.flash_bytes,
+            enough_mm: accuracy,
+        })?;
+        Ok(self.planned(*found, fits, over))
+    }
+
+    fn planned(&self, found: Attempt, fits: bool, over: Option<Limit>) -> Planned {
+        let met = fits && found.plan.meets(self.request.accuracy_mm);
+        let limit = if met {
+            Limit::Accuracy
+        } else if self.clock.is_over() {
+            Limit::Time
+        } else {
+            (over.or(found.limit)).unwrap_or_else(|| Limit::Shape(found.plan.least_accurate()))
+        };
+        Planned {
+            met,
+            fits,
+            limit,
+            plan: found.plan,
+            image: found.baked.image,
+        }
+    }
+
+    /// Bakes for `accuracy_mm`.
+    fn attempt(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
+        let room = self.request.flash_bytes;
+        let found = self.find(accuracy_mm)?;
+        let (mut fields, mut limit, mut too_large) = (Vec::new(), None, false);
+        for (found, name) in found.into_iter().zip(&self.scene.names) {
+            let field = match found {
+                Found::Met(field) => Some(field),
+                Found::Best(field) => {
+                    limit = limit.or_else(|| Some(Limit::Shape(name.clone())));
+                    Some(field)
+                }
+                Found::OutOfWork(field) => {
+                    limit = Some(Limit::Time);
+                    Some(field)
+                }
+                Found::TooLarge(field) => {
+                    too_large = true;
+                    field
+                }
+                Found::Pending => None,
+            };
+            fields.extend(field);
+        }
+        if fields.len() < self.shapes.len() {
+            return Ok(Tried::Over(HOPELESS));
+        }
+        let bytes: u64 = fields.iter().map(Fielded::bytes).sum();
+        if bytes > room {
+            let bytes = bytes as f64 / room.max(1) as f64;
+            return Ok(Tried::Over(Over { bytes, ..HOPELESS }));
+        }
+        if too_large {
+            limit = Some(Limit::Bytes);
+        }
+        self.assemble(accuracy_mm, fields, limit)
+    }
+
+    /// The field of each shape for an accuracy. All shapes take one step after the other from coarse to fine, so that none is left behind when planning
+    /// ends early.
+    fn find(&mut self, accuracy_mm: f64) -> Result<Vec<Found>, BakeError> {
+        let room = self.request.flash_bytes;
+        let mut steps = 1;
+        loop {
+            let found = self.each(|shape, bench| shape.find(bench, accuracy_mm, room, steps))?;
+            if !found.iter().any(|found| matches!(found, Found::Pending)) {
+                return Ok(found);
+            }
+            steps += 1;
+        }
     }
 
     /// The smallest field found of each shape, whatever its error.
-    fn smallest(&mut self, accuracy_mm: f64) -> Result<Option<Attempt>, BakeError> {
-        let mut fields = Vec::new();
-        for shape in 0..self.prepared.len() {
-            let finest = self.demands[shape].choose(accuracy_mm);
-            let mut smallest: Option<Fielded> = None;
-            for choice in self.demands[shape].coarser(&finest) {
-                let Some(next) = self.tried(shape, &choice, accuracy_mm)? else {
-                    break;
-                };
-                if smallest.as_ref().is_none_or(|s| next.bytes() < s.bytes()) {
-                    smallest = Some(next);
-                }
-            }
-            match smallest {
-                Some(field) => fields.push(field),
-                None => return Ok(None),
-            }
+    fn smallest(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
+        let fields = self.each(|shape, bench| shape.smallest(bench, accuracy_mm))?;
+        match fields.into_iter().collect() {
+            Some(fields) => self.assemble(accuracy_mm, fields, None),
+            None => Ok(Tried::Over(HOPELESS)),
         }
-        self.assemble(accuracy_mm, fields)
     }
 
-    /// The smallest field of a shape found that is as accurate as `accuracy_mm` requires; `None` when it would take more than `room` bytes.
-    fn field(&mut self, shape: usize, accuracy_mm: f64, room: u64) -> Result<Option<Fielded>, BakeError> {
-        let finest = self.demands[shape].choose(accuracy_mm);
-        let met = |planner: &Self, field: &Fielded| {
-            planner.demands[shape].is_met(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
-        };
-        let mut before: Option<Fielded> = None;
-        for choice in self.demands[shape].coarser(&finest) {
-            if is_hopeless(before.as_ref(), choice.cell_mm, room) {
-                return Ok(None);
-            }
-            let Some(field) = self.tried(shape, &choice, accuracy_mm)? else {
-                return Ok(None);
-            };
-            if let Some(coarser) = before.take().filter(|coarser| met(self, coarser)) {
-                let smaller = field.bytes() < coarser.bytes() && met(self, &field);
-                return Ok(Some(if smaller { field } else { coarser }));
-            }
-            before = Some(field);
-        }
-        if let Some(coarser) = before.as_ref().filter(|coarser| met(self, coarser)) {
-            return Ok(Some(coarser.clone()));
-        }
-        if is_hopeless(before.as_ref(), finest.cell_mm, room) {
-            return Ok(None);
-        }
-        let Some(mut field) = self.tried(shape, &finest, accuracy_mm)? else {
-            return Ok(None);
-        };
-        for _ in 0..FINER_CELLS {
-            // Bytes grow at most with the inverse square of the cell.
-            let full = field.bytes() as f64 > FINER * FINER * room as f64;
-            if full || field.baked.free_form.worst_mm() <= FIELD_SHARE * accuracy_mm {
-                break;
-            }
-            let choice = Choice {
-                cell_mm: field.choice.cell_mm * FINER,
-                why: "its free-form faces".to_owned(),
-                ..field.choice.clone()
-            };
-            match self.tried(shape, &choice, accuracy_mm)? {
-                Some(finer) => field = finer,
-                None => break,
-            }
-        }
-        Ok(Some(field))
-    }
-
-    /// The field of a shape by this choice and its errors; `None` when the layout cannot hold it.
-    fn tried(
+    /// The result of each shape, all at the same time.
+    fn each<T: Send>(
         &mut self,
-        shape: usize,
-        choice: &Choice,
-        accuracy_mm: f64,
-    ) -> Result<Option<Fielded>, BakeError> {
-        let tolerance_mm = PATCH_SHARE * accuracy_mm;
-        let reach_mm = choice.reach_mm();
-        let same = |field: &&mut Fielded| {
-            field.choice.cell_mm == choice.cell_mm
-                && field.choice.format == choice.format
-                && (field.tolerance_mm == tolerance_mm || field.baked.patches.is_empty())
+        of: impl Fn(&mut Trials, &Bench<'_>) -> Result<T, BakeError> + Sync,
+    ) -> Result<Vec<T>, BakeError> {
+        let bench = Bench {
+            scene: &self.scene,
+            cache: self.cache,
+            progress: self.progress,
+            tolerance_mm: PATCH_SHARE * self.request.accuracy_mm,
+            clock: self.clock,
         };
-        if let Some(known) = self.known[shape].iter_mut().find(same) {
-            if known.reach_mm < reach_mm {
-                known.errors = field_errors(&self.prepared[shape], &known.baked, reach_mm);
-                known.reach_mm = reach_mm;
-            }
-            return Ok(Some(Fielded {
-                choice: choice.clone(),
-                ..known.clone()
-            }));
-        }
-        if choice.cell_mm < LEAST_CELL_MM {
-            return Ok(None);
-        }
-        let options = BakeOptions {
-            cell_mm: Some(choice.cell_mm),
-            band_cells: choice.band_cells,
-            format: choice.format,
-            patch_tolerance_mm: tolerance_mm,
-            ..BakeOptions::default()
-        };
-        let surface = &mut self.prepared[shape];
-        let mut cell_mm = choice.cell_mm;
-        let baked = match self
-            .scene
-            .field(shape, surface, &mut cell_mm, &options, self.progress)
-        {
-            Err(BakeError::CellTooSmall { .. }) => return Ok(None),
-            done => done?,
-        };
-        let field = Fielded {
-            choice: choice.clone(),
-            tolerance_mm,
-            reach_mm,
-            errors: field_errors(surface, &baked, reach_mm),
-            baked,
-        };
-        self.known[shape].push(field.clone());
-        Ok(Some(field))
+        (self.shapes.par_iter_mut().map(|shape| of(shape, &bench))).collect()
     }
 
-    /// The image with these fields, and shells as fine as the fields leave room for; `None` when the layout cannot hold it.
-    fn assemble(&self, accuracy_mm: f64, fielded: Vec<Fielded>) -> Result<Option<Attempt>, BakeError> {
-        let mut shapes: Vec<ShapePlan> = (self.demands.iter().zip(&fielded))
-            .map(|(demand, field)| {
-                demand.state(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
+    /// The image with these fields, and shells as fine as the fields leave room for.
+    fn assemble(
+        &self,
+        accuracy_mm: f64,
+        fielded: Vec<Fielded>,
+        limit: Option<Limit>,
+    ) -> Result<Tried, BakeError> {
+        let mut shapes: Vec<ShapePlan> = (self.shapes.iter().zip(&fielded))
+            .map(|(shape, field)| {
+                let found = &field.errors;
+                (shape.demand).state(accuracy_mm, &field.choice, found, &field.baked.free_form)
             })
             .collect();
         let mut each: Vec<BakeOptions> = shapes.iter().map(|shape| self.options(shape)).collect();
         let sizes: Vec<f64> = fielded.iter().map(|field| field.choice.resolution_mm).collect();
+        let surfaces: Vec<&ExactSurface> = self.shapes.iter().map(|shape| &shape.surface).collect();
         let mut made = Made {
-            fields: fielded.into_iter().map(|field| field.baked).collect(),
+            fields: fielded
+                .iter()
+                .map(|field| BakedField::clone(&field.baked))
+                .collect(),
             shells: Vec::new(),
         };
-        self.scene.shells_again(&each, &self.prepared, &sizes, &mut made);
-        let mut ticks = self.ticks(&made);
+        self.scene.shells_again(&each, &surfaces, &sizes, &mut made);
+        let counted = Ticks {
+            model: self.model,
+            scene: &self.scene,
+            surfaces: surfaces.clone(),
+            fits: &self.fits,
+        };
+        let mut ticks = counted.of(&made);
         // Points inside cylinders and cones serve crossed shafts only, and are most of the points in a fit: they are reduced first.
         for _ in 0..COARSER_CROSSINGS {
-            if ticks
-                .first()
-                .is_none_or(|t| t.cost.instructions <= self.request.tick_instructions.unwrap_or(u64::MAX))
-            {
+            if longest(&ticks) <= self.request.tick_instructions.unwrap_or(u64::MAX) {
                 break;
             }
             for (shape, options) in shapes.iter_mut().zip(&mut each) {
                 shape.crossing_epsilon_mm *= 4.0;
                 options.crossing_epsilon_mm = Some(shape.crossing_epsilon_mm);
             }
-            self.scene.shells_again(&each, &self.prepared, &sizes, &mut made);
-            ticks = self.ticks(&made);
+            self.scene.shells_again(&each, &surfaces, &sizes, &mut made);
+            ticks = counted.of(&made);
         }
-        let baked = match self.scene.assemble(self.model, &each, &self.prepared, made) {
-            Err(BakeError::TooLarge { .. }) => return Ok(None),
+        let baked = match self.scene.assemble(self.model, &each, &surfaces, made) {
+            Err(BakeError::TooLarge { .. }) => return Ok(Tried::Over(HOPELESS)),
             baked => baked?,
         };
         self.scene.done(self.progress);
+        let over = self.over(baked.image.len(), longest(&ticks));
         let plan = Plan {
             accuracy_mm,
             shapes,
             ticks,
             report: baked.report.clone(),
         };
-        Ok(Some(Attempt { baked, plan }))
+        Ok(Tried::Image(Box::new(Attempt {
+            baked,
+            plan,
+            over,
+            limit,
+        })))
     }
 
     fn options(&self, shape: &ShapePlan) -> BakeOptions {
@@ -456,82 +453,77 @@ impl<'a> Planner<'a> {
         }
     }
 
-    fn over(&self, attempt: &Attempt) -> Over {
-        let worst = attempt.plan.ticks.first().map_or(0, |t| t.cost.instructions);
+    fn over(&self, bytes: usize, instructions: u64) -> Over {
         let allowed = self.request.tick_instructions;
         Over {
-            bytes: attempt.baked.image.len() as f64 / self.request.flash_bytes.max(1) as f64,
-            instructions: allowed.map_or(0.0, |most| worst as f64 / most.max(1) as f64),
+            bytes: bytes as f64 / self.request.flash_bytes.max(1) as f64,
+            instructions: allowed.map_or(0.0, |most| instructions as f64 / most.max(1) as f64),
         }
     }
+}
 
-    /// Worst-case tick of each part that may be grabbed: it sits in everything it fits into, or lies flat, whichever has more points near.
-    fn ticks(&self, made: &Made) -> Vec<PartTick> {
-        let scene = &self.scene;
-        let mut ticks: Vec<PartTick> = (0..scene.parts.len())
-            .filter(|&i| scene.grabbable[i])
-            .map(|i| {
-                let (part, own) = scene.parts[i];
-                let met: Vec<usize> = (0..scene.parts.len())
-                    .filter(|&j| j != i)
-                    .map(|j| scene.parts[j].1)
-                    .collect();
-                // On a larger flat at most as much of its border is near as of the smaller one's.
-                let flat = self.flats(made, own);
-                let flats = met
-                    .iter()
-                    .map(|&other| 2 * flat.min(self.flats(made, other)))
-                    .max();
-                let all = made.shells[own].points.len()
-                    + met.iter().map(|&o| made.shells[o].points.len()).sum::<usize>();
-                let near = self.fitted(made, own, &met).max(flats.unwrap_or(0)).min(all);
-                PartTick {
-                    name: self.model.parts[part].name.clone(),
-                    cost: TickCost::of(near as u64, all as u64),
+/// The attempt that reaches the finer accuracy.
+fn better(best: Option<Box<Attempt>>, attempt: Box<Attempt>) -> Option<Box<Attempt>> {
+    match best {
+        Some(best) if best.reached_mm() <= attempt.reached_mm() => Some(best),
+        _ => Some(attempt),
+    }
+}
+
+fn longest(ticks: &[PartTick]) -> u64 {
+    ticks.first().map_or(0, |tick| tick.cost.instructions)
+}
+
+/// The surface of a shape without hollows that nothing can reach, and the faces left out.
+fn reached_surface(model: &CadModel, scene: &Scene, number: usize) -> (ExactSurface, Vec<u32>) {
+    let shape = &model.shapes[scene.shapes[number]];
+    let beside = || {
+        let own = scene.parts.iter().filter(|part| part.1 == number);
+        own.flat_map(|part| others(model, part.0)).collect()
+    };
+    match without_hollows(shape, beside) {
+        Some((filled, left_out)) => (ExactSurface::new(&filled), left_out),
+        None => (ExactSurface::new(shape), Vec::new()),
+    }
+}
+
+/// Fits of all shapes that can meet.
+fn all_fits(model: &CadModel, scene: &Scene, prepared: &[ExactSurface]) -> Vec<((usize, usize), Vec<Fit>)> {
+    let pairs: Vec<(usize, usize)> = (0..prepared.len())
+        .flat_map(|a| scene.met_by(a).into_iter().map(move |b| (a, b)))
+        .collect();
+    let of = |&(a, b): &(usize, usize)| {
+        let mut found = fits(&prepared[a], &prepared[b]);
+        for to_b in placements(model, scene, a, b) {
+            for fit in placed_fits(&prepared[a], &prepared[b], &to_b) {
+                if !found.iter().any(|other| other.faces == fit.faces) {
+                    found.push(fit);
                 }
-            })
-            .collect();
-        ticks.sort_by_key(|t| std::cmp::Reverse(t.cost.instructions));
-        ticks
-    }
-
-    /// Number of points near when a part of shape `own` sits in all of the parts of shapes `met` that it fits: each bore holds one pin; a pin may be
-    /// in a bore of each other part.
-    fn fitted(&self, made: &Made, own: usize, met: &[usize]) -> usize {
-        // For each own face, whether it is hollow, and the point count of the largest matching face of each partner.
-        let mut held: BTreeMap<u32, (bool, Vec<usize>)> = BTreeMap::new();
-        for &other in met {
-            let fits = self.fits.iter().find(|(pair, _)| *pair == (own, other));
-            let mut most: BTreeMap<u32, (bool, usize)> = BTreeMap::new();
-            for fit in fits.map_or(&[][..], |(_, fits)| fits) {
-                let points = points_on(&made.shells[other], fit.faces[1]);
-                let entry = most.entry(fit.faces[0]).or_insert((fit.hollow, 0));
-                entry.1 = entry.1.max(points);
-            }
-            for (face, (hollow, points)) in most {
-                held.entry(face).or_insert((hollow, Vec::new())).1.push(points);
             }
         }
-        let near = |(face, (hollow, theirs)): (u32, (bool, Vec<usize>))| {
-            let own = points_on(&made.shells[own], face);
-            if hollow {
-                own + theirs.iter().max().unwrap_or(&0)
-            } else {
-                theirs.len() * own + theirs.iter().sum::<usize>()
-            }
-        };
-        held.into_iter().map(near).sum()
-    }
+        (!found.is_empty()).then_some(((a, b), found))
+    };
+    pairs.par_iter().filter_map(of).collect()
+}
 
-    /// Number of points around the flat that has most.
-    fn flats(&self, made: &Made, shape: usize) -> usize {
-        let faces = self.prepared[shape].shape().faces.iter().enumerate();
-        let flats = faces.filter(|(_, f)| matches!(f.surface, Surface::Plane { .. }));
-        flats
-            .map(|(i, _)| points_on(&made.shells[shape], i as u32))
-            .max()
-            .unwrap_or(0)
-    }
+/// Requirements of a shape.
+fn demand(
+    scene: &Scene,
+    number: usize,
+    surface: &ExactSurface,
+    fits: &[((usize, usize), Vec<Fit>)],
+    left_out: Vec<u32>,
+) -> Demand {
+    let own: Vec<(u32, f64, String)> = (fits.iter())
+        .filter(|((a, _), _)| *a == number)
+        .flat_map(|((_, b), found)| {
+            let name = &scene.names[*b];
+            found
+                .iter()
+                .map(move |fit| (fit.faces[0], fit.difference, name.clone()))
+        })
+        .collect();
+    Demand::new(&scene.names[number], surface, &own, left_out)
 }
 
 /// Transforms from parts of shape `a` to parts of shape `b` as placed in the model.
@@ -542,13 +534,4 @@ fn placements(model: &CadModel, scene: &Scene, a: usize, b: usize) -> Vec<DAffin
         .take(MOST_PLACEMENTS)
         .map(|(own, other)| model.parts[other].placement.inverse() * model.parts[own].placement)
         .collect()
-}
-
-fn points_on(shell: &Pointshell, face: u32) -> usize {
-    let of = |f: u16| u32::from(f) == face;
-    shell
-        .points
-        .iter()
-        .filter(|p| of(p.face) || of(p.edge_face))
-        .count()
 }

@@ -92,6 +92,7 @@ impl WindingTree {
     /// Winding number at `p`.
     pub fn at(&self, p: DVec3) -> f64 {
         let mut sum = 0.0;
+        let mut angles = Angles::default();
         let mut i = 0;
         while i < self.nodes.len() {
             let node = &self.nodes[i];
@@ -102,23 +103,60 @@ impl WindingTree {
                 i = node.skip as usize;
             } else {
                 if node.skip as usize == i + 1 {
-                    sum += self.triangles[node.first as usize..][..node.count as usize]
-                        .iter()
-                        .map(|t| solid_angle(t, p))
-                        .sum::<f64>();
+                    for t in &self.triangles[node.first as usize..][..node.count as usize] {
+                        angles.add(half_solid_angle(t, p));
+                    }
                 }
                 i += 1;
             }
         }
-        sum / (4.0 * PI)
+        (sum + 2.0 * angles.sum()) / (4.0 * PI)
     }
 }
 
-/// Signed solid angle of a triangle seen from `p`, positive from its back (Van Oosterom & Strackee 1983).
-fn solid_angle(t: &[DVec3; 3], p: DVec3) -> f64 {
+/// A sum of angles, each given by a vector in the plane: the vectors are multiplied as complex numbers, and one arc tangent is taken at the end.
+struct Angles {
+    product: [f64; 2],
+    turns: f64,
+}
+
+impl Default for Angles {
+    fn default() -> Self {
+        Self {
+            product: [1.0, 0.0],
+            turns: 0.0,
+        }
+    }
+}
+
+impl Angles {
+    /// Adds the angle of the vector (x, y), from −π to π.
+    fn add(&mut self, [x, y]: [f64; 2]) {
+        let [re, im] = self.product;
+        let (a, b) = (re * x - im * y, re * y + im * x);
+        // Two angles of one half-plane whose sum is in the other one have gone round by π.
+        if im >= 0.0 && y >= 0.0 && b < 0.0 {
+            self.turns += 1.0;
+        } else if im < 0.0 && y < 0.0 && b >= 0.0 {
+            self.turns -= 1.0;
+        }
+        let size = a.abs() + b.abs();
+        // A point on a triangle's corner sees it at no angle.
+        if size > 0.0 {
+            self.product = [a / size, b / size];
+        }
+    }
+
+    fn sum(&self) -> f64 {
+        self.product[1].atan2(self.product[0]) + 2.0 * PI * self.turns
+    }
+}
+
+/// Vector whose angle is half the signed solid angle of a triangle seen from `p`, positive from its back (Van Oosterom & Strackee 1983).
+fn half_solid_angle(t: &[DVec3; 3], p: DVec3) -> [f64; 2] {
     let [a, b, c] = t.map(|v| v - p);
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let determinant = a.dot(b.cross(c));
     let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * determinant.atan2(denominator)
+    [denominator, determinant]
 }

@@ -3,7 +3,7 @@
 //! [`figures::figures`] measures every row of a named table. An [`experiment`] has a name and a full and a quick form, and its run finds rows and
 //! charts; [`experiments::ALL`] lists all experiments. [`clearance`] finds the smallest clearance that assembles, [`pareto`] compares accuracy with
 //! cost; [`chart`] and [`table`] write the results of sweeps. [`rate`] and [`blend`] show an insertion tick by tick, beside the thesis' figures or
-//! method; [`study`] repeats its chapter 7. [`stability`] closes loops on one axis and finds where they become unstable.
+//! method; [`study`] repeats its chapter 7. [`costs`] measures the board's cost table. [`stability`] closes loops on one axis and finds where they become unstable.
 
 pub mod blend;
 pub mod chart;
@@ -12,6 +12,7 @@ mod contact_law;
 pub mod contacts;
 mod convex;
 pub mod corpus;
+pub mod costs;
 mod crossing_law;
 mod driven;
 pub mod endurance;

@@ -52,7 +52,7 @@ pub use exchange::{ATTEMPTS, Patience};
 pub use faults::{FaultCounts, FaultLine, Faults, InputFault, InputFaultName, Window};
 pub use list::{RigEntry, list};
 pub use pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};
-pub use simulated::{Flash, simulate};
+pub use simulated::{Flash, TickWork, simulate, simulate_counted};
 pub use spec::{EmulatedMode, RigSpec, SpecError};
 pub use transport::{READ_WAIT, Transport};
 pub use upload::{UPLOAD_WINDOW, UploadProgress, begin_message, chunk_message};

@@ -9,7 +9,7 @@ use std::io::Write as _;
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
 use tempfile::{Builder, NamedTempFile};
 
-/// First byte of the first scene slot: firmware/boards/mps2-an500/src/memory.rs.
+/// First byte of the first scene slot: firmware/boards/mps2/src/memory.rs.
 const SLOT: u32 = 0x6000_0000;
 /// Bytes in a slot, likewise.
 const SLOT_SIZE: usize = 2 * 1024 * 1024;

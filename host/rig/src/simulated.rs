@@ -5,6 +5,7 @@ use std::cell::Cell;
 use std::io;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -15,7 +16,8 @@ use mortise_firmware::control::Ticked;
 use mortise_firmware::device;
 use mortise_firmware::link::OUTBOUND_MIN;
 use mortise_firmware::store;
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_haptics::Work;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::message::{CostUnit, ResetReason};
 use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 use mortise_simulation::simulated_rig::SimulatedRig;
@@ -49,13 +51,22 @@ pub struct Flash(Arc<Mutex<Vec<FlashWord>>>);
 /// # Errors
 /// `Thread`.
 pub fn simulate(flash: &Flash, realtime: bool) -> Result<Transport, RigError> {
+    start(flash, realtime, |_| {})
+}
+
+/// Starts the board's thread; `ticked` receives the work of every tick.
+fn start(
+    flash: &Flash,
+    realtime: bool,
+    mut ticked: impl FnMut(TickWork) + Send + 'static,
+) -> Result<Transport, RigError> {
     let (to_board, from_host) = pipe();
     let (to_host, from_board) = pipe();
     let thread = std::thread::Builder::new()
         .name("mortise-board".into())
         .spawn({
             let flash = flash.clone();
-            move || run(&flash, realtime, from_host, to_host)
+            move || run(&flash, realtime, from_host, to_host, &mut ticked)
         })
         .map_err(RigError::Thread)?;
     Ok(Transport {
@@ -63,6 +74,20 @@ pub fn simulate(flash: &Flash, realtime: bool) -> Result<Transport, RigError> {
         writer: Box::new(to_board),
         keep: Some(Box::new(Board(Some(thread)))),
     })
+}
+
+/// The force law's work in a tick, by the tick's number in telemetry; `None` when it did not run.
+pub type TickWork = (u32, Option<Work>);
+
+/// As [`simulate`] in lockstep, and reports the work of every tick. It computes the same bits as an emulated board, which cannot report what it counts.
+///
+/// # Errors
+/// `Thread`.
+pub fn simulate_counted(flash: &Flash) -> Result<(Transport, Receiver<TickWork>), RigError> {
+    let (sender, receiver) = mpsc::channel();
+    // A receiver that is gone needs no reports.
+    let transport = start(flash, false, move |work| _ = sender.send(work))?;
+    Ok((transport, receiver))
 }
 
 /// Waits for the board's end, so that its flash is free once the connection is closed. The board ends because its pipes are closed first.
@@ -78,7 +103,13 @@ impl Drop for Board {
 }
 
 /// Runs the board from power-on, and again after each restart.
-fn run(flash: &Flash, realtime: bool, mut from_host: PipeReader, mut to_host: PipeWriter) {
+fn run(
+    flash: &Flash,
+    realtime: bool,
+    mut from_host: PipeReader,
+    mut to_host: PipeWriter,
+    ticked: &mut dyn FnMut(TickWork),
+) {
     if realtime {
         real_time::ask();
     }
@@ -87,7 +118,15 @@ fn run(flash: &Flash, realtime: bool, mut from_host: PipeReader, mut to_host: Pi
         memory.resize(ALL / size_of::<FlashWord>(), ERASED);
     }
     let mut reset = ResetReason::PowerOn;
-    while power_on(&mut memory, reset, realtime, &mut from_host, &mut to_host).is_ok() {
+    while power_on(
+        &mut memory,
+        reset,
+        realtime,
+        (&mut from_host, &mut to_host),
+        ticked,
+    )
+    .is_ok()
+    {
         reset = ResetReason::Requested;
     }
 }
@@ -97,8 +136,8 @@ fn power_on(
     memory: &mut [FlashWord],
     reset: ResetReason,
     realtime: bool,
-    from_host: &mut PipeReader,
-    to_host: &mut PipeWriter,
+    (from_host, to_host): (&mut PipeReader, &mut PipeWriter),
+    ticked: &mut dyn FnMut(TickWork),
 ) -> io::Result<()> {
     let mut channels = Box::new(Channels::new());
     let pace = Rc::new(Pace::new(realtime));
@@ -120,7 +159,7 @@ fn power_on(
         reset,
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
-        ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
+        hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
         // A count suffices: frames for this board cannot reach boards of other processes.
         entropy: STARTS.fetch_add(1, Ordering::Relaxed),
     };
@@ -145,8 +184,12 @@ fn power_on(
             Err(error) => return Err(error),
         }
         patience = pace.until_next().max(pace.breath.take());
-        if patience.is_zero() && control.tick() == Ticked::Waiting && !realtime {
-            patience = READ_WAIT;
+        if patience.is_zero() {
+            match control.tick() {
+                Ticked::Ran => ticked((control.ticks(), control.work())),
+                Ticked::Waiting if !realtime => patience = READ_WAIT,
+                Ticked::Waiting => {}
+            }
         }
         link.poll(&mut out);
         let waiting = out.pending.len();

@@ -17,11 +17,20 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         if let Safety::Fault(fault) | Safety::SoftStop(AfterSoftStop::Fault(fault)) = &self.safety {
             discriminant(fault).hash(hasher);
         }
-        (self.fade.0, self.silent_ticks, self.restarting).hash(hasher);
+        (self.rendered.fade.0, self.late.silent_ticks, self.host.restarting).hash(hasher);
         (self.scene.is_some(), self.scene_number, self.sensed.referenced).hash(hasher);
-        (self.stops == shared.stops(), self.session == shared.sessions()).hash(hasher);
+        (
+            self.host.stops == shared.stops(),
+            self.host.session == shared.sessions(),
+        )
+            .hash(hasher);
         (self.persistent_cause().is_some(), self.ends.events.len()).hash(hasher);
-        (self.lockstep, self.credit, self.reported == self.safety).hash(hasher);
+        (
+            self.lockstep.on,
+            self.lockstep.credit,
+            self.reports.safety == self.safety,
+        )
+            .hash(hasher);
         for row in PARAMETERS {
             self.settings.parameters.get(row.id).to_bits().hash(hasher);
         }

@@ -11,7 +11,7 @@ use crate::wire::{guidance_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire}
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     pub(super) fn lockstep_has_room(&self) -> bool {
         let events = self.ends.events.capacity() - self.ends.events.len() >= EVENTS_AT_ONCE;
-        events && (self.telemetry_every == 0 || self.ends.samples.ready())
+        events && (self.telemetry.every == 0 || self.ends.samples.ready())
     }
 
     pub(super) fn send(&mut self, event: Event) {
@@ -21,14 +21,14 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
 
     /// Reports a fault and a changed state to the link plane when the queue has space, else at the next tick.
     pub(super) fn report(&mut self) {
-        if let Some((tick, fault)) = self.unreported_fault
+        if let Some((tick, fault)) = self.reports.fault
             && self.ends.events.ready()
         {
-            self.unreported_fault = None;
+            self.reports.fault = None;
             self.send(Event::Fault { tick, fault });
         }
-        if self.reported != self.safety && self.ends.events.ready() {
-            self.reported = self.safety;
+        if self.reports.safety != self.safety && self.ends.events.ready() {
+            self.reports.safety = self.safety;
             self.send(Event::State {
                 tick: self.tick,
                 state: self.safety.reported(),
@@ -43,32 +43,32 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     pub(super) fn ran(&mut self) {
         let ran = Reply::Ran {
             tick: self.tick,
-            state_hash: self.hash.value(),
+            state_hash: self.reports.hash.value(),
         };
-        self.reply(self.run_seq, self.session, ran);
+        self.reply(self.lockstep.run_seq, self.host.session, ran);
     }
 
     pub(super) fn send_statistics(&mut self, seq: u16, reset: bool) {
         let statistics = Statistics {
-            state_hash: self.hash.value(),
-            ..self.statistics
+            state_hash: self.reports.hash.value(),
+            ..self.reports.statistics
         };
-        self.reply(seq, self.session, Reply::Statistics { statistics, reset });
+        self.reply(seq, self.host.session, Reply::Statistics { statistics, reset });
         if reset {
-            self.statistics = Statistics::default();
+            self.reports.statistics = Statistics::default();
         }
     }
 
     /// Queues a telemetry sample when one is due.
     pub(super) fn sample(&mut self) {
-        if self.telemetry_every == 0 {
+        if self.telemetry.every == 0 {
             return;
         }
-        self.telemetry_left = self.telemetry_left.saturating_sub(1);
-        if self.telemetry_left > 0 {
+        self.telemetry.left = self.telemetry.left.saturating_sub(1);
+        if self.telemetry.left > 0 {
             return;
         }
-        self.telemetry_left = self.telemetry_every;
+        self.telemetry.left = self.telemetry.every;
         if !self.ends.samples.ready() {
             self.ends.shared.drop_sample();
             return;
@@ -82,7 +82,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             .mechanism
             .simulation()
             .and_then(|simulation| simulation.hand());
-        let output = self.output.as_ref();
+        let output = self.rendered.output.as_ref();
         let mut flags = output.map_or(Flags::empty(), |o| o.work.flags);
         flags.insert_if(self.replaced, Flags::BAD_INPUT);
         flags.insert_if(output.is_some_and(|o| o.pairs.is_full()), Flags::PAIRS);
@@ -95,12 +95,12 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
                 .grabbed()
                 .zip(self.ends.law.object())
                 .map(|(part, (pose, _))| (part, pose_to_wire(&pose))),
-            wrench: wrench_to_wire(&self.commanded),
+            wrench: wrench_to_wire(&self.rendered.commanded),
             contact: wrench_to_wire(&output.map_or(Wrench::ZERO, |o| o.contact)),
             hand: hand.as_ref().map(wrench_to_wire),
             points: output.map_or(0, |o| o.work.points.min(u32::from(u16::MAX)) as u16),
             flags: flags.bits(),
-            missed: self.missed_total,
+            missed: self.late.missed_total,
             dropped: self.ends.shared.dropped(),
             guidance: output.map(|o| guidance_to_wire(&o.guidance)).unwrap_or_default(),
             pairs: output.map(|o| pairs_to_wire(&o.pairs)).unwrap_or_default(),

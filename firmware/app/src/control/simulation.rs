@@ -8,8 +8,8 @@ use crate::board::{Clock, Mechanism, Simulation};
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     pub(super) fn set_lockstep(&mut self, on: bool) -> Result<(), Refusal> {
         self.simulation()?;
-        self.lockstep = on;
-        self.silent_ticks = 0;
+        self.lockstep.on = on;
+        self.late.silent_ticks = 0;
         Ok(())
     }
 

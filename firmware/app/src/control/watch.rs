@@ -1,10 +1,11 @@
 //! Sensor readings, and the faults found in them.
 
-use mortise_mechanism::ceilings::is_outside;
+use mortise_mechanism::hardware_limits::is_outside;
 use mortise_protocol::message::Fault;
 
 use super::ControlPlane;
 use crate::board::{Clock, DriverFaultKind, Mechanism};
+use crate::parameters::Ticks;
 use crate::safety::{Event as SafetyEvent, Motors, Safety};
 
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
@@ -41,12 +42,12 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
 
     /// Checks for faults, most severe first, and steps the safety state machine.
     pub(super) fn watch(&mut self, missed: u32) {
-        self.missed_total = self.missed_total.saturating_add(missed);
-        self.statistics.missed_ticks = self.statistics.missed_ticks.saturating_add(missed);
-        self.missed_in_row = if missed == 0 {
+        self.late.missed_total = self.late.missed_total.saturating_add(missed);
+        self.reports.statistics.missed_ticks = self.reports.statistics.missed_ticks.saturating_add(missed);
+        self.late.missed_in_row = if missed == 0 {
             0
         } else {
-            self.missed_in_row.saturating_add(missed)
+            self.late.missed_in_row.saturating_add(missed)
         };
         self.listen();
         if self.safety == Safety::Boot {
@@ -79,36 +80,36 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         if let Some(axis) = self.sensed.encoder_stuck {
             return Some(Fault::EncoderStuck { axis });
         }
-        let limit = self.settings.speed_limit_m_per_s;
+        let limit = self.settings.safety.speed_m_per_s;
         if self.sensed.twist.linear.length_squared() > limit * limit {
             return Some(Fault::OverSpeed);
         }
-        let limit = self.settings.angular_speed_limit_rad_per_s;
+        let limit = self.settings.safety.angular_speed_rad_per_s;
         if self.sensed.twist.angular.length_squared() > limit * limit {
             return Some(Fault::AngularOverSpeed);
         }
-        if is_outside(self.sensed.handle.position, self.settings.workspace_m) {
+        if is_outside(self.sensed.handle.position, self.settings.safety.workspace_m) {
             return Some(Fault::Workspace);
         }
         let overrun = u32::from(self.overrun_ticks);
-        if overrun > 0 && self.missed_in_row >= overrun {
+        if overrun > 0 && self.late.missed_in_row >= overrun {
             return Some(Fault::TickOverrun);
         }
         // Not while fading: a host that disarmed may disconnect before the fade is over.
-        let silent =
-            self.silent_ticks > self.settings.host_timeout_ticks && self.safety.motors() != Motors::Fading;
+        let silent = Ticks(self.late.silent_ticks) > self.settings.safety.host_timeout
+            && self.safety.motors() != Motors::Fading;
         silent.then_some(Fault::HostSilent {
-            silent_ms: self.silent_ticks.min(u32::from(u16::MAX)) as u16,
+            silent_ms: self.late.silent_ticks.min(u32::from(u16::MAX)) as u16,
         })
     }
 
     fn listen(&mut self) {
         let heard = self.ends.shared.heard();
-        if heard != self.heard || self.lockstep || !self.safety.live() {
-            self.heard = heard;
-            self.silent_ticks = 0;
+        if heard != self.late.heard || self.lockstep.on || !self.safety.live() {
+            self.late.heard = heard;
+            self.late.silent_ticks = 0;
         } else {
-            self.silent_ticks = self.silent_ticks.saturating_add(1);
+            self.late.silent_ticks = self.late.silent_ticks.saturating_add(1);
         }
     }
 }

@@ -15,7 +15,7 @@ use mortise_firmware::channel::Channels;
 use mortise_firmware::control::{ControlPlane, Ticked};
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::*;
@@ -28,7 +28,7 @@ pub const IDENTITY: Identity = Identity {
     cost_budget: 480_000,
     reset: ResetReason::PowerOn,
     overrun_ticks: 3,
-    ceilings: Ceilings::LARGEST,
+    hardware_limits: HardwareLimits::LARGEST,
     entropy: 1,
 };
 

@@ -7,6 +7,7 @@
 //! | [`executor`] | the idle loop: polls the link's executor, sleeps between interrupts |
 //! | [`log`] | defmt into a bounded ring that the link empties |
 //! | [`crash`] | panic and processor fault: motors off, a record that survives, restart |
+//! | [`start`] | what a board logs when it starts |
 //! | [`stack`] | how deep the stack has been |
 //! | [`ring`], [`record`] | what of this needs no processor |
 #![no_std]
@@ -27,6 +28,8 @@ pub mod executor;
 pub mod log;
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub mod stack;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub mod start;
 
 #[cfg(test)]
 #[path = "../../../app/tests/support/rigs.rs"]

@@ -1,5 +1,7 @@
 //! The record that a crash leaves in memory that a reset does not clear.
 
+use mortise_protocol::message::ResetReason;
+
 /// What left a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crash {
@@ -17,6 +19,17 @@ pub enum Crash {
         /// Configurable Fault Status Register.
         status: u32,
     },
+}
+
+impl Crash {
+    /// What the host is reported. The status of a hard fault goes to the log ([`crate::start`]).
+    pub const fn reason(self) -> ResetReason {
+        match self {
+            Self::Requested => ResetReason::Requested,
+            Self::Panic { line } => ResetReason::Panic { line },
+            Self::HardFault { pc, .. } => ResetReason::HardFault { pc },
+        }
+    }
 }
 
 /// Words of a [`CrashRecord`].

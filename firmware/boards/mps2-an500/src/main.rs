@@ -9,36 +9,38 @@
 #![no_std]
 #![no_main]
 
-mod device;
-mod link_task;
-mod memory;
-mod motors;
-mod planes;
-mod timer;
-mod uart;
-
 use cortex_m_rt as _;
+use mps2::{motors, timer};
 
-defmt::timestamp!("{=u32:ms}", planes::milliseconds());
+defmt::timestamp!("{=u32:ms}", timer::milliseconds());
 
-#[rtic::app(device = crate::device, peripherals = false)]
+/// See [`mortise_board::crash`].
+// SAFETY: the hook's name and signature; defined once.
+#[unsafe(no_mangle)]
+fn mortise_cut_motors() {
+    motors::off();
+}
+
+#[rtic::app(device = mps2, peripherals = false)]
 mod app {
-    use core::sync::atomic::Ordering;
-
     use heapless::spsc::{Consumer, Producer, Queue};
     use mortise_board::record::Crash;
+    use mortise_board::start::announce;
     use mortise_board::{crash, executor};
     use mortise_firmware::board::Identity;
     use mortise_firmware::channel::Channels;
-    use mortise_firmware::control::Ticked;
+    use mortise_firmware::control::{ControlPlane, Ticked};
     use mortise_firmware::device::start;
     use mortise_firmware::store;
-    use mortise_mechanism::ceilings::Ceilings;
+    use mortise_mechanism::hardware_limits::HardwareLimits;
     use mortise_protocol::message::{CostUnit, ResetReason};
+    use mps2::Interrupt;
+    use mps2::link::{self, Link};
+    use mps2::motors::Motors;
+    use mps2::timer::{self, TickClock};
+    use mps2::{memory, uart};
 
-    use crate::device::Interrupt;
-    use crate::planes::{Control, Link, MILLISECONDS};
-    use crate::{link_task, memory, motors, timer, uart};
+    type Control = ControlPlane<'static, 'static, Motors, TickClock>;
 
     #[shared]
     struct Shared {}
@@ -61,6 +63,8 @@ mod app {
         let flash = unsafe { memory::scene_flash() };
         let kept = store::rig::kept(&flash);
         let rig = kept.rig();
+        // QEMU's chip has no reset flags.
+        let last_crash = crash::take(false);
         let identity = Identity {
             board: "mps2-an500",
             force_axes: rig.map_or(3, |rig| rig.joints.len() as u8),
@@ -68,30 +72,18 @@ mod app {
             torque_axes: if rig.is_some() { 0 } else { 3 },
             cost_unit: CostUnit::Instructions,
             cost_budget: timer::BUDGET,
-            // QEMU's chip has no reset flags.
-            reset: match crash::take(false) {
-                Some(Crash::Requested) => ResetReason::Requested,
-                Some(Crash::Panic { line }) => ResetReason::Panic { line },
-                Some(Crash::HardFault { pc, .. }) => ResetReason::HardFault { pc },
-                None => ResetReason::PowerOn,
-            },
+            reset: last_crash.map_or(ResetReason::PowerOn, Crash::reason),
             // The simulated mechanism stands still between ticks: late ticks are counted and do no harm.
             overrun_ticks: 0,
-            ceilings: rig.map_or(Ceilings::LARGEST, Ceilings::of),
+            hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
             // QEMU's chip has no random numbers; each of its runs has a line of its own, on which frames of another run cannot come.
             entropy: memory::starts().into(),
         };
         let (bytes_in, bytes_out) = cx.local.bytes.split();
         // Reads the scene in flash before the first tick is due.
-        let mechanism = motors::Motors::new(rig);
-        let (link, control) = start(
-            cx.local.channels,
-            flash,
-            mechanism,
-            timer::TickClock::new(),
-            identity,
-        );
-        link_task::announce(&identity, &link);
+        let mechanism = Motors::new(rig);
+        let (link, control) = start(cx.local.channels, flash, mechanism, TickClock::new(), identity);
+        announce(identity.reset, last_crash, &link);
         uart::start();
         let local = Local {
             control,
@@ -114,7 +106,7 @@ mod app {
         }
         match cx.local.control.tick() {
             Ticked::Ran => {
-                MILLISECONDS.fetch_add(1, Ordering::Relaxed);
+                timer::count_tick();
                 executor::note();
             }
             Ticked::Waiting => {
@@ -142,7 +134,7 @@ mod app {
     #[idle(local = [link, bytes_out])]
     fn idle(cx: idle::Context) -> ! {
         match (cx.local.link.take(), cx.local.bytes_out.take()) {
-            (Some(link), Some(bytes)) => link_task::run(link, bytes),
+            (Some(link), Some(bytes)) => link::run(link, bytes),
             // Idle runs once.
             _ => loop {
                 cortex_m::asm::wfi();

@@ -18,7 +18,7 @@ pub struct ResetFlags {
     pub pin: bool,
 }
 
-/// What the host is reported. The status of a hard fault goes to the log.
+/// What the host is reported.
 pub const fn reset_reason(flags: ResetFlags, crash: Option<Crash>) -> ResetReason {
     // After power-on or brown-out memory is undefined: no record counts.
     if flags.power_on {
@@ -27,11 +27,8 @@ pub const fn reset_reason(flags: ResetFlags, crash: Option<Crash>) -> ResetReaso
     if flags.brown_out {
         return ResetReason::BrownOut;
     }
-    match crash {
-        Some(Crash::Requested) => return ResetReason::Requested,
-        Some(Crash::Panic { line }) => return ResetReason::Panic { line },
-        Some(Crash::HardFault { pc, .. }) => return ResetReason::HardFault { pc },
-        None => {}
+    if let Some(crash) = crash {
+        return crash.reason();
     }
     if flags.watchdog {
         ResetReason::Watchdog

@@ -71,3 +71,9 @@ pub fn lock_usb_clock() {
     pac::CRS.cfgr().modify(|w| w.set_syncsrc(source));
     pac::CRS.cr().modify(|w| w.set_cen(true));
 }
+
+/// While a debugger halts the processor the watchdog stands, and the motor timer with all its outputs low.
+pub fn stand_still_under_a_debugger() {
+    pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
+    pac::DBGMCU.apb2fzr1().modify(|w| w.set_tim1(true));
+}

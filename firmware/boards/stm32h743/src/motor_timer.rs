@@ -5,13 +5,18 @@
 //! from changing the break settings until the next reset.
 
 use embassy_stm32::Peri;
+use embassy_stm32::gpio::{OutputType, Pull, Speed};
 use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::{Bkp, Lock, OcmGp, Ossi, Ossr, Urs};
 use embassy_stm32::peripherals::TIM1;
 use embassy_stm32::rcc;
+use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
+use embassy_stm32::timer::{BkIn1, BreakInputPin, TimerChannel, TimerPin};
+
+use crate::stop_input::StopInput;
 
 /// Motors with a channel.
-const MOTORS: usize = 3;
+pub const MOTORS: usize = 3;
 /// PWM frequency of the set value: the highest a maxon ESCON accepts (10 Hz to 5 kHz); the driver switches its power stage by itself.
 const PWM_HZ: u32 = 5_000;
 /// Channel of the enable line, counted from 0.
@@ -22,9 +27,23 @@ const SUPPLY_LEVEL: u8 = 0b101;
 const SYSCFG_CFGR: *mut u32 = 0x5800_0418 as *mut u32;
 const LOCKUP_BREAKS: u32 = 1 << 6;
 const SUPPLY_BREAKS: u32 = 1 << 2;
+
+/// Port and number of the enable line's pin, for [`cut`].
+pub type EnablePin = (pac::gpio::Gpio, usize);
+
 /// Outputs off; [`MotorTimer::enable`] may switch them on again. For the stop handler.
 pub fn release() {
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
+}
+
+/// Forces all outputs low, from any context, whatever state the program is in: through the timer, and the enable pin once more by itself.
+/// Only a reset brings the enable line back.
+pub fn cut((port, pin): EnablePin) {
+    release();
+    port.bsrr().write(|w| w.set_br(pin, true));
+    port.moder()
+        .modify(|w| w.set_moder(pin, pac::gpio::vals::Moder::OUTPUT));
+    cortex_m::asm::dsb();
 }
 
 /// PWM and enable line are live.
@@ -50,6 +69,24 @@ impl MotorTimer {
         Self {
             period: set_up_timer(),
         }
+    }
+
+    /// A PWM or enable line, by its channel.
+    pub fn line<C: TimerChannel>(
+        &self,
+        pin: Peri<'static, impl TimerPin<TIM1, C>>,
+    ) -> PwmPin<'static, TIM1, C> {
+        let line = PwmPinConfig {
+            output_type: OutputType::PushPull,
+            speed: Speed::Medium,
+            pull: Pull::Down,
+        };
+        PwmPin::new_with_config(pin, line)
+    }
+
+    /// The stop input: from here on its contact cuts the outputs.
+    pub fn stop_input(&self, pin: Peri<'static, impl BreakInputPin<TIM1, BkIn1>>) -> StopInput {
+        StopInput::new(pin)
     }
 
     /// Share of the period, 0 to 1, that a motor's line is high from the next period (200 µs) on.

@@ -164,6 +164,26 @@ pub(crate) fn exact_curve(shape: &Shape<'_>, edge: &EdgeRecord) -> heapless::Vec
     parts
 }
 
+/// Radius of the circle in which a plane across the axis cuts a surface of revolution, m: `height` of the plane over the surface's origin along the
+/// plane's normal, `along` its height along the axis. A torus is cut in two circles: the one on whose side `outer`, a distance from the axis, is. NaN
+/// where the plane misses.
+fn ring_radius(round: &FaceRecord, height: f64, along: f64, outer: f64) -> f64 {
+    let (radius, second) = (f64::from(round.radius), f64::from(round.second));
+    match round.kind {
+        surface_kind::CYLINDER => radius,
+        surface_kind::CONE => radius + along * libm::tan(second),
+        surface_kind::SPHERE => libm::sqrt(radius * radius - height * height),
+        _ => {
+            let off = libm::sqrt(second * second - height * height);
+            if outer < radius {
+                radius - off
+            } else {
+                radius + off
+            }
+        }
+    }
+}
+
 /// The arc in which a plane cuts a surface of revolution across its axis, over the piece.
 fn arc(a: &FaceRecord, b: &FaceRecord, piece: &Curve) -> Option<Curve> {
     let (plane, round) = match (a.kind, b.kind) {
@@ -183,22 +203,8 @@ fn arc(a: &FaceRecord, b: &FaceRecord, piece: &Curve) -> Option<Curve> {
     let origin = wide(round.origin);
     let height = (wide(plane.origin) - origin).dot(normal);
     let center = origin + normal * height;
-    let along = height * axis.dot(normal);
-    let (radius, second) = (f64::from(round.radius), f64::from(round.second));
     let outer = (piece.center - center).length();
-    let ring = match round.kind {
-        surface_kind::CYLINDER => radius,
-        surface_kind::CONE => radius + along * libm::tan(second),
-        surface_kind::SPHERE => libm::sqrt(radius * radius - height * height),
-        _ => {
-            let off = libm::sqrt(second * second - height * height);
-            if outer < radius {
-                radius - off
-            } else {
-                radius + off
-            }
-        }
-    };
+    let ring = ring_radius(round, height, height * axis.dot(normal), outer);
     let flat = |p: DVec3| {
         let from = p - center;
         from - normal * from.dot(normal)

@@ -58,6 +58,21 @@ pub struct Nearest {
     pub fixed_face: u16,
 }
 
+impl Nearest {
+    /// Before anything is queried.
+    pub(crate) const UNKNOWN: Self = Self {
+        distance_m: f32::INFINITY,
+        field_distance_m: f32::INFINITY,
+        error_m: f32::INFINITY,
+        exact: false,
+        measure: Measure::DeepestPoint,
+        in_band: false,
+        arm: Vec3::ZERO,
+        moving_face: NO_FACE,
+        fixed_face: NO_FACE,
+    };
+}
+
 /// Result so far, over both directions.
 pub(crate) struct Progress {
     /// The nearest point.
@@ -67,6 +82,14 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
+    /// Nothing queried yet.
+    pub fn new() -> Self {
+        Self {
+            best: Nearest::UNKNOWN,
+            work: Work::default(),
+        }
+    }
+
     /// Distance beyond which a point is neither nearest nor overlapping, m.
     #[inline]
     fn limit(&self) -> f32 {

@@ -14,7 +14,7 @@ use crate::collision::contact::{Contacts, Phase};
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::rules::NoRules;
-use crate::collision::search::Search;
+use crate::collision::search::{Search, Traversal};
 use crate::dynamics::body::Body;
 use crate::dynamics::contact_force::{Stiffness, total_force};
 use crate::io::{Flags, Work};
@@ -23,7 +23,7 @@ use crate::math::scalar::smaller;
 use crate::probe::clearance::{BUDGET, clearance};
 use crate::probe::convex::{Separation, separation};
 use crate::probe::epa::Epa;
-use crate::probe::nearest::{Measure, Nearest, NearestSearch, Progress};
+use crate::probe::nearest::{Nearest, NearestSearch, Progress};
 use crate::probe::nearest_voxel::nearest_voxel;
 use crate::probe::on_surface::is_inside;
 use crate::probe::support::Support;
@@ -98,6 +98,71 @@ pub struct Prober {
     epa: Epa,
 }
 
+/// Refuses parts that are not there, or are the same.
+fn check_parts(scene: &SceneImage<'_>, moving: u16, fixed: u16) -> Result<(), ProbeError> {
+    for part in [moving, fixed] {
+        if usize::from(part) >= scene.parts().len() {
+            return Err(ProbeError::NoSuchPart { part });
+        }
+    }
+    if moving == fixed {
+        return Err(ProbeError::SamePart);
+    }
+    Ok(())
+}
+
+/// Searches each part's tree against the other's field, for the nearest point and for what touches.
+fn search_both_ways(
+    pairs: &[DirectedPair<'_>; 2],
+    against: [&Shape<'_>; 2],
+    shrunk_m: f32,
+    progress: &mut Progress,
+    touching: &mut Traversal<'_, '_, '_, NoRules>,
+) {
+    let mut searches = [0, 1].map(|way| NearestSearch::new(&pairs[way], against[way]));
+    for (search, pair) in searches.iter_mut().zip(pairs) {
+        if !pair.field.is_occupancy() {
+            search.traverse(progress, touching);
+        } else if !pair.unused() {
+            nearest_voxel(pair, shrunk_m, progress);
+        }
+    }
+    for search in &mut searches {
+        search.finish(progress, touching);
+    }
+}
+
+/// A search of everything that touches at a pose, with its centre of mass, at rest.
+fn resting_search<'s, 'i>(
+    scene: &'s SceneImage<'i>,
+    moving: u16,
+    (pose, center): (Pose, Vec3),
+    shrunk_m: f32,
+) -> Search<'s, 'i, NoRules> {
+    Search {
+        scene,
+        parts: &[],
+        held: moving,
+        held_shape: scene.shape_of_part(usize::from(moving)),
+        shrunk_m,
+        pose,
+        center,
+        margin: 0.0,
+        way: 0.0,
+        slack: 0.0,
+        motions: [[0.0; 6]; 2],
+        swing: 0.0,
+        inverse_length: 1.0,
+        busy: false,
+        decimation: 0,
+        budget: u32::MAX,
+        reserved: 0,
+        carried: 0,
+        braking_m: 0.0,
+        rules: &NoRules,
+    }
+}
+
 impl Default for Prober {
     fn default() -> Self {
         Self::new()
@@ -129,14 +194,7 @@ impl Prober {
         pose: &Pose,
         settings: &ContactSettings,
     ) -> Result<Probe, ProbeError> {
-        for part in [moving, fixed] {
-            if usize::from(part) >= scene.parts().len() {
-                return Err(ProbeError::NoSuchPart { part });
-            }
-        }
-        if moving == fixed {
-            return Err(ProbeError::SamePart);
-        }
+        check_parts(scene, moving, fixed)?;
         let pose = usable_pose(pose).ok_or(ProbeError::BadPose)?;
         let held = scene.shape_of_part(usize::from(moving));
         let other = scene.shape_of_part(usize::from(fixed));
@@ -144,44 +202,10 @@ impl Prober {
         let center = pose.transform_point(body.center_of_mass);
         let pairs = [0, 1].map(|way| DirectedPair::new(way, (&held, pose), (&other, Pose::IDENTITY), center));
 
-        let mut progress = Progress {
-            best: Nearest {
-                distance_m: f32::INFINITY,
-                field_distance_m: f32::INFINITY,
-                error_m: f32::INFINITY,
-                exact: false,
-                measure: Measure::DeepestPoint,
-                in_band: false,
-                arm: Vec3::ZERO,
-                moving_face: NO_FACE,
-                fixed_face: NO_FACE,
-            },
-            work: Work::default(),
-        };
+        let mut progress = Progress::new();
         let mut touched = Work::default();
         let shrunk_m = settings.shrunk_m(&held.field);
-        let search = Search {
-            scene,
-            parts: &[],
-            held: moving,
-            held_shape: scene.shape_of_part(usize::from(moving)),
-            shrunk_m,
-            pose,
-            center,
-            margin: 0.0,
-            way: 0.0,
-            slack: 0.0,
-            motions: [[0.0; 6]; 2],
-            swing: 0.0,
-            inverse_length: 1.0,
-            busy: false,
-            decimation: 0,
-            budget: u32::MAX,
-            reserved: 0,
-            carried: 0,
-            braking_m: 0.0,
-            rules: &NoRules,
-        };
+        let search = resting_search(scene, moving, (pose, center), shrunk_m);
         let voxmaps = pairs.iter().any(|pair| pair.field.is_occupancy());
         if voxmaps {
             self.coherence.invalidate();
@@ -189,27 +213,14 @@ impl Prober {
         // A pose is measured by itself, whatever touched in the last one.
         self.contacts.clear();
         let mut touching = search.traverse(false, &mut self.coherence, &mut self.contacts, &mut touched);
-        let mut searches = [0, 1].map(|way| NearestSearch::new(&pairs[way], [&other, &held][way]));
-        for (search, pair) in searches.iter_mut().zip(&pairs) {
-            if !pair.field.is_occupancy() {
-                search.traverse(&mut progress, &mut touching);
-            } else if !pair.unused() {
-                nearest_voxel(pair, shrunk_m, &mut progress);
-            }
-        }
-        for search in &mut searches {
-            search.finish(&mut progress, &mut touching);
-        }
+        search_both_ways(&pairs, [&other, &held], shrunk_m, &mut progress, &mut touching);
         let Progress {
             best: mut nearest,
             mut work,
         } = progress;
         let shapes = [(&held, &pose), (&other, &Pose::IDENTITY)];
-        let proven = if voxmaps {
-            None
-        } else {
-            Self::proven(&mut self.epa, center, shapes, &mut nearest)
-        };
+        let proven = (!voxmaps).then(|| Self::proven(&mut self.epa, center, shapes, &mut nearest));
+        let proven = proven.flatten();
         if let Some(found) = &proven {
             nearest = found.nearest(&nearest, shapes, center);
         }
@@ -226,21 +237,23 @@ impl Prober {
             self.agree(found, &nearest);
         }
         work.flags.insert_if(self.contacts.dropped(), Flags::CONTACTS);
-        let pushing = self.contacts.as_slice().len();
-        let k = settings.shared_stiffness(if pushing == 0 { 1.0 } else { pushing as f32 });
-        for contact in self.contacts.as_mut_slice() {
-            // At rest: no rate, so neither period nor damping has an effect.
-            contact.phase = Phase::Parting;
-        }
-        let k = Stiffness::new(k, 1.0);
-        let wrench = total_force(self.contacts.as_slice(), &k, 0.0, 0.0, 1.0);
-        work.contacts = pushing as u16;
+        work.contacts = self.contacts.as_slice().len() as u16;
         Ok(Probe {
             nearest,
-            wrench,
+            wrench: self.wrench_at_rest(settings),
             contacts: work.contacts,
             work,
         })
+    }
+
+    /// Wrench of all contacts found, without a rate, so that neither period nor damping has an effect.
+    fn wrench_at_rest(&mut self, settings: &ContactSettings) -> Wrench {
+        let pushing = self.contacts.as_slice().len();
+        let k = settings.shared_stiffness(if pushing == 0 { 1.0 } else { pushing as f32 });
+        for contact in self.contacts.as_mut_slice() {
+            contact.phase = Phase::Parting;
+        }
+        total_force(self.contacts.as_slice(), &Stiffness::new(k, 1.0), 0.0, 0.0, 1.0)
     }
 
     /// First touch of part `moving` with part `fixed` along `motion` from `start`, in the frame of part `fixed`.

@@ -13,7 +13,7 @@ use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::frame::{Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::MAX_FRAME;
@@ -35,7 +35,7 @@ const IDENTITY: Identity = Identity {
     cost_budget: 0,
     reset: ResetReason::PowerOn,
     overrun_ticks: 0,
-    ceilings: Ceilings::LARGEST,
+    hardware_limits: HardwareLimits::LARGEST,
     entropy: 1,
 };
 

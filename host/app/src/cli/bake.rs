@@ -6,11 +6,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use mortise_bake::{BakeOptions, BakeReport, Grabbable, Method, Planned, PointshellKind, Progress, Request};
+use mortise_bake::{
+    BakeOptions, BakeReport, Cache, Grabbable, Method, NoCache, Planned, PointshellKind, Progress, Request,
+};
+use mortise_brep::CadModel;
 use mortise_output::{Existing, Output, lines};
 
 use super::reading::Reading;
 use super::units;
+use crate::folder_cache::FolderCache;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -23,7 +27,16 @@ pub struct Args {
     /// Replace an existing OUT
     #[arg(long)]
     force: bool,
-    /// Cell edge, mm [default: chosen so that the image fits]
+    /// Largest error of gaps and depths where parts fit, such as 5um (ten times that elsewhere) [default: 10um]
+    #[arg(long, value_name = "LENGTH", value_parser = units::length_mm)]
+    accuracy: Option<f64>,
+    /// Largest size of the image, such as 384KiB [default: 512KiB, a slot of the board]
+    #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes)]
+    flash: Option<u64>,
+    /// Largest estimated number of instructions per tick
+    #[arg(long, value_name = "INSTRUCTIONS", conflicts_with_all = EXPLICIT, value_parser = clap::value_parser!(u64).range(1..))]
+    tick: Option<u64>,
+    /// Cell edge, mm, instead of a plan by accuracy
     #[arg(
         long,
         value_name = "MM",
@@ -31,40 +44,76 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     cell: Option<f64>,
-    /// Largest error of gaps and depths where parts fit, such as 5um (ten times that elsewhere): plans the coarsest model that meets it
-    #[arg(long, value_name = "LENGTH", value_parser = units::length_mm)]
-    accuracy: Option<f64>,
-    /// Largest size of the image, such as 512KiB [default: 1MiB]
-    #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes)]
-    flash: Option<u64>,
-    /// Largest estimated number of instructions per tick
-    #[arg(long, value_name = "INSTRUCTIONS", requires = "accuracy", value_parser = clap::value_parser!(u64).range(1..))]
-    tick: Option<u64>,
-    /// Contact method: distance-field or occupancy (the textbook's)
-    #[arg(long, value_name = "METHOD", default_value_t = Method::DistanceField, conflicts_with = "accuracy")]
-    method: Method,
-    /// Pointshell: error-bounded, or classic (the textbook's: one point per voxel)
-    #[arg(long, value_name = "SHELL", default_value = "error-bounded", value_parser = ["error-bounded", "classic"], conflicts_with = "accuracy")]
-    shell: String,
+    /// Contact method, instead of a plan by accuracy: distance-field or occupancy (the textbook's)
+    #[arg(long, value_name = "METHOD", conflicts_with = "accuracy")]
+    method: Option<Method>,
+    /// Pointshell, instead of a plan by accuracy: error-bounded, or classic (the textbook's: one point per voxel)
+    #[arg(long, value_name = "SHELL", value_parser = ["error-bounded", "classic"], conflicts_with = "accuracy")]
+    shell: Option<String>,
     /// Voxel edge of the classic shell, mm [default: the cell]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", requires = "shell", allow_negative_numbers = true)]
     voxel: Option<f64>,
-    /// Inward shift of the classic shell's points, percent of a voxel
+    /// Inward shift of the classic shell's points, percent of a voxel [default: 0]
     #[arg(
         long,
         value_name = "PERCENT",
-        default_value_t = 0.0,
+        requires = "shell",
         allow_negative_numbers = true
     )]
-    shrink: f64,
+    shrink: Option<f64>,
     /// Part that may be grabbed, by name; repeatable [default: all but the largest]
     #[arg(long, value_name = "NAME")]
     grabbable: Vec<String>,
+    /// Neither use nor keep results of earlier bakes
+    #[arg(long)]
+    no_cache: bool,
     #[command(flatten)]
     reading: Reading,
     /// Print one JSON object: bytes by part and kind
     #[arg(long)]
     json: bool,
+}
+
+/// Options that describe an image, where a plan would choose.
+const EXPLICIT: [&str; 3] = ["cell", "method", "shell"];
+
+impl Args {
+    fn grabbable(&self) -> Grabbable {
+        if self.grabbable.is_empty() {
+            Grabbable::default()
+        } else {
+            Grabbable::Named(self.grabbable.clone())
+        }
+    }
+
+    /// The image described, where one is.
+    fn explicit(&self) -> Option<BakeOptions> {
+        let described = self.cell.is_some() || self.method.is_some() || self.shell.is_some();
+        described.then(|| BakeOptions {
+            method: self.method.unwrap_or_default(),
+            cell_mm: self.cell,
+            shell: match self.shell.as_deref() {
+                Some("classic") => PointshellKind::Classic {
+                    voxel_mm: self.voxel,
+                    shrink_percent: self.shrink.unwrap_or(0.0),
+                },
+                _ => PointshellKind::ErrorBounded,
+            },
+            image_limit_bytes: self.flash.unwrap_or(mortise_bake::SLOT_BYTES),
+            grabbable: self.grabbable(),
+            ..BakeOptions::default()
+        })
+    }
+
+    fn request(&self) -> Request {
+        let asked = Request::default();
+        Request {
+            accuracy_mm: self.accuracy.unwrap_or(asked.accuracy_mm),
+            flash_bytes: self.flash.unwrap_or(asked.flash_bytes),
+            tick_instructions: self.tick,
+            grabbable: self.grabbable(),
+        }
+    }
 }
 
 /// Runs the command.
@@ -74,54 +123,17 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut target = Output::new(&args.output, existing, &[&args.file])?;
     let model = mortise_brep::load_step(&args.file)?;
     target.add_inputs(&model.files)?;
-    let mut options = BakeOptions {
-        method: args.method,
-        cell_mm: args.cell,
-        shell: match args.shell.as_str() {
-            "classic" => PointshellKind::Classic {
-                voxel_mm: args.voxel,
-                shrink_percent: args.shrink,
-            },
-            _ => PointshellKind::ErrorBounded,
-        },
-        ..BakeOptions::default()
-    };
-    if let Some(limit) = args.flash {
-        options.image_limit_bytes = limit;
-    }
-    if !args.grabbable.is_empty() {
-        options.grabbable = Grabbable::Named(args.grabbable.clone());
-    }
     let terminal = std::io::stderr().is_terminal();
     let progress = |progress: Progress| {
         if terminal {
-            let (index, count) = progress.shape;
-            let mut err = std::io::stderr().lock();
-            // A closed terminal must not stop the bake.
-            let _ = write!(
-                err,
-                "\r\x1b[K{:?} of {} ({}/{count}) {:3.0} %",
-                progress.stage,
-                progress.part,
-                (index + 1).min(count),
-                100.0 * progress.fraction
-            );
+            show(&progress);
         }
         ControlFlow::Continue(())
     };
     let in_file = || args.file.display().to_string();
-    if let Some(accuracy_mm) = args.accuracy {
-        let request = Request {
-            accuracy_mm,
-            flash_bytes: options.image_limit_bytes,
-            tick_instructions: args.tick,
-            grabbable: options.grabbable,
-        };
-        let result = mortise_bake::plan(&model, &request, &progress);
-        clear(terminal);
-        let planned = result.with_context(in_file)?;
-        return print_plan(args, &target, &request, &planned, &model.warnings);
-    }
+    let Some(options) = args.explicit() else {
+        return plan(args, &target, &model, terminal, &progress).with_context(in_file);
+    };
     let result = mortise_bake::bake(&model, &options, &progress);
     clear(terminal);
     let baked = result.with_context(in_file)?;
@@ -144,6 +156,44 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     print_warnings(&model.warnings, report)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Plans, and prints and writes the result.
+fn plan(
+    args: &Args,
+    target: &Output,
+    model: &CadModel,
+    terminal: bool,
+    progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+) -> anyhow::Result<ExitCode> {
+    let request = args.request();
+    let folder = if args.no_cache {
+        None
+    } else {
+        FolderCache::of_user()
+    };
+    let cache: &dyn Cache = folder.as_ref().map_or(&NoCache, |folder| folder);
+    let result = mortise_bake::plan_with(model, &request, cache, progress);
+    clear(terminal);
+    for warning in folder.iter().flat_map(FolderCache::finish) {
+        eprintln!("warning: {warning}");
+    }
+    print_plan(args, target, &request, &result?, &model.warnings)
+}
+
+/// Shows progress on the terminal.
+fn show(progress: &Progress) {
+    let (index, count) = progress.shape;
+    let mut err = std::io::stderr().lock();
+    // A closed terminal must not stop the bake.
+    let _ = write!(
+        err,
+        "\r\x1b[K{:?} of {} ({}/{count}) {:3.0} %",
+        progress.stage,
+        progress.part,
+        (index + 1).min(count),
+        100.0 * progress.fraction
+    );
 }
 
 fn clear(terminal: bool) {
@@ -190,6 +240,7 @@ fn print_plan(
         lines::json(&serde_json::json!({
             "met": planned.met,
             "fits": planned.fits,
+            "limit": planned.limit,
             "request": request,
             "plan": plan,
         }))?;
@@ -199,9 +250,8 @@ fn print_plan(
     if planned.fits {
         print_image(args, &plan.report)?;
     }
-    if !planned.met {
-        lines::text(&reached(args, request, planned))?;
-    }
+    let indent = if planned.fits { "  " } else { "" };
+    lines::text(&format!("{indent}{}", planned.reached(request)))?;
     for (shape, made) in plan.shapes.iter().zip(&plan.report.shapes) {
         lines::text(&format!(
             "  {}: cells of {:.3} mm, {:?}, limited by {}; error {:.2} µm in fits ({:.2} field, {:.2} shell), {:.1} µm elsewhere",
@@ -238,37 +288,6 @@ fn print_plan(
     }
     print_warnings(warnings, &plan.report)?;
     Ok(code)
-}
-
-/// What was reached of a request that is not met, and what limits it.
-fn reached(args: &Args, request: &Request, planned: &Planned) -> String {
-    let (plan, um) = (&planned.plan, |mm: f64| 1000.0 * mm);
-    let cost = plan.ticks.first().map_or(0, |tick| tick.cost.instructions);
-    let errors = format!(
-        "{:.1} µm where parts fit and {:.1} µm elsewhere",
-        um(plan.error_in_fits_mm()),
-        um(plan.error_elsewhere_mm())
-    );
-    let file = args.file.display();
-    if !planned.fits {
-        return format!(
-            "{file}: no model fits: the smallest found, with {errors}, takes {} bytes of {} and about {cost} instructions{}. Nothing was written.",
-            plan.report.image_bytes,
-            request.flash_bytes,
-            request
-                .tick_instructions
-                .map_or_else(String::new, |most| format!(" of {most}")),
-        );
-    }
-    let limit = match request.tick_instructions {
-        Some(most) => format!("{} bytes and {most} instructions", request.flash_bytes),
-        None => format!("{} bytes", request.flash_bytes),
-    };
-    format!(
-        "  {:.3} µm where parts fit, and {:.0} times that elsewhere, was asked; reached are {errors}: the best found within {limit}",
-        um(request.accuracy_mm),
-        mortise_bake::ELSEWHERE,
-    )
 }
 
 fn count(what: &str, faces: usize) -> String {

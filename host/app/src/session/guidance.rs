@@ -20,12 +20,12 @@ const MAX_WAITING: usize = 64;
 /// An item of the thread's queue.
 enum Item {
     Sample(Box<Telemetry>),
-    Wish(Wish),
+    Command(GuidanceCommand),
 }
 
 /// A command of the operator to the guidance thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wish {
+pub enum GuidanceCommand {
     /// Pins a target, which keeps it in the list and gives it priority, or unpins it.
     Pin(TargetId, bool),
     /// Switches a target off, or on again.
@@ -53,9 +53,9 @@ impl Tap {
     }
 
     /// Queues a command to be executed before the next sample. `false`: the queue is full or there is no thread.
-    pub fn wish(&self, wish: Wish) -> bool {
+    pub fn command(&self, command: GuidanceCommand) -> bool {
         let sender = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        (sender.as_ref()).is_some_and(|there| there.try_send(Item::Wish(wish)).is_ok())
+        (sender.as_ref()).is_some_and(|there| there.try_send(Item::Command(command)).is_ok())
     }
 
     /// Ends the thread after its current step.
@@ -91,7 +91,7 @@ fn run(mut guide: Guide<'_>, items: &Receiver<Item>, client: &Weak<Client>, outb
         for item in std::iter::once(first).chain(items.try_iter()) {
             match item {
                 Item::Sample(sample) => newest = Some(sample),
-                Item::Wish(wish) => grant(&mut guide, wish),
+                Item::Command(command) => apply(&mut guide, command),
             }
         }
         let Some(sample) = newest else { continue };
@@ -112,13 +112,13 @@ fn run(mut guide: Guide<'_>, items: &Receiver<Item>, client: &Weak<Client>, outb
     }
 }
 
-fn grant(guide: &mut Guide<'_>, wish: Wish) {
-    match wish {
+fn apply(guide: &mut Guide<'_>, command: GuidanceCommand) {
+    match command {
         // A target that no longer exists needs no choice.
-        Wish::Pin(id, pinned) => _ = guide.recogniser().pin(id, pinned),
-        Wish::SwitchOff(id, off) => _ = guide.recogniser().switch_off(id, off),
-        Wish::Set(settings) => guide.set(settings),
-        Wish::PutBack => guide.put_back(),
+        GuidanceCommand::Pin(id, pinned) => _ = guide.recogniser().pin(id, pinned),
+        GuidanceCommand::SwitchOff(id, off) => _ = guide.recogniser().switch_off(id, off),
+        GuidanceCommand::Set(settings) => guide.set(settings),
+        GuidanceCommand::PutBack => guide.put_back(),
     }
 }
 

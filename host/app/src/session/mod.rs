@@ -26,21 +26,22 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
-use mortise_bake::{BakeOptions, Method};
+use mortise_bake::{BakeOptions, Method, Request};
 use mortise_guide::{GuideSettings, List};
 use mortise_protocol::message::{DeviceState, HandScript, Telemetry, ToDevice};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
 
 use self::document::Document;
-use self::guidance::Wish;
+use self::guidance::GuidanceCommand;
 use self::history::History;
 pub use self::intent::{Intent, obstacle};
 use self::link::{Connection, Link};
 use self::notes::{Notes, Severity};
 use self::tour::Tour;
 use self::verdict::Verdict;
-use self::work::{Cancel, Outbox, Update};
+use self::work::{Cancel, Outbox, Update, Wanted};
+use crate::folder_cache::FolderCache;
 
 /// Range of the guidance force limit, N: from barely perceptible to well below the coupling's limit.
 pub const GUIDE_CAP_N: RangeInclusive<f32> = 0.2..=8.0;
@@ -101,6 +102,8 @@ pub struct Session {
     pub method: Method,
     /// Set when this desktop offers no file dialog: the window asks for a path instead.
     pub wants_path: bool,
+    /// Where results of bakes are kept.
+    cache: Option<Arc<FolderCache>>,
     tour: Option<Tour>,
     /// Held part, and its pose in the handle's frame when it was grabbed.
     held: Option<(usize, DAffine3)>,
@@ -133,6 +136,7 @@ impl Session {
             notes: Notes::default(),
             method: Method::default(),
             wants_path: false,
+            cache: None,
             tour: None,
             held: None,
             outbox,
@@ -141,6 +145,12 @@ impl Session {
             link_id: 0,
             samples_since_statistics: 0,
         }
+    }
+
+    /// The session with a store for results of bakes.
+    pub fn with_cache(mut self, cache: Option<FolderCache>) -> Self {
+        self.cache = cache.map(Arc::new);
+        self
     }
 
     /// Executes an intent, or reports why it is not possible.
@@ -215,16 +225,16 @@ impl Session {
                     }
                 }
             }
-            Intent::PinTarget(id, pinned) => self.command_guidance(Wish::Pin(id, pinned)),
-            Intent::SwitchTargetOff(id, off) => self.command_guidance(Wish::SwitchOff(id, off)),
+            Intent::PinTarget(id, pinned) => self.command_guidance(GuidanceCommand::Pin(id, pinned)),
+            Intent::SwitchTargetOff(id, off) => self.command_guidance(GuidanceCommand::SwitchOff(id, off)),
             Intent::GuideWhen(when) => {
                 self.guide.when = when;
-                self.command_guidance(Wish::Set(self.guide));
+                self.command_guidance(GuidanceCommand::Set(self.guide));
             }
             Intent::GuideCap(newton) => {
                 if newton.is_finite() {
                     self.guide.force_cap_n = newton.clamp(*GUIDE_CAP_N.start(), *GUIDE_CAP_N.end());
-                    self.command_guidance(Wish::Set(self.guide));
+                    self.command_guidance(GuidanceCommand::Set(self.guide));
                 }
             }
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
@@ -262,19 +272,32 @@ impl Session {
         };
         document.baked = None;
         let (model, generation) = (Arc::clone(&document.model), document.generation);
-        let mut limit = 1 << 20;
+        let mut slot = mortise_bake::SLOT_BYTES;
         if let Some(connection) = self.connection_mut() {
-            limit = u64::from(connection.capabilities.scene_capacity);
+            slot = u64::from(connection.capabilities.scene_capacity);
             connection.scene_of = None;
             connection.refused_scene_of = None;
         }
         let cancel = self.start_job("Baking the collision model".to_owned(), generation);
-        let options = BakeOptions {
-            method: self.method,
-            image_limit_bytes: limit,
-            ..BakeOptions::default()
+        let wanted = match self.method {
+            Method::DistanceField => Wanted::Planned(Request {
+                flash_bytes: slot,
+                ..Request::default()
+            }),
+            method => Wanted::Described(BakeOptions {
+                method,
+                image_limit_bytes: slot,
+                ..BakeOptions::default()
+            }),
         };
-        work::bake(&self.outbox, model, generation, options, cancel);
+        work::bake(
+            &self.outbox,
+            model,
+            generation,
+            wanted,
+            self.cache.clone(),
+            cancel,
+        );
     }
 
     fn start_job(&mut self, doing: String, generation: u64) -> Cancel {
@@ -353,8 +376,8 @@ impl Session {
         self.parameters[ParameterId::Guidance as usize] >= 0.5
     }
 
-    fn command_guidance(&mut self, wish: Wish) {
-        let taken = self.connection().is_none_or(|c| c.tap.wish(wish));
+    fn command_guidance(&mut self, command: GuidanceCommand) {
+        let taken = self.connection().is_none_or(|c| c.tap.command(command));
         if !taken && self.scene_is_on_board() {
             self.notes.add(Severity::Warning, "Guidance is busy: try again");
         }
@@ -408,7 +431,7 @@ impl Session {
         }
         if id == ParameterId::Guidance {
             self.guide.sending = self.guides();
-            self.command_guidance(Wish::Set(self.guide));
+            self.command_guidance(GuidanceCommand::Set(self.guide));
         }
     }
 

@@ -3,20 +3,19 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use mortise_bake::Baked;
 use mortise_protocol::message::{DeviceState, ResetReason, Telemetry, ToDevice, TouchingPair};
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
 use super::document::Document;
-use super::guidance::{Tap, Wish};
+use super::guidance::{GuidanceCommand, Tap};
 use super::history::Sample;
 use super::insertion::Wall;
 use super::link::{Command, Connection, Link, LinkUpdate};
 use super::notes::Severity;
 use super::touch::Touch;
 use super::verdict::Moment;
-use super::work::Update;
+use super::work::{CollisionModel, Update};
 use super::{Intent, Lost, Session, pose};
 
 /// Samples between two queries of the counters: about two seconds.
@@ -50,7 +49,7 @@ pub fn take(session: &mut Session, update: Update) {
         Update::Baked { generation, result } if is_awaited(session, generation) => {
             session.job = None;
             match result {
-                Ok(baked) => baked_of(session, baked),
+                Ok(model) => baked_of(session, model),
                 Err(why) => {
                     session.tour = None;
                     session.notes.add(Severity::Error, format!("Not baked: {why}"));
@@ -107,20 +106,17 @@ fn opened(session: &mut Session, document: Document) {
     session.bake();
 }
 
-fn baked_of(session: &mut Session, baked: Arc<Baked>) {
+fn baked_of(session: &mut Session, CollisionModel { baked, reached }: CollisionModel) {
     let report = &baked.report;
+    let (kib, shapes) = (report.image_bytes.div_ceil(1024), report.shapes.len());
+    let cells = report.shapes.iter().map(|s| s.cell_mm);
+    let what = reached.unwrap_or_else(|| {
+        let finest = cells.fold(f64::INFINITY, f64::min);
+        format!("finest cells {finest:.3} mm")
+    });
     session.notes.add(
         Severity::Good,
-        format!(
-            "Collision model baked: {} KiB, {} shapes, finest cells {:.3} mm",
-            report.image_bytes.div_ceil(1024),
-            report.shapes.len(),
-            report
-                .shapes
-                .iter()
-                .map(|s| s.cell_mm)
-                .fold(f64::INFINITY, f64::min),
-        ),
+        format!("Collision model baked: {kib} KiB, {shapes} shapes; {what}"),
     );
     for warning in &report.warnings {
         session.notes.add(Severity::Warning, warning.clone());
@@ -361,7 +357,7 @@ fn answered(session: &mut Session, message: &ToDevice, result: Result<(), String
     if let (ToDevice::ResetScene, Some(document)) = (message, &mut session.document) {
         document.reset_poses();
         session.verdict = None;
-        session.command_guidance(Wish::PutBack);
+        session.command_guidance(GuidanceCommand::PutBack);
     }
 }
 

@@ -7,13 +7,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread;
 
-use mortise_bake::{BakeError, BakeOptions, Baked, Progress, Stage};
+use mortise_bake::{
+    BakeError, BakeOptions, Baked, Cache, NoCache, Planned, Progress, Request, Stage,
+    bake as bake_as_described, plan_with,
+};
 use mortise_brep::CadModel;
 use mortise_guide::List;
 use mortise_rig::RigEntry;
 
 use super::document::Document;
 use super::link::LinkUpdate;
+use crate::folder_cache::FolderCache;
 
 /// Capacity of the window's queue; a sender blocks when it is full.
 const MAX_WAITING: usize = 1024;
@@ -40,8 +44,8 @@ pub enum Update {
     Baked {
         /// Id of the document.
         generation: u64,
-        /// The image, or one line with the reason of the failure.
-        result: Result<Arc<Baked>, String>,
+        /// The collision model, or one line with the reason of the failure.
+        result: Result<CollisionModel, String>,
     },
     /// The available rigs.
     Rigs(Vec<RigEntry>),
@@ -63,6 +67,23 @@ pub enum Update {
     Chosen(PathBuf),
     /// No file dialog is available: the window must ask for a path.
     NoDialog,
+}
+
+/// What a bake is to give.
+#[derive(Clone, Debug)]
+pub enum Wanted {
+    /// The model that a plan chooses for a request.
+    Planned(Request),
+    /// A model as described.
+    Described(BakeOptions),
+}
+
+/// A baked model.
+pub struct CollisionModel {
+    /// The image and its report.
+    pub baked: Arc<Baked>,
+    /// What a plan reached and what limits it, in one line.
+    pub reached: Option<String>,
 }
 
 /// Sending end of the window's queue. Wakes the window after each message.
@@ -143,8 +164,15 @@ pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64, cancel: C
     });
 }
 
-/// Bakes a model.
-pub fn bake(outbox: &Outbox, model: Arc<CadModel>, generation: u64, options: BakeOptions, cancel: Cancel) {
+/// Bakes a model; `cache` has and keeps results of other bakes.
+pub fn bake(
+    outbox: &Outbox,
+    model: Arc<CadModel>,
+    generation: u64,
+    wanted: Wanted,
+    cache: Option<Arc<FolderCache>>,
+    cancel: Cancel,
+) {
     let outbox = outbox.clone();
     spawn("mortise-bake", move || {
         let throttle = std::sync::Mutex::new((std::time::Instant::now(), 0.0f32));
@@ -167,12 +195,48 @@ pub fn bake(outbox: &Outbox, model: Arc<CadModel>, generation: u64, options: Bak
             }
             ControlFlow::Continue(())
         };
-        let result = match mortise_bake::bake(&model, &options, &progress) {
+        let result = match collision_model(&model, &wanted, cache.as_deref(), &progress) {
             Err(BakeError::Cancelled) => return,
-            other => other.map(Arc::new).map_err(|error| error.to_string()),
+            Err(error) => Err(error.to_string()),
+            Ok(result) => result,
         };
         outbox.send(Update::Baked { generation, result });
     });
+}
+
+/// The model wanted, or one line with the reason why none fits.
+fn collision_model(
+    model: &CadModel,
+    wanted: &Wanted,
+    cache: Option<&FolderCache>,
+    progress: &(dyn Fn(Progress<'_>) -> ControlFlow<()> + Sync),
+) -> Result<Result<CollisionModel, String>, BakeError> {
+    let request = match wanted {
+        Wanted::Described(options) => {
+            return bake_as_described(model, options, progress).map(|baked| {
+                Ok(CollisionModel {
+                    baked: Arc::new(baked),
+                    reached: None,
+                })
+            });
+        }
+        Wanted::Planned(request) => request,
+    };
+    let kept: &dyn Cache = cache.map_or(&NoCache, |cache| cache);
+    let planned = plan_with(model, request, kept, progress)?;
+    let reached = planned.reached(request);
+    if !planned.fits {
+        return Ok(Err(reached));
+    }
+    let Planned { plan, image, .. } = planned;
+    let mut report = plan.report;
+    report
+        .warnings
+        .extend(cache.iter().flat_map(|cache| cache.finish()));
+    Ok(Ok(CollisionModel {
+        baked: Arc::new(Baked { image, report }),
+        reached: Some(reached),
+    }))
 }
 
 /// Progress over all stages, 0 to 1: the pointshell has a small share, the field nearly all of the rest.

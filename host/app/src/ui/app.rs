@@ -8,6 +8,7 @@ use egui::{ColorImage, Vec2, ViewportCommand};
 use mortise_output::Output;
 
 use super::{Window, fonts, theme};
+use crate::folder_cache::FolderCache;
 use crate::session::{Intent, Session};
 use crate::viewport::surface::Surface;
 
@@ -73,7 +74,8 @@ pub fn run(options: Options) -> anyhow::Result<()> {
             super::appearance::follow(&creation.egui_ctx);
             fonts::install(&creation.egui_ctx);
             let ctx = creation.egui_ctx.clone();
-            let mut window = Window::new(Session::new(Arc::new(move || ctx.request_repaint())));
+            let session = Session::new(Arc::new(move || ctx.request_repaint()));
+            let mut window = Window::new(session.with_cache(FolderCache::of_user()));
             window.view.see_through = options.see_through;
             for intent in options.first {
                 window.session.act(intent);

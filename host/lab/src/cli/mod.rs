@@ -2,6 +2,7 @@
 //!
 //! Exit code 0: done; 1: a bound does not hold; 2: failed, with the reason in one line on standard error.
 
+mod costs;
 mod endurance;
 mod experiments;
 mod figures;
@@ -30,6 +31,8 @@ enum Command {
     Figures(figures::Args),
     /// Keep a board busy for an hour of its own time, and check that nothing degrades; exit code 1 if something does
     Endurance(endurance::Args),
+    /// Measure the board's cost table on the emulated board, and compare it with the firmware's
+    Costs(costs::Args),
     #[command(flatten)]
     Experiment(Chosen),
 }
@@ -45,6 +48,7 @@ pub fn main() -> ExitCode {
         match &cli.command {
             Command::Figures(args) => figures::run(args),
             Command::Endurance(args) => endurance::run(args),
+            Command::Costs(args) => costs::run(args),
             Command::Experiment(chosen) => chosen.run(),
         },
     )

@@ -7,6 +7,7 @@ mod end_to_end;
 mod link;
 mod parts;
 mod plan;
+mod planning;
 pub mod promises;
 pub mod stability;
 
@@ -25,6 +26,7 @@ const TABLES: &[(&str, Measure)] = &[
     ("constraints", constraints::measure),
     ("stability", stability::measure),
     ("promises", promises::measure),
+    ("plan", planning::measure),
 ];
 
 /// Names of all tables.

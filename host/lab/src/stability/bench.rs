@@ -93,7 +93,7 @@ impl Rig {
 
 /// Command of the operator model for one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wish {
+pub struct HandCommand {
     /// Commanded position of the handle, m.
     pub position: f64,
     /// Commanded speed, m/s.
@@ -174,7 +174,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Runs one tick, and the period after it.
-    pub fn step(&mut self, wish: &Wish) -> Output {
+    pub fn step(&mut self, command: &HandCommand) -> Output {
         let period = f64::from(self.settings.period_s);
         let sensor = self.rig.sensor;
         let read = if sensor.resolution_m > 0.0 {
@@ -204,7 +204,7 @@ impl<'a> Bench<'a> {
         self.under_way.push(f64::from(out.handle.force.z));
         let force = self.under_way.remove(0);
         let from = place(self.position, self.orientation);
-        self.advance(force, wish, period);
+        self.advance(force, command, period);
         if let Some(observer) = &mut self.observer {
             // The handle moves along z alone: no other component of the wrench does work.
             let held = Wrench {
@@ -217,7 +217,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Moves the handle for a period under the device's force.
-    fn advance(&mut self, force: f64, wish: &Wish, period: f64) {
+    fn advance(&mut self, force: f64, command: &HandCommand, period: f64) {
         let Rig {
             plant,
             hand_damping,
@@ -227,9 +227,9 @@ impl<'a> Bench<'a> {
         let h = period / f64::from(SUBSTEPS);
         for i in 0..SUBSTEPS {
             // The commanded position moves on within the tick, as a hand does.
-            let wished = |t: f64| wish.position + wish.speed * (f64::from(i) * h + t);
+            let commanded = |t: f64| command.position + command.speed * (f64::from(i) * h + t);
             let smooth = |t: f64, x: f64, v: f64| {
-                force + wish.push + plant.stiffness * (wished(t) - x) + hand_damping * wish.speed
+                force + command.push + plant.stiffness * (commanded(t) - x) + hand_damping * command.speed
                     - plant.damping * v
             };
             let (x, v) = (self.position, self.speed);

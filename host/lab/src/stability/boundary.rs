@@ -6,7 +6,7 @@
 use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
 
-use super::bench::{Bench, Rig, Sensor, Wish};
+use super::bench::{Bench, HandCommand, Rig, Sensor};
 use super::oracle::{Law, Search, Wall, limit};
 
 /// Press force, N.
@@ -88,14 +88,14 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
     // The push grows during half of that time.
     for i in 0..calm {
         let push = -PRESS_N * f64::from(2 * i).min(f64::from(calm)) / f64::from(calm);
-        bench.step(&Wish {
+        bench.step(&HandCommand {
             push,
-            ..Wish::default()
+            ..HandCommand::default()
         });
     }
-    let press = Wish {
+    let press = HandCommand {
         push: -PRESS_N,
-        ..Wish::default()
+        ..HandCommand::default()
     };
     bench.rig.plant.damping = rig.plant.damping;
     let rest = bench.position;

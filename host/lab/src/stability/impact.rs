@@ -5,7 +5,7 @@ use mortise_haptics::{Integrator, Quat, Settings};
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;
 
-use super::bench::{Bench, Rig, Wish};
+use super::bench::{Bench, HandCommand, Rig};
 use super::slab::Slab;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
@@ -117,7 +117,7 @@ pub fn strike(blow: &Strike<'_>) -> Blow {
     bench.orientation = Quat::from_rotation_y(tilt_deg.to_radians() as f32);
     if tilt_deg != 0.0 {
         for _ in 0..TILT_TICKS {
-            bench.step(&Wish::default());
+            bench.step(&HandCommand::default());
         }
     }
     bench.speed = -speed;
@@ -126,7 +126,7 @@ pub fn strike(blow: &Strike<'_>) -> Blow {
     let (mut deepest, mut peak) = (f64::NEG_INFINITY, 0.0f64);
     for i in 0..ticks {
         let wanted = -speed * period * f64::from(i);
-        let out = bench.step(&Wish {
+        let out = bench.step(&HandCommand {
             position: wanted.max(end),
             speed: if wanted > end { -speed } else { 0.0 },
             push: 0.0,

@@ -5,7 +5,7 @@ use mortise_haptics::{Integrator, Pose, Settings, Vec3};
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;
 
-use super::bench::{Bench, Rig, Wish};
+use super::bench::{Bench, HandCommand, Rig};
 use super::slab::Slab;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
@@ -101,9 +101,9 @@ pub fn press(scene: &SceneImage<'_>, part: u16, settings: &Settings) -> Press {
     let (mut least, mut most, mut sum, mut deepest) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0f64);
     for i in 0..ticks {
         let push = -PUSH_N * (2.0 * f64::from(i) / f64::from(ticks)).min(1.0);
-        let out = bench.step(&Wish {
+        let out = bench.step(&HandCommand {
             push,
-            ..Wish::default()
+            ..HandCommand::default()
         });
         if i >= ticks - look {
             let force = f64::from(out.handle.force.z);

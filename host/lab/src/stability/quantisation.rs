@@ -13,7 +13,7 @@
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;
 
-use super::bench::{Bench, Rig, Sensor, Wish};
+use super::bench::{Bench, HandCommand, Rig, Sensor};
 use super::boundary::settings;
 use super::oracle::{COARSE, Law, Wall, limit};
 use super::slab::Slab;
@@ -99,25 +99,25 @@ pub fn rests(scene: &SceneImage<'_>, part: u16, stiffness: f64, coulomb_n: f64, 
         let calm = ((20.0 * (MASS_KG / stiffness).sqrt()).max(0.2) / PERIOD_S) as u32;
         for i in 0..calm {
             let push = -press * f64::from(2 * i).min(f64::from(calm)) / f64::from(calm);
-            bench.step(&Wish {
+            bench.step(&HandCommand {
                 push,
-                ..Wish::default()
+                ..HandCommand::default()
             });
         }
         bench.rig.plant.damping = VISCOUS;
         bench.speed += FLICK_M_PER_S;
-        let wish = Wish {
+        let command = HandCommand {
             push: -press,
-            ..Wish::default()
+            ..HandCommand::default()
         };
         let (watch, still) = ((WATCH_S / PERIOD_S) as u32, (STILL_S / PERIOD_S) as u32);
         for _ in 0..watch - still {
-            bench.step(&wish);
+            bench.step(&command);
         }
         let at = bench.position;
         // A handle held by dry friction does not move at all.
         (0..still).all(|_| {
-            bench.step(&wish);
+            bench.step(&command);
             bench.position == at
         })
     })

@@ -7,7 +7,7 @@ use mortise_bake::{Method, PointshellKind};
 use mortise_haptics::{Settings, Vec3};
 use serde::Serialize;
 
-use super::bench::{Bench, Rig, Wish};
+use super::bench::{Bench, HandCommand, Rig};
 use super::slab::Slab;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;
@@ -69,7 +69,7 @@ fn lower(variant: &Variant, method: &'static str, shrink_percent: f64) -> Result
     let mut start = None;
     let mut gap_mm = None;
     for i in 0..ticks {
-        let out = bench.step(&Wish {
+        let out = bench.step(&HandCommand {
             position: -1e-3 * LOWER_MM_PER_S * period * f64::from(i),
             speed: -1e-3 * LOWER_MM_PER_S,
             push: 0.0,

@@ -51,6 +51,7 @@ const LOOP: &[&str] = &[
     "firmware/app/src",
     "firmware/simulation/src",
     "firmware/boards/common/src",
+    "firmware/boards/mps2/src",
     "firmware/boards/mps2-an500/src",
     "host/rig/src",
     "host/mating/src",

@@ -33,6 +33,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         "firmware/boards",
         &[
             "mortise-board",
+            "mps2",
             "stm32h743",
             "mortise-firmware",
             "mortise-mechanism",

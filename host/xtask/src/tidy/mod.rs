@@ -1,9 +1,10 @@
-//! Checks that keep the repository true: what docs name exists, files stay short, layers hold, no modules need each other, no figure is stale.
+//! Checks that keep the repository true: what docs name exists, files and functions stay short, layers hold, no modules need each other, no figure is stale.
 
 mod circles;
 mod commands;
 mod docs;
 mod finding;
+mod functions;
 mod layers;
 mod sources;
 mod tree;
@@ -53,6 +54,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     findings.extend(docs::check_paths(root, &files)?);
     findings.extend(layers::check(root, &files)?);
     findings.extend(circles::check(root, &files)?);
+    findings.extend(functions::check(root, &files)?);
     let stale = figures::artefacts::complaints(root)?;
     findings.extend(
         stale

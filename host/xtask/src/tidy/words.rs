@@ -14,6 +14,8 @@ const BANNED: &[(&str, &str)] = &[
     ("thinning", "decimation"),
     ("misfit", "alignment error"),
     ("told", "reported, stated, known"),
+    ("wish", "command"),
+    ("wished", "commanded"),
     ("turned down", "damped for stability"),
     ("of nothing", "unaccounted for"),
     ("from nowhere", "unaccounted for"),

@@ -16,7 +16,7 @@ use mortise_firmware::channel::Channels;
 use mortise_firmware::control::ControlPlane;
 use mortise_firmware::device::start;
 use mortise_firmware::link::LinkPlane;
-use mortise_mechanism::ceilings::Ceilings;
+use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
@@ -286,7 +286,7 @@ impl<'c, 's> Board<'c, 's> {
             cost_budget: 0,
             reset: ResetReason::PowerOn,
             overrun_ticks: OVERRUN_TICKS,
-            ceilings: Ceilings::LARGEST,
+            hardware_limits: HardwareLimits::LARGEST,
             entropy: 1,
         };
         let (link, control) = start(

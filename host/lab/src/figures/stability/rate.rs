@@ -4,7 +4,7 @@ use mortise_haptics::Settings;
 
 use crate::LabError;
 use crate::figures::Row;
-use crate::stability::bench::{Bench, Rig, Wish};
+use crate::stability::bench::{Bench, HandCommand, Rig};
 use crate::stability::boundary::stiffness_limit;
 use crate::stability::oracle::{self, COARSE, Law, Wall};
 use crate::stability::slab::Slab;
@@ -41,9 +41,9 @@ pub(super) fn measure(out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
             }
             let t = f64::from(i) / hertz;
             let push = -PRESS_N * t.min(1.0).min(WATCH_S - t);
-            bench.step(&Wish {
+            bench.step(&HandCommand {
                 push,
-                ..Wish::default()
+                ..HandCommand::default()
             });
         }
         let what =

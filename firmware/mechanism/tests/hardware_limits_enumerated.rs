@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 use mortise_haptics::{Twist, Wrench};
-use mortise_mechanism::ceilings::{Ceilings, restrain};
+use mortise_mechanism::hardware_limits::{HardwareLimits, restrain};
 
 const FORCE: f32 = 8.0;
 const TORQUE: f32 = 0.3;
@@ -59,10 +59,10 @@ fn turns() -> impl Iterator<Item = (Vec3, Vec3)> {
 
 /// Checks one combination.
 fn check(wrench: Wrench, handle: Vec3, twist: &Twist) {
-    let bounds = Ceilings {
+    let bounds = HardwareLimits {
         force_n: FORCE,
         torque_nm: TORQUE,
-        ..Ceilings::LARGEST
+        ..HardwareLimits::LARGEST
     }
     .with(POWER, RADIUS);
     let out = restrain(wrench, handle, twist, &bounds);

@@ -4,20 +4,13 @@ use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 use mortise_protocol::rig::Rig;
 use mortise_simulation::simulated_rig::SimulatedRig;
 
-use crate::device::Registers;
+use crate::registers::Registers;
 
 const LEDS: usize = 0x0;
 
 /// Enable output inactive. Safe from any context.
 pub fn off() {
     Registers::FPGAIO.write::<LEDS>(0);
-}
-
-/// See [`mortise_board::crash`].
-// SAFETY: the hook's name and signature; defined once.
-#[unsafe(no_mangle)]
-fn mortise_cut_motors() {
-    off();
 }
 
 /// Simulated mechanism with an enable output.

@@ -5,11 +5,13 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer};
 use mortise_firmware::board::Outbound;
 use mortise_protocol::limits::MAX_FRAME;
 
-use crate::device::Registers;
+use crate::interrupts::Interrupt;
+use crate::registers::Registers;
 
 /// Bytes received that may wait: more than two frames.
 pub const RECEIVED: usize = 2048;
@@ -65,7 +67,7 @@ pub fn resume(queue: &Consumer<'static, u8>) {
         STOPPED.store(false, Ordering::Release);
         Registers::UART0.write::<CTRL>(ENABLE | SEND_INTERRUPT | RECEIVE_INTERRUPT);
         // The byte that waits raises no interrupt of its own.
-        cortex_m::peripheral::NVIC::pend(crate::device::Interrupt::UART0RX);
+        NVIC::pend(Interrupt::UART0RX);
     }
 }
 
@@ -95,6 +97,12 @@ impl Sender {
     /// Everything went out.
     pub fn is_empty(&self) -> bool {
         self.ring.is_empty() && Registers::UART0.read::<STATE>() & SEND_FULL == 0
+    }
+}
+
+impl Default for Sender {
+    fn default() -> Self {
+        Self::new()
     }
 }
 

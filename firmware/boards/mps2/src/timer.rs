@@ -3,11 +3,12 @@
 //! Both timers count 25 MHz of virtual time. With `-icount shift=1` an instruction takes 2 ns, so a count is 20 instructions and a
 //! tick has 500,000; without `-icount` virtual time follows the host and the figure means host time in units of 2 ns.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use mortise_firmware::board::{Clock, TICK_HZ};
 
-use crate::device::Registers;
+use crate::deadlines::Deadlines;
+use crate::registers::Registers;
 
 /// Timer counts in a second.
 const TIMER_HZ: u32 = 25_000_000;
@@ -77,21 +78,32 @@ fn now() -> u32 {
     u32::MAX - Registers::TIMER1.read::<VALUE>()
 }
 
-/// Knows when the tick was due.
-pub struct TickClock {
-    due: u32,
-    last_cost: u32,
+/// Ticks run since start.
+static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
+
+/// A tick has run.
+pub fn count_tick() {
+    MILLISECONDS.fetch_add(1, Ordering::Relaxed);
 }
+
+/// Ticks run since start, for the log's timestamps.
+pub fn milliseconds() -> u32 {
+    MILLISECONDS.load(Ordering::Relaxed)
+}
+
+/// The application's clock: instructions since the running tick was due.
+pub struct TickClock(Deadlines<PERIOD>);
 
 impl TickClock {
     /// For ticks that [`start`] begins.
     pub const fn new() -> Self {
-        Self { due: 0, last_cost: 0 }
+        Self(Deadlines::new())
     }
+}
 
-    fn since_due(&self) -> u32 {
-        // A count of slack between the two timers may make it seem early.
-        (now().wrapping_sub(self.due) as i32).max(0) as u32
+impl Default for TickClock {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -99,20 +111,15 @@ impl Clock for TickClock {
     fn begin(&mut self) -> u32 {
         if BEGUN.swap(false, Ordering::AcqRel) {
             // `start` has armed the next.
-            self.due = 0;
-            self.last_cost = 0;
+            self.0 = Deadlines::new();
             return 0;
         }
-        self.due = self.due.wrapping_add(PERIOD);
-        let skipped = self.since_due() / PERIOD;
-        self.due = self.due.wrapping_add(skipped * PERIOD);
-        arm(self.due.wrapping_add(PERIOD));
-        let overran = u32::from(core::mem::take(&mut self.last_cost) >= BUDGET);
-        skipped + overran
+        let missed = self.0.begin(now());
+        arm(self.0.next());
+        missed
     }
 
     fn cost(&mut self) -> u32 {
-        self.last_cost = self.since_due().saturating_mul(INSTRUCTIONS);
-        self.last_cost
+        self.0.cost(now()).saturating_mul(INSTRUCTIONS)
     }
 }

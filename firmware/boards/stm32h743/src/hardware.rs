@@ -1,31 +1,34 @@
-//! Encoders and motors of this board as the shared device uses them.
+//! Encoders and motors of a board with this chip, as the shared device uses them.
 
 use mortise_board::device::Hardware;
 use mortise_board::set_value::{FULL_CURRENT_A, Setpoint};
-use mortise_protocol::limits::MAX_JOINTS as AXES;
-use stm32h743::motor_timer;
+use mortise_protocol::limits::MAX_JOINTS;
 
-use crate::encoders::Encoders;
+use crate::encoders::Encoder;
+use crate::motor_timer;
 use crate::motors::Motors;
 
-/// See the module.
+/// See the module. In the order of the description's joints.
 pub struct Wired {
-    pub encoders: Encoders,
+    /// One for each joint.
+    pub encoders: [Encoder; MAX_JOINTS],
+    /// One for each joint, enable output and stop input.
     pub motors: Motors,
 }
 
 impl Hardware for Wired {
     const FULL_CURRENT_A: f32 = FULL_CURRENT_A;
 
-    fn counts(&mut self) -> [i32; AXES] {
-        self.encoders.read()
+    fn counts(&mut self) -> [i32; MAX_JOINTS] {
+        // Close together: the counters run on.
+        self.encoders.each_mut().map(Encoder::read)
     }
 
     fn restart_counts(&mut self) {
-        self.encoders.home();
+        self.encoders.iter_mut().for_each(Encoder::restart);
     }
 
-    fn drive(&mut self, currents: [f32; AXES]) {
+    fn drive(&mut self, currents: [f32; MAX_JOINTS]) {
         self.motors.drive(currents.map(Setpoint::of));
     }
 

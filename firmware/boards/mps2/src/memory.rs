@@ -7,9 +7,11 @@ use cortex_m::peripheral::MPU;
 use mortise_firmware::board::{FlashWord, WRITE_SIZE};
 use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 
+use crate::starts::{Counted, after_one_more};
+
 /// Start of the external RAM (QEMU puts it here for AN500, at 0x21000000 for the other images of the board).
 const PSRAM: usize = 0x6000_0000;
-/// Start of the stack's memory, as in memory.x.
+/// Start of the stack's memory, as in every board's memory.x.
 const GUARD: u32 = 0x2000_0000;
 /// Bytes in all slots: 2 MiB for each scene, and a sector for each of the rig's descriptions.
 const SLOTS_SIZE: usize = 2 * (2 * 1024 * 1024 + ERASE_SIZE);
@@ -42,21 +44,17 @@ pub fn guard_stack(mpu: &mut MPU) {
     cortex_m::asm::isb();
 }
 
-/// Starts since power-on, and the complement by which memory that was never written is reported.
+/// See [`crate::starts`].
 // SAFETY: the section exists in the linker script and start-up leaves it alone; every bit pattern is a valid `MaybeUninit`.
 #[unsafe(link_section = ".uninit.STARTS")]
-static mut STARTS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
+static mut STARTS: MaybeUninit<Counted> = MaybeUninit::uninit();
 
 /// Starts since power-on, this one included. Call once.
 pub fn starts() -> u32 {
+    let place = (&raw mut STARTS).cast::<Counted>();
     // SAFETY: plain words, every pattern is valid; nothing else runs yet.
-    let [starts, check] = unsafe { read_volatile((&raw const STARTS).cast::<[u32; 2]>()) };
-    let starts = if check == !starts {
-        starts.wrapping_add(1)
-    } else {
-        1
-    };
+    let counted = after_one_more(unsafe { read_volatile(place) });
     // SAFETY: as above.
-    unsafe { write_volatile((&raw mut STARTS).cast::<[u32; 2]>(), [starts, !starts]) };
-    starts
+    unsafe { write_volatile(place, counted) };
+    counted[0]
 }

@@ -12,7 +12,7 @@ use mortise_protocol::rig::Rig;
 
 /// Hardware limits of one rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ceilings {
+pub struct HardwareLimits {
     /// Force at the handle, N.
     pub force_n: f32,
     /// Torque at the handle, N·m.
@@ -31,7 +31,7 @@ pub struct Ceilings {
     pub workspace_m: f32,
 }
 
-impl Ceilings {
+impl HardwareLimits {
     /// The largest values any board accepts.
     pub const LARGEST: Self = Self {
         force_n: ParameterId::ForceLimit.row().max,
@@ -58,7 +58,7 @@ impl Ceilings {
 
     /// The largest value of a parameter on this rig: the lower of its range's end and the hardware limit.
     pub fn most(&self, id: ParameterId) -> f32 {
-        let ceiling = match id {
+        let limit = match id {
             ParameterId::ForceLimit => self.force_n,
             ParameterId::TorqueLimit => self.torque_nm,
             ParameterId::ForceSlew => self.force_slew_n_per_s,
@@ -70,8 +70,8 @@ impl Ceilings {
             _ => f32::INFINITY,
         };
         // A limit that is not a number yields the range's smallest value; `min` would return the larger one.
-        if ceiling >= id.row().min {
-            ceiling.min(id.row().max)
+        if limit >= id.row().min {
+            limit.min(id.row().max)
         } else {
             id.row().min
         }
@@ -88,7 +88,7 @@ impl Ceilings {
     }
 }
 
-/// Limits for one tick, see [`Ceilings::with`].
+/// Limits for one tick, see [`HardwareLimits::with`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     force_n: f32,
@@ -157,7 +157,7 @@ mod tests {
         fn nothing_beyond_a_bound_gets_through(
             force in vector(), torque in vector(), linear in vector(), angular in vector(), handle in vector(),
         ) {
-            let bounds = Ceilings { force_n: 8.0, torque_nm: 0.3, ..Ceilings::LARGEST }.with(5.0, 0.5);
+            let bounds = HardwareLimits { force_n: 8.0, torque_nm: 0.3, ..HardwareLimits::LARGEST }.with(5.0, 0.5);
             let twist = Twist { linear, angular };
             let out = restrain(Wrench { force, torque }, handle, &twist, &bounds);
             prop_assert!(out.is_finite());
@@ -181,14 +181,14 @@ mod tests {
             let (force, linear) = (Vec3::from_array(force), Vec3::from_array(linear));
             let twist = Twist { linear, angular: Vec3::ZERO };
             let wrench = Wrench { force, torque: Vec3::new(0.1, 0.0, 0.0) };
-            let bounds = Ceilings::LARGEST.with(10.0, 1.0);
+            let bounds = HardwareLimits::LARGEST.with(10.0, 1.0);
             prop_assert_eq!(restrain(wrench, Vec3::splat(0.1), &twist, &bounds), wrench);
         }
     }
 
     #[test]
     fn power_is_cut_when_it_is_given_and_not_when_it_is_taken() {
-        let bounds = Ceilings::LARGEST.with(5.0, 1.0);
+        let bounds = HardwareLimits::LARGEST.with(5.0, 1.0);
         let twist = Twist {
             linear: Vec3::new(2.0, 0.0, 0.0),
             angular: Vec3::ZERO,
@@ -210,14 +210,14 @@ mod tests {
     }
 
     #[test]
-    fn a_ceiling_that_is_no_number_allows_the_least() {
+    fn a_limit_that_is_no_number_allows_the_least() {
         for bad in [f32::NAN, -1.0, f32::NEG_INFINITY] {
-            let ceilings = Ceilings {
+            let limits = HardwareLimits {
                 force_n: bad,
-                ..Ceilings::LARGEST
+                ..HardwareLimits::LARGEST
             };
             assert_eq!(
-                ceilings.most(ParameterId::ForceLimit),
+                limits.most(ParameterId::ForceLimit),
                 ParameterId::ForceLimit.row().min
             );
         }

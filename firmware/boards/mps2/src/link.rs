@@ -1,42 +1,25 @@
-//! The link as an embassy task.
+//! The link plane's task, on the serial line.
 
 use cortex_m::peripheral::NVIC;
 use heapless::Vec;
 use heapless::spsc::Consumer;
 use mortise_board::{crash, executor, log, stack};
-use mortise_firmware::board::{Identity, TICK_HZ};
-use mortise_protocol::message::ResetReason;
+use mortise_firmware::board::TICK_HZ;
+use mortise_firmware::link::LinkPlane;
+use mortise_simulation::ram_flash::RamFlash;
 use static_cell::StaticCell;
 
-use crate::device::Interrupt;
-use crate::planes::{Link, milliseconds};
-use crate::timer;
+use crate::interrupts::Interrupt;
+use crate::timer::{self, milliseconds};
 use crate::uart::{self, Sender};
+
+/// The link plane of this machine.
+pub type Link = LinkPlane<'static, 'static, RamFlash<'static>>;
 
 /// How often the deepest stack is looked up, ms: it reads the whole unused stack.
 const STACK_EVERY: u32 = TICK_HZ as u32;
 /// Bytes taken from the pipe at once.
 const PIECE: usize = 64;
-
-/// Logs what a start looks like.
-pub fn announce(identity: &Identity, link: &Link) {
-    match identity.reset {
-        ResetReason::PowerOn => defmt::info!("started: power on"),
-        ResetReason::Requested => defmt::info!("started: as requested"),
-        ResetReason::Panic { line: 0 } => defmt::error!("started after a processor fault"),
-        ResetReason::Panic { line } => defmt::error!("started after a panic in line {=u32}", line),
-        _ => defmt::warn!("started: reason unknown"),
-    }
-    match link.store().current() {
-        Some(scene) => defmt::info!(
-            "scene {=u32:08x}: {=usize} parts, {=u32} bytes",
-            scene.crc,
-            scene.image.parts().len(),
-            scene.image.header().length
-        ),
-        None => defmt::info!("no scene"),
-    }
-}
 
 /// Serves the link for ever; sleeps between interrupts.
 pub fn run(link: Link, bytes: Consumer<'static, u8>) -> ! {

@@ -1,0 +1,412 @@
+//! Fields tried for one shape, from coarse to fine, and the smallest of them that is as accurate as required.
+//!
+//! Where exact surfaces answer, large cells may do: they are tried first, and accepted by their measured error ([`crate::field_error`]). The cells of
+//! interpolation alone follow in closed form ([`crate::choice`]) and are tried last. What was tried is kept: a coarser accuracy costs little after a
+//! finer one.
+//!
+//! Work is counted in triangles that distance queries examine ([`ExactSurface::work`]). A shape has a share of it; when that is used up, the
+//! most accurate field found so far is taken. So the result depends on the model alone, not on the machine, unless the clock
+//! ends the planning: that is the last resort.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::bake::field_bytes;
+use crate::cache::{Cache, KeptField, field_name};
+use crate::choice::{Choice, Demand, PATCH_SHARE};
+use crate::distance::ExactSurface;
+use crate::error::BakeError;
+use crate::field::BakedField;
+use crate::field_error::{FaceError, field_errors};
+use crate::options::{BakeOptions, Progress};
+use crate::scene::Scene;
+
+/// Bytes of a field grow at least with this power of the inverse cell: the bricks of a prism repeat along it.
+const LEAST_GROWTH: f64 = 1.0;
+/// Attempts with a cell finer than interpolation needs, where the measured error is larger than expected, and the factor between their cells.
+const FINER_CELLS: usize = 5;
+const FINER: f64 = 0.7;
+/// Least improvement for which a still finer cell is tried.
+const HELPS: f64 = 0.9;
+/// Smallest cell tried, mm.
+const LEAST_CELL_MM: f64 = 1e-3;
+
+/// What the trials of all shapes share.
+pub(crate) struct Bench<'a> {
+    pub scene: &'a Scene,
+    pub cache: &'a dyn Cache,
+    pub progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
+    /// Tolerance of local patches at the requested accuracy, mm.
+    pub tolerance_mm: f64,
+    pub clock: Clock,
+}
+
+/// The end of planning by time, the last resort.
+#[derive(Clone, Copy)]
+pub(crate) struct Clock {
+    until: Instant,
+}
+
+impl Clock {
+    /// Ends after this time.
+    pub fn new(most: Duration) -> Self {
+        Self {
+            until: Instant::now() + most,
+        }
+    }
+
+    /// Whether it has ended.
+    pub fn is_over(self) -> bool {
+        Instant::now() >= self.until
+    }
+}
+
+impl Bench<'_> {
+    /// Tolerance of local patches for an accuracy, mm: one of few, so that fields can be used again.
+    fn tolerance(&self, accuracy_mm: f64) -> f64 {
+        let doublings = (PATCH_SHARE * accuracy_mm / self.tolerance_mm).log2() + 1e-9;
+        self.tolerance_mm * 2f64.powf(doublings.floor())
+    }
+}
+
+/// A field with its errors.
+#[derive(Clone)]
+pub(crate) struct Fielded {
+    pub choice: Choice,
+    /// Tolerance of its local patches, mm.
+    tolerance_mm: f64,
+    /// Reach of the places at which its errors were measured, mm.
+    reach_mm: f64,
+    pub errors: Arc<Vec<FaceError>>,
+    pub baked: Arc<BakedField>,
+}
+
+impl Fielded {
+    /// Bytes in the image.
+    pub fn bytes(&self) -> u64 {
+        field_bytes(&self.baked)
+    }
+}
+
+/// Result for an accuracy.
+pub(crate) enum Found {
+    /// The smallest field found that is accurate enough.
+    Met(Fielded),
+    /// The most accurate one found: finer cells do not help.
+    Best(Fielded),
+    /// The most accurate one found in the share of work.
+    OutOfWork(Fielded),
+    /// The steps allowed do not suffice.
+    Pending,
+    /// It would take more bytes than there are; with the most accurate field that does not, if any.
+    TooLarge(Option<Fielded>),
+}
+
+/// The trials of one shape.
+pub(crate) struct Trials {
+    number: usize,
+    pub surface: ExactSurface,
+    pub demand: Demand,
+    /// Name of its geometry in the cache.
+    name: Option<String>,
+    known: Vec<Fielded>,
+    /// Most work, and whether it was reached.
+    share: u64,
+    pub is_out_of_work: bool,
+}
+
+impl Trials {
+    pub fn new(
+        number: usize,
+        surface: ExactSurface,
+        demand: Demand,
+        name: Option<String>,
+        share: u64,
+    ) -> Self {
+        Self {
+            number,
+            surface,
+            demand,
+            name,
+            known: Vec::new(),
+            share,
+            is_out_of_work: false,
+        }
+    }
+
+    /// The smallest field found that is as accurate as `accuracy_mm` requires, of at most about `room` bytes, within so many steps from coarse to fine.
+    pub fn find(
+        &mut self,
+        bench: &Bench<'_>,
+        accuracy_mm: f64,
+        room: u64,
+        steps: usize,
+    ) -> Result<Found, BakeError> {
+        let finest = self.demand.choose(accuracy_mm);
+        let mut tried: Vec<Fielded> = Vec::new();
+        for choice in self.demand.coarser(&finest) {
+            if tried.len() >= steps {
+                return Ok(Found::Pending);
+            }
+            if is_hopeless(tried.last(), choice.cell_mm, room) {
+                return Ok(Found::TooLarge(self.best(accuracy_mm, tried, room)));
+            }
+            let Some(field) = self.tried(bench, &choice, accuracy_mm)? else {
+                return Ok(self.unfinished(accuracy_mm, tried, room));
+            };
+            let is_met = self.excess(accuracy_mm, &field) <= 1.0;
+            if let Some(coarser) = tried.last().filter(|f| self.excess(accuracy_mm, f) <= 1.0) {
+                let smaller = is_met && field.bytes() < coarser.bytes();
+                return Ok(Found::Met(if smaller { field } else { coarser.clone() }));
+            }
+            // Where bytes grow already, the next field would be larger, and takes as long as all before.
+            if is_met
+                && tried
+                    .last()
+                    .is_some_and(|coarser| coarser.bytes() <= field.bytes())
+            {
+                return Ok(Found::Met(field));
+            }
+            tried.push(field);
+        }
+        if let Some(field) = tried.last().filter(|f| self.excess(accuracy_mm, f) <= 1.0) {
+            return Ok(Found::Met(field.clone()));
+        }
+        if tried.len() >= steps {
+            return Ok(Found::Pending);
+        }
+        self.finest(bench, accuracy_mm, room, finest, tried)
+    }
+
+    /// The field of interpolation alone, or finer ones where its measured error needs them.
+    fn finest(
+        &mut self,
+        bench: &Bench<'_>,
+        accuracy_mm: f64,
+        room: u64,
+        finest: Choice,
+        mut tried: Vec<Fielded>,
+    ) -> Result<Found, BakeError> {
+        if is_hopeless(tried.last(), finest.cell_mm, room) {
+            return Ok(Found::TooLarge(self.best(accuracy_mm, tried, room)));
+        }
+        let Some(mut field) = self.tried(bench, &finest, accuracy_mm)? else {
+            return Ok(self.unfinished(accuracy_mm, tried, room));
+        };
+        for _ in 0..FINER_CELLS {
+            let error = self.excess_away(accuracy_mm, &field);
+            if error <= 1.0 {
+                return Ok(Found::Met(field));
+            }
+            tried.push(field.clone());
+            // Bytes grow at most with the inverse square of the cell.
+            if field.bytes() as f64 > FINER * FINER * room as f64 {
+                return Ok(Found::TooLarge(self.best(accuracy_mm, tried, room)));
+            }
+            let choice = Choice {
+                cell_mm: field.choice.cell_mm * FINER,
+                why: "the error measured at its faces".to_owned(),
+                ..field.choice.clone()
+            };
+            let Some(finer) = self.tried(bench, &choice, accuracy_mm)? else {
+                return Ok(self.unfinished(accuracy_mm, tried, room));
+            };
+            let helped = self.excess_away(accuracy_mm, &finer) <= HELPS * error;
+            field = finer;
+            if !helped {
+                break;
+            }
+        }
+        if self.excess_away(accuracy_mm, &field) <= 1.0 {
+            return Ok(Found::Met(field));
+        }
+        tried.push(field);
+        Ok(match self.best(accuracy_mm, tried, room) {
+            Some(best) => Found::Best(best),
+            None => Found::TooLarge(None),
+        })
+    }
+
+    /// The smallest field found, whatever its error; cells larger than those that [`Self::find`] tries are tried as well. `None` when the layout cannot
+    /// hold any.
+    pub fn smallest(&mut self, bench: &Bench<'_>, accuracy_mm: f64) -> Result<Option<Fielded>, BakeError> {
+        let finest = self.demand.choose(accuracy_mm);
+        for choice in self.demand.coarsest(&finest) {
+            self.tried(bench, &choice, accuracy_mm)?;
+        }
+        let smallest = self.known.iter().min_by_key(|field| field.bytes()).cloned();
+        // Its shell resolves no more than its cells, so that it has few points.
+        Ok(smallest.map(|field| {
+            let resolution_mm = field.choice.cell_mm.max(finest.resolution_mm);
+            self.restated(
+                field,
+                Choice {
+                    resolution_mm,
+                    ..finest
+                },
+            )
+        }))
+    }
+
+    /// A known field, stated for another accuracy with the errors near enough for it.
+    fn restated(&mut self, mut field: Fielded, finest: Choice) -> Fielded {
+        field.choice.resolution_mm = finest.resolution_mm;
+        field.choice.edges = finest.edges;
+        let reach_mm = field.choice.reach_mm();
+        if field.reach_mm < reach_mm {
+            field.errors = Arc::new(field_errors(&self.surface, &field.baked, reach_mm));
+            field.reach_mm = reach_mm;
+        }
+        field
+    }
+
+    /// The most accurate of the fields tried.
+    fn best(&self, accuracy_mm: f64, tried: Vec<Fielded>, room: u64) -> Option<Fielded> {
+        tried
+            .into_iter()
+            .filter(|field| field.bytes() <= room)
+            .min_by(|a, b| {
+                self.excess(accuracy_mm, a)
+                    .total_cmp(&self.excess(accuracy_mm, b))
+            })
+    }
+
+    fn unfinished(&self, accuracy_mm: f64, tried: Vec<Fielded>, room: u64) -> Found {
+        match self.best(accuracy_mm, tried, room) {
+            Some(best) if self.is_out_of_work => Found::OutOfWork(best),
+            best => Found::TooLarge(best),
+        }
+    }
+
+    /// Largest error over what an accuracy allows, edges included.
+    fn excess(&self, accuracy_mm: f64, field: &Fielded) -> f64 {
+        let [away, at_edges] = self.excesses(accuracy_mm, field);
+        away.max(at_edges)
+    }
+
+    /// The same away from edges, for cells of interpolation, which never give the distance at edges.
+    fn excess_away(&self, accuracy_mm: f64, field: &Fielded) -> f64 {
+        self.excesses(accuracy_mm, field)[0]
+    }
+
+    fn excesses(&self, accuracy_mm: f64, field: &Fielded) -> [f64; 2] {
+        (self.demand).excess(accuracy_mm, &field.choice, &field.errors, &field.baked.free_form)
+    }
+
+    /// The field by this choice and its errors; `None` when the layout cannot hold it, or there is no work left for it.
+    fn tried(
+        &mut self,
+        bench: &Bench<'_>,
+        choice: &Choice,
+        accuracy_mm: f64,
+    ) -> Result<Option<Fielded>, BakeError> {
+        let tolerance_mm = bench.tolerance(accuracy_mm);
+        let same = |field: &&mut Fielded| {
+            field.choice.cell_mm == choice.cell_mm
+                && field.choice.format == choice.format
+                && (field.tolerance_mm == tolerance_mm || field.baked.patches.is_empty())
+        };
+        if let Some(known) = self.known.iter_mut().find(same) {
+            let reach_mm = choice.reach_mm();
+            if known.reach_mm < reach_mm {
+                known.errors = Arc::new(field_errors(&self.surface, &known.baked, reach_mm));
+                known.reach_mm = reach_mm;
+            }
+            return Ok(Some(Fielded {
+                choice: choice.clone(),
+                ..known.clone()
+            }));
+        }
+        if choice.cell_mm < LEAST_CELL_MM {
+            return Ok(None);
+        }
+        let name = field_name(self.name.as_ref(), choice, tolerance_mm);
+        let faces = self.surface.shape().faces.len();
+        let kept = (name.as_ref())
+            .and_then(|name| bench.cache.get(name))
+            .and_then(|bytes| KeptField::from_bytes(&bytes, faces));
+        let made = match kept {
+            Some(kept) => {
+                if kept.by_winding {
+                    self.surface.set_sign_by_winding();
+                }
+                kept
+            }
+            None => {
+                let Some(made) = self.made(bench, choice, tolerance_mm)? else {
+                    return Ok(None);
+                };
+                if let Some((name, bytes)) = name.zip(made.to_bytes()) {
+                    bench.cache.put(&name, &bytes);
+                }
+                made
+            }
+        };
+        let field = Fielded {
+            choice: choice.clone(),
+            tolerance_mm,
+            reach_mm: choice.reach_mm(),
+            errors: Arc::new(made.errors),
+            baked: Arc::new(made.field),
+        };
+        self.known.push(field.clone());
+        Ok(Some(field))
+    }
+
+    /// Bakes the field and measures its errors; `None` as for [`Self::tried`].
+    fn made(
+        &mut self,
+        bench: &Bench<'_>,
+        choice: &Choice,
+        tolerance_mm: f64,
+    ) -> Result<Option<KeptField>, BakeError> {
+        // Whatever it costs, there is a first field.
+        let is_first = self.known.is_empty();
+        if !is_first && (self.is_out_of_work || bench.clock.is_over()) {
+            self.is_out_of_work = true;
+            return Ok(None);
+        }
+        let options = BakeOptions {
+            cell_mm: Some(choice.cell_mm),
+            band_cells: choice.band_cells,
+            format: choice.format,
+            patch_tolerance_mm: tolerance_mm,
+            ..BakeOptions::default()
+        };
+        let (work, share) = (self.surface.work(), self.share);
+        let stopped = AtomicBool::new(false);
+        let progress = |progress: Progress| {
+            (bench.progress)(progress)?;
+            if !is_first && (work.so_far() > share || bench.clock.is_over()) {
+                stopped.store(true, Ordering::Relaxed);
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        };
+        let mut cell_mm = choice.cell_mm;
+        let baked = bench
+            .scene
+            .field(self.number, &mut self.surface, &mut cell_mm, &options, &progress);
+        let field = match baked {
+            Err(BakeError::CellTooSmall { .. }) => return Ok(None),
+            Err(BakeError::Cancelled) if stopped.load(Ordering::Relaxed) => {
+                self.is_out_of_work = true;
+                return Ok(None);
+            }
+            done => done?,
+        };
+        Ok(Some(KeptField {
+            errors: field_errors(&self.surface, &field, choice.reach_mm()),
+            field,
+            by_winding: self.surface.sign_by_winding(),
+        }))
+    }
+}
+
+/// Whether a field with this cell takes more than `room` bytes, to judge by the field of a larger one.
+fn is_hopeless(coarser: Option<&Fielded>, cell_mm: f64, room: u64) -> bool {
+    let bytes = |field: &Fielded| field.bytes() as f64 * (field.choice.cell_mm / cell_mm).powf(LEAST_GROWTH);
+    coarser.is_some_and(|field| bytes(field) > room as f64)
+}
