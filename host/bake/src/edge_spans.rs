@@ -44,7 +44,11 @@ pub(crate) fn spans(
                 position,
                 normal: normal.try_normalize()?,
                 face: faces[0] as u16,
-                edge_face: if faces[0] == faces[1] { NO_FACE } else { faces[1] as u16 },
+                edge_face: if faces[0] == faces[1] {
+                    NO_FACE
+                } else {
+                    faces[1] as u16
+                },
                 span: Some(ShellSpan {
                     piece: index as u16,
                     ends,
@@ -61,7 +65,8 @@ fn count(piece: &EdgePiece, sharpest: f64, options: &PointshellOptions) -> usize
     let length = piece.length();
     let by_partner = length * sharpest.min(1e9) / SHARE_OF_RADIUS;
     // No more than points would be.
-    let by_points = length * ((piece.curvature_outward() + sharpest.min(1e9)) / (8.0 * options.epsilon_mm)).sqrt();
+    let by_points =
+        length * ((piece.curvature_outward() + sharpest.min(1e9)) / (8.0 * options.epsilon_mm)).sqrt();
     let least = if options.least_spacing_mm > 0.0 {
         length / options.least_spacing_mm
     } else {

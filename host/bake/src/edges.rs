@@ -153,7 +153,14 @@ pub(crate) fn edge_pieces(surface: &ExactSurface, fineness: Fineness) -> Vec<Edg
         let parts = chain.even_parts(fineness);
         for part in 0..parts {
             let ends = [part, part + 1].map(|k| chain.length * k as f64 / parts as f64);
-            divide(surface, (&chain, fineness), ends, MOST_HALVINGS, edge as u32, &mut all);
+            divide(
+                surface,
+                (&chain, fineness),
+                ends,
+                MOST_HALVINGS,
+                edge as u32,
+                &mut all,
+            );
         }
         let thickness = thickness(surface, &all[first..]);
         for piece in &mut all[first..] {
@@ -244,7 +251,14 @@ fn divide(
     let turn = 2.0 * bend.length() / half.length().max(1e-300);
     // A closed chain has no chord: its turn is infinite.
     if halvings > 0 && to - from > TOLERANCE_MM && (turn > fineness.most_turn || !fits()) {
-        divide(surface, (chain, fineness), [from, middle], halvings - 1, edge, out);
+        divide(
+            surface,
+            (chain, fineness),
+            [from, middle],
+            halvings - 1,
+            edge,
+            out,
+        );
         divide(surface, (chain, fineness), [middle, to], halvings - 1, edge, out);
         return;
     }

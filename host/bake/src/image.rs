@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
 use glam::DAffine3;
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
-    BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
-    NO_PIECE, NO_SAMPLES, NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY,
+    BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE, NO_PIECE,
+    NO_SAMPLES, NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY,
     Section, ShapeRecord, oct_encode, surface_kind,
 };
 

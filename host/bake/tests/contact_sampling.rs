@@ -10,7 +10,9 @@ use std::f64::consts::{PI, TAU};
 
 use common::*;
 use glam::{DAffine3, DMat3, DVec3};
-use mortise_bake::{ExactSurface, Met, Partners, Pointshell, PointshellOptions, ShellPoint, ShellSpan, sample_pointshell};
+use mortise_bake::{
+    ExactSurface, Met, Partners, Pointshell, PointshellOptions, ShellPoint, ShellSpan, sample_pointshell,
+};
 use mortise_brep::Shape;
 use proptest::prelude::*;
 
@@ -49,7 +51,10 @@ fn sampled_gap([a, b]: &[Sampled; 2], place: DAffine3) -> f64 {
     let back = place.inverse();
     let least = |points: &Pointshell, to: DAffine3, field: &ExactSurface| {
         let gap = |p: DVec3| field.nearest(to.transform_point3(p)).unwrap().distance;
-        let deepest = |p: &ShellPoint| p.span.map_or_else(|| gap(p.position), |span| least_along(&span, gap));
+        let deepest = |p: &ShellPoint| {
+            p.span
+                .map_or_else(|| gap(p.position), |span| least_along(&span, gap))
+        };
         points.points.iter().map(deepest).fold(f64::INFINITY, f64::min)
     };
     least(&a.shell, back, &b.surface).min(least(&b.shell, place, &a.surface))
@@ -62,7 +67,9 @@ fn least_along(span: &ShellSpan, gap: impl Fn(DVec3) -> f64) -> f64 {
     let (mut least, mut u) = start.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
     let mut step = 0.25;
     while step > 1e-4 {
-        let beside = [u - step, u + step].map(|u| u.clamp(-1.0, 1.0)).map(|u| (at(u), u));
+        let beside = [u - step, u + step]
+            .map(|u| u.clamp(-1.0, 1.0))
+            .map(|u| (at(u), u));
         match beside.into_iter().find(|(gap, _)| *gap < least) {
             Some(lower) => (least, u) = lower,
             None => step *= 0.5,

@@ -18,8 +18,8 @@ use mortise_scenario::wire::{pose_mm, vector};
 use mortise_scenario::{Body, PreparedScene};
 
 use crate::crossing_law::{Piece, STIFFNESS, crossings};
-use crate::span::Span;
 use crate::error::LabError;
+use crate::span::Span;
 
 /// Distance, mm, beyond which a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.
 const REACH_MM: f64 = 0.02;
@@ -92,7 +92,13 @@ fn force(contacts: &[(f64, f64, f64, DVec3)]) -> DVec3 {
 
 /// Points and spans of each part's shell, in its shape's frame.
 fn shells(scene: &PreparedScene) -> Result<Vec<Vec<Span>>, LabError> {
-    of_parts(scene, |shape| shape.points.iter().map(|point| Span::of(point, shape.edges)).collect())
+    of_parts(scene, |shape| {
+        shape
+            .points
+            .iter()
+            .map(|point| Span::of(point, shape.edges))
+            .collect()
+    })
 }
 
 /// Pieces of each part's sharp convex edges, in its shape's frame.
@@ -149,7 +155,11 @@ impl Clear {
             if nearest.distance > reach {
                 continue;
             }
-            let gap = |p: DVec3| body.surface.nearest(to_body[1].transform_point3(p)).map_or(f64::INFINITY, |n| n.distance);
+            let gap = |p: DVec3| {
+                body.surface
+                    .nearest(to_body[1].transform_point3(p))
+                    .map_or(f64::INFINITY, |n| n.distance)
+            };
             let deepest = span.at(span.deepest(gap));
             let [before, after] = to_body.map(|to| to.transform_point3(deepest));
             let Some(nearest) = body.surface.nearest(after) else {

@@ -21,7 +21,9 @@ impl Span {
     /// The span of a point of a shape whose edges have these pieces.
     pub fn of(point: &PointRecord, pieces: &[EdgeRecord]) -> Self {
         let middle = 1e3 * vector(point.position);
-        let piece = pieces.get(usize::from(point.piece)).filter(|_| point.piece != NO_PIECE);
+        let piece = pieces
+            .get(usize::from(point.piece))
+            .filter(|_| point.piece != NO_PIECE);
         let (along, bend) = piece.map_or((DVec3::ZERO, DVec3::ZERO), |piece| {
             let [t, share] = point.span().map(f64::from);
             let (half, bend) = (1e3 * vector(piece.half), 1e3 * vector(piece.bend));

@@ -72,7 +72,9 @@ fn brute_force(scene: &SceneImage<'_>, position: Vec3, turn: Quat) -> f64 {
     let least = |part: u16, gap: &dyn Fn(DVec3) -> f64| {
         let shape = scene.shape_of_part(usize::from(part));
         let spans = shape.points.iter().map(|point| Span::of(point, shape.edges));
-        spans.map(|span| gap(span.at(span.deepest(gap)))).fold(f64::INFINITY, f64::min)
+        spans
+            .map(|span| gap(span.at(span.deepest(gap))))
+            .fold(f64::INFINITY, f64::min)
     };
     let forward = least(PEG, &|p| to_block(turn * p + position));
     forward.min(least(BLOCK, &|p| to_peg(turn.inverse() * (p - position))))

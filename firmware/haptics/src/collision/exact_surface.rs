@@ -494,13 +494,34 @@ mod tests {
                 second,
                 ..cylinder(-1.0)
             };
-            let (p, v) = (Vec3::new(0.012, -0.004, 0.003), Vec3::new(0.3e-3, 0.5e-3, -0.4e-3));
-            let at = |u: f32| f64::from(distance(Surfaces { faces: &[face], patches: &[] }, 0, p + v * u).unwrap());
+            let (p, v) = (
+                Vec3::new(0.012, -0.004, 0.003),
+                Vec3::new(0.3e-3, 0.5e-3, -0.4e-3),
+            );
+            let at = |u: f32| {
+                f64::from(
+                    distance(
+                        Surfaces {
+                            faces: &[face],
+                            patches: &[],
+                        },
+                        0,
+                        p + v * u,
+                    )
+                    .unwrap(),
+                )
+            };
             let differences = at(1.0) - 2.0 * at(0.0) + at(-1.0);
-            let surfaces = Surfaces { faces: &[face], patches: &[] };
+            let surfaces = Surfaces {
+                faces: &[face],
+                patches: &[],
+            };
             let found = f64::from(bending(&face, p, &on_surface_of(surfaces, 0, p).unwrap(), v).unwrap());
             // Rounding of distances of a centimetre, and fourth derivatives.
-            assert!((found - differences).abs() < 6e-9 + 0.02 * found.abs(), "{kind}: {found} {differences}");
+            assert!(
+                (found - differences).abs() < 6e-9 + 0.02 * found.abs(),
+                "{kind}: {found} {differences}"
+            );
         }
     }
 

@@ -34,7 +34,7 @@ use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
-use crate::collision::span::{Parabola, Span, moved, near_at};
+use crate::collision::span::{IN_TICK, Parabola, Span, moved, near_at};
 use crate::io::{Flags, Work};
 use crate::math::pose::Pose;
 use crate::math::scalar::inverse_sqrt;
@@ -428,7 +428,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         face: Option<u16>,
     ) -> f32 {
         let price = if face.is_some() { CACHED_POINT } else { LOOKUP };
-        let (u, lowest) = parabola.lowest(span, |p| {
+        let (u, lowest) = parabola.lowest(span, IN_TICK, |p| {
             self.spent += price;
             near_at(pair, face, p)
         });

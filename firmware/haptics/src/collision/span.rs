@@ -18,10 +18,20 @@ use crate::math::vector::quick_length;
 
 /// Squared length of the field's gradient below which it gives no direction.
 const LEAST_GRADIENT2: f32 = 0.01;
-/// Places evaluated beside the middle, at most.
-const STEPS: usize = 3;
-/// A step that lowers the distance by less is not taken, m: as much as a piece of an edge may be off the edge.
-const LEAST_GAIN_M: f32 = 0.5e-6;
+/// When the search along a span ends.
+#[derive(Clone, Copy)]
+pub(crate) struct Effort {
+    /// Places evaluated beside the middle, at most.
+    pub steps: usize,
+    /// A step that lowers the distance by less is not taken, m.
+    pub least_gain_m: f32,
+}
+
+/// In a tick: as much as a piece of an edge may be off the edge.
+pub(crate) const IN_TICK: Effort = Effort {
+    steps: 3,
+    least_gain_m: 0.5e-6,
+};
 /// Share of a span's length by which third derivatives can lower its least distance below the parabola's: a sixth of its turn, 0.2 rad, squared.
 const BEYOND_PARABOLA: f32 = 0.01;
 /// Share of the middle's distance that a bound from its surface alone may use: another surface may come nearer along the span.
@@ -182,10 +192,15 @@ impl Parabola {
         smaller(by_surface, BOUND_SHARE * distance)
     }
 
-    /// Parameter of the lowest place, from −1 to 1, and the surface there: 0 where no other place is lower by [`LEAST_GAIN_M`]. `eval`: surface nearest
+    /// Parameter of the lowest place, from −1 to 1, and the surface there: 0 where no other place is lower by the least gain. `eval`: surface nearest
     /// to a point.
     #[inline(always)]
-    pub fn lowest(&self, span: &Span, mut eval: impl FnMut(Vec3) -> Option<Near>) -> (f32, Near) {
+    pub fn lowest(
+        &self,
+        span: &Span,
+        effort: Effort,
+        mut eval: impl FnMut(Vec3) -> Option<Near>,
+    ) -> (f32, Near) {
         let mut lowest = (0.0, self.first);
         let second = self.second.unwrap_or(0.0);
         let downward = if self.slope > 0.0 { -1.0 } else { 1.0 };
@@ -194,18 +209,18 @@ impl Parabola {
         } else {
             downward
         };
-        if (self.slope + 0.5 * second * u) * u > -LEAST_GAIN_M {
+        if (self.slope + 0.5 * second * u) * u > -effort.least_gain_m {
             return lowest;
         }
         let mut last = (0.0, self.first.found, self.slope);
-        for _ in 0..STEPS {
+        for _ in 0..effort.steps {
             let Some(here) = eval(span.at(u)) else { break };
             if here.found.distance < lowest.1.found.distance {
                 lowest = (u, here);
             }
             let slope = span.slope(u, here.found.normal);
             let next = next_place(last, (u, here.found, slope));
-            if ((next - u) * slope).abs() < LEAST_GAIN_M {
+            if ((next - u) * slope).abs() < effort.least_gain_m {
                 break;
             }
             last = (u, here.found, slope);
@@ -239,11 +254,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn span(middle: Vec3, along: Vec3, bend: Vec3) -> Span {
-        Span {
-            middle,
-            along,
-            bend,
-        }
+        Span { middle, along, bend }
     }
 
     fn plane(normal: Vec3, offset: f32, face: u16) -> impl Fn(Vec3) -> OnFace {
@@ -263,14 +274,16 @@ mod tests {
             first: near(first),
             second,
         };
-        let (u, lowest) = parabola.lowest(span, |p| Some(near(eval(p))));
+        let (u, lowest) = parabola.lowest(span, IN_TICK, |p| Some(near(eval(p))));
         assert_eq!(lowest.found.distance, eval(span.at(u)).distance);
         (lowest.found.distance, parabola.lower_bound(span))
     }
 
     /// Least distance by dense samples.
     fn dense(span: &Span, eval: impl Fn(Vec3) -> OnFace) -> f32 {
-        (-1000..=1000).map(|i| eval(span.at(i as f32 / 1000.0)).distance).fold(f32::INFINITY, f32::min)
+        (-1000..=1000)
+            .map(|i| eval(span.at(i as f32 / 1000.0)).distance)
+            .fold(f32::INFINITY, f32::min)
     }
 
     proptest! {

@@ -16,10 +16,15 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
-use crate::collision::span::{Parabola, Span, moved, near_at};
+use crate::collision::span::{Effort, Parabola, Span, moved, near_at};
 use crate::io::Work;
 use crate::math::scalar::larger;
 
+/// The search along a span ends at the rounding of positions.
+const ALONG_SPAN: Effort = Effort {
+    steps: 12,
+    least_gain_m: 0.01e-6,
+};
 /// Diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
 
@@ -256,7 +261,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         if parabola.lower_bound(&span) > limit {
             return alone;
         }
-        let (u, _) = parabola.lowest(&span, |p| near_at(self.pair, None, p));
+        let (u, _) = parabola.lowest(&span, ALONG_SPAN, |p| near_at(self.pair, None, p));
         moved(self.pair, point, u)
     }
 
