@@ -22,7 +22,7 @@ pub fn rewritten<'n>(source: &str, rows: &[(&'n str, u32)]) -> Result<String, &'
     Ok(text)
 }
 
-/// As [`rewritten`], in the file itself.
+/// Writes the measured instructions into the table's file.
 ///
 /// # Errors
 /// `Unreadable`, `Unwritable`; `Input` when the file has no such table.
