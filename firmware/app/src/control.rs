@@ -124,7 +124,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.tick
     }
 
-    /// See [`Statistics::state_hash`].
+    /// Hash of the state, as the statistics report it.
     pub fn state_hash(&self) -> u64 {
         self.reports.hash.value()
     }
