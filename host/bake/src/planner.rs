@@ -81,7 +81,7 @@ pub fn plan_with(
         return Ok(planned);
     }
     let planned = Planner::new(model, request, cache, progress)?.search()?;
-    // What the clock ended may be better another time.
+    // A plan ended by the clock may be better in another run, so it is not kept.
     if planned.limit != Limit::Time
         && let Some((name, bytes)) = name.zip(plan_to_bytes(&planned))
     {

@@ -12,7 +12,7 @@ use crate::plan::PartTick;
 use crate::scene::Scene;
 use crate::shell::Pointshell;
 
-/// What the points near a part depend on.
+/// Inputs of the estimate.
 pub(crate) struct Ticks<'a> {
     pub model: &'a CadModel,
     pub scene: &'a Scene,

@@ -88,6 +88,14 @@ impl Fielded {
     pub fn bytes(&self) -> u64 {
         field_bytes(&self.baked)
     }
+
+    /// Measures its errors anew where they do not reach this far from the surface.
+    fn measure_to(&mut self, surface: &ExactSurface, reach_mm: f64) {
+        if self.reach_mm < reach_mm {
+            self.errors = Arc::new(field_errors(surface, &self.baked, reach_mm));
+            self.reach_mm = reach_mm;
+        }
+    }
 }
 
 /// Result for an accuracy.
@@ -255,10 +263,7 @@ impl Trials {
         field.choice.resolution_mm = finest.resolution_mm;
         field.choice.edges = finest.edges;
         let reach_mm = field.choice.reach_mm();
-        if field.reach_mm < reach_mm {
-            field.errors = Arc::new(field_errors(&self.surface, &field.baked, reach_mm));
-            field.reach_mm = reach_mm;
-        }
+        field.measure_to(&self.surface, reach_mm);
         field
     }
 
@@ -309,11 +314,7 @@ impl Trials {
                 && (field.tolerance_mm == tolerance_mm || field.baked.patches.is_empty())
         };
         if let Some(known) = self.known.iter_mut().find(same) {
-            let reach_mm = choice.reach_mm();
-            if known.reach_mm < reach_mm {
-                known.errors = Arc::new(field_errors(&self.surface, &known.baked, reach_mm));
-                known.reach_mm = reach_mm;
-            }
+            known.measure_to(&self.surface, choice.reach_mm());
             return Ok(Some(Fielded {
                 choice: choice.clone(),
                 ..known.clone()
@@ -362,7 +363,7 @@ impl Trials {
         choice: &Choice,
         tolerance_mm: f64,
     ) -> Result<Option<KeptField>, BakeError> {
-        // Whatever it costs, there is a first field.
+        // The first field is baked regardless of its cost, so that there is one.
         let is_first = self.known.is_empty();
         if !is_first && (self.is_out_of_work || bench.clock.is_over()) {
             self.is_out_of_work = true;
