@@ -38,6 +38,9 @@ fn use_everything(image: &SceneImage<'_>, random: &mut Random) -> f32 {
                     sum += shape.faces[usize::from(p.edge_face)].sense;
                 }
                 sum += oct_decode(p.normal)[0];
+                if p.span != NO_SPAN {
+                    sum += shape.spans[usize::from(p.span)].round;
+                }
             }
             node = if random.below(2) == 0 {
                 node + 1

@@ -38,13 +38,14 @@ macro_rules! record {
 fn page_and_records_agree() {
     let page = include_str!("../../docs/scene-image.md");
     assert!(page.starts_with(&format!("# Scene image, layout {LAYOUT_VERSION}\n")));
-    record!(page, "Header", Header, magic layout length crc reserved parts shapes fields nodes points faces patches bricks palette grid blob edges);
+    record!(page, "Header", Header, magic layout length crc reserved parts shapes fields nodes points faces patches bricks palette grid blob edges spans);
     record!(page, "Part", PartRecord, shape flags position orientation);
-    record!(page, "Shape", ShapeRecord, field flags first_node node_count first_point point_count first_face face_count first_patch patch_count center radius volume center_of_mass inertia first_edge_node edge_node_count first_edge edge_count);
+    record!(page, "Shape", ShapeRecord, field flags first_node node_count first_point point_count first_face face_count first_patch patch_count center radius volume center_of_mass inertia first_edge_node edge_node_count first_edge edge_count first_span span_count);
     record!(page, "Field", FieldRecord, origin cell scale band brick_dims format first_grid first_brick brick_count);
     record!(page, "Brick", BrickRecord, samples indices palette palette_len index_bits);
     record!(page, "Node", NodeRecord, center radius first_point point_count skip);
-    record!(page, "Point", PointRecord, position normal face edge_face);
+    record!(page, "Point", PointRecord, position normal face edge_face span reserved);
+    record!(page, "Span", SpanRecord, along bend round);
     record!(page, "Face", FaceRecord, kind sense origin axis radius second);
     record!(page, "Edge", EdgeRecord, center half bend normals faces thickness edge radius);
     record!(page, "Patch", PatchRecord, origin x normal height face reserved);

@@ -104,6 +104,9 @@ fn golden_scene_reads_back() {
         ([0, 1], true, [0.0, -1.0, 0.0])
     );
     assert!(image.shape(1).edges.is_empty());
+    let spans: Vec<u16> = shape.points.iter().map(|p| p.span).collect();
+    assert_eq!(spans, [NO_SPAN, NO_SPAN, 0]);
+    assert_eq!((shape.spans.len(), shape.spans[0].along), (1, [0.002, 0.0, 0.0]));
     let near = |x: f32, y: f32, z: f32| match shape.field.lookup([x, y, z]) {
         Lookup::Near(sample) => sample,
         far => panic!("{far:?}"),

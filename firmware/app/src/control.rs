@@ -156,6 +156,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
     }
 
     fn run(&mut self, missed: u32) {
+        self.simulate();
         self.sense();
         self.watch(missed);
         self.render();
@@ -168,9 +169,10 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         self.report();
         self.sample();
         let points = self.rendered.output.as_ref().map_or(0, |o| o.work.points);
+        let cost = self.cost();
         count_tick(
             &mut self.reports.statistics,
-            self.clock.cost(),
+            cost,
             points,
             &self.rendered.commanded,
         );
@@ -180,6 +182,23 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.ran();
             }
         }
+    }
+
+    /// Moves a simulated mechanism. A real one moves by itself: what this takes is no part of the tick's cost.
+    fn simulate(&mut self) {
+        if self.mechanism.simulation().is_none() {
+            return;
+        }
+        let before = self.clock.cost();
+        if let Some(simulation) = self.mechanism.simulation() {
+            simulation.advance();
+        }
+        self.reports.simulated = self.clock.cost().wrapping_sub(before);
+    }
+
+    /// Cost of the tick so far.
+    fn cost(&mut self) -> u32 {
+        self.clock.cost().saturating_sub(self.reports.simulated)
     }
 
     fn take_stop_and_session(&mut self) {

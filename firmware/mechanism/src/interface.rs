@@ -111,6 +111,10 @@ pub trait Mechanism {
 
 /// Controls that only a simulated mechanism has. Its time may wait for the host (lockstep). A control that a simulation does not model has no effect.
 pub trait Simulation {
+    /// Moves the simulated links and the operator model by one tick, under the last drive command. Called in each tick before [`Mechanism::sense`]; a
+    /// real mechanism moves by itself, so this is no part of a tick's cost.
+    fn advance(&mut self) {}
+
     /// Wrench (world, at the handle's origin) of the operator model in the last tick; `None` without one.
     fn hand(&self) -> Option<Wrench> {
         None

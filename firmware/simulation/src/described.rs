@@ -131,22 +131,6 @@ impl Described {
         self.currents
     }
 
-    fn advance(&mut self) {
-        let held = self.hand.as_mut().map(|hand| (hand.impedance, hand.advance()));
-        let joints = self.mechanism.joints();
-        let motors = joints.torques(&self.currents);
-        let mut sum = Wrench::ZERO;
-        for _ in 0..SUBSTEPS {
-            let hand = self.links.step(motors, held.as_ref(), joints);
-            sum = sum + hand;
-        }
-        let share = 1.0 / SUBSTEPS as f32;
-        self.hand_wrench = Wrench {
-            force: sum.force * share,
-            torque: sum.torque * share,
-        };
-    }
-
     /// The encoders' counts as seen through `wiring`.
     fn count(&mut self, wiring: &Wiring) {
         for encoder in 0..ENCODERS {
@@ -298,7 +282,6 @@ fn solve(system: Mat3, momentum: Vec3) -> Vec3 {
 
 impl Mechanism for Described {
     fn sense(&mut self) -> Sensed {
-        self.advance();
         let wiring = self.script.advance(self.wiring);
         self.wiring.glitch = [0; AXES];
         self.count(&wiring);
@@ -332,6 +315,22 @@ impl Mechanism for Described {
 }
 
 impl Simulation for Described {
+    fn advance(&mut self) {
+        let held = self.hand.as_mut().map(|hand| (hand.impedance, hand.advance()));
+        let joints = self.mechanism.joints();
+        let motors = joints.torques(&self.currents);
+        let mut sum = Wrench::ZERO;
+        for _ in 0..SUBSTEPS {
+            let hand = self.links.step(motors, held.as_ref(), joints);
+            sum = sum + hand;
+        }
+        let share = 1.0 / SUBSTEPS as f32;
+        self.hand_wrench = Wrench {
+            force: sum.force * share,
+            torque: sum.torque * share,
+        };
+    }
+
     fn hand(&self) -> Option<Wrench> {
         Some(self.hand_wrench)
     }

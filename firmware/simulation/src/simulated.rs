@@ -143,20 +143,6 @@ impl Simulated {
             able: true,
         }))
     }
-
-    fn advance(&mut self) {
-        let held = self.hand.as_mut().map(|hand| (hand.impedance, hand.advance()));
-        let mut sum = Wrench::ZERO;
-        for _ in 0..SUBSTEPS {
-            let hand = self.body.step(&self.motors, held.as_ref());
-            sum = sum + hand;
-        }
-        let share = 1.0 / SUBSTEPS as f32;
-        self.hand_wrench = Wrench {
-            force: sum.force * share,
-            torque: sum.torque * share,
-        };
-    }
 }
 
 impl Body {
@@ -329,7 +315,6 @@ fn rounded(x: f32) -> f32 {
 
 impl Mechanism for Simulated {
     fn sense(&mut self) -> Sensed {
-        self.advance();
         let wiring = self.script.advance(self.wiring);
         self.wiring.glitch = [0; AXES];
         let reading = self.encoders.read(&self.body.pose, &wiring);
@@ -386,6 +371,20 @@ impl Mechanism for Simulated {
 }
 
 impl Simulation for Simulated {
+    fn advance(&mut self) {
+        let held = self.hand.as_mut().map(|hand| (hand.impedance, hand.advance()));
+        let mut sum = Wrench::ZERO;
+        for _ in 0..SUBSTEPS {
+            let hand = self.body.step(&self.motors, held.as_ref());
+            sum = sum + hand;
+        }
+        let share = 1.0 / SUBSTEPS as f32;
+        self.hand_wrench = Wrench {
+            force: sum.force * share,
+            torque: sum.torque * share,
+        };
+    }
+
     fn hand(&self) -> Option<Wrench> {
         Some(self.hand_wrench)
     }

@@ -14,6 +14,12 @@ use mortise_simulation::simulated::Simulated;
 use proptest::prelude::*;
 use rigs::{arm, paddle, pantograph};
 
+/// The readings after the next tick of the simulated world.
+fn next<M: Mechanism + Simulation>(mechanism: &mut M) -> Sensed {
+    mechanism.advance();
+    mechanism.sense()
+}
+
 /// Either kind of mechanism, with encoders that can be frozen.
 trait Rig: Mechanism + Simulation {
     fn freeze(&mut self, axis: usize);
@@ -103,7 +109,7 @@ fn press(mut rig: impl Rig, grip: Held, push: Vec3, ticks: u32, mut each: impl F
     rig.set_hand(Some(&hand(grip, &[(0, home, Vec3::ZERO), (500, home, push)])));
     let mut dead = 0;
     for _ in 0..ticks {
-        let sensed = rig.sense();
+        let sensed = next(&mut rig);
         dead += u32::from(sensed.encoder_stuck.is_some());
         rig.watch_encoders(true);
         rig.drive(held(&sensed, home, push.length().max(0.1)));
@@ -165,7 +171,7 @@ fn probes_give_a_resting_hand_less_than_ten_microjoules() {
             rig.set_hand(Some(&hand(grip, &frames)));
             let (mut rise, mut last, mut probed) = (Rise::default(), (rig.truth(), rig.motors()), 0);
             for tick in 0..20_000 {
-                rig.sense();
+                next(&mut rig);
                 let (from, held) = last;
                 let to = rig.truth();
                 let turned = (to.orientation * from.orientation.conjugate()).to_scaled_axis();
@@ -225,7 +231,7 @@ fn a_joint_at_its_stop_is_not_judged() {
     let far = Pose::new(Vec3::new(0.2, -0.1, 0.0), Quat::IDENTITY);
     mechanism.set_hand(Some(&hand(STEADY, &[(0, far, Vec3::ZERO)])));
     for _ in 0..5_000 {
-        let sensed = mechanism.sense();
+        let sensed = next(&mut mechanism);
         assert_eq!(sensed.encoder_stuck, None);
         mechanism.watch_encoders(true);
         mechanism.drive(held(&sensed, Pose::IDENTITY, 4.0));
@@ -253,7 +259,7 @@ fn frozen(
         if tick == at {
             rig.freeze(axis);
         }
-        let sensed = rig.sense();
+        let sensed = next(&mut rig);
         if let Some(dead) = sensed.encoder_stuck {
             return Some((dead, tick.checked_sub(at).expect("no fault before the freeze")));
         }
@@ -357,7 +363,7 @@ fn a_moving_hand_on_a_described_rig_is_hardly_ever_taken_for_a_dead_encoder() {
                 .collect();
             mechanism.set_hand(Some(&hand(grip, &frames)));
             for _ in 0..2_000 {
-                let sensed = mechanism.sense();
+                let sensed = next(&mut mechanism);
                 if sensed.encoder_stuck.is_some() {
                     *alarms += 1;
                     break;

@@ -1,11 +1,17 @@
 //! The simulated mechanism against closed forms, and under any script.
 
 use glam::{Quat, Vec3};
-use mortise_firmware::board::{Drive, Mechanism, Simulation};
+use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_simulation::simulated::*;
 use proptest::prelude::*;
+
+/// The readings after the next tick of the simulated world.
+fn next<M: Mechanism + Simulation>(mechanism: &mut M) -> Sensed {
+    mechanism.advance();
+    mechanism.sense()
+}
 
 fn script(position: Vec3, orientation: Quat, push: Vec3) -> HandScript {
     HandScript {
@@ -38,9 +44,9 @@ fn force(x: f32) -> Drive {
 fn a_constant_force_ends_in_the_speed_that_friction_allows() {
     let mut rig = Simulated::new();
     rig.drive(force(0.51));
-    let mut sensed = rig.sense();
+    let mut sensed = next(&mut rig);
     for _ in 0..2000 {
-        sensed = rig.sense();
+        sensed = next(&mut rig);
     }
     // (0.51 − f_c)/c = 0.5 m/s after 13 time constants of m/c = 0.15 s, which leave 2·10⁻⁶; the encoder's estimate swings by a count
     // a tick through the filter, 1.25 mm/s.
@@ -64,7 +70,7 @@ fn friction_holds_what_is_below_it() {
     let mut rig = Simulated::new();
     rig.drive(force(0.99 * COULOMB));
     for _ in 0..1000 {
-        rig.sense();
+        next(&mut rig);
     }
     assert_eq!(rig.true_pose().position, Vec3::ZERO);
 }
@@ -88,9 +94,9 @@ fn the_hand_brings_the_handle_where_it_wants_it() {
     let turn = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.2);
     let goal = Vec3::new(0.02, -0.03, 0.01);
     rig.set_hand(Some(&script(goal, turn, Vec3::new(0.0, 0.0, 2.0))));
-    let mut sensed = rig.sense();
+    let mut sensed = next(&mut rig);
     for _ in 0..3000 {
-        sensed = rig.sense();
+        sensed = next(&mut rig);
     }
     // Push over stiffness moves the rest position; friction may hold within f_c/k; the encoder rounds.
     let rest = goal + Vec3::new(0.0, 0.0, 2.0 / 400.0);
@@ -135,7 +141,7 @@ fn encoders_round_to_their_resolution_and_never_drift() {
     rig.set_hand(Some(&swinging));
     for tick in 0..3200 {
         let before = rig.true_pose().orientation;
-        let sensed = rig.sense();
+        let sensed = next(&mut rig);
         let truth = rig.true_pose();
         let moved = (truth.orientation * before.conjugate()).xyz().length() * 2.0;
         let error = (sensed.handle.position - truth.position).abs().max_element();
@@ -157,12 +163,12 @@ fn encoders_round_to_their_resolution_and_never_drift() {
 #[test]
 fn a_glitch_is_reported_as_a_jump_once() {
     let mut rig = Simulated::new();
-    rig.sense();
+    next(&mut rig);
     rig.wiring.glitch[0] = 100_000;
-    assert_eq!(rig.sense().encoder_jump, Some(0));
-    assert_eq!(rig.sense().encoder_jump, None);
+    assert_eq!(next(&mut rig).encoder_jump, Some(0));
+    assert_eq!(next(&mut rig).encoder_jump, None);
     rig.wiring.not_a_number = true;
-    assert!(!rig.sense().handle.is_finite());
+    assert!(!next(&mut rig).handle.is_finite());
 }
 
 proptest! {
@@ -186,7 +192,7 @@ proptest! {
             torque: Vec3::from_slice(&wrench[3..]),
         }));
         for _ in 0..300 {
-            let sensed = rig.sense();
+            let sensed = next(&mut rig);
             prop_assert!(sensed.handle.is_finite() && sensed.twist.is_finite());
             let norm = rig.true_pose().orientation.length();
             prop_assert!((norm - 1.0).abs() < 1e-5, "{norm}");
@@ -196,7 +202,7 @@ proptest! {
         let mut last = f32::INFINITY;
         for _ in 0..300 {
             let before = rig.true_pose().position;
-            rig.sense();
+            next(&mut rig);
             let speed = (rig.true_pose().position - before).length();
             // Rounding of a position p to 24 bits, in each of four substeps and twice in the difference.
             let rounding = 6.0 * 6e-8 * before.length();

@@ -4,8 +4,7 @@ use std::ops::ControlFlow;
 
 use mortise_brep::{CadModel, Surface};
 use mortise_protocol::image::{
-    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PatchRecord, PointRecord,
-    ShapeRecord,
+    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PatchRecord, ShapeRecord,
 };
 use rayon::prelude::*;
 
@@ -15,7 +14,7 @@ use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, bake_field};
 use crate::format::FieldOptions;
-use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes};
+use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes, shell_bytes};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::partners::Partners;
@@ -105,8 +104,7 @@ impl Made {
     /// Bytes of the shapes in the image, without parts and header.
     pub fn bytes(&self) -> u64 {
         let shells = self.shells.iter().map(|shell| {
-            let points = shell.points.len();
-            (points * size_of::<PointRecord>() + node_count(points) * size_of::<NodeRecord>()) as u64
+            (shell_bytes(shell) + node_count(shell.points.len()) * size_of::<NodeRecord>()) as u64
         });
         self.fields.iter().map(field_bytes).chain(shells).sum()
     }

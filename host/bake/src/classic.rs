@@ -88,6 +88,7 @@ pub fn classic_pointshell(
                 normal,
                 face,
                 edge_face,
+                span: None,
             };
             Some((point, nearest.distance - inward))
         })

@@ -7,10 +7,11 @@
 
 use std::collections::BTreeSet;
 
-use mortise_protocol::image::NO_FACE;
+use mortise_protocol::image::{NO_FACE, NO_SPAN};
 
 use crate::chains::edge_chains;
 use crate::distance::ExactSurface;
+use crate::edge_spans::spans;
 use glam::DVec3;
 use mortise_brep::Surface;
 
@@ -33,7 +34,7 @@ struct Demand {
     away_only: bool,
 }
 
-/// Appends points strictly inside each chain of boundary pieces; returns the vertices where chains end.
+/// Appends points strictly inside each chain of boundary pieces, or its spans where they are fewer; returns the vertices where chains end.
 pub(crate) fn sample_edges(
     surface: &ExactSurface,
     options: &PointshellOptions,
@@ -55,7 +56,16 @@ pub(crate) fn sample_edges(
         }) else {
             continue;
         };
+        let before = out.len();
         sample_chain(surface, &chain, &demand, options, out);
+        if options.partners != Partners::Unknown
+            && let Some(spans) = spans(surface, &chain, options)
+            && spans.len() < out.len() - before
+            && before + spans.len() <= usize::from(NO_SPAN)
+        {
+            out.truncate(before);
+            out.extend(spans);
+        }
         sample_ring(surface, &chain, options, out);
         if let (Some(&(first, from)), Some(&(last, to))) = (chain.first(), chain.last()) {
             let start = pieces[first as usize].ends[usize::from(!from)];
@@ -119,6 +129,7 @@ fn sample_chain(
                     .map(|s| s.face)
                     .find(|&f| f != piece.sides[0].face)
                     .map_or(NO_FACE, |f| f as u16),
+                span: None,
             });
         }
     }

@@ -1,7 +1,7 @@
 //! Pieces of sharp convex edges, for contact of edges with edges: each a quadratic curve within [`TOLERANCE_MM`] of the exact edge.
 //!
-//! A chain of boundary pieces is divided by halves until a quadratic fits and the tangent turns little. The number of pieces depends on the curve
-//! alone: one for a straight edge, some 25 for a circle of 10 mm.
+//! A chain of boundary pieces is divided until a quadratic fits and the tangent turns little ([`crate::stretch`]). The number of pieces depends on the
+//! curve alone: one for a straight edge, 16 for a circle of 10 mm.
 
 use glam::DVec3;
 use mortise_protocol::image::EdgeRecord;
@@ -9,31 +9,21 @@ use mortise_protocol::image::oct_encode;
 
 use crate::chains::edge_chains;
 use crate::distance::{ExactSurface, Scratch};
-use crate::piece::{Link, Piece};
+use crate::piece::Piece;
+use crate::stretch::{Chain, Curve, Fineness};
 use crate::tree::round_up;
 
-/// Fineness of the division of edges into pieces.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Fineness {
-    /// Largest distance of a piece from the exact edge across its direction, mm.
-    pub tolerance_mm: f64,
-    /// Largest angle by which a piece's tangent turns from its middle to an end, rad.
-    most_turn: f64,
-}
+/// As fine as the exact edges are known.
+pub(crate) const FINEST: Fineness = Fineness {
+    tolerance_mm: TOLERANCE_MM,
+    most_turn: MOST_TURN,
+};
 
-impl Fineness {
-    /// As fine as the exact edges are known.
-    pub const FINEST: Self = Self {
-        tolerance_mm: TOLERANCE_MM,
-        most_turn: MOST_TURN,
-    };
-
-    /// Half as many pieces: the error grows with the fourth power of their length.
-    pub fn coarser(self) -> Self {
-        Self {
-            tolerance_mm: 16.0 * self.tolerance_mm,
-            most_turn: 2.0 * self.most_turn,
-        }
+/// Half as many pieces: the error grows with the fourth power of their length.
+pub(crate) fn coarser(fineness: Fineness) -> Fineness {
+    Fineness {
+        tolerance_mm: 16.0 * fineness.tolerance_mm,
+        most_turn: 2.0 * fineness.most_turn,
     }
 }
 
@@ -41,8 +31,6 @@ impl Fineness {
 const TOLERANCE_MM: f64 = 2.0 * mortise_brep::EDGE_TOLERANCE_MM;
 /// Largest angle by which a piece's tangent turns from its middle to an end, rad.
 const MOST_TURN: f64 = 0.2;
-/// Halvings of a chain at most: a kink inside a chain would be divided without end.
-const MOST_HALVINGS: u32 = 12;
 /// Faces whose normals differ by a smaller angle (rad) meet smoothly: ten times the error that modellers and STEP files leave.
 const SMOOTH: f64 = 0.01;
 /// Pieces of an edge at which the thickness is measured.
@@ -106,19 +94,21 @@ fn meters(mm: DVec3) -> [f32; 3] {
 pub(crate) fn edge_pieces(surface: &ExactSurface, fineness: Fineness) -> Vec<EdgePiece> {
     let mut all = Vec::new();
     for (edge, links) in edge_chains(surface).into_iter().enumerate() {
-        let chain = Chain::new(&surface.topology.pieces, links, fineness);
-        if chain.length <= 0.0 {
-            continue;
-        }
+        let chain = Chain::new(&surface.topology.pieces, &links);
         let first = all.len();
-        divide(
-            surface,
-            &chain,
-            [0.0, chain.length],
-            MOST_HALVINGS,
-            edge as u32,
-            &mut all,
-        );
+        for stretch in chain.stretches(Curve::Parabola, fineness) {
+            if let Some((normals, faces)) = sharp(surface, chain.piece(&stretch), stretch.middle) {
+                all.push(EdgePiece {
+                    center: stretch.middle,
+                    half: stretch.along,
+                    bend: stretch.bend,
+                    normals,
+                    faces,
+                    thickness: 0.0,
+                    edge: edge as u32,
+                });
+            }
+        }
         let thickness = thickness(surface, &all[first..]);
         for piece in &mut all[first..] {
             piece.thickness = thickness;
@@ -127,90 +117,8 @@ pub(crate) fn edge_pieces(surface: &ExactSurface, fineness: Fineness) -> Vec<Edg
     all
 }
 
-/// A chain and the arc length at which each of its pieces begins, mm.
-struct Chain<'a> {
-    pieces: &'a [Piece],
-    links: Vec<Link>,
-    starts: Vec<f64>,
-    length: f64,
-    fineness: Fineness,
-}
-
-impl<'a> Chain<'a> {
-    fn new(pieces: &'a [Piece], links: Vec<Link>, fineness: Fineness) -> Self {
-        let mut length = 0.0;
-        let starts = (links.iter())
-            .map(|&(i, _)| {
-                let start = length;
-                length += pieces[i as usize].length();
-                start
-            })
-            .collect();
-        Self {
-            pieces,
-            links,
-            starts,
-            length,
-            fineness,
-        }
-    }
-
-    /// The boundary piece at arc length `s`, and the point there.
-    fn at(&self, s: f64) -> (&'a Piece, DVec3) {
-        let k = self.starts.partition_point(|&start| start <= s).max(1) - 1;
-        let (i, forward) = self.links[k];
-        let piece = &self.pieces[i as usize];
-        let t = ((s - self.starts[k]) / piece.length().max(1e-300)).clamp(0.0, 1.0);
-        (piece, piece.at(if forward { t } else { 1.0 - t }))
-    }
-}
-
-/// Appends the pieces of a chain between two arc lengths.
-fn divide(
-    surface: &ExactSurface,
-    chain: &Chain<'_>,
-    [from, to]: [f64; 2],
-    halvings: u32,
-    edge: u32,
-    out: &mut Vec<EdgePiece>,
-) {
-    let middle = 0.5 * (from + to);
-    let [a, center, b] = [from, middle, to].map(|s| chain.at(s).1);
-    let half = (b - a) / 2.0;
-    let mut bend = (a + b) / 2.0 - center;
-    if bend.length() < 1e-6 * half.length() {
-        bend = DVec3::ZERO;
-    }
-    let fits = || {
-        [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75].iter().all(|&t| {
-            let exact = chain.at(middle + t * (to - middle)).1;
-            let off = center + half * t + bend * (t * t) - exact;
-            off.reject_from(half + 2.0 * t * bend).length() <= chain.fineness.tolerance_mm
-        })
-    };
-    let turn = 2.0 * bend.length() / half.length().max(1e-300);
-    // A closed chain has no chord: its turn is infinite.
-    if halvings > 0 && to - from > TOLERANCE_MM && (turn > chain.fineness.most_turn || !fits()) {
-        divide(surface, chain, [from, middle], halvings - 1, edge, out);
-        divide(surface, chain, [middle, to], halvings - 1, edge, out);
-        return;
-    }
-    let (piece, at) = chain.at(middle);
-    if let Some((normals, faces)) = sharp(surface, piece, at) {
-        out.push(EdgePiece {
-            center,
-            half,
-            bend,
-            normals,
-            faces,
-            thickness: 0.0,
-            edge,
-        });
-    }
-}
-
 /// Outward normals and numbers of the two faces that meet at a point of a boundary piece, if they form a sharp convex edge.
-fn sharp(surface: &ExactSurface, piece: &Piece, at: DVec3) -> Option<([DVec3; 2], [u32; 2])> {
+pub(crate) fn sharp(surface: &ExactSurface, piece: &Piece, at: DVec3) -> Option<([DVec3; 2], [u32; 2])> {
     let [first, second] = piece.sides.as_slice() else {
         return None;
     };

@@ -58,6 +58,7 @@ fn sample_analytic(
                 normal: normal * sense,
                 face: face as u16,
                 edge_face: NO_FACE,
+                span: None,
             });
         }
     };

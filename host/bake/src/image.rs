@@ -5,8 +5,8 @@ use glam::{DAffine3, DVec3};
 use mortise_brep::{Face, Shape, Surface};
 use mortise_protocol::image::{
     BrickRecord, CRC, EdgeRecord, FaceRecord, FieldRecord, Header, LAYOUT_VERSION, MAGIC, NO_FACE,
-    NO_SAMPLES, NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX, SHAPE_LEAKY,
-    Section, ShapeRecord, oct_encode, surface_kind,
+    NO_SAMPLES, NO_SPAN, NodeRecord, PART_GRABBABLE, PartRecord, PatchRecord, PointRecord, SHAPE_CONVEX,
+    SHAPE_LEAKY, Section, ShapeRecord, SpanRecord, oct_encode, surface_kind,
 };
 
 use crate::edges::EdgePiece;
@@ -42,6 +42,7 @@ pub struct ImageBuilder {
     grid: Vec<u16>,
     blob: Vec<u8>,
     edges: Vec<EdgeRecord>,
+    spans: Vec<SpanRecord>,
 }
 
 /// Padding after the palettes: the last palette runs must cover every value their indices can take.
@@ -50,6 +51,12 @@ pub(crate) const PALETTE_PADDING: usize = 256;
 /// Bytes of this many pieces of edges and of the tree over them.
 pub(crate) fn edge_bytes(pieces: usize) -> usize {
     pieces * size_of::<EdgeRecord>() + edge_node_count(pieces) * size_of::<NodeRecord>()
+}
+
+/// Bytes of a pointshell, without the tree over it.
+pub(crate) fn shell_bytes(shell: &Pointshell) -> usize {
+    let spans = shell.points.iter().filter(|p| p.span.is_some()).count();
+    shell.points.len() * size_of::<PointRecord>() + spans * size_of::<SpanRecord>()
 }
 
 impl ImageBuilder {
@@ -67,13 +74,11 @@ impl ImageBuilder {
         edges: &[EdgePiece],
         convex: bool,
     ) -> (u32, ByteCount) {
-        let positions: Vec<[f32; 3]> = shell
-            .points
-            .iter()
-            .map(|p| (p.position / 1000.0).as_vec3().to_array())
-            .collect();
+        let meters = |p: DVec3| (p / 1000.0).as_vec3().to_array();
+        let positions: Vec<[f32; 3]> = shell.points.iter().map(|p| meters(p.position)).collect();
         let offsets: Vec<f32> = shell.offsets.iter().map(|mm| (mm / 1000.0) as f32).collect();
-        let tree = build_tree(&positions, &offsets);
+        let hulls: Vec<_> = shell.points.iter().map(|p| p.hull().map(meters)).collect();
+        let tree = build_tree(&hulls, &offsets);
         let hulls: Vec<_> = edges.iter().map(EdgePiece::hull).collect();
         let edge_tree = build_edge_tree(&hulls);
         let (lo, hi) = bounding_box(shape);
@@ -85,7 +90,6 @@ impl ImageBuilder {
             .map_or(0.0, |n| f64::from(n.radius))
             .max((hi - lo).length() / 2000.0)
             + f64::from(field.record.cell);
-        let meters = shape.center_of_mass / 1000.0;
         let i = shape.inertia_mm5;
         // mm⁵ to m⁵.
         let inertia = [i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]].map(|v| (v * 1e-15) as f32);
@@ -104,12 +108,14 @@ impl ImageBuilder {
             center: center.to_array(),
             radius: round_up(radius),
             volume: (shape.volume_mm3 * 1e-9) as f32,
-            center_of_mass: meters.as_vec3().to_array(),
+            center_of_mass: meters(shape.center_of_mass),
             inertia,
             first_edge_node: (self.nodes.len() + tree.nodes.len()) as u32,
             edge_node_count: edge_tree.nodes.len() as u32,
             first_edge: self.edges.len() as u32,
             edge_count: edges.len() as u32,
+            first_span: self.spans.len() as u32,
+            span_count: shell.points.iter().filter(|p| p.span.is_some()).count() as u32,
         });
         let bytes = ByteCount {
             samples: field.sample_bytes,
@@ -117,7 +123,7 @@ impl ImageBuilder {
             grid: field.grid.len() * 2,
             bricks: field.bricks.len() * size_of::<BrickRecord>(),
             palette: field.palette.len() * 2,
-            points: positions.len() * size_of::<PointRecord>(),
+            points: shell_bytes(shell),
             nodes: tree.nodes.len() * size_of::<NodeRecord>(),
             faces: shape.faces.len() * size_of::<FaceRecord>(),
             edges: edge_bytes(edges.len()),
@@ -128,15 +134,26 @@ impl ImageBuilder {
         self.nodes.extend(edge_tree.nodes);
         self.edges
             .extend(edge_tree.order.iter().map(|&old| edges[old as usize].record()));
-        self.points.extend(tree.order.iter().map(|&old| {
+        let first_span = self.spans.len();
+        for &old in &tree.order {
             let p = &shell.points[old as usize];
-            PointRecord {
+            let span = p.span.map(|span| {
+                self.spans.push(SpanRecord {
+                    along: meters(span.along),
+                    bend: meters(span.bend),
+                    round: span.round.min(1.0) as f32,
+                });
+                (self.spans.len() - 1 - first_span) as u16
+            });
+            self.points.push(PointRecord {
                 position: positions[old as usize],
                 normal: oct_encode(p.normal.as_vec3().to_array()),
                 face: p.face,
                 edge_face: p.edge_face,
-            }
-        }));
+                span: span.unwrap_or(NO_SPAN),
+                reserved: 0,
+            });
+        }
         self.faces
             .extend(shape.faces.iter().map(|face| face_record(face, (lo, hi))));
         self.patches.extend(&field.patches);
@@ -195,6 +212,7 @@ impl ImageBuilder {
             + padded(size_of_val(self.grid.as_slice()))
             + padded(self.blob.len())
             + padded(size_of_val(self.edges.as_slice()))
+            + padded(size_of_val(self.spans.as_slice()))
     }
 
     /// Whether the image has no shapes and no parts.
@@ -221,6 +239,7 @@ impl ImageBuilder {
             grid: append(&mut bytes, &self.grid),
             blob: append(&mut bytes, &self.blob),
             edges: append(&mut bytes, &self.edges),
+            spans: append(&mut bytes, &self.spans),
             ..Header::zeroed()
         };
         header.length = bytes.len() as u32;

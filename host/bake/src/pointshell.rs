@@ -7,7 +7,8 @@
 //! |---|---|
 //! | inside planes, concave faces, along concave edges | none |
 //! | inside faces convex in some direction | √(4ε/(κᵢ + κ')) in each principal direction i; none where κᵢ + κ' ≤ 0 |
-//! | along convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from the touching partner |
+//! | along sharp convex edges | spans, on which the tick finds the deepest place, see [`crate::edge_spans`]; points as below where they are fewer |
+//! | along other convex edges, straight or curved | √(8ε/(κ + κ')), κ the edge's own curvature away from the touching partner |
 //! | on shafts that fit a bore, beside their rims | a ring, see [`crate::ring_samples`] |
 //!
 //! The two directions of a face share ε; an edge uses all of it. Inside faces that are not convex in both directions, mainly cylinders, samples serve
@@ -82,5 +83,6 @@ fn corner_point(surface: &ExactSurface, vertex: u32) -> Option<ShellPoint> {
         normal: topology.vertex_normals[vertex as usize].try_normalize()?,
         face: *faces.first()? as u16,
         edge_face: faces.get(1).map_or(NO_FACE, |&f| f as u16),
+        span: None,
     })
 }

@@ -65,6 +65,7 @@ pub(crate) fn sample_ring(
                 normal,
                 face: own.face as u16,
                 edge_face: NO_FACE,
+                span: None,
             });
         }
     }

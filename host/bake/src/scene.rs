@@ -8,7 +8,7 @@ use mortise_protocol::limits::MAX_PARTS;
 use rayon::prelude::*;
 
 use crate::distance::ExactSurface;
-use crate::edges::{EdgePiece, Fineness, edge_pieces};
+use crate::edges::{EdgePiece, FINEST, coarser, edge_pieces};
 use crate::error::BakeError;
 use crate::grid::bounding_box;
 use crate::image::edge_bytes;
@@ -113,7 +113,7 @@ impl Scene {
             self.edges = prepared.iter().map(|_| Vec::new()).collect();
             return;
         }
-        let mut fineness = Fineness::FINEST;
+        let mut fineness = FINEST;
         for attempt in 0..=COARSER {
             self.edges = (prepared.par_iter())
                 .map(|surface| edge_pieces(surface, fineness))
@@ -122,9 +122,9 @@ impl Scene {
             if attempt == COARSER || bytes as f64 <= MOST_OF_IMAGE * options.image_limit_bytes as f64 {
                 break;
             }
-            fineness = fineness.coarser();
+            fineness = coarser(fineness);
         }
-        if fineness != Fineness::FINEST {
+        if fineness != FINEST {
             self.warnings.push(format!(
                 "edges are stored within {:.0} µm only, so that they leave space for the rest: allow a larger image",
                 1000.0 * fineness.tolerance_mm

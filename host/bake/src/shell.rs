@@ -72,6 +72,38 @@ pub struct ShellPoint {
     pub face: u16,
     /// Second face of an edge or corner, else [`NO_FACE`](mortise_protocol::image::NO_FACE).
     pub edge_face: u16,
+    /// Stretch of a sharp convex edge of which the point is the middle; the tick finds the deepest place on it.
+    pub span: Option<ShellSpan>,
+}
+
+/// A stretch of an edge, x(u) = m + a·u + b·u²·(1 − k·(1 − u²)) for −1 ≤ u ≤ 1, with the middle m at its [`ShellPoint`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellSpan {
+    /// a, mm.
+    pub along: DVec3,
+    /// b, mm.
+    pub bend: DVec3,
+    /// k, from 0 to 1.
+    pub round: f64,
+}
+
+impl ShellPoint {
+    /// The place at `u` on its span, mm; the point itself without one.
+    pub fn at(&self, u: f64) -> DVec3 {
+        self.span.map_or(self.position, |span| {
+            let bend = span.bend * (u * u * (1.0 - span.round * (1.0 - u * u)));
+            self.position + span.along * u + bend
+        })
+    }
+
+    /// Points whose convex hull contains it, with its span, mm: the ends, and where the tangents there meet.
+    pub(crate) fn hull(&self) -> [DVec3; 3] {
+        let Some(span) = self.span else {
+            return [self.position; 3];
+        };
+        let control = self.position - span.bend * (1.0 + 2.0 * span.round);
+        [self.at(-1.0), control, self.at(1.0)]
+    }
 }
 
 /// Points of a shape, ordered: faces, then edges, then corners.

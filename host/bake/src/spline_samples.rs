@@ -67,6 +67,7 @@ pub(crate) fn sample_spline(
                 normal,
                 face: face as u16,
                 edge_face: NO_FACE,
+                span: None,
             });
         }
     }

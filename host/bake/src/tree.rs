@@ -20,14 +20,13 @@ pub struct SphereTree {
 /// Weight of a point's offset from the surface in the choice of the axis to halve.
 const OFFSET_WEIGHT: f32 = 128.0;
 
-/// Builds the tree over `positions` as they will be stored: it halves along the longest axis down to leaves of at most 16 points. Every sphere
+/// Builds the tree over points and spans as they will be stored, each given by points whose convex hull contains it: it halves along the longest axis down to leaves of at most 16 points. Every sphere
 /// contains all points below it, also in the board's `f32`. Cost: n log² n.
 ///
 /// `offsets` (same unit; may be empty) are the points' distances from the surface. They count as a fourth axis, so that points of equal depth share a
 /// leaf: they come near together, and a leaf with one near point is examined as a whole.
-pub fn build_tree(positions: &[[f32; 3]], offsets: &[f32]) -> SphereTree {
-    let items: Vec<[[f32; 3]; 1]> = positions.iter().map(|&p| [p]).collect();
-    build(&items, offsets, LEAF_POINTS)
+pub fn build_tree(hulls: &[[[f32; 3]; 3]], offsets: &[f32]) -> SphereTree {
+    build(hulls, offsets, LEAF_POINTS)
 }
 
 /// Builds the tree over pieces of edges, each given by points whose convex hull contains it; leaves have at most 4 pieces.
@@ -35,8 +34,8 @@ pub(crate) fn build_edge_tree(hulls: &[[[f32; 3]; 3]]) -> SphereTree {
     build(hulls, &[], LEAF_PIECES)
 }
 
-/// Builds the tree over items of N points each.
-fn build<const N: usize>(items: &[[[f32; 3]; N]], offsets: &[f32], leaf: usize) -> SphereTree {
+/// Builds the tree over items of three points each.
+fn build(items: &[[[f32; 3]; 3]], offsets: &[f32], leaf: usize) -> SphereTree {
     let mut tree = SphereTree {
         nodes: Vec::new(),
         order: (0..items.len() as u32).collect(),
@@ -65,8 +64,8 @@ fn count_nodes(items: usize, leaf: usize) -> usize {
     }
 }
 
-fn split<const N: usize>(
-    items: &[[[f32; 3]; N]],
+fn split(
+    items: &[[[f32; 3]; 3]],
     offsets: &[f32],
     leaf: usize,
     tree: &mut SphereTree,
@@ -89,8 +88,8 @@ fn split<const N: usize>(
     if count > leaf {
         let along = |i: u32, axis: usize| match axis {
             3 => OFFSET_WEIGHT * offsets.get(i as usize).copied().unwrap_or(0.0),
-            // The middle point of a piece stands for it.
-            _ => items[i as usize][N / 2][axis],
+            // The middle one stands for all.
+            _ => items[i as usize][1][axis],
         };
         let extent: [f32; 4] = std::array::from_fn(|axis| {
             let range = run.iter().map(|&i| along(i, axis));
@@ -153,7 +152,8 @@ mod tests {
         /// Preorder, skip links, leaf size, containment, and every point exactly once.
         #[test]
         fn tree_is_sound(positions in prop::collection::vec(prop::array::uniform3(-1.0f32..1.0), 0..400)) {
-            let tree = build_tree(&positions, &[]);
+            let hulls: Vec<_> = positions.iter().map(|&p| [p; 3]).collect();
+            let tree = build_tree(&hulls, &[]);
             let mut seen = tree.order.clone();
             seen.sort_unstable();
             prop_assert_eq!(seen, (0..positions.len() as u32).collect::<Vec<_>>());

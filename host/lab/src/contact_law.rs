@@ -1,10 +1,10 @@
 //! The contact law evaluated on the exact surfaces: the force on the moving part that both pointshells would produce if every distance were that of
 //! the exact surface.
 //!
-//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, and twice that for each two edges that cross
-//! ([`crate::crossing_law`]); φ is its signed distance from the other part's exact surface at the end of the
-//! tick (f64, CAD faces; no field; of the image only the positions of the points), φ̇ its change over the tick, along the exact surface's normal. The
-//! sum is compared with the contact force that the board reports for the same tick.
+//! λ = k·max(0, −(φ + τ·min(0, φ̇))) for each point of either shell, and twice that for the deepest place of each span of an edge, found by a
+//! search of its own, and for each two edges that cross ([`crate::crossing_law`]); φ is its signed distance from the other part's exact surface at the end of
+//! the tick (f64, CAD faces; no field; of the image only the positions of points and spans), φ̇ its change over the tick, along the exact surface's
+//! normal. The sum is compared with the contact force that the board reports for the same tick.
 //!
 //! Poses are reported in single precision: half a unit in the last place of 0.05 m and of a quaternion is 2 nm each at the peg's rim, 0.8 mN a point
 //! at 200 kN/m.
@@ -19,6 +19,7 @@ use mortise_scenario::{Body, PreparedScene};
 
 use crate::crossing_law::{Piece, STIFFNESS, crossings};
 use crate::error::LabError;
+use crate::span::Span;
 
 /// Distance, mm, beyond which a point has no force: more than closes in the time of the damping, 0.5 ms at 40 mm/s.
 const REACH_MM: f64 = 0.02;
@@ -55,12 +56,17 @@ pub(crate) fn pushed(scene: &PreparedScene, samples: &[Telemetry]) -> Result<Vec
             let to_other = poses.map(|pose| other.placement.inverse() * pose);
             let to_part = to_other.map(|to| to.inverse());
             let [forward, backward] = &mut clear[index];
-            forward.touching(&shells[moving], &to_other, other, &mut |gap, rate, normal| {
-                exact.push((1.0, gap, rate, other.placement.transform_vector3(normal)));
-            });
+            forward.touching(
+                &shells[moving],
+                &to_other,
+                other,
+                &mut |share, gap, rate, normal| {
+                    exact.push((share, gap, rate, other.placement.transform_vector3(normal)));
+                },
+            );
             let part = &bodies[moving];
-            backward.touching(&shells[index], &to_part, part, &mut |gap, rate, normal| {
-                exact.push((1.0, gap, rate, -poses[1].transform_vector3(normal)));
+            backward.touching(&shells[index], &to_part, part, &mut |share, gap, rate, normal| {
+                exact.push((share, gap, rate, -poses[1].transform_vector3(normal)));
             });
             let hertz = 1.0 / f64::from(Settings::default().period_s);
             for found in crossings(&edges[moving], &to_other, &edges[index], REACH_MM) {
@@ -89,11 +95,14 @@ fn force(contacts: &[(f64, f64, f64, DVec3)]) -> DVec3 {
         .sum()
 }
 
-/// Points of each part's shell, mm, in its shape's frame.
-fn shells(scene: &PreparedScene) -> Result<Vec<Vec<DVec3>>, LabError> {
+/// Points and spans of each part's shell, in its shape's frame.
+fn shells(scene: &PreparedScene) -> Result<Vec<Vec<Span>>, LabError> {
     of_parts(scene, |shape| {
-        let points = shape.points.iter();
-        points.map(|point| 1e3 * vector(point.position)).collect()
+        shape
+            .points
+            .iter()
+            .map(|point| Span::of(point, shape.spans))
+            .collect()
     })
 }
 
@@ -128,25 +137,39 @@ impl Clear {
         }
     }
 
-    /// Gap, rate and outward normal (frame of `body`) of every point within reach; the pose changes from the first of `to_body` to the second in one
+    /// Share of the stiffness, gap, rate and outward normal (frame of `body`) of every point and span within reach; the pose changes from the first of `to_body` to the second in one
     /// tick.
     fn touching(
         &mut self,
-        points: &[DVec3],
+        points: &[Span],
         to_body: &[DAffine3; 2],
         body: &Body,
-        out: &mut dyn FnMut(f64, f64, DVec3),
+        out: &mut dyn FnMut(f64, f64, f64, DVec3),
     ) {
         let hertz = 1.0 / f64::from(Settings::default().period_s);
-        for (i, &point) in points.iter().enumerate() {
-            let [before, after] = to_body.map(|to| to.transform_point3(point));
-            if self.distance[i] - after.distance(self.at[i]) > REACH_MM {
+        for (i, span) in points.iter().enumerate() {
+            let middle = to_body[1].transform_point3(span.at(0.0));
+            let reach = REACH_MM + span.reach();
+            if self.distance[i] - middle.distance(self.at[i]) > reach {
                 continue;
             }
+            let Some(nearest) = body.surface.nearest(middle) else {
+                continue;
+            };
+            (self.at[i], self.distance[i]) = (middle, nearest.distance);
+            if nearest.distance > reach {
+                continue;
+            }
+            let gap = |p: DVec3| {
+                body.surface
+                    .nearest(to_body[1].transform_point3(p))
+                    .map_or(f64::INFINITY, |n| n.distance)
+            };
+            let deepest = span.at(span.deepest(gap));
+            let [before, after] = to_body.map(|to| to.transform_point3(deepest));
             let Some(nearest) = body.surface.nearest(after) else {
                 continue;
             };
-            (self.at[i], self.distance[i]) = (after, nearest.distance);
             if nearest.distance > REACH_MM {
                 continue;
             }
@@ -156,7 +179,8 @@ impl Clear {
                 .map_or(nearest.distance, |was| was.distance);
             let outward = (after - nearest.point) * nearest.distance.signum();
             if let Some(normal) = outward.try_normalize() {
-                out(nearest.distance, hertz * (nearest.distance - was), normal);
+                let share = if span.reach() > 0.0 { STIFFNESS } else { 1.0 };
+                out(share, nearest.distance, hertz * (nearest.distance - was), normal);
             }
         }
     }

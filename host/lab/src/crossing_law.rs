@@ -8,7 +8,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use mortise_protocol::image::{EdgeRecord, oct_decode};
 use mortise_scenario::wire::vector;
 
-/// Stiffness of a crossing as a multiple of a point's.
+/// Stiffness of a crossing, and of a span, as a multiple of a point's.
 pub(crate) const STIFFNESS: f64 = 2.0;
 /// Sine of the smallest angle between edges that cross, and between two curved ones.
 const LEAST_SINE: f64 = 0.005;

@@ -33,6 +33,7 @@ pub mod rate;
 mod row;
 pub mod scene_p;
 mod separation;
+pub mod span;
 pub mod stability;
 mod step_text;
 pub mod study;

@@ -1,4 +1,4 @@
-//! The probe's branch and bound against every point in closed form: scene P at any pose, near and far, upright and tumbled.
+//! The probe's branch and bound against every point, and every span's deepest place, in closed form: scene P at any pose, near and far, upright and tumbled.
 //!
 //! Both parts have their origin at their centre and the hole along z. Distances here are those of the solids, in double precision; the points are
 //! those of the image, so that the shells' own error bound has no effect.
@@ -11,6 +11,7 @@ use mortise_bake::{Grabbable, bake};
 use mortise_brep::LoadOptions;
 use mortise_haptics::{Flags, Pose, Prober, Quat, Settings, Vec3};
 use mortise_lab::scene_p;
+use mortise_lab::span::Span;
 use mortise_lab::variant::Variant;
 use mortise_protocol::image::SceneImage;
 use proptest::prelude::*;
@@ -64,17 +65,19 @@ fn rounding_mm(position: Vec3) -> f64 {
     32.0 * f64::powi(2.0, -24) * (1e3 * f64::from(position.length()) + FARTHEST_MM)
 }
 
-/// Smallest distance over all points, in both directions, mm.
+/// Smallest distance over all points and spans, in both directions, mm.
 fn brute_force(scene: &SceneImage<'_>, position: Vec3, turn: Quat) -> f64 {
     let position = 1e3 * DVec3::from_array(position.to_array().map(f64::from));
     let turn = DQuat::from_array(turn.to_array().map(f64::from)).normalize();
-    let points = |part: u16| {
-        (scene.shape_of_part(usize::from(part)).points.iter())
-            .map(|point| 1e3 * DVec3::from_array(point.position.map(f64::from)))
+    let least = |part: u16, gap: &dyn Fn(DVec3) -> f64| {
+        let shape = scene.shape_of_part(usize::from(part));
+        let spans = shape.points.iter().map(|point| Span::of(point, shape.spans));
+        spans
+            .map(|span| gap(span.at(span.deepest(gap))))
+            .fold(f64::INFINITY, f64::min)
     };
-    let forward = points(PEG).map(|p| to_block(turn * p + position));
-    let backward = points(BLOCK).map(|p| to_peg(turn.inverse() * (p - position)));
-    forward.chain(backward).fold(f64::INFINITY, f64::min)
+    let forward = least(PEG, &|p| to_block(turn * p + position));
+    forward.min(least(BLOCK, &|p| to_peg(turn.inverse() * (p - position))))
 }
 
 /// Positions, m, and orientations.

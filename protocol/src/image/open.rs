@@ -25,6 +25,7 @@ const SECTION_PALETTE: u8 = 8;
 const SECTION_GRID: u8 = 9;
 const SECTION_BLOB: u8 = 10;
 const SECTION_EDGES: u8 = 11;
+const SECTION_SPANS: u8 = 12;
 
 /// A scene image, read in place.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +43,7 @@ pub struct SceneImage<'a> {
     grid: &'a [u16],
     blob: &'a [u8],
     edges: &'a [EdgeRecord],
+    spans: &'a [SpanRecord],
 }
 
 /// One shape of an image with its arrays.
@@ -59,6 +61,8 @@ pub struct Shape<'a> {
     pub edge_nodes: &'a [NodeRecord],
     /// Pieces of sharp convex edges.
     pub edges: &'a [EdgeRecord],
+    /// Spans of its points.
+    pub spans: &'a [SpanRecord],
     /// Local patches of faces without closed form.
     pub patches: &'a [PatchRecord],
     /// Signed distance.
@@ -124,6 +128,7 @@ impl<'a> SceneImage<'a> {
             grid: section(bytes, header.grid, SECTION_GRID)?,
             blob: section(bytes, header.blob, SECTION_BLOB)?,
             edges: section(bytes, header.edges, SECTION_EDGES)?,
+            spans: section(bytes, header.spans, SECTION_SPANS)?,
         };
         image.check()?;
         Ok(image)
@@ -156,6 +161,7 @@ impl<'a> SceneImage<'a> {
             faces: run(self.faces, record.first_face, record.face_count),
             edge_nodes: run(self.nodes, record.first_edge_node, record.edge_node_count),
             edges: run(self.edges, record.first_edge, record.edge_count),
+            spans: run(self.spans, record.first_span, record.span_count),
             patches: run(self.patches, record.first_patch, record.patch_count),
             field: Field {
                 record: field,
@@ -191,6 +197,7 @@ impl<'a> SceneImage<'a> {
                 && fits(shape.first_face, shape.face_count, self.faces.len())
                 && fits(shape.first_edge_node, shape.edge_node_count, self.nodes.len())
                 && fits(shape.first_edge, shape.edge_count, self.edges.len())
+                && fits(shape.first_span, shape.span_count, self.spans.len())
                 && shape.face_count <= u32::from(NO_FACE)
                 && fits(shape.first_patch, shape.patch_count, self.patches.len())
                 && finite(&shape.center)
@@ -255,6 +262,7 @@ impl<'a> SceneImage<'a> {
                     finite(&p.position)
                         && u32::from(p.face) < shape.face_count
                         && (p.edge_face == NO_FACE || u32::from(p.edge_face) < shape.face_count)
+                        && (p.span == NO_SPAN || u32::from(p.span) < shape.span_count)
                 });
             let edges = run(self.edges, shape.first_edge, shape.edge_count);
             let good = good && edges.iter().all(|e| is_edge(e, shape.face_count));
@@ -270,6 +278,9 @@ impl<'a> SceneImage<'a> {
         }
         each(self.patches, SECTION_PATCHES, |patch| {
             finite(&patch.origin) && finite(&patch.x) && finite(&patch.normal) && finite(&patch.height)
+        })?;
+        each(self.spans, SECTION_SPANS, |span| {
+            finite(&span.along) && finite(&span.bend) && (0.0..=1.0).contains(&span.round)
         })?;
         each(self.faces, SECTION_FACES, |face| {
             face.kind <= surface_kind::TORUS

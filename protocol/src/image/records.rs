@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// First eight bytes of every scene image.
 pub const MAGIC: [u8; 8] = *b"MORTISE\0";
 /// Version of this layout. Any change to a record or its meaning increments it.
-pub const LAYOUT_VERSION: u32 = 3;
+pub const LAYOUT_VERSION: u32 = 4;
 /// Cells along a brick's edge.
 pub const BRICK_CELLS: usize = 8;
 /// Samples along a brick's edge: the last layer repeats the neighbour's first (shared apron).
@@ -65,6 +65,8 @@ pub struct Header {
     pub blob: Section,
     /// [`super::EdgeRecord`]s.
     pub edges: Section,
+    /// [`SpanRecord`]s.
+    pub spans: Section,
 }
 
 /// The part may be grabbed and moved.
@@ -131,6 +133,10 @@ pub struct ShapeRecord {
     pub first_edge: u32,
     /// Number of pieces.
     pub edge_count: u32,
+    /// Spans of its points.
+    pub first_span: u32,
+    /// Number of spans.
+    pub span_count: u32,
 }
 
 /// Samples are `i8`.
@@ -423,7 +429,10 @@ impl NodeRecord {
     }
 }
 
-/// A sample of the exact surface.
+/// [`PointRecord::span`] of a point that stands for itself alone.
+pub const NO_SPAN: u16 = u16::MAX;
+
+/// A sample of the exact surface: a point, or the middle of a span of a sharp convex edge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PointRecord {
@@ -431,10 +440,28 @@ pub struct PointRecord {
     pub position: [f32; 3],
     /// Outward unit normal, octahedral (see [`oct_decode`]).
     pub normal: [i16; 2],
-    /// Face it lies on, counted from the shape's first face.
+    /// Its face, counted from the shape's first.
     pub face: u16,
     /// The second face if the point is on an edge, else [`NO_FACE`].
     pub edge_face: u16,
+    /// Its span, counted from the shape's first; [`NO_SPAN`]: none.
+    pub span: u16,
+    /// Zero.
+    pub reserved: u16,
+}
+
+/// A stretch of a sharp convex edge about a point m: x(u) = m + a·u + b·u²·(1 − k·(1 − u²)) for −1 ≤ u ≤ 1.
+///
+/// With k = |b|²/|a|² it follows a circle's arc of half angle θ and radius r within r·θ⁶/320.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SpanRecord {
+    /// a, m, shape frame.
+    pub along: [f32; 3],
+    /// b, m.
+    pub bend: [f32; 3],
+    /// k, from 0 to 1.
+    pub round: f32,
 }
 
 /// Kinds of surface in [`FaceRecord::kind`].
@@ -534,13 +561,14 @@ mod tests {
 
     #[test]
     fn records_have_the_documented_sizes() {
-        assert_eq!(size_of::<Header>(), 120);
+        assert_eq!(size_of::<Header>(), 128);
         assert_eq!(size_of::<PartRecord>(), 36);
-        assert_eq!(size_of::<ShapeRecord>(), 112);
+        assert_eq!(size_of::<ShapeRecord>(), 120);
         assert_eq!(size_of::<FieldRecord>(), 44);
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
-        assert_eq!(size_of::<PointRecord>(), 20);
+        assert_eq!(size_of::<PointRecord>(), 24);
+        assert_eq!(size_of::<SpanRecord>(), 28);
         assert_eq!(size_of::<super::super::EdgeRecord>(), 60);
         assert_eq!(size_of::<FaceRecord>(), 40);
         assert_eq!(size_of::<PatchRecord>(), 80);

@@ -118,11 +118,17 @@ pub fn bytes() -> Vec<u8> {
         normal: oct_encode([0.0, 0.0, 1.0]),
         face,
         edge_face,
+        span: NO_SPAN,
+        reserved: 0,
     };
     let points = [
         point([0.001, 0.001, 0.004], 0, NO_FACE),
         point([0.007, 0.001, 0.004], 1, NO_FACE),
-        point([0.004, 0.001, 0.004], 0, 1),
+        // The middle half of the edge.
+        PointRecord {
+            span: 0,
+            ..point([0.004, 0.0, 0.004], 0, 1)
+        },
         point([0.002, 0.0, 0.0], 0, 1),
     ];
     let node = |center: [f32; 3], radius: f32, first_point: u32, point_count: u32, skip: u32| NodeRecord {
@@ -135,7 +141,7 @@ pub fn bytes() -> Vec<u8> {
     let nodes = [
         node([0.004, 0.001, 0.004], 0.0031, 0, 3, 3),
         node([0.001, 0.001, 0.004], 0.0001, 0, 1, 2),
-        node([0.0055, 0.001, 0.004], 0.0016, 1, 2, 3),
+        node([0.0045, 0.001, 0.004], 0.0028, 1, 2, 3),
         node([0.002, 0.0, 0.0], 0.0001, 0, 1, 1),
         node([0.004, 0.0, 0.004], 0.0041, 0, 1, 1),
     ];
@@ -148,6 +154,10 @@ pub fn bytes() -> Vec<u8> {
         thickness: 0.004,
         edge: 0,
         radius: 0.004_001,
+    };
+    let span = SpanRecord {
+        along: [0.002, 0.0, 0.0],
+        ..SpanRecord::zeroed()
     };
     let plane = |origin: [f32; 3], axis: [f32; 3]| FaceRecord {
         kind: surface_kind::PLANE,
@@ -199,6 +209,8 @@ pub fn bytes() -> Vec<u8> {
             edge_node_count: 1,
             first_edge: 0,
             edge_count: 1,
+            first_span: 0,
+            span_count: 1,
         },
         ShapeRecord {
             field: 1,
@@ -240,6 +252,7 @@ pub fn bytes() -> Vec<u8> {
         grid: &grid,
         blob: &blob,
         edges: &[edge],
+        spans: &[span],
     }
     .image()
 }
@@ -309,6 +322,7 @@ pub fn occupancy_bytes() -> Vec<u8> {
         grid: &grid,
         blob: &voxels,
         edges: &[],
+        spans: &[],
     }
     .image()
 }
@@ -326,6 +340,7 @@ struct Sections<'a> {
     grid: &'a [u16],
     blob: &'a [u8],
     edges: &'a [EdgeRecord],
+    spans: &'a [SpanRecord],
 }
 
 impl Sections<'_> {
@@ -346,6 +361,7 @@ impl Sections<'_> {
             grid: section(&mut bytes, self.grid),
             blob: section(&mut bytes, self.blob),
             edges: section(&mut bytes, self.edges),
+            spans: section(&mut bytes, self.spans),
             ..Header::zeroed()
         };
         header.length = bytes.len() as u32;

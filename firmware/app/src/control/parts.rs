@@ -69,6 +69,8 @@ pub(super) struct Reports {
     pub fault: Option<(u32, Fault)>,
     pub statistics: Statistics,
     pub hash: StateHash,
+    /// Of the last tick's cost, what the simulation of the mechanism took.
+    pub simulated: u32,
 }
 
 impl Reports {
@@ -79,6 +81,7 @@ impl Reports {
             fault: None,
             statistics: Statistics::default(),
             hash: StateHash::new(),
+            simulated: 0,
         }
     }
 }

@@ -105,7 +105,7 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             guidance: output.map(|o| guidance_to_wire(&o.guidance)).unwrap_or_default(),
             pairs: output.map(|o| pairs_to_wire(&o.pairs)).unwrap_or_default(),
             // Measured last, so that it covers all work before it.
-            cost: self.clock.cost(),
+            cost: self.cost(),
         }
     }
 }

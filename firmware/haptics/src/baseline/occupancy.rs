@@ -124,6 +124,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             (contact.moving_face, contact.static_face) = (point.face, sample.faces[0]);
             (contact.moving_edge_face, contact.static_edge_face) = (point.edge_face, sample.faces[1]);
             contact.edges = [NO_FACE; 2];
+            contact.single = false;
             contact.leaf = leaf;
         }
         0.0

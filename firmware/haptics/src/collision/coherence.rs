@@ -135,7 +135,7 @@ impl Coherence {
     }
 
     /// Stored knowledge of a node, for points that come within the `horizon`. The nodes below an inner node have more precise entries than the node
-    /// itself: when its bound has expired, it counts as near.
+    /// itself: when its bound has expired, they are looked at, not the node's sphere.
     #[inline]
     pub fn query(&self, key: Key, horizon: u32, leaf: bool) -> Known {
         let slot = &self.slots[key.slot()];
@@ -157,6 +157,7 @@ impl Coherence {
         let requery = self.is_turn_of(key, QUERY_AGAIN);
         match (leaf, slot.near) {
             (false, _) if requery => Known::Nothing,
+            (false, 0) => Known::Expired,
             (false, _) => Known::Near(ALL),
             // Once in [`QUERY_AGAIN`] ticks the sphere is queried: it may show by now that the leaf is far.
             (true, 0) if requery || slot.bound_nm & BY_POINTS == 0 => Known::Nothing,

@@ -1,7 +1,6 @@
 //! Contacts of one tick: a bounded store that keeps the deepest contacts and the ones with the longest lever arms.
 
 use glam::Vec3;
-use mortise_protocol::image::NO_FACE;
 
 use crate::collision::node_cursor::NodeCursor;
 use crate::collision::side::Sides;
@@ -27,6 +26,8 @@ pub(crate) struct Contact {
     pub phase: Phase,
     /// Whether a target guides its faces.
     pub guided: bool,
+    /// Whether an edge meets a face, or another edge, in this one place.
+    pub single: bool,
     /// Face of the held part.
     pub moving_face: u16,
     /// Face of the other part.
@@ -51,6 +52,7 @@ impl Contact {
         rate: 0.0,
         phase: Phase::Free,
         guided: false,
+        single: false,
         moving_face: 0,
         static_face: 0,
         moving_edge_face: 0,
@@ -58,12 +60,6 @@ impl Contact {
         edges: [0; 2],
         leaf: NodeCursor::FIRST,
     };
-
-    /// Whether two edges cross in it.
-    #[inline]
-    pub fn is_crossing(&self) -> bool {
-        self.edges[0] != NO_FACE
-    }
 }
 
 /// Branch of a contact's piecewise linear force.

@@ -48,6 +48,8 @@ costs! {
     LOOKUP = QUERY_INSTRUCTIONS;
     /// Extra cost of a point at an edge.
     EDGE = 143;
+    /// Extra cost of a span of an edge: its parabola, and whether it may touch.
+    SPAN = 430;
     /// Extra cost of a point within the margin.
     NEAR = 135;
     /// Extra cost at guided parts: query for the faces' mating.
@@ -127,6 +129,7 @@ mod tests {
             counted.eq([
                 ("LOOKUP", 8),
                 ("EDGE", 6),
+                ("SPAN", 18),
                 ("NEAR", 6),
                 ("MATING", 2),
                 ("ALLOWANCE", 8),

@@ -1,11 +1,14 @@
 //! Directed pair: the tree of one part against the field of the other, with the transforms between their frames.
 
 use glam::{Mat3, Vec3};
-use mortise_protocol::image::{EdgeRecord, Field, NodeRecord, Place, PointRecord, Shape, Surfaces};
+use mortise_protocol::image::{
+    BRICK_CELLS, EdgeRecord, Field, FieldRecord, NodeRecord, Place, PointRecord, Shape, SpanRecord, Surfaces,
+};
 
 use crate::collision::exact_surface::exact;
 use crate::collision::node_key::Keys;
 use crate::collision::rules::ExcludedPairs;
+use crate::collision::span::Span;
 use crate::math::pose::Pose;
 
 /// Rounding error of a position in a field, relative to the lengths summed: eight roundings of 2⁻²⁴ at most.
@@ -23,10 +26,13 @@ pub(crate) struct DirectedPair<'i> {
     /// Keys of the nodes in the coherence tables.
     pub keys: Keys,
     pub points: &'i [PointRecord],
+    pub spans: &'i [SpanRecord],
     pub edges: EdgeTree<'i>,
     /// Edges of the field's shape.
     pub field_edges: EdgeTree<'i>,
     pub field: Field<'i>,
+    /// Record of the field of the tree's own shape.
+    pub own_field: &'i FieldRecord,
     /// Exact surfaces of the field's shape.
     pub surfaces: Surfaces<'i>,
     /// Tree frame to field frame.
@@ -93,10 +99,27 @@ impl<'i> DirectedPair<'i> {
         self.to_field.unapply(p).to_array()
     }
 
-    /// Position of a point of the tree in cells from the corner of the field's grid.
-    pub fn in_cells(&self, point: &PointRecord) -> [f32; 3] {
+    /// Lower bound of the distance between the two shapes, m, by the axes of the boxes of their fields: positive where one of them separates the boxes.
+    pub fn box_gap(&self) -> f32 {
+        let [field, tree] = [self.field.record(), self.own_field].map(|record| {
+            let half =
+                Vec3::from_array(record.brick_dims.map(f32::from)) * (0.5 * BRICK_CELLS as f32 * record.cell);
+            (Vec3::from_array(record.origin) + half, half)
+        });
+        let apart = self.to_field.apply(tree.0.to_array()) - field.0;
+        let turn = self.to_field.linear;
+        let sizes = Mat3::from_cols(turn.x_axis.abs(), turn.y_axis.abs(), turn.z_axis.abs());
+        let across_field = apart.abs() - field.1 - sizes * tree.1;
+        let across_tree = turn.transpose_mul_vec3(apart).abs() - tree.1 - sizes.transpose_mul_vec3(field.1);
+        let extent = apart.abs().element_sum() + self.to_field.offset.abs().element_sum();
+        across_field.max(across_tree).max_element() - ROUNDING * extent
+    }
+
+    /// Corners of a box that contains a point of the tree, or its span, in cells from the corner of the field's grid.
+    pub fn in_cells(&self, point: &PointRecord) -> [Vec3; 2] {
         let in_field = self.to_field.apply(point.position);
-        self.field.in_cells(in_field.to_array())
+        let half = Span::of(self, point).map_or(Vec3::ZERO, |span| span.half_size());
+        [in_field - half, in_field + half].map(|p| Vec3::from_array(self.field.in_cells(p.to_array())))
     }
 
     /// The one surface named by every cell within `clearance_m` of any of these points of the tree, if there is only one; at most `reads` reads, counted
@@ -117,7 +140,8 @@ impl<'i> DirectedPair<'i> {
                 };
                 face = Some(cell.surface()?);
             }
-            (low, high) = (low.min(in_field), high.max(in_field));
+            let half = Span::of(self, point).map_or(Vec3::ZERO, |span| span.half_size());
+            (low, high) = (low.min(in_field - half), high.max(in_field + half));
         }
         let extent = self.field.extent_m() + self.to_field.offset.abs().element_sum();
         let clearance = Vec3::splat(clearance_m + ROUNDING * extent);
@@ -159,9 +183,11 @@ impl<'i> DirectedPair<'i> {
             nodes: tree.nodes,
             keys: Keys::new(index, tree.nodes.len() + tree.edge_nodes.len()),
             points: tree.points,
+            spans: tree.spans,
             edges: EdgeTree::of(tree),
             field_edges: EdgeTree::of(field),
             field: field.field,
+            own_field: tree.field.record(),
             surfaces: field.surfaces(),
             to_field,
             to_arm: Affine {

@@ -78,6 +78,13 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             let key = pair.keys.of(here.node);
             let leaf = node.skip == index + 1;
             let known = self.coherence.query(key, self.horizon, false);
+            if index == 0
+                && let Some(bound) = self.boxes_apart(pair, key, known)
+            {
+                ancestors.note(bound);
+                index = node.skip;
+                continue;
+            }
             let mut distance = f32::NEG_INFINITY;
             match known {
                 Known::Far(bound) if !self.due(key, bound, leaf, early) => {
@@ -325,6 +332,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         [contact.moving_face, contact.moving_edge_face] = own.faces;
         [contact.static_face, contact.static_edge_face] = other.faces;
         contact.edges = edges;
+        contact.single = true;
         contact.leaf = leaf;
     }
 }

@@ -76,6 +76,39 @@ pub(crate) fn signed(face: &FaceRecord, p: Vec3) -> Option<(f32, Vec3)> {
     Some((natural * face.sense, normal * face.sense))
 }
 
+/// vᵀ·H·v, with the Hessian H of the signed distance to `face` at `p`, where it is as `found`, m for `v` in m; `None` for a face without closed form
+/// and where the foot is not unique. About 40 instructions on a Cortex-M7 but for cones and tori.
+#[inline]
+pub(crate) fn bending(face: &FaceRecord, p: Vec3, found: &OnFace, v: Vec3) -> Option<f32> {
+    let squared = v.length_squared();
+    let natural = found.distance * face.sense;
+    let across = found.normal.dot(v);
+    let axis = Vec3::from_array(face.axis);
+    match face.kind {
+        surface_kind::PLANE => Some(0.0),
+        surface_kind::SPHERE => Some((squared - across * across) * face.sense / (natural + face.radius)),
+        surface_kind::CYLINDER => {
+            let axial = axis.dot(v);
+            let around = squared - across * across - axial * axial;
+            Some(around * face.sense / (natural + face.radius))
+        }
+        surface_kind::CONE | surface_kind::TORUS => {
+            let from = p - Vec3::from_array(face.origin);
+            let (r, out) = polar(from - axis * from.dot(axis))?;
+            let (radial, axial) = (out.dot(v), axis.dot(v));
+            // Square of the component round the axis.
+            let around = squared - radial * radial - axial * axial;
+            let outward = found.normal.dot(out) / r;
+            if face.kind == surface_kind::CONE {
+                return Some(around * outward);
+            }
+            let in_section = squared - around - across * across;
+            Some(in_section * face.sense / (natural + face.second) + around * outward)
+        }
+        _ => None,
+    }
+}
+
 /// Length and direction of `v`, unless it is zero.
 #[inline]
 fn polar(v: Vec3) -> Option<(f32, Vec3)> {
@@ -443,6 +476,52 @@ mod tests {
             let at = |p: Vec3| distance(surfaces, 0, p).expect("a closed form");
             let beside = at(center + Vec3::new(1.5e-6, 1.5e-6, 0.0));
             assert!((at(center) - beside).abs() < 3e-6, "{} at {center}", face.kind);
+        }
+    }
+
+    /// The Hessian agrees with second differences of the distance.
+    #[test]
+    fn bending_is_the_second_derivative() {
+        for (kind, second) in [
+            (surface_kind::PLANE, 0.0),
+            (surface_kind::CYLINDER, 0.0),
+            (surface_kind::CONE, 0.3),
+            (surface_kind::SPHERE, 0.0),
+            (surface_kind::TORUS, 0.002),
+        ] {
+            let face = FaceRecord {
+                kind,
+                second,
+                ..cylinder(-1.0)
+            };
+            let (p, v) = (
+                Vec3::new(0.012, -0.004, 0.003),
+                Vec3::new(0.3e-3, 0.5e-3, -0.4e-3),
+            );
+            let at = |u: f32| {
+                f64::from(
+                    distance(
+                        Surfaces {
+                            faces: &[face],
+                            patches: &[],
+                        },
+                        0,
+                        p + v * u,
+                    )
+                    .unwrap(),
+                )
+            };
+            let differences = at(1.0) - 2.0 * at(0.0) + at(-1.0);
+            let surfaces = Surfaces {
+                faces: &[face],
+                patches: &[],
+            };
+            let found = f64::from(bending(&face, p, &on_surface_of(surfaces, 0, p).unwrap(), v).unwrap());
+            // Rounding of distances of a centimetre, and fourth derivatives.
+            assert!(
+                (found - differences).abs() < 6e-9 + 0.02 * found.abs(),
+                "{kind}: {found} {differences}"
+            );
         }
     }
 

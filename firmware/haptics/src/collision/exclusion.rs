@@ -25,6 +25,7 @@ use crate::collision::cost::{EXCLUSION, EXCLUSION_READS, LOOKUP};
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::rules::{FacePairRules, MAX_EXCLUDED, holds};
 use crate::collision::search::Traversal;
+use crate::collision::span::Span;
 
 /// Distance around a leaf's points within which cells must name the mating face only, in cells: half a brick, or else the next cell.
 const FAR_CELLS: f32 = 4.0;
@@ -64,13 +65,13 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             if last.replace(own(point)) != Some(own(point)) {
                 mates = mates_of(pair, point);
             }
-            let at = Vec3::from_array(pair.in_cells(point));
-            if !mates.is_empty() && only([at; 2], NEXT_CELLS, &mates) {
+            if !mates.is_empty() && only(pair.in_cells(point), NEXT_CELLS, &mates) {
                 continue;
             }
             // Not on a mating face, or near another face: use the distance to the field's shape.
             looked_up += 1;
-            let far = pair.distance(point.position) / cell - EDGE_ERROR_CELLS;
+            let reach = Span::of(pair, point).map_or(0.0, |span| span.reach());
+            let far = (pair.distance(point.position) - reach) / cell - EDGE_ERROR_CELLS;
             if far < clear {
                 clear = far;
             }
@@ -129,7 +130,6 @@ fn mates(pair: &DirectedPair<'_>, points: &[PointRecord]) -> Option<Vec<u16, MAX
 
 /// Bounding box of the points, in cells of the field.
 fn bounds(pair: &DirectedPair<'_>, points: &[PointRecord]) -> Option<[Vec3; 2]> {
-    let mut all = points.iter().map(|point| Vec3::from_array(pair.in_cells(point)));
-    let first = all.next()?;
-    Some(all.fold([first; 2], |[low, high], at| [low.min(at), high.max(at)]))
+    let all = points.iter().map(|point| pair.in_cells(point));
+    all.reduce(|[low, high], [from, to]| [low.min(from), high.max(to)])
 }

@@ -1,6 +1,6 @@
 //! Evaluation of one leaf: the choice of points to query, and the advancement bound stored for the rest.
 
-use mortise_protocol::image::PointRecord;
+use mortise_protocol::image::{NO_SPAN, PointRecord};
 
 use crate::collision::coherence::Bound;
 use crate::collision::cost::{CACHED_POINT, FIND_FACE, LOOKUP, NOTED};
@@ -11,6 +11,7 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Key, Points};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
+use crate::collision::span::Span;
 
 /// Leaves per tick whose decimated points are queried for their distance.
 const MAX_DECIMATED_QUERIES: u32 = 8;
@@ -71,7 +72,8 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let count = (self.left() as usize).min(points.len());
         let mut scan = LeafScan::new(self.search.near());
         for point in points.iter().take(count) {
-            scan.add(pair.distance(point.position));
+            let reach = Span::of(pair, point).map_or(0.0, |span| span.reach());
+            scan.add(pair.distance(point.position) - reach);
         }
         self.selected_points(pair, leaf, points, scan.near & mask);
         let before = self.spent;
@@ -144,6 +146,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         point: &PointRecord,
         face: u16,
     ) -> f32 {
+        if point.span != NO_SPAN {
+            return self.span(pair, leaf, point, Some(face));
+        }
         let in_field = pair.to_field.apply(point.position);
         match on_surface_of(pair.surfaces, face, in_field) {
             Some(found) => {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `search`, `leaf` | traversal of all trees within a work budget; the points of one leaf |
 //! | `edge_search`, `edge_crossing` | edges of one part against edges of the other; contact of two edges |
+//! | `span` | lowest place of a span of an edge over the other part's surface |
 //! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
 //! | `exact_surface`, `patch`, `facing` | distance to exact surfaces, and to local patches of free-form ones; normals that rule out a contact |
 //! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
@@ -33,3 +34,4 @@ pub(crate) mod placement;
 pub(crate) mod rules;
 pub(crate) mod search;
 pub(crate) mod side;
+pub(crate) mod span;

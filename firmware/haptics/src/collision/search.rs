@@ -15,23 +15,26 @@
 //! Cost: see [`crate::tick()`]; field queries are two thirds of it.
 
 use glam::Vec3;
-use mortise_protocol::image::{Cell, EDGE_ERROR_CELLS, NO_FACE, Place, PointRecord, SceneImage, Shape};
+use mortise_protocol::image::{
+    Cell, EDGE_ERROR_CELLS, NO_FACE, NO_SPAN, Place, PointRecord, SceneImage, Shape,
+};
 
 use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
-    ALLOWANCE, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, Used,
+    ALLOWANCE, CACHED_POINT, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, SPAN, Used,
 };
 use crate::collision::decimation::mask;
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, exact, exact_on_face, on_surface_of, with_allowance};
 use crate::collision::facing::faces_away;
 use crate::collision::node_cursor::NodeCursor;
-use crate::collision::node_key::{ALL, SHORTEST_SHARE};
+use crate::collision::node_key::{ALL, Key, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
+use crate::collision::span::{Course, IN_TICK, Span, moved, near_at};
 use crate::io::{Flags, Work};
 use crate::math::pose::Pose;
 use crate::math::scalar::inverse_sqrt;
@@ -43,6 +46,10 @@ const LEAST_GRADIENT2: f32 = 0.01;
 /// Safety factor on the approach predicted by either motion. The motion at the tick's end lies between the last motion and the one without contacts,
 /// or is turned by the contacts: the end of a rod struck at the other end moves half as fast again.
 pub(crate) const APPROACH: f32 = 2.0;
+/// Angle by which the normal of a surface turns along half a span, rad: as far as the span itself turns.
+const SPAN_TURN: f32 = 0.4;
+/// Places of a span that are looked at where its middle is outside of all cells.
+const PLACES: u32 = 5;
 /// Points whose bound would expire within this many more ticks like the last one count as near and are queried every tick: evaluating the whole leaf
 /// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
@@ -105,6 +112,15 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             }
         }
         APPROACH * fastest
+    }
+
+    /// Whether a place of the span of `point` at least `gap` (m) from a surface of normal `normal` (field frame, at the span's middle) may be a candidate.
+    #[inline]
+    fn may_touch(&self, pair: &DirectedPair<'_>, point: &PointRecord, gap: f32, normal: Vec3) -> bool {
+        let (n, arm) = (pair.to_push * normal, pair.to_arm.apply(point.position));
+        let turn = arm.cross(n) * self.inverse_length;
+        let approach = self.approach(&[n.x, n.y, n.z, turn.x, turn.y, turn.z]);
+        gap < self.slack + approach + APPROACH * SPAN_TURN * (self.margin - self.slack)
     }
 
     /// Fills `contacts`, starting at `start` and wrapping round. Returns where to resume if the budget ran out, and the cost.
@@ -296,7 +312,15 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             let key = keys.of(index);
             let mut queried = false;
             let mut near = ALL;
-            match self.coherence.query(key, self.horizon, node.skip == index + 1) {
+            let known = self.coherence.query(key, self.horizon, node.skip == index + 1);
+            if index == 0
+                && let Some(bound) = self.boxes_apart(pair, key, known)
+            {
+                ancestors.note(bound);
+                index = node.skip;
+                continue;
+            }
+            match known {
                 Known::Far(bound) => {
                     self.spent += PASSED_OVER;
                     ancestors.note(bound);
@@ -362,12 +386,109 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         None
     }
 
+    /// The bound of a tree's root whose own is not known any more, where the boxes of the two shapes are apart: else all nodes below would be looked at.
+    pub fn boxes_apart(&mut self, pair: &DirectedPair<'_>, root: Key, known: Known) -> Option<Bound> {
+        if !matches!(known, Known::Expired | Known::Nothing) {
+            return None;
+        }
+        self.spent += NODE;
+        let gap = pair.box_gap();
+        (gap > self.search.margin).then(|| self.coherence.set_distance(root, gap))
+    }
+
     /// Queries one point and offers it as a contact if it lies within the margin. Returns its gap or a lower bound of it, m.
     #[inline(always)]
     pub fn point(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         if pair.field.is_occupancy() {
             return self.voxel(pair, leaf, point);
         }
+        if point.span != NO_SPAN {
+            return self.span(pair, leaf, point, None);
+        }
+        self.place(pair, leaf, point)
+    }
+
+    /// As [`Self::point`], for a span of an edge: its lowest place is offered. `face`: the only one near the span, if known.
+    #[inline(never)]
+    pub fn span(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        face: Option<u16>,
+    ) -> f32 {
+        let Some(span) = Span::of(pair, point) else {
+            return self.alone(pair, leaf, point);
+        };
+        self.spent += SPAN;
+        let Some(first) = near_at(pair, face, span.middle()) else {
+            return self.apart(pair, leaf, point, &span);
+        };
+        let course = Course::new(pair, &span, first);
+        let bound = course.lower_bound(&span, face.is_some());
+        if bound > self.search.margin || !self.search.may_touch(pair, point, bound, first.found.normal) {
+            return bound;
+        }
+        self.lowest(pair, leaf, point, (&span, &course), face)
+    }
+
+    /// As [`Self::span`], where the middle is outside of all cells: of [`PLACES`] places of the span the nearest is offered.
+    #[inline(never)]
+    fn apart(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord, span: &Span) -> f32 {
+        let bound = pair.distance(point.position) - span.reach();
+        if bound > self.search.margin {
+            return bound;
+        }
+        let mut nearest = (f32::INFINITY, 0.0);
+        for k in 0..PLACES {
+            self.spent += LOOKUP;
+            let u = (2 * k + 1) as f32 / PLACES as f32 - 1.0;
+            let distance = pair.distance(moved(pair, point, u).position);
+            if distance < nearest.0 {
+                nearest = (distance, u);
+            }
+        }
+        if nearest.0 < self.search.margin {
+            return self.alone(pair, leaf, &moved(pair, point, nearest.1));
+        }
+        nearest.0 - span.longest(1.0 / PLACES as f32)
+    }
+
+    /// Offers the lowest place of a span.
+    #[inline(never)]
+    fn lowest(
+        &mut self,
+        pair: &DirectedPair<'_>,
+        leaf: NodeCursor,
+        point: &PointRecord,
+        (span, course): (&Span, &Course),
+        face: Option<u16>,
+    ) -> f32 {
+        let price = if face.is_some() { CACHED_POINT } else { LOOKUP };
+        let (u, lowest) = course.lowest(span, IN_TICK, |p| {
+            self.spent += price;
+            near_at(pair, face, p)
+        });
+        let at = moved(pair, point, u);
+        if !lowest.alone {
+            self.spent += LOOKUP;
+            return self.alone(pair, leaf, &at);
+        }
+        if lowest.found.distance < self.search.margin {
+            self.near(pair, leaf, &at, &lowest.found);
+        }
+        lowest.found.distance
+    }
+
+    /// As [`Self::place`], out of line.
+    #[inline(never)]
+    fn alone(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
+        self.place(pair, leaf, point)
+    }
+
+    /// As [`Self::point`], for one place.
+    #[inline(always)]
+    fn place(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         let in_field = pair.to_field.apply(point.position);
         match pair.field.place(in_field.to_array()) {
             Place::Cell(cell) => {
@@ -467,6 +588,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             return;
         };
         contact.guided = mating.guided;
+        contact.single = point.span != NO_SPAN;
         (contact.moving_face, contact.static_face) = (moving[0], fixed[0]);
         (contact.moving_edge_face, contact.static_edge_face) = if pair.backward {
             (found.edge_face, point.edge_face)

@@ -33,8 +33,8 @@ const LANDING_SHARE: f32 = 0.8;
 /// Solves after which only [`RATE_BAND_M_PER_S`] applies, since a contact that has not settled by then at the finer bands may never do so.
 const ROUGH_SOLVES: u8 = 4;
 
-/// Stiffness of two edges that cross, as a multiple of a point's: they meet in one place, where faces meet in many points.
-const CROSSING: f32 = 2.0;
+/// Stiffness where an edge meets a face or another edge, as a multiple of a point's: in one place, where faces meet in many points.
+const SINGLE: f32 = 2.0;
 
 /// Stiffness of contacts, N/m.
 #[derive(Clone, Copy, Debug)]
@@ -43,8 +43,8 @@ pub(crate) struct Stiffness {
     pub point: f32,
     /// Stiffness of one point between guided faces.
     pub guided: f32,
-    /// Stiffness of two edges that cross.
-    pub crossing: f32,
+    /// Stiffness where an edge meets a face or another edge in one place.
+    pub single: f32,
 }
 
 impl Stiffness {
@@ -53,7 +53,7 @@ impl Stiffness {
         Self {
             point,
             guided: point * guided_share,
-            crossing: CROSSING * point,
+            single: SINGLE * point,
         }
     }
 
@@ -61,8 +61,8 @@ impl Stiffness {
     fn of(&self, c: &Contact) -> f32 {
         if c.guided {
             self.guided
-        } else if c.is_crossing() {
-            self.crossing
+        } else if c.single {
+            self.single
         } else {
             self.point
         }

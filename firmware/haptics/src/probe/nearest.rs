@@ -9,16 +9,22 @@
 
 use glam::Vec3;
 use mortise_protocol::image::{
-    Cell, EDGE_ERROR_CELLS, NO_FACE, Nearby, NodeRecord, Place, PointRecord, Shape,
+    Cell, EDGE_ERROR_CELLS, NO_FACE, NO_SPAN, Nearby, NodeRecord, Place, PointRecord, Shape,
 };
 
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
+use crate::collision::span::{Course, Effort, Span, moved, near_at};
 use crate::io::Work;
 use crate::math::scalar::larger;
 
+/// The search along a span ends at the rounding of positions.
+const ALONG_SPAN: Effort = Effort {
+    steps: 12,
+    least_gain_m: 0.01e-6,
+};
 /// Diagonal of a cell, cells: interpolation this far below the band's end uses no clamped sample.
 const DIAGONAL_CELLS: f32 = 1.733;
 
@@ -192,14 +198,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                     return;
                 }
             }
-            for point in leaf.points {
-                let sample = search.sample(point);
-                if sample.overlaps {
-                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
-                }
-                search.take(&sample, point, progress);
-            }
-            progress.work.points += leaf.points.len() as u32;
+            search.evaluate(&leaf, progress, contacts);
         });
     }
 
@@ -220,15 +219,53 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             if !leaf.beyond {
                 return;
             }
-            for point in leaf.points {
-                let sample = search.sample(point);
-                if sample.overlaps {
-                    contacts.one(search.pair, leaf.node, point, search.found(&sample, point));
-                }
-                search.take(&sample, point, progress);
-            }
-            progress.work.points += leaf.points.len() as u32;
+            search.evaluate(&leaf, progress, contacts);
         });
+    }
+
+    /// Takes the points of a leaf, spans at their lowest place, and offers the overlapping ones.
+    fn evaluate(
+        &self,
+        leaf: &PendingLeaf<'i>,
+        progress: &mut Progress,
+        contacts: &mut Traversal<'_, '_, '_, impl FacePairRules>,
+    ) {
+        for point in leaf.points {
+            let point = &self.lowest(point, progress.limit());
+            let sample = self.sample(point);
+            if sample.overlaps {
+                contacts.one(self.pair, leaf.node, point, self.found(&sample, point));
+            }
+            self.take(&sample, point, progress);
+        }
+        progress.work.points += leaf.points.len() as u32;
+    }
+
+    /// The point, or the lowest place of its span, if that can be nearer than `limit`, m.
+    #[inline]
+    fn lowest(&self, point: &PointRecord, limit: f32) -> PointRecord {
+        let alone = PointRecord {
+            span: NO_SPAN,
+            ..*point
+        };
+        let Some(span) = Span::of(self.pair, point) else {
+            return alone;
+        };
+        let Some(first) = near_at(self.pair, None, span.middle()) else {
+            return alone;
+        };
+        if first.found.distance - span.reach() > limit {
+            return alone;
+        }
+        let near = |p| near_at(self.pair, None, p);
+        let (mut u, lowest) = Course::new(self.pair, &span, first).lowest(&span, ALONG_SPAN, near);
+        if lowest.found.distance < 0.0 {
+            u = span.deepest((u, lowest.found.distance), near);
+        }
+        PointRecord {
+            span: NO_SPAN,
+            ..moved(self.pair, point, u)
+        }
     }
 
     /// Descends by the nearer child to one leaf, and takes the point of it that seems nearest. Terminates because every step goes forward.

@@ -360,6 +360,7 @@ impl Prober {
             (contact.moving_face, contact.static_face) = (nearest.moving_face, nearest.fixed_face);
             (contact.moving_edge_face, contact.static_edge_face) = (NO_FACE, NO_FACE);
             contact.edges = [NO_FACE; 2];
+            contact.single = false;
             contact.leaf = NodeCursor::FIRST;
         }
     }

@@ -98,6 +98,8 @@ impl Writer {
             normal: oct_encode(p.normal.map(|x| x as f32)),
             face: p.face,
             edge_face: p.edge_face.unwrap_or(NO_FACE),
+            span: NO_SPAN,
+            reserved: 0,
         }));
         let first_face = self.faces.len() as u32;
         let surfaces = self.surfaces;
@@ -320,6 +322,7 @@ impl Writer {
         header.grid = section(&mut bytes, &self.grid);
         header.blob = section(&mut bytes, &self.blob);
         header.edges = section::<EdgeRecord>(&mut bytes, &[]);
+        header.spans = section::<SpanRecord>(&mut bytes, &[]);
         pad(&mut bytes);
         header.length = bytes.len() as u32;
         bytes[..size_of::<Header>()].copy_from_slice(bytes_of(&header));
