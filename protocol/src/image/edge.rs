@@ -1,4 +1,4 @@
-//! Pieces of sharp convex edges.
+//! Pieces and spans of sharp convex edges.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -31,4 +31,21 @@ impl EdgeRecord {
     pub fn is_straight(&self) -> bool {
         self.bend == [0.0; 3]
     }
+}
+
+/// [`super::PointRecord::span`] of a point that stands for itself alone.
+pub const NO_SPAN: u16 = u16::MAX;
+
+/// A stretch of a sharp convex edge about a point m: x(u) = m + a·u + b·u²·(1 − k·(1 − u²)) for −1 ≤ u ≤ 1.
+///
+/// With k = |b|²/|a|² it follows a circle's arc of half angle θ and radius r within r·θ⁶/320.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SpanRecord {
+    /// a, m, shape frame.
+    pub along: [f32; 3],
+    /// b, m.
+    pub bend: [f32; 3],
+    /// k, from 0 to 1.
+    pub round: f32,
 }

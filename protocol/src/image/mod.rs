@@ -4,7 +4,7 @@
 //! offset, index and number once; after that the accessors cannot go out of bounds, for any input bytes. `docs/scene-image.md` is the specification.
 //!
 //! ```text
-//! header | parts | shapes | fields | nodes | points | faces | patches | bricks | palette | grid | blob | edges
+//! header | parts | shapes | fields | nodes | points | faces | patches | bricks | palette | grid | blob | edges | spans
 //! ```
 //!
 //! A **shape** is geometry in its own frame: a signed-distance **field** or voxmap (dense grid of bricks, sparse brick
@@ -20,7 +20,7 @@ mod records;
 mod region;
 mod surfaces;
 
-pub use edge::EdgeRecord;
+pub use edge::{EdgeRecord, NO_SPAN, SpanRecord};
 pub use error::ImageError;
 pub use field::{Cell, EDGE_ERROR_CELLS, Field, FieldSample, Lookup, Place};
 pub use occupancy::{VOXEL_BRICK_BYTES, Voxel, VoxelSample};

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, try_cast_slice};
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-use super::edge::EdgeRecord;
+use super::edge::{EdgeRecord, NO_SPAN, SpanRecord};
 use super::error::ImageError;
 use super::field::Field;
 use super::occupancy::VOXEL_BRICK_BYTES;

@@ -65,7 +65,7 @@ pub struct Header {
     pub blob: Section,
     /// [`super::EdgeRecord`]s.
     pub edges: Section,
-    /// [`SpanRecord`]s.
+    /// [`super::SpanRecord`]s.
     pub spans: Section,
 }
 
@@ -429,9 +429,6 @@ impl NodeRecord {
     }
 }
 
-/// [`PointRecord::span`] of a point that stands for itself alone.
-pub const NO_SPAN: u16 = u16::MAX;
-
 /// A sample of the exact surface: a point, or the middle of a span of a sharp convex edge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -444,24 +441,10 @@ pub struct PointRecord {
     pub face: u16,
     /// The second face if the point is on an edge, else [`NO_FACE`].
     pub edge_face: u16,
-    /// Its span, counted from the shape's first; [`NO_SPAN`]: none.
+    /// Its span, counted from the shape's first; [`super::NO_SPAN`]: none.
     pub span: u16,
     /// Zero.
     pub reserved: u16,
-}
-
-/// A stretch of a sharp convex edge about a point m: x(u) = m + a·u + b·u²·(1 − k·(1 − u²)) for −1 ≤ u ≤ 1.
-///
-/// With k = |b|²/|a|² it follows a circle's arc of half angle θ and radius r within r·θ⁶/320.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct SpanRecord {
-    /// a, m, shape frame.
-    pub along: [f32; 3],
-    /// b, m.
-    pub bend: [f32; 3],
-    /// k, from 0 to 1.
-    pub round: f32,
 }
 
 /// Kinds of surface in [`FaceRecord::kind`].
@@ -568,7 +551,7 @@ mod tests {
         assert_eq!(size_of::<BrickRecord>(), 16);
         assert_eq!(size_of::<NodeRecord>(), 28);
         assert_eq!(size_of::<PointRecord>(), 24);
-        assert_eq!(size_of::<SpanRecord>(), 28);
+        assert_eq!(size_of::<super::super::SpanRecord>(), 28);
         assert_eq!(size_of::<super::super::EdgeRecord>(), 60);
         assert_eq!(size_of::<FaceRecord>(), 40);
         assert_eq!(size_of::<PatchRecord>(), 80);

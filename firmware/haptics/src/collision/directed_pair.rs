@@ -8,7 +8,7 @@ use mortise_protocol::image::{
 use crate::collision::exact_surface::exact;
 use crate::collision::node_key::Keys;
 use crate::collision::rules::ExcludedPairs;
-use crate::collision::span::Span;
+use crate::collision::span::{Span, weight};
 use crate::math::pose::Pose;
 
 /// Rounding error of a position in a field, relative to the lengths summed: eight roundings of 2⁻²⁴ at most.
@@ -99,6 +99,29 @@ impl<'i> DirectedPair<'i> {
         self.to_field.unapply(p).to_array()
     }
 
+    /// The span of a point of the tree, in the frame of the field; `None` for a point that stands for itself alone.
+    #[inline(always)]
+    pub fn span(&self, point: &PointRecord) -> Option<Span> {
+        let record = self.spans.get(usize::from(point.span))?;
+        Some(Span::placed(
+            record,
+            self.to_field.apply(point.position),
+            &self.to_field.linear,
+        ))
+    }
+
+    /// The `point`, which is the middle of a span, moved to `u` on it.
+    pub fn moved(&self, point: &PointRecord, u: f32) -> PointRecord {
+        let mut at = Vec3::from_array(point.position);
+        if let Some(span) = self.spans.get(usize::from(point.span)) {
+            at += Vec3::from_array(span.along) * u + Vec3::from_array(span.bend) * weight(span.round, u);
+        }
+        PointRecord {
+            position: at.to_array(),
+            ..*point
+        }
+    }
+
     /// Lower bound of the distance between the two shapes, m, by the axes of the boxes of their fields: positive where one of them separates the boxes.
     pub fn box_gap(&self) -> f32 {
         let [field, tree] = [self.field.record(), self.own_field].map(|record| {
@@ -118,7 +141,7 @@ impl<'i> DirectedPair<'i> {
     /// Corners of a box that contains a point of the tree, or its span, in cells from the corner of the field's grid.
     pub fn in_cells(&self, point: &PointRecord) -> [Vec3; 2] {
         let in_field = self.to_field.apply(point.position);
-        let half = Span::of(self, point).map_or(Vec3::ZERO, |span| span.half_size());
+        let half = self.span(point).map_or(Vec3::ZERO, |span| span.half_size());
         [in_field - half, in_field + half].map(|p| Vec3::from_array(self.field.in_cells(p.to_array())))
     }
 
@@ -140,7 +163,7 @@ impl<'i> DirectedPair<'i> {
                 };
                 face = Some(cell.surface()?);
             }
-            let half = Span::of(self, point).map_or(Vec3::ZERO, |span| span.half_size());
+            let half = self.span(point).map_or(Vec3::ZERO, |span| span.half_size());
             (low, high) = (low.min(in_field - half), high.max(in_field + half));
         }
         let extent = self.field.extent_m() + self.to_field.offset.abs().element_sum();

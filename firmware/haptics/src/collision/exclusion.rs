@@ -25,7 +25,6 @@ use crate::collision::cost::{EXCLUSION, EXCLUSION_READS, LOOKUP};
 use crate::collision::directed_pair::DirectedPair;
 use crate::collision::rules::{FacePairRules, MAX_EXCLUDED, holds};
 use crate::collision::search::Traversal;
-use crate::collision::span::Span;
 
 /// Distance around a leaf's points within which cells must name the mating face only, in cells: half a brick, or else the next cell.
 const FAR_CELLS: f32 = 4.0;
@@ -70,7 +69,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
             }
             // Not on a mating face, or near another face: use the distance to the field's shape.
             looked_up += 1;
-            let reach = Span::of(pair, point).map_or(0.0, |span| span.reach());
+            let reach = pair.span(point).map_or(0.0, |span| span.reach());
             let far = (pair.distance(point.position) - reach) / cell - EDGE_ERROR_CELLS;
             if far < clear {
                 clear = far;

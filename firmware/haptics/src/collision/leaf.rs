@@ -11,7 +11,6 @@ use crate::collision::node_cursor::NodeCursor;
 use crate::collision::node_key::{ALL, Key, Points};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
-use crate::collision::span::Span;
 
 /// Leaves per tick whose decimated points are queried for their distance.
 const MAX_DECIMATED_QUERIES: u32 = 8;
@@ -72,7 +71,7 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         let count = (self.left() as usize).min(points.len());
         let mut scan = LeafScan::new(self.search.near());
         for point in points.iter().take(count) {
-            let reach = Span::of(pair, point).map_or(0.0, |span| span.reach());
+            let reach = pair.span(point).map_or(0.0, |span| span.reach());
             scan.add(pair.distance(point.position) - reach);
         }
         self.selected_points(pair, leaf, points, scan.near & mask);

@@ -7,6 +7,7 @@
 //! | `span` | lowest place of a span of an edge over the other part's surface |
 //! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
 //! | `exact_surface`, `patch`, `facing` | distance to exact surfaces, and to local patches of free-form ones; normals that rule out a contact |
+//! | `span`, `span_search` | spans of sharp edges: the distance along one, and the place of it that touches |
 //! | `coherence`, `node_key`, `ancestors`, `face_cache` | advancement bounds and cached faces kept from earlier ticks |
 //! | `rules`, `exclusion` | constraint rules for face pairs; leaves that contact exclusions keep apart |
 //! | `cost`, `decimation` | cost model of the work budget; decimation of points when the budget does not suffice |
@@ -35,3 +36,4 @@ pub(crate) mod rules;
 pub(crate) mod search;
 pub(crate) mod side;
 pub(crate) mod span;
+pub(crate) mod span_search;

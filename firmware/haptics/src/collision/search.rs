@@ -23,7 +23,7 @@ use crate::collision::ancestors::Ancestors;
 use crate::collision::coherence::{Bound, Coherence, Known};
 use crate::collision::contact::{Contact, Contacts, Phase};
 use crate::collision::cost::{
-    ALLOWANCE, CACHED_POINT, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, SPAN, Used,
+    ALLOWANCE, CANDIDATE, EDGE, LEAF, LOOKUP, MATING, NEAR, NODE, PASSED_OVER, Used,
 };
 use crate::collision::decimation::mask;
 use crate::collision::directed_pair::DirectedPair;
@@ -34,7 +34,6 @@ use crate::collision::node_key::{ALL, Key, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
-use crate::collision::span::{Course, IN_TICK, Span, moved, near_at};
 use crate::io::{Flags, Work};
 use crate::math::pose::Pose;
 use crate::math::scalar::inverse_sqrt;
@@ -42,14 +41,10 @@ use crate::math::symmetric6::dot;
 
 /// Squared gradient length below which the gradient gives no direction: the field is clamped there, or lies between two surfaces. Within a cell of a
 /// sharp edge the length shrinks to about 0.3 while the direction is still good.
-const LEAST_GRADIENT2: f32 = 0.01;
+pub(crate) const LEAST_GRADIENT2: f32 = 0.01;
 /// Safety factor on the approach predicted by either motion. The motion at the tick's end lies between the last motion and the one without contacts,
 /// or is turned by the contacts: the end of a rod struck at the other end moves half as fast again.
 pub(crate) const APPROACH: f32 = 2.0;
-/// Angle by which the normal of a surface turns along half a span, rad: as far as the span itself turns.
-const SPAN_TURN: f32 = 0.4;
-/// Places of a span that are looked at where its middle is outside of all cells.
-const PLACES: u32 = 5;
 /// Points whose bound would expire within this many more ticks like the last one count as near and are queried every tick: evaluating the whole leaf
 /// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
@@ -112,15 +107,6 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             }
         }
         APPROACH * fastest
-    }
-
-    /// Whether a place of the span of `point` at least `gap` (m) from a surface of normal `normal` (field frame, at the span's middle) may be a candidate.
-    #[inline]
-    fn may_touch(&self, pair: &DirectedPair<'_>, point: &PointRecord, gap: f32, normal: Vec3) -> bool {
-        let (n, arm) = (pair.to_push * normal, pair.to_arm.apply(point.position));
-        let turn = arm.cross(n) * self.inverse_length;
-        let approach = self.approach(&[n.x, n.y, n.z, turn.x, turn.y, turn.z]);
-        gap < self.slack + approach + APPROACH * SPAN_TURN * (self.margin - self.slack)
     }
 
     /// Fills `contacts`, starting at `start` and wrapping round. Returns where to resume if the budget ran out, and the cost.
@@ -408,87 +394,9 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         self.place(pair, leaf, point)
     }
 
-    /// As [`Self::point`], for a span of an edge: its lowest place is offered. `face`: the only one near the span, if known.
-    #[inline(never)]
-    pub fn span(
-        &mut self,
-        pair: &DirectedPair<'_>,
-        leaf: NodeCursor,
-        point: &PointRecord,
-        face: Option<u16>,
-    ) -> f32 {
-        let Some(span) = Span::of(pair, point) else {
-            return self.alone(pair, leaf, point);
-        };
-        self.spent += SPAN;
-        let Some(first) = near_at(pair, face, span.middle()) else {
-            return self.apart(pair, leaf, point, &span);
-        };
-        let course = Course::new(pair, &span, first);
-        let bound = course.lower_bound(&span, face.is_some());
-        if bound > self.search.margin || !self.search.may_touch(pair, point, bound, first.found.normal) {
-            return bound;
-        }
-        self.lowest(pair, leaf, point, (&span, &course), face)
-    }
-
-    /// As [`Self::span`], where the middle is outside of all cells: of [`PLACES`] places of the span the nearest is offered.
-    #[inline(never)]
-    fn apart(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord, span: &Span) -> f32 {
-        let bound = pair.distance(point.position) - span.reach();
-        if bound > self.search.margin {
-            return bound;
-        }
-        let mut nearest = (f32::INFINITY, 0.0);
-        for k in 0..PLACES {
-            self.spent += LOOKUP;
-            let u = (2 * k + 1) as f32 / PLACES as f32 - 1.0;
-            let distance = pair.distance(moved(pair, point, u).position);
-            if distance < nearest.0 {
-                nearest = (distance, u);
-            }
-        }
-        if nearest.0 < self.search.margin {
-            return self.alone(pair, leaf, &moved(pair, point, nearest.1));
-        }
-        nearest.0 - span.longest(1.0 / PLACES as f32)
-    }
-
-    /// Offers the lowest place of a span.
-    #[inline(never)]
-    fn lowest(
-        &mut self,
-        pair: &DirectedPair<'_>,
-        leaf: NodeCursor,
-        point: &PointRecord,
-        (span, course): (&Span, &Course),
-        face: Option<u16>,
-    ) -> f32 {
-        let price = if face.is_some() { CACHED_POINT } else { LOOKUP };
-        let (u, lowest) = course.lowest(span, IN_TICK, |p| {
-            self.spent += price;
-            near_at(pair, face, p)
-        });
-        let at = moved(pair, point, u);
-        if !lowest.alone {
-            self.spent += LOOKUP;
-            return self.alone(pair, leaf, &at);
-        }
-        if lowest.found.distance < self.search.margin {
-            self.near(pair, leaf, &at, &lowest.found);
-        }
-        lowest.found.distance
-    }
-
-    /// As [`Self::place`], out of line.
-    #[inline(never)]
-    fn alone(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
-        self.place(pair, leaf, point)
-    }
-
     /// As [`Self::point`], for one place.
     #[inline(always)]
-    fn place(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
+    pub fn place(&mut self, pair: &DirectedPair<'_>, leaf: NodeCursor, point: &PointRecord) -> f32 {
         let in_field = pair.to_field.apply(point.position);
         match pair.field.place(in_field.to_array()) {
             Place::Cell(cell) => {

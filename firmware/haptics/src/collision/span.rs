@@ -9,18 +9,13 @@
 //!
 //! Cost: [`crate::collision::cost::SPAN`], and a field query for each place evaluated beside the middle: one in most spans that may touch.
 
-use glam::Vec3;
-use mortise_protocol::image::{
-    Cell, FaceRecord, NO_FACE, Place, PointRecord, SpanRecord, Surface, surface_kind,
-};
+use glam::{Mat3, Vec3};
+use mortise_protocol::image::{FaceRecord, SpanRecord, Surface, Surfaces, surface_kind};
 
-use crate::collision::directed_pair::DirectedPair;
-use crate::collision::exact_surface::{OnFace, bending, exact_on_face, on_surface_of};
-use crate::math::scalar::{inverse_sqrt, larger, smaller};
+use crate::collision::exact_surface::{OnFace, bending};
+use crate::math::scalar::{larger, smaller};
 use crate::math::vector::quick_length;
 
-/// Squared length of the field's gradient below which it gives no direction.
-const LEAST_GRADIENT2: f32 = 0.01;
 /// When the search along a span ends.
 #[derive(Clone, Copy)]
 pub(crate) struct Effort {
@@ -53,36 +48,24 @@ pub(crate) struct Span {
     round: f32,
 }
 
-/// The `point`, which is the middle of a span, moved to `u` on it.
-pub(crate) fn moved(pair: &DirectedPair<'_>, point: &PointRecord, u: f32) -> PointRecord {
-    let mut at = Vec3::from_array(point.position);
-    if let Some(span) = pair.spans.get(usize::from(point.span)) {
-        at += Vec3::from_array(span.along) * u + Vec3::from_array(span.bend) * weight(span.round, u);
-    }
-    PointRecord {
-        position: at.to_array(),
-        ..*point
-    }
-}
-
 /// Weight of b at `u`.
 #[inline(always)]
-fn weight(round: f32, u: f32) -> f32 {
+pub(crate) fn weight(round: f32, u: f32) -> f32 {
     let square = u * u;
     square * (1.0 - round * (1.0 - square))
 }
 
 impl Span {
-    /// The span of a point of the tree; `None` for a point that stands for itself alone.
+    /// The span of a record about a point at `middle` (m), turned by `rotation`.
     #[inline(always)]
-    pub fn of(pair: &DirectedPair<'_>, point: &PointRecord) -> Option<Self> {
-        let SpanRecord { along, bend, round } = pair.spans.get(usize::from(point.span))?;
-        Some(Self {
-            middle: pair.to_field.apply(point.position),
-            along: pair.to_field.turn(Vec3::from_array(*along)),
-            bend: pair.to_field.turn(Vec3::from_array(*bend)),
-            round: *round,
-        })
+    pub fn placed(record: &SpanRecord, middle: Vec3, rotation: &Mat3) -> Self {
+        let [along, bend] = [record.along, record.bend].map(|v| *rotation * Vec3::from_array(v));
+        Self {
+            middle,
+            along,
+            bend,
+            round: record.round,
+        }
     }
 
     /// Its middle in the frame of the field, m.
@@ -157,44 +140,6 @@ pub(crate) struct Near {
     pub alone: bool,
 }
 
-/// Surface of the field's shape nearest to `p`: the `face`, if that is known to be the only one near; else by the exact surfaces that the cell names, or by
-/// the field's gradient where they do not answer. `None` outside of all cells and where there is no direction.
-#[inline(always)]
-pub(crate) fn near_at(pair: &DirectedPair<'_>, face: Option<u16>, p: Vec3) -> Option<Near> {
-    if let Some(face) = face
-        && let Some(found) = on_surface_of(pair.surfaces, face, p)
-    {
-        return Some(Near { found, alone: true });
-    }
-    let Place::Cell(cell) = pair.field.place(p.to_array()) else {
-        return None;
-    };
-    if let Some(found) = (cell.surface()).and_then(|surface| on_surface_of(pair.surfaces, surface, p)) {
-        return Some(Near { found, alone: true });
-    }
-    near_in(pair, &cell, p)
-}
-
-/// As [`near_at`], in a cell that names several faces, or none with a closed form.
-#[inline(never)]
-fn near_in(pair: &DirectedPair<'_>, cell: &Cell<'_>, p: Vec3) -> Option<Near> {
-    if let Some(found) = exact_on_face(pair.surfaces, pair.field.nearby(cell), p) {
-        return Some(Near { found, alone: false });
-    }
-    let sample = pair.field.sample(cell);
-    let gradient = Vec3::from_array(sample.gradient);
-    let squared = gradient.length_squared();
-    (squared > LEAST_GRADIENT2).then(|| Near {
-        found: OnFace {
-            distance: pair.field.distance(cell),
-            normal: gradient * inverse_sqrt(squared),
-            face: pair.surfaces.face_of(sample.face),
-            edge_face: NO_FACE,
-        },
-        alone: false,
-    })
-}
-
 /// The distance along a span, from that at its middle: slope·u + half·u², where `half` stands for all even powers, which it meets at the ends; and, at
 /// most, `rest` below.
 #[derive(Clone, Copy)]
@@ -207,8 +152,8 @@ struct Powers {
 impl Powers {
     /// Along a span whose middle is nearest to `found`; `None` where `found` is on a face without closed form.
     #[inline(always)]
-    fn of(pair: &DirectedPair<'_>, span: &Span, found: &OnFace) -> Option<Self> {
-        let Some(Surface::Face(face)) = pair.surfaces.get(found.face) else {
+    fn of(surfaces: Surfaces<'_>, span: &Span, found: &OnFace) -> Option<Self> {
+        let Some(Surface::Face(face)) = surfaces.get(found.face) else {
             return None;
         };
         match face.kind {
@@ -291,9 +236,9 @@ pub(crate) struct Course {
 impl Course {
     /// Of a span whose middle is nearest to `first`.
     #[inline(always)]
-    pub fn new(pair: &DirectedPair<'_>, span: &Span, first: Near) -> Self {
+    pub fn new(surfaces: Surfaces<'_>, span: &Span, first: Near) -> Self {
         Self {
-            powers: Powers::of(pair, span, &first.found),
+            powers: Powers::of(surfaces, span, &first.found),
             first,
         }
     }

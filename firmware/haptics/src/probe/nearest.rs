@@ -16,7 +16,8 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
-use crate::collision::span::{Course, Effort, Span, moved, near_at};
+use crate::collision::span::{Course, Effort};
+use crate::collision::span_search::near_at;
 use crate::io::Work;
 use crate::math::scalar::larger;
 
@@ -248,7 +249,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             span: NO_SPAN,
             ..*point
         };
-        let Some(span) = Span::of(self.pair, point) else {
+        let Some(span) = self.pair.span(point) else {
             return alone;
         };
         let Some(first) = near_at(self.pair, None, span.middle()) else {
@@ -258,13 +259,13 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
             return alone;
         }
         let near = |p| near_at(self.pair, None, p);
-        let (mut u, lowest) = Course::new(self.pair, &span, first).lowest(&span, ALONG_SPAN, near);
+        let (mut u, lowest) = Course::new(self.pair.surfaces, &span, first).lowest(&span, ALONG_SPAN, near);
         if lowest.found.distance < 0.0 {
             u = span.deepest((u, lowest.found.distance), near);
         }
         PointRecord {
             span: NO_SPAN,
-            ..moved(self.pair, point, u)
+            ..self.pair.moved(point, u)
         }
     }
 
