@@ -21,7 +21,7 @@ impl<'s, F: Flash<'s>> LinkPlane<'_, 's, F> {
         self.parameters.fingerprint(hasher);
         while let Some(event) = self.ends.events.dequeue() {
             match event {
-                // Told to the host, which needs none of it.
+                // The host's, which needs none of it.
                 Event::State { .. }
                 | Event::Fault { .. }
                 | Event::Reply {
