@@ -340,6 +340,12 @@ impl<'s> Channels<'s> {
         }
     }
 
+    /// Where in this memory the force law's state is, bytes: only a tick changes it.
+    pub const LAW: core::ops::Range<usize> = {
+        let first = core::mem::offset_of!(Self, law);
+        first..first + size_of::<LawState>()
+    };
+
     /// Both ends; each may be moved to its own interrupt priority or thread.
     pub fn split(&mut self) -> (LinkEnds<'_, 's>, ControlEnds<'_, 's>) {
         let (commands_in, commands_out) = self.commands.split();

@@ -8,7 +8,7 @@
 //! all messages before `Run` in the stream have taken effect before its first tick, independent of the timing of bytes and interrupts. The in-process
 //! rig and the emulated board therefore compute the same bits. The host timeout is not applied there, since time waits for the host.
 
-mod fingerprint;
+pub mod fingerprint;
 mod parts;
 mod report;
 mod simulation;

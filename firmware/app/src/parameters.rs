@@ -1,5 +1,7 @@
 //! The parameters' values, and the tick's settings, which are derived from them at low priority.
 
+use core::hash::{Hash, Hasher};
+
 use mortise_haptics::{FromParameter, Settings, each_parameter_drives_one_setting, settings_group};
 use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::message::Refusal;
@@ -105,6 +107,18 @@ impl Parameters {
     /// A parameter's value, in its unit.
     pub fn get(&self, id: ParameterId) -> f32 {
         self.values[id as usize]
+    }
+
+    /// Adds to `hasher` the values that are not the defaults.
+    pub(crate) fn fingerprint(&self, hasher: &mut impl Hasher) {
+        for row in PARAMETERS {
+            let value = self.get(row.id);
+            if value != row.default {
+                (row.id, value.to_bits()).hash(hasher);
+            }
+        }
+        // Ends the list.
+        PARAMETERS.len().hash(hasher);
     }
 
     /// This set with one value changed. A value outside its range, above the rig's hardware limit or not a number is refused with the range valid

@@ -322,15 +322,17 @@ impl<'s, F: Flash<'s>> Store<'s, F> {
         self.flash
     }
 
-    /// Adds the scene in use and the upload in progress to `hasher`.
-    pub(crate) fn fingerprint(&self, hasher: &mut impl Hasher) {
-        self.current
-            .map(|scene| (scene.slot, scene.sequence))
-            .hash(hasher);
-        self.next.map(|scene| (scene.slot, scene.sequence)).hash(hasher);
-        self.upload
-            .map(|upload| (upload.slot, upload.received))
-            .hash(hasher);
+    /// Adds the scene in use and the upload in progress to `hasher`, with the content of their slots. Sequence numbers are relative to `number`, and the
+    /// slots to each other: the store treats both alike.
+    pub(crate) fn fingerprint(&self, number: u32, hasher: &mut impl Hasher) {
+        // The record is read at the start only.
+        let image = |slot| self.memory(slot).get(IMAGE_OFFSET..);
+        for scene in [self.current, self.next] {
+            let content = scene.map(|scene| (scene.sequence.wrapping_sub(number), image(scene.slot)));
+            content.hash(hasher);
+        }
+        let upload = self.upload.map(|upload| (upload.received, image(upload.slot)));
+        upload.hash(hasher);
     }
 
     fn memory(&self, slot: usize) -> &'s [u8] {

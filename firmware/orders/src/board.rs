@@ -47,6 +47,17 @@ pub(crate) struct Chip {
     in_use: Cell<usize>,
 }
 
+impl Clone for Chip {
+    fn clone(&self) -> Self {
+        let copy = Self {
+            words: [const { UnsafeCell::new([ERASED; WORDS]) }; 2],
+            in_use: Cell::new(0),
+        };
+        copy.set(self);
+        copy
+    }
+}
+
 impl Chip {
     /// A chip with `scene` in slot 0.
     pub fn with(scene: &[u8]) -> Self {
@@ -63,6 +74,11 @@ impl Chip {
         }
     }
 
+    /// Whether [`Self::damage`] was used.
+    pub fn is_damaged(&self) -> bool {
+        self.in_use.get() == 1
+    }
+
     /// Changes one byte of the scene in each slot, once.
     pub fn damage(&self) {
         if self.in_use.replace(1) == 1 {
@@ -75,6 +91,15 @@ impl Chip {
                 words[(slot * SLOT + 200) / WRITE_SIZE].0[8] ^= 0x10;
             }
             *self.words[1].get() = words;
+        }
+    }
+
+    /// Takes the content of `other`.
+    pub fn set(&self, other: &Self) {
+        self.in_use.set(other.in_use.get());
+        for (to, from) in self.words.iter().zip(&other.words) {
+            // SAFETY: two chips, one thread; whoever reads the flash is put back together with it.
+            unsafe { *to.get() = *from.get() };
         }
     }
 
@@ -132,6 +157,7 @@ unsafe impl<'s> Flash<'s> for ChipFlash<'s> {
 }
 
 /// Readings of the mechanism, and its last command.
+#[derive(Clone)]
 pub(crate) struct Rig {
     pub sensed: Cell<Sensed>,
     pub driven: Cell<bool>,
@@ -145,6 +171,13 @@ impl Rig {
             driven: Cell::new(false),
             flash_while_driven: Cell::new(false),
         }
+    }
+
+    /// Takes the state of `other`.
+    pub fn set(&self, other: &Self) {
+        self.sensed.set(other.sensed.get());
+        self.driven.set(other.driven.get());
+        self.flash_while_driven.set(other.flash_while_driven.get());
     }
 
     pub fn sense(&self, change: impl FnOnce(&mut Sensed)) {

@@ -64,6 +64,20 @@ pub enum Event {
     Wait,
 }
 
+impl Event {
+    /// Whether the event itself can break a promise: it runs the control plane, forwards a parameter that was read, or writes flash. The others change
+    /// inputs or put a command in the queue. [`Event::Wait`] begins with a tick.
+    pub const fn can_break(self) -> bool {
+        matches!(
+            self,
+            Self::Wait
+                | Self::Poll
+                | Self::Send(_, Order::Upload | Order::Commit)
+                | Self::Deliver(Order::Upload | Order::Commit)
+        )
+    }
+}
+
 /// Every event.
 pub const ALPHABET: [Event; 29] = [
     Event::Hello(Host::A),

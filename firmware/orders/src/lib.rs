@@ -14,9 +14,10 @@
 mod board;
 mod event;
 mod oracle;
+mod planes;
 mod search;
 mod world;
 
 pub use event::{ALPHABET, Event, Host, Order, TOPICS, Topic};
 pub use oracle::{Broken, PROMISES};
-pub use search::{Report, enumerate, enumerate_of, enumerate_topics};
+pub use search::{Report, compare_equals, enumerate, enumerate_of, enumerate_topics};

@@ -36,7 +36,7 @@ pub const PROMISES: [Broken; 8] = [
 ];
 
 /// Independent record of the events.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Oracle {
     /// There was a stop or a fault that is not cleared yet.
     pub must_clear: bool,

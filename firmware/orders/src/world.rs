@@ -3,10 +3,7 @@
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 
-use mortise_firmware::channel::Channels;
-use mortise_firmware::control::ControlPlane;
-use mortise_firmware::device::start;
-use mortise_firmware::link::LinkPlane;
+use mortise_firmware::channel::{EVENTS, EVENTS_AT_ONCE};
 use mortise_firmware::safety::{AfterSoftStop, Safety};
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
@@ -14,22 +11,30 @@ use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
 use mortise_protocol::message::{FromDevice, ToDevice, Version};
 use mortise_protocol::parameter::ParameterId;
 
-use crate::board::{Chip, ChipFlash, IDENTITY, Line, NoClock, Puppet, Rig};
+use crate::board::Line;
 use crate::event::{Event, Host, ORDERS, Order};
 use crate::oracle::{Broken, Oracle};
+use crate::planes::{Planes, Saved};
 
-/// The parameter that is set and read; its two values, m. The rig is at the origin, within both.
+/// The parameter that is set and read; its values, m: the default, and another. The rig is at the origin, within both.
 const PARAMETER: ParameterId = ParameterId::WorkspaceRadius;
-const VALUES: [f32; 2] = [0.05, 0.3];
+const VALUES: [f32; 2] = [1.0, 0.3];
 /// Ticks of [`Event::Wait`]: a soft stop takes 100.
 const WAIT_TICKS: u32 = 120;
+/// Ticks of a soft stop, a little fewer than it takes.
+const FADE_TICKS: u32 = 99;
+/// Largest number of reports to the host that one event can cause, now or by the commands it queues (checked in every step).
+const REPORTS_AN_EVENT: usize = 4;
+/// Reports that one queued command can cause.
+const REPORTS_A_COMMAND: usize = 3;
+/// Largest number of answers that one event can leave waiting: both frames of an upload.
+const ANSWERS_AN_EVENT: usize = 2;
+/// Waiting answers with which the next message is dropped.
+const ANSWERS: usize = 16;
 
 /// A frame that a host sent.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 struct Sent {
-    bytes: Vec<u8>,
-    /// Frames after it that need no freshness.
-    rest: Vec<u8>,
     stamp: Stamp,
     /// Session in which it was sent: number of the greeting.
     session: u32,
@@ -45,55 +50,61 @@ struct Knows {
     count: u32,
 }
 
-/// Both planes and their environment; see the module.
-pub(crate) struct World<'c, 's> {
-    link: LinkPlane<'c, 's, ChipFlash<'s>>,
-    control: ControlPlane<'c, 's, Puppet<'s>, NoClock>,
-    chip: &'s Chip,
-    rig: &'s Rig,
-    scene: &'s [u8],
-    line: Line,
-    decoder: Decoder,
+/// What is outside the planes.
+#[derive(Clone, Copy)]
+struct Outside {
+    full: bool,
     sessions: u32,
     hosts: [Knows; 2],
     /// The newest frame of each order from A.
     sent: [Option<Sent>; ORDERS],
     /// Count of the newest fresh order that arrived in this session.
     newest: u32,
+    /// Of [`VALUES`], the one sent last.
     value: usize,
-    /// Values in effect since the parameter was queried; `None`: no query.
-    in_force: Option<Vec<f32>>,
+    /// Of [`VALUES`], those in effect since the parameter was queried.
+    in_force: [bool; VALUES.len()],
     /// Number of queries of the parameter without an answer yet.
     questions: u32,
     oracle: Oracle,
-    /// Content of the queues: the events since the last tick that put a command into the queue or made one in it outdated, and the result of each
-    /// tick since the last poll that could forward anything.
-    queued: Vec<Event>,
-    said: Vec<(Vec<Event>, Safety)>,
 }
 
-impl<'c, 's> World<'c, 's> {
+/// Both planes and their environment; see the module.
+pub(crate) struct World<'i> {
+    planes: Planes,
+    scene: &'i [u8],
+    crc: u32,
+    line: Line,
+    decoder: Decoder,
+    outside: Outside,
+}
+
+/// The world at one moment.
+pub(crate) struct Moment {
+    planes: Saved,
+    outside: Outside,
+}
+
+impl<'i> World<'i> {
     /// Starts with a scene, greeted by A.
-    pub fn new(channels: &'c mut Channels<'s>, chip: &'s Chip, rig: &'s Rig, scene: &'s [u8]) -> Self {
-        let (link, control) = start(channels, ChipFlash { chip, rig }, Puppet(rig), NoClock, IDENTITY);
+    pub fn new(scene: &'i [u8]) -> Self {
         let mut world = Self {
-            link,
-            control,
-            chip,
-            rig,
+            planes: Planes::start(scene),
             scene,
+            crc: CRC.checksum(scene),
             line: Line::default(),
             decoder: Decoder::new(),
-            sessions: 0,
-            hosts: [Knows::default(); 2],
-            sent: [const { None }; ORDERS],
-            newest: 0,
-            value: 0,
-            in_force: None,
-            questions: 0,
-            oracle: Oracle::default(),
-            queued: Vec::new(),
-            said: Vec::new(),
+            outside: Outside {
+                full: false,
+                sessions: 0,
+                hosts: [Knows::default(); 2],
+                sent: [None; ORDERS],
+                newest: 0,
+                value: 0,
+                in_force: [false; VALUES.len()],
+                questions: 0,
+                oracle: Oracle::default(),
+            },
         };
         for event in [Event::Tick, Event::Hello(Host::A), Event::Tick, Event::Poll] {
             let broken = world.step(event);
@@ -102,51 +113,61 @@ impl<'c, 's> World<'c, 's> {
         world
     }
 
-    /// Whether the event can occur in this state.
-    pub fn can(&self, event: Event) -> bool {
-        match event {
-            Event::Deliver(order) => self.sent[order as usize].is_some(),
-            Event::Send(Host::B, _) => self.hosts[1].session != 0,
-            _ => true,
+    /// The present moment, to come back to.
+    pub fn save(&self) -> Moment {
+        Moment {
+            planes: Saved::of(&self.planes),
+            outside: self.outside,
         }
+    }
+
+    /// As [`Self::save`], into a moment that is no longer needed.
+    pub fn save_to(&self, moment: &mut Moment) {
+        moment.planes.take(&self.planes);
+        moment.outside = self.outside;
+    }
+
+    /// Goes back to a moment of this world.
+    pub fn put_back(&mut self, moment: &Moment) {
+        moment.planes.put_back(&mut self.planes);
+        self.outside = moment.outside;
+        self.line.full = self.outside.full;
     }
 
     /// Executes the event; returns the promise that it broke, if any.
     pub fn step(&mut self, event: Event) -> Option<Broken> {
-        let waiting = self.link.waiting();
+        let room = self.reports_at_most();
         let mut broken = None;
         match event {
             Event::Hello(host) => self.greet(host),
             Event::Send(host, order) => {
-                let mut sent = self.compose(host, order);
-                self.arrive(order, &mut sent);
+                let sent = self.compose(host, order);
+                let arrived = self.arrive(order, sent);
                 if host == Host::A {
-                    self.sent[order as usize] = Some(sent);
+                    self.outside.sent[order as usize] = Some(arrived);
                 }
             }
-            Event::Hold(order) => self.sent[order as usize] = Some(self.compose(Host::A, order)),
+            Event::Hold(order) => self.outside.sent[order as usize] = Some(self.compose(Host::A, order)),
             Event::Deliver(order) => {
-                if let Some(mut sent) = self.sent[order as usize].take() {
-                    self.arrive(order, &mut sent);
-                    self.sent[order as usize] = Some(sent);
-                }
+                let sent = self.outside.sent[order as usize];
+                let arrived = self.arrive(order, sent.unwrap_or_else(|| self.earlier()));
+                self.outside.sent[order as usize] = sent.map(|_| arrived);
             }
             Event::Read => self.query(),
             Event::Stop => {
-                self.oracle.stop();
-                let bytes = frame(None, &ToDevice::Stop);
-                self.receive(&bytes);
+                self.outside.oracle.stop();
+                self.receive(None, &ToDevice::Stop);
             }
-            Event::Damage => self.chip.damage(),
-            Event::Lose => self.rig.sense(|sensed| sensed.referenced = false),
-            Event::StopInput => self.rig.sense(|sensed| sensed.stop_open ^= true),
-            Event::Full => self.line.full ^= true,
+            Event::Damage => self.planes.chip.damage(),
+            Event::Lose => self.planes.rig.sense(|sensed| sensed.referenced = false),
+            Event::StopInput => self.planes.rig.sense(|sensed| sensed.stop_open ^= true),
+            Event::Full => {
+                self.outside.full ^= true;
+                self.line.full = self.outside.full;
+            }
             Event::Tick => broken = self.tick(),
             Event::Poll => {
-                self.link.poll(&mut self.line);
-                if !self.line.full {
-                    self.said.clear();
-                }
+                self.planes.link.poll(&mut self.line);
             }
             Event::Wait => {
                 for _ in 0..WAIT_TICKS {
@@ -154,140 +175,166 @@ impl<'c, 's> World<'c, 's> {
                 }
             }
         }
-        let outdates = matches!(event, Event::Stop | Event::Hello(_)) && !self.queued.is_empty();
-        if (self.link.waiting() > waiting || outdates) && self.queued.last() != Some(&event) {
-            self.queued.push(event);
-        }
-        let acting = self.acting();
-        if let Some(values) = &mut self.in_force {
-            values.push(acting);
+        assert!(
+            self.reports_at_most() <= room + REPORTS_AN_EVENT,
+            "{event} causes more reports than REPORTS_AN_EVENT"
+        );
+        if self.outside.questions > 0 {
+            self.note_value();
         }
         broken = broken.or(self.listen());
-        if self.rig.flash_while_driven.get() {
+        if self.planes.rig.flash_while_driven.get() {
             broken = broken.or(Some(Broken::FlashWhileLive));
         }
         broken
     }
 
+    /// Reports that wait, and those that the queued commands can cause.
+    fn reports_at_most(&self) -> usize {
+        self.planes.link.reported() + REPORTS_A_COMMAND * self.planes.link.waiting()
+    }
+
     /// A host queries the parameter.
     fn query(&mut self) {
-        let coming = self.link.parameters().get(PARAMETER);
         // A second query before the answer to the first: either answer may come, in the order of the queries.
-        let acting = self.acting();
-        self.in_force.get_or_insert_default().extend([acting, coming]);
-        self.questions += 1;
-        let bytes = frame(None, &ToDevice::GetParameter(PARAMETER));
-        self.receive(&bytes);
+        self.note_value();
+        let coming = self.planes.link.parameters().get(PARAMETER);
+        self.outside.in_force[index(coming)] = true;
+        self.outside.questions += 1;
+        self.receive(None, &ToDevice::GetParameter(PARAMETER));
+    }
+
+    fn note_value(&mut self) {
+        self.outside.in_force[index(self.acting())] = true;
     }
 
     fn greet(&mut self, host: Host) {
-        self.sessions += 1;
-        self.oracle.greeted();
-        self.newest = 0;
-        self.in_force = None;
-        self.questions = 0;
-        let bytes = frame(None, &ToDevice::Hello(Version::own()));
-        self.receive(&bytes);
-        self.hosts[host as usize] = Knows {
-            session: self.sessions,
-            stamp: self.link.session(),
+        self.outside.sessions += 1;
+        self.outside.oracle.greeted();
+        self.outside.newest = 0;
+        self.no_questions();
+        self.receive(None, &ToDevice::Hello(Version::own()));
+        self.outside.hosts[host as usize] = Knows {
+            session: self.outside.sessions,
+            stamp: self.planes.link.session(),
             count: 0,
         };
     }
 
+    fn no_questions(&mut self) {
+        self.outside.questions = 0;
+        self.outside.in_force = [false; VALUES.len()];
+    }
+
     fn compose(&mut self, host: Host, order: Order) -> Sent {
-        let knows = &mut self.hosts[host as usize];
+        if order == Order::Set {
+            self.outside.value = (self.outside.value + 1) % VALUES.len();
+        }
+        let knows = &mut self.outside.hosts[host as usize];
         knows.count += 1;
-        let stamp = Stamp {
-            session: knows.stamp,
-            count: knows.count,
-        };
-        let session = knows.session;
-        let mut rest = Vec::new();
-        let message = match order {
-            Order::Clear => ToDevice::ClearFault,
-            Order::Arm => ToDevice::Arm,
-            Order::Grab => ToDevice::Grab { part: 0 },
-            Order::Home => ToDevice::Home,
-            Order::Set => {
-                self.value = 1 - self.value;
-                ToDevice::SetParameter {
-                    id: PARAMETER,
-                    value: VALUES[self.value],
-                }
-            }
-            Order::Upload => {
-                for (index, piece) in self.scene.chunks(MAX_CHUNK).enumerate() {
-                    let chunk = ToDevice::SceneChunk {
-                        offset: (index * MAX_CHUNK) as u32,
-                        data: piece.iter().copied().collect(),
-                    };
-                    rest.extend(frame(None, &chunk));
-                }
-                ToDevice::SceneBegin {
-                    length: self.scene.len() as u32,
-                    crc: CRC.checksum(self.scene),
-                    layout: LAYOUT_VERSION,
-                }
-            }
-            Order::Commit => ToDevice::SceneCommit,
-        };
         Sent {
-            bytes: frame(Some(stamp), &message),
-            rest,
-            stamp,
-            session,
+            stamp: Stamp {
+                session: knows.stamp,
+                count: knows.count,
+            },
+            session: knows.session,
+            arrived: false,
+        }
+    }
+
+    /// A frame of a session before the first.
+    fn earlier(&self) -> Sent {
+        Sent {
+            stamp: Stamp {
+                session: self.planes.link.session().wrapping_sub(1 << 16),
+                count: 1,
+            },
+            session: 0,
             arrived: false,
         }
     }
 
     /// By the independent record: the frame never arrived, is of this session, and no later frame has arrived.
     fn is_fresh(&self, sent: &Sent) -> bool {
-        !sent.arrived && sent.session == self.sessions && sent.stamp.count > self.newest
+        let outside = &self.outside;
+        !sent.arrived && sent.session == outside.sessions && sent.stamp.count > outside.newest
     }
 
-    fn arrive(&mut self, order: Order, sent: &mut Sent) {
-        let fresh = self.is_fresh(sent);
+    fn arrive(&mut self, order: Order, mut sent: Sent) -> Sent {
+        let fresh = self.is_fresh(&sent);
         match order {
-            Order::Arm => self.oracle.arm(fresh, self.link.store().is_sound()),
-            Order::Clear => self.oracle.clear(fresh),
+            Order::Arm => {
+                let sound = self.planes.link.store().is_sound();
+                self.outside.oracle.arm(fresh, sound);
+            }
+            Order::Clear => self.outside.oracle.clear(fresh),
             _ => {}
         }
         if fresh {
-            self.newest = sent.stamp.count;
+            self.outside.newest = sent.stamp.count;
         }
         sent.arrived = true;
-        self.receive(&sent.bytes);
-        self.receive(&sent.rest);
+        let message = match order {
+            Order::Clear => ToDevice::ClearFault,
+            Order::Arm => ToDevice::Arm,
+            Order::Grab => ToDevice::Grab { part: 0 },
+            Order::Home => ToDevice::Home,
+            Order::Set => ToDevice::SetParameter {
+                id: PARAMETER,
+                value: VALUES[self.outside.value],
+            },
+            Order::Upload => ToDevice::SceneBegin {
+                length: self.scene.len() as u32,
+                crc: self.crc,
+                layout: LAYOUT_VERSION,
+            },
+            Order::Commit => ToDevice::SceneCommit,
+        };
+        self.receive(Some(sent.stamp), &message);
+        if order == Order::Upload {
+            // These need no freshness.
+            for (index, piece) in self.scene.chunks(MAX_CHUNK).enumerate() {
+                let chunk = ToDevice::SceneChunk {
+                    offset: (index * MAX_CHUNK) as u32,
+                    data: piece.iter().copied().collect(),
+                };
+                self.receive(None, &chunk);
+            }
+        }
+        sent
     }
 
-    fn receive(&mut self, bytes: &[u8]) {
-        self.link.receive(bytes, &mut self.line);
+    fn receive(&mut self, stamp: Option<Stamp>, message: &ToDevice) {
+        let mut wire = [0; MAX_FRAME];
+        match encode_stamped(0, stamp, message, &mut wire) {
+            Ok(bytes) => self.planes.link.receive(bytes, &mut self.line),
+            Err(error) => panic!("{message:?} does not fit a frame: {error:?}"),
+        }
     }
 
     fn tick(&mut self) -> Option<Broken> {
-        self.control.tick();
-        let state = self.control.safety();
-        let queued = std::mem::take(&mut self.queued);
-        if !queued.is_empty() || self.said.last().is_some_and(|(_, before)| *before != state) {
-            self.said.push((queued, state));
-        }
+        self.planes.tick();
+        let state = self.planes.control.safety();
         let live = state.live();
         let halted = matches!(
             state,
             Safety::Stopped | Safety::Fault(_) | Safety::SoftStop(AfterSoftStop::Fault(_))
         );
-        let broken = self.oracle.tick(live, halted, self.rig.sensed.get().referenced);
-        let differs = live != self.rig.driven.get();
+        let rig = &self.planes.rig;
+        let broken = self
+            .outside
+            .oracle
+            .tick(live, halted, rig.sensed.get().referenced);
+        let differs = live != rig.driven.get();
         // Every queued command has been executed: the value assumed by the link plane must be in effect.
-        let believed = self.link.parameters().get(PARAMETER) == self.acting();
+        let believed = self.planes.link.parameters().get(PARAMETER) == self.acting();
         broken
             .or(differs.then_some(Broken::StateDiffers))
             .or((!believed).then_some(Broken::ReadBack))
     }
 
     fn acting(&self) -> f32 {
-        self.control.settings().safety.workspace_m
+        self.planes.control.settings().safety.workspace_m
     }
 
     /// Processes the board's output.
@@ -295,64 +342,91 @@ impl<'c, 's> World<'c, 's> {
         let mut broken = None;
         for byte in std::mem::take(&mut self.line.bytes) {
             if let Some(Ok((_, FromDevice::Parameter { value, .. }))) = self.decoder.push(byte)
-                && let Some(values) = &self.in_force
+                && self.outside.questions > 0
             {
-                if !values.contains(&value) {
+                if !self.outside.in_force[index(value)] {
                     broken = Some(Broken::ReadBack);
                 }
-                self.questions = self.questions.saturating_sub(1);
-                if self.questions == 0 {
-                    self.in_force = None;
+                self.outside.questions -= 1;
+                if self.outside.questions == 0 {
+                    self.no_questions();
                 }
             }
         }
         broken
     }
 
-    /// Equal for equivalent worlds.
-    pub fn fingerprint(&self) -> u64 {
+    /// Equal for worlds that behave alike under any `left` more events. The planes must be put back afterwards: their queues are emptied.
+    pub fn fingerprint(&mut self, left: usize) -> u64 {
         let mut hasher = DefaultHasher::new();
-        let hash = &mut hasher;
-        self.link.fingerprint(hash);
-        self.control.fingerprint(hash);
-        let sensed = self.rig.sensed.get();
-        (sensed.referenced, sensed.stop_open, self.rig.driven.get()).hash(hash);
-        (self.line.full, self.link.store().is_sound(), self.value).hash(hash);
-        for knows in &self.hosts {
-            (knows.session == self.sessions, knows.session != 0).hash(hash);
+        self.timers(left).hash(&mut hasher);
+        self.queues(left).hash(&mut hasher);
+        let number = self.planes.control.scene_number();
+        self.planes.control.fingerprint(&mut hasher);
+        self.planes.link.fingerprint(number, &mut hasher);
+        self.outside_fingerprint(left, &mut hasher);
+        hasher.finish()
+    }
+
+    /// The counters of ticks, as far as `left` events can let them decide anything: a soft stop that single ticks cannot end, but any wait does, is
+    /// one that just began, and a silence that no wait can make too long is none.
+    fn timers(&self, left: usize) -> (u32, u32) {
+        let timers = self.planes.control.timers();
+        let left = left as u32;
+        let fades = timers.fade + left < FADE_TICKS;
+        let silent = timers.silent + left * WAIT_TICKS <= timers.timeout;
+        (
+            if fades { 0 } else { timers.fade },
+            if silent { 0 } else { timers.silent },
+        )
+    }
+
+    /// The lengths of the queues to the host, as far as `left` events can fill them.
+    fn queues(&self, left: usize) -> (usize, usize) {
+        let (reports, answers) = (self.reports_at_most(), self.planes.link.unsent());
+        let has_room = reports + left * REPORTS_AN_EVENT <= EVENTS - EVENTS_AT_ONCE;
+        let has_places = answers + left * ANSWERS_AN_EVENT < ANSWERS;
+        (
+            if has_room { 0 } else { self.planes.link.reported() },
+            if has_places { 0 } else { answers },
+        )
+    }
+
+    fn outside_fingerprint(&self, left: usize, hash: &mut impl Hasher) {
+        let (outside, sensed) = (&self.outside, self.planes.rig.sensed.get());
+        let flags = [
+            sensed.referenced,
+            sensed.stop_open,
+            self.planes.rig.driven.get(),
+            self.planes.chip.is_damaged(),
+            outside.full,
+        ];
+        (flags, outside.questions, outside.in_force).hash(hash);
+        outside.oracle.hash(hash);
+        for knows in &outside.hosts {
+            (knows.session == outside.sessions).hash(hash);
         }
-        // Frames by their possible effect, in the order in which they were sent.
-        let mut order: Vec<(u32, usize)> = Vec::with_capacity(ORDERS);
-        for (index, sent) in self.sent.iter().enumerate() {
-            let Some(sent) = sent else {
-                continue;
-            };
-            let takeable = self.link.is_fresh(sent.stamp);
-            (index, takeable).hash(hash);
-            if takeable {
-                (self.is_fresh(sent), sent.arrived).hash(hash);
-                order.push((sent.stamp.count, index));
-            }
+        // A frame that arrives as the last event reaches the queue only, and the uploads and commits of A are never late.
+        if left < 2 {
+            return;
+        }
+        outside.value.hash(hash);
+        // Frames that can have an effect, in the order in which they were sent.
+        let mut order: [Option<(u32, usize, bool)>; ORDERS] = [None; ORDERS];
+        for (index, sent) in outside.sent.iter().enumerate() {
+            order[index] = sent
+                .filter(|sent| self.planes.link.is_fresh(sent.stamp))
+                .map(|sent| (sent.stamp.count, index, self.is_fresh(&sent)));
         }
         order.sort_unstable();
-        order.iter().for_each(|(_, index)| index.hash(hash));
-        let mut values: Vec<u32> = self.in_force.iter().flatten().map(|v| v.to_bits()).collect();
-        values.sort_unstable();
-        values.dedup();
-        (self.questions, values).hash(hash);
-        self.oracle.hash(hash);
-        self.queued.hash(hash);
-        for (queued, state) in &self.said {
-            (queued, std::mem::discriminant(state)).hash(hash);
+        for (_, index, fresh) in order.into_iter().flatten() {
+            (index, fresh).hash(hash);
         }
-        hasher.finish()
     }
 }
 
-fn frame(stamp: Option<Stamp>, message: &ToDevice) -> Vec<u8> {
-    let mut wire = [0; MAX_FRAME];
-    match encode_stamped(0, stamp, message, &mut wire) {
-        Ok(bytes) => bytes.to_vec(),
-        Err(error) => panic!("{message:?} does not fit a frame: {error:?}"),
-    }
+/// Which of [`VALUES`] this is.
+fn index(value: f32) -> usize {
+    let found = VALUES.iter().position(|known| *known == value);
+    found.unwrap_or_else(|| panic!("{value} m was never sent"))
 }

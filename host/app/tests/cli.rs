@@ -50,11 +50,30 @@ fn shared() -> Option<PathBuf> {
 #[test]
 fn a_mistyped_command_gets_a_suggestion_and_no_window() {
     refused(&["opne"], "did you mean `open`?");
+    refused(&["inspct", "x.step"], "did you mean `inspect`?");
     refused(&["insepct"], "did you mean `inspect`?");
     refused(&["gearbox"], "neither a command nor a file");
     refused(&["no-such.step"], "there is no file no-such.step");
     refused(&["open", "no-such.step"], "there is no file no-such.step");
     refused(&["."], "is a folder");
+}
+
+#[test]
+fn a_value_that_no_option_takes_is_refused_for_what_it_is() {
+    for (option, value, what) in [
+        ("--accuracy", "-5um", "accuracy = -0.005 is out of range"),
+        ("--accuracy", "nan", "is not a length"),
+        ("--flash", "-1", "is not a size"),
+        ("--tick", "-5", "invalid digit"),
+        ("--cell", "1e-300", "cell_mm = 1e-300 is out of range"),
+        ("--cell", "nan", "is out of range"),
+        ("--timeout", "0", "is not a time limit"),
+    ] {
+        refused(
+            &["bake", SAMPLE, "-o", "never.image", "--no-cache", option, value],
+            what,
+        );
+    }
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub enum BakeError {
         what: String,
     },
     /// An option out of range.
-    #[error("{option} = {value} is out of range: give {expected}")]
+    #[error("{option} = {value:?} is out of range: give {expected}")]
     Option {
         /// Name of the option.
         option: &'static str,

@@ -299,6 +299,13 @@ fn read(path: &Path, expected: Option<&Metadata>, limit: u64) -> Result<Vec<u8>,
         reason,
     };
     let open = || -> std::io::Result<Vec<u8>> {
+        // Before it is opened: opening a pipe waits for its writer.
+        let kind = std::fs::metadata(path)?.file_type();
+        if !kind.is_file() && !kind.is_dir() {
+            return Err(std::io::Error::other(
+                "it is a pipe or a device, not a regular file",
+            ));
+        }
         let file = File::open(path)?;
         let opened = file.metadata()?;
         if expected.is_some_and(|expected| !same(expected, &opened)) {

@@ -23,7 +23,7 @@ fn main() -> ExitCode {
         println!("{read:?}");
         return ExitCode::SUCCESS;
     }
-    let tests: [(&str, fn()); 13] = [
+    let tests: Vec<(&str, fn())> = vec![
         (
             "a_child_reads_what_the_program_itself_would",
             a_child_reads_what_the_program_itself_would,
@@ -64,6 +64,8 @@ fn main() -> ExitCode {
             "errors_are_one_line_and_exit_code_2",
             errors_are_one_line_and_exit_code_2,
         ),
+        #[cfg(unix)]
+        ("only_regular_files_are_read", only_regular_files_are_read),
     ];
     let trial = |(name, test): (&str, fn())| {
         Trial::test(name, move || {
@@ -381,4 +383,22 @@ fn errors_are_one_line_and_exit_code_2() {
         errors.lines().count() == 1 && errors.contains("check the path"),
         "{errors}"
     );
+}
+
+/// A pipe without a writer would be waited for without end, and a device can be endless.
+#[cfg(unix)]
+fn only_regular_files_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.step");
+    let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    for file in [pipe.as_path(), "/dev/zero".as_ref()] {
+        let begun = Instant::now();
+        let words = load_step(file)
+            .map(|model| model.parts.len())
+            .unwrap_err()
+            .to_string();
+        assert!(words.contains("not a regular file"), "{words}");
+        assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
+    }
 }

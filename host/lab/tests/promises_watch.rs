@@ -29,11 +29,17 @@ fn main() {
     files::external_set(&plan, &mut keep).expect("measured");
     let broken: Vec<&Row> = rows.iter().filter(|row| row.fails()).collect();
     assert!(broken.is_empty(), "{broken:#?}");
-    assert_eq!(rows.len(), 8);
+    assert_eq!(rows.len(), 9);
     // Without STOP the same motors are driven to the end.
     assert_eq!(
         stop::ticks_until_off(&plan, false).expect("measured"),
         f64::INFINITY
     );
+    if mortise_rig::emulator_available(None).is_ok() {
+        assert_eq!(
+            stop::emulated_ticks_until_off(&plan, false).expect("measured"),
+            f64::INFINITY
+        );
+    }
     println!("test result: ok. 1 passed; 0 failed; 0 ignored; 0 measured; 0 filtered out");
 }

@@ -75,7 +75,10 @@ fn qemu() -> PathBuf {
 }
 
 /// Whether QEMU and firmware are available; the error says what to do.
-pub(crate) fn available(firmware: Option<&Path>) -> Result<(), String> {
+///
+/// # Errors
+/// When one of them is missing, in words.
+pub fn emulator_available(firmware: Option<&Path>) -> Result<(), String> {
     let found = Command::new(qemu())
         .arg("--version")
         .stdin(Stdio::null())
@@ -89,6 +92,18 @@ pub(crate) fn available(firmware: Option<&Path>) -> Result<(), String> {
     firmware_path(firmware)
         .map(|_| ())
         .map_err(|error| error.to_string())
+}
+
+/// The bytes of an emulated board in lockstep that starts with the scene `image` in its flash: for a host that is no [`Client`](crate::Client).
+///
+/// # Errors
+/// When QEMU or the firmware is missing or does not start. A scene larger than a slot is left out.
+pub fn emulate(image: &[u8]) -> Result<Transport, RigError> {
+    let scene = Preload::new(image).map_err(|error| RigError::Qemu {
+        what: format!("the scene's file cannot be written: {error}"),
+        hint: "check the folder of temporary files".into(),
+    })?;
+    start(EmulatedMode::Lockstep, &firmware_path(None)?, scene)
 }
 
 /// Starts QEMU and connects to its UART.

@@ -45,7 +45,9 @@ mod words;
 
 pub use client::{Client, LinkCounts, Ran};
 pub use description::{Abilities, DescriptionError, abilities, load_rig, parse_rig, write_rig};
-pub use emulator::{FIRMWARE_VARIABLE, QEMU_VARIABLE, SERIAL_VARIABLE, firmware_path};
+pub use emulator::{
+    FIRMWARE_VARIABLE, QEMU_VARIABLE, SERIAL_VARIABLE, emulate, emulator_available, firmware_path,
+};
 pub use error::{RigError, version_words};
 pub use event::{Event, Events, MAX_EVENTS};
 pub use exchange::{ATTEMPTS, Patience};

@@ -33,7 +33,7 @@ pub fn list() -> Vec<RigEntry> {
             spec: emulated,
             label: "Emulated board".into(),
             detail: "the board's firmware on a Cortex-M7 in QEMU (mps2-an500), simulated mechanism".into(),
-            available: emulator::available(None),
+            available: emulator::emulator_available(None),
         },
     ];
     entries.extend(serial::ports().into_iter().map(|port| RigEntry {

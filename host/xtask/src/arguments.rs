@@ -91,7 +91,7 @@ pub struct Figures {
     #[arg(long, conflicts_with_all = ["check", "renew", "record"])]
     pub quick: bool,
     /// Claim what is measured; else claims are kept, and only those of new rows added
-    #[arg(long, conflicts_with_all = ["check", "renew", "record"])]
+    #[arg(long, conflicts_with_all = ["check", "record"])]
     pub claim: bool,
     /// Compare what README and docs say with the quick form
     #[arg(long, conflicts_with_all = ["names", "renew", "record"])]

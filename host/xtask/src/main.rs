@@ -11,6 +11,7 @@ mod figures;
 mod firmware;
 mod fuzz;
 mod memory_map;
+mod modules;
 mod peers;
 mod program;
 mod rust_source;

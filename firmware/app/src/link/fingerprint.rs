@@ -1,37 +1,58 @@
 //! Fingerprint of the link plane's state, for the enumeration of message orders: equal fingerprints imply equal behaviour.
 
-use core::mem::discriminant;
-
 use core::hash::{Hash, Hasher};
 
 use mortise_protocol::frame::Stamp;
-use mortise_protocol::parameter::PARAMETERS;
 
 use super::LinkPlane;
 use crate::board::Flash;
+use crate::channel::{Event, Reply};
 use crate::parameters::Parameters;
 
 impl<'s, F: Flash<'s>> LinkPlane<'_, 's, F> {
-    /// Adds to `hasher` the state that decides the plane's behaviour: without event counters, and without the content of the queues, of which only
-    /// the length is included.
-    pub fn fingerprint(&self, hasher: &mut impl Hasher) {
+    /// Adds to `hasher` the state that decides the plane's behaviour, and the queued events, relative to the scene in use by the control plane:
+    /// without event counters, without the state last reported, which only words a refusal, and without the lengths of the queues of events and
+    /// answers. Takes the events out of the queue, so the planes must be dropped or restored afterwards.
+    pub fn fingerprint(&mut self, scene_number: u32, hasher: &mut impl Hasher) {
         let shared = self.ends.shared;
-        (self.greeted, discriminant(&self.state), self.restarting).hash(hasher);
-        self.arms.wrapping_sub(shared.arms()).hash(hasher);
-        (shared.live(), shared.storing(), self.ends.commands.len()).hash(hasher);
-        self.answers.len().hash(hasher);
-        self.commit
-            .map(|(_, session)| session == self.session)
-            .hash(hasher);
-        self.store.fingerprint(hasher);
-        for row in PARAMETERS {
-            self.parameters.get(row.id).to_bits().hash(hasher);
+        let flags = [self.greeted, self.restarting, shared.live(), shared.storing()];
+        (flags, self.arms.wrapping_sub(shared.arms())).hash(hasher);
+        self.store.fingerprint(scene_number, hasher);
+        self.parameters.fingerprint(hasher);
+        while let Some(event) = self.ends.events.dequeue() {
+            match event {
+                // The host's, which needs none of it.
+                Event::State { .. }
+                | Event::Fault { .. }
+                | Event::Reply {
+                    reply: Reply::Done | Reply::Refused(_),
+                    ..
+                } => {}
+                Event::Reply { session, .. } if session != self.session => {}
+                Event::SceneTaken(taken) => (0u8, taken.is_ok()).hash(hasher),
+                Event::Reply {
+                    reply: Reply::Parameter { id, value },
+                    ..
+                } => (1u8, id, value.to_bits()).hash(hasher),
+                // Equal to no other: the enumeration causes none of these.
+                Event::Reply { seq, session, .. } => (2u8, seq, session).hash(hasher),
+            }
         }
     }
 
     /// Commands queued for the control plane.
     pub fn waiting(&self) -> usize {
         self.ends.commands.len()
+    }
+
+    /// Events queued by the control plane.
+    pub fn reported(&self) -> usize {
+        self.ends.events.len()
+    }
+
+    /// Own answers that wait for space on the wire.
+    pub fn unsent(&self) -> usize {
+        self.answers.len()
     }
 
     /// The parameters as they will be after every queued command.

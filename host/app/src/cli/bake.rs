@@ -28,13 +28,13 @@ pub struct Args {
     #[arg(long)]
     force: bool,
     /// Largest error of gaps and depths where parts fit, such as 5um (ten times that elsewhere) [default: 10um]
-    #[arg(long, value_name = "LENGTH", value_parser = units::length_mm)]
+    #[arg(long, value_name = "LENGTH", value_parser = units::length_mm, allow_hyphen_values = true)]
     accuracy: Option<f64>,
     /// Largest size of the image, such as 384KiB [default: 512KiB, a slot of the board]
-    #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes)]
+    #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes, allow_hyphen_values = true)]
     flash: Option<u64>,
     /// Largest estimated number of instructions per tick
-    #[arg(long, value_name = "INSTRUCTIONS", conflicts_with_all = EXPLICIT, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "INSTRUCTIONS", conflicts_with_all = EXPLICIT, value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     tick: Option<u64>,
     /// Cell edge, mm, instead of a plan by accuracy
     #[arg(

@@ -24,6 +24,21 @@ pub(super) fn check_lone(argument: &Path, command: &clap::Command) -> anyhow::Re
     }
 }
 
+/// Checks the first argument when the arguments were refused for `error`: with a mistyped command, the rest is refused for reasons that mean nothing.
+///
+/// # Errors
+/// As [`check_lone`].
+pub(super) fn check_first(error: &clap::Error, command: &clap::Command) -> anyhow::Result<()> {
+    let Some(first) = std::env::args_os().nth(1).filter(|_| error.use_stderr()) else {
+        return Ok(());
+    };
+    let is_option = first.to_string_lossy().starts_with('-');
+    if is_option || command.find_subcommand(&first).is_some() {
+        return Ok(());
+    }
+    check_lone(Path::new(&first), command)
+}
+
 /// Checks that the file to open exists, before a window opens.
 ///
 /// # Errors

@@ -64,7 +64,12 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return program::usage(NAME, &error, Cli::command()),
+        Err(error) => {
+            return match mistyped::check_first(&error, &Cli::command()) {
+                Ok(()) => program::usage(NAME, &error, Cli::command()),
+                Err(said) => program::end(NAME, Err(said)),
+            };
+        }
     };
     let result = match cli {
         Cli { command: None, open } => {

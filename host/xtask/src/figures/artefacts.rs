@@ -19,7 +19,8 @@ pub struct Artefact {
     pub name: &'static str,
     /// How it is made.
     pub made: Made,
-    /// Source files and folders, from the root.
+    /// Source files and folders, from the root; of the laboratory and of scenarios only those that measure, the files they use follow
+    /// (see [`sources::hash`]).
     sources: &'static [&'static [&'static str]],
 }
 
@@ -61,25 +62,8 @@ const LOOP: &[&str] = &[
 ];
 const CHART: &[&str] = &["host/lab/src/chart", "host/lab/src/table.rs"];
 /// A scenario played and measured.
-const SCENARIO: &[&str] = &[
-    "host/scenario/src/hand.rs",
-    "host/scenario/src/measure.rs",
-    "host/scenario/src/outcome.rs",
-    "host/scenario/src/overlap.rs",
-    "host/scenario/src/port.rs",
-    "host/scenario/src/run.rs",
-    "host/scenario/src/scenario.rs",
-    "host/scenario/src/scene.rs",
-    "host/scenario/src/truth.rs",
-    "host/scenario/src/wire.rs",
-];
-const TRIAL: &[&str] = &[
-    "host/lab/src/fit.rs",
-    "host/lab/src/exact_fit.rs",
-    "host/lab/src/variant.rs",
-    "host/lab/src/clearance.rs",
-    "host/lab/src/motion.rs",
-];
+const SCENARIO: &[&str] = &["host/scenario/src/run.rs", "host/scenario/src/scene.rs"];
+const TRIAL: &[&str] = &["host/lab/src/clearance.rs"];
 const GUIDED: &[&str] = &["host/lab/src/guided.rs", "host/mating/src", "host/guide/src"];
 
 /// Every command that writes to `docs/figures`.
@@ -154,6 +138,11 @@ pub const ARTEFACTS: &[Artefact] = &[
             GUIDED,
             &["host/lab/src/figures/promises", "host/app/src/cli"],
         ],
+    },
+    Artefact {
+        name: "plan",
+        made: Made::Page { quick: true },
+        sources: &[LAW, &["host/lab/src/figures/planning.rs"]],
     },
     Artefact {
         name: "pareto",
@@ -308,18 +297,17 @@ pub struct State {
 pub struct Manifest(pub BTreeMap<String, State>);
 
 impl Manifest {
-    /// Reads the manifest; `None` if there is none yet.
+    /// Reads the manifest; an empty one if there is none yet.
     ///
     /// # Errors
     /// When it is malformed.
-    pub fn read(root: &Path) -> Result<Option<Self>> {
+    pub fn read(root: &Path) -> Result<Self> {
         let path = root.join(MANIFEST);
         if !path.is_file() {
-            return Ok(None);
+            return Ok(Self::default());
         }
         Self::parse(&std::fs::read_to_string(&path)?)
             .with_context(|| format!("{MANIFEST} is not as `cargo xtask figures --renew` writes it"))
-            .map(Some)
     }
 
     fn parse(text: &str) -> Result<Self> {
@@ -382,26 +370,30 @@ pub fn stale(root: &Path, artefact: &Artefact, manifest: &Manifest) -> Result<Op
     })
 }
 
-/// All problems in `docs/figures`, each with the file it concerns. Nothing is checked before the first manifest exists.
+/// All problems in `docs/figures`, each with the file it concerns. Artefacts that were never recorded are named on standard error and not judged: each is
+/// recorded by itself, when it is renewed.
 ///
 /// # Errors
 /// When a file cannot be read.
 pub fn complaints(root: &Path) -> Result<Vec<(PathBuf, String)>> {
-    let Some(manifest) = Manifest::read(root)? else {
-        eprintln!(
-            "Not checked: whether figures are stale, as {MANIFEST} is not there (`cargo xtask figures --renew` writes it)."
-        );
-        return Ok(Vec::new());
-    };
-    let mut found = Vec::new();
+    let manifest = Manifest::read(root)?;
+    let (mut found, mut unknown) = (Vec::new(), Vec::new());
     for artefact in ARTEFACTS {
-        if let Some(why) = stale(root, artefact, &manifest)? {
+        if !manifest.0.contains_key(artefact.name) {
+            unknown.push(artefact.name);
+        } else if let Some(why) = stale(root, artefact, &manifest)? {
             let what = format!(
-                "`{}` {why}; `cargo xtask figures --renew` makes it anew",
+                "`{0}` {why}; `cargo xtask figures --renew {0}` makes it anew",
                 artefact.name
             );
             found.push((PathBuf::from(MANIFEST), what));
         }
+    }
+    if !unknown.is_empty() {
+        eprintln!(
+            "Not checked whether they are stale, as {MANIFEST} does not have them (`cargo xtask figures --renew NAME` records one): {}.",
+            unknown.join(", ")
+        );
     }
     for file in files(root)? {
         if !WRITTEN.contains(&file.as_str()) && !ARTEFACTS.iter().any(|artefact| artefact.owns(&file)) {

@@ -17,13 +17,13 @@ use crate::shell;
 ///
 /// # Errors
 /// When a command fails, or a name is unknown.
-pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
+pub fn run(root: &Path, program: &Path, names: &[String], by: By) -> Result<bool> {
     for name in names {
         named(name)?;
     }
     let (mut all_hold, mut said) = (true, Vec::new());
     for artefact in ARTEFACTS {
-        let manifest = Manifest::read(root)?.unwrap_or_default();
+        let manifest = Manifest::read(root)?;
         let Some(why) = stale(root, artefact, &manifest)?
             .filter(|_| names.is_empty() || names.iter().any(|name| name == artefact.name))
         else {
@@ -35,7 +35,7 @@ pub fn run(root: &Path, program: &Path, names: &[String]) -> Result<bool> {
         }
         eprintln!("{} {why}", artefact.name);
         let start = Instant::now();
-        all_hold &= make(root, program, artefact)?;
+        all_hold &= make(root, program, artefact, by)?;
         record(root, artefact)?;
         said.push(format!(
             "{}: {:.0} s",
@@ -75,15 +75,15 @@ fn named(name: &str) -> Result<&'static Artefact> {
 
 /// Reads the manifest anew, because another run may have recorded artefacts meanwhile.
 fn record(root: &Path, artefact: &Artefact) -> Result<()> {
-    let mut manifest = Manifest::read(root)?.unwrap_or_default();
+    let mut manifest = Manifest::read(root)?;
     (manifest.0).retain(|name, _| ARTEFACTS.iter().any(|artefact| artefact.name == *name));
     manifest.0.insert(artefact.name.to_owned(), artefact.state(root)?);
     manifest.write(root)
 }
 
-fn make(root: &Path, program: &Path, artefact: &Artefact) -> Result<bool> {
+fn make(root: &Path, program: &Path, artefact: &Artefact, by: By) -> Result<bool> {
     match artefact.made {
-        Made::Page { quick } => write_page(root, program, artefact.name, quick, By::Completed),
+        Made::Page { quick } => write_page(root, program, artefact.name, quick, by),
         Made::Sweep { quick } => {
             let mut command = Command::new(program);
             command.current_dir(root).arg(artefact.experiment());

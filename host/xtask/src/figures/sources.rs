@@ -4,13 +4,32 @@
 //! no chart stale. Other files are hashed byte for byte. The hash is FNV-1a of 64 bits: it detects changes, and does not protect against deliberate
 //! collisions.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use crate::modules;
 use crate::rust_source::words;
 
-/// Hash of all files at and below `places`, paths from `root`; files of tests are left out.
+/// Roots of crates in which a figure depends on a few files: those it names, and the files that these use.
+const FOLLOWED: &[&str] = &["host/lab/src/lib.rs", "host/scenario/src/lib.rs"];
+
+/// What is used only to show what was measured, or to start it: not followed.
+const SHOWN: &[&str] = &[
+    "host/lab/src/chart",
+    "host/lab/src/cli",
+    "host/lab/src/error.rs",
+    "host/lab/src/experiment.rs",
+    "host/lab/src/experiments.rs",
+    "host/lab/src/figures/mod.rs",
+    "host/lab/src/lib.rs",
+    "host/lab/src/table.rs",
+    "host/scenario/src/error.rs",
+    "host/scenario/src/lib.rs",
+];
+
+/// Hash of all files at and below `places`, paths from `root`, and in the crates of [`FOLLOWED`] of those that they use; files of tests are left out.
 ///
 /// # Errors
 /// When a place does not exist or cannot be read.
@@ -25,8 +44,7 @@ pub fn hash(root: &Path, places: &[&str]) -> Result<String> {
             );
         }
     }
-    files.sort();
-    files.dedup();
+    let files = with_uses(root, files)?;
     let mut hash = Fnv::default();
     for file in files {
         let bytes = std::fs::read(root.join(&file)).with_context(|| format!("reading {}", file.display()))?;
@@ -39,6 +57,28 @@ pub fn hash(root: &Path, places: &[&str]) -> Result<String> {
         }
     }
     Ok(hash.text())
+}
+
+/// `files`, and those that they use.
+fn with_uses(root: &Path, files: Vec<PathBuf>) -> Result<BTreeSet<PathBuf>> {
+    let mut found: BTreeSet<PathBuf> = files.into_iter().collect();
+    for crate_root in FOLLOWED
+        .iter()
+        .map(Path::new)
+        .filter(|path| root.join(path).is_file())
+    {
+        let uses = modules::uses(root, crate_root)?;
+        let mut open: Vec<PathBuf> = found.iter().cloned().collect();
+        while let Some(file) = open.pop() {
+            for used in uses.get(&file).into_iter().flatten() {
+                let shown = SHOWN.iter().any(|place| used.starts_with(place));
+                if !shown && found.insert(used.clone()) {
+                    open.push(used.clone());
+                }
+            }
+        }
+    }
+    Ok(found)
 }
 
 fn collect(root: &Path, place: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
@@ -193,5 +233,27 @@ mod tests {
         let mut hash = Fnv::default();
         hash.0 = (hash.0 ^ u64::from(b'a')).wrapping_mul(0x0000_0100_0000_01b3);
         assert_eq!(hash.text(), "af63dc4c8601ec8c");
+    }
+
+    #[test]
+    fn what_measures_is_followed_and_what_shows_is_not() {
+        let root = crate::shell::root().unwrap();
+        let files = with_uses(&root, vec!["host/lab/src/figures/contact/ghosts.rs".into()]).unwrap();
+        assert!(
+            files.contains(Path::new("host/lab/src/least_distance.rs")),
+            "{files:?}"
+        );
+        assert!(
+            files.iter().all(|file| !file.starts_with("host/lab/src/chart")),
+            "{files:?}"
+        );
+    }
+
+    #[test]
+    fn places_that_are_not_followed_exist() {
+        let root = crate::shell::root().unwrap();
+        for place in SHOWN.iter().chain(FOLLOWED) {
+            assert!(root.join(place).exists(), "{place}");
+        }
     }
 }

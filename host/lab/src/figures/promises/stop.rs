@@ -1,7 +1,9 @@
 //! STOP behind everything else: the output full, the host not reading, and commands queued ahead of it.
 //!
-//! Uses the in-process rig in lockstep through raw bytes, so that ticks are counted. The host reads nothing while telemetry nearly fills the line;
-//! then one write releases more ticks, sends 200 requests whose answers have no space, and ends in STOP. Only then does the host read.
+//! Uses the in-process rig and the emulated board's serial line, both in lockstep through raw bytes, so that ticks are counted. The host reads nothing
+//! while telemetry nearly fills the line; then one write releases more ticks, sends 200 requests whose answers have no space, and ends in STOP. Only
+//! then does the host read. The emulated board takes a byte at a time and would run those ticks while the requests arrive: there they are released after
+//! STOP, when the host reads.
 
 use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
@@ -11,7 +13,9 @@ use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{
     FromDevice, HandScript, Keyframe, Statistics, Telemetry, ToDevice, Version, WirePose,
 };
-use mortise_rig::{Client, Flash, PIPE_CAPACITY, Patience, RigError, Transport, simulate};
+use mortise_rig::{
+    Client, Flash, PIPE_CAPACITY, Patience, RigError, Transport, emulate, emulator_available, simulate,
+};
 use mortise_scenario::{PreparedScene, Scenario};
 
 use crate::LabError;
@@ -23,6 +27,9 @@ const COMMANDS: usize = 200;
 const RELEASED: u32 = 50;
 /// Share of the line that telemetry fills before.
 const FILLED: f64 = 0.95;
+/// Bytes that the emulated board's line holds while nobody reads: 8,192 in the board, and in a pseudo-terminal of Linux 4,096 or 16 times as many. The
+/// first with which the ticks before STOP ran and the output was full is the line's.
+const SERIAL_CAPACITIES: [usize; 3] = [12_288, 24_576, 73_728];
 /// Time limit of actions that take milliseconds: only a hang reaches it.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Time for the board to run all released ticks and to read everything written.
@@ -42,6 +49,13 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
         "ticks",
         1.0,
     ));
+    let emulated = format!(
+        "STOP to motors off, output full, host not reading, {COMMANDS} commands before it, through the emulated board's serial line in lockstep (infinite: never)"
+    );
+    out(match emulator_available(None) {
+        Ok(()) => Row::exactly(emulated, emulated_ticks_until_off(plan, true)?, "ticks", 1.0),
+        Err(why) => Row::skipped(emulated, &why),
+    });
     Ok(())
 }
 
@@ -57,14 +71,47 @@ pub fn ticks_until_off(plan: &Plan<'_>, stop: bool) -> Result<f64, LabError> {
     let client = Client::over(simulate(&flash, false)?, "sim-fast", Patience::long(), None)?;
     client.upload(&scene.image, &mut |_| {})?;
     drop(client);
-    run(&flash, scene.part, stop).map_err(|error| {
-        let why = error.to_string();
-        RigError::LinkLost { why }.into()
-    })
+    run(
+        simulate(&flash, false)?,
+        PIPE_CAPACITY,
+        Released::First,
+        scene.part,
+        stop,
+    )
+    .map_err(lost)
 }
 
-fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
-    let board = simulate(flash, false).map_err(io::Error::other)?;
+/// As [`ticks_until_off`], through the emulated board's serial line.
+///
+/// # Errors
+/// As [`measure`].
+pub fn emulated_ticks_until_off(plan: &Plan<'_>, stop: bool) -> Result<f64, LabError> {
+    let scenario = Scenario::insertion(plan.pair)?;
+    let scene = PreparedScene::of(&scenario)?;
+    let mut ticks = f64::NAN;
+    for capacity in SERIAL_CAPACITIES {
+        ticks = run(emulate(&scene.image)?, capacity, Released::Last, scene.part, stop).map_err(lost)?;
+        if !ticks.is_nan() {
+            break;
+        }
+    }
+    Ok(ticks)
+}
+
+fn lost(error: io::Error) -> LabError {
+    let why = error.to_string();
+    RigError::LinkLost { why }.into()
+}
+
+/// When ticks are released: before the commands, or after STOP.
+#[derive(Clone, Copy, PartialEq)]
+enum Released {
+    First,
+    Last,
+}
+
+/// Plays the sequence on a board whose line holds `capacity` bytes.
+fn run(board: Transport, capacity: usize, released: Released, part: u16, stop: bool) -> io::Result<f64> {
     let mut host = Host::greeted(board)?;
     for message in [
         ToDevice::Lockstep(true),
@@ -86,14 +133,21 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
     // After the ramp that follows arming.
     let seen = host.ticks(1_000)?;
     let bytes_a_tick = seen.bytes as f64 / 1_000.0;
-    let filling = (FILLED * PIPE_CAPACITY as f64 / bytes_a_tick) as u32;
+    let filling = (FILLED * capacity as f64 / bytes_a_tick) as u32;
     host.send(&ToDevice::Run { ticks: filling })?;
     std::thread::sleep(PAUSE);
 
-    let mut burst = host.frame(&ToDevice::Run { ticks: RELEASED })?;
+    let mut burst = match released {
+        Released::First => host.frame(&ToDevice::Run { ticks: RELEASED })?,
+        Released::Last => Vec::new(),
+    };
     // Most of them have long answers, so that the output is full before the last.
     let messages = [
-        ToDevice::Release,
+        match released {
+            // Waits for the ticks.
+            Released::First => ToDevice::Release,
+            Released::Last => ToDevice::GetCapabilities,
+        },
         ToDevice::GetCapabilities,
         ToDevice::GetCapabilities,
         ToDevice::Arm,
@@ -111,7 +165,19 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
     host.writer.write_all(&burst)?;
     std::thread::sleep(PAUSE);
 
-    let seen = host.until(|seen| seen.ran.len() == 2)?;
+    let all = (filling + RELEASED) as usize;
+    let seen = match released {
+        Released::First => host.until(|seen| seen.ran.len() == 2 && seen.telemetry.len() >= all)?,
+        Released::Last => {
+            let mut seen = host.ticks_seen(filling)?;
+            // While answers wait on the board, it would drop the next message.
+            host.until_quiet()?;
+            let after = host.ticks(RELEASED)?;
+            seen.ran.extend(after.ran);
+            seen.telemetry.extend(after.telemetry);
+            seen
+        }
+    };
     let Statistics { unanswered, .. } = host.statistics()?;
     let before = seen.ran[0];
     let driven = |sample: &&Telemetry| {
@@ -125,10 +191,7 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
             "motors were driven until then",
             earlier.all(|sample| driven(&sample)),
         ),
-        (
-            "every tick was reported",
-            seen.telemetry.len() == (filling + RELEASED) as usize,
-        ),
+        ("every tick was reported", seen.telemetry.len() == all),
         ("the released ticks ran", seen.ran[1] == before + RELEASED),
     ];
     let missing: Vec<&str> = facts
@@ -137,7 +200,10 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
         .map(|(fact, _)| *fact)
         .collect();
     if !missing.is_empty() {
-        eprintln!("STOP behind a full line: not so: {}", missing.join(", "));
+        eprintln!(
+            "STOP behind a line of {capacity} bytes: not so: {}",
+            missing.join(", ")
+        );
     }
     let sound = missing.is_empty();
     let last_driven = seen
@@ -147,6 +213,8 @@ fn run(flash: &Flash, part: u16, stop: bool) -> io::Result<f64> {
         .map(|sample| sample.tick)
         .max();
     Ok(match last_driven {
+        // A tick of the first run without a wrench: it had not ended when STOP was read.
+        Some(last) if sound && last < before => f64::NAN,
         Some(last) if sound && last < before + RELEASED => f64::from(last - before + 1),
         Some(_) if sound => f64::INFINITY,
         _ => f64::NAN,
@@ -253,7 +321,26 @@ impl Host {
     /// Lets this many ticks run, and reads all of their telemetry.
     fn ticks(&mut self, ticks: u32) -> io::Result<Seen> {
         self.send(&ToDevice::Run { ticks })?;
-        self.until(|seen| !seen.ran.is_empty())
+        self.ticks_seen(ticks)
+    }
+
+    /// Reads until this many ticks have run.
+    fn ticks_seen(&mut self, ticks: u32) -> io::Result<Seen> {
+        // The last sample may follow the answer to the run.
+        self.until(|seen| !seen.ran.is_empty() && seen.telemetry.len() >= ticks as usize)
+    }
+
+    /// Reads until nothing arrives for [`PAUSE`].
+    fn until_quiet(&mut self) -> io::Result<()> {
+        let begun = Instant::now();
+        let mut last = begun;
+        while last.elapsed() < PAUSE && begun.elapsed() < PATIENCE {
+            let seen = self.until(|seen| seen.bytes > 0 || last.elapsed() >= PAUSE)?;
+            if seen.bytes > 0 {
+                last = Instant::now();
+            }
+        }
+        Ok(())
     }
 
     fn statistics(&mut self) -> io::Result<Statistics> {
