@@ -7,13 +7,13 @@ use mortise_protocol::image::{
 };
 
 use crate::cell_samples::{ExactSample, corner_places, index};
+use crate::cell_surfaces::CellSurfaces;
 use crate::cover::LocalPatches;
 use crate::distance::{ExactSurface, Scratch};
 use crate::format::{FieldOptions, SampleFormat, Samples, brick_bytes};
-use crate::free_form_cells::FreeFormCells;
 use crate::free_form_error::{AnsweredBy, FreeFormError};
 use crate::grid::Grid;
-use crate::nearby::{CellNearby, Unproven};
+use crate::nearby::{BrickCells, CellNearby, Unproven};
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {
@@ -141,19 +141,15 @@ fn cells(
     at: [u32; 3],
     samples: &[ExactSample],
 ) -> ([Nearby; CELLS_PER_BRICK], Unproven, FreeFormError) {
-    let faces: Vec<(Surface, f64)> = (surface.shape().faces.iter())
-        .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
-        .collect();
-    let mut nearby = CellNearby::new(surface, samples, grid.sample(at, [0; 3]), grid.cell());
-    let free_forms = FreeFormCells {
-        faces: &faces,
-        patches,
-        tolerance_mm,
+    let surfaces = CellSurfaces::new(surface, patches, tolerance_mm, grid.cell());
+    let brick = BrickCells {
         samples,
         origin: grid.sample(at, [0; 3]),
         cell: grid.cell(),
         first: at.map(|b| b * BRICK_CELLS as u32),
+        surfaces: &surfaces,
     };
+    let mut nearby = CellNearby::new(surface, brick, patches);
     let mut scratch = Scratch::default();
     let mut error = FreeFormError::default();
     let cells = std::array::from_fn(|i| {
@@ -168,20 +164,19 @@ fn cells(
                 .query(center, f64::INFINITY, &mut scratch)
                 .map_or(NO_FACE, |n| n.face as u16)
         };
-        let Some(known) = patches.verified(std::array::from_fn(|a| free_forms.first[a] + cell[a] as u32))
-        else {
-            return nearby.of(cell, nearest);
+        let named = nearby.of(cell, nearest);
+        let Some(known) = patches.verified(std::array::from_fn(|a| brick.first[a] + cell[a] as u32)) else {
+            return named;
         };
-        let named = free_forms.of(cell, nearest, || known.to_vec());
         let by = match named {
-            Nearby::Roughly(_) | Nearby::Unknown if free_forms.at_edge(cell, nearest, known) => {
+            Nearby::Roughly(_) | Nearby::Unknown if brick.at_edge(cell, nearest, known) => {
                 AnsweredBy::SamplesAtEdge
             }
             Nearby::Roughly(_) | Nearby::Unknown => AnsweredBy::Samples,
             _ => AnsweredBy::Surfaces,
         };
         for place in known {
-            error.add(place, grid.cell(), free_forms.rendered(cell, named, place), by);
+            error.add(place, grid.cell(), brick.rendered(cell, named, place), by);
         }
         named
     });

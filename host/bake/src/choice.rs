@@ -300,7 +300,10 @@ impl Demand {
         let elsewhere = ELSEWHERE * accuracy_mm;
         let bounds: Vec<(u32, f64)> = ((0..).zip(found))
             .filter(|(face, _)| self.counts(*face, choice))
-            .map(|(face, error)| (face, self.bound_mm(face, choice, error)))
+            .map(|(face, error)| {
+                let bound = self.bound_mm(face, choice, error);
+                (face, bound.max(SAFETY * error.at_edges_mm.unwrap_or(0.0)))
+            })
             .collect();
         let most = |of: &dyn Fn(u32) -> bool| {
             let of = bounds.iter().filter(|(face, _)| of(*face));

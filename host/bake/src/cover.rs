@@ -2,7 +2,8 @@
 //!
 //! The cells near a face are divided in space, by the median of their longer extent, until one cubic patch fits all points of the face that are
 //! nearest to the cells of a part within the tolerance, also at points that it was not fitted to. Nothing is divided in the surface's own parameters,
-//! so poles, seams and two sheets in one face need no rule. A single cell that no patch fits keeps its interpolated distance.
+//! so poles, seams and two sheets in one face need no rule. A single cell takes a patch that errs more, for
+//! interpolation there would err far more still.
 //!
 //! Cost: five exact queries for each cell near a free-form face; fits cost little beside them.
 
@@ -13,16 +14,24 @@ use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_CELLS, CELLS_PER_BRICK, NO_FACE, Nearby, PatchRecord};
 use rayon::prelude::*;
 
+use crate::cell_features::places_on_faces;
 use crate::cell_samples::{ExactSample, Place, about, corner_places, index};
 use crate::distance::{ExactSurface, Scratch};
 use crate::grid::Grid;
-use crate::local_patch::{FacePoint, board_distance, fit};
+use crate::local_patch::{FacePoint, board_distance, fit, is_foot};
 
 /// Distance from the surface up to which patches hold their tolerance, cells. Farther off the feet of a cell spread: a cell deep inside a sharply
 /// curved face would need a patch of half of that face.
 pub(crate) const NEAR_CELLS: f64 = 0.6;
 /// Distance up to which patches are fitted, cells: that of a corner of a cell that the surface crosses.
 const FITTED_CELLS: f64 = 0.9;
+/// Share of the tolerance that a patch may use at the places verified: between them it errs a little more.
+const FIT_SHARE: f64 = 0.75;
+/// Factors by which the tolerance is relaxed in a cell where no surface keeps it: the error is measured, and interpolation there errs far more.
+pub(crate) const RELAXED: [f64; 3] = [1.0, 4.0, 16.0];
+/// Edge of the cube from which a patch is fitted at a face's border, as a multiple of a cell's edge, and share of the edge by which it holds beyond.
+const AROUND: f64 = 1.4;
+const BEYOND: f64 = 0.01;
 /// Error of patches farther off than [`NEAR_CELLS`], as a share of the distance.
 const FAR_ERROR: f64 = 0.02;
 /// A cell with no corner this near to the surface has no point within [`NEAR_CELLS`], cells.
@@ -41,8 +50,6 @@ pub(crate) const VERIFIED: [[f64; 3]; 5] = [
 ];
 /// Points along a cell's edge at which a patch must have a foot.
 const ANSWERED: usize = 4;
-/// A foot whose direction is farther than this from the surface's normal is on the face's border: cosine.
-const ALONG_NORMAL: f64 = 0.9999;
 
 /// Largest error of a patch at this distance from the surface, mm.
 pub(crate) fn tolerance_at(tolerance_mm: f64, cell_mm: f64, distance: f64) -> f64 {
@@ -74,6 +81,8 @@ struct NearCell {
     corners: [Place; 8],
     verified: [Place; VERIFIED.len()],
     faces: Vec<u16>,
+    /// Points of free-form faces in and around a cell that several faces enter, where few other places have a foot; whether each is in the cell.
+    on: Vec<(u16, FacePoint, bool)>,
 }
 
 impl LocalPatches {
@@ -104,7 +113,7 @@ impl LocalPatches {
                     surface,
                     face,
                     cell: grid.cell(),
-                    tolerance_mm,
+                    tolerance_mm: FIT_SHARE * tolerance_mm,
                     alive,
                 };
                 fitter.divide(&mut cells)
@@ -209,13 +218,36 @@ fn near_cells<'a>(
         if faces.is_empty() {
             return None;
         }
+        let center = corners[0].at + DVec3::splat(0.5 * grid.cell());
         Some(NearCell {
+            on: points_at_borders(surface, center, grid.cell()),
             cell: std::array::from_fn(|a| brick[a] * BRICK_CELLS as u32 + at[a] as u32),
             verified: verify_places(surface, corners[0], grid.cell(), &mut scratch),
             corners,
             faces,
         })
     })
+}
+
+/// Points of free-form faces in and around the cell with this centre and edge if more than one face is there.
+fn points_at_borders(surface: &ExactSurface, center: DVec3, cell: f64) -> Vec<(u16, FacePoint, bool)> {
+    let places = places_on_faces(surface, center, AROUND * cell);
+    if places.iter().all(|place| place.0 == places[0].0) {
+        return Vec::new();
+    }
+    let topology = &surface.topology;
+    (places.into_iter())
+        .filter_map(|(face, triangle, p)| {
+            let on = topology.free_forms.beside(u32::from(face), triangle, p)?;
+            let outward = on.normal * topology.sense[usize::from(face)];
+            let within = (on.point - center).abs().max_element() <= (0.5 + BEYOND) * cell;
+            let point = FacePoint {
+                at: on.point,
+                outward,
+            };
+            Some((face, point, within))
+        })
+        .collect()
 }
 
 /// Cells of one patch.
@@ -241,7 +273,10 @@ impl Fitter<'_> {
             return Vec::new();
         }
         let patch = fit(&self.points(cells), self.face);
-        if let Some(patch) = patch.filter(|patch| cells.iter().all(|cell| self.holds(patch, cell))) {
+        // A single cell is not divided: it takes a patch that errs more.
+        let relaxed = if cells.len() < 2 { RELAXED[2] } else { 1.0 };
+        let holds = |patch: &PatchRecord| cells.iter().all(|cell| self.holds(patch, cell, relaxed));
+        if let Some(patch) = patch.filter(holds) {
             let cells = cells.to_vec();
             return vec![Part { patch, cells }];
         }
@@ -266,6 +301,12 @@ impl Fitter<'_> {
             .flat_map(|cell| cell.corners)
             .filter_map(|place| self.foot(&place))
             .collect();
+        all.extend(
+            cells
+                .iter()
+                .flat_map(|cell| self.on(cell))
+                .map(|(point, _)| point),
+        );
         if all.len() > MOST_POINTS {
             let (count, step) = (all.len(), all.len() as f64 / MOST_POINTS as f64);
             return (0..MOST_POINTS)
@@ -285,6 +326,13 @@ impl Fitter<'_> {
         all
     }
 
+    /// Points of the face in and around a cell at its border, and whether each is in the cell.
+    fn on<'c>(&self, cell: &'c NearCell) -> impl Iterator<Item = (FacePoint, bool)> + use<'c> {
+        let face = self.face;
+        let own = cell.on.iter().filter(move |(of, ..)| *of == face);
+        own.map(|&(_, point, within)| (point, within))
+    }
+
     /// Foot of a place near the surface if it lies on the face.
     fn foot(&self, place: &Place) -> Option<FacePoint> {
         let near = place.exact.distance.abs() <= FITTED_CELLS * self.cell;
@@ -294,27 +342,21 @@ impl Fitter<'_> {
         })
     }
 
-    /// Whether the patch passes through the feet of a cell's places, and gives their distances, within the tolerance.
-    fn holds(&self, patch: &PatchRecord, cell: &NearCell) -> bool {
+    /// Whether the patch passes through the feet of a cell's places, and gives their distances, within the tolerance times `relaxed`.
+    fn holds(&self, patch: &PatchRecord, cell: &NearCell, relaxed: f64) -> bool {
+        let tolerance_mm = relaxed * self.tolerance_mm;
+        let passes = |p: FacePoint| board_distance(patch, p.at).abs() <= tolerance_mm;
+        if !self.on(cell).all(|(point, within)| !within || passes(point)) {
+            return false;
+        }
         cell.corners.iter().chain(&cell.verified).all(|place| {
             let Some(foot) = self.foot(place) else { return true };
             let distance = place.exact.distance;
-            let tolerance = tolerance_at(self.tolerance_mm, self.cell, distance);
+            let tolerance = tolerance_at(tolerance_mm, self.cell, distance);
             // False for NaN.
             let within = |p: DVec3, distance: f64| (board_distance(patch, p) - distance).abs() <= tolerance;
             // On the border of the face the cell is decided together with its neighbours.
-            within(foot.at, 0.0)
-                && (!self.is_along_normal(patch, &foot, distance) || within(place.at, distance))
-        })
-    }
-
-    /// Whether the direction to a foot is along the normal of the patch there.
-    fn is_along_normal(&self, patch: &PatchRecord, foot: &FacePoint, distance: f64) -> bool {
-        let at = mortise_haptics::Vec3::from_array((foot.at / 1000.0).as_vec3().to_array());
-        mortise_haptics::distance_to_patch(patch, at).is_some_and(|(_, normal)| {
-            foot.outward
-                .dot(DVec3::from_array(normal.to_array().map(f64::from)))
-                >= ALONG_NORMAL * distance.abs()
+            within(foot.at, 0.0) && (!is_foot(patch, place) || within(place.at, distance))
         })
     }
 }

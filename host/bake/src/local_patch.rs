@@ -8,12 +8,17 @@ use glam::DVec3;
 use mortise_haptics::{Vec3, distance_to_patch};
 use mortise_protocol::image::PatchRecord;
 
+use crate::cell_samples::Place;
+
 /// Coefficients of a cubic in two variables.
 const TERMS: usize = 10;
 /// Fewest points of a fit.
 const LEAST_POINTS: usize = 12;
 /// Weight of the coefficients themselves: decides those that the points leave open, at a millionth of a micrometre in heights of a millimetre.
 const RIDGE: f64 = 1e-9;
+
+/// A foot whose direction is farther than this from the surface's normal is on the face's border: cosine.
+const ALONG_NORMAL: f64 = 0.9999;
 
 /// A point of a face, and the direction out of the solid there (of any length), mm.
 #[derive(Clone, Copy)]
@@ -95,6 +100,23 @@ pub(crate) fn fit(points: &[FacePoint], face: u16) -> Option<PatchRecord> {
 pub(crate) fn board_distance(patch: &PatchRecord, p: DVec3) -> f64 {
     let found = distance_to_patch(patch, Vec3::from_array((p / 1000.0).as_vec3().to_array()));
     found.map_or(f64::NAN, |(distance, _)| f64::from(distance) * 1000.0)
+}
+
+/// Whether the direction to a place from its nearest point is along the normal of the patch there: if not, that point is on the face's border.
+pub(crate) fn is_foot(patch: &PatchRecord, place: &Place) -> bool {
+    let distance = place.exact.distance;
+    let outward = (place.at - place.exact.foot) * distance.signum();
+    let at = Vec3::from_array((place.exact.foot / 1000.0).as_vec3().to_array());
+    distance_to_patch(patch, at).is_some_and(|(_, normal)| {
+        outward.dot(DVec3::from_array(normal.to_array().map(f64::from))) >= ALONG_NORMAL * distance.abs()
+    })
+}
+
+/// Foot of `p` on a patch as the board finds it, mm.
+pub(crate) fn board_foot(patch: &PatchRecord, p: DVec3) -> Option<DVec3> {
+    let at = Vec3::from_array((p / 1000.0).as_vec3().to_array());
+    let (distance, normal) = distance_to_patch(patch, at)?;
+    Some(p - DVec3::from_array(normal.to_array().map(f64::from)) * (f64::from(distance) * 1000.0))
 }
 
 /// Solution of a positive definite system whose lower triangle is given (Cholesky).

@@ -3,27 +3,35 @@
 //! A point of a cell has its nearest surface point on one of the faces with a triangle near the cell; among these the cell's rule is sought. The cell
 //! is *exact* where one face's unbounded surface gives the distance. At convex edges, corners and thin walls the largest of several distances does
 //! (exact inside and at the faces; outside it is a lower bound of the right sign), at re-entrant ones the smallest, at mixed ones a largest of
-//! smallest ones or the reverse (see `rule`). A rule is tested against the exact distance at the corners and half-way between them, at points of the
-//! near faces in the cell and, where the surface crosses the cell, on a lattice of 4³ more; a point at which it fails joins the tests of the next
-//! attempt. Cells without a rule are interpolated.
+//! smallest ones or the reverse (see `rule`). For a free-form face its local patch answers ([`crate::cover`]).
+//!
+//! A rule is tested against the exact distance at the corners and half-way between them, and at places on and beside every face, edge and corner in the
+//! cell ([`crate::cell_features`]). Where the surface crosses the cell it is then verified on another lattice, and where one of its surfaces appears to
+//! be the boundary; a place at which it fails joins the tests of the next attempt. All this extends a little beyond the cell: a bound that is zero on
+//! the cell's border, clear of the surface, would be felt there. Cells without a rule are interpolated.
 
 use glam::DVec3;
-use mortise_brep::Surface;
 use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, NO_FACE, Nearby};
 
-use crate::cell_samples::ExactSample;
+use crate::cell_features::CellFeatures;
+use crate::cell_samples::{ExactSample, Place, about, corner_places};
+use crate::cell_surfaces::CellSurfaces;
+use crate::cover::{LocalPatches, RELAXED};
 use crate::distance::{ExactSurface, Scratch};
-use crate::rule::{SAME_MM, Test, find_rule, holds};
-use crate::surface::signed_distance;
+use crate::rule::{SAME_MM, Test, find_rule, holds, value};
 
 /// Half steps of samples along a brick's edge.
 const HALVES: usize = 2 * BRICK_CELLS + 1;
 /// Attempts to find a rule: each failed one adds tests.
 const ATTEMPTS: usize = 4;
-/// Most points of near faces that are tests.
-const MOST_TOUCHES: usize = 24;
 /// Points along a cell's edge at which the rule of a crossed cell is verified.
 const VERIFIED: usize = 4;
+/// Share of a cell's edge by which rules hold beyond the cell.
+const BEYOND: f64 = 0.01;
+/// Most feet of verified points on surfaces of a rule that are tested.
+const MOST_FEET: usize = 24;
+/// Most patches tried for a free-form face beside the best one.
+const MOST_OTHERS: usize = 4;
 
 /// Cells crossed by the surface that have no rule although all near faces have a closed form.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,48 +42,79 @@ pub(crate) struct Unproven {
     pub at: Option<DVec3>,
 }
 
+/// Where a field's cells are: the brick, its exact samples and its surfaces.
+#[derive(Clone, Copy)]
+pub(crate) struct BrickCells<'a> {
+    /// 9³ samples of the brick, x fastest.
+    pub samples: &'a [ExactSample],
+    /// Position of sample (0, 0, 0), mm, and the sample step.
+    pub origin: DVec3,
+    pub cell: f64,
+    /// Place of the brick's first cell in the grid.
+    pub first: [u32; 3],
+    /// Surfaces that can answer.
+    pub surfaces: &'a CellSurfaces<'a>,
+}
+
+impl BrickCells<'_> {
+    /// Exact sample at a place of the brick's lattice.
+    pub fn place(&self, place: [usize; 3]) -> Place {
+        Place {
+            at: self.position(place),
+            exact: self.samples[index(place, BRICK_SAMPLES)],
+        }
+    }
+
+    fn position(&self, place: [usize; 3]) -> DVec3 {
+        self.origin + DVec3::from_array(place.map(|i| i as f64)) * self.cell
+    }
+}
+
 /// Finds the palette entries of a brick's cells.
 pub(crate) struct CellNearby<'a> {
     surface: &'a ExactSurface,
-    /// Faces of the shape: surface, and +1 where the outward normal is the natural one, −1 where it is reversed.
-    faces: Vec<(Surface, f64)>,
-    /// 9³ samples of the brick, x fastest.
-    samples: &'a [ExactSample],
-    /// Position of sample (0, 0, 0), mm, and the sample step.
-    origin: DVec3,
-    cell: f64,
+    brick: BrickCells<'a>,
+    /// Exact samples inside cells near free-form faces.
+    patches: &'a LocalPatches,
     /// Whether only one face is near the brick.
     alone: bool,
-    /// Distances on the lattice of half steps, NaN where not yet computed.
-    halves: Vec<f64>,
-    /// Distances on the lattice by which the present cell's rules are verified; empty where not yet computed.
-    lattice: Vec<f64>,
+    /// Exact samples on the lattice of half steps, where already computed.
+    halves: Vec<Option<ExactSample>>,
+    /// Exact samples on the lattice by which the present cell's rules are verified; empty where not yet computed.
+    lattice: Vec<Place>,
     scratch: Scratch,
     /// Crossed cells without a rule so far.
     pub unproven: Unproven,
 }
 
+/// Surfaces that stand for the faces near a cell, and the tests of their rule.
+struct Trial {
+    surfaces: Vec<u16>,
+    with_patches: bool,
+    nearest: u16,
+    /// Factor of the tolerance.
+    relaxed: f64,
+    tests: Vec<Test>,
+}
+
 impl<'a> CellNearby<'a> {
-    /// Of the brick with `samples` from `origin` in steps of `cell`, mm.
-    pub fn new(surface: &'a ExactSurface, samples: &'a [ExactSample], origin: DVec3, cell: f64) -> Self {
+    /// Of a brick of `surface`.
+    pub fn new(surface: &'a ExactSurface, brick: BrickCells<'a>, patches: &'a LocalPatches) -> Self {
         let mut this = Self {
             surface,
-            faces: (surface.shape().faces.iter())
-                .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
-                .collect(),
-            samples,
-            origin,
-            cell,
+            brick,
+            patches,
             alone: false,
-            halves: vec![f64::NAN; HALVES * HALVES * HALVES],
+            halves: vec![None; HALVES * HALVES * HALVES],
             lattice: Vec::new(),
             scratch: Scratch::default(),
             unproven: Unproven::default(),
         };
-        let center = origin + DVec3::splat(0.5 * cell * BRICK_CELLS as f64);
+        let edge = brick.cell * BRICK_CELLS as f64;
+        let center = brick.origin + DVec3::splat(0.5 * edge);
         this.alone = this
-            .near(center, cell * BRICK_CELLS as f64, f64::INFINITY)
-            .0
+            .features(center, edge * (1.0 + BEYOND), f64::INFINITY)
+            .faces
             .len()
             < 2;
         this
@@ -86,148 +125,265 @@ impl<'a> CellNearby<'a> {
         if nearest > Nearby::MAX_FACES {
             return Nearby::Unknown;
         }
-        let corners = (0..8).all(|c| {
-            let place = [at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)];
-            let distance = self.samples[index(place, BRICK_SAMPLES)].distance;
-            (self.distance(nearest, self.position(place)) - distance).abs() <= SAME_MM
-        });
-        let (candidates, touches) = if self.alone {
-            (vec![nearest], Vec::new())
-        } else {
-            let center = self.position(at) + DVec3::splat(0.5 * self.cell);
-            self.near(center, self.cell, self.within(at))
-        };
-        if candidates.len() < 2 {
-            return if corners {
-                Nearby::Face(nearest)
-            } else {
-                Nearby::Roughly(nearest)
-            };
-        }
-        let crossed = !touches.is_empty();
-        self.lattice.clear();
-        let mut tests = self.tests(at, &candidates, touches);
-        for _ in 0..ATTEMPTS {
-            let Some(rule) = find_rule(&tests, &candidates, nearest) else {
-                break;
-            };
-            let failed = if crossed {
-                self.failures(at, rule, &candidates)
-            } else {
-                Vec::new()
-            };
-            if failed.is_empty() {
-                return rule;
+        let features = if self.alone {
+            CellFeatures {
+                faces: vec![nearest],
+                ..CellFeatures::default()
             }
-            tests.extend(failed);
+        } else {
+            let center = self.brick.position(at) + DVec3::splat(0.5 * self.brick.cell);
+            self.features(center, self.brick.cell * (1.0 + 2.0 * BEYOND), self.within(at))
+        };
+        let cell = std::array::from_fn(|a| self.brick.first[a] + at[a] as u32);
+        let known = self.patches.verified(cell);
+        if let Some(known) = known {
+            // Without a patch that holds at the places known already no others need be queried.
+            let mut few = corner_places(at).map(|place| self.brick.place(place)).to_vec();
+            few.extend(known);
+            let has_none = |face: &u16| self.brick.surfaces.has_none(cell, *face, &few);
+            if features.faces.iter().any(has_none) {
+                return Nearby::Roughly(nearest);
+            }
         }
-        if crossed && tests.iter().all(|test| test.faces.iter().all(|d| d.is_finite())) {
+        if features.faces.len() < 2 || (known.is_some() && self.is_within_a_face(at, nearest, &features)) {
+            return self.one_face(at, cell, nearest);
+        }
+        self.several_faces(at, cell, nearest, features)
+    }
+
+    /// Whether no other face enters a cell near free-form faces, and none is nearest about it.
+    fn is_within_a_face(&self, at: [usize; 3], nearest: u16, features: &CellFeatures) -> bool {
+        features.entering.iter().all(|&face| face == nearest)
+            && about(at).all(|place| self.brick.place(place).exact.face == nearest)
+    }
+
+    /// Entry of a cell near one face only.
+    fn one_face(&self, at: [usize; 3], cell: [u32; 3], nearest: u16) -> Nearby {
+        let mut places = corner_places(at).map(|place| self.brick.place(place)).to_vec();
+        let surfaces = self.brick.surfaces;
+        if surfaces.is_free_form(nearest) {
+            places.extend(self.patches.verified(cell).into_iter().flatten());
+        }
+        let answering = surfaces.alternatives(cell, nearest, &places);
+        let holds_with = |surface: u16, relaxed: f64| {
+            let rule = Nearby::Face(surface);
+            let trial = self.trial(vec![surface], surface, &places, relaxed);
+            trial.tests.iter().all(|test| holds(rule, test, &trial.surfaces))
+        };
+        let found = RELAXED.into_iter().find_map(|relaxed| {
+            let mut answering = answering.iter().copied();
+            answering.find(|&surface| holds_with(surface, relaxed))
+        });
+        found.map_or(Nearby::Roughly(nearest), Nearby::Face)
+    }
+
+    /// Entry of a cell near several faces.
+    fn several_faces(
+        &mut self,
+        at: [usize; 3],
+        cell: [u32; 3],
+        nearest: u16,
+        features: CellFeatures,
+    ) -> Nearby {
+        let crossed = !features.entering.is_empty();
+        self.lattice.clear();
+        let mut places = self.places(at, &features.places);
+        places.extend(self.patches.verified(cell).into_iter().flatten());
+        let choices: Vec<Vec<u16>> = (features.faces.iter())
+            .map(|&face| self.brick.surfaces.alternatives(cell, face, &places))
+            .collect();
+        let closed = features
+            .faces
+            .iter()
+            .all(|&face| !self.brick.surfaces.is_free_form(face));
+        let own = features.faces.iter().position(|&face| face == nearest);
+        for &relaxed in if closed { &RELAXED[..1] } else { &RELAXED } {
+            // Others than the best patches may keep the tolerance itself.
+            let most = if relaxed > 1.0 { 1 } else { usize::MAX };
+            for surfaces in selections(&choices).into_iter().take(most) {
+                let of_nearest = own.map_or(NO_FACE, |own| surfaces[own]);
+                let mut trial = self.trial(surfaces, of_nearest, &places, relaxed);
+                if let Some(rule) = self.rule(at, crossed, &mut trial, &mut places) {
+                    return rule;
+                }
+            }
+        }
+        if crossed && closed {
             self.unproven.cells += 1;
-            (self.unproven.at).get_or_insert(self.position(at) + DVec3::splat(0.5 * self.cell));
+            (self.unproven.at).get_or_insert(self.brick.position(at) + DVec3::splat(0.5 * self.brick.cell));
         }
         Nearby::Roughly(nearest)
     }
 
-    /// Faces that can hold the point nearest to some point of the cube with this centre and edge; and points of their triangles in the cube. No face is
-    /// farther from the centre than `within`.
-    fn near(&mut self, center: DVec3, edge: f64, within: f64) -> (Vec<u16>, Vec<DVec3>) {
-        let (mut faces, mut touches) = (Vec::new(), Vec::new());
+    /// The rule of a cell with these surfaces, if one is found; places at which one failed join `places`.
+    fn rule(
+        &mut self,
+        at: [usize; 3],
+        crossed: bool,
+        trial: &mut Trial,
+        places: &mut Vec<Place>,
+    ) -> Option<Nearby> {
+        for _ in 0..ATTEMPTS {
+            let rule = find_rule(&trial.tests, &trial.surfaces, trial.nearest)?;
+            let failed = if crossed {
+                self.failures(at, rule, trial)
+            } else {
+                Vec::new()
+            };
+            if failed.is_empty() {
+                return Some(rule);
+            }
+            let more: Vec<Test> = failed.iter().map(|place| self.test(trial, place)).collect();
+            trial.tests.extend(more);
+            places.extend(failed);
+        }
+        None
+    }
+
+    /// Tests of these surfaces at these places, with the tolerance times `relaxed`.
+    fn trial(&self, surfaces: Vec<u16>, nearest: u16, places: &[Place], relaxed: f64) -> Trial {
+        let mut trial = Trial {
+            with_patches: surfaces
+                .iter()
+                .any(|&surface| self.brick.surfaces.is_patch(surface)),
+            surfaces,
+            nearest,
+            relaxed,
+            tests: Vec::with_capacity(places.len()),
+        };
+        trial.tests = places.iter().map(|place| self.test(&trial, place)).collect();
+        trial
+    }
+
+    fn test(&self, trial: &Trial, place: &Place) -> Test {
+        let surfaces = self.brick.surfaces;
+        let distance = place.exact.distance;
+        Test {
+            distance,
+            faces: (trial.surfaces.iter())
+                .map(|&surface| surfaces.distance(surface, place.at))
+                .collect(),
+            tolerance: surfaces.tolerance(trial.with_patches, distance, trial.relaxed),
+            may_interpolate: trial.with_patches && surfaces.may_interpolate(distance),
+        }
+    }
+
+    /// Faces and places of the cube with this centre and edge. No face is farther from the centre than `within`.
+    fn features(&mut self, center: DVec3, edge: f64, within: f64) -> CellFeatures {
         let Some(nearest) = self.surface.query(center, within, &mut self.scratch) else {
-            return (faces, touches);
+            return CellFeatures::default();
         };
         let diagonal = edge * 3f64.sqrt();
         let radius = nearest.distance.abs() + diagonal + 2.0 * self.surface.chord + SAME_MM;
-        self.surface.triangles.within(center, radius, |triangle, on, _| {
-            faces.push(self.surface.shape.mesh.triangle_face[triangle as usize] as u16);
-            if (on.point - center).abs().max_element() <= 0.5 * edge {
-                touches.push(on.point);
-            }
-        });
-        faces.sort_unstable();
-        faces.dedup();
-        faces.retain(|&face| face <= Nearby::MAX_FACES && face != NO_FACE);
-        let step = touches.len().div_ceil(MOST_TOUCHES).max(1);
-        (faces, touches.into_iter().step_by(step).collect())
+        CellFeatures::of(self.surface, center, edge, radius)
     }
 
-    /// Tests on the lattice of half steps of the cell, and at points of the surface.
-    fn tests(&mut self, at: [usize; 3], candidates: &[u16], touches: Vec<DVec3>) -> Vec<Test> {
-        let mut tests = Vec::with_capacity(27 + touches.len());
+    /// Exact samples on the lattice of half steps of the cell, and at points of features.
+    fn places(&mut self, at: [usize; 3], of_features: &[DVec3]) -> Vec<Place> {
+        let mut places = Vec::with_capacity(27 + of_features.len());
         for i in 0..27 {
             let place = [2 * at[0] + i % 3, 2 * at[1] + i / 3 % 3, 2 * at[2] + i / 9];
-            let p = self.origin + DVec3::from_array(place.map(|i| i as f64)) * (0.5 * self.cell);
-            let known = self.halves[index(place, HALVES)];
-            let distance = if place.iter().all(|i| i % 2 == 0) {
-                self.samples[index(place.map(|i| i / 2), BRICK_SAMPLES)].distance
-            } else if known.is_nan() {
-                self.exact(at, p)
+            let p = self.brick.origin + DVec3::from_array(place.map(|i| i as f64)) * (0.5 * self.brick.cell);
+            let exact = if place.iter().all(|i| i % 2 == 0) {
+                self.brick.samples[index(place.map(|i| i / 2), BRICK_SAMPLES)]
             } else {
-                known
+                match self.halves[index(place, HALVES)] {
+                    Some(known) => known,
+                    None => self.exact(at, p),
+                }
             };
-            self.halves[index(place, HALVES)] = distance;
-            tests.push(self.test(p, distance, candidates));
+            self.halves[index(place, HALVES)] = Some(exact);
+            places.push(Place { at: p, exact });
         }
-        for p in touches {
-            let distance = self.exact(at, p);
-            tests.push(self.test(p, distance, candidates));
-        }
-        tests
+        places.extend(of_features.iter().map(|&p| Place {
+            at: p,
+            exact: self.exact(at, p),
+        }));
+        places
     }
 
-    /// Tests at which `rule` fails, of the lattice by which a crossed cell is verified.
-    fn failures(&mut self, at: [usize; 3], rule: Nearby, candidates: &[u16]) -> Vec<Test> {
-        let mut failed = Vec::new();
-        let low = self.position(at);
-        for i in 0..VERIFIED * VERIFIED * VERIFIED {
-            let place = [i % VERIFIED, i / VERIFIED % VERIFIED, i / VERIFIED / VERIFIED];
-            let share = DVec3::from_array(place.map(|i| (i as f64 + 0.5) / VERIFIED as f64));
-            let p = low + share * self.cell;
-            if self.lattice.len() == i {
-                let distance = self.exact(at, p);
-                self.lattice.push(distance);
-            }
-            let test = self.test(p, self.lattice[i], candidates);
-            if !holds(rule, &test, candidates) {
-                failed.push(test);
-            }
+    /// Places at which `rule` fails: of the lattice by which a crossed cell is verified, and of its feet on surfaces where the rule has the boundary.
+    fn failures(&mut self, at: [usize; 3], rule: Nearby, trial: &Trial) -> Vec<Place> {
+        let low = self.brick.position(at);
+        if self.lattice.is_empty() {
+            self.lattice = (0..VERIFIED * VERIFIED * VERIFIED)
+                .map(|i| {
+                    let place = [i % VERIFIED, i / VERIFIED % VERIFIED, i / VERIFIED / VERIFIED];
+                    let share = DVec3::from_array(place.map(|i| i as f64 / (VERIFIED - 1) as f64));
+                    let p = low + (share * (1.0 + 2.0 * BEYOND) - BEYOND) * self.brick.cell;
+                    Place {
+                        at: p,
+                        exact: self.exact(at, p),
+                    }
+                })
+                .collect();
         }
-        failed
+        let feet = self.feet(low, rule);
+        let feet: Vec<Place> = (feet.into_iter())
+            .map(|p| Place {
+                at: p,
+                exact: self.exact(at, p),
+            })
+            .collect();
+        (self.lattice.iter().copied().chain(feet))
+            .filter(|place| !holds(rule, &self.test(trial, place), &trial.surfaces))
+            .collect()
     }
 
-    fn test(&self, p: DVec3, distance: f64, candidates: &[u16]) -> Test {
-        Test {
-            distance,
-            faces: candidates.iter().map(|&face| self.distance(face, p)).collect(),
-        }
+    /// Feet of the lattice in the cell on surfaces of `rule` where the rule is zero: there the boundary must be.
+    fn feet(&self, low: DVec3, rule: Nearby) -> Vec<DVec3> {
+        let (Nearby::Convex(group) | Nearby::Reentrant(group)) = rule else {
+            return Vec::new();
+        };
+        let surfaces = self.brick.surfaces;
+        let first = low - BEYOND * self.brick.cell;
+        let last = low + (1.0 + BEYOND) * self.brick.cell;
+        let zero = |p: DVec3| {
+            let distance = |surface| surfaces.distance(surface, p);
+            value(rule, distance).is_some_and(|found| found.abs() <= SAME_MM)
+        };
+        let feet: Vec<DVec3> = (group.faces())
+            .flat_map(|(surface, _)| {
+                let of = self.lattice.iter();
+                of.filter_map(move |place| surfaces.foot(surface, place.at))
+            })
+            .filter(|p| p.cmpge(first).all() && p.cmple(last).all() && zero(*p))
+            .collect();
+        let step = feet.len().div_ceil(MOST_FEET).max(1);
+        feet.into_iter().step_by(step).collect()
     }
 
-    /// Exact distance at `p` in the cell with the lowest corner `at`.
-    fn exact(&mut self, at: [usize; 3], p: DVec3) -> f64 {
+    /// Exact sample at `p` in the cell with the lowest corner `at`.
+    fn exact(&mut self, at: [usize; 3], p: DVec3) -> ExactSample {
         let within = self.within(at);
-        (self.surface.query(p, within, &mut self.scratch)).map_or(f64::NAN, |n| n.distance)
+        (self.surface.query(p, within, &mut self.scratch)).map_or(ExactSample::NONE, ExactSample::of)
     }
 
-    /// Upper bound of the distance's magnitude in a cell, mm: that at its lowest corner and the diagonal.
+    /// Upper bound of the distance's magnitude in and just beyond a cell, mm: that at its lowest corner and the diagonal.
     fn within(&self, at: [usize; 3]) -> f64 {
-        let corner = self.samples[index(at, BRICK_SAMPLES)].distance.abs();
+        let corner = self.brick.samples[index(at, BRICK_SAMPLES)].distance.abs();
         if corner.is_nan() {
             f64::INFINITY
         } else {
-            corner + 1.7321 * self.cell
+            corner + 1.7321 * (1.0 + 2.0 * BEYOND) * self.brick.cell
         }
     }
+}
 
-    fn position(&self, place: [usize; 3]) -> DVec3 {
-        self.origin + DVec3::from_array(place.map(|i| i as f64)) * self.cell
-    }
-
-    /// Signed distance to the unbounded surface of a face, mm; NaN where it has no closed form.
-    fn distance(&self, face: u16, p: DVec3) -> f64 {
-        let Some((surface, sense)) = self.faces.get(usize::from(face)) else {
-            return f64::NAN;
-        };
-        signed_distance(surface, p) * sense
-    }
+/// One surface of each choice, a surface index that is none where a choice is empty: first the best ones, then others for one face at a time.
+fn selections(choices: &[Vec<u16>]) -> Vec<Vec<u16>> {
+    let best: Vec<u16> = (choices.iter())
+        .map(|choice| choice.first().copied().unwrap_or(NO_FACE))
+        .collect();
+    let others = choices.iter().enumerate().flat_map(|(i, choice)| {
+        let best = best.clone();
+        choice.iter().skip(1).take(MOST_OTHERS).map(move |&other| {
+            let mut chosen = best.clone();
+            chosen[i] = other;
+            chosen
+        })
+    });
+    std::iter::once(best.clone()).chain(others).collect()
 }
 
 fn index([x, y, z]: [usize; 3], across: usize) -> usize {

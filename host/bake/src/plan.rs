@@ -56,18 +56,18 @@ pub struct ShapePlan {
     pub epsilon_mm: f64,
     /// Error bound of the shell where convex faces touch each other away from every edge, mm: larger only where the requested tick requires it.
     pub crossing_epsilon_mm: f64,
-    /// Largest error of the field where the shape fits another, mm.
+    /// Largest error of the field at the faces that fit another shape's and at flats, their edges included, mm.
     pub field_error_in_fits_mm: f64,
     /// Largest error of the shell there, mm.
     pub shell_error_in_fits_mm: f64,
-    /// Largest combined error of field and shell elsewhere, mm; within a cell of sharp edges the field's error is up to half a cell.
+    /// Largest combined error of field and shell anywhere, edges included, mm.
     pub error_elsewhere_mm: f64,
     /// Largest error where the distance is interpolated within a cell of another face, mm, by measurement; 0 where surfaces answer everywhere.
     #[serde(default)]
     pub error_at_edges_mm: f64,
     /// Faces that fit another part's.
     pub faces_that_fit: Vec<u32>,
-    /// Faces too sharply curved to resolve: the field's error there is that at sharp edges.
+    /// Faces too sharply curved to resolve: the field's error there is up to half a cell, and not in the errors stated.
     pub faces_taken_as_edges: Vec<u32>,
     /// Unreachable faces.
     pub faces_left_out: Vec<u32>,

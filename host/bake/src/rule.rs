@@ -17,8 +17,19 @@ const NOISE_MM: f64 = 1e-5;
 pub(crate) struct Test {
     /// Exact distance there, mm, outside positive.
     pub distance: f64,
-    /// Distance to each candidate's surface, NaN where it has no closed form.
+    /// Distance to each candidate's surface, NaN where it has none.
     pub faces: Vec<f64>,
+    /// Largest error of a rule there, mm.
+    pub tolerance: f64,
+    /// Whether a reader interpolates where a surface of the rule has no distance, which is accurate enough this far from the surface.
+    pub may_interpolate: bool,
+}
+
+impl Test {
+    /// Whether candidate `i` leaves the answer here to interpolation.
+    fn is_left_out(&self, i: usize) -> bool {
+        self.may_interpolate && self.faces[i].is_nan()
+    }
 }
 
 /// The rule that holds at all tests, if one is found. Groups begin with `nearest` if they contain it.
@@ -59,23 +70,19 @@ pub(crate) fn find_rule(tests: &[Test], candidates: &[u16], nearest: u16) -> Opt
         })
 }
 
-/// Whether `rule` is right at `test`: of the right sign and no larger magnitude than the distance, and equal to it where the rule is exact.
-pub(crate) fn holds(rule: Nearby, test: &Test, candidates: &[u16]) -> bool {
-    let face = |face: u16| {
-        let at = candidates.iter().position(|&c| c == face);
-        at.map_or(f64::NAN, |at| test.faces[at])
-    };
+/// Distance by `rule` where its surfaces have these distances; `None` where one has none, so that a reader interpolates.
+pub(crate) fn value(rule: Nearby, distance: impl Fn(u16) -> f64) -> Option<f64> {
     let (group, sign) = match rule {
-        Nearby::Face(one) => return (face(one) - test.distance).abs() <= SAME_MM,
+        Nearby::Face(one) => return Some(distance(one)).filter(|d| !d.is_nan()),
         Nearby::Convex(group) => (group, 1.0),
         Nearby::Reentrant(group) => (group, -1.0),
-        Nearby::Roughly(_) | Nearby::Unknown => return false,
+        Nearby::Roughly(_) | Nearby::Unknown => return None,
     };
     let (mut found, mut clause) = (f64::NEG_INFINITY, f64::INFINITY);
     for (one, joined) in group.faces() {
-        let own = sign * face(one);
+        let own = sign * distance(one);
         if own.is_nan() {
-            return false;
+            return None;
         }
         clause = clause.min(own);
         if !joined {
@@ -83,11 +90,32 @@ pub(crate) fn holds(rule: Nearby, test: &Test, candidates: &[u16]) -> bool {
             clause = f64::INFINITY;
         }
     }
+    Some(sign * found)
+}
+
+/// Whether `rule` is right at `test`: of the right sign and no larger magnitude than the distance, and equal to it where the rule is exact.
+pub(crate) fn holds(rule: Nearby, test: &Test, candidates: &[u16]) -> bool {
+    let place = |face: u16| candidates.iter().position(|&c| c == face);
+    let (group, sign) = match rule {
+        Nearby::Convex(group) => (group, 1.0),
+        Nearby::Reentrant(group) => (group, -1.0),
+        Nearby::Face(one) => {
+            return place(one).is_some_and(|i| {
+                test.is_left_out(i) || (test.faces[i] - test.distance).abs() <= test.tolerance
+            });
+        }
+        Nearby::Roughly(_) | Nearby::Unknown => return false,
+    };
+    let Some(found) = value(rule, |face| place(face).map_or(f64::NAN, |i| test.faces[i])) else {
+        return test.may_interpolate;
+    };
+    let found = sign * found;
     let distance = sign * test.distance;
-    if distance.abs() <= SAME_MM || (distance < 0.0 && group.is_plain()) {
-        (found - distance).abs() <= SAME_MM
+    if distance.abs() <= test.tolerance || (distance < 0.0 && group.is_plain()) {
+        (found - distance).abs() <= test.tolerance
     } else {
-        found * distance > 0.0 && found.abs() <= distance.abs() + SAME_MM
+        // A bound of zero clear of the surface would be felt.
+        found * distance.signum() >= NOISE_MM && found.abs() <= distance.abs() + test.tolerance
     }
 }
 
@@ -96,16 +124,16 @@ fn largest(tests: &[Test], candidates: usize, sign: f64) -> Vec<usize> {
     let below = |i: usize| {
         tests
             .iter()
-            .all(|test| sign * test.faces[i] <= sign * test.distance + SAME_MM)
+            .all(|test| test.is_left_out(i) || sign * test.faces[i] <= sign * test.distance + test.tolerance)
     };
     let mut kept: Vec<usize> = (0..candidates).filter(|&i| below(i)).collect();
     let mut at = 0;
     while at < kept.len() {
         let own = kept[at];
         let covers = |other: usize| {
-            tests
-                .iter()
-                .all(|test| sign * test.faces[own] <= sign * test.faces[other] + 1e-9)
+            tests.iter().all(|test| {
+                test.is_left_out(own) || sign * test.faces[own] <= sign * test.faces[other] + 1e-9
+            })
         };
         if kept.iter().any(|&other| other != own && covers(other)) {
             kept.remove(at);
@@ -121,25 +149,32 @@ fn largest(tests: &[Test], candidates: usize, sign: f64) -> Vec<usize> {
 fn clauses(tests: &[Test], candidates: usize, sign: f64) -> Option<Vec<Vec<usize>>> {
     let below = |clause: &[usize]| {
         tests.iter().all(|test| {
+            if clause.iter().any(|&i| test.is_left_out(i)) {
+                return true;
+            }
             let least = (clause.iter().map(|&i| sign * test.faces[i])).fold(f64::INFINITY, f64::min);
             let distance = sign * test.distance;
-            if distance < -SAME_MM {
-                least < 0.0
+            if distance < -test.tolerance {
+                least <= -NOISE_MM
             } else {
-                least <= distance.max(0.0) + SAME_MM
+                least <= distance.max(0.0) + test.tolerance
             }
         })
     };
     // A clause serves a test if it is positive outside, and elsewhere no deeper than the surface.
     let least = |test: &Test| {
         let distance = sign * test.distance;
-        if distance > SAME_MM {
+        if distance > test.tolerance {
             NOISE_MM
         } else {
-            distance - SAME_MM
+            distance - test.tolerance
         }
     };
-    let serves = |clause: &[usize], test: &Test| clause.iter().all(|&i| sign * test.faces[i] >= least(test));
+    let serves = |clause: &[usize], test: &Test| {
+        clause
+            .iter()
+            .all(|&i| test.is_left_out(i) || sign * test.faces[i] >= least(test))
+    };
     let mut found: Vec<Vec<usize>> = Vec::new();
     for test in tests {
         let mut clause: Vec<usize> = (0..candidates).filter(|&i| serves(&[i], test)).collect();
@@ -190,6 +225,8 @@ mod tests {
                 Test {
                     distance: value(faces),
                     faces: faces.to_vec(),
+                    tolerance: SAME_MM,
+                    may_interpolate: false,
                 }
             })
             .collect()

@@ -206,7 +206,7 @@ impl Trials {
         for _ in 0..FINER_CELLS {
             let error = self.excess_away(accuracy_mm, &field);
             if error <= 1.0 {
-                return Ok(Found::Met(field));
+                return Ok(self.least_at_edges(accuracy_mm, field, tried, room));
             }
             tried.push(field.clone());
             // Bytes grow at most with the inverse square of the cell.
@@ -228,13 +228,24 @@ impl Trials {
             }
         }
         if self.excess_away(accuracy_mm, &field) <= 1.0 {
-            return Ok(Found::Met(field));
+            return Ok(self.least_at_edges(accuracy_mm, field, tried, room));
         }
         tried.push(field);
         Ok(match self.best(accuracy_mm, tried, room) {
             Some(best) => Found::Best(best),
             None => Found::TooLarge(None),
         })
+    }
+
+    /// `field`, accurate enough away from edges, or one of those tried that errs less everywhere: where surfaces answer at edges and are nearly accurate
+    /// enough.
+    fn least_at_edges(&self, accuracy_mm: f64, field: Fielded, mut tried: Vec<Fielded>, room: u64) -> Found {
+        let own = self.excess(accuracy_mm, &field);
+        tried.retain(|other| self.excess(accuracy_mm, other) < own);
+        match self.best(accuracy_mm, tried, room) {
+            Some(best) if own > 1.0 => Found::Best(best),
+            _ => Found::Met(field),
+        }
     }
 
     /// The smallest field found, whatever its error; cells larger than those that [`Self::find`] tries are tried as well. `None` when the layout cannot

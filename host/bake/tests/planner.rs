@@ -43,7 +43,7 @@ fn pair() -> CadModel {
     ])
 }
 
-/// Number of points compared; worst error over the stated one where the shape fits and elsewhere; interpolated next to edges the worst error in cells.
+/// Number of points compared; worst error over the stated one where the shape fits and elsewhere; at faces taken as edges the worst error in cells.
 #[derive(Debug, Default)]
 struct Found {
     points: usize,
@@ -106,16 +106,7 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
                 _ => (distance - exact.distance).abs(),
             };
             let kind = &shape.faces[exact.face as usize].surface;
-            let corners = (0..8).map(|k| {
-                let side = DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0;
-                surface.nearest(p + side * own.cell_mm).unwrap()
-            });
-            let clear = !answer.interpolated
-                || (corners.into_iter().all(|n| n.face == exact.face)
-                    && !matches!(kind, Surface::Spline)
-                    && !own.faces_taken_as_edges.contains(&exact.face)
-                    && edge_distance(shape, p) > 2.0 * own.cell_mm);
-            if !clear {
+            if own.faces_taken_as_edges.contains(&exact.face) {
                 found.edges_cells = found.edges_cells.max(error / own.cell_mm);
                 continue;
             }
@@ -143,16 +134,6 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
     }
     assert!(found.edges_cells <= 0.6, "{found:?}");
     found
-}
-
-fn edge_distance(shape: &mortise_brep::Shape, p: DVec3) -> f64 {
-    let to = |a: DVec3, b: DVec3| {
-        let ab = b - a;
-        let t = ((p - a).dot(ab) / ab.length_squared().max(1e-300)).clamp(0.0, 1.0);
-        (a + ab * t).distance(p)
-    };
-    let edges = shape.edges.iter().flat_map(|e| e.polyline.windows(2));
-    edges.map(|w| to(w[0], w[1])).fold(f64::INFINITY, f64::min)
 }
 
 #[test]

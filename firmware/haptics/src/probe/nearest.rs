@@ -83,6 +83,8 @@ impl Nearest {
 pub(crate) struct Progress {
     /// The nearest point.
     pub best: Nearest,
+    /// Whether its distance is that to exact surfaces, so that the gap is no larger: not interpolated, and not a bound.
+    pub settled: bool,
     /// Work done.
     pub work: Work,
 }
@@ -92,6 +94,7 @@ impl Progress {
     pub fn new() -> Self {
         Self {
             best: Nearest::UNKNOWN,
+            settled: false,
             work: Work::default(),
         }
     }
@@ -152,6 +155,8 @@ struct PointSample {
     edge_nearest: bool,
     /// Whether `distance` is that to an analytic face.
     settled: bool,
+    /// Whether `distance` is that to an edge of analytic faces.
+    at_edge: bool,
 }
 
 impl PointSample {
@@ -166,6 +171,7 @@ impl PointSample {
         in_band: false,
         edge_nearest: false,
         settled: false,
+        at_edge: false,
     };
 }
 
@@ -406,6 +412,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                         in_band: true,
                         edge_nearest: false,
                         settled: true,
+                        at_edge: false,
                     };
                 }
                 self.interpolated(&cell, nearby, exact, p)
@@ -454,6 +461,7 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
                 (sample.distance, sample.lower, sample.surface) = (distance, distance, surface);
             } else {
                 let beside = beside_edge(self.shape.surfaces(), nearby, p);
+                sample.at_edge = beside.is_some();
                 // The faces' distance is a lower bound of the right sign.
                 sample.distance = beside.unwrap_or(distance);
                 if distance > 0.0 {
@@ -491,8 +499,10 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         if sample.lower > progress.best.distance_m {
             return;
         }
-        let distance_m = self.at_face(sample, point).unwrap_or(sample.distance);
+        let at_face = self.at_face(sample, point);
+        let distance_m = at_face.unwrap_or(sample.distance);
         if distance_m < progress.best.distance_m {
+            progress.settled = at_face.is_some() || sample.at_edge;
             let face = self.shape.surfaces().face_of(sample.surface);
             let (moving_face, fixed_face) = if self.pair.backward {
                 (face, point.face)

@@ -11,7 +11,7 @@ use crate::probe::nearest::{Measure, Nearest, Progress};
 ///
 /// Queries every point that may be nearer to a surface voxel than the nearest so far.
 pub(crate) fn nearest_voxel(pair: &DirectedPair<'_>, shrunk_m: f32, progress: &mut Progress) {
-    let Progress { best, work } = progress;
+    let Progress { best, work, .. } = progress;
     let mut index = 0;
     while let Some(node) = pair.nodes.get(index) {
         work.nodes += 1;

@@ -216,10 +216,11 @@ impl Prober {
         search_both_ways(&pairs, [&other, &held], shrunk_m, &mut progress, &mut touching);
         let Progress {
             best: mut nearest,
+            settled,
             mut work,
         } = progress;
         let shapes = [(&held, &pose), (&other, &Pose::IDENTITY)];
-        let proven = (!voxmaps).then(|| Self::proven(&mut self.epa, center, shapes, &mut nearest));
+        let proven = (!voxmaps).then(|| Self::proven(&mut self.epa, center, shapes, &mut nearest, settled));
         let proven = proven.flatten();
         if let Some(found) = &proven {
             nearest = found.nearest(&nearest, shapes, center);
@@ -296,12 +297,13 @@ impl Prober {
     }
 
     /// Separation of two shapes with proven bounds, where they are both convex or shown to be apart; else `nearest` is not called exact, and negative
-    /// where they were found to overlap.
+    /// where they were found to overlap. `settled`: the gap is no larger than that of `nearest`, whatever the search of the surfaces finds in its budget.
     fn proven(
         epa: &mut Epa,
         center: Vec3,
         shapes: [(&Shape<'_>, &Pose); 2],
         nearest: &mut Nearest,
+        settled: bool,
     ) -> Option<Separation> {
         if let [Some(a), Some(b)] = shapes.map(|(shape, pose)| Support::new(shape, pose)) {
             return Some(separation(&a, &b, epa));
@@ -333,6 +335,8 @@ impl Prober {
             // No point was found inside: what interpolation tells to be a depth is a gap.
             nearest.distance_m = if nearest.distance_m < 0.0 {
                 smaller(found.upper as f32, -nearest.distance_m)
+            } else if settled {
+                smaller(found.upper as f32, nearest.distance_m)
             } else {
                 found.upper as f32
             };

@@ -227,3 +227,31 @@ pub(super) fn search(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), La
     out(Row::at_most(what, 1e3 * worst, "µm", 1.0));
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A key in its slot: the slot is narrower than a cell, and the search of the exact surfaces uses up its budget.
+    #[test]
+    fn a_keyed_shaft_errs_by_no_more_than_its_plan_states() {
+        let Some(cad) = corpus::folder() else {
+            eprintln!("skipped: {ABSENT}");
+            return;
+        };
+        let pairs = true_pairs(&cad).expect("the shared pairs can be read");
+        for pair in pairs
+            .iter()
+            .filter(|pair| ["keyed_shaft", "dovetail"].contains(&pair.name.as_str()))
+        {
+            let (scene, stated_mm) = plan_pair(&pair.step).expect("it is planned");
+            let errors = ask(&scene, pair, stated_mm).expect("it is probed");
+            assert_eq!(
+                (errors.unstated, errors.ghosts),
+                (0, 0),
+                "{}: {errors:?}",
+                pair.name
+            );
+        }
+    }
+}
