@@ -52,6 +52,7 @@ mod ring_samples;
 mod rule;
 mod scene;
 mod shell;
+mod sides;
 mod sign_check;
 mod spline_samples;
 mod surface;

@@ -14,14 +14,21 @@ use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, NO_FACE, Nearby};
 use crate::cell_samples::ExactSample;
 use crate::distance::{ExactSurface, Scratch};
 use crate::rule::{SAME_MM, Test, find_rule, holds};
+use crate::sides::Sides;
 use crate::surface::signed_distance;
 
 /// Half steps of samples along a brick's edge.
 const HALVES: usize = 2 * BRICK_CELLS + 1;
 /// Attempts to find a rule: each failed one adds tests.
 const ATTEMPTS: usize = 4;
+/// The same where sides of smooth edges take part, after the attempts without them.
+const ATTEMPTS_WITH_SIDES: usize = 10;
+/// Most sides that take part: two for each smooth edge.
+const MOST_SIDES: usize = 16;
 /// Most points of near faces that are tests.
 const MOST_TOUCHES: usize = 24;
+/// Steps to a point at which the surface crosses a line.
+const SECANTS: usize = 3;
 /// Points along a cell's edge at which the rule of a crossed cell is verified.
 const VERIFIED: usize = 4;
 
@@ -39,6 +46,8 @@ pub(crate) struct CellNearby<'a> {
     surface: &'a ExactSurface,
     /// Faces of the shape: surface, and +1 where the outward normal is the natural one, −1 where it is reversed.
     faces: Vec<(Surface, f64)>,
+    /// Sides of its smooth edges.
+    sides: &'a Sides,
     /// 9³ samples of the brick, x fastest.
     samples: &'a [ExactSample],
     /// Position of sample (0, 0, 0), mm, and the sample step.
@@ -57,9 +66,16 @@ pub(crate) struct CellNearby<'a> {
 
 impl<'a> CellNearby<'a> {
     /// Of the brick with `samples` from `origin` in steps of `cell`, mm.
-    pub fn new(surface: &'a ExactSurface, samples: &'a [ExactSample], origin: DVec3, cell: f64) -> Self {
+    pub fn new(
+        surface: &'a ExactSurface,
+        sides: &'a Sides,
+        samples: &'a [ExactSample],
+        origin: DVec3,
+        cell: f64,
+    ) -> Self {
         let mut this = Self {
             surface,
+            sides,
             faces: (surface.shape().faces.iter())
                 .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
                 .collect(),
@@ -91,7 +107,7 @@ impl<'a> CellNearby<'a> {
             let distance = self.samples[index(place, BRICK_SAMPLES)].distance;
             (self.distance(nearest, self.position(place)) - distance).abs() <= SAME_MM
         });
-        let (candidates, touches) = if self.alone {
+        let (mut candidates, mut touches) = if self.alone {
             (vec![nearest], Vec::new())
         } else {
             let center = self.position(at) + DVec3::splat(0.5 * self.cell);
@@ -104,11 +120,22 @@ impl<'a> CellNearby<'a> {
                 Nearby::Roughly(nearest)
             };
         }
+        let faces = candidates.len();
+        let sides: Vec<u16> = self.sides.among(&candidates).take(MOST_SIDES).collect();
+        candidates.extend(&sides);
+        let attempts = if sides.is_empty() {
+            ATTEMPTS
+        } else {
+            ATTEMPTS_WITH_SIDES
+        };
         let crossed = !touches.is_empty();
+        if crossed && !sides.is_empty() {
+            touches.extend(self.crossings(at));
+        }
         self.lattice.clear();
         let mut tests = self.tests(at, &candidates, touches);
-        for _ in 0..ATTEMPTS {
-            let Some(rule) = find_rule(&tests, &candidates, nearest) else {
+        for _ in 0..attempts {
+            let Some(rule) = find_rule(&tests, &candidates, faces, nearest) else {
                 break;
             };
             let failed = if crossed {
@@ -148,6 +175,35 @@ impl<'a> CellNearby<'a> {
         faces.retain(|&face| face <= Nearby::MAX_FACES && face != NO_FACE);
         let step = touches.len().div_ceil(MOST_TOUCHES).max(1);
         (faces, touches.into_iter().step_by(step).collect())
+    }
+
+    /// Points at which the surface crosses the lines of a cell's lattice of half steps. Where faces continue each other smoothly a rule that omits one
+    /// errs only farthest from their edge: at the cell's border.
+    fn crossings(&mut self, at: [usize; 3]) -> Vec<DVec3> {
+        let (low, step) = (self.position(at), 0.5 * self.cell);
+        let place = |i: usize| DVec3::new((i % 3) as f64, (i / 3 % 3) as f64, (i / 9) as f64);
+        let known: Vec<f64> = (0..27).map(|i| self.exact(at, low + place(i) * step)).collect();
+        let mut crossings = Vec::new();
+        for i in 0..27 {
+            for (axis, stride) in [1, 3, 9].into_iter().enumerate() {
+                if i / stride % 3 == 2 || known[i] * known[i + stride] > 0.0 {
+                    continue;
+                }
+                // Secants between places on both sides.
+                let (mut a, mut b) = ([0.0, known[i]], [step, known[i + stride]]);
+                let mut p = low + place(i) * step;
+                for _ in 0..SECANTS {
+                    let between = a[0] + (b[0] - a[0]) * (a[1] / (a[1] - b[1]));
+                    p = low + place(i) * step + DVec3::AXES[axis] * between;
+                    let distance = self.exact(at, p);
+                    let end = if distance * a[1] > 0.0 { &mut a } else { &mut b };
+                    *end = [between, distance];
+                }
+                crossings.push(p);
+            }
+        }
+        crossings.retain(|p| p.is_finite());
+        crossings
     }
 
     /// Tests on the lattice of half steps of the cell, and at points of the surface.
@@ -221,10 +277,10 @@ impl<'a> CellNearby<'a> {
         self.origin + DVec3::from_array(place.map(|i| i as f64)) * self.cell
     }
 
-    /// Signed distance to the unbounded surface of a face, mm; NaN where it has no closed form.
+    /// Signed distance to the unbounded surface of a face, or that by which a side counts, mm; NaN where it has no closed form.
     fn distance(&self, face: u16, p: DVec3) -> f64 {
         let Some((surface, sense)) = self.faces.get(usize::from(face)) else {
-            return f64::NAN;
+            return self.sides.distance(face, p);
         };
         signed_distance(surface, p) * sense
     }

@@ -311,7 +311,7 @@ impl Trials {
         let same = |field: &&mut Fielded| {
             field.choice.cell_mm == choice.cell_mm
                 && field.choice.format == choice.format
-                && (field.tolerance_mm == tolerance_mm || field.baked.patches.is_empty())
+                && (field.tolerance_mm == tolerance_mm || !field.baked.has_local_patches())
         };
         if let Some(known) = self.known.iter_mut().find(same) {
             known.measure_to(&self.surface, choice.reach_mm());

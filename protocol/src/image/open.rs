@@ -269,7 +269,11 @@ impl<'a> SceneImage<'a> {
             self.check_bricks_without_samples(shape)?;
         }
         each(self.patches, SECTION_PATCHES, |patch| {
-            finite(&patch.origin) && finite(&patch.x) && finite(&patch.normal) && finite(&patch.height)
+            patch.kind <= patch_kind::SIDE
+                && finite(&patch.origin)
+                && finite(&patch.x)
+                && finite(&patch.normal)
+                && finite(&patch.height)
         })?;
         each(self.faces, SECTION_FACES, |face| {
             face.kind <= surface_kind::TORUS
