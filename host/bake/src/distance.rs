@@ -68,6 +68,11 @@ impl Work {
     pub fn so_far(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
+
+    /// Counts work that took place elsewhere.
+    pub fn add(&self, triangles: u64) {
+        self.0.fetch_add(triangles, Ordering::Relaxed);
+    }
 }
 
 /// Work of a query beside the triangles that it examines.

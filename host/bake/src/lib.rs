@@ -79,7 +79,7 @@ pub use occupancy::{CROSSING_TOLERANCE_CELLS, PROXIMITY_LAYERS, bake_occupancy};
 pub use options::{BakeOptions, Grabbable, Method, PointshellKind, Progress, Stage};
 pub use partners::{CurvatureRange, Met, Partners};
 pub use plan::{ELSEWHERE, Limit, PartTick, Plan, Planned, Request, SLOT_BYTES, ShapePlan};
-pub use planner::{plan, plan_with};
+pub use planner::{Effort, plan, plan_with, plan_within};
 pub use pointshell::sample_pointshell;
 pub use report::{BakeReport, ByteCount, PartReport, ShapeReport};
 pub use shell::{Pointshell, PointshellOptions, ShellPoint};
