@@ -315,7 +315,11 @@ impl Demand {
         let elsewhere = ELSEWHERE * accuracy_mm;
         let bounds: Vec<(u32, f64)> = ((0..).zip(found))
             .filter(|(face, _)| self.counts(*face, choice))
-            .map(|(face, error)| (face, self.bound_mm(face, choice, error).max(least)))
+            .map(|(face, error)| {
+                let bound = self.bound_mm(face, choice, error);
+                let is_small = bound <= self.allowed_mm(face, trusted_mm);
+                (face, if is_small { bound } else { bound.max(least) })
+            })
             .collect();
         let most = |of: &dyn Fn(u32) -> bool| {
             let of = bounds.iter().filter(|(face, _)| of(*face));
