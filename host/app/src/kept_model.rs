@@ -79,9 +79,9 @@ mod tests {
         std::fs::read(path).expect("the sources contain it")
     }
 
-    /// An unchanged file is told from the cache, a changed one, another name and damaged bytes are not.
+    /// An unchanged file is taken from the cache; a changed one, another name and damaged bytes are not.
     #[test]
-    fn only_an_unchanged_file_is_told_from_the_cache() {
+    fn only_an_unchanged_file_is_taken_from_the_cache() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("a.step");
         std::fs::write(&path, sample()).expect("written");
