@@ -48,7 +48,7 @@ fn page_and_records_agree() {
     record!(page, "Span", SpanRecord, along bend round);
     record!(page, "Face", FaceRecord, kind sense origin axis radius second);
     record!(page, "Edge", EdgeRecord, center half bend normals faces thickness edge radius);
-    record!(page, "Patch", PatchRecord, origin x normal height face reserved);
+    record!(page, "Patch", PatchRecord, origin x normal height face kind);
     for limit in [
         BRICK_CELLS,
         BRICK_SAMPLES,

@@ -44,7 +44,7 @@ mod tick;
 pub use collision::cost;
 pub use collision::edge_crossing::LEAST_SINE as LEAST_CROSSING_SINE;
 pub use collision::exact_surface::{Rendered, rendered_distance};
-pub use collision::patch::distance_to_patch;
+pub use collision::patch::{SIDE_M, distance_to_patch};
 pub use constraints::targets::TargetError;
 pub use glam::{Quat, Vec3};
 pub use io::{FacePair, FacePairs, Flags, GuidanceState, Input, Output, Work};

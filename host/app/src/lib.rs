@@ -5,6 +5,7 @@
 
 pub mod cli;
 pub mod folder_cache;
+mod kept_model;
 #[cfg(feature = "window")]
 pub mod session;
 #[cfg(feature = "window")]

@@ -14,6 +14,7 @@ use crate::format::{FieldOptions, SampleFormat, Samples, brick_bytes};
 use crate::free_form_error::{AnsweredBy, FreeFormError};
 use crate::grid::Grid;
 use crate::nearby::{BrickCells, CellNearby, Unproven};
+use crate::sides::Sides;
 
 /// A brick before it is placed in the image.
 pub(crate) struct Brick {
@@ -31,6 +32,14 @@ pub(crate) struct Brick {
     pub unproven: Unproven,
     /// Error near free-form faces.
     pub free_form: FreeFormError,
+}
+
+impl Brick {
+    /// Words of the groups behind the palette's entries.
+    pub fn groups(&mut self) -> &mut [u16] {
+        let entries = usize::from(self.palette_len);
+        self.palette.get_mut(entries..).unwrap_or_default()
+    }
 }
 
 /// Exact samples of the brick at place `at` of `grid`, x fastest.
@@ -58,11 +67,12 @@ pub(crate) fn bake_brick(
     surface: &ExactSurface,
     grid: &Grid,
     options: &FieldOptions,
-    patches: &LocalPatches,
+    (patches, sides): (&LocalPatches, &Sides),
     at: [u32; 3],
     exact: &[ExactSample],
 ) -> Brick {
-    let (cells, unproven, free_form) = cells(surface, grid, patches, options.patch_tolerance_mm, at, exact);
+    let tolerance_mm = options.patch_tolerance_mm;
+    let (cells, unproven, free_form) = cells(surface, grid, (patches, sides), tolerance_mm, at, exact);
     let units_per_mm = options.units_per_cell() / grid.cell();
     let interpolates =
         options.samples == Samples::Everywhere || interpolates(surface, grid, patches, at, &cells);
@@ -136,12 +146,12 @@ fn quantise(units: f64, format: SampleFormat) -> f64 {
 fn cells(
     surface: &ExactSurface,
     grid: &Grid,
-    patches: &LocalPatches,
+    (patches, sides): (&LocalPatches, &Sides),
     tolerance_mm: f64,
     at: [u32; 3],
     samples: &[ExactSample],
 ) -> ([Nearby; CELLS_PER_BRICK], Unproven, FreeFormError) {
-    let surfaces = CellSurfaces::new(surface, patches, tolerance_mm, grid.cell());
+    let surfaces = CellSurfaces::new(surface, (patches, sides), tolerance_mm, grid.cell());
     let brick = BrickCells {
         samples,
         origin: grid.sample(at, [0; 3]),

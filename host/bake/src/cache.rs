@@ -44,13 +44,18 @@ pub(crate) fn shape_name(shape: &Shape) -> Option<String> {
     hash(shape)
 }
 
-/// Name of the plan for a model. The names of its files and its warnings do not matter.
-pub(crate) fn plan_name(shapes: &[Option<String>], model: &CadModel, request: &Request) -> Option<String> {
+/// Name of the plan for a model within a limit of work. The names of its files and its warnings do not matter.
+pub(crate) fn plan_name(
+    shapes: &[Option<String>],
+    model: &CadModel,
+    request: &Request,
+    work: u64,
+) -> Option<String> {
     let shapes: Vec<&str> = shapes.iter().map(Option::as_deref).collect::<Option<_>>()?;
     let parts: Vec<_> = (model.parts.iter())
         .map(|part| (&part.name, part.shape, part.placement.to_cols_array()))
         .collect();
-    Some(format!("plan-{}", hash(&(shapes, parts, request))?))
+    Some(format!("plan-{}", hash(&(shapes, parts, request, work))?))
 }
 
 /// Name of a field of a shape.
@@ -69,6 +74,8 @@ pub(crate) fn field_name(shape: Option<&String>, choice: &Choice, tolerance_mm: 
 pub(crate) struct KeptField {
     pub field: BakedField,
     pub errors: Vec<FaceError>,
+    /// Work that both took: a plan that takes it from the cache counts the same.
+    pub work: u64,
     /// Whether the winding number was found to decide signs.
     pub by_winding: bool,
 }
@@ -86,6 +93,7 @@ struct Stored {
     counts: [usize; 5],
     unproven_at: Option<[f64; 3]>,
     errors: Vec<FaceError>,
+    work: u64,
     by_winding: bool,
 }
 
@@ -110,6 +118,7 @@ impl KeptField {
             ],
             unproven_at: field.unproven_at.map(|p| p.to_array()),
             errors: self.errors.clone(),
+            work: self.work,
             by_winding: self.by_winding,
         };
         postcard::to_stdvec(&stored).ok()
@@ -143,6 +152,7 @@ impl KeptField {
                 unproven_at: stored.unproven_at.map(Into::into),
             },
             errors: stored.errors,
+            work: stored.work,
             by_winding: stored.by_winding,
         })
     }

@@ -1,4 +1,4 @@
-//! Surfaces that can answer in a cell: unbounded surfaces of faces, and local patches of free-form ones.
+//! Surfaces that can answer in a cell: unbounded surfaces of faces, local patches of free-form ones, and sides of smooth edges.
 
 use glam::DVec3;
 use mortise_brep::Surface;
@@ -9,13 +9,16 @@ use crate::cover::{LocalPatches, NEAR_CELLS, RELAXED, tolerance_at};
 use crate::distance::ExactSurface;
 use crate::local_patch::{board_distance, board_foot, is_foot};
 use crate::rule::SAME_MM;
+use crate::sides::Sides;
 use crate::surface::{project, signed_distance};
 
-/// Surfaces of a shape by their surface index: faces first, then patches.
+/// Surfaces of a shape by their surface index: faces first, then patches, then sides.
 pub(crate) struct CellSurfaces<'a> {
     /// Faces: surface, and +1 where the outward normal is the natural one, −1 where it is reversed.
     faces: Vec<(Surface, f64)>,
     patches: &'a LocalPatches,
+    /// Sides of smooth edges, behind the patches.
+    sides: &'a Sides,
     /// Largest error of a patch, mm.
     tolerance_mm: f64,
     /// Cell edge, mm.
@@ -23,13 +26,19 @@ pub(crate) struct CellSurfaces<'a> {
 }
 
 impl<'a> CellSurfaces<'a> {
-    /// Of the faces of `surface` and their `patches`.
-    pub fn new(surface: &ExactSurface, patches: &'a LocalPatches, tolerance_mm: f64, cell: f64) -> Self {
+    /// Of the faces of `surface`, their `patches` and the `sides` of their edges.
+    pub fn new(
+        surface: &ExactSurface,
+        (patches, sides): (&'a LocalPatches, &'a Sides),
+        tolerance_mm: f64,
+        cell: f64,
+    ) -> Self {
         Self {
             faces: (surface.shape().faces.iter())
                 .map(|face| (face.surface, if face.reversed { -1.0 } else { 1.0 }))
                 .collect(),
             patches,
+            sides,
             tolerance_mm,
             cell,
         }
@@ -37,7 +46,7 @@ impl<'a> CellSurfaces<'a> {
 
     /// Whether a surface is a patch.
     pub fn is_patch(&self, surface: u16) -> bool {
-        usize::from(surface) >= self.faces.len()
+        self.patch(surface).is_some()
     }
 
     /// Whether a face answers by patches only.
@@ -50,14 +59,20 @@ impl<'a> CellSurfaces<'a> {
         self.patches.records.get(number)
     }
 
-    /// Signed distance to a surface, mm: NaN where it has none.
+    /// Surface indices of the sides of edges between two of these faces, which are in ascending order.
+    pub fn sides(&self, faces: &'a [u16]) -> impl Iterator<Item = u16> + 'a {
+        self.sides.among(faces)
+    }
+
+    /// Signed distance to a surface, or that by which a side counts, mm: NaN where it has none.
     pub fn distance(&self, surface: u16, p: DVec3) -> f64 {
         let number = usize::from(surface);
         match self.faces.get(number) {
             Some((face, sense)) => signed_distance(face, p) * sense,
-            None => self
-                .patch(surface)
-                .map_or(f64::NAN, |patch| board_distance(patch, p)),
+            None => self.patch(surface).map_or_else(
+                || self.sides.distance(surface, p),
+                |patch| board_distance(patch, p),
+            ),
         }
     }
 

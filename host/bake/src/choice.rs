@@ -28,6 +28,10 @@ const FIELD_SHARE_ELSEWHERE: f64 = 0.5;
 const MOST_EPSILON_CELLS: f64 = 0.5;
 /// Measured errors are stated with this margin: between the places measured they may be larger.
 const SAFETY: f64 = 1.5;
+/// Proved bound of a field's error, cells. Interpolated distances err by at most √3/2 (see [`crate::sign_check`]). A rule is right on the lattice of half
+/// steps at least, of which every point of a cell is within √3/4; beyond a point at which it is right, both it and the distance change at most by
+/// the way there.
+const PROVED_CELLS: f64 = 0.8661;
 /// Cells along a shape's longest side from which larger cells are tried, and the factor from one to the next.
 const FEWEST_CELLS: f64 = 4.0;
 const LADDER: f64 = 1.5;
@@ -289,20 +293,33 @@ impl Demand {
         [away, at_edges]
     }
 
-    /// The model of `choice` with the errors measured of its field, and the shell that they leave room for.
+    /// The model of `choice` with the errors measured of its field, and the shell that they leave room for. Where they
+    /// exceed what the accuracy `trusted_mm` in fits allows, at least what is proved is stated: a few cells may err by far more than all places measured.
     pub fn state(
         &self,
         accuracy_mm: f64,
         choice: &Choice,
         found: &[FaceError],
         free_form: &FreeFormError,
+        trusted_mm: f64,
     ) -> ShapePlan {
+        let is_trusted =
+            (self.excess(trusted_mm, choice, found, free_form).iter()).all(|excess| *excess <= 1.0);
+        let least = if is_trusted {
+            0.0
+        } else {
+            PROVED_CELLS * choice.cell_mm
+                + step_error(choice.cell_mm, choice.band_cells, choice.format)
+                + rounding_error(self.size_mm)
+        };
         let elsewhere = ELSEWHERE * accuracy_mm;
         let bounds: Vec<(u32, f64)> = ((0..).zip(found))
             .filter(|(face, _)| self.counts(*face, choice))
             .map(|(face, error)| {
                 let bound = self.bound_mm(face, choice, error);
-                (face, bound.max(SAFETY * error.at_edges_mm.unwrap_or(0.0)))
+                let bound = bound.max(SAFETY * error.at_edges_mm.unwrap_or(0.0));
+                let is_small = bound <= self.allowed_mm(face, trusted_mm);
+                (face, if is_small { bound } else { bound.max(least) })
             })
             .collect();
         let most = |of: &dyn Fn(u32) -> bool| {
@@ -311,7 +328,8 @@ impl Demand {
         };
         let (in_fits, field) = (most(&|face| self.is_fit(face)), most(&|_| true));
         let at_edges = found.iter().filter_map(|error| error.at_edges_mm);
-        let at_edges = SAFETY * at_edges.fold(0.0, f64::max);
+        let at_edges = SAFETY * at_edges.fold(free_form.at_edges_mm / SAFETY, f64::max);
+        let at_edges = if at_edges > 0.0 { at_edges.max(least) } else { 0.0 };
         // The shell gets the share that the field leaves, and half of it at least where the field needs more than its own.
         let left = (elsewhere - field).max(FIELD_SHARE_ELSEWHERE * elsewhere);
         let difference = self.fits.iter().map(|f| f.2).fold(0.0, f64::max);
@@ -331,7 +349,7 @@ impl Demand {
             field_error_in_fits_mm: in_fits,
             shell_error_in_fits_mm: epsilon * difference,
             error_elsewhere_mm: field + epsilon,
-            error_at_edges_mm: at_edges.max(free_form.at_edges_mm),
+            error_at_edges_mm: at_edges,
             faces_that_fit: faces_that_fit(&self.fits),
             faces_taken_as_edges: choice.edges.clone(),
             faces_left_out: self.left_out.clone(),

@@ -22,7 +22,7 @@ use mortise_brep::{Shape, Surface};
 use crate::piece::OnPiece;
 use crate::surface::project;
 use crate::topology::{NONE, Topology};
-use crate::triangles::{NearTriangle, TriangleFeature, TriangleTree};
+use crate::triangles::{NearTriangle, TriangleFeature, TriangleTree, nearest_on_triangle};
 use crate::winding::WindingTree;
 
 /// Distances that differ by less than this are equal, mm: rounding of a few operations on metre-sized coordinates.
@@ -68,6 +68,11 @@ impl Work {
     pub fn so_far(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
+
+    /// Counts work that took place elsewhere.
+    pub fn add(&self, triangles: u64) {
+        self.0.fetch_add(triangles, Ordering::Relaxed);
+    }
 }
 
 /// Work of a query beside the triangles that it examines.
@@ -79,6 +84,8 @@ pub(crate) struct Scratch {
     near: Vec<NearTriangle>,
     faces: Vec<u32>,
     pieces: Vec<u32>,
+    /// Triangle nearest to the last query: the next one is usually near it.
+    last: Option<u32>,
 }
 
 #[derive(Clone, Copy)]
@@ -166,32 +173,53 @@ impl ExactSurface {
 
     /// Nearest point, given that the surface is not farther than `within` (any larger value is allowed, including infinity).
     pub(crate) fn query(&self, p: DVec3, within: f64, scratch: &mut Scratch) -> Option<Nearest> {
-        let (facet, _) = self
-            .triangles
-            .nearest(p, within + self.chord + SAME_MM)
-            .or_else(|| self.triangles.nearest(p, f64::INFINITY))?;
+        let Scratch {
+            near,
+            faces,
+            pieces,
+            last,
+        } = scratch;
+        let by_last = last
+            .filter(|&t| (t as usize) < self.shape.mesh.triangles.len())
+            .map_or(f64::INFINITY, |t| {
+                nearest_on_triangle(self.triangles.corners(t), p)
+                    .point
+                    .distance(p)
+            });
+        let mut most = by_last.min(within + self.chord + SAME_MM);
+        if !most.is_finite() {
+            most = self.triangles.nearest(p, f64::INFINITY)?.0;
+        }
         // The nearest exact point is within facet + chord of p, its triangle within facet + 2·chord; 4·chord more include the boundary pieces that
         // the trim test needs.
-        let radius = facet + 6.0 * self.chord + 10.0 * SAME_MM;
-        let Scratch { near, faces, pieces } = scratch;
-        near.clear();
+        let margin = 6.0 * self.chord + 10.0 * SAME_MM;
+        let mut collect = |most: f64| {
+            near.clear();
+            self.triangles.near(p, most, margin, |triangle, on, distance| {
+                near.push(NearTriangle {
+                    triangle,
+                    face: self.shape.mesh.triangle_face[triangle as usize],
+                    on,
+                    distance,
+                });
+            })
+        };
+        let mut facet = collect(most * (1.0 + 1e-12) + 1e-12);
+        if facet.is_infinite() {
+            facet = collect(self.triangles.nearest(p, f64::INFINITY)?.0 * (1.0 + 1e-12) + 1e-12);
+        }
+        near.retain(|n| n.distance <= facet + margin);
+        *last = near.iter().find(|n| n.distance == facet).map(|n| n.triangle);
         faces.clear();
         pieces.clear();
-        self.triangles.within(p, radius, |triangle, on, distance| {
-            let face = self.shape.mesh.triangle_face[triangle as usize];
-            near.push(NearTriangle {
-                triangle,
-                face,
-                on,
-                distance,
-            });
-            faces.push(face);
+        for n in near.iter() {
+            faces.push(n.face);
             pieces.extend(
-                self.topology.triangle_pieces[triangle as usize]
+                self.topology.triangle_pieces[n.triangle as usize]
                     .iter()
                     .filter(|&&i| i != NONE),
             );
-        });
+        }
         let examined = QUERY_WORK + near.len() as u64;
         self.work.0.fetch_add(examined, Ordering::Relaxed);
         faces.sort_unstable();

@@ -8,7 +8,9 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use mortise_protocol::image::{BRICK_CELLS, BrickRecord, FieldRecord, GridEntry, NO_SAMPLES, PatchRecord};
+use mortise_protocol::image::{
+    BRICK_CELLS, BrickRecord, FieldRecord, GridEntry, NO_SAMPLES, PatchRecord, patch_kind,
+};
 use rayon::prelude::*;
 
 use crate::bounds::{Class, classify};
@@ -20,6 +22,7 @@ use crate::error::BakeError;
 use crate::format::FieldOptions;
 use crate::free_form_error::FreeFormError;
 use crate::grid::Grid;
+use crate::sides::Sides;
 
 /// A standalone field: record offsets count from its own arrays.
 #[derive(Clone, Debug)]
@@ -32,7 +35,7 @@ pub struct BakedField {
     pub bricks: Vec<BrickRecord>,
     /// Palette entries.
     pub palette: Vec<u16>,
-    /// Local patches that palettes name.
+    /// Local patches, and behind them sides of smooth edges, that palettes name.
     pub patches: Vec<PatchRecord>,
     /// Measured error near free-form faces.
     pub free_form: FreeFormError,
@@ -50,6 +53,13 @@ pub struct BakedField {
     pub unproven_cells: usize,
     /// Centre of one of these, mm.
     pub unproven_at: Option<DVec3>,
+}
+
+impl BakedField {
+    /// Whether it depends on the tolerance of local patches.
+    pub(crate) fn has_local_patches(&self) -> bool {
+        self.patches.iter().any(|patch| patch.kind == patch_kind::HEIGHT)
+    }
 }
 
 /// Most grid entries of a field (2 bytes each; a larger grid would not fit any board).
@@ -79,10 +89,11 @@ pub fn bake_field(
         let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
         progress(n, near.stored.len()).is_continue()
     };
-    let baked = |patches: &LocalPatches, at, exact: &[ExactSample]| {
-        bake_brick(surface, &grid, options, patches, at, exact)
+    let faces = surface.shape().faces.len();
+    let baked = |beside: (&LocalPatches, &Sides), at, exact: &[ExactSample]| {
+        bake_brick(surface, &grid, options, beside, at, exact)
     };
-    let (bricks, patches): (Option<Vec<Brick>>, _) = if has_free_forms(surface) {
+    let (bricks, patches, sides): (Option<Vec<Brick>>, _, _) = if has_free_forms(surface) {
         // Patches extend over many bricks: all samples first.
         let sampled: Option<Vec<Sampled>> = (near.stored.par_iter())
             .map(|&at| step().then(|| (at, sample_brick(surface, &grid, at))))
@@ -90,17 +101,20 @@ pub fn bake_field(
         let sampled = sampled.ok_or(BakeError::Cancelled)?;
         let alive = || progress(near.stored.len(), near.stored.len()).is_continue();
         let patches = LocalPatches::cover(surface, &grid, &sampled, options.patch_tolerance_mm, &alive);
-        let bricks = sampled
-            .par_iter()
-            .map(|(at, exact)| alive().then(|| baked(&patches, *at, exact)));
-        (bricks.collect(), patches)
+        let sides = Sides::of(surface, faces + patches.records.len());
+        let bricks =
+            (sampled.par_iter()).map(|(at, exact)| alive().then(|| baked((&patches, &sides), *at, exact)));
+        (bricks.collect(), patches, sides)
     } else {
         let none = LocalPatches::default();
+        let sides = Sides::of(surface, faces);
         let bricks = (near.stored.par_iter())
-            .map(|&at| step().then(|| baked(&none, at, &sample_brick(surface, &grid, at))));
-        (bricks.collect(), LocalPatches::default())
+            .map(|&at| step().then(|| baked((&none, &sides), at, &sample_brick(surface, &grid, at))));
+        (bricks.collect(), none, sides)
     };
-    let bricks = bricks.ok_or(BakeError::Cancelled)?;
+    let mut bricks = bricks.ok_or(BakeError::Cancelled)?;
+    let mut patches = patches.records;
+    patches.extend(sides.named((bricks.iter_mut()).map(Brick::groups)));
     let unproven_cells = bricks.iter().map(|brick| brick.unproven.cells).sum();
     let unproven_at = bricks.iter().find_map(|brick| brick.unproven.at);
     let free_form =
@@ -112,7 +126,7 @@ pub fn bake_field(
         sign_disagreements: near.sign_disagreements,
         unproven_cells,
         unproven_at,
-        patches: patches.records,
+        patches,
         free_form,
         ..packed
     })

@@ -20,8 +20,9 @@ use crate::shell::Pointshell;
 
 /// Places for each square cell of a face's area, and for each cell along an edge.
 const PER_CELL: f64 = 4.0;
-/// Fewest places on a face or edge.
-const FEWEST: f64 = 24.0;
+/// Places on a small face or edge: errors of large cells vary with the faces, not with the cells. Fewest of them where all would be too many.
+const FEWEST: f64 = 128.0;
+const FEWEST_OF_MANY: usize = 24;
 /// Most places of a shape, about.
 const MOST: f64 = 20_000.0;
 /// Most places on one face or edge.
@@ -152,7 +153,7 @@ fn lines(surface: &ExactSurface, cell_mm: f64) -> Vec<Line> {
     let share = MOST / places as f64;
     if share < 1.0 {
         for line in &mut all {
-            line.places = ((line.places as f64 * share) as usize).max(FEWEST as usize);
+            line.places = ((line.places as f64 * share) as usize).max(FEWEST_OF_MANY);
         }
     }
     all

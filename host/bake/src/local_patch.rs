@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 use mortise_haptics::{Vec3, distance_to_patch};
-use mortise_protocol::image::PatchRecord;
+use mortise_protocol::image::{PatchRecord, patch_kind};
 
 use crate::cell_samples::Place;
 
@@ -92,7 +92,7 @@ pub(crate) fn fit(points: &[FacePoint], face: u16) -> Option<PatchRecord> {
         normal: normal.to_array(),
         height,
         face,
-        reserved: 0,
+        kind: patch_kind::HEIGHT,
     })
 }
 

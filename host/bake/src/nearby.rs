@@ -3,7 +3,7 @@
 //! A point of a cell has its nearest surface point on one of the faces with a triangle near the cell; among these the cell's rule is sought. The cell
 //! is *exact* where one face's unbounded surface gives the distance. At convex edges, corners and thin walls the largest of several distances does
 //! (exact inside and at the faces; outside it is a lower bound of the right sign), at re-entrant ones the smallest, at mixed ones a largest of
-//! smallest ones or the reverse (see `rule`). For a free-form face its local patch answers ([`crate::cover`]).
+//! smallest ones or the reverse (see `rule`), in which sides of smooth edges may take part ([`crate::sides`]). For a free-form face its local patch answers ([`crate::cover`]).
 //!
 //! A rule is tested against the exact distance at the corners and half-way between them, and at places on and beside every face, edge and corner in the
 //! cell ([`crate::cell_features`]). Where the surface crosses the cell it is then verified on another lattice, and where one of its surfaces appears to
@@ -24,6 +24,10 @@ use crate::rule::{SAME_MM, Test, find_rule, holds, value};
 const HALVES: usize = 2 * BRICK_CELLS + 1;
 /// Attempts to find a rule: each failed one adds tests.
 const ATTEMPTS: usize = 4;
+/// The same where sides of smooth edges take part, after the attempts without them.
+const ATTEMPTS_WITH_SIDES: usize = 10;
+/// Most sides that take part: two for each smooth edge.
+const MOST_SIDES: usize = 16;
 /// Points along a cell's edge at which the rule of a crossed cell is verified.
 const VERIFIED: usize = 4;
 /// Share of a cell's edge by which rules hold beyond the cell.
@@ -90,6 +94,8 @@ pub(crate) struct CellNearby<'a> {
 /// Surfaces that stand for the faces near a cell, and the tests of their rule.
 struct Trial {
     surfaces: Vec<u16>,
+    /// Number of those that are no sides of edges, which stand behind them.
+    faces: usize,
     with_patches: bool,
     nearest: u16,
     /// Factor of the tolerance.
@@ -197,12 +203,17 @@ impl<'a> CellNearby<'a> {
             .iter()
             .all(|&face| !self.brick.surfaces.is_free_form(face));
         let own = features.faces.iter().position(|&face| face == nearest);
+        let sides: Vec<u16> = (self.brick.surfaces.sides(&features.faces))
+            .take(MOST_SIDES)
+            .collect();
         for &relaxed in if closed { &RELAXED[..1] } else { &RELAXED } {
             // Others than the best patches may keep the tolerance itself.
             let most = if relaxed > 1.0 { 1 } else { usize::MAX };
-            for surfaces in selections(&choices).into_iter().take(most) {
+            for mut surfaces in selections(&choices).into_iter().take(most) {
                 let of_nearest = own.map_or(NO_FACE, |own| surfaces[own]);
+                surfaces.extend(&sides);
                 let mut trial = self.trial(surfaces, of_nearest, &places, relaxed);
+                trial.faces -= sides.len();
                 if let Some(rule) = self.rule(at, crossed, &mut trial, &mut places) {
                     return rule;
                 }
@@ -223,8 +234,13 @@ impl<'a> CellNearby<'a> {
         trial: &mut Trial,
         places: &mut Vec<Place>,
     ) -> Option<Nearby> {
-        for _ in 0..ATTEMPTS {
-            let rule = find_rule(&trial.tests, &trial.surfaces, trial.nearest)?;
+        let attempts = if trial.faces < trial.surfaces.len() {
+            ATTEMPTS_WITH_SIDES
+        } else {
+            ATTEMPTS
+        };
+        for _ in 0..attempts {
+            let rule = find_rule(&trial.tests, &trial.surfaces, trial.faces, trial.nearest)?;
             let failed = if crossed {
                 self.failures(at, rule, trial)
             } else {
@@ -246,6 +262,7 @@ impl<'a> CellNearby<'a> {
             with_patches: surfaces
                 .iter()
                 .any(|&surface| self.brick.surfaces.is_patch(surface)),
+            faces: surfaces.len(),
             surfaces,
             nearest,
             relaxed,

@@ -140,7 +140,9 @@ pub enum Limit {
     Tick,
     /// The surface of this part: finer cells did not help.
     Shape(String),
-    /// The time for planning.
+    /// The work of planning: what was found by then.
+    Work,
+    /// The time for planning, on a slow machine: another run may find more.
     Time,
 }
 
@@ -195,6 +197,7 @@ impl Planned {
             Limit::Bytes => format!("{asked} was asked; limited by the size"),
             Limit::Tick => format!("{asked} was asked; limited by the tick"),
             Limit::Shape(part) => format!("{asked} was asked; limited by the surface of \"{part}\""),
+            Limit::Work => format!("{asked} was asked; limited by the work of planning"),
             Limit::Time => format!("{asked} was asked; limited by the time for planning"),
         };
         format!("{errors} in {of}: {why}")

@@ -4,7 +4,7 @@
 //! flash, or the worst-case tick exceeds its budget, the accuracy is lowered until both fit; at last the smallest fields are taken, whatever their
 //! error. The result is reported as the best possible, with what limits it.
 //!
-//! Cost: a bake of each cell tried, the finest of which takes most of the time; bounded by [`MOST_WORK`], and at last by [`MOST_TIME`].
+//! Cost: a bake of each cell tried, the finest of which takes most of the time; bounded by [`Effort`].
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -26,7 +26,7 @@ use crate::placed_fits::placed_fits;
 use crate::plan::{ELSEWHERE, Limit, PartTick, Plan, Planned, Request, ShapePlan};
 use crate::scene::Scene;
 use crate::ticks::Ticks;
-use crate::trials::{Bench, Clock, Fielded, Found, Trials};
+use crate::trials::{Bench, Clock, End, Fielded, Found, Trials};
 use crate::voids::{others, without_hollows};
 
 /// Attempts to find an accuracy that fits, and then one between that and the last that did not fit.
@@ -38,10 +38,25 @@ const COARSER_CROSSINGS: usize = 4;
 const MOST_PLACEMENTS: usize = 16;
 /// Coarsest accuracy tried.
 const COARSEST_MM: f64 = 2.0;
-/// Most work of all trials together, in triangles examined: about half a minute on two cores.
-const MOST_WORK: u64 = 1_500_000_000;
-/// Time after which no further field is tried.
-const MOST_TIME: Duration = Duration::from_secs(40);
+
+/// What may be spent on planning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effort {
+    /// Most work of all trials together, in triangles examined. What it ends is the same on any machine.
+    pub work: u64,
+    /// Time after which no further field is tried: a last resort, as what it ends depends on the machine.
+    pub time: Duration,
+}
+
+impl Default for Effort {
+    /// Work of about 20 s on two cores, and a time that only much slower machines reach.
+    fn default() -> Self {
+        Self {
+            work: 500_000_000,
+            time: Duration::from_secs(55),
+        }
+    }
+}
 
 /// Plans and bakes `model`. `progress` as for [`crate::bake`]; it restarts with each attempt.
 ///
@@ -65,6 +80,20 @@ pub fn plan_with(
     cache: &dyn Cache,
     progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
 ) -> Result<Planned, BakeError> {
+    plan_within(model, request, Effort::default(), cache, progress)
+}
+
+/// As [`plan_with`], with this effort.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_within(
+    model: &CadModel,
+    request: &Request,
+    effort: Effort,
+    cache: &dyn Cache,
+    progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
+) -> Result<Planned, BakeError> {
     if !(request.accuracy_mm >= 1e-5 && request.accuracy_mm <= 100.0) {
         return Err(BakeError::Option {
             option: "accuracy",
@@ -73,16 +102,16 @@ pub fn plan_with(
         });
     }
     let shapes: Vec<Option<String>> = model.shapes.par_iter().map(shape_name).collect();
-    let name = plan_name(&shapes, model, request);
+    let name = plan_name(&shapes, model, request, effort.work);
     let kept = (name.as_ref())
         .and_then(|name| cache.get(name))
         .and_then(|bytes| plan_from_bytes(&bytes));
     if let Some(planned) = kept {
         return Ok(planned);
     }
-    let planned = Planner::new(model, request, cache, progress)?.search()?;
-    // A plan ended by the clock may be better in another run, so it is not kept.
-    if planned.limit != Limit::Time
+    let (planned, ended) = Planner::new(model, request, effort, cache, progress)?.search()?;
+    // A plan that the clock ended may be better in another run, so it is not kept.
+    if ended != Some(End::Time)
         && let Some((name, bytes)) = name.zip(plan_to_bytes(&planned))
     {
         cache.put(&name, &bytes);
@@ -165,6 +194,8 @@ struct Planner<'a> {
     progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
     cache: &'a dyn Cache,
     clock: Clock,
+    /// What ended a search, the clock before the work.
+    ended: Option<End>,
     scene: Scene,
     shapes: Vec<Trials>,
     /// Fits of shapes that can meet.
@@ -175,10 +206,11 @@ impl<'a> Planner<'a> {
     fn new(
         model: &'a CadModel,
         request: &'a Request,
+        effort: Effort,
         cache: &'a dyn Cache,
         progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
     ) -> Result<Self, BakeError> {
-        let clock = Clock::new(MOST_TIME);
+        let clock = Clock::new(effort.time);
         let options = BakeOptions {
             grabbable: request.grabbable.clone(),
             image_limit_bytes: request.flash_bytes,
@@ -201,7 +233,7 @@ impl<'a> Planner<'a> {
                 let share = surface.shape().faces.len() as f64 / faces.max(1) as f64;
                 let share = share.max(0.5 / scene.shapes.len() as f64);
                 let name = shape_name(surface.shape());
-                Trials::new(i, surface, demand, name, (share * MOST_WORK as f64) as u64)
+                Trials::new(i, surface, demand, name, (share * effort.work as f64) as u64)
             })
             .collect();
         Ok(Self {
@@ -210,14 +242,15 @@ impl<'a> Planner<'a> {
             progress,
             cache,
             clock,
+            ended: None,
             scene,
             shapes,
             fits,
         })
     }
 
-    /// The best plan found.
-    fn search(mut self) -> Result<Planned, BakeError> {
+    /// The best plan found, and what ended the search before its end.
+    fn search(mut self) -> Result<(Planned, Option<End>), BakeError> {
         let asked = self.request.accuracy_mm;
         let (mut failed, mut accuracy) = (asked, asked);
         let mut best: Option<Box<Attempt>> = None;
@@ -252,7 +285,11 @@ impl<'a> Planner<'a> {
             accuracy *= found.coarser();
         }
         for _ in 0..REFINEMENTS {
-            if best.is_none() || accuracy < 1.1 * failed || self.clock.is_over() {
+            if best.is_none() || accuracy < 1.1 * failed {
+                break;
+            }
+            if self.clock.is_over() {
+                self.ended = Some(End::Time);
                 break;
             }
             let between = (accuracy * failed).sqrt();
@@ -279,14 +316,14 @@ impl<'a> Planner<'a> {
             limit: self.request.flash_bytes,
             enough_mm: accuracy,
         })?;
-        Ok(self.planned(*found, fits, over))
+        Ok((self.planned(*found, fits, over), self.ended))
     }
 
     fn planned(&self, found: Attempt, fits: bool, over: Option<Limit>) -> Planned {
         let met = fits && found.plan.meets(self.request.accuracy_mm);
         let limit = if met {
             Limit::Accuracy
-        } else if self.clock.is_over() {
+        } else if self.ended == Some(End::Time) {
             Limit::Time
         } else {
             (over.or(found.limit)).unwrap_or_else(|| Limit::Shape(found.plan.least_accurate()))
@@ -304,6 +341,7 @@ impl<'a> Planner<'a> {
     fn attempt(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
         let room = self.request.flash_bytes;
         let found = self.find(accuracy_mm)?;
+        self.note_end();
         let (mut fields, mut limit, mut too_large) = (Vec::new(), None, false);
         for (found, name) in found.into_iter().zip(&self.scene.names) {
             let field = match found {
@@ -312,8 +350,11 @@ impl<'a> Planner<'a> {
                     limit = limit.or_else(|| Some(Limit::Shape(name.clone())));
                     Some(field)
                 }
-                Found::OutOfWork(field) => {
-                    limit = Some(Limit::Time);
+                Found::Ended(field, end) => {
+                    limit = Some(match end {
+                        End::Work => Limit::Work,
+                        End::Time => Limit::Time,
+                    });
                     Some(field)
                 }
                 Found::TooLarge(field) => {
@@ -338,6 +379,12 @@ impl<'a> Planner<'a> {
         self.assemble(accuracy_mm, fields, limit)
     }
 
+    /// Notes what ended the trials of any shape.
+    fn note_end(&mut self) {
+        let ends = self.shapes.iter().filter_map(|shape| shape.ended);
+        self.ended = (ends.chain(self.ended)).max_by_key(|end| *end == End::Time);
+    }
+
     /// The field of each shape for an accuracy. All shapes take one step after the other from coarse to fine, so that none is left behind when planning
     /// ends early.
     fn find(&mut self, accuracy_mm: f64) -> Result<Vec<Found>, BakeError> {
@@ -355,6 +402,7 @@ impl<'a> Planner<'a> {
     /// The smallest field found of each shape, whatever its error.
     fn smallest(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
         let fields = self.each(|shape, bench| shape.smallest(bench, accuracy_mm))?;
+        self.note_end();
         match fields.into_iter().collect() {
             Some(fields) => self.assemble(accuracy_mm, fields, None),
             None => Ok(Tried::Over(HOPELESS)),
@@ -386,7 +434,15 @@ impl<'a> Planner<'a> {
         let mut shapes: Vec<ShapePlan> = (self.shapes.iter().zip(&fielded))
             .map(|(shape, field)| {
                 let found = &field.errors;
-                (shape.demand).state(accuracy_mm, &field.choice, found, &field.baked.free_form)
+                let free_form = &field.baked.free_form;
+                // What ended early, or was taken whatever its error, was not refined until its errors were small.
+                let ended = shape.ended.is_some() || field.is_smallest;
+                let trusted_mm = if ended {
+                    self.request.accuracy_mm
+                } else {
+                    f64::INFINITY
+                };
+                (shape.demand).state(accuracy_mm, &field.choice, found, free_form, trusted_mm)
             })
             .collect();
         let mut each: Vec<BakeOptions> = shapes.iter().map(|shape| self.options(shape)).collect();

@@ -17,7 +17,7 @@ const NOISE_MM: f64 = 1e-5;
 pub(crate) struct Test {
     /// Exact distance there, mm, outside positive.
     pub distance: f64,
-    /// Distance to each candidate's surface, NaN where it has none.
+    /// Distance to each candidate's surface, NaN where it has none; of a side that by which it counts.
     pub faces: Vec<f64>,
     /// Largest error of a rule there, mm.
     pub tolerance: f64,
@@ -32,8 +32,9 @@ impl Test {
     }
 }
 
-/// The rule that holds at all tests, if one is found. Groups begin with `nearest` if they contain it.
-pub(crate) fn find_rule(tests: &[Test], candidates: &[u16], nearest: u16) -> Option<Nearby> {
+/// The rule that holds at all tests, if one is found. Groups begin with `nearest` if they contain it. The first `faces` of the candidates are faces,
+/// the others sides of edges, which serve in clauses with faces: they are used only where faces alone do not do.
+pub(crate) fn find_rule(tests: &[Test], candidates: &[u16], faces: usize, nearest: u16) -> Option<Nearby> {
     let hold = |rule: &Nearby| tests.iter().all(|test| holds(*rule, test, candidates));
     let single = Nearby::Face(nearest);
     if hold(&single) {
@@ -56,18 +57,25 @@ pub(crate) fn find_rule(tests: &[Test], candidates: &[u16], nearest: u16) -> Opt
         })
     };
     let plain = [1.0, -1.0].into_iter().filter_map(|sign| {
-        let faces = largest(tests, candidates.len(), sign);
-        of(sign, &faces.into_iter().map(|i| vec![i]).collect::<Vec<_>>())
+        let kept = largest(tests, faces, sign);
+        of(sign, &kept.into_iter().map(|i| vec![i]).collect::<Vec<_>>())
     });
     if let Some(rule) = plain.into_iter().find(hold) {
         return Some(rule);
     }
-    (([1.0, -1.0].into_iter()).filter_map(|sign| of(sign, &clauses(tests, candidates.len(), sign)?)))
-        .filter(hold)
-        .min_by_key(|rule| match rule {
+    let of_clauses = |count: usize| {
+        let found = [1.0, -1.0]
+            .into_iter()
+            .filter_map(|sign| of(sign, &clauses(tests, count, sign)?));
+        found.filter(hold).min_by_key(|rule| match rule {
             Nearby::Convex(group) | Nearby::Reentrant(group) => group.words().len(),
             _ => 0,
         })
+    };
+    of_clauses(faces).or_else(|| {
+        let has_sides = faces < candidates.len();
+        has_sides.then(|| of_clauses(candidates.len())).flatten()
+    })
 }
 
 /// Distance by `rule` where its surfaces have these distances; `None` where one has none, so that a reader interpolates.
@@ -239,7 +247,7 @@ mod tests {
     #[test]
     fn corners_of_every_kind() {
         let faces = [4, 5, 6];
-        let found = |value: fn([f64; 3]) -> f64, nearest| find_rule(&lattice(value), &faces, nearest);
+        let found = |value: fn([f64; 3]) -> f64, nearest| find_rule(&lattice(value), &faces, 3, nearest);
         assert_eq!(found(|[x, ..]| x, 4), Some(Nearby::Face(4)));
         assert_eq!(
             found(|[x, y, z]| x.max(y).max(z), 5),

@@ -5,12 +5,12 @@
 //! finer one.
 //!
 //! Work is counted in triangles that distance queries examine ([`ExactSurface::work`]). A shape has a share of it; when that is used up, the
-//! most accurate field found so far is taken. So the result depends on the model alone, not on the machine, unless the clock
-//! ends the planning: that is the last resort.
+//! most accurate field found so far is taken. A field that exceeds the share is not used, however much of it was done, and one from the cache counts as
+//! when it was baked. So the result depends on the model alone, not on the machine, unless the clock ends the planning: that is the last resort.
+//! Whatever ends it, only fields whose errors were measured completely are used.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crate::bake::field_bytes;
@@ -46,20 +46,21 @@ pub(crate) struct Bench<'a> {
 /// The end of planning by time, the last resort.
 #[derive(Clone, Copy)]
 pub(crate) struct Clock {
-    until: Instant,
+    /// Never without one.
+    until: Option<Instant>,
 }
 
 impl Clock {
     /// Ends after this time.
     pub fn new(most: Duration) -> Self {
         Self {
-            until: Instant::now() + most,
+            until: Instant::now().checked_add(most),
         }
     }
 
     /// Whether it has ended.
     pub fn is_over(self) -> bool {
-        Instant::now() >= self.until
+        self.until.is_some_and(|until| Instant::now() >= until)
     }
 }
 
@@ -79,6 +80,8 @@ pub(crate) struct Fielded {
     tolerance_mm: f64,
     /// Reach of the places at which its errors were measured, mm.
     reach_mm: f64,
+    /// Whether it was taken as the smallest, whatever its error.
+    pub is_smallest: bool,
     pub errors: Arc<Vec<FaceError>>,
     pub baked: Arc<BakedField>,
 }
@@ -104,12 +107,21 @@ pub(crate) enum Found {
     Met(Fielded),
     /// The most accurate one found: finer cells do not help.
     Best(Fielded),
-    /// The most accurate one found in the share of work.
-    OutOfWork(Fielded),
+    /// The most accurate one found before the share of work or the time ended.
+    Ended(Fielded, End),
     /// The steps allowed do not suffice.
     Pending,
     /// It would take more bytes than there are; with the most accurate field that does not, if any.
     TooLarge(Option<Fielded>),
+}
+
+/// What ended the trials of a shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum End {
+    /// Its share of work is used up.
+    Work,
+    /// The clock.
+    Time,
 }
 
 /// The trials of one shape.
@@ -120,9 +132,10 @@ pub(crate) struct Trials {
     /// Name of its geometry in the cache.
     name: Option<String>,
     known: Vec<Fielded>,
-    /// Most work, and whether it was reached.
+    /// Most work.
     share: u64,
-    pub is_out_of_work: bool,
+    /// What ended them, if anything has.
+    pub ended: Option<End>,
 }
 
 impl Trials {
@@ -140,7 +153,7 @@ impl Trials {
             name,
             known: Vec::new(),
             share,
-            is_out_of_work: false,
+            ended: None,
         }
     }
 
@@ -271,6 +284,7 @@ impl Trials {
 
     /// A known field, stated for another accuracy with the errors near enough for it.
     fn restated(&mut self, mut field: Fielded, finest: Choice) -> Fielded {
+        field.is_smallest = true;
         field.choice.resolution_mm = finest.resolution_mm;
         field.choice.edges = finest.edges;
         let reach_mm = field.choice.reach_mm();
@@ -290,9 +304,9 @@ impl Trials {
     }
 
     fn unfinished(&self, accuracy_mm: f64, tried: Vec<Fielded>, room: u64) -> Found {
-        match self.best(accuracy_mm, tried, room) {
-            Some(best) if self.is_out_of_work => Found::OutOfWork(best),
-            best => Found::TooLarge(best),
+        match (self.best(accuracy_mm, tried, room), self.ended) {
+            (Some(best), Some(end)) => Found::Ended(best, end),
+            (best, _) => Found::TooLarge(best),
         }
     }
 
@@ -322,7 +336,7 @@ impl Trials {
         let same = |field: &&mut Fielded| {
             field.choice.cell_mm == choice.cell_mm
                 && field.choice.format == choice.format
-                && (field.tolerance_mm == tolerance_mm || field.baked.patches.is_empty())
+                && (field.tolerance_mm == tolerance_mm || !field.baked.has_local_patches())
         };
         if let Some(known) = self.known.iter_mut().find(same) {
             known.measure_to(&self.surface, choice.reach_mm());
@@ -336,11 +350,17 @@ impl Trials {
         }
         let name = field_name(self.name.as_ref(), choice, tolerance_mm);
         let faces = self.surface.shape().faces.len();
+        // The first field is baked regardless of its cost, so that there is one.
+        let is_first = self.known.is_empty();
+        if !is_first && self.ended.is_some() {
+            return Ok(None);
+        }
         let kept = (name.as_ref())
             .and_then(|name| bench.cache.get(name))
             .and_then(|bytes| KeptField::from_bytes(&bytes, faces));
         let made = match kept {
             Some(kept) => {
+                self.surface.work().add(kept.work);
                 if kept.by_winding {
                     self.surface.set_sign_by_winding();
                 }
@@ -356,10 +376,15 @@ impl Trials {
                 made
             }
         };
+        if !is_first && self.surface.work().so_far() > self.share {
+            self.ended = Some(End::Work);
+            return Ok(None);
+        }
         let field = Fielded {
             choice: choice.clone(),
             tolerance_mm,
             reach_mm: choice.reach_mm(),
+            is_smallest: false,
             errors: Arc::new(made.errors),
             baked: Arc::new(made.field),
         };
@@ -374,10 +399,9 @@ impl Trials {
         choice: &Choice,
         tolerance_mm: f64,
     ) -> Result<Option<KeptField>, BakeError> {
-        // The first field is baked regardless of its cost, so that there is one.
         let is_first = self.known.is_empty();
-        if !is_first && (self.is_out_of_work || bench.clock.is_over()) {
-            self.is_out_of_work = true;
+        if !is_first && bench.clock.is_over() {
+            self.ended = Some(End::Time);
             return Ok(None);
         }
         let options = BakeOptions {
@@ -388,14 +412,24 @@ impl Trials {
             ..BakeOptions::default()
         };
         let (work, share) = (self.surface.work(), self.share);
-        let stopped = AtomicBool::new(false);
+        let before = work.so_far();
+        let stopped = Mutex::new(None);
         let progress = |progress: Progress| {
             (bench.progress)(progress)?;
-            if !is_first && (work.so_far() > share || bench.clock.is_over()) {
-                stopped.store(true, Ordering::Relaxed);
-                return ControlFlow::Break(());
+            let end = if work.so_far() > share {
+                End::Work
+            } else if bench.clock.is_over() {
+                End::Time
+            } else {
+                return ControlFlow::Continue(());
+            };
+            if is_first {
+                return ControlFlow::Continue(());
             }
-            ControlFlow::Continue(())
+            if let Ok(mut stopped) = stopped.lock() {
+                stopped.get_or_insert(end);
+            }
+            ControlFlow::Break(())
         };
         let mut cell_mm = choice.cell_mm;
         let baked = bench
@@ -403,14 +437,16 @@ impl Trials {
             .field(self.number, &mut self.surface, &mut cell_mm, &options, &progress);
         let field = match baked {
             Err(BakeError::CellTooSmall { .. }) => return Ok(None),
-            Err(BakeError::Cancelled) if stopped.load(Ordering::Relaxed) => {
-                self.is_out_of_work = true;
-                return Ok(None);
+            Err(BakeError::Cancelled) => {
+                self.ended = stopped.lock().ok().and_then(|end| *end);
+                return self.ended.map_or(Err(BakeError::Cancelled), |_| Ok(None));
             }
             done => done?,
         };
+        let errors = field_errors(&self.surface, &field, choice.reach_mm());
         Ok(Some(KeptField {
-            errors: field_errors(&self.surface, &field, choice.reach_mm()),
+            errors,
+            work: work.so_far() - before,
             field,
             by_winding: self.surface.sign_by_winding(),
         }))

@@ -1,5 +1,7 @@
 //! Bounding-volume hierarchy over the tessellation: nearest triangle, and all triangles within a distance.
 
+use std::cell::Cell;
+
 use glam::DVec3;
 use mortise_brep::Mesh;
 use parry3d_f64::bounding_volume::Aabb;
@@ -73,6 +75,28 @@ impl TriangleTree {
                 |t, _| Some(nearest_on_triangle(self.corners(t), p).point.distance_squared(p)),
             )
             .map(|(t, d2)| (d2.sqrt(), t))
+    }
+
+    /// Calls `visit` with each triangle that is at most `margin` farther from `p` than the nearest one, and with some that are farther; returns the
+    /// distance of the nearest one, infinite when it exceeds `most`. One descent instead of [`Self::nearest`] and [`Self::within`]: the smaller
+    /// `most`, the cheaper.
+    pub fn near(&self, p: DVec3, most: f64, margin: f64, mut visit: impl FnMut(u32, OnTriangle, f64)) -> f64 {
+        let mut nearest = f64::INFINITY;
+        let radius2 = Cell::new((most + margin) * (most + margin));
+        for t in self.bvh.leaves(|node| box_distance2(node, p) <= radius2.get()) {
+            let on = nearest_on_triangle(self.corners(t), p);
+            let d2 = on.point.distance_squared(p);
+            if d2 > radius2.get() {
+                continue;
+            }
+            let distance = d2.sqrt();
+            visit(t, on, distance);
+            if distance < nearest.min(most) {
+                nearest = distance;
+                radius2.set((nearest + margin) * (nearest + margin));
+            }
+        }
+        nearest
     }
 
     /// Calls `visit` with each triangle within `radius` of `p`, its nearest point and its distance.
@@ -180,6 +204,18 @@ mod tests {
             found.sort_unstable();
             let expected: Vec<u32> = (0..soup.len() as u32).filter(|&t| all[t as usize] <= radius).collect();
             prop_assert_eq!(found, expected);
+            // One descent finds the same, whatever bound it begins with.
+            for most in [brute * (1.0 + 1e-12) + 1e-12, brute + 1.0, 1e6] {
+                let mut near = Vec::new();
+                let nearest = tree.near(p, most, radius, |t, _, distance| near.push((t, distance)));
+                prop_assert!((nearest - brute).abs() < 1e-12);
+                near.retain(|near| near.1 <= nearest + radius);
+                near.sort_by_key(|near| near.0);
+                let near: Vec<u32> = near.into_iter().map(|near| near.0).collect();
+                let expected: Vec<u32> = (0..soup.len() as u32).filter(|&t| all[t as usize] <= nearest + radius).collect();
+                prop_assert_eq!(near, expected);
+            }
+            prop_assert_eq!(tree.near(p, (brute * 0.999 - 1e-9).max(0.0), 0.0, |_, _, _| ()), f64::INFINITY);
         }
     }
 }

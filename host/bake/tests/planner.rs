@@ -7,12 +7,13 @@ mod common;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use common::*;
 use glam::{DAffine3, DVec3};
-use mortise_bake::{ExactSurface, Grabbable, Planned, Request, plan};
-use mortise_brep::{CadModel, Surface, load_step};
-use mortise_haptics::{Pose, Prober, Settings, Vec3, rendered_distance};
+use mortise_bake::{Effort, ExactSurface, Grabbable, Limit, NoCache, Planned, Request, plan, plan_within};
+use mortise_brep::{CadModel, Shape, Surface, load_step};
+use mortise_haptics::{Pose, Prober, Rendered, Settings, Vec3, rendered_distance};
 use mortise_protocol::image::{Lookup, Nearby, SceneImage};
 
 fn request(accuracy_um: f64, flash_kib: u64) -> Request {
@@ -95,16 +96,7 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
                     own.name, exact.distance
                 );
             };
-            let distance = f64::from(answer.distance) * 1000.0;
-            let error = match answer.nearby {
-                // Beside an edge surfaces give a bound: of the right sign, and no larger.
-                Nearby::Convex(_) | Nearby::Reentrant(_)
-                    if !answer.interpolated && distance * exact.distance > 0.0 =>
-                {
-                    (distance.abs() - exact.distance.abs()).max(0.0)
-                }
-                _ => (distance - exact.distance).abs(),
-            };
+            let error = error_of(&answer, exact.distance);
             let kind = &shape.faces[exact.face as usize].surface;
             if own.faces_taken_as_edges.contains(&exact.face) {
                 found.edges_cells = found.edges_cells.max(error / own.cell_mm);
@@ -134,6 +126,17 @@ fn check_promise(model: &CadModel, planned: &Planned, tries: usize) -> Found {
     }
     assert!(found.edges_cells <= 0.6, "{found:?}");
     found
+}
+
+/// Error of the board's distance, mm. Beside an edge surfaces give a bound: of the right sign, and no larger.
+fn error_of(answer: &Rendered, exact_mm: f64) -> f64 {
+    let distance = f64::from(answer.distance) * 1000.0;
+    match answer.nearby {
+        Nearby::Convex(_) | Nearby::Reentrant(_) if !answer.interpolated && distance * exact_mm > 0.0 => {
+            (distance.abs() - exact_mm.abs()).max(0.0)
+        }
+        _ => (distance - exact_mm).abs(),
+    }
 }
 
 #[test]
@@ -219,6 +222,100 @@ fn stated_errors_bound_those_of_random_fits() {
     over.sort_by(f64::total_cmp);
     println!("stated over twice the measured error and a micrometre: {over:.2?}");
     assert!(over[over.len() / 2] <= 1.0, "{over:?}");
+}
+
+/// A peg with ribs and grooves so fine that the first cells tried contain more of them than a rule names.
+fn ribbed(radius: f64, pitch: f64, depth: f64, ribs: usize) -> Shape {
+    let cylinder = |radius| Surface::Cylinder {
+        frame: world(),
+        radius,
+    };
+    let plane = |z: f64, up: DVec3| Surface::Plane {
+        frame: frame_at(DVec3::Z * z, up),
+    };
+    let (mut profile, mut surfaces) = (vec![(0.0, 0.0, 0)], vec![(plane(0.0, -DVec3::Z), false)]);
+    for rib in 0..2 * ribs {
+        let own = if rib % 2 == 0 { radius } else { radius - depth };
+        let (low, high) = (rib as f64 * pitch, (rib + 1) as f64 * pitch);
+        let up = if rib % 2 == 0 { DVec3::Z } else { -DVec3::Z };
+        let face = surfaces.len() as u32;
+        profile.extend([(own, low, face), (own, high, face + 1)]);
+        surfaces.extend([(cylinder(own), false), (plane(high, up), false)]);
+    }
+    let top = 2.0 * ribs as f64 * pitch;
+    // The last face is the end, which looks up.
+    if let Some(end) = surfaces.last_mut() {
+        *end = (plane(top, DVec3::Z), false);
+    }
+    profile.push((0.0, top, 0));
+    revolve(&profile, false, &surfaces, 48)
+}
+
+/// Planning that ends early states no less than it errs, and gives the same image again unless the clock ended it.
+#[test]
+fn plans_that_end_early_state_their_errors() {
+    let mut ended = [0; 2];
+    for i in 0..2 {
+        let r = |k: f64| ((f64::from(i) + 0.5) * k).fract();
+        let radius = 6.0 + 6.0 * r(0.898_654);
+        let bore = block_with_hole([25.0, 20.0], 30.0, radius + 0.01 + 0.1 * r(0.807_578), 48);
+        let (pitch, depth) = (0.05 + 0.05 * r(0.725_732), 0.1 + 0.1 * r(0.652_182));
+        let peg = ribbed(radius, pitch, depth, 12 + i as usize);
+        let model = model(vec![
+            ("block", bore, DAffine3::IDENTITY),
+            ("peg", peg, DAffine3::from_translation(DVec3::Z * 80.0)),
+        ]);
+        let run = |work, time| {
+            let effort = Effort { work, time };
+            let quiet = &|_: mortise_bake::Progress<'_>| ControlFlow::Continue(());
+            plan_within(&model, &request(5.0, 512), effort, &NoCache, quiet).unwrap()
+        };
+        for work in [0, (2e6 * r(0.586_086)) as u64] {
+            let planned = run(work, Duration::MAX);
+            ended[0] += usize::from(planned.limit == Limit::Work);
+            check_stated(&model, &planned);
+            assert!(run(work, Duration::MAX).image == planned.image, "{i}");
+        }
+        let planned = run(u64::MAX, Duration::ZERO);
+        ended[1] += usize::from(planned.limit == Limit::Time);
+        check_stated(&model, &planned);
+    }
+    assert!(ended[0] >= 2 && ended[1] >= 1, "{ended:?}");
+}
+
+/// Compares the field with the exact surface wherever the plan states an error, beside edges too.
+fn check_stated(model: &CadModel, planned: &Planned) {
+    let aligned = AlignedBytes::new(&planned.image);
+    let image = SceneImage::open(aligned.bytes()).unwrap();
+    for (number, own) in planned.plan.shapes.iter().enumerate() {
+        let parts = &planned.plan.report.parts;
+        let part = parts.iter().find(|part| part.shape == number).unwrap();
+        let shape = &model.shapes[model.parts[part.model_part].shape];
+        let surface = ExactSurface::new(shape);
+        let board = image.shape(number);
+        let stated = (own.error_elsewhere_mm.max(own.error_at_edges_mm)).max(own.field_error_in_fits_mm);
+        let vertices = &shape.mesh.vertices;
+        for i in 0..3_000 {
+            let r = |k: f64| (f64::from(i) * k + 0.37).fract();
+            let at = |k: f64| vertices[(r(k) * vertices.len() as f64) as usize];
+            let on = surface.nearest(at(0.754_877_666).lerp(at(0.301_541), 0.2 * r(0.437_016)));
+            let aside = DVec3::new(r(0.819_172_513), r(0.671_043_607), r(0.549_700_478)) * 2.0 - 1.0;
+            let at = ((on.unwrap().point + aside * (0.5 * own.reach_mm)) / 1000.0).as_vec3();
+            let exact = surface.nearest(at.as_dvec3() * 1000.0).unwrap();
+            if own.faces_left_out.contains(&exact.face) {
+                continue;
+            }
+            let answer = rendered_distance(&board, Vec3::from_array(at.to_array())).expect("a cell");
+            let error = error_of(&answer, exact.distance);
+            assert!(
+                error <= stated + 1e-4,
+                "{}: errs by {error} mm at {at}, stated {stated} by {:?}; {answer:?}, exact {}",
+                own.name,
+                planned.limit,
+                exact.distance
+            );
+        }
+    }
 }
 
 /// A coarser request gives no larger image, a much coarser one a smaller one: edges take spans, whose number does not depend on the accuracy.

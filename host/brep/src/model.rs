@@ -22,6 +22,18 @@ pub struct CadModel {
     pub files: Vec<PathBuf>,
 }
 
+impl CadModel {
+    /// Its bytes, for this version of the program only.
+    pub fn to_bytes(&self) -> Option<Vec<u8>> {
+        postcard::to_allocvec(self).ok()
+    }
+
+    /// The model with these bytes; `None` when they are no model's.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        postcard::from_bytes(bytes).ok()
+    }
+}
+
 /// One placed part: a leaf of the assembly.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Part {

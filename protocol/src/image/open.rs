@@ -277,7 +277,11 @@ impl<'a> SceneImage<'a> {
             self.check_bricks_without_samples(shape)?;
         }
         each(self.patches, SECTION_PATCHES, |patch| {
-            finite(&patch.origin) && finite(&patch.x) && finite(&patch.normal) && finite(&patch.height)
+            patch.kind <= patch_kind::SIDE
+                && finite(&patch.origin)
+                && finite(&patch.x)
+                && finite(&patch.normal)
+                && finite(&patch.height)
         })?;
         each(self.spans, SECTION_SPANS, |span| {
             finite(&span.along) && finite(&span.bend) && (0.0..=1.0).contains(&span.round)

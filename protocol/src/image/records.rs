@@ -481,10 +481,22 @@ pub struct FaceRecord {
     pub second: f32,
 }
 
+/// Kinds of patch in [`PatchRecord::kind`].
+pub mod patch_kind {
+    /// A height over a tangent plane.
+    pub const HEIGHT: u16 = 0;
+    /// One side of an edge along which two faces continue each other smoothly.
+    pub const SIDE: u16 = 1;
+}
+
 /// A local patch of a face without closed form: a height over a tangent plane, w = h(u, v), in its shape's frame.
 ///
 /// A point p has u = (p − `origin`)·`x`, v = (p − `origin`)·(`normal` × `x`), w = (p − `origin`)·`normal`. The patch stands for its face only in cells
 /// that name it.
+///
+/// Of kind [`patch_kind::SIDE`] it is no surface but one side of the surface that the normals along a line or circle sweep: with the distance ρ from the
+/// axis through `origin` along `normal`, a point is on it where (ρ − `height[0]`)·`height[1]` + w·`height[2]` > 0. Its distance is a great positive one
+/// there, else a great negative one: in a clause it limits another face to that side, or leaves it out.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PatchRecord {
@@ -498,8 +510,8 @@ pub struct PatchRecord {
     pub height: [f32; 10],
     /// The face that it is a part of, counted from the shape's first.
     pub face: u16,
-    /// Zero.
-    pub reserved: u16,
+    /// One of [`patch_kind`].
+    pub kind: u16,
 }
 
 /// Unit vector from its octahedral code (Cigolla et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors"):

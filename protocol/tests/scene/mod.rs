@@ -186,7 +186,7 @@ pub fn bytes() -> Vec<u8> {
         normal: [1.0, 0.0, 0.0],
         height: [0.0, 0.0, 0.0, 4.0, 0.0, -2.0, 0.0, 8.0, 0.0, 16.0],
         face: 1,
-        reserved: 0,
+        kind: patch_kind::HEIGHT,
     }];
     let shapes = [
         ShapeRecord {

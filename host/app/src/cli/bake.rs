@@ -9,12 +9,12 @@ use anyhow::Context as _;
 use mortise_bake::{
     BakeOptions, BakeReport, Cache, Grabbable, Method, NoCache, Planned, PointshellKind, Progress, Request,
 };
-use mortise_brep::CadModel;
 use mortise_output::{Existing, Output, lines};
 
 use super::reading::Reading;
 use super::units;
 use crate::folder_cache::FolderCache;
+use crate::kept_model;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -121,7 +121,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     args.reading.apply();
     let existing = Existing::from_force(args.force);
     let mut target = Output::new(&args.output, existing, &[&args.file])?;
-    let model = mortise_brep::load_step(&args.file)?;
+    let folder = if args.no_cache {
+        None
+    } else {
+        FolderCache::of_user()
+    };
+    let cache: &dyn Cache = folder.as_ref().map_or(&NoCache, |folder| folder);
+    let model = kept_model::load(&args.file, cache)?;
     target.add_inputs(&model.files)?;
     let terminal = std::io::stderr().is_terminal();
     let progress = |progress: Progress| {
@@ -132,10 +138,15 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let in_file = || args.file.display().to_string();
     let Some(options) = args.explicit() else {
-        return plan(args, &target, &model, terminal, &progress).with_context(in_file);
+        let result = mortise_bake::plan_with(&model, &args.request(), cache, &progress);
+        clear(terminal);
+        warn_of(folder.as_ref());
+        let planned = result.with_context(in_file)?;
+        return print_plan(args, &target, &args.request(), &planned, &model.warnings).with_context(in_file);
     };
     let result = mortise_bake::bake(&model, &options, &progress);
     clear(terminal);
+    warn_of(folder.as_ref());
     let baked = result.with_context(in_file)?;
     target.write(&baked.image)?;
     if args.json {
@@ -158,27 +169,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Plans, and prints and writes the result.
-fn plan(
-    args: &Args,
-    target: &Output,
-    model: &CadModel,
-    terminal: bool,
-    progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
-) -> anyhow::Result<ExitCode> {
-    let request = args.request();
-    let folder = if args.no_cache {
-        None
-    } else {
-        FolderCache::of_user()
-    };
-    let cache: &dyn Cache = folder.as_ref().map_or(&NoCache, |folder| folder);
-    let result = mortise_bake::plan_with(model, &request, cache, progress);
-    clear(terminal);
-    for warning in folder.iter().flat_map(FolderCache::finish) {
+/// Says what went wrong with the cache.
+fn warn_of(folder: Option<&FolderCache>) {
+    for warning in folder.into_iter().flat_map(FolderCache::finish) {
         eprintln!("warning: {warning}");
     }
-    print_plan(args, target, &request, &result?, &model.warnings)
 }
 
 /// Shows progress on the terminal.
