@@ -54,6 +54,17 @@ impl<'a> CellSurfaces<'a> {
         matches!(self.faces.get(usize::from(face)), Some((Surface::Spline, _)))
     }
 
+    /// Number of different surfaces under these faces. Where a face enters a cell, only its own surface is zero: with more of them than a group names
+    /// there is no rule.
+    pub fn count(&self, faces: &[u16]) -> usize {
+        let surface = |face: u16| self.faces.get(usize::from(face));
+        let is_first =
+            |&(i, &face): &(usize, &u16)| !faces[..i].iter().any(|&other| surface(other) == surface(face));
+        let free_forms = faces.iter().filter(|&&face| self.is_free_form(face)).count();
+        let closed = faces.iter().enumerate().filter(is_first);
+        closed.filter(|&(_, &face)| !self.is_free_form(face)).count() + free_forms
+    }
+
     fn patch(&self, surface: u16) -> Option<&PatchRecord> {
         let number = usize::from(surface).checked_sub(self.faces.len())?;
         self.patches.records.get(number)

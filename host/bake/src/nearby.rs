@@ -11,7 +11,7 @@
 //! the cell's border, clear of the surface, would be felt there. Cells without a rule are interpolated.
 
 use glam::DVec3;
-use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, NO_FACE, Nearby};
+use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, Group, NO_FACE, Nearby};
 
 use crate::cell_features::CellFeatures;
 use crate::cell_samples::{ExactSample, Place, about, corner_places};
@@ -192,16 +192,16 @@ impl<'a> CellNearby<'a> {
         features: CellFeatures,
     ) -> Nearby {
         let crossed = !features.entering.is_empty();
+        if self.brick.surfaces.count(&features.entering) > Group::MOST {
+            return self.without_rule(at, nearest, &features);
+        }
         self.lattice.clear();
         let mut places = self.places(at, &features.places);
         places.extend(self.patches.verified(cell).into_iter().flatten());
         let choices: Vec<Vec<u16>> = (features.faces.iter())
             .map(|&face| self.brick.surfaces.alternatives(cell, face, &places))
             .collect();
-        let closed = features
-            .faces
-            .iter()
-            .all(|&face| !self.brick.surfaces.is_free_form(face));
+        let closed = self.is_closed(&features);
         let own = features.faces.iter().position(|&face| face == nearest);
         let sides: Vec<u16> = (self.brick.surfaces.sides(&features.faces))
             .take(MOST_SIDES)
@@ -219,7 +219,18 @@ impl<'a> CellNearby<'a> {
                 }
             }
         }
-        if crossed && closed {
+        self.without_rule(at, nearest, &features)
+    }
+
+    /// Whether all near faces have a closed form.
+    fn is_closed(&self, features: &CellFeatures) -> bool {
+        let surfaces = self.brick.surfaces;
+        features.faces.iter().all(|&face| !surfaces.is_free_form(face))
+    }
+
+    /// Entry of a cell without a rule, which is counted where there should be one.
+    fn without_rule(&mut self, at: [usize; 3], nearest: u16, features: &CellFeatures) -> Nearby {
+        if !features.entering.is_empty() && self.is_closed(features) {
             self.unproven.cells += 1;
             (self.unproven.at).get_or_insert(self.brick.position(at) + DVec3::splat(0.5 * self.brick.cell));
         }
