@@ -63,6 +63,7 @@ pub fn parts(count: usize, tag: u8) -> Vec<u8> {
     header.palette = section(&[], 0);
     header.grid = section(bytes_of(&grid), 1);
     header.edges = section(&[], 0);
+    header.spans = section(&[], 0);
     // Some bytes of its own, so that it spans sectors and does not end on a flash word.
     header.blob = section(&[tag; 1001], 1001);
     header.length = (size_of::<Header>() + body.len()) as u32;

@@ -363,7 +363,7 @@ mod tests {
         fn a_rim_and_a_cylinder(
             (r, room) in (1e-3f32..0.35, -1e-3f32..1e-3),
             (aside, tilt) in (-1.0f32..1.0, -0.02f32..0.02),
-            about in 0.0f32..6.28,
+            about in 0.0f32..6.2,
             sense in prop::bool::ANY.prop_map(|outward| if outward { 1.0f32 } else { -1.0 }),
         ) {
             // As far as the formula follows an arc within a quarter of a micrometre, to either side.
@@ -392,7 +392,7 @@ mod tests {
         }
         /// A rim over a tilted plane: the plane adds no bending, so the span's own is all.
         #[test]
-        fn a_rim_on_a_plane(about in 0.0f32..6.28, tilt in 0.0f32..1.5, r in 1e-3f32..0.35) {
+        fn a_rim_on_a_plane(about in 0.0f32..6.2, tilt in 0.0f32..1.5, r in 1e-3f32..0.35) {
             let (s, c) = (libm::sinf(0.39), libm::cosf(0.39));
             // An arc of ±0.39 rad about x.
             let span = span(Vec3::X * r, Vec3::Y * (r * s), Vec3::X * (r * (c - 1.0)));

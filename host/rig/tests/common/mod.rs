@@ -45,6 +45,7 @@ pub fn image(filling: usize, seed: u8) -> Vec<u8> {
         grid: none,
         patches: none,
         edges: none,
+        spans: none,
         blob: Section {
             offset: head as u32,
             count: (length - head) as u32,
