@@ -3,7 +3,7 @@
 use mortise_protocol::image::{CRC, Header, LAYOUT_VERSION, MAGIC};
 
 /// Sections in a header, and the place of the blob among them.
-const SECTIONS: usize = 12;
+const SECTIONS: usize = 13;
 /// See [`SECTIONS`].
 const BLOB: usize = 10;
 

@@ -5,13 +5,19 @@
 mod rigs;
 
 use glam::Vec3;
-use mortise_firmware::board::{Drive, Mechanism, Simulation, TICK_S};
+use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation, TICK_S};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_protocol::rig::Rig;
 use mortise_simulation::described::Described;
 use proptest::prelude::*;
 use rigs::{arm, paddle, pantograph};
+
+/// The readings after the next tick of the simulated world.
+fn next(mechanism: &mut Described) -> Sensed {
+    mechanism.advance();
+    mechanism.sense()
+}
 
 fn any_rig() -> impl Strategy<Value = Rig> {
     prop_oneof![Just(arm()), Just(pantograph()), Just(paddle())]
@@ -65,7 +71,7 @@ proptest! {
         mechanism.set_hand(Some(&script(stiffness, &poses)));
         for tick in 0..300u32 {
             mechanism.drive(if tick % 50 < 25 { push(force) } else { Drive::Off });
-            let sensed = mechanism.sense();
+            let sensed = next(&mut mechanism);
             prop_assert!(sensed.handle.is_finite() && sensed.twist.is_finite());
             for (current, joint) in mechanism.currents().iter().zip(&rig.joints) {
                 // One rounding of the common factor.
@@ -90,13 +96,13 @@ proptest! {
         let home = mechanism.true_pose().position;
         mechanism.set_hand(Some(&script(300.0, &[(0, home, Vec3::ZERO), (60, home + away, Vec3::ZERO)])));
         for _ in 0..40 {
-            mechanism.sense();
+            next(&mut mechanism);
         }
         mechanism.set_hand(None);
-        mechanism.sense();
+        next(&mut mechanism);
         let mut last = mechanism.kinetic_energy();
         for _ in 0..4_000 {
-            mechanism.sense();
+            next(&mut mechanism);
             let now = mechanism.kinetic_energy();
             // The rounding of two small sums.
             prop_assert!(now <= last * 1.00001 + 1e-9, "{last} J, then {now} J");
@@ -113,7 +119,7 @@ proptest! {
         mechanism.set_hand(Some(&script(1_000.0, &[(0, home, Vec3::ZERO)])));
         for _ in 0..1_500 {
             mechanism.drive(push(force));
-            mechanism.sense();
+            next(&mut mechanism);
         }
         let model = mortise_mechanism::kinematics::Model::new(&rig).unwrap();
         let mut angles = [0.0; 3];
@@ -135,7 +141,7 @@ fn a_stop_gives_nothing_back() {
     let far = Vec3::new(0.2, -0.1, 0.0);
     mechanism.set_hand(Some(&script(200.0, &[(0, far, Vec3::ZERO)])));
     for _ in 0..2_000 {
-        mechanism.sense();
+        next(&mut mechanism);
     }
     let end = mechanism.true_pose().position;
     let (sin, cos) = libm::sincosf(rig.joints[0].range[0]);
@@ -153,9 +159,9 @@ fn a_wrist_follows_the_hand_and_is_sensed() {
     let mut hand = script(500.0, &[(0, home.position, Vec3::ZERO)]);
     hand.keyframes[0].pose.orientation = commanded.to_array();
     mechanism.set_hand(Some(&hand));
-    let mut sensed = mechanism.sense();
+    let mut sensed = next(&mut mechanism);
     for _ in 0..2_000 {
-        sensed = mechanism.sense();
+        sensed = next(&mut mechanism);
     }
     let away = (commanded * sensed.handle.orientation.conjugate())
         .to_scaled_axis()
@@ -168,12 +174,12 @@ fn a_wrist_follows_the_hand_and_is_sensed() {
 #[test]
 fn homing_sets_the_reference_and_reset_starts_anew() {
     let mut mechanism = Described::new(&pantograph()).unwrap();
-    let start = mechanism.sense().handle;
+    let start = next(&mut mechanism).handle;
     mechanism.wiring.glitch[1] = 50_000;
-    let jumped = mechanism.sense();
+    let jumped = next(&mut mechanism);
     assert_eq!((jumped.encoder_jump, jumped.referenced), (Some(1), false));
     mechanism.home();
-    let again = mechanism.sense();
+    let again = next(&mut mechanism);
     assert_eq!((again.encoder_jump, again.referenced), (None, true));
     assert_eq!(again.handle, start);
     mechanism.set_hand(Some(&script(
@@ -181,8 +187,8 @@ fn homing_sets_the_reference_and_reset_starts_anew() {
         &[(0, Vec3::new(0.01, 0.0, 0.0), Vec3::ZERO)],
     )));
     for _ in 0..100 {
-        mechanism.sense();
+        next(&mut mechanism);
     }
     assert_eq!(mechanism.reset(), Some(start));
-    assert_eq!(mechanism.sense().handle, start);
+    assert_eq!(next(&mut mechanism).handle, start);
 }

@@ -244,13 +244,13 @@ fn bake_plans_for_an_accuracy() {
         assert!(shape["field_error_in_fits_mm"].as_f64().expect("a number") <= 0.005);
         assert!(!shape["why"].as_str().expect("words").is_empty());
     }
-    let best = ask(&["--flash", "16KiB", "--force"]);
+    let best = ask(&["--flash", "11KiB", "--force"]);
     let text = String::from_utf8_lossy(&best.stdout);
     assert!(
         best.status.success() && text.contains("5.0 µm was asked; limited by the size"),
         "{text}"
     );
-    assert!(std::fs::read(&out).expect("written").len() <= 16 << 10);
+    assert!(std::fs::read(&out).expect("written").len() <= 11 << 10);
     std::fs::remove_file(&out).expect("there");
     let missed = ask(&["--flash", "4KiB"]);
     assert_eq!(missed.status.code(), Some(1));

@@ -277,7 +277,8 @@ mod tests {
                 trial.inserted_mm.is_some_and(|inserted| inserted > 41.5),
                 "{trial}"
             );
-            assert!(trial.penetration_mm.is_some_and(|deep| deep < 5e-3), "{trial}");
+            // Where a leaning peg is wedged between both rims their spans bear several newtons, 2.5 µm each.
+            assert!(trial.penetration_mm.is_some_and(|deep| deep < 7e-3), "{trial}");
         }
     }
 

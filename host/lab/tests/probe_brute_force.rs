@@ -24,6 +24,8 @@ const BETWEEN_MM: f64 = 0.05;
 const FARTHEST_MM: f64 = 47.0;
 /// Depth, mm, beyond which the field does not resolve a point (band minus a diagonal, 2.3 cells), and near an edge may not measure it.
 const RESOLVED_MM: f64 = 1.1;
+/// Share of an overlap by which the deepest place found may be less deep than the deepest of all.
+const OVERLAP_SHARE: f64 = 0.015;
 
 /// Signed distance to the peg, ø20 × 50.
 fn to_peg(p: DVec3) -> f64 {
@@ -118,7 +120,9 @@ proptest! {
             let below = if least > 0.0 { BETWEEN_MM } else { 0.0 };
             let error = 1e3 * f64::from(found.nearest.error_m);
             let rounding = rounding + if error.is_finite() { error } else { 0.0 };
-            prop_assert!(probed <= least + rounding && probed >= least - below - rounding, "{probed} {least} {found:?}");
+            // Inside a solid the distance along a span has several minima, and rules at its edges are no more than bounds.
+            let inside = OVERLAP_SHARE * (-least).max(0.0);
+            prop_assert!(probed <= least + inside + rounding && probed >= least - below - rounding, "{probed} {least} {found:?}");
             prop_assert!(found.nearest.exact || least <= BETWEEN_MM, "{found:?}");
         } else {
             prop_assert!(probed < -RESOLVED_MM + rounding, "{probed} {least} {found:?}");

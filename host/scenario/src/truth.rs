@@ -27,11 +27,13 @@ pub fn replay(before: (&HandScript, u32), script: &HandScript, samples: &[Teleme
     let mut mechanism = Simulated::new();
     mechanism.set_hand(Some(before.0));
     for _ in 0..before.1 {
+        mechanism.advance();
         mechanism.sense();
     }
     mechanism.set_hand(Some(script));
     let first = samples.first()?.tick;
     let felt = samples.iter().zip(0..).map(|(sample, age)| {
+        mechanism.advance();
         let sensed = mechanism.sense();
         let reading = pose_to_wire(&sensed.handle);
         let handle = pose_to_wire(&mechanism.true_pose());
