@@ -105,9 +105,8 @@ impl Span {
 
 impl Span {
     /// Parameter of the deepest place inside the other solid, where the distance has several minima: the least at even places and at `lowest` (a
-    /// parameter and the distance there, m), then by thirds between the places beside it.
-    pub fn deepest(&self, lowest: (f32, f32), eval: impl Fn(Vec3) -> Option<Near>) -> f32 {
-        let at = |u: f32| eval(self.at(u)).map_or(f32::INFINITY, |near| near.found.distance);
+    /// parameter and the distance there, m), then by thirds between the places beside it. `at`: distance at a parameter.
+    pub fn deepest(lowest: (f32, f32), at: impl Fn(f32) -> f32) -> f32 {
         let mut deepest = lowest;
         for k in -PLACES..=PLACES {
             let u = k as f32 / PLACES as f32;

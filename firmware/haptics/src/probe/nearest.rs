@@ -16,7 +16,7 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
-use crate::collision::span::{Course, Effort};
+use crate::collision::span::{Course, Effort, Span};
 use crate::collision::span_search::near_at;
 use crate::io::Work;
 use crate::math::scalar::larger;
@@ -266,13 +266,16 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         }
         let near = |p| near_at(self.pair, None, p);
         let (mut u, lowest) = Course::new(self.pair.surfaces, &span, first).lowest(&span, ALONG_SPAN, near);
-        if lowest.found.distance < 0.0 {
-            u = span.deepest((u, lowest.found.distance), near);
-        }
-        PointRecord {
+        let place = |u: f32| PointRecord {
             span: NO_SPAN,
             ..self.pair.moved(point, u)
+        };
+        if lowest.found.distance < 0.0 {
+            // By the distance that is reported, which beside edges is nearer the truth than a rule's bound.
+            let at = |u: f32| self.sample(&place(u)).distance;
+            u = Span::deepest((u, at(u)), at);
         }
+        place(u)
     }
 
     /// Descends by the nearer child to one leaf, and takes the point of it that seems nearest. Terminates because every step goes forward.
