@@ -25,7 +25,7 @@ const BETWEEN_MM: f64 = 0.05;
 const FARTHEST_MM: f64 = 47.0;
 /// Depth, mm, beyond which the field does not resolve a point (band minus a diagonal, 2.3 cells), and near an edge may not measure it.
 const RESOLVED_MM: f64 = 1.1;
-/// Most of 512 poses apart whose gap may be told with a bound rather than exactly.
+/// Most of 512 poses apart whose gap may be stated with a bound rather than exactly.
 const MOST_INEXACT: u32 = 10;
 static INEXACT: AtomicU32 = AtomicU32::new(0);
 /// Share of an overlap by which the deepest place found may be less deep than the deepest of all.
