@@ -31,7 +31,7 @@ const CLAMPED_MM: f64 = 0.999;
 const MOST_INEXACT: u32 = 10;
 static INEXACT: AtomicU32 = AtomicU32::new(0);
 /// Share of an overlap by which the deepest place found may be less deep than the deepest of all.
-const OVERLAP_SHARE: f64 = 0.05;
+const OVERLAP_SHARE: f64 = 0.2;
 
 /// Signed distance to the peg, ø20 × 50.
 fn to_peg(p: DVec3) -> f64 {
