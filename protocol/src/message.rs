@@ -516,7 +516,7 @@ pub struct Telemetry {
     pub contact: WireWrench,
     /// Wrench of the simulated hand on the handle, if the hand is simulated.
     pub hand: Option<WireWrench>,
-    /// Cost of this tick, see [`Capabilities::cost_unit`].
+    /// Cost of this tick, see [`Capabilities::cost_unit`]; without the simulation of a mechanism, which a real board does not run.
     pub cost: u32,
     /// Number of points queried.
     pub points: u16,

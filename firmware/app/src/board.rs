@@ -15,7 +15,7 @@ pub trait Clock {
     /// one for each further tick that could not run for that reason.
     fn begin(&mut self) -> u32;
 
-    /// Cost since the moment this tick was due, in [`Identity::cost_unit`]; includes the interrupt's latency where the board can tell.
+    /// Cost since the moment this tick was due, in [`Identity::cost_unit`]; includes the interrupt's latency where the board can state it.
     fn cost(&mut self) -> u32;
 }
 

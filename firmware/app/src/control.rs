@@ -186,14 +186,11 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
 
     /// Moves a simulated mechanism. A real one moves by itself: what this takes is no part of the tick's cost.
     fn simulate(&mut self) {
-        if self.mechanism.simulation().is_none() {
-            return;
-        }
-        let before = self.clock.cost();
         if let Some(simulation) = self.mechanism.simulation() {
+            let before = self.clock.cost();
             simulation.advance();
+            self.reports.simulated = self.clock.cost().wrapping_sub(before);
         }
-        self.reports.simulated = self.clock.cost().wrapping_sub(before);
     }
 
     /// Cost of the tick so far.

@@ -3,21 +3,17 @@
 
 #[path = "../../app/tests/support/rigs.rs"]
 mod rigs;
+mod support;
 
 use glam::Vec3;
-use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation, TICK_S};
+use mortise_firmware::board::{Drive, Mechanism, Simulation, TICK_S};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_protocol::rig::Rig;
 use mortise_simulation::described::Described;
 use proptest::prelude::*;
 use rigs::{arm, paddle, pantograph};
-
-/// The readings after the next tick of the simulated world.
-fn next(mechanism: &mut Described) -> Sensed {
-    mechanism.advance();
-    mechanism.sense()
-}
+use support::next;
 
 fn any_rig() -> impl Strategy<Value = Rig> {
     prop_oneof![Just(arm()), Just(pantograph()), Just(paddle())]

@@ -2,6 +2,7 @@
 
 #[path = "../../app/tests/support/rigs.rs"]
 mod rigs;
+mod support;
 
 use glam::{Quat, Vec3};
 use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
@@ -13,12 +14,7 @@ use mortise_simulation::described::Described;
 use mortise_simulation::simulated::Simulated;
 use proptest::prelude::*;
 use rigs::{arm, paddle, pantograph};
-
-/// The readings after the next tick of the simulated world.
-fn next<M: Mechanism + Simulation>(mechanism: &mut M) -> Sensed {
-    mechanism.advance();
-    mechanism.sense()
-}
+use support::next;
 
 /// Either kind of mechanism, with encoders that can be frozen.
 trait Rig: Mechanism + Simulation {

@@ -1,17 +1,14 @@
 //! The simulated mechanism against closed forms, and under any script.
 
+mod support;
+
 use glam::{Quat, Vec3};
-use mortise_firmware::board::{Drive, Mechanism, Sensed, Simulation};
+use mortise_firmware::board::{Drive, Mechanism, Simulation};
 use mortise_haptics::Wrench;
 use mortise_protocol::message::{HandScript, Keyframe, WirePose};
 use mortise_simulation::simulated::*;
 use proptest::prelude::*;
-
-/// The readings after the next tick of the simulated world.
-fn next<M: Mechanism + Simulation>(mechanism: &mut M) -> Sensed {
-    mechanism.advance();
-    mechanism.sense()
-}
+use support::next;
 
 fn script(position: Vec3, orientation: Quat, push: Vec3) -> HandScript {
     HandScript {

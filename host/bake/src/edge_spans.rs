@@ -40,7 +40,7 @@ pub(crate) fn spans(
         let [from, to] = stretch.range;
         let end = |k: usize| from + (to - from) * k as f64 / count as f64;
         for k in 0..count {
-            let part = chain.stretch([end(k), end(k + 1)], Curve::Round);
+            let part = Stretch::new(&chain, [end(k), end(k + 1)], Curve::Round);
             let piece = chain.piece(&part);
             let (normals, faces) = sharp(surface, piece, part.middle)?;
             points.push(ShellPoint {

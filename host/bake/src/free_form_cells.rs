@@ -1,4 +1,4 @@
-//! What the board tells in a cell near free-form faces, for the measurement of its error.
+//! Distance that the board gives in a cell near free-form faces, for the measurement of its error.
 
 use mortise_protocol::image::{NO_FACE, Nearby};
 

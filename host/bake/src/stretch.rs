@@ -31,13 +31,13 @@ pub(crate) struct Fineness {
 /// A stretch of a chain, mm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stretch {
-    /// m.
+    /// m, its middle.
     pub middle: DVec3,
-    /// a.
+    /// a, the derivative at the middle for k = 0.
     pub along: DVec3,
-    /// b.
+    /// b, half of the second derivative there for k = 0.
     pub bend: DVec3,
-    /// k.
+    /// k, from 0 to 1.
     pub round: f64,
     /// Arc lengths of its ends along the chain.
     pub range: [f64; 2],
@@ -45,7 +45,7 @@ pub(crate) struct Stretch {
 
 impl Stretch {
     /// The stretch of a chain between two arc lengths.
-    fn new(chain: &Chain<'_>, range: [f64; 2], curve: Curve) -> Self {
+    pub fn new(chain: &Chain<'_>, range: [f64; 2], curve: Curve) -> Self {
         let [a, middle, b] = [range[0], 0.5 * (range[0] + range[1]), range[1]].map(|s| chain.at(s).1);
         let along = (b - a) / 2.0;
         let mut bend = (a + b) / 2.0 - middle;
@@ -134,11 +134,6 @@ impl<'a> Chain<'a> {
     /// The boundary piece at the middle of a stretch.
     pub fn piece(&self, stretch: &Stretch) -> &'a Piece {
         self.at(0.5 * (stretch.range[0] + stretch.range[1])).0
-    }
-
-    /// The stretch between two arc lengths.
-    pub fn stretch(&self, range: [f64; 2], curve: Curve) -> Stretch {
-        Stretch::new(self, range, curve)
     }
 
     /// The stretches of the chain, in order.

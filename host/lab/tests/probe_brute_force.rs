@@ -25,13 +25,9 @@ const BETWEEN_MM: f64 = 0.05;
 const FARTHEST_MM: f64 = 47.0;
 /// Depth, mm, beyond which the field does not resolve a point (band minus a diagonal, 2.3 cells), and near an edge may not measure it.
 const RESOLVED_MM: f64 = 1.1;
-/// Depth at which samples end, mm, two cells: deeper places of a span may all be reported as this.
-const CLAMPED_MM: f64 = 0.999;
-/// Most of 512 poses apart whose gap may be stated with a bound rather than exactly.
-const MOST_INEXACT: u32 = 10;
-static INEXACT: AtomicU32 = AtomicU32::new(0);
-/// Share of an overlap by which the deepest place found may be less deep than the deepest of all.
-const OVERLAP_SHARE: f64 = 0.2;
+/// Most of the poses apart, of 512, whose gap is right but not proven: one of two thousand is.
+const MOST_UNPROVEN: u32 = 2;
+static UNPROVEN: AtomicU32 = AtomicU32::new(0);
 
 /// Signed distance to the peg, ø20 × 50.
 fn to_peg(p: DVec3) -> f64 {
@@ -126,16 +122,14 @@ proptest! {
             let below = if least > 0.0 { BETWEEN_MM } else { 0.0 };
             let error = 1e3 * f64::from(found.nearest.error_m);
             let rounding = rounding + if error.is_finite() { error } else { 0.0 };
-            // Inside a solid the distance along a span has several minima, and rules at its edges are no more than bounds.
-            let inside = OVERLAP_SHARE * (-least).max(0.0);
-            prop_assert!(probed <= least + inside + rounding && probed >= least - below - rounding, "{probed} {least} {found:?}");
+            prop_assert!(probed <= least + rounding && probed >= least - below - rounding, "{probed} {least} {found:?}");
             if !found.nearest.exact && least > BETWEEN_MM {
-                // The search of the exact surfaces ends after a number of evaluations: its error bound, checked above, is then wide.
-                let inexact = 1 + INEXACT.fetch_add(1, Ordering::Relaxed);
-                prop_assert!(inexact <= MOST_INEXACT, "{found:?}");
+                // Rims of nearly one radius above each other: the proof takes more evaluations than a query may.
+                let unproven = 1 + UNPROVEN.fetch_add(1, Ordering::Relaxed);
+                prop_assert!(unproven <= MOST_UNPROVEN, "{found:?}");
             }
         } else {
-            prop_assert!(probed < -CLAMPED_MM + rounding, "{probed} {least} {found:?}");
+            prop_assert!(probed < -RESOLVED_MM + rounding, "{probed} {least} {found:?}");
         }
         // Where every point is deeper than the field reaches, none has a direction to push in, and the probe reports so.
         let felt = found.contacts > 0 || found.work.flags.contains(Flags::DEEP);

@@ -36,8 +36,8 @@ const BEYOND_PARABOLA: f32 = 0.027;
 /// Share of the middle's distance that a bound from its surface alone may use: another surface may come nearer along the span.
 const BOUND_SHARE: f32 = 0.5;
 
-/// Even places to either side of the middle at which [`Span::deepest`] looks, and its steps, each of which leaves two thirds of the interval.
-const PLACES: i32 = 4;
+/// Even places to either side of the middle at which [`deepest`] looks, and its steps, each of which leaves two thirds of the interval.
+const PLACES: i32 = 8;
 const THIRDS: u32 = 24;
 
 /// A span in the frame of the field.
@@ -103,33 +103,28 @@ impl Span {
     }
 }
 
-impl Span {
-    /// Parameter of the deepest place inside the other solid, where the distance has several minima: the least at even places and at `lowest` (a
-    /// parameter and the distance there, m), then by thirds between the places beside it. `at`: distance at a parameter.
-    pub fn deepest(lowest: (f32, f32), at: impl Fn(f32) -> f32) -> f32 {
-        let mut deepest = lowest;
-        for k in -PLACES..=PLACES {
-            let u = k as f32 / PLACES as f32;
-            let distance = at(u);
-            if distance < deepest.1 {
-                deepest = (u, distance);
-            }
+/// Parameter of the lowest place of a span where the distance has several minima: the least at even places and at `lowest` (a parameter and the
+/// distance there, m), then by thirds between the places beside it. `at`: distance at a parameter, m.
+pub(crate) fn deepest(mut lowest: (f32, f32), at: impl Fn(f32) -> f32) -> f32 {
+    for k in -PLACES..=PLACES {
+        let u = k as f32 / PLACES as f32;
+        let distance = at(u);
+        if distance < lowest.1 {
+            lowest = (u, distance);
         }
-        if deepest == lowest {
-            return lowest.0;
-        }
-        let step = 1.0 / PLACES as f32;
-        let [mut from, mut to] = [deepest.0 - step, deepest.0 + step].map(|u| u.clamp(-1.0, 1.0));
-        for _ in 0..THIRDS {
-            let third = (to - from) / 3.0;
-            if at(from + third) < at(to - third) {
-                to -= third;
-            } else {
-                from += third;
-            }
-        }
-        0.5 * (from + to)
     }
+    let step = 1.0 / PLACES as f32;
+    let [mut from, mut to] = [lowest.0 - step, lowest.0 + step].map(|u| u.clamp(-1.0, 1.0));
+    for _ in 0..THIRDS {
+        let third = (to - from) / 3.0;
+        if at(from + third) < at(to - third) {
+            to -= third;
+        } else {
+            from += third;
+        }
+    }
+    let u = 0.5 * (from + to);
+    if at(u) < lowest.1 { u } else { lowest.0 }
 }
 
 /// Surface nearest to a place, and whether its cell names no other.

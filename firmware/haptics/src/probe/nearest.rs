@@ -16,7 +16,7 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, agreeing, beside_edge, exact, on_surface_of};
 use crate::collision::rules::FacePairRules;
 use crate::collision::search::Traversal;
-use crate::collision::span::{Course, Effort, Span};
+use crate::collision::span::{Course, Effort, deepest};
 use crate::collision::span_search::near_at;
 use crate::io::Work;
 use crate::math::scalar::larger;
@@ -258,22 +258,27 @@ impl<'s, 'i> NearestSearch<'s, 'i> {
         let Some(span) = self.pair.span(point) else {
             return alone;
         };
+        let place = |u: f32| PointRecord {
+            span: NO_SPAN,
+            ..self.pair.moved(point, u)
+        };
+        // By the distance that is reported, which beside edges is nearer the truth than a rule's bound.
+        let at = |u: f32| self.sample(&place(u)).distance;
         let Some(first) = near_at(self.pair, None, span.middle()) else {
-            return alone;
+            // The middle is outside of all cells, or deep inside.
+            return if self.sample(&alone).lower - span.reach() > limit {
+                alone
+            } else {
+                place(deepest((0.0, at(0.0)), at))
+            };
         };
         if first.found.distance - span.reach() > limit {
             return alone;
         }
         let near = |p| near_at(self.pair, None, p);
         let (mut u, lowest) = Course::new(self.pair.surfaces, &span, first).lowest(&span, ALONG_SPAN, near);
-        let place = |u: f32| PointRecord {
-            span: NO_SPAN,
-            ..self.pair.moved(point, u)
-        };
         if lowest.found.distance < 0.0 {
-            // By the distance that is reported, which beside edges is nearer the truth than a rule's bound.
-            let at = |u: f32| self.sample(&place(u)).distance;
-            u = Span::deepest((u, at(u)), at);
+            u = deepest((u, at(u)), at);
         }
         place(u)
     }
