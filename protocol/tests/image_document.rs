@@ -42,13 +42,13 @@ fn page_and_records_agree() {
     record!(page, "Part", PartRecord, shape flags position orientation);
     record!(page, "Shape", ShapeRecord, field flags first_node node_count first_point point_count first_face face_count first_patch patch_count center radius volume center_of_mass inertia first_edge_node edge_node_count first_edge edge_count first_span span_count);
     record!(page, "Field", FieldRecord, origin cell scale band brick_dims format first_grid first_brick brick_count);
-    record!(page, "Brick", BrickRecord, samples indices palette palette_len index_bits);
+    record!(page, "Brick", BrickRecord, samples indices palette palette_len index_bits coarse);
     record!(page, "Node", NodeRecord, center radius first_point point_count skip);
     record!(page, "Point", PointRecord, position normal face edge_face span reserved);
     record!(page, "Span", SpanRecord, along bend round);
     record!(page, "Face", FaceRecord, kind sense origin axis radius second);
     record!(page, "Edge", EdgeRecord, center half bend normals faces thickness edge radius);
-    record!(page, "Patch", PatchRecord, origin x normal height face kind);
+    record!(page, "Patch", PatchRecord, origin x normal height radius face kind);
     for limit in [
         BRICK_CELLS,
         BRICK_SAMPLES,

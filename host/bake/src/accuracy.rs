@@ -62,6 +62,7 @@ pub(crate) fn step_error(cell_mm: f64, band_cells: f64, format: SampleFormat) ->
         format,
         patch_tolerance_mm: 0.0,
         samples: Samples::Everywhere,
+        finer: None,
     };
     0.5 * cell_mm / options.units_per_cell()
 }

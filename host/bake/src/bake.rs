@@ -131,7 +131,7 @@ impl Scene {
         let mut fields = Vec::new();
         let mut shells = Vec::new();
         for (i, (mut cell, options)) in cells.into_iter().zip(each).enumerate() {
-            fields.push(self.field(i, &mut prepared[i], &mut cell, options, progress)?);
+            fields.push(self.field(i, &mut prepared[i], &mut cell, (options, None), progress)?);
             shells.push(self.shell(i, &prepared[i], &self.partners[i], cell, options, progress)?);
         }
         Ok(Made { fields, shells })
@@ -256,7 +256,7 @@ impl Scene {
                     break;
                 }
                 let mut cell = f64::from(made.fields[i].record.cell) * 500.0;
-                let field = self.field(i, &mut prepared[i], &mut cell, options, progress)?;
+                let field = self.field(i, &mut prepared[i], &mut cell, (options, None), progress)?;
                 if 2 * field.unproven_cells >= before {
                     break;
                 }
@@ -274,13 +274,14 @@ impl Scene {
         Ok(made)
     }
 
-    /// Makes the field of a shape, with cells of about this size (see [`Self::fields_and_shells`]).
+    /// Makes the field of a shape, with cells of about this size (see [`Self::fields_and_shells`]), and finer bricks for these factors (see
+    /// [`FieldOptions::finer`]).
     pub fn field(
         &self,
         index: usize,
         surface: &mut ExactSurface,
         cell_mm: &mut f64,
-        options: &BakeOptions,
+        (options, finer): (&BakeOptions, Option<&[f64]>),
         progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
     ) -> Result<BakedField, BakeError> {
         let part = self.names[index].as_str();
@@ -299,6 +300,7 @@ impl Scene {
                 format: options.format,
                 patch_tolerance_mm: options.patch_tolerance_mm,
                 samples: options.samples,
+                finer,
             };
             let baked = match options.method {
                 Method::DistanceField => bake_field(surface, &field, part, &step),

@@ -58,14 +58,20 @@ pub(crate) fn plan_name(
     Some(format!("plan-{}", hash(&(shapes, parts, request, work))?))
 }
 
-/// Name of a field of a shape.
-pub(crate) fn field_name(shape: Option<&String>, choice: &Choice, tolerance_mm: f64) -> Option<String> {
+/// Name of a field of a shape, with finer bricks for these factors or without any.
+pub(crate) fn field_name(
+    shape: Option<&String>,
+    choice: &Choice,
+    tolerance_mm: f64,
+    finer: Option<&[f64]>,
+) -> Option<String> {
     let options = (
         choice.cell_mm,
         choice.band_cells,
         choice.format,
         choice.reach_mm(),
         tolerance_mm,
+        finer,
     );
     Some(format!("field-{}", hash(&(shape?, options))?))
 }
@@ -92,6 +98,8 @@ struct Stored {
     blob: Vec<u8>,
     counts: [usize; 5],
     unproven_at: Option<[f64; 3]>,
+    rough_mm: f64,
+    finer_bricks: usize,
     errors: Vec<FaceError>,
     work: u64,
     by_winding: bool,
@@ -117,6 +125,8 @@ impl KeptField {
                 field.unproven_cells,
             ],
             unproven_at: field.unproven_at.map(|p| p.to_array()),
+            rough_mm: field.rough_mm,
+            finer_bricks: field.finer_bricks,
             errors: self.errors.clone(),
             work: self.work,
             by_winding: self.by_winding,
@@ -150,6 +160,10 @@ impl KeptField {
                 sign_tests,
                 unproven_cells,
                 unproven_at: stored.unproven_at.map(Into::into),
+                rough_mm: stored.rough_mm,
+                finer_bricks: stored.finer_bricks,
+                // Only packing needs them.
+                groups: Vec::new(),
             },
             errors: stored.errors,
             work: stored.work,

@@ -14,6 +14,8 @@ pub(crate) struct ExactSample {
     pub face: u16,
     /// The nearest point, mm.
     pub foot: DVec3,
+    /// Outward unit normal there, or zero; see [`Nearest::normal`].
+    pub normal: DVec3,
 }
 
 impl ExactSample {
@@ -22,6 +24,7 @@ impl ExactSample {
         distance: f64::NAN,
         face: NO_FACE,
         foot: DVec3::NAN,
+        normal: DVec3::ZERO,
     };
 
     /// The sample of an exact query.
@@ -30,6 +33,7 @@ impl ExactSample {
             distance: nearest.distance,
             face: nearest.face as u16,
             foot: nearest.point,
+            normal: nearest.normal,
         }
     }
 }

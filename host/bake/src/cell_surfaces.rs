@@ -4,9 +4,10 @@ use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::PatchRecord;
 
-use crate::cell_samples::Place;
+use crate::cell_samples::{ExactSample, Place};
 use crate::cover::{LocalPatches, NEAR_CELLS, RELAXED, tolerance_at};
 use crate::distance::ExactSurface;
+use crate::format::FieldOptions;
 use crate::local_patch::{board_distance, board_foot, is_foot};
 use crate::rule::SAME_MM;
 use crate::sides::Sides;
@@ -19,8 +20,7 @@ pub(crate) struct CellSurfaces<'a> {
     patches: &'a LocalPatches,
     /// Sides of smooth edges, behind the patches.
     sides: &'a Sides,
-    /// Largest error of a patch, mm.
-    tolerance_mm: f64,
+    options: &'a FieldOptions<'a>,
     /// Cell edge, mm.
     cell: f64,
 }
@@ -30,7 +30,7 @@ impl<'a> CellSurfaces<'a> {
     pub fn new(
         surface: &ExactSurface,
         (patches, sides): (&'a LocalPatches, &'a Sides),
-        tolerance_mm: f64,
+        options: &'a FieldOptions<'a>,
         cell: f64,
     ) -> Self {
         Self {
@@ -39,7 +39,7 @@ impl<'a> CellSurfaces<'a> {
                 .collect(),
             patches,
             sides,
-            tolerance_mm,
+            options,
             cell,
         }
     }
@@ -97,12 +97,28 @@ impl<'a> CellSurfaces<'a> {
     }
 
     /// Largest error of a rule where the exact distance is `exact`, mm: with patches theirs times `relaxed`.
-    pub fn tolerance(&self, with_patches: bool, exact: f64, relaxed: f64) -> f64 {
+    pub fn tolerance(&self, with_patches: bool, exact: &ExactSample, relaxed: f64) -> f64 {
         if with_patches {
-            SAME_MM + tolerance_at(relaxed * self.tolerance_mm, self.cell, exact)
+            let of_patches = self.options.patch_tolerance_mm * self.options.factor(exact.face);
+            SAME_MM + tolerance_at(relaxed * of_patches, self.cell, exact.distance)
         } else {
             SAME_MM
         }
+    }
+
+    /// By how much the tolerance may be relaxed: not where finer bricks can keep it.
+    pub fn relaxations(&self) -> &'static [f64] {
+        if self.options.finer.is_some() {
+            &RELAXED[..1]
+        } else {
+            &RELAXED
+        }
+    }
+
+    /// Whether a cell is so far from the surface, all of it, that no patch answers there.
+    pub fn is_far(&self, corners: &[Place; 8]) -> bool {
+        let nearest = corners.iter().map(|corner| corner.exact.distance.abs());
+        nearest.fold(f64::INFINITY, f64::min) > self.cell
     }
 
     /// Whether a reader may interpolate at this distance from the surface where a patch has no foot.
@@ -110,42 +126,67 @@ impl<'a> CellSurfaces<'a> {
         exact.abs() > NEAR_CELLS * self.cell
     }
 
-    /// Surfaces that can stand for a face in a cell of the grid, the best first: the face itself, or its patches in the cell and in those around it, by
-    /// their error at those of the `places` to which the face is nearest.
-    pub fn alternatives(&self, cell: [u32; 3], face: u16, places: &[Place]) -> Vec<u16> {
-        let rated = self.rated(cell, face, places);
-        rated.into_iter().map(|(_, surface)| surface).collect()
+    /// Surfaces that can stand for each sheet of a face in a cell of the grid, the best first: the face itself, or its patches in the cell and in those
+    /// around it, by their error at those of the `places` that are nearest to the sheet.
+    pub fn alternatives(&self, cell: [u32; 3], face: u16, places: &[Place]) -> Vec<Vec<u16>> {
+        let rated = self.rated(cell, face, places).into_iter();
+        rated
+            .map(|sheet| sheet.into_iter().map(|(_, surface)| surface).collect())
+            .collect()
     }
 
-    /// Whether no surface gives the distance of a face at those of the `places` to which it is nearest.
+    /// Whether no surface gives the distance of a sheet of a face at those of the `places` that are nearest to it.
     pub fn has_none(&self, cell: [u32; 3], face: u16, places: &[Place]) -> bool {
-        let best = self
-            .rated(cell, face, places)
-            .first()
-            .map_or(f64::INFINITY, |best| best.0);
         let is_nearest =
             |place: &Place| place.exact.face == face && !self.may_interpolate(place.exact.distance);
-        best > self.tolerance(true, 0.0, RELAXED[2]) && places.iter().any(is_nearest)
+        let Some(first) = places.iter().find(|place| is_nearest(place)) else {
+            return false;
+        };
+        let most = self.tolerance(
+            true,
+            &ExactSample {
+                distance: 0.0,
+                ..first.exact
+            },
+            RELAXED[2],
+        );
+        let best = |sheet: &Vec<(f64, u16)>| sheet.first().map_or(f64::INFINITY, |best| best.0);
+        self.rated(cell, face, places)
+            .iter()
+            .any(|sheet| best(sheet) > most)
     }
 
     /// The same with their errors, mm.
-    fn rated(&self, cell: [u32; 3], face: u16, places: &[Place]) -> Vec<(f64, u16)> {
+    fn rated(&self, cell: [u32; 3], face: u16, places: &[Place]) -> Vec<Vec<(f64, u16)>> {
         if !self.is_free_form(face) {
-            return vec![(0.0, face)];
+            return vec![vec![(0.0, face)]];
         }
         let mut found: Vec<u16> = Vec::new();
         // The cell itself first.
         for i in (0..27).map(|i| (i + 13) % 27) {
             let step = [i % 3, i / 3 % 3, i / 9];
             let beside = std::array::from_fn(|a| (cell[a] + step[a]).wrapping_sub(1));
-            let patch = self.patches.patch(beside, face);
-            let surface = patch.map(|patch| self.faces.len() as u16 + patch);
-            found.extend(surface.filter(|surface| !found.contains(surface)));
+            for sheet in self.patches.sheets(beside, face) {
+                let surface = self.faces.len() as u16 + sheet.patch;
+                if !found.contains(&surface) {
+                    found.push(surface);
+                }
+            }
         }
-        let own: Vec<&Place> = (places.iter())
-            .filter(|place| place.exact.face == face && !self.may_interpolate(place.exact.distance))
-            .collect();
-        let error = |surface: u16| {
+        let sheets = self.patches.sheets(cell, face);
+        let own = |sheet: usize| {
+            let near =
+                |place: &&Place| place.exact.face == face && !self.may_interpolate(place.exact.distance);
+            let of_sheet = move |place: &&Place| {
+                sheets.len() < 2 || LocalPatches::sheet_of(sheets, place) == Some(sheet)
+            };
+            places
+                .iter()
+                .filter(near)
+                .filter(of_sheet)
+                .collect::<Vec<&Place>>()
+        };
+        let error = |surface: u16, own: &[&Place]| {
             let Some(patch) = self.patch(surface) else {
                 return f64::INFINITY;
             };
@@ -154,11 +195,19 @@ impl<'a> CellSurfaces<'a> {
                 .map(|error| if error.is_nan() { f64::INFINITY } else { error })
                 .fold(0.0, f64::max)
         };
-        let mut rated: Vec<(f64, u16)> = found
-            .into_iter()
-            .map(|surface| (error(surface), surface))
-            .collect();
-        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
-        rated
+        (0..sheets.len().max(1))
+            .map(|sheet| {
+                let own = own(sheet);
+                let rated = found.iter().map(|&surface| (error(surface, &own), surface));
+                let mut rated: Vec<(f64, u16)> = rated.collect();
+                rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+                rated
+            })
+            .collect()
+    }
+
+    /// Number of sheets of a face in a cell that have patches of their own.
+    pub fn sheet_count(&self, cell: [u32; 3], face: u16) -> usize {
+        self.patches.sheets(cell, face).len()
     }
 }

@@ -13,7 +13,7 @@ use crate::accuracy::{
 };
 use crate::distance::ExactSurface;
 use crate::field_error::FaceError;
-use crate::format::SampleFormat;
+use crate::format::{NOT_REACHED, SampleFormat};
 use crate::free_form_error::FreeFormError;
 use crate::plan::{ELSEWHERE, ShapePlan};
 use crate::scene::longest_side;
@@ -267,6 +267,20 @@ impl Demand {
         by_surfaces.max(interpolated)
     }
 
+    /// By how many times the tolerance of local patches a field may err near each face, for [`crate::FieldOptions::finer`].
+    pub fn factors(&self) -> Vec<f64> {
+        let factor = |face: u32| {
+            if self.left_out.contains(&face) {
+                NOT_REACHED
+            } else if self.is_fit(face) {
+                1.0
+            } else {
+                FIELD_SHARE_ELSEWHERE * ELSEWHERE / FIELD_SHARE
+            }
+        };
+        (0..self.faces as u32).map(factor).collect()
+    }
+
     /// Largest measured error of a field over what `accuracy_mm` in fits allows it there, away from edges and at them: both at most 1 where it is
     /// accurate enough.
     pub fn excess(
@@ -277,7 +291,8 @@ impl Demand {
         free_form: &FreeFormError,
     ) -> [f64; 2] {
         let elsewhere = FIELD_SHARE_ELSEWHERE * ELSEWHERE * accuracy_mm;
-        let mut away = free_form.worst_mm() / (FIELD_SHARE * accuracy_mm);
+        let mut away =
+            (free_form.worst_mm() / (FIELD_SHARE * accuracy_mm)).max(free_form.elsewhere_mm / elsewhere);
         let mut at_edges = free_form.at_edges_mm / elsewhere;
         for (face, error) in (0..).zip(found) {
             if self.left_out.contains(&face) {
@@ -294,13 +309,14 @@ impl Demand {
     }
 
     /// The model of `choice` with the errors measured of its field, and the shell that they leave room for. Where they
-    /// exceed what the accuracy `trusted_mm` in fits allows, at least what is proved is stated: a few cells may err by far more than all places measured.
+    /// exceed what the accuracy `trusted_mm` in fits allows, at least what is proved of interpolated cells of up to `rough_mm` near the surface is stated:
+    /// a few of them may err by far more than all places measured.
     pub fn state(
         &self,
         accuracy_mm: f64,
         choice: &Choice,
         found: &[FaceError],
-        free_form: &FreeFormError,
+        (free_form, rough_mm): (&FreeFormError, f64),
         trusted_mm: f64,
     ) -> ShapePlan {
         let is_trusted =
@@ -308,7 +324,7 @@ impl Demand {
         let least = if is_trusted {
             0.0
         } else {
-            PROVED_CELLS * choice.cell_mm
+            PROVED_CELLS * rough_mm
                 + step_error(choice.cell_mm, choice.band_cells, choice.format)
                 + rounding_error(self.size_mm)
         };
@@ -326,7 +342,8 @@ impl Demand {
             let of = bounds.iter().filter(|(face, _)| of(*face));
             of.map(|(_, bound)| *bound).fold(free_form.worst_mm(), f64::max)
         };
-        let (in_fits, field) = (most(&|face| self.is_fit(face)), most(&|_| true));
+        let in_fits = most(&|face| self.is_fit(face));
+        let field = most(&|_| true).max(free_form.elsewhere_mm);
         let at_edges = found.iter().filter_map(|error| error.at_edges_mm);
         let at_edges = SAFETY * at_edges.fold(free_form.at_edges_mm / SAFETY, f64::max);
         let at_edges = if at_edges > 0.0 { at_edges.max(least) } else { 0.0 };

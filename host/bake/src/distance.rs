@@ -34,6 +34,9 @@ const CUSP: f64 = 1e-2;
 /// Sine of the angle to a feature's normal plane below which the normal does not decide the sign.
 const DOUBT: f64 = 1e-4;
 
+/// Cosine of the largest angle between the normal of a free-form face and the line to a foot inside it: the rest is rounding.
+const ALONG: f64 = 0.999;
+
 /// Nearest point of a shape's exact surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
@@ -43,6 +46,8 @@ pub struct Nearest {
     pub point: DVec3,
     /// A face it lies on.
     pub face: u32,
+    /// Outward unit normal of that face there; zero at an edge or corner, and where only the tessellation is known.
+    pub normal: DVec3,
 }
 
 /// A shape prepared for exact distance queries. Lengths mm, in the shape's frame.
@@ -256,10 +261,14 @@ impl ExactSurface {
                 self.topology.free_forms.feet(f, p, chord, triangles, near, |q| {
                     let d = p.distance(q.point);
                     if d <= best + SAME_MM && self.in_trim(f, q.point, near) {
-                        (best, at, face) = (d, q.point, f);
                         let normal = q.normal * self.topology.sense[f as usize];
-                        // At a pole, and at a crease inside the surface, the line to the foot is not along the normal there.
-                        let along = (p - q.point).dot(normal).abs() >= 0.7 * d;
+                        // At a pole, at a crease inside the surface, and on its border, the line to the foot is not along the normal there: that would
+                        // give the wrong sign beside an acute edge, of which the piece of the border knows both faces.
+                        let along = (p - q.point).dot(normal).abs() >= ALONG * d;
+                        if !along && d > SAME_MM && matches!(feature, Some(Feature::Piece { .. })) {
+                            return;
+                        }
+                        (best, at, face) = (d, q.point, f);
                         feature = Some(if along || d <= SAME_MM {
                             Feature::Face { normal }
                         } else {
@@ -303,12 +312,17 @@ impl ExactSurface {
                 distance: self.sign(p, nearest.on.point, nearest.distance, feature) * nearest.distance,
                 point: nearest.on.point,
                 face: nearest.face,
+                normal: DVec3::ZERO,
             });
         };
         Some(Nearest {
             distance: self.sign(p, at, best, feature) * best,
             point: at,
             face,
+            normal: match feature {
+                Feature::Face { normal } => normal,
+                Feature::Piece { .. } | Feature::Facet { .. } => DVec3::ZERO,
+            },
         })
     }
 

@@ -5,7 +5,7 @@
 //! each of 729 samples of a stored brick, in parallel; a few queries for each empty one.
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use glam::DVec3;
 use mortise_protocol::image::{
@@ -14,14 +14,13 @@ use mortise_protocol::image::{
 use rayon::prelude::*;
 
 use crate::bounds::{Class, classify};
-use crate::bricks::{Brick, bake_brick, sample_brick};
-use crate::cell_samples::ExactSample;
-use crate::cover::{LocalPatches, Sampled, has_free_forms};
+use crate::bricks::{Brick, Packed};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::format::FieldOptions;
 use crate::free_form_error::FreeFormError;
 use crate::grid::Grid;
+use crate::levels::{Level, bake_levels, cell_of};
 use crate::sides::Sides;
 
 /// A standalone field: record offsets count from its own arrays.
@@ -53,6 +52,12 @@ pub struct BakedField {
     pub unproven_cells: usize,
     /// Centre of one of these, mm.
     pub unproven_at: Option<DVec3>,
+    /// Edge of the largest cell near the surface that is interpolated and errs more than asked, mm; 0 where there is none.
+    pub rough_mm: f64,
+    /// Number of finer bricks over cells without a rule.
+    pub finer_bricks: usize,
+    /// Groups of surfaces among the words of `palette`.
+    pub(crate) groups: Vec<Range<usize>>,
 }
 
 impl BakedField {
@@ -85,50 +90,48 @@ pub fn bake_field(
     let near = NearSurface::find(surface, &grid, reach, options.cell_mm, part, progress)?;
     let surface = &*surface;
     let done = std::sync::atomic::AtomicUsize::new(0);
+    let all = near.stored.len();
     let step = || {
         let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-        progress(n, near.stored.len()).is_continue()
+        progress(n.min(all), all).is_continue()
     };
-    let faces = surface.shape().faces.len();
-    let baked = |beside: (&LocalPatches, &Sides), at, exact: &[ExactSample]| {
-        bake_brick(surface, &grid, options, beside, at, exact)
+    let sides = Sides::of(surface);
+    let (levels, patches) =
+        bake_levels(surface, &grid, options, &near.stored, &sides, &step).ok_or(BakeError::Cancelled)?;
+    let unproven = || {
+        let rough = levels.iter().flat_map(Level::rough);
+        rough.filter_map(|(rough, at)| rough.unproven.then_some(at))
     };
-    let (bricks, patches, sides): (Option<Vec<Brick>>, _, _) = if has_free_forms(surface) {
-        // Patches extend over many bricks: all samples first.
-        let sampled: Option<Vec<Sampled>> = (near.stored.par_iter())
-            .map(|&at| step().then(|| (at, sample_brick(surface, &grid, at))))
-            .collect();
-        let sampled = sampled.ok_or(BakeError::Cancelled)?;
-        let alive = || progress(near.stored.len(), near.stored.len()).is_continue();
-        let patches = LocalPatches::cover(surface, &grid, &sampled, options.patch_tolerance_mm, &alive);
-        let sides = Sides::of(surface, faces + patches.records.len());
-        let bricks =
-            (sampled.par_iter()).map(|(at, exact)| alive().then(|| baked((&patches, &sides), *at, exact)));
-        (bricks.collect(), patches, sides)
-    } else {
-        let none = LocalPatches::default();
-        let sides = Sides::of(surface, faces);
-        let bricks = (near.stored.par_iter())
-            .map(|&at| step().then(|| baked((&none, &sides), at, &sample_brick(surface, &grid, at))));
-        (bricks.collect(), none, sides)
-    };
-    let mut bricks = bricks.ok_or(BakeError::Cancelled)?;
-    let mut patches = patches.records;
-    patches.extend(sides.named((bricks.iter_mut()).map(Brick::groups)));
-    let unproven_cells = bricks.iter().map(|brick| brick.unproven.cells).sum();
-    let unproven_at = bricks.iter().find_map(|brick| brick.unproven.at);
-    let free_form =
-        (bricks.iter().map(|brick| brick.free_form)).fold(FreeFormError::default(), FreeFormError::and);
-    let packed = pack(&grid, options, &near.classes, &near.stored, bricks);
-    check_brick_count(packed.bricks.len(), options.cell_mm, part)?;
-    Ok(BakedField {
+    let (unproven_cells, unproven_at) = (unproven().count(), unproven().next());
+    let is_rough = |level: &&Level| level.rough().any(|(rough, _)| rough.over > 1.0);
+    let rough_mm = (levels.iter().filter(is_rough).map(|level| level.grid.cell())).fold(0.0, f64::max);
+    let free_form = (levels.iter().map(Level::free_form)).fold(FreeFormError::default(), FreeFormError::and);
+    let mut found = BakedField {
         sign_tests: near.sign_tests,
         sign_disagreements: near.sign_disagreements,
         unproven_cells,
         unproven_at,
-        patches,
+        rough_mm,
+        finer_bricks: levels.iter().skip(1).map(|level| level.bricks.len()).sum(),
         free_form,
-        ..packed
+        patches,
+        ..pack(&grid, options, &near.classes, levels)
+    };
+    let first = surface.shape().faces.len() + found.patches.len();
+    let named = sides.named(slices(&mut found.palette, &found.groups), first);
+    found.patches.extend(named);
+    check_brick_count(found.bricks.len(), options.cell_mm, part)?;
+    Ok(found)
+}
+
+/// These runs of an array, which are in ascending order.
+fn slices<'a>(mut words: &'a mut [u16], runs: &'a [Range<usize>]) -> impl Iterator<Item = &'a mut [u16]> {
+    let mut at = 0;
+    runs.iter().map(move |run| {
+        let rest = std::mem::take(&mut words).split_at_mut(run.start - at).1;
+        let (own, rest) = rest.split_at_mut(run.len());
+        (words, at) = (rest, run.end);
+        own
     })
 }
 
@@ -249,14 +252,82 @@ fn compare_signs(
         .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
 }
 
-/// Packs bricks into arrays and stores equal ones once: grid entries share bricks, bricks share samples, indices and palettes.
-fn pack(
-    grid: &Grid,
-    options: &FieldOptions,
-    classes: &[Class],
-    stored: &[[u32; 3]],
-    bricks: Vec<Brick>,
-) -> BakedField {
+/// Bricks in arrays. Equal ones are stored once: grid entries share bricks, bricks share samples, indices and palettes.
+#[derive(Default)]
+struct Packer {
+    records: Vec<BrickRecord>,
+    palette: Vec<u16>,
+    /// Groups of surfaces among the words of the palette.
+    groups: Vec<Range<usize>>,
+    blob: Vec<u8>,
+    sample_bytes: usize,
+    by_record: HashMap<[u32; 4], u16>,
+    by_bytes: HashMap<Vec<u8>, u32>,
+    by_palette: HashMap<(Vec<u16>, u16), u32>,
+}
+
+impl Packer {
+    /// Number of a brick, which is stored if none is equal. Numbers past the limit wrap: the caller rejects such a field.
+    fn number(&mut self, mut brick: Brick, options: &FieldOptions) -> u16 {
+        let (samples, coarse) = brick.stored_samples(options.format, options.finer.is_some());
+        let (palette, groups) = (&mut self.palette, &mut self.groups);
+        let Packed {
+            palette: run,
+            palette_len,
+            group_len,
+            index_bits,
+            indices,
+        } = brick.packed;
+        let palette_at = *(self.by_palette.entry((run, palette_len))).or_insert_with_key(|(run, entries)| {
+            let at = palette.len();
+            palette.extend_from_slice(run);
+            let first = at + usize::from(*entries);
+            groups.push(first..first + usize::from(group_len));
+            at as u32
+        });
+        let samples = if samples.is_empty() {
+            NO_SAMPLES
+        } else {
+            let (blob, sample_bytes) = (&mut self.blob, &mut self.sample_bytes);
+            *self.by_bytes.entry(samples).or_insert_with_key(|bytes| {
+                *sample_bytes += bytes.len();
+                append_aligned(blob, bytes)
+            })
+        };
+        let indices = if index_bits == 0 {
+            0
+        } else {
+            let blob = &mut self.blob;
+            *(self.by_bytes.entry(indices)).or_insert_with_key(|bytes| append_aligned(blob, bytes))
+        };
+        let bits = u32::from(index_bits) | u32::from(coarse) << 8 | u32::from(palette_len) << 16;
+        let next = self.records.len() as u16;
+        *(self.by_record.entry([samples, indices, palette_at, bits])).or_insert_with(|| {
+            self.records.push(BrickRecord {
+                samples,
+                indices,
+                palette: palette_at,
+                palette_len,
+                index_bits,
+                coarse: u8::from(coarse),
+            });
+            next
+        })
+    }
+}
+
+/// The field of these levels. The bricks of the finest are stored first, so that each names only bricks of smaller numbers.
+fn pack(grid: &Grid, options: &FieldOptions, classes: &[Class], levels: Vec<Level>) -> BakedField {
+    let mut packer = Packer::default();
+    let mut numbers: HashMap<[u32; 3], u16> = HashMap::new();
+    for level in levels.into_iter().rev() {
+        let mut own = HashMap::with_capacity(level.bricks.len());
+        for (at, mut brick) in level.bricks {
+            brick.cover(|cell| numbers.get(&cell_of(at, cell)).copied());
+            own.insert(at, packer.number(brick, options));
+        }
+        numbers = own;
+    }
     let mut entries: Vec<u16> = classes
         .iter()
         .map(|class| match *class {
@@ -264,48 +335,8 @@ fn pack(
             Class::Stored => GridEntry::Brick(0).to_bits(),
         })
         .collect();
-    let mut records: Vec<BrickRecord> = Vec::new();
-    let mut palette: Vec<u16> = Vec::new();
-    let mut blob: Vec<u8> = Vec::new();
-    let mut by_record: HashMap<BrickRecord2, u16> = HashMap::new();
-    let mut by_bytes: HashMap<Vec<u8>, u32> = HashMap::new();
-    let mut by_palette: HashMap<Vec<u16>, u32> = HashMap::new();
-    let mut sample_bytes = 0;
-    for (&at, brick) in stored.iter().zip(bricks) {
-        let palette_len = brick.palette_len;
-        let palette_at = *by_palette.entry(brick.palette).or_insert_with_key(|run| {
-            palette.extend_from_slice(run);
-            (palette.len() - run.len()) as u32
-        });
-        let samples = if brick.samples.is_empty() {
-            NO_SAMPLES
-        } else {
-            *by_bytes.entry(brick.samples).or_insert_with_key(|bytes| {
-                sample_bytes += bytes.len();
-                append_aligned(&mut blob, bytes)
-            })
-        };
-        let indices = if brick.index_bits == 0 {
-            0
-        } else {
-            *by_bytes
-                .entry(brick.indices)
-                .or_insert_with_key(|bytes| append_aligned(&mut blob, bytes))
-        };
-        let key = (samples, indices, palette_at, palette_len, brick.index_bits);
-        let next = records.len();
-        // Numbers past the limit wrap here; the caller rejects such a field.
-        let number = *by_record.entry(key).or_insert_with(|| {
-            records.push(BrickRecord {
-                samples,
-                indices,
-                palette: palette_at,
-                palette_len,
-                index_bits: brick.index_bits,
-            });
-            next as u16
-        });
-        entries[grid.index(at)] = GridEntry::Brick(number).to_bits();
+    for (at, number) in &numbers {
+        entries[grid.index(*at)] = GridEntry::Brick(*number).to_bits();
     }
     let units = options.units_per_cell();
     let scale = (grid.cell() / 1000.0 / units) as f32;
@@ -319,25 +350,25 @@ fn pack(
             format: options.format.code(),
             first_grid: 0,
             first_brick: 0,
-            brick_count: records.len() as u32,
+            brick_count: packer.records.len() as u32,
         },
         grid: entries,
-        bricks: records,
-        palette,
+        bricks: packer.records,
+        palette: packer.palette,
+        groups: packer.groups,
         patches: Vec::new(),
         free_form: FreeFormError::default(),
-        blob,
-        sample_bytes,
-        stored_entries: stored.len(),
+        blob: packer.blob,
+        sample_bytes: packer.sample_bytes,
+        stored_entries: numbers.len(),
         sign_disagreements: 0,
         sign_tests: 0,
         unproven_cells: 0,
         unproven_at: None,
+        rough_mm: 0.0,
+        finer_bricks: 0,
     }
 }
-
-/// Samples, indices, palette, palette length, index bits.
-type BrickRecord2 = (u32, u32, u32, u16, u16);
 
 pub(crate) fn append_aligned(blob: &mut Vec<u8>, bytes: &[u8]) -> u32 {
     blob.resize(blob.len().next_multiple_of(4), 0);

@@ -51,9 +51,12 @@ pub enum Samples {
     Everywhere,
 }
 
+/// Factor of [`FieldOptions::finer`] for a face that nothing can reach: its errors do not count.
+pub(crate) const NOT_REACHED: f64 = 50.0;
+
 /// How to sample a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldOptions {
+pub struct FieldOptions<'a> {
     /// Cell edge, mm.
     pub cell_mm: f64,
     /// Every point within this many cells of the surface lies in a stored brick, and interpolation there uses no clamped sample.
@@ -64,9 +67,22 @@ pub struct FieldOptions {
     pub patch_tolerance_mm: f64,
     /// Bricks that store samples.
     pub samples: Samples,
+    /// With finer bricks over the cells that have no rule: by how many times the tolerance of patches each face may err. `None`: without.
+    pub finer: Option<&'a [f64]>,
 }
 
-impl FieldOptions {
+impl FieldOptions<'_> {
+    /// Whether the error near a face counts: not where nothing can reach it.
+    pub(crate) fn counts(&self, face: u16) -> bool {
+        self.factor(face) < NOT_REACHED
+    }
+
+    /// By how many times the tolerance of patches the distance may err near a face.
+    pub(crate) fn factor(&self, face: u16) -> f64 {
+        let factors = self.finer.unwrap_or_default();
+        factors.get(usize::from(face)).copied().unwrap_or(1.0)
+    }
+
     /// Sample units per cell: a whole number, so that planes and repeated features at whole-cell offsets give equal bricks.
     pub(crate) fn units_per_cell(&self) -> f64 {
         (self.format.max() / self.range_cells()).floor().max(1.0)

@@ -22,7 +22,8 @@ impl BrickCells<'_> {
         }
     }
 
-    fn interpolated(&self, at: [usize; 3], place: &Place) -> f64 {
+    /// Distance by interpolation at a place of a cell.
+    pub fn interpolated(&self, at: [usize; 3], place: &Place) -> f64 {
         let fraction = (place.at - self.place(at).at) / self.cell;
         let weighted = corner_places(at).into_iter().enumerate().map(|(c, corner)| {
             let along = |a: usize| {

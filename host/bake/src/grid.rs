@@ -46,6 +46,15 @@ impl Grid {
         }
     }
 
+    /// The grid of cells an eighth as large, of which a brick covers one cell of this one.
+    pub fn finer(&self) -> Self {
+        Self {
+            origin_m: self.origin_m,
+            cell_m: self.cell_m / BRICK_CELLS as f32,
+            dims: self.dims.map(|d| d.saturating_mul(BRICK_CELLS as u32)),
+        }
+    }
+
     /// Cell edge, mm.
     pub fn cell(&self) -> f64 {
         f64::from(self.cell_m) * 1000.0

@@ -46,8 +46,9 @@ fn terms(u: f64, v: f64) -> [f64; TERMS] {
 /// Degree of each of the [`terms`].
 const DEGREES: [i32; TERMS] = [0, 1, 1, 2, 2, 2, 3, 3, 3, 3];
 
-/// Patch of face `face` fitted to these points; `None` with too few of them, or without a common direction out of the solid.
-pub(crate) fn fit(points: &[FacePoint], face: u16) -> Option<PatchRecord> {
+/// Patch of face `face` fitted to these points, with feet as far as `beyond` mm outside them; `None` with too few points, or without a common
+/// direction out of the solid.
+pub(crate) fn fit(points: &[FacePoint], face: u16, beyond: f64) -> Option<PatchRecord> {
     if points.len() < LEAST_POINTS {
         return None;
     }
@@ -91,6 +92,7 @@ pub(crate) fn fit(points: &[FacePoint], face: u16) -> Option<PatchRecord> {
         x: x.to_array(),
         normal: normal.to_array(),
         height,
+        radius: ((radius + beyond) / 1000.0) as f32,
         face,
         kind: patch_kind::HEIGHT,
     })
@@ -176,7 +178,7 @@ mod tests {
                     outward: normal,
                 })
                 .collect();
-            let patch = fit(&points, 5).unwrap();
+            let patch = fit(&points, 5, 1.0).unwrap();
             for (u, v) in [(0.3, 0.2), (-1.2, 0.7), (1.4, -1.3)] {
                 prop_assert!(board_distance(&patch, on(u, v)).abs() < 5e-5, "{}", board_distance(&patch, on(u, v)));
                 let above = board_distance(&patch, on(u, v) + normal * 0.2);
@@ -191,8 +193,8 @@ mod tests {
             at: DVec3::ZERO,
             outward: DVec3::Z,
         };
-        assert!(fit(&[point; 11], 0).is_none());
+        assert!(fit(&[point; 11], 0, 1.0).is_none());
         let both = [DVec3::Z, -DVec3::Z].map(|outward| FacePoint { outward, ..point });
-        assert!(fit(&both.repeat(10), 0).is_none());
+        assert!(fit(&both.repeat(10), 0, 1.0).is_none());
     }
 }

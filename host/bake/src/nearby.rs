@@ -16,7 +16,7 @@ use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, Group, NO_FACE, Nearby
 use crate::cell_features::CellFeatures;
 use crate::cell_samples::{ExactSample, Place, about, corner_places};
 use crate::cell_surfaces::CellSurfaces;
-use crate::cover::{LocalPatches, RELAXED};
+use crate::cover::LocalPatches;
 use crate::distance::{ExactSurface, Scratch};
 use crate::rule::{SAME_MM, Test, find_rule, holds, value};
 
@@ -36,15 +36,6 @@ const BEYOND: f64 = 0.01;
 const MOST_FEET: usize = 24;
 /// Most patches tried for a free-form face beside the best one.
 const MOST_OTHERS: usize = 4;
-
-/// Cells crossed by the surface that have no rule although all near faces have a closed form.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Unproven {
-    /// Their number.
-    pub cells: usize,
-    /// Centre of one of them, mm.
-    pub at: Option<DVec3>,
-}
 
 /// Where a field's cells are: the brick, its exact samples and its surfaces.
 #[derive(Clone, Copy)]
@@ -87,8 +78,8 @@ pub(crate) struct CellNearby<'a> {
     /// Exact samples on the lattice by which the present cell's rules are verified; empty where not yet computed.
     lattice: Vec<Place>,
     scratch: Scratch,
-    /// Crossed cells without a rule so far.
-    pub unproven: Unproven,
+    /// Number of crossed cells so far that have no rule although all near faces have a closed form.
+    pub unproven: usize,
 }
 
 /// Surfaces that stand for the faces near a cell, and the tests of their rule.
@@ -114,7 +105,7 @@ impl<'a> CellNearby<'a> {
             halves: vec![None; HALVES * HALVES * HALVES],
             lattice: Vec::new(),
             scratch: Scratch::default(),
-            unproven: Unproven::default(),
+            unproven: 0,
         };
         let edge = brick.cell * BRICK_CELLS as f64;
         let center = brick.origin + DVec3::splat(0.5 * edge);
@@ -140,18 +131,25 @@ impl<'a> CellNearby<'a> {
             let center = self.brick.position(at) + DVec3::splat(0.5 * self.brick.cell);
             self.features(center, self.brick.cell * (1.0 + 2.0 * BEYOND), self.within(at))
         };
+        let surfaces = self.brick.surfaces;
+        let corners = corner_places(at).map(|place| self.brick.place(place));
+        if surfaces.is_free_form(nearest) && surfaces.is_far(&corners) {
+            return Nearby::Roughly(nearest);
+        }
         let cell = std::array::from_fn(|a| self.brick.first[a] + at[a] as u32);
         let known = self.patches.verified(cell);
         if let Some(known) = known {
             // Without a patch that holds at the places known already no others need be queried.
-            let mut few = corner_places(at).map(|place| self.brick.place(place)).to_vec();
+            let mut few = corners.to_vec();
             few.extend(known);
-            let has_none = |face: &u16| self.brick.surfaces.has_none(cell, *face, &few);
+            let has_none = |face: &u16| surfaces.has_none(cell, *face, &few);
             if features.faces.iter().any(has_none) {
                 return Nearby::Roughly(nearest);
             }
         }
-        if features.faces.len() < 2 || (known.is_some() && self.is_within_a_face(at, nearest, &features)) {
+        let is_alone =
+            features.faces.len() < 2 || (known.is_some() && self.is_within_a_face(at, nearest, &features));
+        if is_alone && surfaces.sheet_count(cell, nearest) < 2 {
             return self.one_face(at, cell, nearest);
         }
         self.several_faces(at, cell, nearest, features)
@@ -164,19 +162,22 @@ impl<'a> CellNearby<'a> {
     }
 
     /// Entry of a cell near one face only.
-    fn one_face(&self, at: [usize; 3], cell: [u32; 3], nearest: u16) -> Nearby {
-        let mut places = corner_places(at).map(|place| self.brick.place(place)).to_vec();
+    fn one_face(&mut self, at: [usize; 3], cell: [u32; 3], nearest: u16) -> Nearby {
         let surfaces = self.brick.surfaces;
-        if surfaces.is_free_form(nearest) {
+        let places = if surfaces.is_free_form(nearest) {
+            let mut places = self.places(at, &[]);
             places.extend(self.patches.verified(cell).into_iter().flatten());
-        }
-        let answering = surfaces.alternatives(cell, nearest, &places);
+            places
+        } else {
+            corner_places(at).map(|place| self.brick.place(place)).to_vec()
+        };
+        let answering = surfaces.alternatives(cell, nearest, &places).concat();
         let holds_with = |surface: u16, relaxed: f64| {
             let rule = Nearby::Face(surface);
             let trial = self.trial(vec![surface], surface, &places, relaxed);
             trial.tests.iter().all(|test| holds(rule, test, &trial.surfaces))
         };
-        let found = RELAXED.into_iter().find_map(|relaxed| {
+        let found = surfaces.relaxations().iter().find_map(|&relaxed| {
             let mut answering = answering.iter().copied();
             answering.find(|&surface| holds_with(surface, relaxed))
         });
@@ -193,20 +194,25 @@ impl<'a> CellNearby<'a> {
     ) -> Nearby {
         let crossed = !features.entering.is_empty();
         if self.brick.surfaces.count(&features.entering) > Group::MOST {
-            return self.without_rule(at, nearest, &features);
+            return self.without_rule(nearest, &features);
         }
         self.lattice.clear();
         let mut places = self.places(at, &features.places);
         places.extend(self.patches.verified(cell).into_iter().flatten());
-        let choices: Vec<Vec<u16>> = (features.faces.iter())
-            .map(|&face| self.brick.surfaces.alternatives(cell, face, &places))
-            .collect();
+        let mut own = None;
+        let mut choices: Vec<Vec<u16>> = Vec::new();
+        for &face in &features.faces {
+            if face == nearest {
+                own = Some(choices.len());
+            }
+            choices.extend(self.brick.surfaces.alternatives(cell, face, &places));
+        }
         let closed = self.is_closed(&features);
-        let own = features.faces.iter().position(|&face| face == nearest);
         let sides: Vec<u16> = (self.brick.surfaces.sides(&features.faces))
             .take(MOST_SIDES)
             .collect();
-        for &relaxed in if closed { &RELAXED[..1] } else { &RELAXED } {
+        let relaxations = self.brick.surfaces.relaxations();
+        for &relaxed in if closed { &relaxations[..1] } else { relaxations } {
             // Others than the best patches may keep the tolerance itself.
             let most = if relaxed > 1.0 { 1 } else { usize::MAX };
             for mut surfaces in selections(&choices).into_iter().take(most) {
@@ -219,7 +225,7 @@ impl<'a> CellNearby<'a> {
                 }
             }
         }
-        self.without_rule(at, nearest, &features)
+        self.without_rule(nearest, &features)
     }
 
     /// Whether all near faces have a closed form.
@@ -229,10 +235,9 @@ impl<'a> CellNearby<'a> {
     }
 
     /// Entry of a cell without a rule, which is counted where there should be one.
-    fn without_rule(&mut self, at: [usize; 3], nearest: u16, features: &CellFeatures) -> Nearby {
+    fn without_rule(&mut self, nearest: u16, features: &CellFeatures) -> Nearby {
         if !features.entering.is_empty() && self.is_closed(features) {
-            self.unproven.cells += 1;
-            (self.unproven.at).get_or_insert(self.brick.position(at) + DVec3::splat(0.5 * self.brick.cell));
+            self.unproven += 1;
         }
         Nearby::Roughly(nearest)
     }
@@ -291,9 +296,20 @@ impl<'a> CellNearby<'a> {
             faces: (trial.surfaces.iter())
                 .map(|&surface| surfaces.distance(surface, place.at))
                 .collect(),
-            tolerance: surfaces.tolerance(trial.with_patches, distance, trial.relaxed),
+            tolerance: surfaces.tolerance(trial.with_patches, &place.exact, trial.relaxed),
             may_interpolate: trial.with_patches && surfaces.may_interpolate(distance),
         }
+    }
+
+    /// Largest error of interpolation in a cell, near the surface, over what may err there.
+    pub fn interpolation_over(&mut self, at: [usize; 3]) -> f64 {
+        let places = self.places(at, &[]);
+        let near = (places.iter()).filter(|place| !self.brick.surfaces.may_interpolate(place.exact.distance));
+        near.map(|place| {
+            let error = (self.brick.interpolated(at, place) - place.exact.distance).abs();
+            error / self.brick.surfaces.tolerance(true, &place.exact, 1.0)
+        })
+        .fold(0.0, f64::max)
     }
 
     /// Faces and places of the cube with this centre and edge. No face is farther from the centre than `within`.
@@ -307,7 +323,7 @@ impl<'a> CellNearby<'a> {
     }
 
     /// Exact samples on the lattice of half steps of the cell, and at points of features.
-    fn places(&mut self, at: [usize; 3], of_features: &[DVec3]) -> Vec<Place> {
+    pub fn places(&mut self, at: [usize; 3], of_features: &[DVec3]) -> Vec<Place> {
         let mut places = Vec::with_capacity(27 + of_features.len());
         for i in 0..27 {
             let place = [2 * at[0] + i % 3, 2 * at[1] + i / 3 % 3, 2 * at[2] + i / 9];

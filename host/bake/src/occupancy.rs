@@ -258,7 +258,7 @@ fn pack(
     let mut blob: Vec<u8> = Vec::new();
     let mut by_bytes: HashMap<Vec<u8>, u32> = HashMap::new();
     let mut by_palette: HashMap<Vec<u16>, u32> = HashMap::new();
-    let mut by_record: HashMap<(u32, u32, u32, u16), u16> = HashMap::new();
+    let mut by_record: HashMap<(u32, u32, u32, u8), u16> = HashMap::new();
     let mut sample_bytes = 0;
     let mut stored_entries = 0;
     for ((&at, kinds), voxels) in near.stored.iter().zip(kinds).zip(crossed) {
@@ -301,6 +301,7 @@ fn pack(
                 palette: palette_at,
                 palette_len: named.palette_len,
                 index_bits: named.index_bits,
+                coarse: 0,
             });
             // Numbers past the limit wrap here; the caller rejects such a field.
             (bricks.len() - 1) as u16
@@ -308,6 +309,9 @@ fn pack(
         *entry = GridEntry::Brick(number).to_bits();
     }
     BakedField {
+        rough_mm: 0.0,
+        finer_bricks: 0,
+        groups: Vec::new(),
         record: FieldRecord {
             origin: grid.origin_m,
             cell: grid.cell_m,

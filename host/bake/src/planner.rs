@@ -9,33 +9,32 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use glam::DAffine3;
 use mortise_brep::CadModel;
 use mortise_haptics::LEAST_CROSSING_SINE;
 use rayon::prelude::*;
 
 use crate::bake::{Baked, Made};
 use crate::cache::{Cache, NoCache, plan_from_bytes, plan_name, plan_to_bytes, shape_name};
-use crate::choice::{Demand, PATCH_SHARE};
+use crate::choice::PATCH_SHARE;
+use crate::demands::{all_fits, demand, reached_surface};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::BakedField;
-use crate::fits::{Fit, fits};
+use crate::fits::Fit;
+use crate::mix::mix;
 use crate::options::{BakeOptions, Progress};
-use crate::placed_fits::placed_fits;
 use crate::plan::{ELSEWHERE, Limit, PartTick, Plan, Planned, Request, ShapePlan};
 use crate::scene::Scene;
 use crate::ticks::Ticks;
 use crate::trials::{Bench, Clock, End, Fielded, Found, Trials};
-use crate::voids::{others, without_hollows};
 
 /// Attempts to find an accuracy that fits, and then one between that and the last that did not fit.
 const ATTEMPTS: usize = 12;
 const REFINEMENTS: usize = 3;
 /// Number of times the bound of crossings may be quadrupled.
 const COARSER_CROSSINGS: usize = 4;
-/// Most pairs of placed parts in which the fits of two shapes are looked for.
-const MOST_PLACEMENTS: usize = 16;
+/// Attempts to find a mix of fields that fits together with what is no field.
+const MIXES: usize = 4;
 /// Coarsest accuracy tried.
 const COARSEST_MM: f64 = 2.0;
 
@@ -301,13 +300,19 @@ impl<'a> Planner<'a> {
                 _ => failed = between,
             }
         }
-        if best.is_none()
-            && let Tried::Image(smallest) = self.smallest(COARSEST_MM)?
-        {
-            if smallest.over.fits() {
-                best = Some(smallest);
-            } else if (last.as_ref()).is_none_or(|last| last.baked.image.len() > smallest.baked.image.len()) {
-                last = Some(smallest);
+        // Shells for a coarse accuracy take fewer bytes.
+        for accuracy in [asked, COARSEST_MM] {
+            let is_enough = |best: &Attempt| best.plan.meets(asked) || accuracy > asked;
+            if best.as_deref().is_some_and(is_enough) {
+                break;
+            }
+            let Tried::Image(mixed) = self.mixed(accuracy)? else {
+                continue;
+            };
+            if mixed.over.fits() {
+                best = better(best, mixed);
+            } else if (last.as_ref()).is_none_or(|last| last.baked.image.len() > mixed.baked.image.len()) {
+                last = Some(mixed);
             }
         }
         let fits = best.is_some();
@@ -399,13 +404,40 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The smallest field found of each shape, whatever its error.
-    fn smallest(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
-        let fields = self.each(|shape, bench| shape.smallest(bench, accuracy_mm))?;
+    /// The best mix of the fields found of all shapes that fits the flash; the smallest one where none does.
+    fn mixed(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
+        let rated = self.each(|shape, bench| shape.rated(bench, accuracy_mm))?;
         self.note_end();
-        match fields.into_iter().collect() {
-            Some(fields) => self.assemble(accuracy_mm, fields, None),
-            None => Ok(Tried::Over(HOPELESS)),
+        let flash = self.request.flash_bytes;
+        let mut room = flash;
+        for _ in 0..MIXES {
+            let Some(chosen) = mix(&rated, room) else { break };
+            let fields =
+                (self.shapes.iter().zip(chosen)).map(|(shape, number)| shape.taken(number, accuracy_mm));
+            let Some(fields) = fields.collect::<Option<Vec<Fielded>>>() else {
+                break;
+            };
+            let bytes: u64 = fields.iter().map(Fielded::bytes).sum();
+            let tried = self.assemble(accuracy_mm, fields, None)?;
+            match &tried {
+                Tried::Image(attempt) if !attempt.over.fits() && bytes > 0 && room > 0 => {
+                    // What is no field takes the rest.
+                    let rest = (attempt.baked.image.len() as u64).saturating_sub(bytes);
+                    let less = flash.saturating_sub(rest + rest / 8).min(room - room / 8);
+                    room = if attempt.over.bytes > 1.0 { less } else { 0 };
+                    if room == 0 {
+                        return Ok(tried);
+                    }
+                }
+                _ => return Ok(tried),
+            }
+        }
+        let smallest = mix(&rated, 0).unwrap_or_default();
+        let fields =
+            (self.shapes.iter().zip(smallest)).map(|(shape, number)| shape.taken(number, accuracy_mm));
+        match fields.collect::<Option<Vec<Fielded>>>() {
+            Some(fields) if fields.len() == self.shapes.len() => self.assemble(accuracy_mm, fields, None),
+            _ => Ok(Tried::Over(HOPELESS)),
         }
     }
 
@@ -420,6 +452,7 @@ impl<'a> Planner<'a> {
             progress: self.progress,
             tolerance_mm: PATCH_SHARE * self.request.accuracy_mm,
             clock: self.clock,
+            room: self.request.flash_bytes,
         };
         (self.shapes.par_iter_mut().map(|shape| of(shape, &bench))).collect()
     }
@@ -442,7 +475,8 @@ impl<'a> Planner<'a> {
                 } else {
                     f64::INFINITY
                 };
-                (shape.demand).state(accuracy_mm, &field.choice, found, free_form, trusted_mm)
+                let measured = (free_form, field.baked.rough_mm);
+                (shape.demand).state(accuracy_mm, &field.choice, found, measured, trusted_mm)
             })
             .collect();
         let mut each: Vec<BakeOptions> = shapes.iter().map(|shape| self.options(shape)).collect();
@@ -528,66 +562,4 @@ fn better(best: Option<Box<Attempt>>, attempt: Box<Attempt>) -> Option<Box<Attem
 
 fn longest(ticks: &[PartTick]) -> u64 {
     ticks.first().map_or(0, |tick| tick.cost.instructions)
-}
-
-/// The surface of a shape without hollows that nothing can reach, and the faces left out.
-fn reached_surface(model: &CadModel, scene: &Scene, number: usize) -> (ExactSurface, Vec<u32>) {
-    let shape = &model.shapes[scene.shapes[number]];
-    let beside = || {
-        let own = scene.parts.iter().filter(|part| part.1 == number);
-        own.flat_map(|part| others(model, part.0)).collect()
-    };
-    match without_hollows(shape, beside) {
-        Some((filled, left_out)) => (ExactSurface::new(&filled), left_out),
-        None => (ExactSurface::new(shape), Vec::new()),
-    }
-}
-
-/// Fits of all shapes that can meet.
-fn all_fits(model: &CadModel, scene: &Scene, prepared: &[ExactSurface]) -> Vec<((usize, usize), Vec<Fit>)> {
-    let pairs: Vec<(usize, usize)> = (0..prepared.len())
-        .flat_map(|a| scene.met_by(a).into_iter().map(move |b| (a, b)))
-        .collect();
-    let of = |&(a, b): &(usize, usize)| {
-        let mut found = fits(&prepared[a], &prepared[b]);
-        for to_b in placements(model, scene, a, b) {
-            for fit in placed_fits(&prepared[a], &prepared[b], &to_b) {
-                if !found.iter().any(|other| other.faces == fit.faces) {
-                    found.push(fit);
-                }
-            }
-        }
-        (!found.is_empty()).then_some(((a, b), found))
-    };
-    pairs.par_iter().filter_map(of).collect()
-}
-
-/// Requirements of a shape.
-fn demand(
-    scene: &Scene,
-    number: usize,
-    surface: &ExactSurface,
-    fits: &[((usize, usize), Vec<Fit>)],
-    left_out: Vec<u32>,
-) -> Demand {
-    let own: Vec<(u32, f64, String)> = (fits.iter())
-        .filter(|((a, _), _)| *a == number)
-        .flat_map(|((_, b), found)| {
-            let name = &scene.names[*b];
-            found
-                .iter()
-                .map(move |fit| (fit.faces[0], fit.difference, name.clone()))
-        })
-        .collect();
-    Demand::new(&scene.names[number], surface, &own, left_out)
-}
-
-/// Transforms from parts of shape `a` to parts of shape `b` as placed in the model.
-fn placements(model: &CadModel, scene: &Scene, a: usize, b: usize) -> Vec<DAffine3> {
-    let of = |shape: usize| scene.parts.iter().filter(move |part| part.1 == shape);
-    (of(a).flat_map(|own| of(b).map(move |other| (own.0, other.0))))
-        .filter(|(own, other)| own != other)
-        .take(MOST_PLACEMENTS)
-        .map(|(own, other)| model.parts[other].placement.inverse() * model.parts[own].placement)
-        .collect()
 }

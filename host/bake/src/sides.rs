@@ -12,6 +12,7 @@ use mortise_brep::{Curve, Surface};
 use mortise_haptics::SIDE_M;
 use mortise_protocol::image::{Nearby, PatchRecord, patch_kind};
 
+use crate::cover::MOST_SIDES;
 use crate::distance::ExactSurface;
 use crate::local_patch::board_distance;
 
@@ -26,14 +27,17 @@ pub(crate) struct Sides {
     first: u16,
 }
 
+/// The first surface index of sides before they are named: the last ones of all, so that patches can still be added.
+const FIRST: u16 = Nearby::MAX_FACES - MOST_SIDES as u16;
+
 impl Sides {
-    /// Of all smooth edges between faces with a closed form; `first` is the number of the shape's other surfaces.
-    pub fn of(surface: &ExactSurface, first: usize) -> Self {
+    /// Of all smooth edges between faces with a closed form.
+    pub fn of(surface: &ExactSurface) -> Self {
         let (shape, topology) = (surface.shape(), &surface.topology);
         let mut sides = Self {
             records: Vec::new(),
             between: Vec::new(),
-            first: first as u16,
+            first: FIRST,
         };
         let mut seen: Vec<(u32, [u32; 2])> = Vec::new();
         for piece in &topology.pieces {
@@ -56,7 +60,7 @@ impl Sides {
             let Some(record) = swept(&shape.edges[edge as usize].curve, at, a) else {
                 continue;
             };
-            if first + sides.records.len() + 2 > usize::from(Nearby::MAX_FACES) {
+            if sides.records.len() + 2 > MOST_SIDES {
                 break;
             }
             for way in [1.0, -1.0] {
@@ -89,8 +93,9 @@ impl Sides {
             .map_or(f64::NAN, |side| board_distance(side, p))
     }
 
-    /// The sides that groups of faces name, in order, for the image; `groups` are the words of the groups, which then name these.
-    pub fn named<'a>(self, groups: impl Iterator<Item = &'a mut [u16]>) -> Vec<PatchRecord> {
+    /// The sides that groups of faces name, in order, for the image; `groups` are the words of the groups, which then name these by surface indices from
+    /// `first` on.
+    pub fn named<'a>(self, groups: impl Iterator<Item = &'a mut [u16]>, first: usize) -> Vec<PatchRecord> {
         let mut groups: Vec<&mut [u16]> = groups.collect();
         let number = |word: u16| {
             usize::from(word & Nearby::MAX_FACES)
@@ -106,7 +111,7 @@ impl Sides {
         let before = |number: usize| is_named[..number].iter().filter(|named| **named).count() as u16;
         for word in groups.iter_mut().flat_map(|words| words.iter_mut()) {
             if let Some(number) = number(*word) {
-                *word = (*word & !Nearby::MAX_FACES) | (self.first + before(number));
+                *word = (*word & !Nearby::MAX_FACES) | (first as u16 + before(number));
             }
         }
         (self.records.into_iter().zip(is_named))
@@ -135,6 +140,7 @@ fn swept(curve: &Curve, at: DVec3, n: DVec3) -> Option<PatchRecord> {
         x: normal.any_orthonormal_vector().to_array(),
         normal: normal.to_array(),
         height,
+        radius: 0.0,
         face: 0,
         kind: patch_kind::SIDE,
     })

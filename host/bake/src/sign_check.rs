@@ -150,6 +150,7 @@ pub fn check_signs(
         format: SampleFormat::Int16,
         patch_tolerance_mm: 2e-3,
         samples: Samples::Everywhere,
+        finer: None,
     };
     let baked = bake_field(&mut surface, &field, "part", &|_, _| ControlFlow::Continue(()))?;
     let cell_mm = f64::from(baked.record.cell) * 1000.0;

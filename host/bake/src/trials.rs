@@ -30,6 +30,8 @@ const FINER_CELLS: usize = 5;
 const FINER: f64 = 0.7;
 /// Least improvement for which a still finer cell is tried.
 const HELPS: f64 = 0.9;
+/// A field with finer bricks of more than this share of the image is kept without them, too.
+const LARGE_SHARE: u64 = 4;
 /// Smallest cell tried, mm.
 const LEAST_CELL_MM: f64 = 1e-3;
 
@@ -41,6 +43,8 @@ pub(crate) struct Bench<'a> {
     /// Tolerance of local patches at the requested accuracy, mm.
     pub tolerance_mm: f64,
     pub clock: Clock,
+    /// Bytes of the image.
+    pub room: u64,
 }
 
 /// The end of planning by time, the last resort.
@@ -99,6 +103,16 @@ impl Fielded {
             self.reach_mm = reach_mm;
         }
     }
+}
+
+/// A field found for a shape.
+#[derive(Clone, Copy)]
+pub(crate) struct Rated {
+    /// Its number among those found.
+    pub number: usize,
+    pub bytes: u64,
+    /// Its error over what an accuracy allows.
+    pub excess: f64,
 }
 
 /// Result for an accuracy.
@@ -261,29 +275,41 @@ impl Trials {
         }
     }
 
-    /// The smallest field found, whatever its error; cells larger than those that [`Self::find`] tries are tried as well. `None` when the layout cannot
-    /// hold any.
-    pub fn smallest(&mut self, bench: &Bench<'_>, accuracy_mm: f64) -> Result<Option<Fielded>, BakeError> {
+    /// All fields found, the smallest first, each with its bytes and its error over what an accuracy allows; cells larger than those that [`Self::find`]
+    /// tries are tried as well. None where the layout cannot hold any.
+    pub fn rated(&mut self, bench: &Bench<'_>, accuracy_mm: f64) -> Result<Vec<Rated>, BakeError> {
         let finest = self.demand.choose(accuracy_mm);
         for choice in self.demand.coarsest(&finest) {
             self.tried(bench, &choice, accuracy_mm)?;
         }
-        let smallest = self.known.iter().min_by_key(|field| field.bytes()).cloned();
+        let mut rated: Vec<Rated> = (self.known.iter().enumerate())
+            .map(|(number, field)| Rated {
+                number,
+                bytes: field.bytes(),
+                excess: self.excess(accuracy_mm, field),
+            })
+            .collect();
+        rated.sort_by(|a, b| a.bytes.cmp(&b.bytes).then(a.excess.total_cmp(&b.excess)));
+        Ok(rated)
+    }
+
+    /// One of the fields found, stated for an accuracy.
+    pub fn taken(&self, number: usize, accuracy_mm: f64) -> Option<Fielded> {
+        let finest = self.demand.choose(accuracy_mm);
+        let field = self.known.get(number)?.clone();
         // Its shell resolves no more than its cells, so that it has few points.
-        Ok(smallest.map(|field| {
-            let resolution_mm = field.choice.cell_mm.max(finest.resolution_mm);
-            self.restated(
-                field,
-                Choice {
-                    resolution_mm,
-                    ..finest
-                },
-            )
-        }))
+        let resolution_mm = field.choice.cell_mm.max(finest.resolution_mm);
+        Some(self.restated(
+            field,
+            Choice {
+                resolution_mm,
+                ..finest
+            },
+        ))
     }
 
     /// A known field, stated for another accuracy with the errors near enough for it.
-    fn restated(&mut self, mut field: Fielded, finest: Choice) -> Fielded {
+    fn restated(&self, mut field: Fielded, finest: Choice) -> Fielded {
         field.is_smallest = true;
         field.choice.resolution_mm = finest.resolution_mm;
         field.choice.edges = finest.edges;
@@ -348,48 +374,68 @@ impl Trials {
         if choice.cell_mm < LEAST_CELL_MM {
             return Ok(None);
         }
-        let name = field_name(self.name.as_ref(), choice, tolerance_mm);
-        let faces = self.surface.shape().faces.len();
-        // The first field is baked regardless of its cost, so that there is one.
+        // The first field is baked regardless of its cost, if without finer bricks, so that there is one.
         let is_first = self.known.is_empty();
         if !is_first && self.ended.is_some() {
             return Ok(None);
         }
-        let kept = (name.as_ref())
-            .and_then(|name| bench.cache.get(name))
-            .and_then(|bytes| KeptField::from_bytes(&bytes, faces));
-        let made = match kept {
-            Some(kept) => {
-                self.surface.work().add(kept.work);
-                if kept.by_winding {
-                    self.surface.set_sign_by_winding();
-                }
-                kept
+        let factors = self.demand.factors();
+        let mut made = self.kept_or_made(bench, choice, tolerance_mm, Some(&factors))?;
+        if made.is_none() && is_first {
+            made = self.kept_or_made(bench, choice, tolerance_mm, None)?;
+        }
+        let Some(made) = made else { return Ok(None) };
+        let bytes = field_bytes(&made.field);
+        let mut found = vec![made];
+        // Where finer bricks take much, the same field without them may be what fits beside the other shapes.
+        if found[0].field.finer_bricks > 0 && bytes > bench.room / LARGE_SHARE {
+            found.extend(self.kept_or_made(bench, choice, tolerance_mm, None)?);
+            if bytes > bench.room {
+                found.remove(0);
             }
-            None => {
-                let Some(made) = self.made(bench, choice, tolerance_mm)? else {
-                    return Ok(None);
-                };
-                if let Some((name, bytes)) = name.zip(made.to_bytes()) {
-                    bench.cache.put(&name, &bytes);
-                }
-                made
-            }
-        };
+        }
         if !is_first && self.surface.work().so_far() > self.share {
             self.ended = Some(End::Work);
             return Ok(None);
         }
-        let field = Fielded {
+        let fields = found.into_iter().map(|made| Fielded {
             choice: choice.clone(),
             tolerance_mm,
             reach_mm: choice.reach_mm(),
             is_smallest: false,
             errors: Arc::new(made.errors),
             baked: Arc::new(made.field),
-        };
-        self.known.push(field.clone());
-        Ok(Some(field))
+        });
+        let first = self.known.len();
+        self.known.extend(fields);
+        Ok(self.known.get(first).cloned())
+    }
+
+    /// The field with its errors from the cache, or made; `None` as for [`Self::tried`].
+    fn kept_or_made(
+        &mut self,
+        bench: &Bench<'_>,
+        choice: &Choice,
+        tolerance_mm: f64,
+        finer: Option<&[f64]>,
+    ) -> Result<Option<KeptField>, BakeError> {
+        let name = field_name(self.name.as_ref(), choice, tolerance_mm, finer);
+        let faces = self.surface.shape().faces.len();
+        let kept = (name.as_ref())
+            .and_then(|name| bench.cache.get(name))
+            .and_then(|bytes| KeptField::from_bytes(&bytes, faces));
+        if let Some(kept) = kept {
+            self.surface.work().add(kept.work);
+            if kept.by_winding {
+                self.surface.set_sign_by_winding();
+            }
+            return Ok(Some(kept));
+        }
+        let made = self.made(bench, choice, tolerance_mm, finer)?;
+        if let Some((name, bytes)) = name.zip(made.as_ref().and_then(KeptField::to_bytes)) {
+            bench.cache.put(&name, &bytes);
+        }
+        Ok(made)
     }
 
     /// Bakes the field and measures its errors; `None` as for [`Self::tried`].
@@ -398,8 +444,9 @@ impl Trials {
         bench: &Bench<'_>,
         choice: &Choice,
         tolerance_mm: f64,
+        finer: Option<&[f64]>,
     ) -> Result<Option<KeptField>, BakeError> {
-        let is_first = self.known.is_empty();
+        let is_first = self.known.is_empty() && finer.is_none();
         if !is_first && bench.clock.is_over() {
             self.ended = Some(End::Time);
             return Ok(None);
@@ -432,9 +479,13 @@ impl Trials {
             ControlFlow::Break(())
         };
         let mut cell_mm = choice.cell_mm;
-        let baked = bench
-            .scene
-            .field(self.number, &mut self.surface, &mut cell_mm, &options, &progress);
+        let baked = bench.scene.field(
+            self.number,
+            &mut self.surface,
+            &mut cell_mm,
+            (&options, finer),
+            &progress,
+        );
         let field = match baked {
             Err(BakeError::CellTooSmall { .. }) => return Ok(None),
             Err(BakeError::Cancelled) => {

@@ -6,6 +6,7 @@
 //! Trilinear interpolation inside a stored brick: on a cylinder of radius R the error is about cell²/(8R). Cost: about half of the 300 instructions
 //! that a point near the surface takes in a tick, counted on an emulated Cortex-M7 on 2026-11-21.
 
+use super::nearby::{Group, MOST_LEVELS, Nearby};
 use super::records::*;
 
 /// A field and the arrays it refers to. Created by [`super::SceneImage`], which has checked every index.
@@ -59,8 +60,10 @@ pub struct Cell<'a> {
     entry: u16,
     /// Index of the cell in the brick.
     index: usize,
-    /// The position, in cells from the grid's corner.
+    /// The position, in cells from the corner of the grid, or of the finer brick.
     at: [f32; 3],
+    /// Edge of the cell over that of the field's cells: less than 1 in a finer brick.
+    scale: f32,
 }
 
 /// Distance and gradient at a position.
@@ -129,11 +132,17 @@ impl<'a> Field<'a> {
                 if self.is_occupancy() {
                     return self.voxel_as_far(brick, index);
                 }
-                Place::Cell(Cell {
+                let cell = Cell {
                     brick,
                     index,
                     at: g,
                     entry: self.palette_entry(brick, index),
+                    scale: 1.0,
+                };
+                Place::Cell(if Nearby::may_be_finer(cell.entry) {
+                    self.finest(cell)
+                } else {
+                    cell
                 })
             }
             GridEntry::Empty { inside, cells } => Place::Far {
@@ -141,6 +150,32 @@ impl<'a> Field<'a> {
                 bound: f32::from(cells) * self.record.cell,
             },
         }
+    }
+
+    /// The cell at the same position in the finest brick that covers this one.
+    #[inline(never)]
+    fn finest(&self, mut cell: Cell<'a>) -> Cell<'a> {
+        for _ in 0..MOST_LEVELS {
+            let Some(brick) = self.finer(&cell) else { break };
+            // Below 8: the fraction is below 1 by at least a rounding step.
+            let at = within(cell.at).map(|f| f * BRICK_CELLS as f32);
+            let index = index_in_brick(at.map(|a| a as u32));
+            cell = Cell {
+                brick,
+                index,
+                at,
+                entry: self.palette_entry(brick, index),
+                scale: cell.scale * (1.0 / BRICK_CELLS as f32),
+            };
+        }
+        cell
+    }
+
+    /// The finer brick that covers a cell, if any.
+    #[inline]
+    fn finer(&self, cell: &Cell<'_>) -> Option<&'a BrickRecord> {
+        let number = Nearby::finer(cell.entry, self.palette.get(cell.brick.palette as usize..)?)?;
+        self.bricks.get(usize::from(number))
     }
 
     /// Nearest faces of a cell.
@@ -171,7 +206,7 @@ impl<'a> Field<'a> {
     /// Interpolated distance in a cell, m; 0 without samples.
     #[inline(always)]
     pub fn distance(&self, cell: &Cell<'_>) -> f32 {
-        value(&self.corners(cell.brick, cell.index), within(cell.at)) * self.record.scale
+        value(&self.corners(cell.brick, cell.index), within(cell.at)) * (self.record.scale * cell.scale)
     }
 
     /// Interpolated distance and its gradient in a cell; 0 without samples.
@@ -181,7 +216,7 @@ impl<'a> Field<'a> {
         let per_cell = self.record.scale * self.inverse_cell;
         let nearby = self.nearby(cell);
         FieldSample {
-            distance: value(&corners, within(cell.at)) * self.record.scale,
+            distance: value(&corners, within(cell.at)) * (self.record.scale * cell.scale),
             gradient: gradient(&corners, within(cell.at)).map(|x| x * per_cell),
             face: nearby.face(),
             nearby,
@@ -223,9 +258,7 @@ impl<'a> Field<'a> {
         let dims = &self.record.brick_dims;
         let row = (w[2] >> BRICK_SHIFT) * u32::from(dims[1]) + (w[1] >> BRICK_SHIFT);
         let index = row * u32::from(dims[0]) + (w[0] >> BRICK_SHIFT);
-        // Three bits for each axis, x lowest: also the cell's place among the palette indices.
-        let cell = (w[0] & 7) | (w[1] & 7) << 3 | (w[2] & 7) << 6;
-        (GridEntry::from_bits(self.grid[index as usize]), cell as usize)
+        (GridEntry::from_bits(self.grid[index as usize]), index_in_brick(w))
     }
 
     /// The eight samples around a cell, x fastest; 0 without samples.
@@ -238,10 +271,11 @@ impl<'a> Field<'a> {
             (cell & 7) + BRICK_SAMPLES * (cell >> 3 & 7) + BRICK_SAMPLES * BRICK_SAMPLES * (cell >> 6 & 7);
         let mut c = [0f32; 8];
         // All eight are in the run from the first to the last: one bounds check for the run instead of one for each.
-        if self.record.format == FORMAT_I8 {
+        if self.record.format == FORMAT_I8 || brick.coarse != 0 {
+            let unit = if brick.coarse != 0 { COARSE_UNITS } else { 1.0 };
             let run: &[u8; RUN] = chunk(self.blob, brick.samples as usize + first);
             for (c, corner) in c.iter_mut().zip(CORNERS) {
-                *c = f32::from(run[corner] as i8);
+                *c = f32::from(run[corner] as i8) * unit;
             }
         } else {
             let run: &[u8; 2 * RUN] = chunk(self.blob, brick.samples as usize + 2 * first);
@@ -267,6 +301,12 @@ impl<'a> Field<'a> {
 }
 
 impl Cell<'_> {
+    /// Its edge over that of the field's cells: less than 1 in a finer brick.
+    #[inline(always)]
+    pub fn scale(&self) -> f32 {
+        self.scale
+    }
+
     /// Whether its brick stores samples: if not, the surfaces that the cell names give the distance.
     #[inline(always)]
     pub fn has_samples(&self) -> bool {
@@ -283,6 +323,9 @@ impl Cell<'_> {
 /// Largest amount by which trilinear interpolation overstates the distance next to a sharp edge or corner, cells. Measured: 0.2 cells at a right
 /// angle along the grid, 0.3 across it, 0.5 at a corner, 0.87 at worst.
 pub const EDGE_ERROR_CELLS: f32 = 0.9;
+
+/// Units of a coarse brick's samples.
+pub const COARSE_UNITS: f32 = 256.0;
 
 /// log₂ of [`BRICK_CELLS`].
 const BRICK_SHIFT: u32 = BRICK_CELLS.trailing_zeros();
@@ -302,7 +345,12 @@ fn chunk<const N: usize>(blob: &[u8], at: usize) -> &[u8; N] {
         .expect("checked when the image was opened")
 }
 
-// `entry` packs three bits per axis.
+/// Index of a cell in its brick: three bits for each axis, x lowest; also its place among the palette indices.
+#[inline(always)]
+fn index_in_brick(cell: [u32; 3]) -> usize {
+    ((cell[0] & 7) | (cell[1] & 7) << 3 | (cell[2] & 7) << 6) as usize
+}
+
 const _: () = assert!(BRICK_CELLS == 8);
 
 /// Fractions, 0 to 1, of a grid position inside the grid from its cell's lowest corner.

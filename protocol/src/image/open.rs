@@ -6,6 +6,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use super::edge::{EdgeRecord, NO_SPAN, SpanRecord};
 use super::error::ImageError;
 use super::field::Field;
+use super::nearby::{Group, Nearby};
 use super::occupancy::VOXEL_BRICK_BYTES;
 use super::records::*;
 use super::surfaces::Surfaces;
@@ -235,7 +236,7 @@ impl<'a> SceneImage<'a> {
                         let needs_none = b.samples == NO_SAMPLES && field.format != FORMAT_OCCUPANCY;
                         needs_none
                             || b.samples.is_multiple_of(4)
-                                && brick_bytes(field.format)
+                                && sample_bytes(field.format, b)
                                     .is_some_and(|n| fits(b.samples, n as u32, self.blob.len()))
                     })
         })?;
@@ -246,6 +247,7 @@ impl<'a> SceneImage<'a> {
                 8 => fits(brick.indices, CELLS_PER_BRICK as u32, self.blob.len()),
                 _ => false,
             };
+            let indices_fit = indices_fit && brick.coarse <= 1;
             // Indices are not checked one by one: the palette run must cover every value they can take.
             indices_fit
                 && fits(brick.palette, 1 << brick.index_bits, self.palette.len())
@@ -274,6 +276,7 @@ impl<'a> SceneImage<'a> {
                     index: index as u32,
                 });
             }
+            self.check_finer_bricks(shape)?;
             self.check_bricks_without_samples(shape)?;
         }
         each(self.patches, SECTION_PATCHES, |patch| {
@@ -282,6 +285,7 @@ impl<'a> SceneImage<'a> {
                 && finite(&patch.x)
                 && finite(&patch.normal)
                 && finite(&patch.height)
+                && patch.radius.is_finite()
         })?;
         each(self.spans, SECTION_SPANS, |span| {
             finite(&span.along) && finite(&span.bend) && (0.0..=1.0).contains(&span.round)
@@ -292,6 +296,24 @@ impl<'a> SceneImage<'a> {
                 && finite(&face.axis)
                 && finite(&[face.sense, face.radius, face.second])
         })
+    }
+
+    /// Whether every finer brick of a shape's field has a smaller number than the one that names it, so that none is within itself.
+    fn check_finer_bricks(&self, shape: &ShapeRecord) -> Result<(), ImageError> {
+        let field = &self.fields[shape.field as usize];
+        let bricks = run(self.bricks, field.first_brick, field.brick_count);
+        let is_smaller = |(own, brick): (usize, &BrickRecord)| {
+            let palette = &self.palette[brick.palette as usize..];
+            let entries = palette.iter().take(usize::from(brick.palette_len));
+            (entries.filter_map(|&bits| Nearby::finer(bits, palette))).all(|number| usize::from(number) < own)
+        };
+        match bricks.iter().enumerate().position(|brick| !is_smaller(brick)) {
+            Some(number) => Err(ImageError::Record {
+                section: SECTION_BRICKS,
+                index: field.first_brick + number as u32,
+            }),
+            None => Ok(()),
+        }
     }
 
     /// Whether every cell of a brick without samples names surfaces of `shape` that give its distance: faces with a closed form, or patches.
@@ -311,6 +333,9 @@ impl<'a> SceneImage<'a> {
             let answers = |index: u8| {
                 let entry = palette.get(usize::from(index));
                 let entry = entry.filter(|_| u16::from(index) < brick.palette_len);
+                if entry.is_some_and(|&bits| Nearby::finer(bits, palette).is_some()) {
+                    return true;
+                }
                 let group = |at: u16| Group::read(palette.get(usize::from(at)..)?);
                 match entry.map(|&bits| Nearby::from_bits(bits, group)) {
                     Some(Nearby::Face(surface)) => gives(surface),
@@ -360,6 +385,14 @@ fn is_edge(edge: &EdgeRecord, faces: u32) -> bool {
         && edge.radius.is_finite()
         && edge.radius >= 0.0
         && edge.faces.iter().all(|&face| u32::from(face) < faces)
+}
+
+/// Bytes of this brick's samples; `None` for a format that this side does not know, or that cannot be coarse.
+fn sample_bytes(format: u16, brick: &BrickRecord) -> Option<usize> {
+    match brick.coarse {
+        0 => brick_bytes(format),
+        _ => (format == FORMAT_I16).then_some(SAMPLES_PER_BRICK),
+    }
 }
 
 /// Bytes of a brick's samples; `None` for a format that this side does not know.

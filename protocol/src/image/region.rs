@@ -1,6 +1,7 @@
 //! Faces that a region of a field refers to.
 
 use super::field::Field;
+use super::nearby::Nearby;
 use super::records::*;
 
 /// Most palette entries whose result `good` can hold: one bit each.

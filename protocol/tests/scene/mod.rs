@@ -56,6 +56,7 @@ pub fn bytes() -> Vec<u8> {
         palette: 0,
         palette_len: 2,
         index_bits: 4,
+        coarse: 0,
     });
     for number in 0..2i32 {
         let samples = append(&mut blob, |blob| {
@@ -75,6 +76,7 @@ pub fn bytes() -> Vec<u8> {
             palette: if number == 1 { 2 } else { 5 },
             palette_len: if number == 1 { 3 } else { 1 },
             index_bits: if number == 1 { 8 } else { 0 },
+            coarse: 0,
         });
     }
     bricks.push(BrickRecord {
@@ -83,6 +85,7 @@ pub fn bytes() -> Vec<u8> {
         palette: 5,
         palette_len: 1,
         index_bits: 0,
+        coarse: 0,
     });
     let mut palette = vec![0, 1, 0, 1, NO_FACE, 1];
     palette.resize(6 + 256, NO_FACE);
@@ -185,6 +188,7 @@ pub fn bytes() -> Vec<u8> {
         x: [0.0, 1.0, 0.0],
         normal: [1.0, 0.0, 0.0],
         height: [0.0, 0.0, 0.0, 4.0, 0.0, -2.0, 0.0, 8.0, 0.0, 16.0],
+        radius: 0.003,
         face: 1,
         kind: patch_kind::HEIGHT,
     }];
@@ -321,6 +325,102 @@ pub fn occupancy_bytes() -> Vec<u8> {
         palette: &[0],
         grid: &grid,
         blob: &voxels,
+        edges: &[],
+        spans: &[],
+    }
+    .image()
+}
+
+/// A scene with finer bricks: the half-space z < 2.3 mm on one brick of 1 mm cells, one coarse finer brick over its cell (3, 2, 2), one more over the cell
+/// (7, 0, 2) of that. All cells are interpolated.
+pub fn finer_bytes() -> Vec<u8> {
+    let mut blob = Vec::new();
+    // Units of a sample in a brick whose cells are 1/8^level mm.
+    let units = |level: i32, low: f64, k: usize| {
+        let cell = 0.125f64.powi(level);
+        ((low + k as f64 * cell - 2.3) / cell * 4096.0)
+            .clamp(-32767.0, 32767.0)
+            .round()
+    };
+    let exact = |level: i32, low: f64| {
+        move |blob: &mut Vec<u8>| {
+            each(BRICK_SAMPLES, |_, _, k| {
+                blob.extend((units(level, low, k) as i16).to_le_bytes());
+            });
+        }
+    };
+    // The finest covers z from 2.25 to 2.375 mm.
+    let finest = append(&mut blob, exact(2, 2.25));
+    let middle = append(&mut blob, |blob| {
+        each(BRICK_SAMPLES, |_, _, k| {
+            blob.push((units(1, 2.0, k) / 256.0).round().clamp(-127.0, 127.0) as i8 as u8);
+        });
+    });
+    let coarsest = append(&mut blob, exact(0, 0.0));
+    let over = |blob: &mut Vec<u8>, finer: [usize; 3]| {
+        append(blob, |blob| {
+            let mut cells = [0u8; CELLS_PER_BRICK];
+            cells[finer[0] | finer[1] << 3 | finer[2] << 6] = 1;
+            blob.extend(cells.chunks_exact(2).map(|pair| pair[0] | pair[1] << 4));
+        })
+    };
+    let in_middle = over(&mut blob, [7, 0, 2]);
+    let in_coarsest = over(&mut blob, [3, 2, 2]);
+    // Palettes: the face; the face and the finer brick 0; the face and the finer brick 1.
+    let roughly = Nearby::Roughly(0).to_bits(0);
+    let mut palette = vec![roughly];
+    for number in 0..2 {
+        palette.extend([roughly, Nearby::finer_bits(2), FINER, number]);
+    }
+    palette.resize(palette.len() + 256, NO_FACE);
+    let brick = |samples: u32, coarse: u8, palette: u32, indices: Option<u32>| BrickRecord {
+        samples,
+        indices: indices.unwrap_or(0),
+        palette,
+        palette_len: if indices.is_some() { 2 } else { 1 },
+        index_bits: if indices.is_some() { 4 } else { 0 },
+        coarse,
+    };
+    let field = FieldRecord {
+        origin: [0.0; 3],
+        cell: 0.001,
+        scale: 0.001 / 4096.0,
+        band: 0.006,
+        brick_dims: [1; 3],
+        format: FORMAT_I16,
+        first_grid: 0,
+        first_brick: 0,
+        brick_count: 3,
+    };
+    Sections {
+        parts: &[PartRecord {
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            ..PartRecord::zeroed()
+        }],
+        shapes: &[ShapeRecord {
+            face_count: 1,
+            radius: 0.02,
+            ..ShapeRecord::zeroed()
+        }],
+        fields: &[field],
+        nodes: &[],
+        points: &[],
+        faces: &[FaceRecord {
+            kind: surface_kind::PLANE,
+            sense: 1.0,
+            origin: [0.0, 0.0, 0.0023],
+            axis: [0.0, 0.0, 1.0],
+            ..FaceRecord::zeroed()
+        }],
+        patches: &[],
+        bricks: &[
+            brick(finest, 0, 0, None),
+            brick(middle, 1, 1, Some(in_middle)),
+            brick(coarsest, 0, 5, Some(in_coarsest)),
+        ],
+        palette: &palette,
+        grid: &[GridEntry::Brick(2).to_bits()],
+        blob: &blob,
         edges: &[],
         spans: &[],
     }

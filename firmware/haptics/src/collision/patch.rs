@@ -14,6 +14,10 @@ use crate::math::vector::quick_length;
 
 /// Newton steps to the foot: each squares the error.
 const STEPS: usize = 2;
+/// Farthest that the two steps may end beside the foot: a share of the distance, and a length, m². Farther aside the steps have not converged, as at
+/// a point that has no foot on the patch; the distance would be that of another point.
+const MOST_ASIDE: f32 = 0.05;
+const ASIDE_M2: f32 = 1e-12;
 /// Least determinant of the Hessian, which is 1 on a plane: below it the point is at the centre of curvature and has no unique foot.
 const LEAST_DETERMINANT: f32 = 1e-3;
 
@@ -64,7 +68,8 @@ fn side(patch: &PatchRecord, p: Vec3) -> f32 {
     if beyond > 0.0 { SIDE_M } else { -SIDE_M }
 }
 
-/// Signed distance from `p` (m, shape frame), outward positive, and outward unit normal; `None` where the foot is not unique.
+/// Signed distance from `p` (m, shape frame), outward positive, and outward unit normal; `None` where the foot is not unique, is not reached, or is
+/// beyond the patch's radius.
 #[inline(never)]
 pub fn distance_to_patch(patch: &PatchRecord, p: Vec3) -> Option<(f32, Vec3)> {
     let (x, normal) = (Vec3::from_array(patch.x), Vec3::from_array(patch.normal));
@@ -94,6 +99,14 @@ pub fn distance_to_patch(patch: &PatchRecord, p: Vec3) -> Option<(f32, Vec3)> {
         at = jet(&patch.height, s, t);
     }
     let [hs, ht] = at.slope;
+    let over = at.h - w;
+    let (aside_s, aside_t) = (s - u + over * hs, t - v + over * ht);
+    let most = MOST_ASIDE * over;
+    let is_reached = aside_s * aside_s + aside_t * aside_t <= most * most + ASIDE_M2;
+    // False for NaN too.
+    if !(is_reached && s * s + t * t <= patch.radius * patch.radius) {
+        return None;
+    }
     let scale = inverse_sqrt(1.0 + hs * hs + ht * ht);
     let distance = (w - at.h - (u - s) * hs - (v - t) * ht) * scale;
     Some((distance, (normal - x * hs - y * ht) * scale))
@@ -126,6 +139,7 @@ mod tests {
                 8e3 * k[5],
                 8e3 * k[6],
             ],
+            radius: 0.004,
             face: 3,
             kind: patch_kind::HEIGHT,
         }
@@ -176,6 +190,28 @@ mod tests {
             prop_assert!((f64::from(found) - distance).abs() < 5e-8, "{found} {distance}");
             let cosine: f64 = (0..3).map(|i| f64::from(direction[i]) * normal[i]).sum();
             prop_assert!(cosine > 1.0 - 1e-5, "{cosine}");
+        }
+    }
+
+    proptest! {
+        /// Wherever there is an answer, the point at that distance along the normal is on the patch, within its radius: at most a twentieth of the distance
+        /// beside the foot, which bends away from its tangent plane by less than that.
+        #[test]
+        fn an_answer_leads_to_the_patch(
+            k in prop::array::uniform7(-1.0f32..1.0),
+            turn in -3.0f32..3.0,
+            at in prop::array::uniform3(-0.02f32..0.02),
+        ) {
+            let patch = patch(k, turn);
+            let p = Vec3::from_array(patch.origin) + Vec3::from_array(at);
+            if let Some((distance, normal)) = distance_to_patch(&patch, p) {
+                let (x, up) = (Vec3::from_array(patch.x), Vec3::from_array(patch.normal));
+                let q = p - normal * distance - Vec3::from_array(patch.origin);
+                let (u, v, w) = (q.dot(x), q.dot(up.cross(x)), q.dot(up));
+                let off = (jet(&patch.height, u, v).h - w).abs();
+                prop_assert!(off <= 0.1 * distance.abs() + 2e-6, "{off} at {distance}");
+                prop_assert!(u.hypot(v) <= patch.radius + 0.06 * distance.abs() + 2e-6);
+            }
         }
     }
 

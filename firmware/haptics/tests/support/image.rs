@@ -236,6 +236,7 @@ impl Writer {
                 palette: self.palette.len() as u32,
                 palette_len: 16,
                 index_bits: 4,
+                coarse: 0,
             });
         }
         self.palette.extend(0..15);
@@ -300,6 +301,7 @@ impl Writer {
             palette,
             palette_len,
             index_bits,
+            coarse: 0,
         });
     }
 
