@@ -7,7 +7,7 @@ use mortise_brep::CadModel;
 use mortise_mating::{Contact, MergedSurface, Tolerances, identify, merge};
 
 use crate::body::Body;
-use crate::clearance::{Gap, Limits, Placed, free_share, gap, least_over, refined};
+use crate::clearance::{Gap, Limits, Placed, free_share, gap, gap_until, least_over, refined};
 use crate::error::TaskError;
 use crate::motion::Motion;
 
@@ -210,6 +210,24 @@ impl Assembly {
             let gap = gap(self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY), -self.allowed_mm(a, b))?;
             Some(Clearance { gap, pair: [a, b] })
         })
+    }
+
+    /// Depth by which a moved group overlaps one of `others` beyond what is allowed of the pair, mm, and the pair; `None` when it is clear. The deepest pair,
+    /// or the first found that is at least `enough` deep.
+    pub fn excess(&self, group: &Moved<'_>, others: &[usize], enough: f64) -> Option<(f64, [usize; 2])> {
+        let mut found: Option<(f64, [usize; 2])> = None;
+        for (a, b) in self.pairs(group, others, 0.0) {
+            let allowed = self.allowed_mm(a, b);
+            let most = found.map_or(0.0, |(depth, _)| depth);
+            let within = -allowed - most;
+            let Some(gap) = gap_until(self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY), within, -allowed - enough) else { continue };
+            let depth = -gap - allowed;
+            found = Some((depth, [a, b]));
+            if depth >= enough {
+                break;
+            }
+        }
+        found
     }
 
     /// Pairs of a moved group and `others` whose boxes are within `within`.

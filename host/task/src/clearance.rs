@@ -67,6 +67,17 @@ fn sides<'a>(way: Way, a: Placed<'a>, b: Placed<'a>) -> Sides<'a> {
 
 /// Least signed distance of two placed bodies where it is below `within` mm, by their samples; `None` where it is not.
 pub fn gap(a: Placed<'_>, b: Placed<'_>, within: f64) -> Option<Gap> {
+    let (distance, way, sample) = least_sample(a, b, within, f64::NEG_INFINITY)?;
+    let position = sides(way, a, b).of.samples()[sample as usize].position;
+    Some(place(way, a, b, position, distance))
+}
+
+/// As the distance of [`gap`]; ends with the first sample at or below `enough`.
+pub(crate) fn gap_until(a: Placed<'_>, b: Placed<'_>, within: f64, enough: f64) -> Option<f64> {
+    least_sample(a, b, within, enough).map(|(distance, ..)| distance)
+}
+
+fn least_sample(a: Placed<'_>, b: Placed<'_>, within: f64, enough: f64) -> Option<(f64, Way, u32)> {
     let mut best = within;
     let mut found = None;
     for way in WAYS {
@@ -83,7 +94,10 @@ pub fn gap(a: Placed<'_>, b: Placed<'_>, within: f64) -> Option<Gap> {
                 let d = s.within.distance(p);
                 if d < best {
                     best = d;
-                    found = Some((way, node.first));
+                    found = Some((d, way, node.first));
+                    if d <= enough {
+                        return found;
+                    }
                 }
             } else {
                 stack.push(node.second);
@@ -91,11 +105,7 @@ pub fn gap(a: Placed<'_>, b: Placed<'_>, within: f64) -> Option<Gap> {
             }
         }
     }
-    found.map(|(way, sample)| {
-        let s = sides(way, a, b);
-        let position = s.of.samples()[sample as usize].position;
-        place(way, a, b, position, best)
-    })
+    found
 }
 
 /// The gap at a point of one of the surfaces: `position` in the frame of the body whose surface it is on.

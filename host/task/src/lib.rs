@@ -7,6 +7,7 @@ pub mod directions;
 mod error;
 pub mod mobility;
 mod motion;
+pub mod removal;
 pub use assembly::*;
 pub use body::*;
 pub use clearance::*;
