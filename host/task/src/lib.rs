@@ -1,5 +1,6 @@
 //! Assembly by task: contacts, freedoms, ports, and collision-free sequences with their clearances.
 mod assembly;
+pub mod blocking;
 mod body;
 mod clearance;
 pub mod cone;
@@ -8,6 +9,7 @@ mod error;
 pub mod mobility;
 mod motion;
 pub mod removal;
+pub mod sequence;
 pub use assembly::*;
 pub use body::*;
 pub use clearance::*;
