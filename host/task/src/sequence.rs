@@ -18,7 +18,7 @@ use crate::motion::Motion;
 use crate::removal::{Blocked, Budget, Path, Removal, remove};
 
 /// Travel between checks of samples in contact when a step is measured, mm.
-pub const MEASURE_STEP_MM: f64 = 0.05;
+pub const MEASURE_STEP_MM: f64 = 0.25;
 /// Distance beyond which a clearance is not stated, mm.
 pub const FAR_MM: f64 = 1e3;
 /// Most directions, each both ways, in which straight ways are sought.
