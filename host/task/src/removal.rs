@@ -381,6 +381,10 @@ impl Search<'_> {
                 }
                 Err(least) => {
                     self.note(least.map(|(_, excess, pair)| (excess, pair)), pair);
+                    // A wider opening that was found before is as good.
+                    if found.is_some() {
+                        break;
+                    }
                     let (at, ..) = least.filter(|&(_, excess, _)| excess <= COMPLY_MM)?;
                     (at, Some(self.comply(group, p, at, q, travel)?))
                 }
