@@ -111,7 +111,12 @@ pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> C
                         add(&mut axes, share, line, same_line);
                     }
                 }
-                Surface::Sphere { .. } | Surface::Spline => {}
+                Surface::Sphere { frame, .. } => {
+                    for z in [frame.z, frame.x, frame.y] {
+                        add(&mut axes, share, line(&Frame { z, ..*frame }), same_line);
+                    }
+                }
+                Surface::Spline => {}
             }
         }
     }

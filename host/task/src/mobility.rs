@@ -94,6 +94,8 @@ pub fn contact_cone(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) ->
 pub fn freedoms(assembly: &Assembly, group: &Moved<'_>, others: &[usize], extra: &[DVec3]) -> Freedoms {
     let cone = contact_cone(assembly, group, others);
     let found = candidates(assembly, group, others);
+    let (mut cone, rays) = (cone.clone(), cone.rays.len());
+    few(&mut cone.rays);
     let mut directions: Vec<DVec3> = Vec::new();
     for d in (cone.rays.iter().copied()).chain([&cone.lines[..], &found.directions, extra].concat().into_iter().flat_map(|d| [d, -d])) {
         if directions.iter().all(|e| e.dot(d) < 0.0 || !same_direction(*e, d)) {
@@ -107,7 +109,28 @@ pub fn freedoms(assembly: &Assembly, group: &Moved<'_>, others: &[usize], extra:
     }
     translations.sort_by_key(|t| t.reach as u8);
     let rotations = found.axes.iter().filter_map(|axis| rotation(assembly, group, others, axis)).collect();
-    Freedoms { lines: cone.lines.len(), rays: cone.rays.len(), translations, rotations }
+    Freedoms { lines: cone.lines.len(), rays, translations, rotations }
+}
+
+/// Most extreme rays of which each is followed.
+const MOST_RAYS: usize = 8;
+
+/// Leaves of many rays (those of a round cone) the ones farthest from each other, and adds their middle.
+fn few(rays: &mut Vec<DVec3>) {
+    if rays.len() <= MOST_RAYS {
+        return;
+    }
+    let middle = rays.iter().sum::<DVec3>().try_normalize();
+    let mut kept = vec![rays[0]];
+    while kept.len() < MOST_RAYS {
+        let far = |r: &DVec3| kept.iter().map(|k| k.dot(*r)).fold(-1.0, f64::max);
+        match rays.iter().min_by(|a, b| far(a).total_cmp(&far(b))) {
+            Some(&farthest) => kept.push(farthest),
+            None => break,
+        }
+    }
+    kept.extend(middle);
+    *rays = kept;
 }
 
 /// Travel after which the group is beyond all of `others` along `direction`, mm.

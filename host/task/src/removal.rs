@@ -82,8 +82,10 @@ impl Budget {
     }
 }
 
-/// Displacement past its present range by which a blocked motion is tested, mm of travel.
-const OPENING_MM: f64 = 1.0;
+/// Displacement past its present range by which a blocked motion is tested, as a share of the group's size and its limits, mm of travel: a larger one overlooks
+/// shallow openings, a smaller one takes more tests.
+const OPENING: f64 = 0.04;
+const OPENING_MM: [f64; 2] = [0.5, 3.0];
 /// Smallest step between tested places, mm of travel, and most places of a scan.
 const SCAN_MM: f64 = 0.008;
 const MOST_SCANS: usize = 300;
@@ -119,7 +121,9 @@ impl Kind {
 
 /// Searches a way out of `parts` from among `others`, which stay.
 pub fn remove(assembly: &Assembly, parts: &[usize], others: &[usize], extra: &[DVec3], budget: &Budget) -> Removal {
-    let mut search = Search { assembly, parts, others, extra, budget, seen: vec![DAffine3::IDENTITY], blocked: None, out_of_time: false, tilts: false };
+    let (low, high) = assembly.bounds_of(parts, DAffine3::IDENTITY);
+    let opening_mm = (OPENING * low.distance(high)).clamp(OPENING_MM[0], OPENING_MM[1]);
+    let mut search = Search { assembly, parts, others, extra, budget, seen: vec![DAffine3::IDENTITY], blocked: None, out_of_time: false, tilts: false, opening_mm };
     let start = Moved { parts, by: DAffine3::IDENTITY };
     if let Some(leg) = search.straight(&start) {
         return Removal::Out(Path { legs: vec![leg] });
@@ -152,6 +156,8 @@ struct Search<'a> {
     out_of_time: bool,
     /// Whether turns about the place where the group is held count.
     tilts: bool,
+    /// Least displacement of an opening, mm.
+    opening_mm: f64,
 }
 
 impl Kind {
@@ -243,10 +249,7 @@ impl Search<'_> {
                 legs.push(last);
                 return Some(Path { legs });
             }
-            let t = Instant::now();
-            if std::env::var("TRACE").is_ok() { eprintln!("place legs {} by {:.2}", place.legs.len(), place.by); }
             let mut next = self.openings(&place);
-            if std::env::var("TRACE").is_ok() { eprintln!("expanded {:?}: {}", t.elapsed(), next.len()); }
             // The largest gain is expanded first.
             next.sort_by(|a, b| a.0.total_cmp(&b.0));
             open.extend(next.into_iter().map(|(_, place)| place));
@@ -277,12 +280,7 @@ impl Search<'_> {
                     return found;
                 }
                 let Some(pair) = pair else { continue };
-                let t = Instant::now();
-                let o = self.opening(&group, p, reach, q, range, pair);
-                if std::env::var("TRACE").is_ok() && (o.is_some() || t.elapsed().as_millis() > 300) {
-                eprintln!("  p {p:.2?} reach {reach:.3} q {q:.2?} range {range:.3} -> {o:.3?} {:?}", t.elapsed());
-                }
-                if let Some(opening) = o {
+                if let Some(opening) = self.opening(&group, p, reach, q, range, pair) {
                     let leg = p.over(opening.at);
                     let by = opening.shift() * leg.at(1.0) * place.by;
                     if self.is_new(by) {
@@ -362,14 +360,14 @@ impl Search<'_> {
         }
     }
 
-    /// Where along leg `p` motion `q` goes at least [`OPENING_MM`] beyond its `range`.
+    /// Where along leg `p` motion `q` goes beyond its `range` by at least the displacement of an opening.
     fn opening(&mut self, group: &Moved<'_>, p: &Kind, reach: f64, q: &Kind, range: f64, pair: [usize; 2]) -> Option<Opening> {
         if same_axis(p, q) {
             return None;
         }
         let (mut low, mut high) = (0.0, reach);
         let mut found = None;
-        let mut gain = OPENING_MM;
+        let mut gain = self.opening_mm;
         // The displacement doubles while there is a clear stretch.
         let most = self.most(group, q);
         while range + gain <= most {
@@ -456,7 +454,8 @@ impl Search<'_> {
             let by = carry(q, &leg).over(travel).at(1.0) * leg.at(1.0) * group.by;
             self.assembly.excess(&Moved { parts: self.parts, by }, self.others, DEEP_MM)
         };
-        let scale = if matches!(p, Kind::Turn(..)) { 2.0 } else { 1.0 };
+        // A group displaced sideways has a longer arm.
+        let scale = if matches!((p, q), (Kind::Turn(..), _)) { 1.3 } else { 1.0 };
         let mut least: Option<Least> = None;
         let mut s = low;
         let mut start = None;

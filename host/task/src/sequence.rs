@@ -110,8 +110,10 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequen
         if Instant::now() >= end {
             break;
         }
-        step.least = measure(assembly, step);
-        step.measured = true;
+        if let Some(least) = measure(assembly, step, end) {
+            step.least = least;
+            step.measured = true;
+        }
     }
     found.time = start.elapsed();
     found
@@ -181,17 +183,28 @@ fn pairs(assembly: &Assembly, set: &[usize]) -> Vec<Vec<usize>> {
     pairs
 }
 
-/// Least distance on a step's way in.
-pub fn measure(assembly: &Assembly, step: &Step) -> Option<Clearance> {
+/// Least distance on a step's way in, with the descent between samples at its narrowest place; the outer `None` when it is not measured by `until`.
+pub fn measure(assembly: &Assembly, step: &Step, until: Instant) -> Option<Option<Clearance>> {
     let (mut by, path) = step.path.reversed();
     let mut least: Option<Clearance> = None;
+    let mut at = by;
     for leg in &path.legs {
-        let moved = Moved { parts: &step.group, by };
-        let within = least.map_or(FAR_MM, |l| l.gap.distance_mm);
-        if let Some((_, found)) = assembly.least_over(&moved, &step.onto, leg, MEASURE_STEP_MM, within) {
-            least = Some(found);
+        for part in &step.onto {
+            if Instant::now() >= until {
+                return None;
+            }
+            let moved = Moved { parts: &step.group, by };
+            let within = least.map_or(FAR_MM, |l| l.gap.distance_mm);
+            if let Some((t, found)) = assembly.least_over(&moved, std::slice::from_ref(part), leg, MEASURE_STEP_MM, within) {
+                least = Some(found);
+                at = leg.at(t) * by;
+            }
         }
         by = leg.at(1.0) * by;
     }
-    least
+    if let Some(known) = least {
+        let moved = Moved { parts: &known.pair[..1], by: at };
+        least = assembly.clearance(&moved, &known.pair[1..], known.gap.distance_mm + 1e-6, true).or(least);
+    }
+    Some(least)
 }

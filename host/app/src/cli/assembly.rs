@@ -144,8 +144,11 @@ fn take_out(assembly: &Assembly, part: usize, time: Duration) -> Sequence {
     match remove(assembly, &group, &onto, &[], &Budget::lasting(time)) {
         Removal::Out(path) => {
             let mut step = Step { group, onto, path, least: None, measured: false };
-            step.least = sequence::measure(assembly, &step);
-            step.measured = true;
+            // A way that was found is measured, also when the time is nearly over.
+            if let Some(least) = sequence::measure(assembly, &step, Instant::now() + time) {
+                step.least = least;
+                step.measured = true;
+            }
             found.steps.push(step);
         }
         Removal::Blocked(blocked) => found.stuck.push((group, blocked)),
