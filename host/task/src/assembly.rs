@@ -68,13 +68,25 @@ impl Assembly {
             .collect();
         for part in &model.parts {
             if !matches!(bodies.get(part.shape), Some(Some(_))) {
-                return Err(TaskError::Empty { name: part.name.clone() });
+                return Err(TaskError::Empty {
+                    name: part.name.clone(),
+                });
             }
         }
         let contacts = identify(&model, &tolerances);
-        let merged = model.shapes.iter().map(|shape| merge(shape, &tolerances)).collect();
+        let merged = model
+            .shapes
+            .iter()
+            .map(|shape| merge(shape, &tolerances))
+            .collect();
         let count = model.parts.len();
-        let mut assembly = Self { model, contacts, bodies, merged, pressed_mm: vec![0.0; count * count] };
+        let mut assembly = Self {
+            model,
+            contacts,
+            bodies,
+            merged,
+            pressed_mm: vec![0.0; count * count],
+        };
         for a in 0..count {
             for b in a + 1..count {
                 let depth = assembly.pair_gap(a, b, 0.0).map_or(0.0, |gap| -gap.distance_mm);
@@ -114,9 +126,15 @@ impl Assembly {
             [one] => Ok(one),
             [] => Err(TaskError::NoSuchPart {
                 name: name.to_owned(),
-                known: (0..self.count()).map(|i| self.name(i)).collect::<Vec<_>>().join(", "),
+                known: (0..self.count())
+                    .map(|i| self.name(i))
+                    .collect::<Vec<_>>()
+                    .join(", "),
             }),
-            _ => Err(TaskError::Ambiguous { name: name.to_owned(), count: like.len() }),
+            _ => Err(TaskError::Ambiguous {
+                name: name.to_owned(),
+                count: like.len(),
+            }),
         }
     }
 
@@ -126,17 +144,26 @@ impl Assembly {
     /// For a part that is not in the assembly.
     pub fn body(&self, part: usize) -> &Body {
         let shape = self.model.parts[part].shape;
-        self.bodies[shape].as_deref().unwrap_or_else(|| unreachable!("checked when the assembly was made"))
+        self.bodies[shape]
+            .as_deref()
+            .unwrap_or_else(|| unreachable!("checked when the assembly was made"))
     }
 
     /// Merged surfaces of a part's shape, in its frame: the indices of [`Contact::surfaces`].
     pub fn surfaces(&self, part: usize) -> &[MergedSurface] {
-        self.model.parts.get(part).and_then(|p| self.merged.get(p.shape)).map_or(&[], Vec::as_slice)
+        self.model
+            .parts
+            .get(part)
+            .and_then(|p| self.merged.get(p.shape))
+            .map_or(&[], Vec::as_slice)
     }
 
     /// Placement of a part in the file.
     pub fn placement(&self, part: usize) -> DAffine3 {
-        self.model.parts.get(part).map_or(DAffine3::IDENTITY, |p| p.placement)
+        self.model
+            .parts
+            .get(part)
+            .map_or(DAffine3::IDENTITY, |p| p.placement)
     }
 
     /// Places a part elsewhere. [`Self::contacts`] and [`Self::pressed_mm`] stay those of the file.
@@ -159,7 +186,10 @@ impl Assembly {
 
     /// A part moved by `by` from its placement.
     pub fn placed(&self, part: usize, by: DAffine3) -> Placed<'_> {
-        Placed { body: self.body(part), pose: by * self.placement(part) }
+        Placed {
+            body: self.body(part),
+            pose: by * self.placement(part),
+        }
     }
 
     /// Box of a part moved by `by`: low and high corner in the assembly's frame.
@@ -175,29 +205,48 @@ impl Assembly {
 
     /// Box of several parts in place.
     pub fn bounds_of(&self, parts: &[usize], by: DAffine3) -> (DVec3, DVec3) {
-        parts.iter().map(|&p| self.bounds(p, by)).fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(low, high), (l, h)| (low.min(l), high.max(h)),
-        )
+        parts
+            .iter()
+            .map(|&p| self.bounds(p, by))
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (l, h)| {
+                (low.min(l), high.max(h))
+            })
     }
 
     /// Least distance of two parts as placed where it is below `within`.
     pub fn pair_gap(&self, a: usize, b: usize, within: f64) -> Option<Gap> {
-        let ((al, ah), (bl, bh)) = (self.bounds(a, DAffine3::IDENTITY), self.bounds(b, DAffine3::IDENTITY));
+        let ((al, ah), (bl, bh)) = (
+            self.bounds(a, DAffine3::IDENTITY),
+            self.bounds(b, DAffine3::IDENTITY),
+        );
         if (al - bh).max(bl - ah).max_element() > within {
             return None;
         }
-        gap(self.placed(a, DAffine3::IDENTITY), self.placed(b, DAffine3::IDENTITY), within)
+        gap(
+            self.placed(a, DAffine3::IDENTITY),
+            self.placed(b, DAffine3::IDENTITY),
+            within,
+        )
     }
 
     /// Least distance of a moved group from `others` (at their placements) where it is below `within` mm, by samples; `exact` adds the descent between
     /// samples.
-    pub fn clearance(&self, group: &Moved<'_>, others: &[usize], within: f64, exact: bool) -> Option<Clearance> {
+    pub fn clearance(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        within: f64,
+        exact: bool,
+    ) -> Option<Clearance> {
         let mut best = within;
         let mut found = None;
         for (a, b) in self.pairs(group, others, within) {
             let (pa, pb) = (self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY));
-            let gap = if exact { refined(pa, pb, best) } else { gap(pa, pb, best) };
+            let gap = if exact {
+                refined(pa, pb, best)
+            } else {
+                gap(pa, pb, best)
+            };
             if let Some(gap) = gap.filter(|gap| gap.distance_mm < best) {
                 best = gap.distance_mm;
                 found = Some(Clearance { gap, pair: [a, b] });
@@ -214,7 +263,11 @@ impl Assembly {
     /// The first pair found of a moved group and `others` that overlaps by more than is allowed of it.
     pub fn blocker(&self, group: &Moved<'_>, others: &[usize]) -> Option<Clearance> {
         self.pairs(group, others, 0.0).find_map(|(a, b)| {
-            let gap = gap(self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY), -self.allowed_mm(a, b))?;
+            let gap = gap(
+                self.placed(a, group.by),
+                self.placed(b, DAffine3::IDENTITY),
+                -self.allowed_mm(a, b),
+            )?;
             Some(Clearance { gap, pair: [a, b] })
         })
     }
@@ -227,7 +280,14 @@ impl Assembly {
             let allowed = self.allowed_mm(a, b);
             let most = found.map_or(0.0, |(depth, _)| depth);
             let within = -allowed - most;
-            let Some(gap) = gap_until(self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY), within, -allowed - enough) else { continue };
+            let Some(gap) = gap_until(
+                self.placed(a, group.by),
+                self.placed(b, DAffine3::IDENTITY),
+                within,
+                -allowed - enough,
+            ) else {
+                continue;
+            };
             let depth = -gap - allowed;
             found = Some((depth, [a, b]));
             if depth >= enough {
@@ -238,7 +298,12 @@ impl Assembly {
     }
 
     /// Pairs of a moved group and `others` whose boxes are within `within`.
-    fn pairs<'a>(&'a self, group: &Moved<'a>, others: &'a [usize], within: f64) -> impl Iterator<Item = (usize, usize)> + 'a {
+    fn pairs<'a>(
+        &'a self,
+        group: &Moved<'a>,
+        others: &'a [usize],
+        within: f64,
+    ) -> impl Iterator<Item = (usize, usize)> + 'a {
         let by = group.by;
         group.parts.iter().flat_map(move |&a| {
             let (al, ah) = self.bounds(a, by);
@@ -250,14 +315,28 @@ impl Assembly {
     }
 
     /// Share of a motion, 0 to 1, that a moved group makes before it meets one of `others`, and the pair that meets.
-    pub fn free_share(&self, group: &Moved<'_>, others: &[usize], motion: &Motion, step_mm: f64) -> (f64, Option<[usize; 2]>) {
+    pub fn free_share(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        motion: &Motion,
+        step_mm: f64,
+    ) -> (f64, Option<[usize; 2]>) {
         let mut motion = *motion;
         let mut share = 1.0;
         let mut pair = None;
         for &a in group.parts {
             for &b in others {
-                let limits = Limits { allow_mm: self.allowed_mm(a, b), step_mm };
-                let free = free_share(self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY), &motion, &limits);
+                let limits = Limits {
+                    allow_mm: self.allowed_mm(a, b),
+                    step_mm,
+                };
+                let free = free_share(
+                    self.placed(a, group.by),
+                    self.placed(b, DAffine3::IDENTITY),
+                    &motion,
+                    &limits,
+                );
                 if free < 1.0 {
                     share *= free;
                     motion = motion.until(free);
@@ -272,14 +351,30 @@ impl Assembly {
     }
 
     /// As [`Self::free_share`] with the place where the motion ends found to within a micrometre of travel: the group is clear there.
-    pub fn touch_share(&self, group: &Moved<'_>, others: &[usize], motion: &Motion, step_mm: f64) -> (f64, Option<[usize; 2]>) {
+    pub fn touch_share(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        motion: &Motion,
+        step_mm: f64,
+    ) -> (f64, Option<[usize; 2]>) {
         let (share, pair) = self.free_share(group, others, motion, step_mm);
         let Some(pair) = pair else {
             return (share, None);
         };
         let (low, high) = self.bounds_of(group.parts, group.by);
-        let length = motion.speed(motion.arm((low + high) / 2.0) + low.distance(high) / 2.0).max(1e-9);
-        let clear = |t: f64| self.clear(&Moved { parts: group.parts, by: motion.at(t) * group.by }, others);
+        let length = motion
+            .speed(motion.arm((low + high) / 2.0) + low.distance(high) / 2.0)
+            .max(1e-9);
+        let clear = |t: f64| {
+            self.clear(
+                &Moved {
+                    parts: group.parts,
+                    by: motion.at(t) * group.by,
+                },
+                others,
+            )
+        };
         let back = step_mm / length;
         let (mut free, mut met) = (share, (share + back).min(1.0));
         while free > 0.0 && !clear(free) {
@@ -288,18 +383,35 @@ impl Assembly {
         }
         while (met - free) * length > 1e-3 {
             let middle = (free + met) / 2.0;
-            if clear(middle) { free = middle } else { met = middle }
+            if clear(middle) {
+                free = middle
+            } else {
+                met = middle
+            }
         }
         (free, Some(pair))
     }
 
     /// Least distance of a group over a motion from `others` where it is below `within`: share of the motion, and the distance.
-    pub fn least_over(&self, group: &Moved<'_>, others: &[usize], motion: &Motion, step_mm: f64, within: f64) -> Option<(f64, Clearance)> {
+    pub fn least_over(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        motion: &Motion,
+        step_mm: f64,
+        within: f64,
+    ) -> Option<(f64, Clearance)> {
         let mut best = within;
         let mut found = None;
         for &a in group.parts {
             for &b in others {
-                let least = least_over(self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY), motion, step_mm, best);
+                let least = least_over(
+                    self.placed(a, group.by),
+                    self.placed(b, DAffine3::IDENTITY),
+                    motion,
+                    step_mm,
+                    best,
+                );
                 if let Some((t, gap)) = least.filter(|(_, gap)| gap.distance_mm < best) {
                     best = gap.distance_mm;
                     found = Some((t, Clearance { gap, pair: [a, b] }));

@@ -37,7 +37,11 @@ pub struct Leaving {
 impl<'a> Blocking<'a> {
     /// Relations along `directions`, both ways of each.
     pub fn new(assembly: &'a Assembly, directions: Vec<DVec3>) -> Self {
-        Self { assembly, directions, known: HashMap::new() }
+        Self {
+            assembly,
+            directions,
+            known: HashMap::new(),
+        }
     }
 
     /// The directions.
@@ -48,9 +52,14 @@ impl<'a> Blocking<'a> {
     /// Whether part `i` moved along direction `line`, or against it, meets part `j`.
     pub fn blocks(&mut self, line: usize, against: bool, i: usize, j: usize) -> bool {
         let (first, second) = if against { (j, i) } else { (i, j) };
-        let Some(&direction) = self.directions.get(line) else { return false };
+        let Some(&direction) = self.directions.get(line) else {
+            return false;
+        };
         let assembly = self.assembly;
-        *self.known.entry((line, first, second)).or_insert_with(|| meets(assembly, first, second, direction))
+        *self
+            .known
+            .entry((line, first, second))
+            .or_insert_with(|| meets(assembly, first, second, direction))
     }
 
     /// The least groups of `set` that leave it along one of the directions, smallest first; ends at `until`.
@@ -72,7 +81,9 @@ impl<'a> Blocking<'a> {
                 }
                 let direction = self.directions[line] * if against { -1.0 } else { 1.0 };
                 for component in tarjan_scc(&graph) {
-                    let leaves = component.iter().all(|&n| graph.neighbors(n).all(|m| component.contains(&m)));
+                    let leaves = component
+                        .iter()
+                        .all(|&n| graph.neighbors(n).all(|m| component.contains(&m)));
                     if leaves && component.len() < set.len() {
                         let mut parts: Vec<usize> = component.iter().map(|&n| graph[n]).collect();
                         parts.sort_unstable();
@@ -81,16 +92,32 @@ impl<'a> Blocking<'a> {
                 }
             }
         }
-        let size = |l: &Leaving| l.parts.iter().map(|&p| self.assembly.body(p).surface().shape().volume_mm3.abs()).sum::<f64>();
-        found.sort_by(|a, b| a.parts.len().cmp(&b.parts.len()).then(size(a).total_cmp(&size(b))));
+        let size = |l: &Leaving| {
+            l.parts
+                .iter()
+                .map(|&p| self.assembly.body(p).surface().shape().volume_mm3.abs())
+                .sum::<f64>()
+        };
+        found.sort_by(|a, b| {
+            a.parts
+                .len()
+                .cmp(&b.parts.len())
+                .then(size(a).total_cmp(&size(b)))
+        });
         found
     }
 }
 
 fn meets(assembly: &Assembly, i: usize, j: usize, direction: DVec3) -> bool {
-    let ((il, ih), (jl, jh)) = (assembly.bounds(i, DAffine3::IDENTITY), assembly.bounds(j, DAffine3::IDENTITY));
+    let ((il, ih), (jl, jh)) = (
+        assembly.bounds(i, DAffine3::IDENTITY),
+        assembly.bounds(j, DAffine3::IDENTITY),
+    );
     let parts = [i];
-    let group = Moved { parts: &parts, by: DAffine3::IDENTITY };
+    let group = Moved {
+        parts: &parts,
+        by: DAffine3::IDENTITY,
+    };
     let far = leaving_mm(assembly, &group, &[j], direction);
     // The box that the part sweeps.
     let by = direction * far;
@@ -98,5 +125,8 @@ fn meets(assembly: &Assembly, i: usize, j: usize, direction: DVec3) -> bool {
     if (low - jh).max(jl - high).max_element() > 0.0 {
         return false;
     }
-    assembly.free_share(&group, &[j], &Motion::slide(by), SEARCH_STEP_MM).0 < 1.0
+    assembly
+        .free_share(&group, &[j], &Motion::slide(by), SEARCH_STEP_MM)
+        .0
+        < 1.0
 }

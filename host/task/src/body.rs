@@ -79,8 +79,15 @@ impl Kept {
         let (origin, extent) = (low - margin, high - low + 2.0 * margin);
         let cell_mm = (extent.element_product() / CELLS).cbrt();
         let counts = extent.to_array().map(|e| (e / cell_mm).ceil().max(1.0) as usize);
-        let values = (0..counts.iter().product()).map(|_| AtomicU32::new(f32::NAN.to_bits())).collect();
-        Self { origin, cell_mm, counts, values }
+        let values = (0..counts.iter().product())
+            .map(|_| AtomicU32::new(f32::NAN.to_bits()))
+            .collect();
+        Self {
+            origin,
+            cell_mm,
+            counts,
+            values,
+        }
     }
 
     /// Index of the cell of `p` and its middle; `None` outside.
@@ -100,15 +107,25 @@ impl Body {
     pub fn new(shape: &Shape) -> Option<Self> {
         let surface = ExactSurface::new(shape);
         let mesh = &surface.shape().mesh;
-        let used = || mesh.triangles.iter().flatten().map(|&v| mesh.vertices[v as usize]);
-        let (low, high) = used().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        let used = || {
+            mesh.triangles
+                .iter()
+                .flatten()
+                .map(|&v| mesh.vertices[v as usize])
+        };
+        let (low, high) = used().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+            (low.min(p), high.max(p))
+        });
         if !low.is_finite() || !high.is_finite() {
             return None;
         }
         let size = low.distance(high).max(1e-3);
         let samples = sample(&surface, size);
-        let meets = |s: &Sample| s.normal.is_none() || surface.shape().faces.get(s.face as usize).is_none_or(bulges);
-        let mut order: Vec<u32> = (0..samples.len() as u32).filter(|&i| meets(&samples[i as usize])).collect();
+        let meets =
+            |s: &Sample| s.normal.is_none() || surface.shape().faces.get(s.face as usize).is_none_or(bulges);
+        let mut order: Vec<u32> = (0..samples.len() as u32)
+            .filter(|&i| meets(&samples[i as usize]))
+            .collect();
         let mut nodes = Vec::with_capacity(2 * samples.len());
         if !order.is_empty() {
             split(&samples, &mut order, &mut nodes);
@@ -222,10 +239,24 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
     options.least_spacing_mm = along;
     let shell = sample_pointshell(surface, &options);
     // Points along edges are sampled below, at even spacing.
-    let mut samples: Vec<Sample> = (shell.points.iter().take(shell.face_points).map(|p| (p, Some(p.normal))))
-        .chain(shell.points.iter().skip(shell.face_points + shell.edge_points).map(|p| (p, None)))
-        .map(|(p, normal)| Sample { position: p.position, normal, face: u32::from(p.face) })
-        .collect();
+    let mut samples: Vec<Sample> = (shell
+        .points
+        .iter()
+        .take(shell.face_points)
+        .map(|p| (p, Some(p.normal))))
+    .chain(
+        shell
+            .points
+            .iter()
+            .skip(shell.face_points + shell.edge_points)
+            .map(|p| (p, None)),
+    )
+    .map(|(p, normal)| Sample {
+        position: p.position,
+        normal,
+        face: u32::from(p.face),
+    })
+    .collect();
     for edge in &surface.shape().edges {
         let Some(&face) = edge.faces.first() else { continue };
         for pair in edge.polyline.windows(2) {
@@ -236,11 +267,17 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
                     Curve::Line { origin, direction } => origin + direction * (chord - origin).dot(direction),
                     Curve::Circle { frame, radius } => {
                         let across = (chord - frame.origin).reject_from_normalized(frame.z);
-                        across.try_normalize().map_or(chord, |out| frame.origin + out * radius)
+                        across
+                            .try_normalize()
+                            .map_or(chord, |out| frame.origin + out * radius)
                     }
                     Curve::Other => surface.nearest(chord).map_or(chord, |n| n.point),
                 };
-                samples.push(Sample { position, normal: None, face });
+                samples.push(Sample {
+                    position,
+                    normal: None,
+                    face,
+                });
             }
         }
     }
@@ -252,17 +289,34 @@ fn split(samples: &[Sample], order: &mut [u32], nodes: &mut Vec<Node>) -> u32 {
     let at = nodes.len() as u32;
     let position = |i: u32| samples[i as usize].position;
     if let [only] = order {
-        nodes.push(Node { center: position(*only), radius: 0.0, first: *only, second: u32::MAX });
+        nodes.push(Node {
+            center: position(*only),
+            radius: 0.0,
+            first: *only,
+            second: u32::MAX,
+        });
         return at;
     }
-    let (low, high) = order.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &i| {
-        (low.min(position(i)), high.max(position(i)))
-    });
+    let (low, high) = order
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &i| {
+            (low.min(position(i)), high.max(position(i)))
+        });
     let center = (low + high) / 2.0;
-    let radius = order.iter().map(|&i| position(i).distance(center)).fold(0.0, f64::max);
-    nodes.push(Node { center, radius, first: 0, second: 0 });
+    let radius = order
+        .iter()
+        .map(|&i| position(i).distance(center))
+        .fold(0.0, f64::max);
+    nodes.push(Node {
+        center,
+        radius,
+        first: 0,
+        second: 0,
+    });
     let extent = high - low;
-    let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
+    let axis = (0..3)
+        .max_by(|&a, &b| extent[a].total_cmp(&extent[b]))
+        .unwrap_or(0);
     let half = order.len() / 2;
     order.select_nth_unstable_by(half, |&a, &b| position(a)[axis].total_cmp(&position(b)[axis]));
     let (left, right) = order.split_at_mut(half);

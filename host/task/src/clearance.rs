@@ -60,8 +60,16 @@ struct Sides<'a> {
 
 fn sides<'a>(way: Way, a: Placed<'a>, b: Placed<'a>) -> Sides<'a> {
     match way {
-        Way::Forth => Sides { of: a.body, within: b.body, to: b.pose.inverse() * a.pose },
-        Way::Back => Sides { of: b.body, within: a.body, to: a.pose.inverse() * b.pose },
+        Way::Forth => Sides {
+            of: a.body,
+            within: b.body,
+            to: b.pose.inverse() * a.pose,
+        },
+        Way::Back => Sides {
+            of: b.body,
+            within: a.body,
+            to: a.pose.inverse() * b.pose,
+        },
     }
 }
 
@@ -137,7 +145,9 @@ pub fn refined(a: Placed<'_>, b: Placed<'_>, within: f64) -> Option<Gap> {
         let of = if way == Way::Forth { a.pose } else { b.pose };
         let start = of.inverse().transform_point3(least.point);
         // The point may lie on the other body's surface: the nearest point of this one starts the descent.
-        let Some(start) = s.of.nearest(start) else { continue };
+        let Some(start) = s.of.nearest(start) else {
+            continue;
+        };
         let mut p = start.point;
         let value = |p: DVec3| s.within.distance(s.to.transform_point3(p));
         let mut best = value(p);
@@ -147,7 +157,9 @@ pub fn refined(a: Placed<'_>, b: Placed<'_>, within: f64) -> Option<Gap> {
             let mut better = false;
             for _ in 0..DIRECTIONS {
                 let direction = DVec3::from_array([0; 3].map(|_| 2.0 * random.f64() - 1.0));
-                let Some(near) = s.of.nearest(p + step * direction) else { continue };
+                let Some(near) = s.of.nearest(p + step * direction) else {
+                    continue;
+                };
                 let d = value(near.point);
                 if d < best {
                     (p, best, better) = (near.point, d, true);
@@ -181,23 +193,46 @@ pub fn free_share(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits
 
 /// Least distance of the bodies over a motion of the first where it is below `within` mm, and the share of the motion at which it is reached; `None` where it
 /// stays above. Samples that stay near are checked at least every `step_mm` of travel.
-pub fn least_over(a: Placed<'_>, b: Placed<'_>, motion: &Motion, step_mm: f64, within: f64) -> Option<(f64, Gap)> {
-    let limits = Limits { allow_mm: 0.0, step_mm };
+pub fn least_over(
+    a: Placed<'_>,
+    b: Placed<'_>,
+    motion: &Motion,
+    step_mm: f64,
+    within: f64,
+) -> Option<(f64, Gap)> {
+    let limits = Limits {
+        allow_mm: 0.0,
+        step_mm,
+    };
     let mut items = Vec::new();
     for way in WAYS {
         if !sides(way, a, b).of.nodes().is_empty() {
             items.push((way, 0));
         }
     }
-    let mut least = Least { distance: within, found: None };
+    let mut least = Least {
+        distance: within,
+        found: None,
+    };
     // Both ends first: most paths are narrowest at one of them.
     for t in [0.0, 1.0] {
-        let moved = Placed { body: a.body, pose: motion.at(t) * a.pose };
+        let moved = Placed {
+            body: a.body,
+            pose: motion.at(t) * a.pose,
+        };
         if let Some(gap) = gap(moved, b, least.distance) {
-            least = Least { distance: gap.distance_mm, found: Some((t, gap)) };
+            least = Least {
+                distance: gap.distance_mm,
+                found: Some((t, gap)),
+            };
         }
     }
-    let sweep = Sweep { a, b, motion, limits: &limits };
+    let sweep = Sweep {
+        a,
+        b,
+        motion,
+        limits: &limits,
+    };
     sweep.least(&items, 0.0, 1.0, 0, &mut least);
     least.found
 }
@@ -219,17 +254,28 @@ struct Sweep<'a> {
 
 impl<'a> Sweep<'a> {
     fn moved(&self, t: f64) -> Placed<'a> {
-        Placed { body: self.a.body, pose: self.motion.at(t) * self.a.pose }
+        Placed {
+            body: self.a.body,
+            pose: self.motion.at(t) * self.a.pose,
+        }
     }
 
     /// Place of a node in the other body's frame at `middle`, and a bound on its travel in half of the stretch.
     fn travel(&self, s: &Sides<'_>, way: Way, i: u32, middle: f64, half: f64) -> (DVec3, f64) {
         let node = s.of.nodes()[i as usize];
         let p = s.to.transform_point3(node.center);
-        let in_assembly = if way == Way::Forth { self.b.pose.transform_point3(p) } else { self.b.pose.transform_point3(node.center) };
+        let in_assembly = if way == Way::Forth {
+            self.b.pose.transform_point3(p)
+        } else {
+            self.b.pose.transform_point3(node.center)
+        };
         // Distance from the turned axis, which the slide carries along. Of a fixed point it changes by the slide.
         let arm = self.motion.arm(in_assembly - self.motion.slide * middle) + node.radius;
-        let slack = if way == Way::Back { self.motion.slide.length() * half } else { 0.0 };
+        let slack = if way == Way::Back {
+            self.motion.slide.length() * half
+        } else {
+            0.0
+        };
         (p, self.motion.speed(arm + slack) * half)
     }
 
@@ -259,7 +305,8 @@ impl<'a> Sweep<'a> {
         if left.is_empty() {
             return None;
         }
-        self.stretch(&left, from, middle, depth + 1).or_else(|| self.stretch(&left, middle, to, depth + 1))
+        self.stretch(&left, from, middle, depth + 1)
+            .or_else(|| self.stretch(&left, middle, to, depth + 1))
     }
 
     /// Lowers `least` to the least distance of samples below `items` within `from`..`to`.
@@ -279,7 +326,10 @@ impl<'a> Sweep<'a> {
                 let d = s.within.distance(p);
                 if d < least.distance {
                     let position = s.of.samples()[node.first as usize].position;
-                    *least = Least { distance: d, found: Some((middle, place(way, self.moved(middle), self.b, position, d))) };
+                    *least = Least {
+                        distance: d,
+                        found: Some((middle, place(way, self.moved(middle), self.b, position, d))),
+                    };
                 }
             }
             let last = travel <= self.limits.step_mm / 2.0 || depth >= MOST_HALVINGS;

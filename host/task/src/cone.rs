@@ -34,7 +34,11 @@ impl Cone {
 pub fn cone(normals: &[DVec3]) -> Cone {
     let mut distinct: Vec<DVec3> = Vec::new();
     for &n in normals {
-        if distinct.len() < MOST_NORMALS && distinct.iter().all(|m| m.cross(n).length() > SAME_RAD || m.dot(n) < 0.0) {
+        if distinct.len() < MOST_NORMALS
+            && distinct
+                .iter()
+                .all(|m| m.cross(n).length() > SAME_RAD || m.dot(n) < 0.0)
+        {
             distinct.push(n);
         }
     }
@@ -42,7 +46,9 @@ pub fn cone(normals: &[DVec3]) -> Cone {
     let holds = |v: DVec3| distinct.iter().all(|n| n.dot(v) >= -INTO);
     let mut rays: Vec<DVec3> = Vec::new();
     let mut keep = |v: DVec3| {
-        let Some(v) = lines.iter().fold(v, |v, l| v - *l * l.dot(v)).try_normalize() else { return };
+        let Some(v) = lines.iter().fold(v, |v, l| v - *l * l.dot(v)).try_normalize() else {
+            return;
+        };
         if holds(v) && rays.iter().all(|r| r.dot(v) < 1.0 - SAME_RAD * SAME_RAD) {
             rays.push(v);
         }
@@ -78,12 +84,20 @@ fn lineality(normals: &[DVec3]) -> Vec<DVec3> {
         return vec![DVec3::X, DVec3::Y, DVec3::Z];
     };
     let across = |n: &DVec3| n.cross(first).length();
-    let Some(second) = normals.iter().max_by(|a, b| across(a).total_cmp(&across(b))).filter(|n| across(n) > 10.0 * SAME_RAD) else {
+    let Some(second) = normals
+        .iter()
+        .max_by(|a, b| across(a).total_cmp(&across(b)))
+        .filter(|n| across(n) > 10.0 * SAME_RAD)
+    else {
         let x = first.any_orthonormal_vector();
         return vec![x, first.cross(x)];
     };
     let line = first.cross(*second).normalize();
-    if normals.iter().all(|n| n.dot(line).abs() <= 10.0 * SAME_RAD) { vec![line] } else { Vec::new() }
+    if normals.iter().all(|n| n.dot(line).abs() <= 10.0 * SAME_RAD) {
+        vec![line]
+    } else {
+        Vec::new()
+    }
 }
 
 #[cfg(test)]
@@ -133,7 +147,15 @@ mod tests {
         assert_eq!(cone(&[DVec3::Z, DVec3::NEG_Z]).lines.len(), 2);
         assert!(cone(&[DVec3::Z, DVec3::NEG_Z]).rays.is_empty());
         assert_eq!(cone(&[DVec3::X, DVec3::Y, DVec3::Z]).rays.len(), 3);
-        assert!(cone(&[DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(-1.0, -1.0, -1.0).normalize()]).is_point());
+        assert!(
+            cone(&[
+                DVec3::X,
+                DVec3::Y,
+                DVec3::Z,
+                DVec3::new(-1.0, -1.0, -1.0).normalize()
+            ])
+            .is_point()
+        );
     }
 
     /// Whether `v` is a sum of lines and non-negative rays: by Carathéodory three rays are enough.
@@ -151,7 +173,10 @@ mod tests {
             for j in 0..i {
                 let n = r[i].cross(r[j]);
                 if n.length() > 1e-9 && (v.dot(n.normalize())).abs() < 1e-6 {
-                    let (a, b) = (v.cross(r[j]).dot(n) / n.length_squared(), r[i].cross(v).dot(n) / n.length_squared());
+                    let (a, b) = (
+                        v.cross(r[j]).dot(n) / n.length_squared(),
+                        r[i].cross(v).dot(n) / n.length_squared(),
+                    );
                     if a >= -1e-6 && b >= -1e-6 {
                         return true;
                     }
@@ -159,7 +184,11 @@ mod tests {
                 for k in 0..j {
                     let d = r[i].dot(r[j].cross(r[k]));
                     if d.abs() > 1e-9 {
-                        let x = [v.dot(r[j].cross(r[k])) / d, r[i].dot(v.cross(r[k])) / d, r[i].dot(r[j].cross(v)) / d];
+                        let x = [
+                            v.dot(r[j].cross(r[k])) / d,
+                            r[i].dot(v.cross(r[k])) / d,
+                            r[i].dot(r[j].cross(v)) / d,
+                        ];
                         if x.iter().all(|&x| x >= -1e-6) {
                             return true;
                         }

@@ -50,7 +50,10 @@ pub fn contact_normals(assembly: &Assembly, group: &Moved<'_>, others: &[usize])
             }
             let error = [a, b].map(|p| assembly.body(p).surface().surface_error_mm());
             let within = near + error[0] + error[1];
-            let (pa, pb) = (assembly.placed(a, group.by), assembly.placed(b, glam::DAffine3::IDENTITY));
+            let (pa, pb) = (
+                assembly.placed(a, group.by),
+                assembly.placed(b, glam::DAffine3::IDENTITY),
+            );
             touching(pa, pb, within, &mut |n| normals.push(-n));
             touching(pb, pa, within, &mut |n| normals.push(n));
         }
@@ -70,7 +73,9 @@ fn touching(a: Placed<'_>, b: Placed<'_>, within: f64, each: &mut dyn FnMut(DVec
         let Some(near) = b.body.nearest(p) else { continue };
         let facing = b.body.face_normal(near.face, p);
         let own = to.transform_vector3(normal);
-        if near.distance >= -10.0 * within && facing.is_some_and(|n| n.dot(own) < 0.0 && n.cross(own).length() < FACING) {
+        if near.distance >= -10.0 * within
+            && facing.is_some_and(|n| n.dot(own) < 0.0 && n.cross(own).length() < FACING)
+        {
             each(a.pose.transform_vector3(normal));
         }
     }
@@ -82,7 +87,11 @@ pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> C
     let mut axes: Vec<(f64, Line)> = Vec::new();
     let (low, high) = assembly.bounds_of(group.parts, group.by);
     let near = 0.05 * low.distance(high);
-    let all = group.parts.iter().map(|&p| (p, group.by)).chain(others.iter().map(|&p| (p, glam::DAffine3::IDENTITY)));
+    let all = group
+        .parts
+        .iter()
+        .map(|&p| (p, group.by))
+        .chain(others.iter().map(|&p| (p, glam::DAffine3::IDENTITY)));
     for (part, by) in all {
         let (l, h) = assembly.bounds(part, by);
         if (low - h).max(l - high).max_element() > near {
@@ -97,16 +106,27 @@ pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> C
             if share < LEAST_SHARE {
                 continue;
             }
-            let line = |f: &Frame| Line { point: pose.transform_point3(f.origin), direction: pose.transform_vector3(f.z) };
+            let line = |f: &Frame| Line {
+                point: pose.transform_point3(f.origin),
+                direction: pose.transform_vector3(f.z),
+            };
             match &face.surface {
-                Surface::Plane { frame } => add(&mut directions, share, pose.transform_vector3(frame.z), same_direction),
-                Surface::Cylinder { frame, .. } | Surface::Cone { frame, .. } | Surface::Torus { frame, .. } => {
+                Surface::Plane { frame } => add(
+                    &mut directions,
+                    share,
+                    pose.transform_vector3(frame.z),
+                    same_direction,
+                ),
+                Surface::Cylinder { frame, .. }
+                | Surface::Cone { frame, .. }
+                | Surface::Torus { frame, .. } => {
                     let line = line(frame);
                     if !matches!(face.surface, Surface::Torus { .. }) {
                         add(&mut directions, share, line.direction, same_direction);
                     }
                     // An axis far beyond both parts is that of a slightly curved face.
-                    let foot = line.point + line.direction * ((low + high) / 2.0 - line.point).dot(line.direction);
+                    let foot =
+                        line.point + line.direction * ((low + high) / 2.0 - line.point).dot(line.direction);
                     if foot.distance((low + high) / 2.0) < 2.0 * low.distance(high) {
                         add(&mut axes, share, line, same_line);
                     }
@@ -123,7 +143,11 @@ pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> C
     directions.sort_by(|a, b| b.0.total_cmp(&a.0));
     axes.sort_by(|a, b| b.0.total_cmp(&a.0));
     Candidates {
-        directions: directions.into_iter().take(MOST_DIRECTIONS).map(|(_, d)| d).collect(),
+        directions: directions
+            .into_iter()
+            .take(MOST_DIRECTIONS)
+            .map(|(_, d)| d)
+            .collect(),
         axes: axes.into_iter().take(MOST_AXES).map(|(_, l)| l).collect(),
     }
 }
@@ -142,5 +166,6 @@ pub(crate) fn same_direction(a: DVec3, b: DVec3) -> bool {
 
 /// Whether two axes are one line.
 pub(crate) fn same_line(a: Line, b: Line) -> bool {
-    same_direction(a.direction, b.direction) && (b.point - a.point).reject_from_normalized(a.direction).length() < SAME_MM
+    same_direction(a.direction, b.direction)
+        && (b.point - a.point).reject_from_normalized(a.direction).length() < SAME_MM
 }

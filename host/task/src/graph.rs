@@ -88,7 +88,10 @@ pub fn graph(assembly: &Assembly) -> UnGraph<usize, Edge> {
 }
 
 fn edge(assembly: &Assembly, a: usize, b: usize) -> Option<Edge> {
-    let contacts: Vec<usize> = (assembly.contacts.iter().enumerate()).filter(|(_, c)| c.parts == [a, b]).map(|(i, _)| i).collect();
+    let contacts: Vec<usize> = (assembly.contacts.iter().enumerate())
+        .filter(|(_, c)| c.parts == [a, b])
+        .map(|(i, _)| i)
+        .collect();
     let mut fits = fits(assembly, a, b);
     fits.extend(self::fits(assembly, b, a));
     let pressed = assembly.pressed_mm(a, b) > PRESSED_MM;
@@ -98,10 +101,18 @@ fn edge(assembly: &Assembly, a: usize, b: usize) -> Option<Edge> {
     let threaded = [a, b].map(|p| is_threaded(assembly.name(p)));
     let mut kinds: Vec<Connection> = Vec::new();
     for fit in &fits {
-        kinds.push(if fit.clearance_mm < -PRESSED_MM { Connection::Pressed } else { Connection::Inserted });
+        kinds.push(if fit.clearance_mm < -PRESSED_MM {
+            Connection::Pressed
+        } else {
+            Connection::Inserted
+        });
     }
     // A thread holds only in the last part that its shaft meets; geometry of plain pins cannot tell which, so every bore of a named screw counts.
-    if (threaded[0] != threaded[1] && !fits.is_empty()) || fits.iter().any(|f| helical(assembly, f.parts[0]) && helical(assembly, f.parts[1])) {
+    if (threaded[0] != threaded[1] && !fits.is_empty())
+        || fits
+            .iter()
+            .any(|f| helical(assembly, f.parts[0]) && helical(assembly, f.parts[1]))
+    {
         kinds.push(Connection::Screwed);
     }
     if pressed && fits.iter().any(|f| f.clearance_mm <= 0.0) {
@@ -123,42 +134,70 @@ fn edge(assembly: &Assembly, a: usize, b: usize) -> Option<Edge> {
     };
     kinds.sort_by_key(strength);
     kinds.dedup();
-    Some(Edge { parts: [a, b], kinds, contacts, fits })
+    Some(Edge {
+        parts: [a, b],
+        kinds,
+        contacts,
+        fits,
+    })
 }
 
 /// Words in the name of a part that has a thread which the model leaves out.
-const THREADED: [&str; 8] = ["screw", "bolt", "nut", "stud", "schraube", "mutter", "threaded", "gewinde"];
+const THREADED: [&str; 8] = [
+    "screw", "bolt", "nut", "stud", "schraube", "mutter", "threaded", "gewinde",
+];
 
 /// Whether a part's name says that it has a thread.
 pub fn is_threaded(name: &str) -> bool {
     let lower = name.to_lowercase();
-    lower.split(|c: char| !c.is_alphabetic()).any(|word| THREADED.iter().any(|t| word.trim_end_matches('s') == *t))
+    lower
+        .split(|c: char| !c.is_alphabetic())
+        .any(|word| THREADED.iter().any(|t| word.trim_end_matches('s') == *t))
 }
 
 /// Whether a part has free-form faces that coil about one of its cylinders' axes: a modelled thread.
 pub fn helical(assembly: &Assembly, part: usize) -> bool {
     let shape = assembly.body(part).surface().shape();
     let mesh = &shape.mesh;
-    shape.faces.iter().enumerate().filter(|(_, f)| f.surface == Surface::Spline).any(|(id, _)| {
-        let points: Vec<DVec3> = (mesh.triangles.iter().zip(&mesh.triangle_face))
-            .filter(|(_, face)| **face as usize == id)
-            .flat_map(|(t, _)| t.map(|v| mesh.vertices[v as usize]))
-            .collect();
-        assembly.surfaces(part).iter().any(|m| match m.surface {
-            Surface::Cylinder { frame, .. } => crate::helix::winds(&points, frame.origin, frame.z),
-            _ => false,
+    shape
+        .faces
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| f.surface == Surface::Spline)
+        .any(|(id, _)| {
+            let points: Vec<DVec3> = (mesh.triangles.iter().zip(&mesh.triangle_face))
+                .filter(|(_, face)| **face as usize == id)
+                .flat_map(|(t, _)| t.map(|v| mesh.vertices[v as usize]))
+                .collect();
+            assembly.surfaces(part).iter().any(|m| match m.surface {
+                Surface::Cylinder { frame, .. } => crate::helix::winds(&points, frame.origin, frame.z),
+                _ => false,
+            })
         })
-    })
 }
 
 /// Shafts of `a` in bores of `b`.
 fn fits(assembly: &Assembly, a: usize, b: usize) -> Vec<Fit> {
     let mut found = Vec::new();
     let (pa, pb) = (assembly.placement(a), assembly.placement(b));
-    for (i, shaft) in assembly.surfaces(a).iter().enumerate().filter(|(_, m)| m.side == Side::Convex) {
-        let Surface::Cylinder { frame: f, radius: r } = shaft.surface else { continue };
-        for (j, bore) in assembly.surfaces(b).iter().enumerate().filter(|(_, m)| m.side == Side::Concave) {
-            let Surface::Cylinder { frame: g, radius } = bore.surface else { continue };
+    for (i, shaft) in assembly
+        .surfaces(a)
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| m.side == Side::Convex)
+    {
+        let Surface::Cylinder { frame: f, radius: r } = shaft.surface else {
+            continue;
+        };
+        for (j, bore) in assembly
+            .surfaces(b)
+            .iter()
+            .enumerate()
+            .filter(|(_, m)| m.side == Side::Concave)
+        {
+            let Surface::Cylinder { frame: g, radius } = bore.surface else {
+                continue;
+            };
             let clearance = radius - r;
             if !(-PRESS_MM..=FIT_MM).contains(&clearance) {
                 continue;
@@ -169,11 +208,24 @@ fn fits(assembly: &Assembly, a: usize, b: usize) -> Vec<Fit> {
             if z.cross(w).length() > COAXIAL_RAD || apart > clearance.abs() + 1e-3 {
                 continue;
             }
-            let (Some(s), Some(t)) = (extent(assembly, a, &shaft.faces, o, z), extent(assembly, b, &bore.faces, o, z)) else { continue };
+            let (Some(s), Some(t)) = (
+                extent(assembly, a, &shaft.faces, o, z),
+                extent(assembly, b, &bore.faces, o, z),
+            ) else {
+                continue;
+            };
             let (low, high) = (s[0].max(t[0]), s[1].min(t[1]));
             if high - low > COMMON_MM {
                 let center = o + z * ((low + high) / 2.0);
-                found.push(Fit { parts: [a, b], surfaces: [i, j], center, axis: z, radius_mm: r, clearance_mm: clearance, length_mm: high - low });
+                found.push(Fit {
+                    parts: [a, b],
+                    surfaces: [i, j],
+                    center,
+                    axis: z,
+                    radius_mm: r,
+                    clearance_mm: clearance,
+                    length_mm: high - low,
+                });
             }
         }
     }
@@ -181,7 +233,13 @@ fn fits(assembly: &Assembly, a: usize, b: usize) -> Vec<Fit> {
 }
 
 /// Interval of some faces of a part along an axis in the assembly's frame, mm from `origin`.
-pub(crate) fn extent(assembly: &Assembly, part: usize, faces: &[u32], origin: DVec3, axis: DVec3) -> Option<[f64; 2]> {
+pub(crate) fn extent(
+    assembly: &Assembly,
+    part: usize,
+    faces: &[u32],
+    origin: DVec3,
+    axis: DVec3,
+) -> Option<[f64; 2]> {
     let shape = assembly.body(part).surface().shape();
     let place = assembly.placement(part);
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];

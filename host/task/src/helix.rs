@@ -21,15 +21,25 @@ pub fn winds(points: &[DVec3], origin: DVec3, axis: DVec3) -> bool {
     }
     let x = axis.any_orthonormal_vector();
     let y = axis.cross(x);
-    let polar: Vec<(f64, f64, f64)> = points.iter().map(|&p| {
-        let d = p - origin;
-        (d.dot(y).atan2(d.dot(x)), d.dot(axis), d.dot(x).hypot(d.dot(y)))
-    }).collect();
+    let polar: Vec<(f64, f64, f64)> = points
+        .iter()
+        .map(|&p| {
+            let d = p - origin;
+            (d.dot(y).atan2(d.dot(x)), d.dot(axis), d.dot(x).hypot(d.dot(y)))
+        })
+        .collect();
     let mean = polar.iter().map(|p| p.2).sum::<f64>() / polar.len() as f64;
-    let (low, high) = polar.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.1), h.max(p.1)));
+    let (low, high) = polar
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
+            (l.min(p.1), h.max(p.1))
+        });
     let mut angles: Vec<f64> = polar.iter().map(|p| p.0).collect();
     angles.sort_by(f64::total_cmp);
-    let gap = angles.windows(2).map(|w| w[1] - w[0]).fold(angles[0] + TAU - angles[angles.len() - 1], f64::max);
+    let gap = angles
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .fold(angles[0] + TAU - angles[angles.len() - 1], f64::max);
     if TAU - gap < LEAST_TURN || mean < 1e-6 {
         return false;
     }
@@ -59,22 +69,28 @@ mod tests {
     use super::*;
 
     fn coil(pitch: f64, width: f64, turns: f64) -> Vec<DVec3> {
-        (0..400).map(|i| {
-            let t = f64::from(i % 100) / 100.0 * turns * TAU;
-            let across = f64::from(i / 100) / 3.0 * width;
-            DVec3::new(5.0 * t.cos(), 5.0 * t.sin(), pitch * t / TAU + across)
-        }).collect()
+        (0..400)
+            .map(|i| {
+                let t = f64::from(i % 100) / 100.0 * turns * TAU;
+                let across = f64::from(i / 100) / 3.0 * width;
+                DVec3::new(5.0 * t.cos(), 5.0 * t.sin(), pitch * t / TAU + across)
+            })
+            .collect()
     }
 
     #[test]
     fn a_flank_winds_and_a_cylinder_does_not() {
         assert!(winds(&coil(1.5, 0.4, 3.0), DVec3::ZERO, DVec3::Z));
-        let cylinder: Vec<DVec3> = (0..400).map(|i| {
-            let t = f64::from(i % 20) / 20.0 * TAU;
-            DVec3::new(5.0 * t.cos(), 5.0 * t.sin(), f64::from(i / 20) * 0.5)
-        }).collect();
+        let cylinder: Vec<DVec3> = (0..400)
+            .map(|i| {
+                let t = f64::from(i % 20) / 20.0 * TAU;
+                DVec3::new(5.0 * t.cos(), 5.0 * t.sin(), f64::from(i / 20) * 0.5)
+            })
+            .collect();
         assert!(!winds(&cylinder, DVec3::ZERO, DVec3::Z));
-        let plane: Vec<DVec3> = (0..400).map(|i| DVec3::new(f64::from(i % 20) - 9.5, f64::from(i / 20) - 9.5, 0.0)).collect();
+        let plane: Vec<DVec3> = (0..400)
+            .map(|i| DVec3::new(f64::from(i % 20) - 9.5, f64::from(i / 20) - 9.5, 0.0))
+            .collect();
         assert!(!winds(&plane, DVec3::ZERO, DVec3::Z));
     }
 }

@@ -81,7 +81,10 @@ pub struct Freedoms {
 impl Freedoms {
     /// Directions in which it leaves straight.
     pub fn ways_out(&self) -> impl Iterator<Item = DVec3> + '_ {
-        self.translations.iter().filter(|t| t.reach == Reach::Out).map(|t| DVec3::from_array(t.direction))
+        self.translations
+            .iter()
+            .filter(|t| t.reach == Reach::Out)
+            .map(|t| DVec3::from_array(t.direction))
     }
 }
 
@@ -97,19 +100,41 @@ pub fn freedoms(assembly: &Assembly, group: &Moved<'_>, others: &[usize], extra:
     let (mut cone, rays) = (cone.clone(), cone.rays.len());
     few(&mut cone.rays);
     let mut directions: Vec<DVec3> = Vec::new();
-    for d in (cone.rays.iter().copied()).chain([&cone.lines[..], &found.directions, extra].concat().into_iter().flat_map(|d| [d, -d])) {
-        if directions.iter().all(|e| e.dot(d) < 0.0 || !same_direction(*e, d)) {
+    for d in (cone.rays.iter().copied()).chain(
+        [&cone.lines[..], &found.directions, extra]
+            .concat()
+            .into_iter()
+            .flat_map(|d| [d, -d]),
+    ) {
+        if directions
+            .iter()
+            .all(|e| e.dot(d) < 0.0 || !same_direction(*e, d))
+        {
             directions.push(d);
         }
     }
-    let mut translations: Vec<Translation> = directions.iter().filter_map(|&d| translation(assembly, group, others, d)).collect();
+    let mut translations: Vec<Translation> = directions
+        .iter()
+        .filter_map(|&d| translation(assembly, group, others, d))
+        .collect();
     for i in 0..translations.len() {
         let d = DVec3::from_array(translations[i].direction);
-        translations[i].two_sided = translations.iter().any(|t| DVec3::from_array(t.direction).dot(d) < -0.999_999);
+        translations[i].two_sided = translations
+            .iter()
+            .any(|t| DVec3::from_array(t.direction).dot(d) < -0.999_999);
     }
     translations.sort_by_key(|t| t.reach as u8);
-    let rotations = found.axes.iter().filter_map(|axis| rotation(assembly, group, others, axis)).collect();
-    Freedoms { lines: cone.lines.len(), rays, translations, rotations }
+    let rotations = found
+        .axes
+        .iter()
+        .filter_map(|axis| rotation(assembly, group, others, axis))
+        .collect();
+    Freedoms {
+        lines: cone.lines.len(),
+        rays,
+        translations,
+        rotations,
+    }
 }
 
 /// Most extreme rays of which each is followed.
@@ -136,17 +161,29 @@ fn few(rays: &mut Vec<DVec3>) {
 /// Travel after which the group is beyond all of `others` along `direction`, mm.
 pub fn leaving_mm(assembly: &Assembly, group: &Moved<'_>, others: &[usize], direction: DVec3) -> f64 {
     let reach = |parts: &[usize], by, sign: f64| {
-        parts.iter().map(|&p| {
-            let (low, high) = assembly.bounds(p, by);
-            let (center, half) = ((low + high) / 2.0, (high - low) / 2.0);
-            sign * center.dot(direction) + half.dot(direction.abs())
-        }).fold(f64::NEG_INFINITY, f64::max)
+        parts
+            .iter()
+            .map(|&p| {
+                let (low, high) = assembly.bounds(p, by);
+                let (center, half) = ((low + high) / 2.0, (high - low) / 2.0);
+                sign * center.dot(direction) + half.dot(direction.abs())
+            })
+            .fold(f64::NEG_INFINITY, f64::max)
     };
     (reach(others, glam::DAffine3::IDENTITY, 1.0) + reach(group.parts, group.by, -1.0)).max(0.0) + 1.0
 }
 
-fn translation(assembly: &Assembly, group: &Moved<'_>, others: &[usize], direction: DVec3) -> Option<Translation> {
-    if assembly.free_share(group, others, &Motion::slide(direction * STEP_MM), STEP_MM / 4.0).0 < 1.0 {
+fn translation(
+    assembly: &Assembly,
+    group: &Moved<'_>,
+    others: &[usize],
+    direction: DVec3,
+) -> Option<Translation> {
+    if assembly
+        .free_share(group, others, &Motion::slide(direction * STEP_MM), STEP_MM / 4.0)
+        .0
+        < 1.0
+    {
         return None;
     }
     let far = leaving_mm(assembly, group, others, direction);
@@ -166,17 +203,35 @@ fn translation(assembly: &Assembly, group: &Moved<'_>, others: &[usize], directi
 }
 
 fn rotation(assembly: &Assembly, group: &Moved<'_>, others: &[usize], axis: &Line) -> Option<Rotation> {
-    let arm = group.parts.iter().map(|&p| {
-        let pose = group.by * assembly.placement(p);
-        let far = |q: DVec3| (pose.transform_point3(q) - axis.point).reject_from_normalized(axis.direction).length();
-        assembly.body(p).samples().iter().map(|s| far(s.position)).fold(0.0, f64::max)
-    }).fold(0.0, f64::max);
+    let arm = group
+        .parts
+        .iter()
+        .map(|&p| {
+            let pose = group.by * assembly.placement(p);
+            let far = |q: DVec3| {
+                (pose.transform_point3(q) - axis.point)
+                    .reject_from_normalized(axis.direction)
+                    .length()
+            };
+            assembly
+                .body(p)
+                .samples()
+                .iter()
+                .map(|s| far(s.position))
+                .fold(0.0, f64::max)
+        })
+        .fold(0.0, f64::max);
     if arm < 1e-6 {
         return None;
     }
     let turn = |angle: f64| Motion::turn(axis.point, axis.direction, angle);
     let step = STEP_MM / arm;
-    let free = [-1.0, 1.0].map(|s| assembly.free_share(group, others, &turn(s * step), STEP_MM / 4.0).0 >= 1.0);
+    let free = [-1.0, 1.0].map(|s| {
+        assembly
+            .free_share(group, others, &turn(s * step), STEP_MM / 4.0)
+            .0
+            >= 1.0
+    });
     if !free[0] && !free[1] {
         return None;
     }

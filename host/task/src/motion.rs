@@ -19,12 +19,22 @@ pub struct Motion {
 impl Motion {
     /// A translation.
     pub fn slide(by: DVec3) -> Self {
-        Self { slide: by, point: DVec3::ZERO, axis: DVec3::Z, angle: 0.0 }
+        Self {
+            slide: by,
+            point: DVec3::ZERO,
+            axis: DVec3::Z,
+            angle: 0.0,
+        }
     }
 
     /// A turn about the line through `point` along `axis`.
     pub fn turn(point: DVec3, axis: DVec3, angle: f64) -> Self {
-        Self { slide: DVec3::ZERO, point, axis: axis.normalize_or(DVec3::Z), angle }
+        Self {
+            slide: DVec3::ZERO,
+            point,
+            axis: axis.normalize_or(DVec3::Z),
+            angle,
+        }
     }
 
     /// The motion from one pose to another in which `center` (fixed to the moving parts, given at the first pose, in the assembly's frame) moves on a
@@ -32,24 +42,45 @@ impl Motion {
     pub fn between(from: &DAffine3, to: &DAffine3, center: DVec3) -> Self {
         let by = *to * from.inverse();
         let (axis, angle) = DQuat::from_mat3(&by.matrix3).normalize().to_axis_angle();
-        let (axis, angle) = if angle > std::f64::consts::PI { (-axis, std::f64::consts::TAU - angle) } else { (axis, angle) };
-        Self { slide: by.transform_point3(center) - center, point: center, axis: axis.normalize_or(DVec3::Z), angle }
+        let (axis, angle) = if angle > std::f64::consts::PI {
+            (-axis, std::f64::consts::TAU - angle)
+        } else {
+            (axis, angle)
+        };
+        Self {
+            slide: by.transform_point3(center) - center,
+            point: center,
+            axis: axis.normalize_or(DVec3::Z),
+            angle,
+        }
     }
 
     /// The pose at share `t`, 0 to 1, relative to its start.
     pub fn at(&self, t: f64) -> DAffine3 {
         let turn = DMat3::from_quat(DQuat::from_axis_angle(self.axis, self.angle * t));
-        DAffine3 { matrix3: turn, translation: self.point - turn * self.point + self.slide * t }
+        DAffine3 {
+            matrix3: turn,
+            translation: self.point - turn * self.point + self.slide * t,
+        }
     }
 
     /// The first part of the motion, up to share `t`.
     pub fn until(&self, t: f64) -> Self {
-        Self { slide: self.slide * t, angle: self.angle * t, ..*self }
+        Self {
+            slide: self.slide * t,
+            angle: self.angle * t,
+            ..*self
+        }
     }
 
     /// The motion backwards, from its end to its start.
     pub fn reversed(&self) -> Self {
-        Self { slide: -self.slide, point: self.point + self.slide, axis: self.axis, angle: -self.angle }
+        Self {
+            slide: -self.slide,
+            point: self.point + self.slide,
+            axis: self.axis,
+            angle: -self.angle,
+        }
     }
 
     /// Bound on how far the motion moves a point at distance `arm` of its axis, per unit of t, mm.
@@ -59,7 +90,11 @@ impl Motion {
 
     /// Distance of `p` from the axis, mm; 0 when it does not turn.
     pub fn arm(&self, p: DVec3) -> f64 {
-        if self.angle == 0.0 { 0.0 } else { (p - self.point).reject_from_normalized(self.axis).length() }
+        if self.angle == 0.0 {
+            0.0
+        } else {
+            (p - self.point).reject_from_normalized(self.axis).length()
+        }
     }
 }
 

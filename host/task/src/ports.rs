@@ -71,16 +71,32 @@ pub enum Port {
 impl fmt::Display for Port {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Extrusion { sex, diameter_mm, capacity_mm: [low, high], through, thread, .. } => {
+            Self::Extrusion {
+                sex,
+                diameter_mm,
+                capacity_mm: [low, high],
+                through,
+                thread,
+                ..
+            } => {
                 let what = match (*sex, through) {
                     ("male", _) => "shaft",
                     (_, Some(true)) => "through bore",
                     _ => "blind bore",
                 };
-                write!(f, "{what} ⌀ {diameter_mm:.3} mm, {:.3} mm long{}", high - low, if *thread { ", thread" } else { "" })
+                write!(
+                    f,
+                    "{what} ⌀ {diameter_mm:.3} mm, {:.3} mm long{}",
+                    high - low,
+                    if *thread { ", thread" } else { "" }
+                )
             }
             Self::Plane { area_mm2, .. } => write!(f, "plane, {area_mm2:.1} mm²"),
-            Self::Point { sex, diameter_mm, .. } => write!(f, "{} ⌀ {diameter_mm:.3} mm", if *sex == "male" { "ball" } else { "socket" }),
+            Self::Point { sex, diameter_mm, .. } => write!(
+                f,
+                "{} ⌀ {diameter_mm:.3} mm",
+                if *sex == "male" { "ball" } else { "socket" }
+            ),
         }
     }
 }
@@ -94,7 +110,10 @@ pub fn ports(assembly: &Assembly, part: usize) -> Vec<Port> {
     (assembly.surfaces(part).iter())
         .filter_map(|m| match m.surface {
             Surface::Cylinder { frame, radius } => {
-                let (origin, axis) = (pose.transform_point3(frame.origin), pose.transform_vector3(frame.z));
+                let (origin, axis) = (
+                    pose.transform_point3(frame.origin),
+                    pose.transform_vector3(frame.z),
+                );
                 let capacity = extent(assembly, part, &m.faces, origin, axis)?;
                 Some(Port::Extrusion {
                     sex: sex(m.side),
@@ -102,7 +121,8 @@ pub fn ports(assembly: &Assembly, part: usize) -> Vec<Port> {
                     axis: axis.to_array(),
                     diameter_mm: 2.0 * radius,
                     capacity_mm: capacity,
-                    through: (m.side == Side::Concave).then(|| through(assembly, part, origin, axis, radius, capacity)),
+                    through: (m.side == Side::Concave)
+                        .then(|| through(assembly, part, origin, axis, radius, capacity)),
                     thread,
                     span_deg: span_deg(assembly, part, &m.faces, frame.origin, frame.z),
                 })
@@ -123,12 +143,23 @@ pub fn ports(assembly: &Assembly, part: usize) -> Vec<Port> {
 }
 
 /// Whether the part has no material on the axis of a bore just beyond its ends.
-fn through(assembly: &Assembly, part: usize, origin: DVec3, axis: DVec3, radius: f64, [low, high]: [f64; 2]) -> bool {
+fn through(
+    assembly: &Assembly,
+    part: usize,
+    origin: DVec3,
+    axis: DVec3,
+    radius: f64,
+    [low, high]: [f64; 2],
+) -> bool {
     let beyond = (BEYOND * radius).max(BEYOND_MM);
     let back = assembly.placement(part).inverse();
     [low - beyond, high + beyond].iter().all(|&t| {
         let p = back.transform_point3(origin + axis * t);
-        assembly.body(part).surface().nearest(p).is_none_or(|n| n.distance > 0.0)
+        assembly
+            .body(part)
+            .surface()
+            .nearest(p)
+            .is_none_or(|n| n.distance > 0.0)
     })
 }
 
@@ -148,7 +179,10 @@ fn span_deg(assembly: &Assembly, part: usize, faces: &[u32], origin: DVec3, axis
             d.dot(y).atan2(d.dot(x)).to_degrees()
         });
         let turn = |a: f64| (a - angles[0] + 540.0).rem_euclid(360.0) - 180.0;
-        let (low, high) = angles.iter().map(|&a| turn(a)).fold((0.0f64, 0.0f64), |(l, h), t| (l.min(t), h.max(t)));
+        let (low, high) = angles
+            .iter()
+            .map(|&a| turn(a))
+            .fold((0.0f64, 0.0f64), |(l, h), t| (l.min(t), h.max(t)));
         arcs.push([(angles[0] + low).rem_euclid(360.0), high - low]);
     }
     arcs.sort_by(|a, b| a[0].total_cmp(&b[0]));

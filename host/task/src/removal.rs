@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use glam::{DAffine3, DVec3};
 
 use crate::assembly::{Assembly, Moved, SEARCH_STEP_MM};
-use crate::directions::{Line, candidates, contact_normals};
 use crate::cone::cone;
+use crate::directions::{Line, candidates, contact_normals};
 use crate::mobility::{PLAY_MM, leaving_mm};
 use crate::motion::Motion;
 
@@ -38,7 +38,12 @@ impl Path {
     /// The way back, from outside into place: its legs, and where the group is at its start.
     pub fn reversed(&self) -> (DAffine3, Self) {
         let start = self.poses().pop().unwrap_or(DAffine3::IDENTITY);
-        (start, Self { legs: self.legs.iter().rev().map(Motion::reversed).collect() })
+        (
+            start,
+            Self {
+                legs: self.legs.iter().rev().map(Motion::reversed).collect(),
+            },
+        )
     }
 }
 
@@ -47,7 +52,8 @@ impl Path {
 pub struct Blocked {
     /// Part of the group, and the part that holds it.
     pub pair: [usize; 2],
-    /// Least overlap with which the search could have gone on at its narrowest place, mm; `None` where no opening was near.
+    /// Overlap that the group would need to leave straight, or turn by half a turn, at the most promising place found, mm: by how much it is held. `None` where
+    /// no such place was within a millimetre.
     pub overlap_mm: Option<f64>,
 }
 
@@ -74,7 +80,10 @@ pub struct Budget {
 impl Budget {
     /// Ends after this long; up to twelve legs.
     pub fn lasting(time: Duration) -> Self {
-        Self { until: Instant::now() + time, legs: 12 }
+        Self {
+            until: Instant::now() + time,
+            legs: 12,
+        }
     }
 
     fn is_over(&self) -> bool {
@@ -95,6 +104,10 @@ const DEEP_MM: f64 = 3.0;
 const COMPLY_MM: f64 = 0.6;
 const PUSHES: usize = 40;
 const PUSH_MM: f64 = 5e-3;
+/// Missed openings that are kept, the part of a leg around one that is searched for the place with the least overlap, and steps of its motion, mm.
+const MOST_MISSED: usize = 6;
+const NEAR_MM: f64 = 0.2;
+const NEEDED_STEP_MM: f64 = 0.1;
 /// Poses nearer to each other than this are one, mm and radians.
 const SAME_POSE: (f64, f64) = (0.4, 0.03);
 /// Directions and axes used at each place.
@@ -120,11 +133,31 @@ impl Kind {
 }
 
 /// Searches a way out of `parts` from among `others`, which stay.
-pub fn remove(assembly: &Assembly, parts: &[usize], others: &[usize], extra: &[DVec3], budget: &Budget) -> Removal {
+pub fn remove(
+    assembly: &Assembly,
+    parts: &[usize],
+    others: &[usize],
+    extra: &[DVec3],
+    budget: &Budget,
+) -> Removal {
     let (low, high) = assembly.bounds_of(parts, DAffine3::IDENTITY);
     let opening_mm = (OPENING * low.distance(high)).clamp(OPENING_MM[0], OPENING_MM[1]);
-    let mut search = Search { assembly, parts, others, extra, budget, seen: vec![DAffine3::IDENTITY], blocked: None, out_of_time: false, tilts: false, opening_mm };
-    let start = Moved { parts, by: DAffine3::IDENTITY };
+    let mut search = Search {
+        assembly,
+        parts,
+        others,
+        extra,
+        budget,
+        seen: vec![DAffine3::IDENTITY],
+        missed: Vec::new(),
+        out_of_time: false,
+        tilts: false,
+        opening_mm,
+    };
+    let start = Moved {
+        parts,
+        by: DAffine3::IDENTITY,
+    };
     if let Some(leg) = search.straight(&start) {
         return Removal::Out(Path { legs: vec![leg] });
     }
@@ -138,11 +171,15 @@ pub fn remove(assembly: &Assembly, parts: &[usize], others: &[usize], extra: &[D
     if let Some(path) = found {
         return Removal::Out(path);
     }
-    let blocked = search.blocked.unwrap_or_else(|| Blocked {
+    let blocked = search.held().unwrap_or_else(|| Blocked {
         pair: search.nearest_pair(),
         overlap_mm: None,
     });
-    if search.out_of_time { Removal::TimedOut(blocked) } else { Removal::Blocked(blocked) }
+    if search.out_of_time {
+        Removal::TimedOut(blocked)
+    } else {
+        Removal::Blocked(blocked)
+    }
 }
 
 struct Search<'a> {
@@ -152,7 +189,8 @@ struct Search<'a> {
     extra: &'a [DVec3],
     budget: &'a Budget,
     seen: Vec<DAffine3>,
-    blocked: Option<Blocked>,
+    /// Narrowly missed openings, least overlap first.
+    missed: Vec<Missed>,
     out_of_time: bool,
     /// Whether turns about the place where the group is held count.
     tilts: bool,
@@ -164,7 +202,13 @@ impl Kind {
     fn shifted(self, by: DVec3) -> Self {
         match self {
             Self::Slide(d) => Self::Slide(d),
-            Self::Turn(line, arm) => Self::Turn(Line { point: line.point + by, ..line }, arm),
+            Self::Turn(line, arm) => Self::Turn(
+                Line {
+                    point: line.point + by,
+                    ..line
+                },
+                arm,
+            ),
         }
     }
 }
@@ -189,6 +233,22 @@ impl Opening {
     }
 }
 
+/// An opening that was missed.
+#[derive(Clone, Copy, Debug)]
+struct Missed {
+    /// Where the leg starts.
+    by: DAffine3,
+    leg: Kind,
+    /// Travel of the leg at which the least was missing, mm.
+    at: f64,
+    motion: Kind,
+    /// Travel of the motion after which it is over, mm.
+    most: f64,
+    /// What was missing, mm.
+    excess: f64,
+    pair: [usize; 2],
+}
+
 /// A place of the search.
 struct Place {
     by: DAffine3,
@@ -197,7 +257,10 @@ struct Place {
 
 impl Search<'_> {
     fn group(&self, by: DAffine3) -> Moved<'_> {
-        Moved { parts: self.parts, by }
+        Moved {
+            parts: self.parts,
+            by,
+        }
     }
 
     /// Directions to try from a pose, both ways, and extreme rays of its contacts.
@@ -205,7 +268,11 @@ impl Search<'_> {
         let c = cone(&contact_normals(self.assembly, group, self.others));
         let found = candidates(self.assembly, group, self.others).directions;
         let mut all: Vec<DVec3> = Vec::new();
-        let both = found.iter().chain(self.extra).chain(&c.lines).flat_map(|&d| [d, -d]);
+        let both = found
+            .iter()
+            .chain(self.extra)
+            .chain(&c.lines)
+            .flat_map(|&d| [d, -d]);
         for d in c.rays.iter().copied().chain(both) {
             if all.iter().all(|e| e.dot(d) < 1.0 - 1e-6) {
                 all.push(d);
@@ -221,12 +288,22 @@ impl Search<'_> {
                 return None;
             }
             let first = Motion::slide(d * PLAY_MM);
-            if self.assembly.free_share(group, self.others, &first, SEARCH_STEP_MM).0 < 1.0 {
+            if self
+                .assembly
+                .free_share(group, self.others, &first, SEARCH_STEP_MM)
+                .0
+                < 1.0
+            {
                 continue;
             }
             let far = leaving_mm(self.assembly, group, self.others, d);
             let motion = Motion::slide(d * far);
-            if self.assembly.free_share(group, self.others, &motion, SEARCH_STEP_MM).0 >= 1.0 {
+            if self
+                .assembly
+                .free_share(group, self.others, &motion, SEARCH_STEP_MM)
+                .0
+                >= 1.0
+            {
                 return Some(motion);
             }
         }
@@ -234,7 +311,10 @@ impl Search<'_> {
     }
 
     fn legs(&mut self) -> Option<Path> {
-        let mut open = vec![Place { by: DAffine3::IDENTITY, legs: Vec::new() }];
+        let mut open = vec![Place {
+            by: DAffine3::IDENTITY,
+            legs: Vec::new(),
+        }];
         while let Some(place) = open.pop() {
             if self.budget.is_over() {
                 self.out_of_time = true;
@@ -243,8 +323,13 @@ impl Search<'_> {
             if place.legs.len() + 1 > self.budget.legs {
                 continue;
             }
-            let group = Moved { parts: self.parts, by: place.by };
-            if !place.legs.is_empty() && let Some(last) = self.straight(&group) {
+            let group = Moved {
+                parts: self.parts,
+                by: place.by,
+            };
+            if !place.legs.is_empty()
+                && let Some(last) = self.straight(&group)
+            {
                 let mut legs = place.legs;
                 legs.push(last);
                 return Some(Path { legs });
@@ -259,7 +344,10 @@ impl Search<'_> {
 
     /// Places reached by one leg at which another motion opens, with the gain of that motion in mm.
     fn openings(&mut self, place: &Place) -> Vec<(f64, Place)> {
-        let group = Moved { parts: self.parts, by: place.by };
+        let group = Moved {
+            parts: self.parts,
+            by: place.by,
+        };
         let kinds = self.kinds(&group);
         let mut ranges = Vec::new();
         for kind in &kinds {
@@ -279,8 +367,10 @@ impl Search<'_> {
                     self.out_of_time = true;
                     return found;
                 }
-                let Some(pair) = pair else { continue };
-                if let Some(opening) = self.opening(&group, p, reach, q, range, pair) {
+                if pair.is_none() {
+                    continue;
+                }
+                if let Some(opening) = self.opening(&group, p, reach, q, range) {
                     let leg = p.over(opening.at);
                     let by = opening.shift() * leg.at(1.0) * place.by;
                     if self.is_new(by) {
@@ -299,25 +389,51 @@ impl Search<'_> {
     fn kinds(&self, group: &Moved<'_>) -> Vec<Kind> {
         let found = candidates(self.assembly, group, self.others);
         let directions: Vec<DVec3> = found.directions.iter().take(DIRECTIONS).copied().collect();
-        let mut kinds: Vec<Kind> = directions.iter().flat_map(|&d| [Kind::Slide(d), Kind::Slide(-d)]).collect();
+        let mut kinds: Vec<Kind> = directions
+            .iter()
+            .flat_map(|&d| [Kind::Slide(d), Kind::Slide(-d)])
+            .collect();
         let mut axes: Vec<Line> = found.axes.into_iter().take(AXES).collect();
         // Where the group is held narrowly it can tilt.
-        if self.tilts && let Some(pivot) = self.pivot(group) {
+        if self.tilts
+            && let Some(pivot) = self.pivot(group)
+        {
             for &direction in directions.iter().take(3) {
-                let axis = Line { point: pivot, direction };
-                if axes.iter().all(|known| !crate::directions::same_line(*known, axis)) {
+                let axis = Line {
+                    point: pivot,
+                    direction,
+                };
+                if axes
+                    .iter()
+                    .all(|known| !crate::directions::same_line(*known, axis))
+                {
                     axes.push(axis);
                 }
             }
         }
-        let points: Vec<DVec3> = self.parts.iter().flat_map(|&p| {
-            let pose = group.by * self.assembly.placement(p);
-            self.assembly.body(p).samples().iter().step_by(7).map(move |s| pose.transform_point3(s.position))
-        }).collect();
+        let points: Vec<DVec3> = self
+            .parts
+            .iter()
+            .flat_map(|&p| {
+                let pose = group.by * self.assembly.placement(p);
+                self.assembly
+                    .body(p)
+                    .samples()
+                    .iter()
+                    .step_by(7)
+                    .map(move |s| pose.transform_point3(s.position))
+            })
+            .collect();
         for axis in axes {
-            let arm = points.iter().map(|p| (*p - axis.point).reject_from_normalized(axis.direction).length()).fold(0.0, f64::max);
+            let arm = points
+                .iter()
+                .map(|p| (*p - axis.point).reject_from_normalized(axis.direction).length())
+                .fold(0.0, f64::max);
             if arm > 0.1 {
-                let back = Line { direction: -axis.direction, ..axis };
+                let back = Line {
+                    direction: -axis.direction,
+                    ..axis
+                };
                 kinds.extend([Kind::Turn(axis, arm), Kind::Turn(back, arm)]);
             }
         }
@@ -329,7 +445,10 @@ impl Search<'_> {
         let least = self.assembly.clearance(group, self.others, 5.0, false)?;
         let [a, b] = least.pair;
         let within = least.gap.distance_mm.max(0.0) + 0.3;
-        let (pa, pb) = (self.assembly.placed(a, group.by), self.assembly.placed(b, DAffine3::IDENTITY));
+        let (pa, pb) = (
+            self.assembly.placed(a, group.by),
+            self.assembly.placed(b, DAffine3::IDENTITY),
+        );
         let to = pb.pose.inverse() * pa.pose;
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
@@ -348,7 +467,9 @@ impl Search<'_> {
             Kind::Slide(d) => leaving_mm(self.assembly, group, self.others, *d),
             Kind::Turn(_, arm) => std::f64::consts::TAU * arm,
         };
-        let (share, pair) = self.assembly.touch_share(group, self.others, &kind.over(most), SEARCH_STEP_MM);
+        let (share, pair) = self
+            .assembly
+            .touch_share(group, self.others, &kind.over(most), SEARCH_STEP_MM);
         (share * most, pair)
     }
 
@@ -361,7 +482,7 @@ impl Search<'_> {
     }
 
     /// Where along leg `p` motion `q` goes beyond its `range` by at least the displacement of an opening.
-    fn opening(&mut self, group: &Moved<'_>, p: &Kind, reach: f64, q: &Kind, range: f64, pair: [usize; 2]) -> Option<Opening> {
+    fn opening(&mut self, group: &Moved<'_>, p: &Kind, reach: f64, q: &Kind, range: f64) -> Option<Opening> {
         if same_axis(p, q) {
             return None;
         }
@@ -378,7 +499,17 @@ impl Search<'_> {
                     ((from + to) / 2.0, None)
                 }
                 Err(least) => {
-                    self.note(least.map(|(_, excess, pair)| (excess, pair)), pair);
+                    if let Some((at, excess, pair)) = least {
+                        self.note(Missed {
+                            by: group.by,
+                            leg: *p,
+                            at,
+                            motion: *q,
+                            most,
+                            excess,
+                            pair,
+                        });
+                    }
                     // A wider opening that was found before is as good.
                     if found.is_some() {
                         break;
@@ -392,14 +523,40 @@ impl Search<'_> {
             let mut by = leg.at(1.0) * group.by;
             if let Some(shift) = shift {
                 // The shift must be free where the leg ends.
-                if self.assembly.free_share(&Moved { parts: self.parts, by }, self.others, &Motion::slide(shift), SEARCH_STEP_MM).0 < 1.0 {
+                if self
+                    .assembly
+                    .free_share(
+                        &Moved {
+                            parts: self.parts,
+                            by,
+                        },
+                        self.others,
+                        &Motion::slide(shift),
+                        SEARCH_STEP_MM,
+                    )
+                    .0
+                    < 1.0
+                {
                     break;
                 }
                 by = opening.shift() * by;
             }
             // The motion itself, not its end alone, must be free.
             let carried = carry(q, &leg).shifted(shift.unwrap_or(DVec3::ZERO));
-            if self.assembly.free_share(&Moved { parts: self.parts, by }, self.others, &carried.over(travel), SEARCH_STEP_MM).0 < 1.0 {
+            if self
+                .assembly
+                .free_share(
+                    &Moved {
+                        parts: self.parts,
+                        by,
+                    },
+                    self.others,
+                    &carried.over(travel),
+                    SEARCH_STEP_MM,
+                )
+                .0
+                < 1.0
+            {
                 break;
             }
             found = Some(opening);
@@ -415,14 +572,24 @@ impl Search<'_> {
     fn comply(&self, group: &Moved<'_>, p: &Kind, at: f64, q: &Kind, travel: f64) -> Option<DVec3> {
         let leg = p.over(at);
         let displaced = carry(q, &leg).over(travel).at(1.0) * leg.at(1.0) * group.by;
-        let moved = |shift: DVec3| Moved { parts: self.parts, by: DAffine3::from_translation(shift) * displaced };
+        let moved = |shift: DVec3| Moved {
+            parts: self.parts,
+            by: DAffine3::from_translation(shift) * displaced,
+        };
         let mut shift = DVec3::ZERO;
         for _ in 0..PUSHES {
             let Some(met) = self.assembly.blocker(&moved(shift), self.others) else {
                 // Beyond contact the middle of the play is better than its end.
-                let gap = |s: DVec3| self.assembly.clearance(&moved(s), self.others, 1.0, false).map_or(1.0, |c| c.gap.distance_mm);
+                let gap = |s: DVec3| {
+                    self.assembly
+                        .clearance(&moved(s), self.others, 1.0, false)
+                        .map_or(1.0, |c| c.gap.distance_mm)
+                };
                 let further = (0..=8).map(|i| shift + shift.normalize_or_zero() * (0.05 * f64::from(i)));
-                return further.map(|s| (gap(s), s)).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, s)| s);
+                return further
+                    .map(|s| (gap(s), s))
+                    .max_by(|a, b| a.0.total_cmp(&b.0))
+                    .map(|(_, s)| s);
             };
             shift += met.gap.away * (PUSH_MM - met.gap.distance_mm);
             // Pushed back along the motion itself nothing is gained.
@@ -434,28 +601,103 @@ impl Search<'_> {
         None
     }
 
-    fn note(&mut self, least: Option<(f64, [usize; 2])>, pair: [usize; 2]) {
-        let overlap = least.map(|(overlap, _)| overlap);
-        let pair = least.map_or(pair, |(_, pair)| pair);
-        let better = match (self.blocked, overlap) {
-            (None, _) => true,
-            (Some(known), Some(overlap)) => known.overlap_mm.is_none_or(|o| overlap < o),
-            (Some(_), None) => false,
-        };
-        if better {
-            self.blocked = Some(Blocked { pair, overlap_mm: overlap });
+    /// Keeps an opening that was missed by the overlap `excess`.
+    fn note(&mut self, missed: Missed) {
+        let at = self.missed.partition_point(|m| m.excess <= missed.excess);
+        self.missed.insert(at, missed);
+        self.missed.truncate(MOST_MISSED);
+    }
+
+    /// What holds the group: of the missed openings the one that needs the least overlap all along its motion.
+    fn held(&self) -> Option<Blocked> {
+        let mut best: Option<Blocked> = None;
+        for missed in &self.missed {
+            // The place along the leg where the least is needed, by ternary search.
+            let (mut low, mut high) = (missed.at - NEAR_MM, missed.at + NEAR_MM);
+            let mut found = self.needed(missed, missed.at);
+            while high - low > SCAN_MM {
+                let (l, h) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+                let (at_l, at_h) = (self.needed(missed, l), self.needed(missed, h));
+                for (depth, pair) in [at_l, at_h] {
+                    if depth < found.0 {
+                        found = (depth, pair);
+                    }
+                }
+                if at_l.0 < at_h.0 {
+                    high = h
+                } else {
+                    low = l
+                }
+                if found.0 >= DEEP_MM {
+                    break;
+                }
+            }
+            let (depth, pair) = found;
+            if depth <= 1.0 && best.is_none_or(|b| b.overlap_mm.is_none_or(|mm| depth < mm)) {
+                best = Some(Blocked {
+                    pair,
+                    overlap_mm: Some(depth),
+                });
+            }
         }
+        best
+    }
+
+    /// Largest overlap of the missed motion from `at` on its leg to its end, mm, and of which pair; stops at [`DEEP_MM`].
+    fn needed(&self, missed: &Missed, at: f64) -> (f64, [usize; 2]) {
+        let leg = missed.leg.over(at);
+        let by = leg.at(1.0) * missed.by;
+        let motion = carry(&missed.motion, &leg);
+        let mut most = (0.0, missed.pair);
+        let mut travel = 0.0;
+        while travel < missed.most {
+            let moved = Moved {
+                parts: self.parts,
+                by: motion.over(travel).at(1.0) * by,
+            };
+            let depth = self.assembly.excess(&moved, self.others, DEEP_MM);
+            if let Some((excess, pair)) = depth {
+                let full = excess + self.assembly.allowed_mm(pair[0], pair[1]);
+                if full > most.0 {
+                    most = (full, pair);
+                }
+                if most.0 >= 1.0 {
+                    return (DEEP_MM, pair);
+                }
+            }
+            travel += NEEDED_STEP_MM;
+        }
+        most
     }
 
     /// The first stretch of leg `p` within `low`..`high` along which the group displaced by `q` is clear; else the least overlap found.
-    fn clear_stretch(&self, group: &Moved<'_>, p: &Kind, low: f64, high: f64, q: &Kind, travel: f64) -> Result<(f64, f64), Option<Least>> {
+    fn clear_stretch(
+        &self,
+        group: &Moved<'_>,
+        p: &Kind,
+        low: f64,
+        high: f64,
+        q: &Kind,
+        travel: f64,
+    ) -> Result<(f64, f64), Option<Least>> {
         let depth = |s: f64| {
             let leg = p.over(s);
             let by = carry(q, &leg).over(travel).at(1.0) * leg.at(1.0) * group.by;
-            self.assembly.excess(&Moved { parts: self.parts, by }, self.others, DEEP_MM)
+            self.assembly.excess(
+                &Moved {
+                    parts: self.parts,
+                    by,
+                },
+                self.others,
+                DEEP_MM,
+            )
         };
         // A group displaced sideways has a longer arm.
-        let scale = if matches!((p, q), (Kind::Turn(..), _)) { 1.3 } else { 1.0 };
+        let scale = if matches!((p, q), (Kind::Turn(..), _)) {
+            1.3
+        } else {
+            1.0
+        };
         let mut least: Option<Least> = None;
         let mut s = low;
         let mut start = None;
@@ -488,7 +730,11 @@ impl Search<'_> {
                 let mut met = next;
                 while met - clear > SCAN_MM / 2.0 {
                     let middle = (met + clear) / 2.0;
-                    if depth(middle).is_none() { clear = middle } else { met = middle }
+                    if depth(middle).is_none() {
+                        clear = middle
+                    } else {
+                        met = middle
+                    }
                 }
                 return Ok((start, clear));
             }
@@ -508,10 +754,17 @@ impl Search<'_> {
 
     fn nearest_pair(&self) -> [usize; 2] {
         let group = self.group(DAffine3::IDENTITY);
-        self.assembly.clearance(&group, self.others, f64::INFINITY, false).map_or_else(
-            || [self.parts.first().copied().unwrap_or(0), self.others.first().copied().unwrap_or(0)],
-            |c| c.pair,
-        )
+        self.assembly
+            .clearance(&group, self.others, f64::INFINITY, false)
+            .map_or_else(
+                || {
+                    [
+                        self.parts.first().copied().unwrap_or(0),
+                        self.others.first().copied().unwrap_or(0),
+                    ]
+                },
+                |c| c.pair,
+            )
     }
 }
 
@@ -521,7 +774,13 @@ fn carry(q: &Kind, leg: &Motion) -> Kind {
         Kind::Slide(d) => Kind::Slide(d),
         Kind::Turn(line, arm) => {
             let by = leg.at(1.0);
-            Kind::Turn(Line { point: by.transform_point3(line.point), direction: by.transform_vector3(line.direction).normalize() }, arm)
+            Kind::Turn(
+                Line {
+                    point: by.transform_point3(line.point),
+                    direction: by.transform_vector3(line.direction).normalize(),
+                },
+                arm,
+            )
         }
     }
 }

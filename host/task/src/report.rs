@@ -40,7 +40,10 @@ pub fn waypoints(path: &Path, from: DAffine3) -> Vec<Waypoint> {
 fn waypoint(by: &DAffine3) -> Waypoint {
     let q = DQuat::from_mat3(&by.matrix3).normalize();
     let q = if q.w < 0.0 { -q } else { q };
-    Waypoint { t: by.translation.to_array(), q: [q.w, q.x, q.y, q.z] }
+    Waypoint {
+        t: by.translation.to_array(),
+        q: [q.w, q.x, q.y, q.z],
+    }
 }
 
 /// One step of a sequence.
@@ -128,8 +131,16 @@ pub fn sequence<'a>(assembly: &'a Assembly, found: &Sequence, sense: Sense) -> S
     SequenceReport {
         verdict,
         parts: (0..assembly.count()).map(|p| assembly.name(p)).collect(),
-        steps: order.iter().enumerate().map(|(i, step)| step_report(assembly, step, i + 1, sense)).collect(),
-        stuck: found.stuck.iter().map(|(parts, blocked)| stuck(assembly, parts, blocked)).collect(),
+        steps: order
+            .iter()
+            .enumerate()
+            .map(|(i, step)| step_report(assembly, step, i + 1, sense))
+            .collect(),
+        stuck: found
+            .stuck
+            .iter()
+            .map(|(parts, blocked)| stuck(assembly, parts, blocked))
+            .collect(),
         pressed: pressed(assembly),
         time_s: found.time.as_secs_f64(),
     }
@@ -153,7 +164,12 @@ fn step_report<'a>(assembly: &'a Assembly, step: &Step, number: usize, sense: Se
         moving: names(assembly, &step.group),
         onto: names(assembly, &step.onto),
         legs: step.path.legs.len(),
-        direction: step.path.legs.first().filter(|leg| leg.angle == 0.0).map(|leg| leg.slide.normalize_or_zero().to_array()),
+        direction: step
+            .path
+            .legs
+            .first()
+            .filter(|leg| leg.angle == 0.0)
+            .map(|leg| leg.slide.normalize_or_zero().to_array()),
         waypoints,
         clearance_um: distance.map(|d| d.max(0.0)),
         overlap_um: step.measured.then_some(distance.map_or(0.0, |d| (-d).max(0.0))),
@@ -174,7 +190,11 @@ const PRESSED_UM: f64 = 0.1;
 
 fn pressed(assembly: &Assembly) -> Vec<PressedReport<'_>> {
     let pairs = (0..assembly.count()).flat_map(|a| (a + 1..assembly.count()).map(move |b| (a, b)));
-    pairs.map(|(a, b)| PressedReport { parts: [assembly.name(a), assembly.name(b)], overlap_um: assembly.pressed_mm(a, b) * 1e3 })
+    pairs
+        .map(|(a, b)| PressedReport {
+            parts: [assembly.name(a), assembly.name(b)],
+            overlap_um: assembly.pressed_mm(a, b) * 1e3,
+        })
         .filter(|p| p.overlap_um > PRESSED_UM)
         .collect()
 }
@@ -224,12 +244,23 @@ pub struct RotationReport {
 
 /// Freedoms of some parts, each against all others in place.
 pub fn mobility<'a>(assembly: &'a Assembly, parts: &[usize]) -> Vec<PartMobility<'a>> {
-    parts.iter().map(|&part| {
-        let group = [part];
-        let others: Vec<usize> = (0..assembly.count()).filter(|&p| p != part).collect();
-        let found = freedoms(assembly, &Moved { parts: &group, by: DAffine3::IDENTITY }, &others, &[]);
-        part_mobility(assembly, part, &found)
-    }).collect()
+    parts
+        .iter()
+        .map(|&part| {
+            let group = [part];
+            let others: Vec<usize> = (0..assembly.count()).filter(|&p| p != part).collect();
+            let found = freedoms(
+                assembly,
+                &Moved {
+                    parts: &group,
+                    by: DAffine3::IDENTITY,
+                },
+                &others,
+                &[],
+            );
+            part_mobility(assembly, part, &found)
+        })
+        .collect()
 }
 
 fn part_mobility<'a>(assembly: &'a Assembly, part: usize, found: &Freedoms) -> PartMobility<'a> {
@@ -248,7 +279,12 @@ fn part_mobility<'a>(assembly: &'a Assembly, part: usize, found: &Freedoms) -> P
             })
             .collect(),
         rotations: (found.rotations.iter())
-            .map(|r| RotationReport { point_mm: r.point, direction: tidy(r.direction), reach: r.reach, range_deg: r.range_deg })
+            .map(|r| RotationReport {
+                point_mm: r.point,
+                direction: tidy(r.direction),
+                reach: r.reach,
+                range_deg: r.range_deg,
+            })
             .collect(),
     }
 }
@@ -290,19 +326,30 @@ pub struct FitReport<'a> {
 /// The connection graph.
 pub fn connections(assembly: &Assembly) -> Vec<ConnectionReport<'_>> {
     let graph = graph(assembly);
-    graph.edge_weights().map(|edge| ConnectionReport {
-        a: assembly.name(edge.parts[0]),
-        b: assembly.name(edge.parts[1]),
-        kinds: edge.kinds.clone(),
-        contacts: edge.contacts.iter().map(|&i| assembly.contacts[i].kind.name()).collect(),
-        fits: edge.fits.iter().map(|fit| FitReport {
-            shaft: assembly.name(fit.parts[0]),
-            bore: assembly.name(fit.parts[1]),
-            center_mm: fit.center.to_array(),
-            axis: fit.axis.to_array(),
-            diameter_mm: 2.0 * fit.radius_mm,
-            clearance_um: 2e3 * fit.clearance_mm,
-            length_mm: fit.length_mm,
-        }).collect(),
-    }).collect()
+    graph
+        .edge_weights()
+        .map(|edge| ConnectionReport {
+            a: assembly.name(edge.parts[0]),
+            b: assembly.name(edge.parts[1]),
+            kinds: edge.kinds.clone(),
+            contacts: edge
+                .contacts
+                .iter()
+                .map(|&i| assembly.contacts[i].kind.name())
+                .collect(),
+            fits: edge
+                .fits
+                .iter()
+                .map(|fit| FitReport {
+                    shaft: assembly.name(fit.parts[0]),
+                    bore: assembly.name(fit.parts[1]),
+                    center_mm: fit.center.to_array(),
+                    axis: fit.axis.to_array(),
+                    diameter_mm: 2.0 * fit.radius_mm,
+                    clearance_um: 2e3 * fit.clearance_mm,
+                    length_mm: fit.length_mm,
+                })
+                .collect(),
+        })
+        .collect()
 }

@@ -64,8 +64,15 @@ pub fn directions(assembly: &Assembly, set: &[usize]) -> Vec<DVec3> {
     let mut sums: Vec<(f64, DVec3)> = Vec::new();
     for &part in set {
         let group = [part];
-        let moved = Moved { parts: &group, by: DAffine3::IDENTITY };
-        for (rank, d) in candidates(assembly, &moved, &[]).directions.into_iter().enumerate() {
+        let moved = Moved {
+            parts: &group,
+            by: DAffine3::IDENTITY,
+        };
+        for (rank, d) in candidates(assembly, &moved, &[])
+            .directions
+            .into_iter()
+            .enumerate()
+        {
             let weight = 1.0 / (1.0 + rank as f64);
             match sums.iter_mut().find(|(_, known)| same_direction(*known, d)) {
                 Some((sum, _)) => *sum += weight,
@@ -82,7 +89,12 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequen
     let start = Instant::now();
     // A tenth is left for measuring.
     let until = start + time.mul_f64(0.9);
-    let mut found = Sequence { steps: Vec::new(), stuck: Vec::new(), timed_out: false, time };
+    let mut found = Sequence {
+        steps: Vec::new(),
+        stuck: Vec::new(),
+        timed_out: false,
+        time,
+    };
     let mut blocking = Blocking::new(assembly, directions(assembly, set));
     let mut open = vec![set.to_vec()];
     while let Some(set) = open.pop() {
@@ -120,14 +132,35 @@ pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequen
 }
 
 /// Splits a set: the smallest group that leaves straight, else a part that leaves on several legs.
-fn split(assembly: &Assembly, blocking: &mut Blocking<'_>, set: &[usize], until: Instant) -> Result<Step, (Blocked, bool)> {
-    let rest = |group: &[usize]| set.iter().copied().filter(|p| !group.contains(p)).collect::<Vec<_>>();
+fn split(
+    assembly: &Assembly,
+    blocking: &mut Blocking<'_>,
+    set: &[usize],
+    until: Instant,
+) -> Result<Step, (Blocked, bool)> {
+    let rest = |group: &[usize]| {
+        set.iter()
+            .copied()
+            .filter(|p| !group.contains(p))
+            .collect::<Vec<_>>()
+    };
     if let Some(leaving) = blocking.leaving(set, until).into_iter().next() {
         let onto = rest(&leaving.parts);
-        let moved = Moved { parts: &leaving.parts, by: DAffine3::IDENTITY };
+        let moved = Moved {
+            parts: &leaving.parts,
+            by: DAffine3::IDENTITY,
+        };
         let far = crate::mobility::leaving_mm(assembly, &moved, &onto, leaving.direction);
-        let path = Path { legs: vec![Motion::slide(leaving.direction * far)] };
-        return Ok(Step { group: leaving.parts, onto, path, least: None, measured: false });
+        let path = Path {
+            legs: vec![Motion::slide(leaving.direction * far)],
+        };
+        return Ok(Step {
+            group: leaving.parts,
+            onto,
+            path,
+            least: None,
+            measured: false,
+        });
     }
     let mut groups: Vec<Vec<usize>> = set.iter().map(|&p| vec![p]).collect();
     groups.sort_by(|a, b| volume(assembly, a).total_cmp(&volume(assembly, b)));
@@ -147,9 +180,20 @@ fn split(assembly: &Assembly, blocking: &mut Blocking<'_>, set: &[usize], until:
             break;
         }
         let onto = rest(&group);
-        let budget = Budget { until: Instant::now() + left.div_f64((count - i).min(3) as f64), legs: 12 };
+        let budget = Budget {
+            until: Instant::now() + left.div_f64((count - i).min(3) as f64),
+            legs: 12,
+        };
         match remove(assembly, &group, &onto, &[], &budget) {
-            Removal::Out(path) => return Ok(Step { group, onto, path, least: None, measured: false }),
+            Removal::Out(path) => {
+                return Ok(Step {
+                    group,
+                    onto,
+                    path,
+                    least: None,
+                    measured: false,
+                });
+            }
             Removal::Blocked(blocked) => worst = Some(nearer(worst, blocked)),
             Removal::TimedOut(blocked) => {
                 timed_out = true;
@@ -157,20 +201,30 @@ fn split(assembly: &Assembly, blocking: &mut Blocking<'_>, set: &[usize], until:
             }
         }
     }
-    let blocked = worst.unwrap_or(Blocked { pair: [set[0], set[1]], overlap_mm: None });
+    let blocked = worst.unwrap_or(Blocked {
+        pair: [set[0], set[1]],
+        overlap_mm: None,
+    });
     Err((blocked, timed_out))
 }
 
 /// The one of two blocks that lacks less.
 fn nearer(known: Option<Blocked>, new: Blocked) -> Blocked {
     match known {
-        Some(known) if known.overlap_mm.unwrap_or(f64::INFINITY) <= new.overlap_mm.unwrap_or(f64::INFINITY) => known,
+        Some(known)
+            if known.overlap_mm.unwrap_or(f64::INFINITY) <= new.overlap_mm.unwrap_or(f64::INFINITY) =>
+        {
+            known
+        }
         _ => new,
     }
 }
 
 fn volume(assembly: &Assembly, group: &[usize]) -> f64 {
-    group.iter().map(|&p| assembly.body(p).surface().shape().volume_mm3.abs()).sum()
+    group
+        .iter()
+        .map(|&p| assembly.body(p).surface().shape().volume_mm3.abs())
+        .sum()
 }
 
 /// Pairs of touching parts of `set`.
@@ -193,9 +247,14 @@ pub fn measure(assembly: &Assembly, step: &Step, until: Instant) -> Option<Optio
             if Instant::now() >= until {
                 return None;
             }
-            let moved = Moved { parts: &step.group, by };
+            let moved = Moved {
+                parts: &step.group,
+                by,
+            };
             let within = least.map_or(FAR_MM, |l| l.gap.distance_mm);
-            if let Some((t, found)) = assembly.least_over(&moved, std::slice::from_ref(part), leg, MEASURE_STEP_MM, within) {
+            if let Some((t, found)) =
+                assembly.least_over(&moved, std::slice::from_ref(part), leg, MEASURE_STEP_MM, within)
+            {
                 least = Some(found);
                 at = leg.at(t) * by;
             }
@@ -203,8 +262,13 @@ pub fn measure(assembly: &Assembly, step: &Step, until: Instant) -> Option<Optio
         by = leg.at(1.0) * by;
     }
     if let Some(known) = least {
-        let moved = Moved { parts: &known.pair[..1], by: at };
-        least = assembly.clearance(&moved, &known.pair[1..], known.gap.distance_mm + 1e-6, true).or(least);
+        let moved = Moved {
+            parts: &known.pair[..1],
+            by: at,
+        };
+        least = assembly
+            .clearance(&moved, &known.pair[1..], known.gap.distance_mm + 1e-6, true)
+            .or(least);
     }
     Some(least)
 }

@@ -25,12 +25,20 @@ fn pair() -> &'static (Assembly, DAffine3) {
 fn gap(shift: DVec3, exact: bool) -> f64 {
     let (assembly, inside) = pair();
     let by = DAffine3::from_translation(shift) * *inside;
-    assembly.clearance(&Moved { parts: &[1], by }, &[0], f64::INFINITY, exact).unwrap().gap.distance_mm
+    assembly
+        .clearance(&Moved { parts: &[1], by }, &[0], f64::INFINITY, exact)
+        .unwrap()
+        .gap
+        .distance_mm
 }
 
 #[test]
 fn the_centred_peg_has_half_the_clearance() {
-    assert!((gap(DVec3::ZERO, true) - 0.5).abs() < 1e-6, "{}", gap(DVec3::ZERO, true));
+    assert!(
+        (gap(DVec3::ZERO, true) - 0.5).abs() < 1e-6,
+        "{}",
+        gap(DVec3::ZERO, true)
+    );
 }
 
 proptest! {

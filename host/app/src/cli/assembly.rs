@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use mortise_brep::LoadOptions;
 use mortise_output::lines;
 use mortise_task::removal::{Budget, Removal, remove};
 use mortise_task::report::{self, Sense, SequenceReport};
@@ -65,9 +66,16 @@ pub struct DisassembleArgs {
     part: Option<String>,
 }
 
+/// Largest distance between a spline and the simpler surface recognised in it, mm: that of `contacts`.
+const FIT_MM: f64 = 1e-3;
+
 fn read(file: &Path, reading: &Reading) -> anyhow::Result<Assembly> {
     reading.apply();
-    Ok(Assembly::new(mortise_brep::load_step(file)?)?)
+    let options = LoadOptions {
+        recognise_mm: FIT_MM,
+        ..LoadOptions::default()
+    };
+    Ok(Assembly::new(mortise_brep::load_step_with(file, &options)?)?)
 }
 
 /// Runs `mobility`.
@@ -84,7 +92,10 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
             parts: Vec<report::PartMobility<'a>>,
             warnings: &'a [String],
         }
-        lines::json(&Report { parts: found, warnings: &assembly.model.warnings })?;
+        lines::json(&Report {
+            parts: found,
+            warnings: &assembly.model.warnings,
+        })?;
         return Ok(ExitCode::SUCCESS);
     }
     for part in &found {
@@ -99,8 +110,15 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
         for r in &part.rotations {
             let [x, y, z] = r.point_mm;
             let [back, forth] = r.range_deg;
-            let range = if r.reach == mortise_task::mobility::Reach::Full { "all around".into() } else { format!("−{back:.2}° to {forth:.2}°") };
-            lines::text(&format!("  about {} through {x:.3}, {y:.3}, {z:.3} mm: {range}", direction(r.direction)))?;
+            let range = if r.reach == mortise_task::mobility::Reach::Full {
+                "all around".into()
+            } else {
+                format!("−{back:.2}° to {forth:.2}°")
+            };
+            lines::text(&format!(
+                "  about {} through {x:.3}, {y:.3}, {z:.3} mm: {range}",
+                direction(r.direction)
+            ))?;
         }
         if part.translations.is_empty() && part.rotations.is_empty() {
             lines::text("  held")?;
@@ -110,9 +128,19 @@ pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn direction([x, y, z]: [f64; 3]) -> String {
-    let names = [([1.0, 0.0, 0.0], "+x"), ([-1.0, 0.0, 0.0], "-x"), ([0.0, 1.0, 0.0], "+y"), ([0.0, -1.0, 0.0], "-y"), ([0.0, 0.0, 1.0], "+z"), ([0.0, 0.0, -1.0], "-z")];
+    let names = [
+        ([1.0, 0.0, 0.0], "+x"),
+        ([-1.0, 0.0, 0.0], "-x"),
+        ([0.0, 1.0, 0.0], "+y"),
+        ([0.0, -1.0, 0.0], "-y"),
+        ([0.0, 0.0, 1.0], "+z"),
+        ([0.0, 0.0, -1.0], "-z"),
+    ];
     let near = |d: &[f64; 3]| (d[0] - x).abs().max((d[1] - y).abs()).max((d[2] - z).abs()) < 1e-6;
-    names.iter().find(|(d, _)| near(d)).map_or_else(|| format!("({x:.4}, {y:.4}, {z:.4})"), |(_, name)| (*name).into())
+    names
+        .iter()
+        .find(|(d, _)| near(d))
+        .map_or_else(|| format!("({x:.4}, {y:.4}, {z:.4})"), |(_, name)| (*name).into())
 }
 
 /// Runs `assemble`.
@@ -132,7 +160,10 @@ pub fn disassemble(args: &DisassembleArgs) -> anyhow::Result<ExitCode> {
         Some(name) => take_out(&assembly, assembly.part(name)?, time),
         None => sequence::disassemble(&assembly, &(0..assembly.count()).collect::<Vec<_>>(), time),
     };
-    print_sequence(&report::sequence(&assembly, &found, Sense::Disassembly), search.json)
+    print_sequence(
+        &report::sequence(&assembly, &found, Sense::Disassembly),
+        search.json,
+    )
 }
 
 /// Removal of one part from all others in place.
@@ -140,10 +171,21 @@ fn take_out(assembly: &Assembly, part: usize, time: Duration) -> Sequence {
     let start = Instant::now();
     let group = vec![part];
     let onto: Vec<usize> = (0..assembly.count()).filter(|&p| p != part).collect();
-    let mut found = Sequence { steps: Vec::new(), stuck: Vec::new(), timed_out: false, time };
+    let mut found = Sequence {
+        steps: Vec::new(),
+        stuck: Vec::new(),
+        timed_out: false,
+        time,
+    };
     match remove(assembly, &group, &onto, &[], &Budget::lasting(time)) {
         Removal::Out(path) => {
-            let mut step = Step { group, onto, path, least: None, measured: false };
+            let mut step = Step {
+                group,
+                onto,
+                path,
+                least: None,
+                measured: false,
+            };
             // A way that was found is measured, also when the time is nearly over.
             if let Some(least) = sequence::measure(assembly, &step, Instant::now() + time) {
                 step.least = least;
@@ -163,7 +205,11 @@ fn take_out(assembly: &Assembly, part: usize, time: Duration) -> Sequence {
 
 /// Prints a sequence; exit code 1 when parts stay together.
 fn print_sequence(report: &SequenceReport<'_>, json: bool) -> anyhow::Result<ExitCode> {
-    let code = if report.stuck.is_empty() && report.verdict != "timed_out" { ExitCode::SUCCESS } else { ExitCode::from(1) };
+    let code = if report.stuck.is_empty() && report.verdict != "timed_out" {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(1)
+    };
     if json {
         lines::json(report)?;
         return Ok(code);
@@ -179,22 +225,41 @@ fn print_sequence(report: &SequenceReport<'_>, json: bool) -> anyhow::Result<Exi
             (Some(_), None) => "clear".into(),
             (None, _) => "not measured in the time".into(),
         };
-        let legs = if step.legs > 1 { format!(", {} legs", step.legs) } else { String::new() };
-        lines::text(&format!("{}. {} {way}{legs}: {gap}", step.step, step.moving.join(", ")))?;
+        let legs = if step.legs > 1 {
+            format!(", {} legs", step.legs)
+        } else {
+            String::new()
+        };
+        lines::text(&format!(
+            "{}. {} {way}{legs}: {gap}",
+            step.step,
+            step.moving.join(", ")
+        ))?;
     }
     for stuck in &report.stuck {
         let [a, b] = stuck.pair;
-        let lacks = stuck.overlap_um.map_or(String::new(), |um| format!(" by {um:.1} µm at the least"));
-        lines::text(&format!("{} stay together: {a} meets {b}{lacks}", stuck.parts.join(", ")))?;
+        let lacks = stuck
+            .overlap_um
+            .map_or(String::new(), |um| format!(" by {um:.1} µm at the least"));
+        lines::text(&format!(
+            "{} stay together: {a} meets {b}{lacks}",
+            stuck.parts.join(", ")
+        ))?;
     }
-    lines::text(&format!("{} in {:.1} s", report.verdict.replace('_', " "), report.time_s))?;
+    lines::text(&format!(
+        "{} in {:.1} s",
+        report.verdict.replace('_', " "),
+        report.time_s
+    ))?;
     Ok(code)
 }
 
 /// Runs `features`.
 pub fn features(args: &FeaturesArgs) -> anyhow::Result<ExitCode> {
     let assembly = read(&args.file, &args.reading)?;
-    let found: Vec<_> = (0..assembly.count()).map(|p| (assembly.name(p), ports::ports(&assembly, p))).collect();
+    let found: Vec<_> = (0..assembly.count())
+        .map(|p| (assembly.name(p), ports::ports(&assembly, p)))
+        .collect();
     let connections = report::connections(&assembly);
     if args.json {
         #[derive(Serialize)]
@@ -209,7 +274,11 @@ pub fn features(args: &FeaturesArgs) -> anyhow::Result<ExitCode> {
             warnings: &'a [String],
         }
         let parts = found.iter().map(|(part, ports)| Part { part, ports }).collect();
-        lines::json(&Report { parts, connections, warnings: &assembly.model.warnings })?;
+        lines::json(&Report {
+            parts,
+            connections,
+            warnings: &assembly.model.warnings,
+        })?;
         return Ok(ExitCode::SUCCESS);
     }
     for (part, ports) in &found {

@@ -15,7 +15,9 @@ pub fn own(path: &str) -> Assembly {
 #[allow(dead_code)]
 pub fn shared(test: &str) -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("MORTISE_SHARED").map_or(beside, PathBuf::from).join("cad");
+    let folder = std::env::var_os("MORTISE_SHARED")
+        .map_or(beside, PathBuf::from)
+        .join("cad");
     if folder.is_dir() {
         return Some(folder);
     }
