@@ -118,11 +118,11 @@ fn edge(assembly: &Assembly, a: usize, b: usize) -> Option<Edge> {
     if pressed && fits.iter().any(|f| f.clearance_mm <= 0.0) {
         kinds.push(Connection::Pressed);
     }
-    kinds.extend(contacts.iter().filter_map(|&i| match assembly.contacts[i].kind {
-        ContactKind::Planar => Some(Connection::Resting),
-        ContactKind::Conical => Some(Connection::Seated),
-        ContactKind::Spherical | ContactKind::Annular => Some(Connection::Ball),
-        ContactKind::Cylindrical => Some(Connection::Inserted),
+    kinds.extend(contacts.iter().map(|&i| match assembly.contacts[i].kind {
+        ContactKind::Planar => Connection::Resting,
+        ContactKind::Conical => Connection::Seated,
+        ContactKind::Spherical | ContactKind::Annular => Connection::Ball,
+        ContactKind::Cylindrical => Connection::Inserted,
     }));
     let strength = |kind: &Connection| match kind {
         Connection::Screwed => 0,

@@ -21,12 +21,16 @@ pub mod directions;
 mod error;
 pub mod graph;
 mod helix;
+mod leg;
 pub mod mobility;
 mod motion;
+mod opening;
 pub mod ports;
 pub mod removal;
 pub mod report;
+mod search;
 pub mod sequence;
+mod way;
 
 pub use assembly::{ALLOWED_MM, Assembly, Clearance, Moved, SEARCH_STEP_MM};
 pub use body::{Body, SAMPLE_ERROR_MM, Sample};
