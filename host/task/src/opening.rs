@@ -1,5 +1,7 @@
 //! Where along a leg another motion opens, and by how much it is missed where it does not.
 
+use std::time::Duration;
+
 use glam::{DAffine3, DVec3};
 
 use crate::assembly::{Moved, SEARCH_STEP_MM};
@@ -21,6 +23,8 @@ const PUSH_MM: f64 = 5e-3;
 const MOST_MISSED: usize = 6;
 const NEAR_MM: f64 = 0.2;
 const NEEDED_STEP_MM: f64 = 0.1;
+/// Time after the end of a search for the question by how much the group is held.
+const HELD_TIME: Duration = Duration::from_secs(4);
 
 /// Least overlap on a leg: where, mm along it; how deep, mm; of which pair.
 type Least = (f64, f64, [usize; 2]);
@@ -203,6 +207,9 @@ impl Search<'_> {
         let mut most = (0.0, missed.pair);
         let mut travel = 0.0;
         while travel < missed.most {
+            if self.budget.until.elapsed() > HELD_TIME {
+                return (DEEP_MM, missed.pair);
+            }
             let moved = Moved {
                 parts: self.parts,
                 by: motion.over(travel).at(1.0) * by,
