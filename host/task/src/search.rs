@@ -1,0 +1,317 @@
+//! The search for a way of several legs: places, the motions from each, and the order in which they are tried.
+
+use glam::{DAffine3, DVec3};
+
+use crate::assembly::{Assembly, Moved, SEARCH_STEP_MM};
+use crate::cone::cone;
+use crate::directions::{Line, candidates, contact_normals, same_line};
+use crate::leg::{Kind, Missed};
+use crate::mobility::{PLAY_MM, leaving_mm};
+use crate::motion::Motion;
+use crate::way::{Budget, Path};
+
+/// Displacement past its present range by which a blocked motion is tested, as a share of the group's size and its limits, mm of travel: a larger one overlooks
+/// shallow openings, a smaller one takes more tests.
+const OPENING: f64 = 0.04;
+const OPENING_MM: [f64; 2] = [0.5, 3.0];
+/// Poses nearer to each other than this are one, mm and radians.
+const SAME_POSE: (f64, f64) = (0.4, 0.03);
+/// Directions and axes used at each place.
+const DIRECTIONS: usize = 5;
+const AXES: usize = 4;
+
+/// State of a search.
+pub(crate) struct Search<'a> {
+    pub assembly: &'a Assembly,
+    pub parts: &'a [usize],
+    pub others: &'a [usize],
+    pub extra: &'a [DVec3],
+    pub budget: &'a Budget,
+    pub seen: Vec<DAffine3>,
+    /// Narrowly missed openings, least overlap first.
+    pub missed: Vec<Missed>,
+    pub out_of_time: bool,
+    /// Whether turns about the place where the group is held count.
+    pub tilts: bool,
+    /// Least displacement of an opening, mm.
+    pub opening_mm: f64,
+}
+
+impl<'a> Search<'a> {
+    /// A search that has not begun.
+    pub fn new(
+        assembly: &'a Assembly,
+        parts: &'a [usize],
+        others: &'a [usize],
+        extra: &'a [DVec3],
+        budget: &'a Budget,
+    ) -> Self {
+        let (low, high) = assembly.bounds_of(parts, DAffine3::IDENTITY);
+        Self {
+            assembly,
+            parts,
+            others,
+            extra,
+            budget,
+            seen: vec![DAffine3::IDENTITY],
+            missed: Vec::new(),
+            out_of_time: false,
+            tilts: false,
+            opening_mm: (OPENING * low.distance(high)).clamp(OPENING_MM[0], OPENING_MM[1]),
+        }
+    }
+}
+
+/// A place of the search.
+struct Place {
+    by: DAffine3,
+    legs: Vec<Motion>,
+}
+
+impl Search<'_> {
+    fn group(&self, by: DAffine3) -> Moved<'_> {
+        Moved {
+            parts: self.parts,
+            by,
+        }
+    }
+
+    /// Directions to try from a pose, both ways, and extreme rays of its contacts.
+    fn directions(&self, group: &Moved<'_>) -> Vec<DVec3> {
+        let c = cone(&contact_normals(self.assembly, group, self.others));
+        let found = candidates(self.assembly, group, self.others).directions;
+        let mut all: Vec<DVec3> = Vec::new();
+        let both = found
+            .iter()
+            .chain(self.extra)
+            .chain(&c.lines)
+            .flat_map(|&d| [d, -d]);
+        for d in c.rays.iter().copied().chain(both) {
+            if all.iter().all(|e| e.dot(d) < 1.0 - 1e-6) {
+                all.push(d);
+            }
+        }
+        all
+    }
+
+    /// A straight way out from a pose.
+    pub fn straight(&self, group: &Moved<'_>) -> Option<Motion> {
+        for d in self.directions(group) {
+            if self.budget.is_over() {
+                return None;
+            }
+            let first = Motion::slide(d * PLAY_MM);
+            if self
+                .assembly
+                .free_share(group, self.others, &first, SEARCH_STEP_MM)
+                .0
+                < 1.0
+            {
+                continue;
+            }
+            let far = leaving_mm(self.assembly, group, self.others, d);
+            let motion = Motion::slide(d * far);
+            if self
+                .assembly
+                .free_share(group, self.others, &motion, SEARCH_STEP_MM)
+                .0
+                >= 1.0
+            {
+                return Some(motion);
+            }
+        }
+        None
+    }
+
+    pub fn legs(&mut self) -> Option<Path> {
+        let mut open = vec![Place {
+            by: DAffine3::IDENTITY,
+            legs: Vec::new(),
+        }];
+        while let Some(place) = open.pop() {
+            if self.budget.is_over() {
+                self.out_of_time = true;
+                return None;
+            }
+            if place.legs.len() + 1 > self.budget.legs {
+                continue;
+            }
+            let group = Moved {
+                parts: self.parts,
+                by: place.by,
+            };
+            if !place.legs.is_empty()
+                && let Some(last) = self.straight(&group)
+            {
+                let mut legs = place.legs;
+                legs.push(last);
+                return Some(Path { legs });
+            }
+            let mut next = self.openings(&place);
+            // The largest gain is expanded first.
+            next.sort_by(|a, b| a.0.total_cmp(&b.0));
+            open.extend(next.into_iter().map(|(_, place)| place));
+        }
+        None
+    }
+
+    /// Places reached by one leg at which another motion opens, with the gain of that motion in mm.
+    fn openings(&mut self, place: &Place) -> Vec<(f64, Place)> {
+        let group = Moved {
+            parts: self.parts,
+            by: place.by,
+        };
+        let kinds = self.kinds(&group);
+        let mut ranges = Vec::new();
+        for kind in &kinds {
+            if self.budget.is_over() {
+                self.out_of_time = true;
+                return Vec::new();
+            }
+            ranges.push(self.range(&group, kind));
+        }
+        let mut found = Vec::new();
+        for (p, &(reach, _)) in kinds.iter().zip(&ranges) {
+            if reach <= PLAY_MM {
+                continue;
+            }
+            for (q, &(range, pair)) in kinds.iter().zip(&ranges) {
+                if self.budget.is_over() {
+                    self.out_of_time = true;
+                    return found;
+                }
+                if pair.is_none() {
+                    continue;
+                }
+                if let Some(opening) = self.opening(&group, p, reach, q, range) {
+                    let leg = p.over(opening.at);
+                    let by = opening.shift() * leg.at(1.0) * place.by;
+                    if self.is_new(by) {
+                        self.seen.push(by);
+                        let mut legs = place.legs.clone();
+                        legs.push(leg);
+                        legs.extend(opening.shift.map(Motion::slide));
+                        found.push((opening.gain, Place { by, legs }));
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    fn kinds(&self, group: &Moved<'_>) -> Vec<Kind> {
+        let found = candidates(self.assembly, group, self.others);
+        let directions: Vec<DVec3> = found.directions.iter().take(DIRECTIONS).copied().collect();
+        let mut kinds: Vec<Kind> = directions
+            .iter()
+            .flat_map(|&d| [Kind::Slide(d), Kind::Slide(-d)])
+            .collect();
+        let mut axes: Vec<Line> = found.axes.into_iter().take(AXES).collect();
+        // Where the group is held narrowly it can tilt.
+        if self.tilts
+            && let Some(pivot) = self.pivot(group)
+        {
+            for &direction in directions.iter().take(3) {
+                let axis = Line {
+                    point: pivot,
+                    direction,
+                };
+                if axes.iter().all(|known| !same_line(*known, axis)) {
+                    axes.push(axis);
+                }
+            }
+        }
+        let points: Vec<DVec3> = self
+            .parts
+            .iter()
+            .flat_map(|&p| {
+                let pose = group.by * self.assembly.placement(p);
+                self.assembly
+                    .body(p)
+                    .samples()
+                    .iter()
+                    .step_by(7)
+                    .map(move |s| pose.transform_point3(s.position))
+            })
+            .collect();
+        for axis in axes {
+            let arm = points
+                .iter()
+                .map(|p| (*p - axis.point).reject_from_normalized(axis.direction).length())
+                .fold(0.0, f64::max);
+            if arm > 0.1 {
+                let back = Line {
+                    direction: -axis.direction,
+                    ..axis
+                };
+                kinds.extend([Kind::Turn(axis, arm), Kind::Turn(back, arm)]);
+            }
+        }
+        kinds
+    }
+
+    /// Middle of the samples of the group that are about as near to the others as its nearest.
+    fn pivot(&self, group: &Moved<'_>) -> Option<DVec3> {
+        let least = self.assembly.clearance(group, self.others, 5.0, false)?;
+        let [a, b] = least.pair;
+        let within = least.gap.distance_mm.max(0.0) + 0.3;
+        let (pa, pb) = (
+            self.assembly.placed(a, group.by),
+            self.assembly.placed(b, DAffine3::IDENTITY),
+        );
+        let to = pb.pose.inverse() * pa.pose;
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
+        for s in pa.body.samples() {
+            if !pb.body.exceeds(to.transform_point3(s.position), within) {
+                let p = pa.pose.transform_point3(s.position);
+                (low, high) = (low.min(p), high.max(p));
+            }
+        }
+        low.is_finite().then(|| (low + high) / 2.0)
+    }
+
+    /// Free travel of a motion, mm, and the pair that ends it (`None`: it leaves, or turns all around).
+    fn range(&self, group: &Moved<'_>, kind: &Kind) -> (f64, Option<[usize; 2]>) {
+        let most = match kind {
+            Kind::Slide(d) => leaving_mm(self.assembly, group, self.others, *d),
+            Kind::Turn(_, arm) => std::f64::consts::TAU * arm,
+        };
+        let (share, pair) = self
+            .assembly
+            .touch_share(group, self.others, &kind.over(most), SEARCH_STEP_MM);
+        (share * most, pair)
+    }
+
+    /// Most travel by which a motion is displaced, mm: until it leaves, or half a turn.
+    pub fn most(&self, group: &Moved<'_>, q: &Kind) -> f64 {
+        match q {
+            Kind::Slide(d) => leaving_mm(self.assembly, group, self.others, *d),
+            Kind::Turn(_, arm) => std::f64::consts::PI * arm,
+        }
+    }
+
+    fn is_new(&self, by: DAffine3) -> bool {
+        let center = self.assembly.bounds_of(self.parts, DAffine3::IDENTITY);
+        let center = (center.0 + center.1) / 2.0;
+        self.seen.iter().all(|known| {
+            let apart = Motion::between(known, &by, known.transform_point3(center));
+            apart.slide.length() > SAME_POSE.0 || apart.angle.abs() > SAME_POSE.1
+        })
+    }
+
+    pub fn nearest_pair(&self) -> [usize; 2] {
+        let group = self.group(DAffine3::IDENTITY);
+        self.assembly
+            .clearance(&group, self.others, f64::INFINITY, false)
+            .map_or_else(
+                || {
+                    [
+                        self.parts.first().copied().unwrap_or(0),
+                        self.others.first().copied().unwrap_or(0),
+                    ]
+                },
+                |c| c.pair,
+            )
+    }
+}

@@ -1,0 +1,80 @@
+//! Ways out, and the bounds of a search for one.
+
+use std::time::{Duration, Instant};
+
+use glam::DAffine3;
+
+use crate::motion::Motion;
+
+/// A collision-free way of a group from its place: legs one after another, in the assembly's frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Path {
+    /// The legs. Each starts where the one before ends.
+    pub legs: Vec<Motion>,
+}
+
+impl Path {
+    /// Motions of the group from its place: the start (identity), and the end of every leg.
+    pub fn poses(&self) -> Vec<DAffine3> {
+        let mut poses = vec![DAffine3::IDENTITY];
+        for leg in &self.legs {
+            poses.push(leg.at(1.0) * poses[poses.len() - 1]);
+        }
+        poses
+    }
+
+    /// The way back, from outside into place: its legs, and where the group is at its start.
+    pub fn reversed(&self) -> (DAffine3, Self) {
+        let start = self.poses().pop().unwrap_or(DAffine3::IDENTITY);
+        (
+            start,
+            Self {
+                legs: self.legs.iter().rev().map(Motion::reversed).collect(),
+            },
+        )
+    }
+}
+
+/// What keeps a group in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blocked {
+    /// Part of the group, and the part that holds it.
+    pub pair: [usize; 2],
+    /// Overlap that the group would need to leave straight, or turn by half a turn, at the most promising place found, mm: by how much it is held. `None` where
+    /// no such place was within a millimetre.
+    pub overlap_mm: Option<f64>,
+}
+
+/// Result of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Removal {
+    /// It comes out on this way.
+    Out(Path),
+    /// All that the search knows was tried.
+    Blocked(Blocked),
+    /// Time ran out first.
+    TimedOut(Blocked),
+}
+
+/// Bounds of a search.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    /// When it ends.
+    pub until: Instant,
+    /// Most legs of a way; 1: straight ways only.
+    pub legs: usize,
+}
+
+impl Budget {
+    /// Ends after this long; up to twelve legs.
+    pub fn lasting(time: Duration) -> Self {
+        Self {
+            until: Instant::now() + time,
+            legs: 12,
+        }
+    }
+
+    pub(crate) fn is_over(&self) -> bool {
+        Instant::now() >= self.until
+    }
+}

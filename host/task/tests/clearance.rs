@@ -1,0 +1,90 @@
+//! Clearances and sweeps against closed forms: a peg of 17.75 mm in a hole of 18.75 mm, moved sideways, tilted and turned.
+
+mod support;
+
+use std::sync::OnceLock;
+
+use glam::{DAffine3, DVec3};
+use mortise_task::{Assembly, Motion, Moved, SEARCH_STEP_MM};
+use proptest::prelude::*;
+
+/// The assembly, and the peg's motion from beside the block, on the hole's axis, to the middle of the hole.
+fn pair() -> &'static (Assembly, DAffine3) {
+    static PAIR: OnceLock<(Assembly, DAffine3)> = OnceLock::new();
+    PAIR.get_or_init(|| {
+        let assembly = support::own("app/samples/pair_d18.75_clear1.00.step");
+        let middle = |part| {
+            let (low, high) = assembly.bounds(part, DAffine3::IDENTITY);
+            (low + high) / 2.0
+        };
+        let by = DAffine3::from_translation((middle(0) - middle(1)) * DVec3::Z);
+        (assembly, by)
+    })
+}
+
+fn gap(shift: DVec3, exact: bool) -> f64 {
+    let (assembly, inside) = pair();
+    let by = DAffine3::from_translation(shift) * *inside;
+    assembly
+        .clearance(&Moved { parts: &[1], by }, &[0], f64::INFINITY, exact)
+        .unwrap()
+        .gap
+        .distance_mm
+}
+
+#[test]
+fn the_centred_peg_has_half_the_clearance() {
+    assert!(
+        (gap(DVec3::ZERO, true) - 0.5).abs() < 1e-6,
+        "{}",
+        gap(DVec3::ZERO, true)
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Sideways by d the least distance is 0.5 − d, also where that is an overlap: within 0.1 µm after the descent, and the samples alone find no less.
+    #[test]
+    fn sideways_the_distance_is_that_of_circles(angle in 0.0..std::f64::consts::TAU, d in 0.0..0.9f64) {
+        let shift = DVec3::new(angle.cos(), angle.sin(), 0.0) * d;
+        let (sampled, exact) = (gap(shift, false), gap(shift, true));
+        prop_assert!((exact - (0.5 - d)).abs() < 1e-4, "{exact} {}", 0.5 - d);
+        prop_assert!(sampled >= exact - 1e-9 && sampled - exact < 0.02, "{sampled} {exact}");
+    }
+
+    /// A slide sideways ends where the peg touches, allowance included, and a turn about the axis does not end.
+    #[test]
+    fn a_slide_ends_at_the_wall(angle in 0.0..std::f64::consts::TAU, length in 1.0..30.0f64) {
+        let (assembly, inside) = pair();
+        let group = Moved { parts: &[1], by: *inside };
+        let along = DVec3::new(angle.cos(), angle.sin(), 0.0) * length;
+        let (share, met) = assembly.touch_share(&group, &[0], &Motion::slide(along), SEARCH_STEP_MM);
+        prop_assert_eq!(met, Some([1, 0]));
+        // The samples see the wall up to their chord error late.
+        let touch = share * length;
+        prop_assert!(touch >= 0.5 - 1e-6 && touch < 0.5 + assembly.allowed_mm(0, 1) + 0.02, "{touch}");
+        let turn = Motion::turn(DVec3::ZERO, DVec3::Z, 6.0);
+        prop_assert_eq!(assembly.free_share(&group, &[0], &turn, SEARCH_STEP_MM), (1.0, None));
+    }
+
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    /// Over a motion the least distance is no more than that of any pose on it.
+    #[test]
+    fn the_least_over_a_motion_is_the_least_of_its_poses(x in -0.4..0.4f64, y in -0.4..0.4f64, z in -30.0..30.0f64, tilt in -0.01..0.01f64) {
+        let (assembly, inside) = pair();
+        let group = Moved { parts: &[1], by: *inside };
+        let (low, high) = assembly.bounds(1, *inside);
+        let motion = Motion { slide: DVec3::new(x, y, z), point: (low + high) / 2.0, axis: DVec3::X, angle: tilt };
+        let (_, least) = assembly.least_over(&group, &[0], &motion, 0.05, f64::INFINITY).unwrap();
+        for i in 0..=10 {
+            let by = motion.at(f64::from(i) / 10.0) * *inside;
+            let there = assembly.clearance(&Moved { parts: &[1], by }, &[0], f64::INFINITY, false).unwrap().gap.distance_mm;
+            prop_assert!(least.gap.distance_mm <= there + 0.05, "{} {there}", least.gap.distance_mm);
+        }
+    }
+}

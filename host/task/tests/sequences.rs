@@ -1,0 +1,121 @@
+//! Ways out and sequences on the shared extraction tasks: found, free by the exact distance at every waypoint, and in an order that meets every constraint.
+
+mod support;
+
+use std::time::{Duration, Instant};
+
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_task::removal::{Budget, Path, Removal, remove};
+use mortise_task::report::{self, Sense};
+use mortise_task::{Assembly, Moved, sequence};
+use serde_json::Value;
+
+/// Removes part 1 from part 0 and checks the way by its waypoints, the form in which it is published.
+fn out(assembly: &Assembly, time_s: u64) -> Option<Path> {
+    let Removal::Out(path) = remove(
+        assembly,
+        &[1],
+        &[0],
+        &[],
+        &Budget::lasting(Duration::from_secs(time_s)),
+    ) else {
+        return None;
+    };
+    for w in report::waypoints(&path, DAffine3::IDENTITY) {
+        let [a, x, y, z] = w.q;
+        let by = DAffine3::from_rotation_translation(DQuat::from_xyzw(x, y, z, a), DVec3::from_array(w.t));
+        let gap = assembly
+            .clearance(&Moved { parts: &[1], by }, &[0], 1e3, true)
+            .map_or(1e3, |c| c.gap.distance_mm);
+        assert!(gap > -0.01, "overlap of {gap} mm at {w:?}");
+    }
+    let (low, high) = assembly.bounds(1, path.poses().pop().unwrap());
+    let (l, h) = assembly.bounds(0, DAffine3::IDENTITY);
+    assert!((low - h).max(l - high).max_element() > 0.0, "still inside");
+    Some(path)
+}
+
+#[test]
+fn straight_and_turned_ways_out_are_found() {
+    let Some(folder) = support::shared("straight_and_turned_ways_out_are_found") else {
+        return;
+    };
+    for (name, legs) in [("ubolt_plate", 1), ("cross_pin", 3)] {
+        let assembly = support::load(&folder.join("10_extraction"), &format!("{name}.step"));
+        let path = out(&assembly, 240).unwrap_or_else(|| panic!("{name} stays in"));
+        assert_eq!(path.legs.len(), legs, "{name}: {path:?}");
+    }
+}
+
+#[test]
+fn without_time_nothing_is_claimed() {
+    let assembly = support::own("mating/tests/data/two_pin_exact.step");
+    let budget = Budget {
+        until: Instant::now(),
+        legs: 12,
+    };
+    assert!(matches!(
+        remove(&assembly, &[1], &[0], &[], &budget),
+        Removal::TimedOut(_)
+    ));
+    let found = sequence::disassemble(&assembly, &[0, 1], Duration::ZERO);
+    assert!(found.timed_out && found.steps.is_empty());
+    assert_eq!(
+        report::sequence(&assembly, &found, Sense::Assembly).verdict,
+        "timed_out"
+    );
+}
+
+/// The step after which two parts are together in a plan of steps (group, onto).
+fn together(plan: &[(Vec<&str>, Vec<&str>)], a: &str, b: &str) -> usize {
+    let meets = |(group, onto): &(Vec<&str>, Vec<&str>)| {
+        (group.contains(&a) && onto.contains(&b)) || (group.contains(&b) && onto.contains(&a))
+    };
+    plan.iter().position(meets).unwrap()
+}
+
+fn meets(plan: &[(Vec<&str>, Vec<&str>)], constraint: &Value) -> bool {
+    if let Some(any) = constraint["any"].as_array() {
+        return any.iter().any(|c| meets(plan, c));
+    }
+    let step = |key: &str| {
+        together(
+            plan,
+            constraint[key][0].as_str().unwrap(),
+            constraint[key][1].as_str().unwrap(),
+        )
+    };
+    step("first") <= step("then")
+}
+
+#[test]
+fn the_box_goes_together_in_its_order() {
+    let Some(folder) = support::shared("the_box_goes_together_in_its_order") else {
+        return;
+    };
+    let folder = folder.join("10_extraction");
+    let assembly = support::load(&folder, "box_with_board.step");
+    let all: Vec<usize> = (0..assembly.count()).collect();
+    let found = sequence::disassemble(&assembly, &all, Duration::from_secs(240));
+    assert!(found.complete(), "{found:?}");
+    let report = report::sequence(&assembly, &found, Sense::Assembly);
+    assert_eq!((report.verdict, report.steps.len()), ("assembles", 6));
+    assert!(
+        report
+            .steps
+            .iter()
+            .all(|s| s.overlap_um.is_some_and(|um| um < 2.0)),
+        "{report:?}"
+    );
+    let plan: Vec<_> = report
+        .steps
+        .iter()
+        .map(|s| (s.moving.clone(), s.onto.clone()))
+        .collect();
+    let order: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("box_with_board.order.json")).unwrap())
+            .unwrap();
+    for constraint in order["constraints"].as_array().unwrap() {
+        assert!(meets(&plan, constraint), "{constraint}");
+    }
+}
