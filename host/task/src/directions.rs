@@ -1,0 +1,148 @@
+//! Directions and axes along which a part could move: those of its own surfaces and of the surfaces beside it, and the normals of its contacts.
+
+use glam::DVec3;
+use mortise_brep::{Frame, Surface};
+use mortise_mating::Tolerances;
+
+use crate::assembly::{Assembly, Moved};
+use crate::clearance::Placed;
+
+/// Angle within which two directions, and distance within which two axes, are the same.
+const SAME_RAD: f64 = 1e-3;
+const SAME_MM: f64 = 5e-2;
+/// Most directions (each used both ways) and axes of a group.
+const MOST_DIRECTIONS: usize = 8;
+const MOST_AXES: usize = 8;
+/// Smallest share of its shape's area that a surface must have to count.
+const LEAST_SHARE: f64 = 2e-3;
+/// Sine between opposing normals in a contact.
+const FACING: f64 = 1e-2;
+/// Samples at a contact that are evaluated of a pair, each way.
+const MOST_SAMPLES: usize = 4000;
+
+/// A line about which a part could turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Point on it, mm, in the assembly's frame.
+    pub point: DVec3,
+    /// Unit direction.
+    pub direction: DVec3,
+}
+
+/// Candidates of motion of a group, most important first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Candidates {
+    /// Unit directions, of which both ways count.
+    pub directions: Vec<DVec3>,
+    /// Axes of turns.
+    pub axes: Vec<Line>,
+}
+
+/// Normals of the contacts of a moved group with `others`: unit, pointing out of the other part, in the assembly's frame. A contact is a sample inside
+/// a face within [`Tolerances::linear_mm`] of the other part's face that it faces.
+pub fn contact_normals(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> Vec<DVec3> {
+    let near = Tolerances::default().linear_mm;
+    let mut normals = Vec::new();
+    for &a in group.parts {
+        for &b in others {
+            let error = [a, b].map(|p| assembly.body(p).surface().surface_error_mm());
+            let within = near + error[0] + error[1];
+            let (pa, pb) = (assembly.placed(a, group.by), assembly.placed(b, glam::DAffine3::IDENTITY));
+            touching(pa, pb, within, &mut |n| normals.push(-n));
+            touching(pb, pa, within, &mut |n| normals.push(n));
+        }
+    }
+    normals
+}
+
+/// Outward normals, in the assembly's frame, of the samples inside faces of `a` that touch faces of `b`.
+fn touching(a: Placed<'_>, b: Placed<'_>, within: f64, each: &mut dyn FnMut(DVec3)) {
+    let to = b.pose.inverse() * a.pose;
+    let nodes = a.body.nodes();
+    let mut stack = if nodes.is_empty() { Vec::new() } else { vec![0u32] };
+    let mut count = 0;
+    while let Some(i) = stack.pop() {
+        let node = nodes[i as usize];
+        let p = to.transform_point3(node.center);
+        if b.body.exceeds(p, within + node.radius) || count >= MOST_SAMPLES {
+            continue;
+        }
+        if !node.is_leaf() {
+            stack.push(node.second);
+            stack.push(node.first);
+            continue;
+        }
+        let Some(normal) = a.body.samples()[node.first as usize].normal else { continue };
+        let Some(near) = b.body.nearest(p) else { continue };
+        count += 1;
+        let facing = b.body.face_normal(near.face, p);
+        let own = to.transform_vector3(normal);
+        if near.distance >= -10.0 * within && facing.is_some_and(|n| n.dot(own) < 0.0 && n.cross(own).length() < FACING) {
+            each(a.pose.transform_vector3(normal));
+        }
+    }
+}
+
+/// Directions and axes of a moved group and of the surfaces beside it, by area: axes of cylinders, cones and tori, normals of planes.
+pub fn candidates(assembly: &Assembly, group: &Moved<'_>, others: &[usize]) -> Candidates {
+    let mut directions: Vec<(f64, DVec3)> = Vec::new();
+    let mut axes: Vec<(f64, Line)> = Vec::new();
+    let (low, high) = assembly.bounds_of(group.parts, group.by);
+    let near = 0.05 * low.distance(high);
+    let all = group.parts.iter().map(|&p| (p, group.by)).chain(others.iter().map(|&p| (p, glam::DAffine3::IDENTITY)));
+    for (part, by) in all {
+        let (l, h) = assembly.bounds(part, by);
+        if (low - h).max(l - high).max_element() > near {
+            continue;
+        }
+        let pose = by * assembly.placement(part);
+        let shape = assembly.body(part).surface().shape();
+        // Surfaces of the group count twice: it moves along its own.
+        let weight = if group.parts.contains(&part) { 2.0 } else { 1.0 } / shape.area_mm2.max(1e-9);
+        for face in &shape.faces {
+            let share = face.area_mm2 * weight;
+            if share < LEAST_SHARE {
+                continue;
+            }
+            let line = |f: &Frame| Line { point: pose.transform_point3(f.origin), direction: pose.transform_vector3(f.z) };
+            match &face.surface {
+                Surface::Plane { frame } => add(&mut directions, share, pose.transform_vector3(frame.z), same_direction),
+                Surface::Cylinder { frame, .. } | Surface::Cone { frame, .. } | Surface::Torus { frame, .. } => {
+                    let line = line(frame);
+                    if !matches!(face.surface, Surface::Torus { .. }) {
+                        add(&mut directions, share, line.direction, same_direction);
+                    }
+                    // An axis far beyond both parts is that of a slightly curved face.
+                    let foot = line.point + line.direction * ((low + high) / 2.0 - line.point).dot(line.direction);
+                    if foot.distance((low + high) / 2.0) < 2.0 * low.distance(high) {
+                        add(&mut axes, share, line, same_line);
+                    }
+                }
+                Surface::Sphere { .. } | Surface::Spline => {}
+            }
+        }
+    }
+    directions.sort_by(|a, b| b.0.total_cmp(&a.0));
+    axes.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Candidates {
+        directions: directions.into_iter().take(MOST_DIRECTIONS).map(|(_, d)| d).collect(),
+        axes: axes.into_iter().take(MOST_AXES).map(|(_, l)| l).collect(),
+    }
+}
+
+fn add<T: Copy>(list: &mut Vec<(f64, T)>, weight: f64, item: T, same: fn(T, T) -> bool) {
+    match list.iter_mut().find(|(_, other)| same(item, *other)) {
+        Some((sum, _)) => *sum += weight,
+        None => list.push((weight, item)),
+    }
+}
+
+/// Whether two directions are parallel, either way.
+pub(crate) fn same_direction(a: DVec3, b: DVec3) -> bool {
+    a.cross(b).length() < SAME_RAD
+}
+
+/// Whether two axes are one line.
+pub(crate) fn same_line(a: Line, b: Line) -> bool {
+    same_direction(a.direction, b.direction) && (b.point - a.point).reject_from_normalized(a.direction).length() < SAME_MM
+}
