@@ -37,12 +37,16 @@ pub fn adjust(world: &mut World, part: usize, out: bool, way: Option<Place>, amo
     let along = match way {
         Some(place) => stated(world, part, place)?,
         None => {
-            let outwards = outwards(world, part);
+            let outwards = outwards(world, part, amount);
             if out { outwards } else { -outwards }
         }
     };
     let range = range_mm(world, part, along);
-    let (free, pair) = world.travel(&[part], along, range);
+    let limit = match amount {
+        Amount::Length(mm) => mm.min(range),
+        _ => range,
+    };
+    let (free, pair) = world.travel(&[part], along, limit);
     let by = match amount {
         Amount::Length(mm) => mm,
         Amount::Half if out => range / 2.0,
@@ -66,7 +70,7 @@ pub fn adjust(world: &mut World, part: usize, out: bool, way: Option<Place>, amo
         return stuck(world);
     }
     if by > range {
-        if blocker.is_some() && free + STILL_MM < range {
+        if blocker.is_some() {
             return stuck(world);
         }
         let words = format!("{name} would leave {} after {range:.3} mm", world.name(connections[0]));
@@ -111,12 +115,16 @@ fn stated(world: &World, part: usize, place: Place) -> Result<DVec3, Trouble> {
     }
 }
 
-/// Direction out of the connection: where it can leave by the shortest way, else where it goes farthest.
-fn outwards(world: &World, part: usize) -> DVec3 {
+/// Direction out of the connection: the shortest way out of those in which the amount is free, else where it goes farthest.
+fn outwards(world: &World, part: usize, amount: Amount) -> DVec3 {
     let mut best: Option<(bool, f64, DVec3)> = None;
     for axis in axes(world, part) {
         let range = range_mm(world, part, axis);
-        let (free, pair) = world.travel(&[part], axis, range);
+        let wanted = match amount {
+            Amount::Length(mm) => mm.min(range),
+            _ => range,
+        };
+        let (free, pair) = world.free(&[part], axis, wanted);
         let leaves = pair.is_none();
         let score = if leaves { -range } else { free };
         let better = best.is_none_or(|(l, s, d)| (leaves, score, axis.z) > (l, s + 1e-6, d.z) && (leaves != l || score > s + 1e-6 || axis.z > d.z));

@@ -193,7 +193,7 @@ fn enter(world: &mut World, part: usize, pose: &DAffine3, wish: &Wish, blockers:
         .collect();
     ways.sort_by(|(s, v), (t, w)| (s * 10.0).round().total_cmp(&(t * 10.0).round()).then(w.z.total_cmp(&v.z)));
     for (exit, way) in ways {
-        let (_, pair) = world.travel(&[part], way, exit);
+        let (_, pair) = world.free(&[part], way, exit);
         match pair {
             None => {
                 return Some(Seat {

@@ -83,7 +83,7 @@ fn leave(world: &World, part: usize, loose: &[usize], way: DVec3) -> Result<(Vec
     loop {
         let needed = exit(world, &moving, loose, way) + ROOM_MM;
         let wanted = needed + world.diagonal();
-        let (free, pair) = world.travel(&moving, way, wanted);
+        let (free, pair) = world.free(&moving, way, wanted);
         match pair {
             None => return Ok((moving, wanted)),
             Some(_) if free >= needed => return Ok((moving, (needed + free) / 2.0)),

@@ -3,8 +3,8 @@
 //! 1. [`token`]: words, numbers and part names; misspelt words corrected.
 //! 2. [`grammar`]: verb, noun phrases, places, amounts, to [`phrase::Command`].
 //! 3. [`reference`]: noun phrases to parts; what is ambiguous becomes a question.
-//! 4. [`mod@connect`], [`mod@disconnect`], [`mod@adjust`]: the operations of Jung, Hoffhenke & Wachsmuth, "Task-level assembly modeling in virtual
-//!    environments" (2003), on exact geometry by [`mortise_task`].
+//! 4. [`mod@connect`], [`mod@disconnect`], [`mod@adjust`]: the operations of Jung, "Task-Level Assembly Modeling in Virtual Environments"
+//!    (2003), figs. 5 and 8, on exact geometry by [`mortise_task`].
 //! 5. [`session`]: one turn after another, with undo and redo.
 //!
 //! Nothing here reads or writes files. Lengths are in millimetres in the assembly's frame, angles in radians unless a name says degrees.

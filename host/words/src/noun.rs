@@ -16,6 +16,9 @@ const NEVER: &[&str] = &[
     "they", "then", "is", "are", "but", "while", "without", "than", "up", "down", "upwards", "downwards", "about", "around", "own",
 ];
 
+/// Words for a part that is connected to nothing.
+const FREE: &[&str] = &["free", "loose", "unused", "spare", "remaining"];
+
 /// Whether `word` may be a noun of a part.
 pub(crate) fn is_noun(word: &str) -> bool {
     let one = lexicon::singular(word);
@@ -168,6 +171,13 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
                     phrase.sizes.push(size);
                 } else if let (true, Some(n)) = (phrase.nouns.is_empty() && counted.is_none(), count_word(&text)) {
                     phrase.quantity = Quantity::Count(n);
+                } else if phrase.nouns.is_empty() && !last && FREE.contains(&text.as_str()) {
+                    phrase.free = true;
+                } else if text == "half" && !phrase.places.is_empty() && phrase.nouns.is_empty() {
+                    phrase.nouns.push(word);
+                } else if !phrase.nouns.is_empty() && count_word(&text).is_some() {
+                    // "screw two": a number after the noun.
+                    break;
                 } else if phrase.nouns.is_empty() && ["the", "of"].contains(&text.as_str()) {
                     // "all of the screws".
                 } else if NEVER.contains(&text.as_str()) || lexicon::INTO.iter().any(|(w, _)| *w == text) {
@@ -212,7 +222,7 @@ fn may_be_noun(token: &Token) -> bool {
     match token {
         Token::Name { .. } => true,
         Token::Word { text, .. } => {
-            !starts_constituent(text)
+            (!starts_constituent(text) || text == "half")
                 && !["the", "of", "number"].contains(&text.as_str())
                 || (lexicon::PLACES.iter().any(|(_, w)| w.contains(&text.as_str())) && text != "back")
         }
@@ -360,7 +370,7 @@ fn state_words(phrase: &mut Phrase) {
         let before = phrase.nouns.len();
         phrase
             .nouns
-            .retain(|word| !["free", "loose", "unused", "spare", "remaining"].contains(&word.as_str()));
-        phrase.free = phrase.nouns.len() < before;
+            .retain(|word| !FREE.contains(&word.as_str()));
+        phrase.free |= phrase.nouns.len() < before;
     }
 }

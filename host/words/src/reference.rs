@@ -121,7 +121,9 @@ impl Scene<'_> {
             candidates = self.prefer(candidates, |p| owners.iter().any(|o| self.parts[p].connected.contains(o) || p == *o));
         }
         if phrase.free {
-            candidates.retain(|&p| self.parts[p].connected.is_empty());
+            let said = |p: usize| self.names.words(p).iter().any(|w| w == "free" || w == "loose");
+            let by_name = candidates.iter().any(|&p| said(p));
+            candidates.retain(|&p| if by_name { said(p) } else { self.parts[p].connected.is_empty() });
             if candidates.is_empty() {
                 return Err(self.none(phrase, "is loose"));
             }

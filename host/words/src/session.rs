@@ -59,6 +59,17 @@ impl Session {
         &self.world.assembly().model.parts
     }
 
+    /// Places every part as in the file and forgets what was said.
+    pub fn start_over(&mut self) {
+        for part in 0..self.world.count() {
+            let home = self.world.home(part);
+            self.world.set_placement(part, home);
+        }
+        self.memory = Memory::default();
+        self.done.clear();
+        self.undone.clear();
+    }
+
     /// Carries out one instruction.
     pub fn say(&mut self, text: &str) -> Turn {
         let before = self.snapshot();

@@ -4,12 +4,20 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::CadModel;
-use mortise_task::{Assembly, Clearance, Motion, Moved, SEARCH_STEP_MM, TaskError};
+use mortise_task::{Assembly, Clearance, Motion, Moved, TaskError};
 
 use crate::port::{Port, ports};
 
 /// Distance within which two placements are the same, mm at the corners of the part's box: well below the micrometre promised.
 const SAME_MM: f64 = 1e-4;
+/// Gap up to which the file has two parts together, mm: the clearance of a ring in its groove.
+const NEAR_MM: f64 = 0.35;
+/// Travel between two checks of samples that stay in contact, mm; others are bounded without a gap.
+const STEP_MM: f64 = 0.5;
+/// The same for questions whether a way is free, which are long.
+const COARSE_MM: f64 = 1.0;
+/// Travel that is tried first, mm.
+const START_MM: f64 = 0.25;
 /// Room around a part that has left the others, mm.
 pub const ROOM_MM: f64 = 5.0;
 
@@ -32,7 +40,7 @@ pub struct World {
     /// Placements in the file.
     home: Vec<DAffine3>,
     ports: Vec<Arc<[Port]>>,
-    /// Pairs connected in the file.
+    /// Pairs together in the file: in contact, a shaft in a bore, or within [`NEAR_MM`].
     joined: Vec<Vec<bool>>,
     diagonal: f64,
 }
@@ -64,7 +72,8 @@ impl World {
         }
         for a in 0..count {
             for b in a + 1..count {
-                if !world.fits_between(a, b).is_empty() {
+                let near = world.assembly.pair_gap(a, b, NEAR_MM).is_some();
+                if near || !world.fits_between(a, b).is_empty() {
                     world.join([a, b]);
                 }
             }
@@ -189,29 +198,47 @@ impl World {
         (0..self.count()).filter(|p| !moving.contains(p)).collect()
     }
 
-    /// Travel of `moving` along the unit vector `direction`, at most `limit` mm, until it meets another part; and the pair that meets.
+    /// Travel of `moving` along the unit vector `direction`, at most `limit` mm, until it meets another part; and the pair that meets. Found to a
+    /// micrometre.
     pub fn travel(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
+        let near = self.on_the_way(moving, direction, limit);
+        let group = Moved { parts: moving, by: DAffine3::IDENTITY };
+        let (share, pair) = self.assembly.touch_share(&group, &near, &Motion::slide(direction * limit), STEP_MM);
+        (share * limit, pair)
+    }
+
+    /// As [`Self::travel`], found to [`COARSE_MM`] only: for questions whether a way is free. A way blocked at its start costs little.
+    pub fn free(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
+        let group = Moved { parts: moving, by: DAffine3::IDENTITY };
+        for length in [START_MM.min(limit), limit] {
+            let near = self.on_the_way(moving, direction, length);
+            let step = COARSE_MM.min(length / 2.0);
+            let (share, pair) = self.assembly.free_share(&group, &near, &Motion::slide(direction * length), step);
+            if pair.is_some() {
+                return (share * length, pair);
+            }
+        }
+        (limit, None)
+    }
+
+    /// Parts whose boxes meet the box of the motion.
+    fn on_the_way(&self, moving: &[usize], direction: DVec3, limit: f64) -> Vec<usize> {
         let (mut low, mut high) = self.assembly.bounds_of(moving, DAffine3::IDENTITY);
         low = low.min(low + direction * limit);
         high = high.max(high + direction * limit);
-        let near: Vec<usize> = self
-            .others(moving)
-            .into_iter()
-            .filter(|&o| {
-                let (l, h) = self.bounds(o);
-                low.cmple(h).all() && l.cmple(high).all()
-            })
-            .collect();
-        let group = Moved { parts: moving, by: DAffine3::IDENTITY };
-        let (share, pair) = self.assembly.touch_share(&group, &near, &Motion::slide(direction * limit), SEARCH_STEP_MM);
-        (share * limit, pair)
+        let mut near = self.others(moving);
+        near.retain(|&o| {
+            let (l, h) = self.bounds(o);
+            low.cmple(h).all() && l.cmple(high).all()
+        });
+        near
     }
 
     /// Share of a motion that `part` makes before it meets another part, and the pair.
     pub fn share(&self, part: usize, motion: &Motion) -> (f64, Option<[usize; 2]>) {
         let moving = [part];
         let group = Moved { parts: &moving, by: DAffine3::IDENTITY };
-        self.assembly.touch_share(&group, &self.others(&moving), motion, SEARCH_STEP_MM)
+        self.assembly.touch_share(&group, &self.others(&moving), motion, STEP_MM)
     }
 
     /// A part that overlaps `part` where it is now.

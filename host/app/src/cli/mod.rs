@@ -1,6 +1,6 @@
 //! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: the insertion was not completed; 2: not possible, with one line on standard error that
+//! Exit code 0: done; 1: the insertion was not completed, or an instruction not carried out; 2: not possible, with one line on standard error that
 //! gives the reason.
 
 mod bake;
@@ -13,6 +13,7 @@ mod ports;
 mod probe;
 mod reading;
 mod rig;
+mod task;
 mod units;
 mod window;
 
@@ -56,6 +57,8 @@ enum Command {
     Ports(ports::Args),
     /// Check, send or show the description of a rig
     Rig(rig::Args),
+    /// Take an assembly apart and together by instructions in plain words
+    Task(task::Args),
     /// Open the window
     Open(window::Open),
 }
@@ -94,6 +97,7 @@ pub fn main() -> ExitCode {
             Command::Probe(args) => probe::run(&args),
             Command::Ports(args) => ports::run(&args),
             Command::Rig(args) => rig::run(&args),
+            Command::Task(args) => task::run(&args),
         },
     };
     program::end(NAME, result)
