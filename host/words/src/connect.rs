@@ -121,7 +121,7 @@ fn in_hole(world: &World, part: usize, pose: &DAffine3, hole: Option<Port>) -> b
 
 /// Places of `part` against `into` that the file knows, the own first, then the nearest.
 fn seats(world: &World, part: usize, into: usize) -> Vec<DAffine3> {
-    let shape = |p: usize| world.assembly().model.parts[p].shape;
+    let shape = |p: usize| world.kind(p);
     let mut known: Vec<(bool, DAffine3)> = Vec::new();
     for like in (0..world.count()).filter(|&p| shape(p) == shape(part)) {
         for base in (0..world.count()).filter(|&p| shape(p) == shape(into) && world.joined_at_home(like, p)) {

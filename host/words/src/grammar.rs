@@ -135,7 +135,7 @@ fn command(mut input: Input<'_>, before: Option<&Command>) -> Result<Command, Pu
         return Err(no_verb(&text, whole));
     };
     if lexicon::QUESTIONS.contains(&word.as_str()) {
-        return Err(Puzzle::NotAnAction(format!("\"{text}\" is a question; nothing to do for it")));
+        return Err(Puzzle::NotAnAction(format!("\"{text}\" asks for nothing that can be done with parts")));
     }
     let Some(class) = lexicon::verb(&word) else {
         return Err(no_verb(&text, whole));
@@ -272,14 +272,11 @@ fn clockwise(input: &mut Input<'_>) -> winnow::Result<bool> {
 
 /// "about its own axis": what a turn does anyway.
 fn own_axis(input: &mut Input<'_>) -> winnow::Result<()> {
-    (
-        one_of(&["about", "around", "on"]),
-        one_of(&["its", "their", "the"]),
-        opt(one_of(&["own"])),
-        one_of(&["axis", "axes", "axle"]),
-    )
-        .void()
-        .parse_next(input)
+    alt((
+        (one_of(&["about", "around"]), one_of(&["its", "their", "the"]), opt(one_of(&["own"])), one_of(&["axis", "axes"])).void(),
+        (one_of(&["on"]), one_of(&["its", "their"]), opt(one_of(&["own"])), one_of(&["axis", "axes"])).void(),
+    ))
+    .parse_next(input)
 }
 
 /// "from above".
@@ -454,7 +451,7 @@ impl Clause {
             },
             VerbClass::Remove | VerbClass::Undo if measured => adjust(&self, true),
             VerbClass::Remove | VerbClass::Undo => disconnect(self),
-            VerbClass::Connect if measured && self.into.is_none() => adjust(&self, self.out),
+            VerbClass::Connect if matches!(self.amount, Amount::Length(_) | Amount::Vague) && self.into.is_none() => adjust(&self, self.out),
             VerbClass::Connect if self.out && self.into.is_none() => disconnect(self),
             VerbClass::Connect => connect(self),
             VerbClass::Take if self.into.is_some() => connect(self),

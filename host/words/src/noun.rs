@@ -14,6 +14,7 @@ use crate::token::Token;
 const NEVER: &[&str] = &[
     "and", "or", "by", "from", "to", "into", "onto", "through", "with", "until", "if", "not", "dont", "never", "off", "out", "along", "it", "them",
     "they", "then", "is", "are", "but", "while", "without", "than", "up", "down", "upwards", "downwards", "about", "around", "own",
+    "towards", "toward", "next", "near", "beside", "between", "under", "above", "below", "behind", "except", "instead", "before", "after",
 ];
 
 /// Words for a part that is connected to nothing.
@@ -207,6 +208,7 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
         }
         // "the last", "the second".
     }
+    plural |= phrase.nouns.last().is_some_and(|head| head == "everything");
     if plural && phrase.quantity == Quantity::One {
         phrase.quantity = Quantity::All;
     }
@@ -240,7 +242,7 @@ fn count_word(word: &str) -> Option<u32> {
 /// "all four of the", "both", "a", "any"; `Some` when a count or totality is stated.
 fn quantity(input: &mut Input<'_>, phrase: &mut Phrase) -> winnow::Result<Option<()>> {
     let _: Vec<()> = repeat(0..2, one_of(lexicon::DETERMINERS)).parse_next(input)?;
-    let total = opt(one_of(&["all", "every", "each", "everything"])).parse_next(input)?;
+    let total = opt(one_of(&["all", "every", "each"])).parse_next(input)?;
     let both = opt(one_of(&["both"])).parse_next(input)?;
     let any_one = opt(one_of(&["any", "some", "whichever"])).parse_next(input)?;
     let _: Vec<()> = repeat(0..3, one_of(&["of", "the", "a", "an", "its", "their", "these", "those", "another", "single"])).parse_next(input)?;

@@ -10,6 +10,9 @@ use crate::phrase::{Phrase, Pronoun, Quantity};
 use crate::token::Names;
 use crate::turn::{Code, Trouble};
 
+/// Largest spread across a row, as a share of its length.
+const ROW: f64 = 0.1;
+
 /// What references need to know of a part.
 #[derive(Clone, Debug)]
 pub struct Seen {
@@ -217,6 +220,9 @@ impl Scene<'_> {
             word.parse::<f64>().is_ok_and(|n| self.names.numbers(part).iter().any(|&m| f64::from(m) == n))
         };
         let mut found: Vec<usize> = all.clone().filter(|&p| has(p, head)).collect();
+        if found.is_empty() && ["part", "component", "everything"].contains(&head) {
+            found = all.clone().collect();
+        }
         if found.is_empty() {
             found = all.clone().filter(|&p| similar(p, head)).collect();
         }
@@ -267,10 +273,14 @@ impl Scene<'_> {
     /// Applies places, sizes, numbers and ordinals, in this order.
     fn located(&self, phrase: &Phrase, mut candidates: Vec<usize>) -> Result<Vec<usize>, Trouble> {
         for &place in &phrase.places {
-            candidates = self.at_place(candidates, place);
+            let found = self.at_place(candidates.clone(), place);
+            self.distinguished(phrase, &candidates, &found)?;
+            candidates = found;
         }
         for &size in &phrase.sizes {
-            candidates = self.of_size(candidates, size);
+            let found = self.of_size(candidates.clone(), size);
+            self.distinguished(phrase, &candidates, &found)?;
+            candidates = found;
         }
         if !phrase.numbers.is_empty() {
             candidates = self.numbered(phrase, &candidates)?;
@@ -290,6 +300,13 @@ impl Scene<'_> {
             candidates = taken;
         }
         Ok(candidates)
+    }
+
+    /// A place or size that all candidates share distinguishes none of them: a question.
+    fn distinguished(&self, phrase: &Phrase, before: &[usize], after: &[usize]) -> Result<(), Trouble> {
+        let by_name = |p: &usize| self.names.words(*p).iter().any(|w| phrase.text.split_whitespace().any(|t| lexicon::singular(t) == *w && lexicon::find(lexicon::PLACES, t).is_some()));
+        let all = before.len() > 1 && before.len() == after.len();
+        if all && !before.iter().all(by_name) { Err(self.ask(phrase, before.to_vec())) } else { Ok(()) }
     }
 
     fn numbered(&self, phrase: &Phrase, candidates: &[usize]) -> Result<Vec<usize>, Trouble> {
@@ -337,10 +354,18 @@ impl Scene<'_> {
         extreme(&candidates, &heights)
     }
 
-    /// Median along the axis of the largest spread; both of an even number.
+    /// Median of parts in a row; both of an even number; all when they stand in no row.
     fn middle(&self, mut candidates: Vec<usize>) -> Vec<usize> {
         let centers: Vec<DVec3> = candidates.iter().map(|&p| self.parts[p].center).collect();
         let axis = longest_axis(&centers);
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &c in &centers {
+            (low, high) = (low.min(c), high.max(c));
+        }
+        let spread = high - low;
+        if spread.reject_from_normalized(axis).length() > ROW * spread.dot(axis) {
+            return candidates;
+        }
         candidates.sort_by(|&p, &q| self.parts[p].center.dot(axis).total_cmp(&self.parts[q].center.dot(axis)));
         let n = candidates.len();
         match n {

@@ -248,7 +248,7 @@ impl Session {
                     center: (low + high) / 2.0,
                     size: high - low,
                     volume_mm3: model.shapes[model.parts[p].shape].volume_mm3,
-                    shape: model.parts[p].shape,
+                    shape: self.world.kind(p),
                     connected: self.world.connections(p),
                 }
             })

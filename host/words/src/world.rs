@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use mortise_brep::CadModel;
+use mortise_brep::{CadModel, Shape};
 use mortise_task::{Assembly, Clearance, Motion, Moved, TaskError};
 
 use crate::port::{Port, ports};
@@ -18,6 +18,8 @@ const STEP_MM: f64 = 0.5;
 const COARSE_MM: f64 = 1.0;
 /// Travel that is tried first, mm.
 const START_MM: f64 = 0.25;
+/// Relative difference up to which volumes, areas and moments are equal.
+const EQUAL_SHARE: f64 = 1e-7;
 /// Room around a part that has left the others, mm.
 pub const ROOM_MM: f64 = 5.0;
 
@@ -40,6 +42,8 @@ pub struct World {
     /// Placements in the file.
     home: Vec<DAffine3>,
     ports: Vec<Arc<[Port]>>,
+    /// Number of the first equal shape.
+    kinds: Vec<usize>,
     /// Pairs together in the file: in contact, a shaft in a bore, or within [`NEAR_MM`].
     joined: Vec<Vec<bool>>,
     diagonal: f64,
@@ -54,6 +58,7 @@ impl World {
     /// Cost: as [`Assembly::new`], and the fits of each pair.
     pub fn new(model: CadModel) -> Result<Self, TaskError> {
         let of_shapes: Vec<Arc<[Port]>> = model.shapes.iter().map(|shape| ports(shape).into()).collect();
+        let kinds = model.parts.iter().map(|p| kind(&model.shapes, p.shape)).collect();
         let assembly = Assembly::new(model)?;
         let count = assembly.count();
         let home: Vec<DAffine3> = (0..count).map(|p| assembly.placement(p)).collect();
@@ -64,6 +69,7 @@ impl World {
             assembly,
             home,
             ports,
+            kinds,
             joined: vec![vec![false; count]; count],
             diagonal: low.distance(high),
         };
@@ -119,6 +125,11 @@ impl World {
     /// All placements now.
     pub fn placements(&self) -> Vec<DAffine3> {
         (0..self.count()).map(|p| self.placement(p)).collect()
+    }
+
+    /// Number of a part's kind: parts of equal shape in equal frames have the same, however often a file writes the shape.
+    pub fn kind(&self, part: usize) -> usize {
+        self.kinds[part]
     }
 
     /// Ports of a part, in its own frame.
@@ -317,4 +328,19 @@ impl World {
             self.set_placement(part, moved);
         }
     }
+}
+
+/// The first shape that is equal to shape `index` in its own frame: same faces, volume, area and centre of mass.
+fn kind(shapes: &[Shape], index: usize) -> usize {
+    let this = &shapes[index];
+    let close = |a: f64, b: f64| (a - b).abs() <= EQUAL_SHARE * a.abs().max(b.abs());
+    let equal = |other: &Shape| {
+        other.faces.len() == this.faces.len()
+            && other.edges.len() == this.edges.len()
+            && close(other.volume_mm3, this.volume_mm3)
+            && close(other.area_mm2, this.area_mm2)
+            && other.center_of_mass.distance(this.center_of_mass) < SAME_MM
+            && (0..3).all(|i| close(other.inertia_mm5[i][i], this.inertia_mm5[i][i]))
+    };
+    shapes.iter().position(equal).unwrap_or(index)
 }
