@@ -15,7 +15,7 @@ use crate::motion::Motion;
 /// ([`Tolerances::linear_mm`]), so that resting faces slide.
 pub const ALLOWED_MM: f64 = 2e-3;
 /// Travel between two checks of samples in contact while searching, mm.
-pub const SEARCH_STEP_MM: f64 = 0.2;
+pub const SEARCH_STEP_MM: f64 = 0.4;
 
 /// An assembly: its parts as placed in the file, prepared for queries. Lengths mm, poses from part to assembly.
 pub struct Assembly {
@@ -137,6 +137,13 @@ impl Assembly {
     /// Placement of a part in the file.
     pub fn placement(&self, part: usize) -> DAffine3 {
         self.model.parts.get(part).map_or(DAffine3::IDENTITY, |p| p.placement)
+    }
+
+    /// Places a part elsewhere. [`Self::contacts`] and [`Self::pressed_mm`] stay those of the file.
+    pub fn set_placement(&mut self, part: usize, placement: DAffine3) {
+        if let Some(part) = self.model.parts.get_mut(part) {
+            part.placement = placement;
+        }
     }
 
     /// Overlap of two parts as placed in the file, mm; 0 where they do not overlap.

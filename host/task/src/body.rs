@@ -3,12 +3,11 @@
 //! Samples inside faces are as dense as a chord error of [`SAMPLE_ERROR_MM`] requires, samples along edges no farther apart than a share of the shape's
 //! size. Lengths are mm, in the shape's frame. Cost: sampling is proportional to area over spacing²; a tree over n samples has 2n − 1 nodes.
 
-use std::collections::HashMap;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 use mortise_bake::{ExactSurface, Nearest, PointshellOptions, sample_pointshell};
-use mortise_brep::{Curve, Shape};
+use mortise_brep::{Curve, Face, Shape, Surface};
 
 /// Chord error between neighbouring samples inside a face, mm.
 pub const SAMPLE_ERROR_MM: f64 = 0.01;
@@ -18,10 +17,10 @@ const FACE_SPACING_MM: [f64; 2] = [0.8, 8.0];
 const EDGE_SPACING_MM: [f64; 2] = [0.25, 2.0];
 /// Share of the box's diagonal that is the spacing inside faces and along edges, between these limits.
 const SHARES: [f64; 2] = [1.0 / 40.0, 1.0 / 160.0];
-/// Cells of the cached distances along the box's diagonal.
-const CELLS: f64 = 160.0;
-/// Most cached cells of a shape: about 40 MB.
-const MOST_CELLS: usize = 1_000_000;
+/// Most kept distances of a shape: 8 MB.
+const CELLS: f64 = 2e6;
+/// Margin of the kept distances around the shape's box, as a share of its diagonal.
+const MARGIN: f64 = 0.1;
 
 /// Distance below which the line to the nearest point has no reliable direction, mm.
 const ON_SURFACE_MM: f64 = 1e-6;
@@ -58,11 +57,42 @@ impl Node {
 pub struct Body {
     surface: ExactSurface,
     samples: Vec<Sample>,
+    /// Tree over the samples that can be the first to meet another part.
     nodes: Vec<Node>,
     low: DVec3,
     high: DVec3,
+    kept: Kept,
+}
+
+/// Distances at the middles of cells, evaluated when first needed.
+struct Kept {
+    origin: DVec3,
     cell_mm: f64,
-    cells: Mutex<HashMap<[i32; 3], f64>>,
+    counts: [usize; 3],
+    /// Bits of an `f32`; NaN: not known yet.
+    values: Vec<AtomicU32>,
+}
+
+impl Kept {
+    fn new(low: DVec3, high: DVec3) -> Self {
+        let margin = MARGIN * low.distance(high);
+        let (origin, extent) = (low - margin, high - low + 2.0 * margin);
+        let cell_mm = (extent.element_product() / CELLS).cbrt();
+        let counts = extent.to_array().map(|e| (e / cell_mm).ceil().max(1.0) as usize);
+        let values = (0..counts.iter().product()).map(|_| AtomicU32::new(f32::NAN.to_bits())).collect();
+        Self { origin, cell_mm, counts, values }
+    }
+
+    /// Index of the cell of `p` and its middle; `None` outside.
+    fn cell(&self, p: DVec3) -> Option<(usize, DVec3)> {
+        let at = ((p - self.origin) / self.cell_mm).floor();
+        let inside = |i: usize| at[i] >= 0.0 && at[i] < self.counts[i] as f64;
+        if !(inside(0) && inside(1) && inside(2)) {
+            return None;
+        }
+        let index = (at.z as usize * self.counts[1] + at.y as usize) * self.counts[0] + at.x as usize;
+        Some((index, self.origin + (at + 0.5) * self.cell_mm))
+    }
 }
 
 impl Body {
@@ -77,7 +107,8 @@ impl Body {
         }
         let size = low.distance(high).max(1e-3);
         let samples = sample(&surface, size);
-        let mut order: Vec<u32> = (0..samples.len() as u32).collect();
+        let meets = |s: &Sample| s.normal.is_none() || surface.shape().faces.get(s.face as usize).is_none_or(bulges);
+        let mut order: Vec<u32> = (0..samples.len() as u32).filter(|&i| meets(&samples[i as usize])).collect();
         let mut nodes = Vec::with_capacity(2 * samples.len());
         if !order.is_empty() {
             split(&samples, &mut order, &mut nodes);
@@ -86,8 +117,7 @@ impl Body {
         Some(Self {
             low: low - chord,
             high: high + chord,
-            cell_mm: size / CELLS,
-            cells: Mutex::default(),
+            kept: Kept::new(low, high),
             surface,
             samples,
             nodes,
@@ -150,24 +180,19 @@ impl Body {
         if off > 0.0 && off > least {
             return true;
         }
-        let cell = (p / self.cell_mm).floor();
-        let middle = (cell + 0.5) * self.cell_mm;
-        let key = cell.to_array().map(|c| c as i32);
-        let Ok(mut cells) = self.cells.lock() else {
+        let Some((index, middle)) = self.kept.cell(p) else {
             return self.distance(p) > least;
         };
-        let at_middle = match cells.get(&key) {
-            Some(&known) => known,
-            None => {
-                let found = self.distance(middle);
-                if cells.len() < MOST_CELLS {
-                    cells.insert(key, found);
-                }
-                found
-            }
-        };
-        drop(cells);
-        let apart = p.distance(middle);
+        let slot = &self.kept.values[index];
+        let mut known = f32::from_bits(slot.load(Ordering::Relaxed));
+        if known.is_nan() {
+            known = self.distance(middle) as f32;
+            slot.store(known.to_bits(), Ordering::Relaxed);
+        }
+        // The value is rounded to seven digits.
+        let at_middle = f64::from(known);
+        let rounding = at_middle.abs() * 1e-6;
+        let apart = p.distance(middle) + rounding;
         if at_middle - apart > least {
             return true;
         }
@@ -175,6 +200,16 @@ impl Body {
             return false;
         }
         self.distance(p) > least
+    }
+}
+
+/// Whether the inside of a face can be what first meets another part: it is convex in some direction. Planes, bores and sockets are met by the edges and
+/// bulging faces of the other part, which has samples there.
+fn bulges(face: &Face) -> bool {
+    match face.surface {
+        Surface::Plane { .. } => false,
+        Surface::Cylinder { .. } | Surface::Cone { .. } | Surface::Sphere { .. } => !face.reversed,
+        Surface::Torus { .. } | Surface::Spline => true,
     }
 }
 
@@ -186,12 +221,10 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
     let mut options = PointshellOptions::everywhere(SAMPLE_ERROR_MM, inside);
     options.least_spacing_mm = along;
     let shell = sample_pointshell(surface, &options);
-    let mut samples: Vec<Sample> = (shell.points.iter().enumerate())
-        .map(|(i, p)| Sample {
-            position: p.position,
-            normal: (i < shell.face_points).then_some(p.normal),
-            face: u32::from(p.face),
-        })
+    // Points along edges are sampled below, at even spacing.
+    let mut samples: Vec<Sample> = (shell.points.iter().take(shell.face_points).map(|p| (p, Some(p.normal))))
+        .chain(shell.points.iter().skip(shell.face_points + shell.edge_points).map(|p| (p, None)))
+        .map(|(p, normal)| Sample { position: p.position, normal, face: u32::from(p.face) })
         .collect();
     for edge in &surface.shape().edges {
         let Some(&face) = edge.faces.first() else { continue };

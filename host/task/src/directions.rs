@@ -17,8 +17,6 @@ const MOST_AXES: usize = 8;
 const LEAST_SHARE: f64 = 2e-3;
 /// Sine between opposing normals in a contact.
 const FACING: f64 = 1e-2;
-/// Samples at a contact that are evaluated of a pair, each way.
-const MOST_SAMPLES: usize = 4000;
 
 /// A line about which a part could turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +42,12 @@ pub fn contact_normals(assembly: &Assembly, group: &Moved<'_>, others: &[usize])
     let near = Tolerances::default().linear_mm;
     let mut normals = Vec::new();
     for &a in group.parts {
+        let (al, ah) = assembly.bounds(a, group.by);
         for &b in others {
+            let (bl, bh) = assembly.bounds(b, glam::DAffine3::IDENTITY);
+            if (al - bh).max(bl - ah).max_element() > near {
+                continue;
+            }
             let error = [a, b].map(|p| assembly.body(p).surface().surface_error_mm());
             let within = near + error[0] + error[1];
             let (pa, pb) = (assembly.placed(a, group.by), assembly.placed(b, glam::DAffine3::IDENTITY));
@@ -58,23 +61,13 @@ pub fn contact_normals(assembly: &Assembly, group: &Moved<'_>, others: &[usize])
 /// Outward normals, in the assembly's frame, of the samples inside faces of `a` that touch faces of `b`.
 fn touching(a: Placed<'_>, b: Placed<'_>, within: f64, each: &mut dyn FnMut(DVec3)) {
     let to = b.pose.inverse() * a.pose;
-    let nodes = a.body.nodes();
-    let mut stack = if nodes.is_empty() { Vec::new() } else { vec![0u32] };
-    let mut count = 0;
-    while let Some(i) = stack.pop() {
-        let node = nodes[i as usize];
-        let p = to.transform_point3(node.center);
-        if b.body.exceeds(p, within + node.radius) || count >= MOST_SAMPLES {
+    for sample in a.body.samples() {
+        let Some(normal) = sample.normal else { continue };
+        let p = to.transform_point3(sample.position);
+        if b.body.exceeds(p, within) {
             continue;
         }
-        if !node.is_leaf() {
-            stack.push(node.second);
-            stack.push(node.first);
-            continue;
-        }
-        let Some(normal) = a.body.samples()[node.first as usize].normal else { continue };
         let Some(near) = b.body.nearest(p) else { continue };
-        count += 1;
         let facing = b.body.face_normal(near.face, p);
         let own = to.transform_vector3(normal);
         if near.distance >= -10.0 * within && facing.is_some_and(|n| n.dot(own) < 0.0 && n.cross(own).length() < FACING) {

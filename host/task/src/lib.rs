@@ -1,15 +1,35 @@
-//! Assembly by task: contacts, freedoms, ports, and collision-free sequences with their clearances.
+//! Assembly by task: where parts can be connected, what connects them, how they move, and in which order they come apart and go together, with every
+//! clearance in micrometres.
+//!
+//! 1. [`Assembly`] prepares a [`CadModel`](mortise_brep::CadModel): samples of each part under a tree ([`Body`]), and contacts.
+//! 2. Queries on exact surfaces: the least distance of placed parts ([`gap`], [`refined`]), how far a motion goes ([`free_share`]), and the least distance over a
+//!    motion ([`least_over`]).
+//! 3. [`mod@graph`]: the connection graph; [`ports`]: places for connections.
+//! 4. [`mobility`]: freedoms by contact cones ([`mod@cone`]), confirmed over finite steps.
+//! 5. [`removal`]: ways out of one or several legs; [`blocking`] and [`sequence`]: whole sequences with subassemblies.
+//! 6. [`report`]: results as values for JSON.
+//!
+//! Lengths are mm, angles radians, poses from part to assembly. Nothing here reads files, and results depend on no random numbers but those of fixed seeds; where
+//! a time limit ends a search, how far it came depends on the computer.
+
 mod assembly;
+pub mod blocking;
 mod body;
 mod clearance;
 pub mod cone;
 pub mod directions;
 mod error;
+pub mod graph;
+mod helix;
 pub mod mobility;
 mod motion;
+pub mod ports;
 pub mod removal;
-pub use assembly::*;
-pub use body::*;
-pub use clearance::*;
-pub use error::*;
-pub use motion::*;
+pub mod report;
+pub mod sequence;
+
+pub use assembly::{ALLOWED_MM, Assembly, Clearance, Moved, SEARCH_STEP_MM};
+pub use body::{Body, SAMPLE_ERROR_MM, Sample};
+pub use clearance::{Gap, Limits, Placed, free_share, gap, least_over, refined};
+pub use error::TaskError;
+pub use motion::Motion;

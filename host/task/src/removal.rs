@@ -89,6 +89,10 @@ const SCAN_MM: f64 = 0.008;
 const MOST_SCANS: usize = 300;
 /// Overlap that is as good as any deeper one for the next place, mm.
 const DEEP_MM: f64 = 3.0;
+/// Overlap that is worth a push aside, mm; pushes, and the distance each leaves, mm.
+const COMPLY_MM: f64 = 0.6;
+const PUSHES: usize = 40;
+const PUSH_MM: f64 = 5e-3;
 /// Poses nearer to each other than this are one, mm and radians.
 const SAME_POSE: (f64, f64) = (0.4, 0.03);
 /// Directions and axes used at each place.
@@ -115,12 +119,18 @@ impl Kind {
 
 /// Searches a way out of `parts` from among `others`, which stay.
 pub fn remove(assembly: &Assembly, parts: &[usize], others: &[usize], extra: &[DVec3], budget: &Budget) -> Removal {
-    let mut search = Search { assembly, parts, others, extra, budget, seen: vec![DAffine3::IDENTITY], blocked: None, out_of_time: false };
+    let mut search = Search { assembly, parts, others, extra, budget, seen: vec![DAffine3::IDENTITY], blocked: None, out_of_time: false, tilts: false };
     let start = Moved { parts, by: DAffine3::IDENTITY };
     if let Some(leg) = search.straight(&start) {
         return Removal::Out(Path { legs: vec![leg] });
     }
-    let found = if budget.legs > 1 { search.legs() } else { None };
+    let mut found = if budget.legs > 1 { search.legs() } else { None };
+    if found.is_none() && budget.legs > 1 && !search.out_of_time {
+        // Again, with more motions.
+        search.tilts = true;
+        search.seen.truncate(1);
+        found = search.legs();
+    }
     if let Some(path) = found {
         return Removal::Out(path);
     }
@@ -140,6 +150,37 @@ struct Search<'a> {
     seen: Vec<DAffine3>,
     blocked: Option<Blocked>,
     out_of_time: bool,
+    /// Whether turns about the place where the group is held count.
+    tilts: bool,
+}
+
+impl Kind {
+    fn shifted(self, by: DVec3) -> Self {
+        match self {
+            Self::Slide(d) => Self::Slide(d),
+            Self::Turn(line, arm) => Self::Turn(Line { point: line.point + by, ..line }, arm),
+        }
+    }
+}
+
+/// Least overlap on a leg: where, mm along it; how deep, mm; of which pair.
+type Least = (f64, f64, [usize; 2]);
+
+/// A place along a leg at which another motion opens.
+#[derive(Clone, Copy, Debug)]
+struct Opening {
+    /// Travel of the leg, mm.
+    at: f64,
+    /// A small slide after it.
+    shift: Option<DVec3>,
+    /// How far the motion goes beyond its range before, mm.
+    gain: f64,
+}
+
+impl Opening {
+    fn shift(&self) -> DAffine3 {
+        DAffine3::from_translation(self.shift.unwrap_or(DVec3::ZERO))
+    }
 }
 
 /// A place of the search.
@@ -202,7 +243,10 @@ impl Search<'_> {
                 legs.push(last);
                 return Some(Path { legs });
             }
+            let t = Instant::now();
+            if std::env::var("TRACE").is_ok() { eprintln!("place legs {} by {:.2}", place.legs.len(), place.by); }
             let mut next = self.openings(&place);
+            if std::env::var("TRACE").is_ok() { eprintln!("expanded {:?}: {}", t.elapsed(), next.len()); }
             // The largest gain is expanded first.
             next.sort_by(|a, b| a.0.total_cmp(&b.0));
             open.extend(next.into_iter().map(|(_, place)| place));
@@ -224,7 +268,7 @@ impl Search<'_> {
         }
         let mut found = Vec::new();
         for (p, &(reach, _)) in kinds.iter().zip(&ranges) {
-            if reach <= 2.0 * OPENING_MM {
+            if reach <= PLAY_MM {
                 continue;
             }
             for (q, &(range, pair)) in kinds.iter().zip(&ranges) {
@@ -233,14 +277,20 @@ impl Search<'_> {
                     return found;
                 }
                 let Some(pair) = pair else { continue };
-                if let Some((at, gain)) = self.opening(&group, p, reach, q, range, pair) {
-                    let leg = p.over(at);
-                    let by = leg.at(1.0) * place.by;
+                let t = Instant::now();
+                let o = self.opening(&group, p, reach, q, range, pair);
+                if std::env::var("TRACE").is_ok() && (o.is_some() || t.elapsed().as_millis() > 300) {
+                eprintln!("  p {p:.2?} reach {reach:.3} q {q:.2?} range {range:.3} -> {o:.3?} {:?}", t.elapsed());
+                }
+                if let Some(opening) = o {
+                    let leg = p.over(opening.at);
+                    let by = opening.shift() * leg.at(1.0) * place.by;
                     if self.is_new(by) {
                         self.seen.push(by);
                         let mut legs = place.legs.clone();
                         legs.push(leg);
-                        found.push((gain, Place { by, legs }));
+                        legs.extend(opening.shift.map(Motion::slide));
+                        found.push((opening.gain, Place { by, legs }));
                     }
                 }
             }
@@ -254,8 +304,13 @@ impl Search<'_> {
         let mut kinds: Vec<Kind> = directions.iter().flat_map(|&d| [Kind::Slide(d), Kind::Slide(-d)]).collect();
         let mut axes: Vec<Line> = found.axes.into_iter().take(AXES).collect();
         // Where the group is held narrowly it can tilt.
-        if let Some(pivot) = self.pivot(group) {
-            axes.extend(directions.iter().take(3).map(|&direction| Line { point: pivot, direction }));
+        if self.tilts && let Some(pivot) = self.pivot(group) {
+            for &direction in directions.iter().take(3) {
+                let axis = Line { point: pivot, direction };
+                if axes.iter().all(|known| !crate::directions::same_line(*known, axis)) {
+                    axes.push(axis);
+                }
+            }
         }
         let points: Vec<DVec3> = self.parts.iter().flat_map(|&p| {
             let pose = group.by * self.assembly.placement(p);
@@ -299,8 +354,16 @@ impl Search<'_> {
         (share * most, pair)
     }
 
-    /// Place along leg `p`, mm, at which motion `q` goes at least [`OPENING_MM`] beyond its `range`, and how far beyond.
-    fn opening(&mut self, group: &Moved<'_>, p: &Kind, reach: f64, q: &Kind, range: f64, pair: [usize; 2]) -> Option<(f64, f64)> {
+    /// Most travel by which a motion is displaced, mm: until it leaves, or half a turn.
+    fn most(&self, group: &Moved<'_>, q: &Kind) -> f64 {
+        match q {
+            Kind::Slide(d) => leaving_mm(self.assembly, group, self.others, *d),
+            Kind::Turn(_, arm) => std::f64::consts::PI * arm,
+        }
+    }
+
+    /// Where along leg `p` motion `q` goes at least [`OPENING_MM`] beyond its `range`.
+    fn opening(&mut self, group: &Moved<'_>, p: &Kind, reach: f64, q: &Kind, range: f64, pair: [usize; 2]) -> Option<Opening> {
         if same_axis(p, q) {
             return None;
         }
@@ -308,25 +371,69 @@ impl Search<'_> {
         let mut found = None;
         let mut gain = OPENING_MM;
         // The displacement doubles while there is a clear stretch.
-        for _ in 0..10 {
+        let most = self.most(group, q);
+        while range + gain <= most {
             let travel = range + gain;
-            let Ok((from, to)) = self.clear_stretch(group, p, low, high, q, travel) .map_err(|least| self.note(least, pair)) else { break };
-            let middle = (from + to) / 2.0;
-            let by = p.over(middle).at(1.0) * group.by;
+            let (at, shift) = match self.clear_stretch(group, p, low, high, q, travel) {
+                Ok((from, to)) => {
+                    (low, high) = (from, to);
+                    ((from + to) / 2.0, None)
+                }
+                Err(least) => {
+                    self.note(least.map(|(_, excess, pair)| (excess, pair)), pair);
+                    // A wider opening that was found before is as good.
+                    if found.is_some() {
+                        break;
+                    }
+                    let (at, ..) = least.filter(|&(_, excess, _)| excess <= COMPLY_MM)?;
+                    (at, Some(self.comply(group, p, at, q, travel)?))
+                }
+            };
+            let opening = Opening { at, shift, gain };
+            let leg = p.over(at);
+            let mut by = leg.at(1.0) * group.by;
+            if let Some(shift) = shift {
+                // The shift must be free where the leg ends.
+                if self.assembly.free_share(&Moved { parts: self.parts, by }, self.others, &Motion::slide(shift), SEARCH_STEP_MM).0 < 1.0 {
+                    break;
+                }
+                by = opening.shift() * by;
+            }
             // The motion itself, not its end alone, must be free.
-            let moved = Moved { parts: self.parts, by };
-            let carried = carry(q, &p.over(middle));
-            if self.assembly.free_share(&moved, self.others, &carried.over(travel), SEARCH_STEP_MM).0 < 1.0 {
+            let carried = carry(q, &leg).shifted(shift.unwrap_or(DVec3::ZERO));
+            if self.assembly.free_share(&Moved { parts: self.parts, by }, self.others, &carried.over(travel), SEARCH_STEP_MM).0 < 1.0 {
                 break;
             }
-            found = Some((middle, gain));
-            (low, high) = (from, to);
+            found = Some(opening);
             gain *= 2.0;
-            if to - from <= 4.0 * SCAN_MM {
+            if shift.is_some() || high - low <= 4.0 * SCAN_MM {
                 break;
             }
         }
         found
+    }
+
+    /// A small slide after which the group, at `at` of leg `p` and displaced by `q`, is clear: pushed out of its deepest overlap again and again.
+    fn comply(&self, group: &Moved<'_>, p: &Kind, at: f64, q: &Kind, travel: f64) -> Option<DVec3> {
+        let leg = p.over(at);
+        let displaced = carry(q, &leg).over(travel).at(1.0) * leg.at(1.0) * group.by;
+        let moved = |shift: DVec3| Moved { parts: self.parts, by: DAffine3::from_translation(shift) * displaced };
+        let mut shift = DVec3::ZERO;
+        for _ in 0..PUSHES {
+            let Some(met) = self.assembly.blocker(&moved(shift), self.others) else {
+                // Beyond contact the middle of the play is better than its end.
+                let gap = |s: DVec3| self.assembly.clearance(&moved(s), self.others, 1.0, false).map_or(1.0, |c| c.gap.distance_mm);
+                let further = (0..=8).map(|i| shift + shift.normalize_or_zero() * (0.05 * f64::from(i)));
+                return further.map(|s| (gap(s), s)).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, s)| s);
+            };
+            shift += met.gap.away * (PUSH_MM - met.gap.distance_mm);
+            // Pushed back along the motion itself nothing is gained.
+            let back = matches!(q, Kind::Slide(d) if shift.dot(*d) < -0.5 * shift.length());
+            if back || shift.length() > 4.0 * COMPLY_MM {
+                return None;
+            }
+        }
+        None
     }
 
     fn note(&mut self, least: Option<(f64, [usize; 2])>, pair: [usize; 2]) {
@@ -343,15 +450,14 @@ impl Search<'_> {
     }
 
     /// The first stretch of leg `p` within `low`..`high` along which the group displaced by `q` is clear; else the least overlap found.
-    #[allow(clippy::type_complexity)]
-    fn clear_stretch(&self, group: &Moved<'_>, p: &Kind, low: f64, high: f64, q: &Kind, travel: f64) -> Result<(f64, f64), Option<(f64, [usize; 2])>> {
+    fn clear_stretch(&self, group: &Moved<'_>, p: &Kind, low: f64, high: f64, q: &Kind, travel: f64) -> Result<(f64, f64), Option<Least>> {
         let depth = |s: f64| {
             let leg = p.over(s);
             let by = carry(q, &leg).over(travel).at(1.0) * leg.at(1.0) * group.by;
             self.assembly.excess(&Moved { parts: self.parts, by }, self.others, DEEP_MM)
         };
         let scale = if matches!(p, Kind::Turn(..)) { 2.0 } else { 1.0 };
-        let mut least: Option<(f64, [usize; 2])> = None;
+        let mut least: Option<Least> = None;
         let mut s = low;
         let mut start = None;
         for _ in 0..MOST_SCANS {
@@ -361,8 +467,8 @@ impl Search<'_> {
                     break;
                 }
                 Some((excess, pair)) => {
-                    if excess < DEEP_MM && least.is_none_or(|(e, _)| excess < e) {
-                        least = Some((excess, pair));
+                    if excess < DEEP_MM && least.is_none_or(|(_, e, _)| excess < e) {
+                        least = Some((s, excess, pair));
                     }
                     if s >= high {
                         break;

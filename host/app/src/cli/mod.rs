@@ -1,8 +1,9 @@
 //! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: the insertion was not completed, or an instruction not carried out; 2: not possible, with one line on standard error that
-//! gives the reason.
+//! Exit code 0: done; 1: the insertion was not completed, an instruction not carried out, or parts do not go together; 2: not possible, with one line
+//! on standard error that gives the reason.
 
+mod assembly;
 mod bake;
 mod contacts;
 mod demo;
@@ -44,6 +45,14 @@ enum Command {
     Inspect(inspect::Args),
     /// Find which faces of which parts touch, and the kinds of contact
     Contacts(contacts::Args),
+    /// Find the directions and axes along which each part of an assembly can move, and how far
+    Mobility(assembly::MobilityArgs),
+    /// Find ports of the parts of an assembly (shafts, bores, planes, balls) and what connects them
+    Features(assembly::FeaturesArgs),
+    /// Find an order and collision-free ways in which an assembly goes together; exit code 1 when it does not
+    Assemble(assembly::AssembleArgs),
+    /// Find collision-free ways out: of one part, or of all in order; exit code 1 when something stays in
+    Disassemble(assembly::DisassembleArgs),
     /// Convert a STEP file to a scene image (collision model) for the board
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
@@ -91,6 +100,10 @@ pub fn main() -> ExitCode {
             }
             Command::Inspect(args) => inspect::run(&args),
             Command::Contacts(args) => contacts::run(&args),
+            Command::Mobility(args) => assembly::mobility(&args),
+            Command::Features(args) => assembly::features(&args),
+            Command::Assemble(args) => assembly::assemble(&args),
+            Command::Disassemble(args) => assembly::disassemble(&args),
             Command::Bake(args) => bake::run(&args),
             Command::Demo(args) => demo::run(args),
             Command::Lab(args) => lab::run(&args),

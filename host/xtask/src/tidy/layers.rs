@@ -75,6 +75,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("firmware", &["mortise-haptics", "mortise-protocol"]),
     ("protocol", &[]),
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
+    ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     (
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],
@@ -105,6 +106,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-protocol",
             "mortise-rig",
             "mortise-scenario",
+            "mortise-task",
         ],
     ),
     (

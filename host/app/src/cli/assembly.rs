@@ -1,0 +1,223 @@
+//! `mortise mobility`, `disassemble`, `assemble` and `features`: how the parts of an assembly are connected, move, and come apart.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use mortise_output::lines;
+use mortise_task::removal::{Budget, Removal, remove};
+use mortise_task::report::{self, Sense, SequenceReport};
+use mortise_task::sequence::{self, Sequence, Step};
+use mortise_task::{Assembly, ports};
+use serde::Serialize;
+
+use super::reading::Reading;
+
+/// Arguments of `mobility`.
+#[derive(Debug, clap::Args)]
+pub struct MobilityArgs {
+    /// STEP file of an assembly
+    file: PathBuf,
+    /// One part instead of all
+    #[arg(long, value_name = "PART")]
+    part: Option<String>,
+    #[command(flatten)]
+    reading: Reading,
+    /// One JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `features`.
+#[derive(Debug, clap::Args)]
+pub struct FeaturesArgs {
+    /// STEP file of an assembly
+    file: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
+    /// One JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `assemble`.
+#[derive(Debug, clap::Args)]
+pub struct AssembleArgs {
+    /// STEP file of an assembly, parts in their final places
+    file: PathBuf,
+    /// Limit on the time of the search, in seconds
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = super::units::seconds, allow_negative_numbers = true)]
+    time: u64,
+    #[command(flatten)]
+    reading: Reading,
+    /// One JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `disassemble`.
+#[derive(Debug, clap::Args)]
+pub struct DisassembleArgs {
+    #[command(flatten)]
+    search: AssembleArgs,
+    /// Take out this part alone, the others in place [default: take everything apart]
+    #[arg(long, value_name = "PART")]
+    part: Option<String>,
+}
+
+fn read(file: &Path, reading: &Reading) -> anyhow::Result<Assembly> {
+    reading.apply();
+    Ok(Assembly::new(mortise_brep::load_step(file)?)?)
+}
+
+/// Runs `mobility`.
+pub fn mobility(args: &MobilityArgs) -> anyhow::Result<ExitCode> {
+    let assembly = read(&args.file, &args.reading)?;
+    let parts = match &args.part {
+        Some(name) => vec![assembly.part(name)?],
+        None => (0..assembly.count()).collect(),
+    };
+    let found = report::mobility(&assembly, &parts);
+    if args.json {
+        #[derive(Serialize)]
+        struct Report<'a> {
+            parts: Vec<report::PartMobility<'a>>,
+            warnings: &'a [String],
+        }
+        lines::json(&Report { parts: found, warnings: &assembly.model.warnings })?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for part in &found {
+        lines::text(part.part)?;
+        for t in &part.translations {
+            let reach = match (t.range_mm, t.meets) {
+                (Some(range), Some(meets)) => format!("{range:.3} mm to {meets}"),
+                _ => "out".into(),
+            };
+            lines::text(&format!("  along {}: {reach}", direction(t.direction)))?;
+        }
+        for r in &part.rotations {
+            let [x, y, z] = r.point_mm;
+            let [back, forth] = r.range_deg;
+            let range = if r.reach == mortise_task::mobility::Reach::Full { "all around".into() } else { format!("−{back:.2}° to {forth:.2}°") };
+            lines::text(&format!("  about {} through {x:.3}, {y:.3}, {z:.3} mm: {range}", direction(r.direction)))?;
+        }
+        if part.translations.is_empty() && part.rotations.is_empty() {
+            lines::text("  held")?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn direction([x, y, z]: [f64; 3]) -> String {
+    let names = [([1.0, 0.0, 0.0], "+x"), ([-1.0, 0.0, 0.0], "-x"), ([0.0, 1.0, 0.0], "+y"), ([0.0, -1.0, 0.0], "-y"), ([0.0, 0.0, 1.0], "+z"), ([0.0, 0.0, -1.0], "-z")];
+    let near = |d: &[f64; 3]| (d[0] - x).abs().max((d[1] - y).abs()).max((d[2] - z).abs()) < 1e-6;
+    names.iter().find(|(d, _)| near(d)).map_or_else(|| format!("({x:.4}, {y:.4}, {z:.4})"), |(_, name)| (*name).into())
+}
+
+/// Runs `assemble`.
+pub fn assemble(args: &AssembleArgs) -> anyhow::Result<ExitCode> {
+    let assembly = read(&args.file, &args.reading)?;
+    let all: Vec<usize> = (0..assembly.count()).collect();
+    let found = sequence::disassemble(&assembly, &all, Duration::from_secs(args.time));
+    print_sequence(&report::sequence(&assembly, &found, Sense::Assembly), args.json)
+}
+
+/// Runs `disassemble`.
+pub fn disassemble(args: &DisassembleArgs) -> anyhow::Result<ExitCode> {
+    let search = &args.search;
+    let assembly = read(&search.file, &search.reading)?;
+    let time = Duration::from_secs(search.time);
+    let found = match &args.part {
+        Some(name) => take_out(&assembly, assembly.part(name)?, time),
+        None => sequence::disassemble(&assembly, &(0..assembly.count()).collect::<Vec<_>>(), time),
+    };
+    print_sequence(&report::sequence(&assembly, &found, Sense::Disassembly), search.json)
+}
+
+/// Removal of one part from all others in place.
+fn take_out(assembly: &Assembly, part: usize, time: Duration) -> Sequence {
+    let start = Instant::now();
+    let group = vec![part];
+    let onto: Vec<usize> = (0..assembly.count()).filter(|&p| p != part).collect();
+    let mut found = Sequence { steps: Vec::new(), stuck: Vec::new(), timed_out: false, time };
+    match remove(assembly, &group, &onto, &[], &Budget::lasting(time)) {
+        Removal::Out(path) => {
+            let mut step = Step { group, onto, path, least: None, measured: false };
+            step.least = sequence::measure(assembly, &step);
+            step.measured = true;
+            found.steps.push(step);
+        }
+        Removal::Blocked(blocked) => found.stuck.push((group, blocked)),
+        Removal::TimedOut(blocked) => {
+            found.stuck.push((group, blocked));
+            found.timed_out = true;
+        }
+    }
+    found.time = start.elapsed();
+    found
+}
+
+/// Prints a sequence; exit code 1 when parts stay together.
+fn print_sequence(report: &SequenceReport<'_>, json: bool) -> anyhow::Result<ExitCode> {
+    let code = if report.stuck.is_empty() && report.verdict != "timed_out" { ExitCode::SUCCESS } else { ExitCode::from(1) };
+    if json {
+        lines::json(report)?;
+        return Ok(code);
+    }
+    for step in &report.steps {
+        let way = match step.direction {
+            Some(d) => format!("along {}", direction(d)),
+            None => "by a turn".into(),
+        };
+        let gap = match (step.overlap_um, step.clearance_um) {
+            (Some(overlap), _) if overlap > 0.05 => format!("overlap {overlap:.1} µm"),
+            (Some(_), Some(clearance)) => format!("clearance {clearance:.1} µm"),
+            (Some(_), None) => "clear".into(),
+            (None, _) => "not measured in the time".into(),
+        };
+        let legs = if step.legs > 1 { format!(", {} legs", step.legs) } else { String::new() };
+        lines::text(&format!("{}. {} {way}{legs}: {gap}", step.step, step.moving.join(", ")))?;
+    }
+    for stuck in &report.stuck {
+        let [a, b] = stuck.pair;
+        let lacks = stuck.overlap_um.map_or(String::new(), |um| format!(" by {um:.1} µm at the least"));
+        lines::text(&format!("{} stay together: {a} meets {b}{lacks}", stuck.parts.join(", ")))?;
+    }
+    lines::text(&format!("{} in {:.1} s", report.verdict.replace('_', " "), report.time_s))?;
+    Ok(code)
+}
+
+/// Runs `features`.
+pub fn features(args: &FeaturesArgs) -> anyhow::Result<ExitCode> {
+    let assembly = read(&args.file, &args.reading)?;
+    let found: Vec<_> = (0..assembly.count()).map(|p| (assembly.name(p), ports::ports(&assembly, p))).collect();
+    let connections = report::connections(&assembly);
+    if args.json {
+        #[derive(Serialize)]
+        struct Part<'a> {
+            part: &'a str,
+            ports: &'a [ports::Port],
+        }
+        #[derive(Serialize)]
+        struct Report<'a> {
+            parts: Vec<Part<'a>>,
+            connections: Vec<report::ConnectionReport<'a>>,
+            warnings: &'a [String],
+        }
+        let parts = found.iter().map(|(part, ports)| Part { part, ports }).collect();
+        lines::json(&Report { parts, connections, warnings: &assembly.model.warnings })?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for (part, ports) in &found {
+        lines::text(part)?;
+        for port in ports {
+            lines::text(&format!("  {port}"))?;
+        }
+    }
+    for c in &connections {
+        let kinds: Vec<String> = c.kinds.iter().map(|k| format!("{k:?}").to_lowercase()).collect();
+        lines::text(&format!("{} – {}: {}", c.a, c.b, kinds.join(", ")))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,197 @@
+//! Sequences: how an assembly comes apart, and in reverse how it goes together.
+//!
+//! A set of parts is split into a group that leaves and the rest, and both again, down to single parts: a tree of splits, whose reverse is an assembly with
+//! subassemblies. Removing a group never makes another removal harder, because it takes obstacles away; so the first split found is as good as any, and the
+//! search needs no backtracking (for rigid groups, two at a time, each on its way without intermediate stops). Straight ways are found by blocking
+//! graphs ([`crate::blocking`]), others by [`crate::removal`] for single parts, and for pairs of connected parts where no single part leaves.
+//!
+//! Every step is measured again in the direction of assembly, from outside into place.
+
+use std::time::{Duration, Instant};
+
+use glam::{DAffine3, DVec3};
+
+use crate::assembly::{Assembly, Clearance, Moved};
+use crate::blocking::Blocking;
+use crate::directions::{candidates, same_direction};
+use crate::motion::Motion;
+use crate::removal::{Blocked, Budget, Path, Removal, remove};
+
+/// Travel between checks of samples in contact when a step is measured, mm.
+pub const MEASURE_STEP_MM: f64 = 0.25;
+/// Distance beyond which a clearance is not stated, mm.
+pub const FAR_MM: f64 = 1e3;
+/// Most directions, each both ways, in which straight ways are sought.
+const LINES: usize = 6;
+
+/// One step: a group that leaves, or in reverse is put onto, the others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// Parts that move together.
+    pub group: Vec<usize>,
+    /// Parts that stay.
+    pub onto: Vec<usize>,
+    /// Way of the group from its place to the outside.
+    pub path: Path,
+    /// Least distance on the way in, and the pair; `None` when it stays beyond [`FAR_MM`], or was not measured for lack of time.
+    pub least: Option<Clearance>,
+    /// Whether it was measured.
+    pub measured: bool,
+}
+
+/// What a search found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sequence {
+    /// Steps of disassembly; the reverse is the order of assembly.
+    pub steps: Vec<Step>,
+    /// Sets of parts that stay together, with what holds each.
+    pub stuck: Vec<(Vec<usize>, Blocked)>,
+    /// Whether time ran out.
+    pub timed_out: bool,
+    /// Time taken.
+    pub time: Duration,
+}
+
+impl Sequence {
+    /// Whether everything comes apart.
+    pub fn complete(&self) -> bool {
+        self.stuck.is_empty() && !self.timed_out
+    }
+}
+
+/// Directions of all parts of `set`, most important first.
+pub fn directions(assembly: &Assembly, set: &[usize]) -> Vec<DVec3> {
+    let mut sums: Vec<(f64, DVec3)> = Vec::new();
+    for &part in set {
+        let group = [part];
+        let moved = Moved { parts: &group, by: DAffine3::IDENTITY };
+        for (rank, d) in candidates(assembly, &moved, &[]).directions.into_iter().enumerate() {
+            let weight = 1.0 / (1.0 + rank as f64);
+            match sums.iter_mut().find(|(_, known)| same_direction(*known, d)) {
+                Some((sum, _)) => *sum += weight,
+                None => sums.push((weight, d)),
+            }
+        }
+    }
+    sums.sort_by(|a, b| b.0.total_cmp(&a.0));
+    sums.into_iter().take(LINES).map(|(_, d)| d).collect()
+}
+
+/// Takes the parts of `set` apart within `time`.
+pub fn disassemble(assembly: &Assembly, set: &[usize], time: Duration) -> Sequence {
+    let start = Instant::now();
+    // A tenth is left for measuring.
+    let until = start + time.mul_f64(0.9);
+    let mut found = Sequence { steps: Vec::new(), stuck: Vec::new(), timed_out: false, time };
+    let mut blocking = Blocking::new(assembly, directions(assembly, set));
+    let mut open = vec![set.to_vec()];
+    while let Some(set) = open.pop() {
+        if set.len() < 2 {
+            continue;
+        }
+        if Instant::now() >= until {
+            found.timed_out = true;
+            break;
+        }
+        match split(assembly, &mut blocking, &set, until) {
+            Ok(step) => {
+                open.push(step.onto.clone());
+                open.push(step.group.clone());
+                found.steps.push(step);
+            }
+            Err((blocked, timed_out)) => {
+                found.timed_out |= timed_out;
+                found.stuck.push((set, blocked));
+            }
+        }
+    }
+    let end = start + time;
+    for step in &mut found.steps {
+        if Instant::now() >= end {
+            break;
+        }
+        step.least = measure(assembly, step);
+        step.measured = true;
+    }
+    found.time = start.elapsed();
+    found
+}
+
+/// Splits a set: the smallest group that leaves straight, else a part that leaves on several legs.
+fn split(assembly: &Assembly, blocking: &mut Blocking<'_>, set: &[usize], until: Instant) -> Result<Step, (Blocked, bool)> {
+    let rest = |group: &[usize]| set.iter().copied().filter(|p| !group.contains(p)).collect::<Vec<_>>();
+    if let Some(leaving) = blocking.leaving(set, until).into_iter().next() {
+        let onto = rest(&leaving.parts);
+        let moved = Moved { parts: &leaving.parts, by: DAffine3::IDENTITY };
+        let far = crate::mobility::leaving_mm(assembly, &moved, &onto, leaving.direction);
+        let path = Path { legs: vec![Motion::slide(leaving.direction * far)] };
+        return Ok(Step { group: leaving.parts, onto, path, least: None, measured: false });
+    }
+    let mut groups: Vec<Vec<usize>> = set.iter().map(|&p| vec![p]).collect();
+    groups.sort_by(|a, b| volume(assembly, a).total_cmp(&volume(assembly, b)));
+    if set.len() == 2 {
+        // Either part is the other's obstacle: one search is enough.
+        groups.truncate(1);
+    } else if set.len() > 3 {
+        groups.extend(pairs(assembly, set));
+    }
+    let mut worst: Option<Blocked> = None;
+    let mut timed_out = false;
+    let count = groups.len();
+    for (i, group) in groups.into_iter().enumerate() {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            timed_out = true;
+            break;
+        }
+        let onto = rest(&group);
+        let budget = Budget { until: Instant::now() + left.div_f64((count - i).min(3) as f64), legs: 12 };
+        match remove(assembly, &group, &onto, &[], &budget) {
+            Removal::Out(path) => return Ok(Step { group, onto, path, least: None, measured: false }),
+            Removal::Blocked(blocked) => worst = Some(nearer(worst, blocked)),
+            Removal::TimedOut(blocked) => {
+                timed_out = true;
+                worst = Some(nearer(worst, blocked));
+            }
+        }
+    }
+    let blocked = worst.unwrap_or(Blocked { pair: [set[0], set[1]], overlap_mm: None });
+    Err((blocked, timed_out))
+}
+
+/// The one of two blocks that lacks less.
+fn nearer(known: Option<Blocked>, new: Blocked) -> Blocked {
+    match known {
+        Some(known) if known.overlap_mm.unwrap_or(f64::INFINITY) <= new.overlap_mm.unwrap_or(f64::INFINITY) => known,
+        _ => new,
+    }
+}
+
+fn volume(assembly: &Assembly, group: &[usize]) -> f64 {
+    group.iter().map(|&p| assembly.body(p).surface().shape().volume_mm3.abs()).sum()
+}
+
+/// Pairs of touching parts of `set`.
+fn pairs(assembly: &Assembly, set: &[usize]) -> Vec<Vec<usize>> {
+    let mut pairs: Vec<Vec<usize>> = (assembly.contacts.iter().map(|c| c.parts.to_vec()))
+        .filter(|pair| pair.iter().all(|p| set.contains(p)))
+        .collect();
+    pairs.sort();
+    pairs.dedup();
+    pairs
+}
+
+/// Least distance on a step's way in.
+pub fn measure(assembly: &Assembly, step: &Step) -> Option<Clearance> {
+    let (mut by, path) = step.path.reversed();
+    let mut least: Option<Clearance> = None;
+    for leg in &path.legs {
+        let moved = Moved { parts: &step.group, by };
+        let within = least.map_or(FAR_MM, |l| l.gap.distance_mm);
+        if let Some((_, found)) = assembly.least_over(&moved, &step.onto, leg, MEASURE_STEP_MM, within) {
+            least = Some(found);
+        }
+        by = leg.at(1.0) * by;
+    }
+    least
+}
