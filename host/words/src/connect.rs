@@ -71,7 +71,7 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
             continue;
         }
         tried = true;
-        if let Some(seat) = enter(world, part, &pose, wish, &mut blockers) {
+        if let Some(seat) = enter(world, [part, into], &pose, wish, &mut blockers) {
             found = Some(seat);
             break;
         }
@@ -79,7 +79,7 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
     if found.is_none() {
         let poses = matches(world, part, into, wish, &mut blockers);
         tried |= !poses.is_empty();
-        found = poses.into_iter().find_map(|pose| enter(world, part, &pose, wish, &mut blockers));
+        found = poses.into_iter().find_map(|pose| enter(world, [part, into], &pose, wish, &mut blockers));
     }
     world.set_placement(part, now);
     let Some(seat) = found else {
@@ -177,14 +177,14 @@ fn carried_over(world: &World, part: usize, into: usize, pose: &DAffine3) -> Vec
 }
 
 /// Checks a seat: free of overlap, and with a straight way in. The part stands there afterwards.
-fn enter(world: &mut World, part: usize, pose: &DAffine3, wish: &Wish, blockers: &mut Vec<usize>) -> Option<Seat> {
+fn enter(world: &mut World, [part, into]: [usize; 2], pose: &DAffine3, wish: &Wish, blockers: &mut Vec<usize>) -> Option<Seat> {
     world.set_placement(part, *pose);
     if let Some(found) = world.blocker(part) {
         blockers.push(found.pair[1]);
         return None;
     }
     let loose: Vec<usize> = (0..world.count()).filter(|&p| p != part && world.connections(p).is_empty()).collect();
-    let fixed: Vec<usize> = world.others(&[part]).into_iter().filter(|p| !loose.contains(p)).collect();
+    let fixed: Vec<usize> = world.others(&[part]).into_iter().filter(|p| *p == into || !loose.contains(p)).collect();
     let mut ways: Vec<(f64, DVec3)> = world
         .ways(part)
         .into_iter()

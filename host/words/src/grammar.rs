@@ -77,6 +77,16 @@ pub fn parse(tokens: &[Token]) -> Result<Vec<Command>, Puzzle> {
     Ok(commands)
 }
 
+/// The noun phrase that is all of an instruction: the answer to a question.
+pub fn only_phrase(mut tokens: &[Token]) -> Option<Phrase> {
+    while let Some((Token::Stop | Token::Comma, rest)) = tokens.split_last() {
+        tokens = rest;
+    }
+    let starts_with_verb = tokens.first().and_then(Token::word).is_some_and(|w| lexicon::verb(w).is_some()) && verb_at(tokens);
+    let found = phrase(&mut tokens, true).ok()?;
+    (tokens.is_empty() && !starts_with_verb).then_some(found)
+}
+
 /// Splits at stops, commas, "then" and "and" before a verb.
 fn clauses(tokens: &[Token]) -> Vec<&[Token]> {
     let mut out = Vec::new();

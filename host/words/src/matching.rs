@@ -59,7 +59,7 @@ pub fn matches(world: &mut World, part: usize, into: usize, wish: &Wish, blocker
             if wish.from.is_some_and(|place| direction(place).dot(entry) < 0.7) {
                 continue;
             }
-            out.extend(insert(world, part, now, m, entry, blockers));
+            out.extend(insert(world, [part, into], now, m, entry, blockers));
         }
         world.set_placement(part, now);
         if !out.is_empty() {
@@ -147,7 +147,14 @@ fn pairs(own: &[Port], others: &[Port], p: &Port, q: &Port, rotation: DQuat) -> 
 }
 
 /// Pushes the part in from the side `entry`; `None` when the ports do not engage.
-fn insert(world: &mut World, part: usize, now: DAffine3, m: &Match, entry: DVec3, blockers: &mut Vec<usize>) -> Option<DAffine3> {
+fn insert(
+    world: &mut World,
+    [part, into]: [usize; 2],
+    now: DAffine3,
+    m: &Match,
+    entry: DVec3,
+    blockers: &mut Vec<usize>,
+) -> Option<DAffine3> {
     let turn = DMat3::from_quat(m.rotation);
     // The port's origin onto the other's axis.
     let onto = m.other.origin;
@@ -156,14 +163,12 @@ fn insert(world: &mut World, part: usize, now: DAffine3, m: &Match, entry: DVec3
         translation: onto - turn * m.own.origin,
     } * now;
     world.set_placement(part, turned);
-    let others = world.others(&[part]);
-    // Beyond everything on this side, then inwards.
+    // Beyond the other part on this side, then inwards; how it comes there is not looked at.
     let height = |world: &World, p: usize, sign: f64| {
         let (low, high) = world.bounds(p);
         sign * ((low + high) / 2.0).dot(entry) + ((high - low) / 2.0).dot(entry.abs())
     };
-    let top = others.iter().map(|&p| height(world, p, 1.0)).fold(f64::NEG_INFINITY, f64::max);
-    let out = (top + height(world, part, -1.0)).max(0.0) + 1.0;
+    let out = (height(world, into, 1.0) + height(world, part, -1.0)).max(0.0) + 1.0;
     world.shift(&[part], entry * out);
     let own = Port {
         origin: onto + entry * out,

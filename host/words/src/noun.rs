@@ -224,7 +224,7 @@ fn may_be_noun(token: &Token) -> bool {
     match token {
         Token::Name { .. } => true,
         Token::Word { text, .. } => {
-            (!starts_constituent(text) || text == "half")
+            (!starts_constituent(text) || ["half", "one", "ones"].contains(&text.as_str()))
                 && !["the", "of", "number"].contains(&text.as_str())
                 || (lexicon::PLACES.iter().any(|(_, w)| w.contains(&text.as_str())) && text != "back")
         }

@@ -9,7 +9,7 @@ use mortise_task::TaskError;
 use crate::adjust::{adjust, turn};
 use crate::connect::{Wish, connect};
 use crate::disconnect::disconnect;
-use crate::grammar::parse;
+use crate::grammar::{only_phrase, parse};
 use crate::phrase::{Command, Phrase, Puzzle};
 use crate::port::Port;
 use crate::reference::{Memory, Purpose, Scene, Seen, direction, longest_axis};
@@ -24,11 +24,22 @@ struct Snapshot {
     memory: Memory,
 }
 
+/// Phrase of a command that a question is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Slot {
+    What,
+    Into,
+}
+
 /// Instructions on one assembly.
 pub struct Session {
     world: World,
     names: Names,
     memory: Memory,
+    /// The phrase that is being resolved.
+    slot: Option<Slot>,
+    /// The instruction that was answered by a question, and what the question is about.
+    asked: Option<(Command, Slot)>,
     done: Vec<Snapshot>,
     undone: Vec<Snapshot>,
 }
@@ -44,6 +55,8 @@ impl Session {
             world: World::new(model)?,
             names,
             memory: Memory::default(),
+            slot: None,
+            asked: None,
             done: Vec::new(),
             undone: Vec::new(),
         })
@@ -66,11 +79,12 @@ impl Session {
             self.world.set_placement(part, home);
         }
         self.memory = Memory::default();
+        self.asked = None;
         self.done.clear();
         self.undone.clear();
     }
 
-    /// Carries out one instruction.
+    /// Carries out one instruction. After a question a noun phrase alone is its answer: "the left one".
     pub fn say(&mut self, text: &str) -> Turn {
         let before = self.snapshot();
         let result = self.carry_out(text);
@@ -161,10 +175,15 @@ impl Session {
             let words = format!("the instruction has {} bytes; at most {LONGEST} are read, so say less at once", text.len());
             return Err(Trouble::Refuse(Code::NotUnderstood, words, vec![]));
         }
-        let commands = parse(&read(text, &self.names)).map_err(|puzzle| match puzzle {
-            Puzzle::NotAnAction(words) => Trouble::Refuse(Code::NotAnAction, words, vec![]),
-            Puzzle::NotUnderstood(words) => Trouble::Refuse(Code::NotUnderstood, words, vec![]),
-        })?;
+        let tokens = read(text, &self.names);
+        let asked = self.asked.take();
+        let commands = match (asked, only_phrase(&tokens)) {
+            (Some((command, slot)), Some(answer)) => vec![answered(command, slot, answer)],
+            _ => parse(&tokens).map_err(|puzzle| match puzzle {
+                Puzzle::NotAnAction(words) => Trouble::Refuse(Code::NotAnAction, words, vec![]),
+                Puzzle::NotUnderstood(words) => Trouble::Refuse(Code::NotUnderstood, words, vec![]),
+            })?,
+        };
         if let [only @ (Command::Undo | Command::Redo)] = &commands[..] {
             self.rewind(only == &Command::Undo)?;
             return Ok((Vec::new(), None, true));
@@ -172,7 +191,12 @@ impl Session {
         let mut acts = Vec::new();
         let mut memory = None;
         for command in &commands {
-            let meant = self.one(command, &mut acts)?;
+            self.slot = None;
+            let meant = self.one(command, &mut acts);
+            if let (Err(Trouble::Ask(..)), Some(slot), [only]) = (&meant, self.slot, &commands[..]) {
+                self.asked = Some((only.clone(), slot));
+            }
+            let meant = meant?;
             self.memory = meant.clone();
             memory = Some(meant);
         }
@@ -210,11 +234,15 @@ impl Session {
         {
             near = self.resolve(from, Purpose::Owner, &[])?.0;
         }
+        self.slot = Some(Slot::What);
         let (parts, class) = self.resolve(what, purpose, &near)?;
+        self.slot = None;
         for &part in &parts {
             match command {
                 Command::Connect { into, relation, from, extent, .. } => {
+                    self.slot = into.as_ref().is_none_or(|i| !i.hole).then_some(Slot::Into);
                     let (into, hole) = self.destination(part, &parts, into.as_ref())?;
+                    self.slot = None;
                     let wish = Wish {
                         relation: *relation,
                         from: *from,
@@ -354,6 +382,20 @@ impl Session {
         }
         Ok(None)
     }
+}
+
+/// The command with the phrase that was asked about.
+fn answered(mut command: Command, slot: Slot, answer: Phrase) -> Command {
+    match &mut command {
+        Command::Connect { into, .. } if slot == Slot::Into => *into = Some(answer),
+        Command::Connect { what, .. }
+        | Command::Disconnect { what, .. }
+        | Command::Adjust { what, .. }
+        | Command::Turn { what, .. }
+        | Command::Pick { what } => *what = answer,
+        Command::Undo | Command::Redo => {}
+    }
+    command
 }
 
 fn pose(placement: &DAffine3) -> Pose {
