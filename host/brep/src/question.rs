@@ -38,7 +38,9 @@ pub(crate) struct Question {
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) enum Kind {
-    Sides { tolerance_mm: f64 },
+    Sides {
+        tolerance_mm: f64,
+    },
     Feet,
     /// The STEP text of an assembly with these parts.
     Write(Vec<Part>),

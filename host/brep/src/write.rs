@@ -12,7 +12,11 @@ use std::path::Path;
 /// As [`crate::load_step_with`], and [`BrepError::NoSuchShape`] for a part whose shape is not in the file.
 ///
 /// Cost: the file is read again, in a child process if possible (see [`crate::child`]).
-pub fn step_text(path: impl AsRef<Path>, options: &LoadOptions, parts: &[Part]) -> Result<Vec<u8>, BrepError> {
+pub fn step_text(
+    path: impl AsRef<Path>,
+    options: &LoadOptions,
+    parts: &[Part],
+) -> Result<Vec<u8>, BrepError> {
     let path = path.as_ref();
     let shape = parts.iter().map(|part| part.shape).max().unwrap_or(0);
     match oracle::ask(path, options, Kind::Write(parts.to_vec()), shape, &[])? {

@@ -1,5 +1,7 @@
 //! adjust(a): along or about the remaining freedom, so that the connections still hold (Jung 2003, section 4).
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 use mortise_task::Motion;
 
@@ -11,6 +13,8 @@ use crate::world::World;
 
 /// Travel that counts as none, mm: the resolution of a contact.
 const STILL_MM: f64 = 2e-3;
+/// Most turns of one instruction.
+const MOST_TURNS: f64 = 1000.0;
 /// Cosine between a direction asked for and a freedom: within 25°.
 const AGREES: f64 = 0.9;
 
@@ -25,14 +29,28 @@ fn refuse<T>(code: Code, words: String, parts: Vec<usize>) -> Result<T, Trouble>
 /// `NoFit`: connected to nothing.
 ///
 /// Cost: one sweep for each direction along its axes.
-pub fn adjust(world: &mut World, part: usize, out: bool, way: Option<Place>, amount: Amount) -> Result<Act, Trouble> {
+pub fn adjust(
+    world: &mut World,
+    part: usize,
+    out: bool,
+    way: Option<Place>,
+    amount: Amount,
+) -> Result<Act, Trouble> {
     let name = world.name(part).to_owned();
     let connections = world.connections(part);
     if connections.is_empty() {
-        return refuse(Code::NoFit, format!("{name} is connected to nothing; connect it first"), vec![part]);
+        return refuse(
+            Code::NoFit,
+            format!("{name} is connected to nothing; connect it first"),
+            vec![part],
+        );
     }
     if let Amount::Vague | Amount::Open | Amount::Angle(_) = amount {
-        return refuse(Code::NotUnderstood, format!("say how far {name} moves, with a unit: 12 mm, half, fully"), vec![part]);
+        return refuse(
+            Code::NotUnderstood,
+            format!("say how far {name} moves, with a unit: 12 mm, half, fully"),
+            vec![part],
+        );
     }
     let along = match way {
         Some(place) => stated(world, part, place)?,
@@ -54,7 +72,11 @@ pub fn adjust(world: &mut World, part: usize, out: bool, way: Option<Place>, amo
         _ => free,
     };
     if by <= 0.0 {
-        return refuse(Code::OutOfRange, format!("{name}: the amount must be more than 0"), vec![part]);
+        return refuse(
+            Code::OutOfRange,
+            format!("{name}: the amount must be more than 0"),
+            vec![part],
+        );
     }
     let blocker = pair.map(|[_, other]| other);
     let stuck = |world: &World| {
@@ -73,7 +95,10 @@ pub fn adjust(world: &mut World, part: usize, out: bool, way: Option<Place>, amo
         if blocker.is_some() {
             return stuck(world);
         }
-        let words = format!("{name} would leave {} after {range:.3} mm", world.name(connections[0]));
+        let words = format!(
+            "{name} would leave {} after {range:.3} mm",
+            world.name(connections[0])
+        );
         return refuse(Code::OutOfRange, words, connections);
     }
     if by > free + STILL_MM / 2.0 {
@@ -97,14 +122,21 @@ fn axes(world: &World, part: usize) -> Vec<DVec3> {
             axes.push(fit.port.direction);
         }
     }
-    if axes.is_empty() { world.ways(part) } else { axes.iter().flat_map(|&a| [a, -a]).collect() }
+    if axes.is_empty() {
+        world.ways(part)
+    } else {
+        axes.iter().flat_map(|&a| [a, -a]).collect()
+    }
 }
 
 /// The freedom that agrees with a direction asked for.
 fn stated(world: &World, part: usize, place: Place) -> Result<DVec3, Trouble> {
     let wanted = direction(place);
     let all = axes(world, part);
-    let best = all.iter().copied().max_by(|a, b| a.dot(wanted).total_cmp(&b.dot(wanted)));
+    let best = all
+        .iter()
+        .copied()
+        .max_by(|a, b| a.dot(wanted).total_cmp(&b.dot(wanted)));
     match best {
         Some(axis) if axis.dot(wanted) > AGREES => Ok(axis),
         _ => refuse(
@@ -127,7 +159,9 @@ fn outwards(world: &World, part: usize, amount: Amount) -> DVec3 {
         let (free, pair) = world.free(&[part], axis, wanted);
         let leaves = pair.is_none();
         let score = if leaves { -range } else { free };
-        let better = best.is_none_or(|(l, s, d)| (leaves, score, axis.z) > (l, s + 1e-6, d.z) && (leaves != l || score > s + 1e-6 || axis.z > d.z));
+        let better = best.is_none_or(|(l, s, d)| {
+            (leaves, score, axis.z) > (l, s + 1e-6, d.z) && (leaves != l || score > s + 1e-6 || axis.z > d.z)
+        });
         if better {
             best = Some((leaves, score, axis));
         }
@@ -144,7 +178,11 @@ pub fn range_mm(world: &World, part: usize, axis: DVec3) -> f64 {
             continue;
         }
         let (low, high) = fit.other.interval_on(&fit.port);
-        range = range.max(if along > 0.0 { high - fit.port.low } else { fit.port.high - low });
+        range = range.max(if along > 0.0 {
+            high - fit.port.low
+        } else {
+            fit.port.high - low
+        });
     }
     if range > 0.0 {
         return range;
@@ -161,7 +199,11 @@ pub fn range_mm(world: &World, part: usize, axis: DVec3) -> f64 {
 pub fn turn(world: &mut World, part: usize, amount: Amount) -> Result<Act, Trouble> {
     let name = world.name(part).to_owned();
     let Amount::Angle(angle) = amount else {
-        return refuse(Code::NotUnderstood, format!("say how far {name} turns: 90 degrees, a quarter"), vec![part]);
+        return refuse(
+            Code::NotUnderstood,
+            format!("say how far {name} turns: 90 degrees, a quarter"),
+            vec![part],
+        );
     };
     let fit = world.fits(part).first().copied();
     let own = || {
@@ -170,20 +212,38 @@ pub fn turn(world: &mut World, part: usize, amount: Amount) -> Result<Act, Troub
         Some(largest.placed(&world.placement(part)))
     };
     let Some(port) = fit.map(|f| f.port).or_else(own) else {
-        return refuse(Code::NoFit, format!("{name} has no round surface to turn about"), vec![part]);
+        return refuse(
+            Code::NoFit,
+            format!("{name} has no round surface to turn about"),
+            vec![part],
+        );
     };
     // The axis counts as pointing up, else to the rear, else to the right.
     let d = port.direction;
-    let up = [d.z, d.y, d.x].into_iter().find(|c| c.abs() > 1e-6).unwrap_or(1.0);
+    let up = [d.z, d.y, d.x]
+        .into_iter()
+        .find(|c| c.abs() > 1e-6)
+        .unwrap_or(1.0);
     let axis = d * up.signum();
-    let motion = Motion::turn(port.origin, axis, angle);
+    if !angle.is_finite() || angle.abs() > MOST_TURNS * TAU {
+        return refuse(
+            Code::OutOfRange,
+            format!("{name}: at most {MOST_TURNS} turns at once"),
+            vec![part],
+        );
+    }
+    // What is free once around is free for ever.
+    let motion = Motion::turn(port.origin, axis, angle.clamp(-TAU, TAU));
     let (share, pair) = world.share(part, &motion);
     if let Some([_, other]) = pair {
-        let degrees = (share * angle).to_degrees().abs();
-        let words = format!("{name} turns only {degrees:.3}° this way, then {} is in the way", world.name(other));
+        let degrees = (share * motion.angle).to_degrees().abs();
+        let words = format!(
+            "{name} turns only {degrees:.3}° this way, then {} is in the way",
+            world.name(other)
+        );
         return refuse(Code::Blocked, words, vec![other]);
     }
-    let turned = motion.at(1.0) * world.placement(part);
+    let turned = Motion::turn(port.origin, axis, angle).at(1.0) * world.placement(part);
     world.set_placement(part, turned);
     Ok(Act {
         verb: Verb::Turn,

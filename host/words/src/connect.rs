@@ -50,7 +50,11 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
     let name = world.name(part).to_owned();
     let target = world.name(into).to_owned();
     if part == into {
-        return Err(Trouble::Refuse(Code::NoFit, format!("{name} cannot be connected to itself"), vec![part]));
+        return Err(Trouble::Refuse(
+            Code::NoFit,
+            format!("{name} cannot be connected to itself"),
+            vec![part],
+        ));
     }
     let now = world.placement(part);
     let mut act = Act {
@@ -60,7 +64,10 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
         axis: None,
         amount: None,
     };
-    if world.connected(part, into) && wish.hole.is_none() && seats(world, part, into).iter().any(|s| world.same(part, &now, s)) {
+    if world.connected(part, into)
+        && wish.hole.is_none()
+        && seats(world, part, into).iter().any(|s| world.same(part, &now, s))
+    {
         return Ok(act);
     }
     let mut blockers = Vec::new();
@@ -79,7 +86,9 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
     if found.is_none() {
         let poses = matches(world, part, into, wish, &mut blockers);
         tried |= !poses.is_empty();
-        found = poses.into_iter().find_map(|pose| enter(world, [part, into], &pose, wish, &mut blockers));
+        found = poses
+            .into_iter()
+            .find_map(|pose| enter(world, [part, into], &pose, wish, &mut blockers));
     }
     world.set_placement(part, now);
     let Some(seat) = found else {
@@ -90,7 +99,10 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
             let words = if names.is_empty() {
                 format!("{name} cannot come into {target} from this side")
             } else {
-                format!("{name} cannot come into its place at {target}: {} in the way", names.join(", "))
+                format!(
+                    "{name} cannot come into its place at {target}: {} in the way",
+                    names.join(", ")
+                )
             };
             return Err(Trouble::Refuse(Code::Blocked, words, blockers));
         }
@@ -116,7 +128,12 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
 }
 
 fn in_hole(world: &World, part: usize, pose: &DAffine3, hole: Option<Port>) -> bool {
-    hole.is_none_or(|hole| world.ports(part).iter().any(|port| port.placed(pose).connected(&hole).is_some()))
+    hole.is_none_or(|hole| {
+        world
+            .ports(part)
+            .iter()
+            .any(|port| port.placed(pose).connected(&hole).is_some())
+    })
 }
 
 /// Places of `part` against `into` that the file knows, the own first, then the nearest.
@@ -177,21 +194,38 @@ fn carried_over(world: &World, part: usize, into: usize, pose: &DAffine3) -> Vec
 }
 
 /// Checks a seat: free of overlap, and with a straight way in. The part stands there afterwards.
-fn enter(world: &mut World, [part, into]: [usize; 2], pose: &DAffine3, wish: &Wish, blockers: &mut Vec<usize>) -> Option<Seat> {
+fn enter(
+    world: &mut World,
+    [part, into]: [usize; 2],
+    pose: &DAffine3,
+    wish: &Wish,
+    blockers: &mut Vec<usize>,
+) -> Option<Seat> {
     world.set_placement(part, *pose);
     if let Some(found) = world.blocker(part) {
         blockers.push(found.pair[1]);
         return None;
     }
-    let loose: Vec<usize> = (0..world.count()).filter(|&p| p != part && world.connections(p).is_empty()).collect();
-    let fixed: Vec<usize> = world.others(&[part]).into_iter().filter(|p| *p == into || !loose.contains(p)).collect();
+    let loose: Vec<usize> = (0..world.count())
+        .filter(|&p| p != part && world.connections(p).is_empty())
+        .collect();
+    let fixed: Vec<usize> = world
+        .others(&[part])
+        .into_iter()
+        .filter(|p| *p == into || !loose.contains(p))
+        .collect();
     let mut ways: Vec<(f64, DVec3)> = world
         .ways(part)
         .into_iter()
         .filter(|way| wish.from.is_none_or(|place| direction(place).dot(*way) > AGREES))
         .map(|way| (world.exit_mm(&[part], &fixed, way), way))
         .collect();
-    ways.sort_by(|(s, v), (t, w)| (s * 10.0).round().total_cmp(&(t * 10.0).round()).then(w.z.total_cmp(&v.z)));
+    ways.sort_by(|(s, v), (t, w)| {
+        (s * 10.0)
+            .round()
+            .total_cmp(&(t * 10.0).round())
+            .then(w.z.total_cmp(&v.z))
+    });
     for (exit, way) in ways {
         let (_, pair) = world.free(&[part], way, exit);
         match pair {

@@ -18,7 +18,12 @@ const MOST_CARRIED: usize = 16;
 /// [`Trouble::Refuse`]: `Blocked` with the parts in the way, `NoFit` when it is connected to nothing.
 ///
 /// Cost: one sweep for each direction tried.
-pub fn disconnect(world: &mut World, part: usize, from: Option<usize>, hint: Option<DVec3>) -> Result<Act, Trouble> {
+pub fn disconnect(
+    world: &mut World,
+    part: usize,
+    from: Option<usize>,
+    hint: Option<DVec3>,
+) -> Result<Act, Trouble> {
     let connections = world.connections(part);
     let name = world.name(part).to_owned();
     if let Some(b) = from
@@ -28,16 +33,27 @@ pub fn disconnect(world: &mut World, part: usize, from: Option<usize>, hint: Opt
         return Err(Trouble::Refuse(Code::NoFit, words, vec![part, b]));
     }
     if connections.is_empty() {
-        return Err(Trouble::Refuse(Code::NoFit, format!("{name} is connected to nothing; there is nothing to take it from"), vec![part]));
+        return Err(Trouble::Refuse(
+            Code::NoFit,
+            format!("{name} is connected to nothing; there is nothing to take it from"),
+            vec![part],
+        ));
     }
-    let loose: Vec<usize> = (0..world.count()).filter(|&p| p != part && world.connections(p).is_empty()).collect();
+    let loose: Vec<usize> = (0..world.count())
+        .filter(|&p| p != part && world.connections(p).is_empty())
+        .collect();
     let mut ways: Vec<(f64, DVec3)> = world
         .ways(part)
         .into_iter()
         .filter(|way| hint.is_none_or(|hint| hint.dot(*way) > AGREES))
         .map(|way| (exit(world, &[part], &loose, way), way))
         .collect();
-    ways.sort_by(|(s, v), (t, w)| ((s * 10.0).round()).total_cmp(&(t * 10.0).round()).then(w.z.total_cmp(&v.z)).then(w.x.total_cmp(&v.x)));
+    ways.sort_by(|(s, v), (t, w)| {
+        ((s * 10.0).round())
+            .total_cmp(&(t * 10.0).round())
+            .then(w.z.total_cmp(&v.z))
+            .then(w.x.total_cmp(&v.x))
+    });
     let mut blockers: Vec<(f64, usize)> = Vec::new();
     for (_, way) in ways {
         match leave(world, part, &loose, way) {
@@ -66,14 +82,21 @@ pub fn disconnect(world: &mut World, part: usize, from: Option<usize>, hint: Opt
     let names: Vec<&str> = parts.iter().map(|&p| world.name(p)).collect();
     let words = match hint {
         Some(_) if names.is_empty() => format!("{name} has no way out in this direction"),
-        _ => format!("{name} cannot leave straight in any direction tried: {} in the way", names.join(", ")),
+        _ => format!(
+            "{name} cannot leave straight in any direction tried: {} in the way",
+            names.join(", ")
+        ),
     };
     Err(Trouble::Refuse(Code::Blocked, words, parts))
 }
 
 /// Travel after which the group is apart from all parts that are connected to something.
 fn exit(world: &World, moving: &[usize], loose: &[usize], way: DVec3) -> f64 {
-    let fixed: Vec<usize> = world.others(moving).into_iter().filter(|p| !loose.contains(p)).collect();
+    let fixed: Vec<usize> = world
+        .others(moving)
+        .into_iter()
+        .filter(|p| !loose.contains(p))
+        .collect();
     world.exit_mm(moving, &fixed, way)
 }
 
@@ -87,7 +110,9 @@ fn leave(world: &World, part: usize, loose: &[usize], way: DVec3) -> Result<(Vec
         match pair {
             None => return Ok((moving, wanted)),
             Some(_) if free >= needed => return Ok((moving, (needed + free) / 2.0)),
-            Some([_, blocker]) if loose.contains(&blocker) && moving.len() < MOST_CARRIED => moving.push(blocker),
+            Some([_, blocker]) if loose.contains(&blocker) && moving.len() < MOST_CARRIED => {
+                moving.push(blocker)
+            }
             Some([_, blocker]) => return Err((free, blocker)),
         }
     }

@@ -7,28 +7,14 @@ use winnow::combinator::{alt, opt, preceded, repeat};
 use winnow::prelude::*;
 use winnow::token::any;
 
-use crate::lexicon::{self, Place, Relation, VerbClass};
+use crate::clause::{Clause, Piece};
+use crate::lexicon::{self, Place, VerbClass};
 use crate::noun::phrase;
-use crate::phrase::{Amount, Command, Phrase, Pronoun, Puzzle};
+use crate::phrase::{Amount, Command, Phrase, Puzzle};
 use crate::token::Token;
 
 /// Tokens still to be parsed.
 pub(crate) type Input<'a> = &'a [Token];
-
-/// A constituent of a clause.
-#[derive(Clone, Debug)]
-enum Piece {
-    Thing(Phrase),
-    Into(Relation, Phrase),
-    From(Phrase, bool),
-    Side(Place),
-    Way(Place),
-    Amount(Amount),
-    Clockwise(bool),
-    Out,
-    In,
-    Filler,
-}
 
 /// A word of a list.
 pub(crate) fn one_of<'a>(list: &'static [&'static str]) -> impl FnMut(&mut Input<'a>) -> winnow::Result<()> {
@@ -56,7 +42,9 @@ pub(crate) fn of_table<'a, T: Copy + 'static>(
 pub(crate) fn number(input: &mut Input<'_>) -> winnow::Result<f64> {
     any.verify_map(|token: Token| match token {
         Token::Number { value, .. } => Some(value),
-        Token::Word { text, joined: false } => lexicon::NUMBERS.iter().find(|(_, w)| *w == text).map(|&(n, _)| n),
+        Token::Word { text, joined: false } => {
+            lexicon::NUMBERS.iter().find(|(_, w)| *w == text).map(|&(n, _)| n)
+        }
         _ => None,
     })
     .parse_next(input)
@@ -72,7 +60,9 @@ pub fn parse(tokens: &[Token]) -> Result<Vec<Command>, Puzzle> {
         commands.push(command(clause, commands.last())?);
     }
     if commands.is_empty() {
-        return Err(Puzzle::NotUnderstood("there are no words in it; say what to do with which part".into()));
+        return Err(Puzzle::NotUnderstood(
+            "there are no words in it; say what to do with which part".into(),
+        ));
     }
     Ok(commands)
 }
@@ -82,7 +72,11 @@ pub fn only_phrase(mut tokens: &[Token]) -> Option<Phrase> {
     while let Some((Token::Stop | Token::Comma, rest)) = tokens.split_last() {
         tokens = rest;
     }
-    let starts_with_verb = tokens.first().and_then(Token::word).is_some_and(|w| lexicon::verb(w).is_some()) && verb_at(tokens);
+    let starts_with_verb = tokens
+        .first()
+        .and_then(Token::word)
+        .is_some_and(|w| lexicon::verb(w).is_some())
+        && verb_at(tokens);
     let found = phrase(&mut tokens, true).ok()?;
     (tokens.is_empty() && !starts_with_verb).then_some(found)
 }
@@ -107,25 +101,31 @@ fn clauses(tokens: &[Token]) -> Vec<&[Token]> {
     }
     out.push(&tokens[start..]);
     out.retain(|clause| {
-        clause
-            .iter()
-            .any(|t| !matches!(t, Token::Comma | Token::Stop) && t.word().is_none_or(|w| !["then", "and", "please"].contains(&w)))
+        clause.iter().any(|t| {
+            !matches!(t, Token::Comma | Token::Stop)
+                && t.word().is_none_or(|w| !["then", "and", "please"].contains(&w))
+        })
     });
     out
 }
 
 /// Whether a clause begins here: a verb after lead words. Nouns that are verbs too ("bolt") need an article or pronoun after them.
 fn verb_at(tokens: &[Token]) -> bool {
-    let skipped = tokens.iter().take_while(|t| t.word().is_some_and(|w| lexicon::LEADS.contains(&w)));
+    let skipped = tokens
+        .iter()
+        .take_while(|t| t.word().is_some_and(|w| lexicon::LEADS.contains(&w)));
     let rest = &tokens[skipped.count()..];
     let Some(word) = rest.first().and_then(Token::word) else {
         return false;
     };
-    let Some(class) = lexicon::verb(word) else { return false };
+    let Some(class) = lexicon::verb(word) else {
+        return false;
+    };
     if class == VerbClass::Other {
         return false;
     }
-    let noun = lexicon::SYNONYMS.iter().any(|group| group.contains(&word)) || ["crank", "seat", "thread", "turn", "set"].contains(&word);
+    let noun = lexicon::SYNONYMS.iter().any(|group| group.contains(&word))
+        || ["crank", "seat", "thread", "turn", "set"].contains(&word);
     let follows = rest.get(1).and_then(Token::word);
     !noun || follows.is_some_and(|w| ["the", "it", "them", "all", "both", "a", "in", "out"].contains(&w))
 }
@@ -134,7 +134,9 @@ fn command(mut input: Input<'_>, before: Option<&Command>) -> Result<Command, Pu
     let whole = input;
     let text = shown(whole);
     while let Some(first) = input.first() {
-        let lead = first.word().is_some_and(|w| lexicon::LEADS.contains(&w) && lexicon::verb(w).is_none());
+        let lead = first
+            .word()
+            .is_some_and(|w| lexicon::LEADS.contains(&w) && lexicon::verb(w).is_none());
         if lead || matches!(first, Token::Comma) {
             input = &input[1..];
         } else {
@@ -145,7 +147,9 @@ fn command(mut input: Input<'_>, before: Option<&Command>) -> Result<Command, Pu
         return Err(no_verb(&text, whole));
     };
     if lexicon::QUESTIONS.contains(&word.as_str()) {
-        return Err(Puzzle::NotAnAction(format!("\"{text}\" asks for nothing that can be done with parts")));
+        return Err(Puzzle::NotAnAction(format!(
+            "\"{text}\" asks for nothing that can be done with parts"
+        )));
     }
     let Some(class) = lexicon::verb(&word) else {
         return Err(no_verb(&text, whole));
@@ -176,7 +180,24 @@ fn command(mut input: Input<'_>, before: Option<&Command>) -> Result<Command, Pu
 }
 
 fn undone(word: &str) -> bool {
-    ["that", "it", "this", "the", "last", "step", "move", "one", "please", "action", "change", "again", "operation", "previous", "turn"].contains(&word)
+    [
+        "that",
+        "it",
+        "this",
+        "the",
+        "last",
+        "step",
+        "move",
+        "one",
+        "please",
+        "action",
+        "change",
+        "again",
+        "operation",
+        "previous",
+        "turn",
+    ]
+    .contains(&word)
 }
 
 fn shown(tokens: &[Token]) -> String {
@@ -189,15 +210,22 @@ fn shown(tokens: &[Token]) -> String {
 }
 
 fn unread(token: &Token, text: &str) -> Puzzle {
-    Puzzle::NotUnderstood(format!("cannot follow \"{text}\" at \"{}\"; say it in shorter words", token.shown()))
+    Puzzle::NotUnderstood(format!(
+        "cannot follow \"{text}\" at \"{}\"; say it in shorter words",
+        token.shown()
+    ))
 }
 
 /// A sentence with a part in it and no verb is no action; anything else is not understood.
 fn no_verb(text: &str, tokens: &[Token]) -> Puzzle {
     if tokens.iter().any(|t| matches!(t, Token::Name { .. })) && tokens.len() > 1 {
-        Puzzle::NotAnAction(format!("\"{text}\" names a part and no operation; say what to do with it"))
+        Puzzle::NotAnAction(format!(
+            "\"{text}\" names a part and no operation; say what to do with it"
+        ))
     } else {
-        Puzzle::NotUnderstood(format!("no verb is understood in \"{text}\"; say, for example, \"remove the cover\""))
+        Puzzle::NotUnderstood(format!(
+            "no verb is understood in \"{text}\"; say, for example, \"remove the cover\""
+        ))
     }
 }
 
@@ -217,7 +245,8 @@ fn piece(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Piece> {
         one_of(lexicon::IN).value(Piece::In),
         |input: &mut Input<'_>| phrase(input, loose_in).map(Piece::Thing),
         one_of(lexicon::FILLERS).value(Piece::Filler),
-        any.verify(|t: &Token| matches!(t, Token::Comma | Token::Stop)).value(Piece::Filler),
+        any.verify(|t: &Token| matches!(t, Token::Comma | Token::Stop))
+            .value(Piece::Filler),
     ))
     .parse_next(input)
 }
@@ -225,11 +254,30 @@ fn piece(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Piece> {
 /// "by 12 mm", "90 degrees", "a quarter turn", "halfway", "fully".
 fn amount(input: &mut Input<'_>) -> winnow::Result<Amount> {
     let by = |input: &mut Input<'_>| {
-        one_of(&["by", "about", "approximately", "roughly", "for", "through", "around", "another", "exactly", "further"]).parse_next(input)
+        one_of(&[
+            "by",
+            "about",
+            "approximately",
+            "roughly",
+            "for",
+            "through",
+            "around",
+            "another",
+            "exactly",
+            "further",
+        ])
+        .parse_next(input)
     };
     let _: Vec<()> = repeat(0..3, by).parse_next(input)?;
     let angle = alt((
-        (number, one_of(&["and"]), opt(article), fraction, of_table(lexicon::ANGLES)).map(|(n, (), _, f, u)| Amount::Angle((n + f) * u)),
+        (
+            number,
+            one_of(&["and"]),
+            opt(article),
+            fraction,
+            of_table(lexicon::ANGLES),
+        )
+            .map(|(n, (), _, f, u)| Amount::Angle((n + f) * u)),
         (number, of_table(lexicon::LENGTHS)).map(|(n, u)| Amount::Length(n * u)),
         (number, of_table(lexicon::ANGLES)).map(|(n, u)| Amount::Angle(n * u)),
         (
@@ -240,17 +288,39 @@ fn amount(input: &mut Input<'_>) -> winnow::Result<Amount> {
             of_table(&lexicon::ANGLES[2..]),
         )
             .map(|(_, f, _, _, turn)| Amount::Angle(f * turn)),
-        (opt(article), one_of(&["full", "complete", "whole"]), of_table(&lexicon::ANGLES[2..])).map(|(_, (), turn)| Amount::Angle(turn)),
+        (
+            opt(article),
+            one_of(&["full", "complete", "whole"]),
+            of_table(&lexicon::ANGLES[2..]),
+        )
+            .map(|(_, (), turn)| Amount::Angle(turn)),
         (article, of_table(&lexicon::ANGLES[2..])).map(|((), turn)| Amount::Angle(turn)),
-        (opt(article), fraction).verify(|(_, f)| (*f - 0.5).abs() > 1e-9).map(|(_, f)| Amount::Angle(f * std::f64::consts::TAU)),
+        (opt(article), fraction)
+            .verify(|(_, f)| (*f - 0.5).abs() > 1e-9)
+            .map(|(_, f)| Amount::Angle(f * std::f64::consts::TAU)),
     ));
     let share = alt((
         (article, fraction, of_table(lexicon::LENGTHS)).map(|((), f, u)| Amount::Length(f * u)),
-        one_of(&["halfway", "half"]).then_ignore(opt(one_of(&["way"]))).value(Amount::Half),
+        one_of(&["halfway", "half"])
+            .then_ignore(opt(one_of(&["way"])))
+            .value(Amount::Half),
         one_of(lexicon::FULLY).value(Amount::Full),
         (one_of(&["all"]), one_of(&["the"]), one_of(&["way"])).value(Amount::Full),
-        (one_of(&["as"]), one_of(&["far"]), one_of(&["as"]), any, opt(one_of(&["goes", "go", "will"])), opt(one_of(&["go"]))).value(Amount::Full),
-        (article, opt(one_of(&["little", "tiny", "small"])), one_of(&["bit", "little", "touch", "hair"])).value(Amount::Vague),
+        (
+            one_of(&["as"]),
+            one_of(&["far"]),
+            one_of(&["as"]),
+            any,
+            opt(one_of(&["goes", "go", "will"])),
+            opt(one_of(&["go"])),
+        )
+            .value(Amount::Full),
+        (
+            article,
+            opt(one_of(&["little", "tiny", "small"])),
+            one_of(&["bit", "little", "touch", "hair"]),
+        )
+            .value(Amount::Vague),
         one_of(&["slightly", "somewhat"]).value(Amount::Vague),
     ));
     alt((angle, share)).parse_next(input)
@@ -283,32 +353,52 @@ fn clockwise(input: &mut Input<'_>) -> winnow::Result<bool> {
 /// "about its own axis": what a turn does anyway.
 fn own_axis(input: &mut Input<'_>) -> winnow::Result<()> {
     alt((
-        (one_of(&["about", "around"]), one_of(&["its", "their", "the"]), opt(one_of(&["own"])), one_of(&["axis", "axes"])).void(),
-        (one_of(&["on"]), one_of(&["its", "their"]), opt(one_of(&["own"])), one_of(&["axis", "axes"])).void(),
+        (
+            one_of(&["about", "around"]),
+            one_of(&["its", "their", "the"]),
+            opt(one_of(&["own"])),
+            one_of(&["axis", "axes"]),
+        )
+            .void(),
+        (
+            one_of(&["on"]),
+            one_of(&["its", "their"]),
+            opt(one_of(&["own"])),
+            one_of(&["axis", "axes"]),
+        )
+            .void(),
     ))
     .parse_next(input)
 }
 
 /// "from above".
 fn side(input: &mut Input<'_>) -> winnow::Result<Place> {
-    preceded((one_of(&["from"]), opt(one_of(&["the"]))), of_table(lexicon::SIDES))
-        .then_ignore(opt(one_of(&["side"])))
-        .parse_next(input)
+    preceded(
+        (one_of(&["from"]), opt(one_of(&["the"]))),
+        of_table(lexicon::SIDES),
+    )
+    .then_ignore(opt(one_of(&["side"])))
+    .parse_next(input)
 }
 
 /// "upwards", "to the left".
 fn way(input: &mut Input<'_>) -> winnow::Result<Place> {
     alt((
         of_table(lexicon::WAYS),
-        preceded((one_of(&["to", "towards"]), one_of(&["the"])), of_table(lexicon::PLACES))
-            .verify(|place| *place != Place::Middle),
+        preceded(
+            (one_of(&["to", "towards"]), one_of(&["the"])),
+            of_table(lexicon::PLACES),
+        )
+        .verify(|place| *place != Place::Middle),
     ))
     .parse_next(input)
     .and_then(|found| {
         // "to the left bearing" is a destination.
         match input.first() {
             Some(Token::Name { .. }) => Err(winnow::error::ContextError::new()),
-            Some(Token::Word { text, .. }) if !lexicon::known(text) || crate::noun::is_noun(text) => Err(winnow::error::ContextError::new()),
+            Some(Token::Word { text, .. }) if !lexicon::known(text) || crate::noun::is_noun(text) => {
+                Err(winnow::error::ContextError::new())
+            }
             _ => Ok(found),
         }
     })
@@ -318,7 +408,12 @@ fn way(input: &mut Input<'_>) -> winnow::Result<Place> {
 fn into(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Piece> {
     let back: Vec<()> = repeat(0..2, one_of(&["back", "down", "up"])).parse_next(input)?;
     let relation = any
-        .verify_map(|token: Token| lexicon::INTO.iter().find(|(w, _)| Some(*w) == token.word()).map(|&(_, r)| r))
+        .verify_map(|token: Token| {
+            lexicon::INTO
+                .iter()
+                .find(|(w, _)| Some(*w) == token.word())
+                .map(|&(_, r)| r)
+        })
         .parse_next(input)?;
     let _ = opt(one_of(&["to"])).parse_next(input)?;
     let what = phrase(input, loose_in)?;
@@ -339,161 +434,12 @@ fn from(input: &mut Input<'_>) -> winnow::Result<Piece> {
 }
 
 trait ThenIgnore<'a, O>: Parser<Input<'a>, O, winnow::error::ContextError> + Sized {
-    fn then_ignore<P>(self, then: impl Parser<Input<'a>, P, winnow::error::ContextError>) -> impl Parser<Input<'a>, O, winnow::error::ContextError> {
+    fn then_ignore<P>(
+        self,
+        then: impl Parser<Input<'a>, P, winnow::error::ContextError>,
+    ) -> impl Parser<Input<'a>, O, winnow::error::ContextError> {
         winnow::combinator::terminated(self, then)
     }
 }
 
 impl<'a, O, T: Parser<Input<'a>, O, winnow::error::ContextError>> ThenIgnore<'a, O> for T {}
-
-/// The constituents of a clause, sorted.
-struct Clause {
-    what: Option<Phrase>,
-    extra: bool,
-    into: Option<(Relation, Phrase)>,
-    from: Option<Phrase>,
-    side: Option<Place>,
-    way: Option<Place>,
-    amount: Amount,
-    clockwise: bool,
-    out: bool,
-    inwards: bool,
-}
-
-impl Clause {
-    fn new(pieces: Vec<Piece>) -> Self {
-        let mut clause = Self {
-            what: None,
-            extra: false,
-            into: None,
-            from: None,
-            side: None,
-            way: None,
-            amount: Amount::Open,
-            clockwise: false,
-            out: false,
-            inwards: false,
-        };
-        for piece in pieces {
-            match piece {
-                Piece::Thing(phrase) if clause.what.is_none() => clause.what = Some(phrase),
-                Piece::Thing(_) => clause.extra = true,
-                Piece::Into(relation, phrase) if clause.into.is_none() => clause.into = Some((relation, phrase)),
-                Piece::Into(..) => clause.extra = true,
-                Piece::From(phrase, bare) => {
-                    clause.out = true;
-                    if bare && clause.what.is_none() {
-                        clause.what = Some(phrase);
-                    } else if clause.from.is_none() {
-                        clause.from = Some(phrase);
-                    } else {
-                        clause.extra = true;
-                    }
-                }
-                Piece::Side(place) => clause.side = Some(place),
-                Piece::Way(place) => clause.way = Some(place),
-                Piece::Amount(amount) => clause.amount = amount,
-                Piece::Clockwise(clockwise) => clause.clockwise = clockwise,
-                Piece::Out => clause.out = true,
-                Piece::In => clause.inwards = true,
-                Piece::Filler => {}
-            }
-        }
-        clause
-    }
-
-    fn command(mut self, class: VerbClass, verb: &str, text: &str, before: Option<&Command>) -> Result<Command, Puzzle> {
-        let puzzle = |what: &str| Err(Puzzle::NotUnderstood(format!("\"{text}\": {what}")));
-        if self.extra {
-            return puzzle("more objects than the verb takes; give one instruction after another");
-        }
-        if self.what.is_none()
-            && matches!(class, VerbClass::Connect | VerbClass::Push)
-            && let Some((Relation::Inside | Relation::Around, phrase)) = self.into.take()
-        {
-            // "put in the screw".
-            self.what = Some(phrase);
-            self.inwards = true;
-        }
-        let Some(what) = self.what.clone().or_else(|| before.map(|_| pronoun())) else {
-            return puzzle("say which part");
-        };
-        self.what = Some(what.clone());
-        let measured = matches!(self.amount, Amount::Length(_) | Amount::Half | Amount::Vague);
-        let open = |amount| if amount == Amount::Open { Amount::Full } else { amount };
-        let disconnect = |clause: Self| Command::Disconnect {
-            what: what.clone(),
-            way: clause.way.or(clause.side),
-            from: clause.from,
-        };
-        let connect = |clause: Self| {
-            let (relation, into) = clause.into.map_or((Relation::Any, None), |(relation, into)| (relation, Some(into)));
-            Command::Connect {
-                what: what.clone(),
-                into,
-                relation,
-                from: clause.side,
-                extent: open(clause.amount),
-            }
-        };
-        let adjust = |clause: &Self, out: bool| Command::Adjust {
-            what: what.clone(),
-            out,
-            way: clause.way,
-            amount: clause.amount,
-        };
-        Ok(match class {
-            _ if matches!(self.amount, Amount::Angle(_)) && class != VerbClass::Turn => {
-                if self.into.is_some() || self.from.is_some() {
-                    return puzzle("an angle needs a verb such as \"turn\"");
-                }
-                return puzzle("an angle goes with \"turn\", a length with \"pull\" or \"push\"");
-            }
-            VerbClass::Turn if verb == "give" && !matches!(self.amount, Amount::Angle(_)) => return puzzle("say what to give it: an angle"),
-            VerbClass::Turn if self.into.is_some() || self.from.is_some() => return puzzle("turn a part about its axis, without a place"),
-            VerbClass::Turn => Command::Turn {
-                what,
-                amount: match self.amount {
-                    Amount::Angle(angle) if self.clockwise => Amount::Angle(-angle),
-                    Amount::Half => Amount::Angle(std::f64::consts::PI),
-                    amount => amount,
-                },
-            },
-            VerbClass::Remove | VerbClass::Undo if measured => adjust(&self, true),
-            VerbClass::Remove | VerbClass::Undo => disconnect(self),
-            VerbClass::Connect if matches!(self.amount, Amount::Length(_) | Amount::Vague) && self.into.is_none() => adjust(&self, self.out),
-            VerbClass::Connect if self.out && self.into.is_none() => disconnect(self),
-            VerbClass::Connect => connect(self),
-            VerbClass::Take if self.into.is_some() => connect(self),
-            VerbClass::Take if measured => adjust(&self, true),
-            VerbClass::Take if self.out || self.from.is_some() => disconnect(self),
-            VerbClass::Take => Command::Pick { what },
-            VerbClass::Pull if self.into.is_some() => connect(self),
-            VerbClass::Pull if measured => adjust(&self, !self.inwards),
-            VerbClass::Pull if verb == "loosen" => return puzzle("say by how many millimetres to loosen it"),
-            VerbClass::Pull if verb == "back" && !self.out => return puzzle("say how far to back it out"),
-            VerbClass::Pull if self.inwards && !self.out => connect(self),
-            VerbClass::Pull => disconnect(self),
-            VerbClass::Push if self.into.is_some() => connect(self),
-            VerbClass::Push if measured || verb == "tighten" => {
-                self.amount = open(self.amount);
-                adjust(&self, self.out)
-            }
-            VerbClass::Push if self.out => disconnect(self),
-            VerbClass::Push => connect(self),
-            VerbClass::Move if self.into.is_some() => connect(self),
-            VerbClass::Move if measured && (self.out || self.inwards || self.way.is_some()) => adjust(&self, self.out || !self.inwards),
-            VerbClass::Move if self.out || self.from.is_some() => disconnect(self),
-            VerbClass::Move if self.inwards => connect(self),
-            VerbClass::Move => return puzzle("say which way, and how far or to which part"),
-            VerbClass::Redo | VerbClass::Other => return puzzle("not an operation on a part"),
-        })
-    }
-}
-
-fn pronoun() -> Phrase {
-    Phrase {
-        pronoun: Some(Pronoun::Them),
-        ..Phrase::new("it".into())
-    }
-}

@@ -2,97 +2,80 @@
 //!
 //! Words are lower case and singular. A word that is here or in a part's name is never taken for a misspelling of another.
 
-/// What a verb asks for, before its objects are known.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VerbClass {
-    /// Take apart: "remove".
-    Remove,
-    /// Put together: "insert".
-    Connect,
-    /// Along an axis outwards, or apart when no amount is given: "pull".
-    Pull,
-    /// Along an axis inwards, or together when a place is given: "push".
-    Push,
-    /// Either way, by what follows: "slide".
-    Move,
-    /// Apart with "off" or "out", otherwise only a choice of the part: "take".
-    Take,
-    /// About an axis: "turn".
-    Turn,
-    /// The turn before: "undo"; with a part: apart.
-    Undo,
-    /// The turn undone: "redo".
-    Redo,
-    /// Not an assembly operation: "paint".
-    Other,
-}
-
-/// Verbs and their classes.
-pub const VERBS: &[(VerbClass, &[&str])] = &[
-    (
-        VerbClass::Remove,
-        &[
-            "remove", "disconnect", "detach", "dismount", "demount", "unmount", "disassemble", "dismantle", "unscrew", "unbolt",
-            "extract", "unplug", "uninstall", "separate", "eject", "unfasten", "unclip", "pry", "strip", "disengage", "decouple",
-        ],
-    ),
-    (
-        VerbClass::Connect,
-        &[
-            "insert", "connect", "attach", "mount", "install", "fit", "join", "screw", "plug", "put", "place", "set", "fasten",
-            "fix", "bolt", "seat", "assemble", "thread", "mate", "return", "replace", "reinstall", "reattach", "reinsert",
-            "reconnect", "refit", "remount", "add", "stick", "clip", "couple", "feed",
-        ],
-    ),
-    (
-        VerbClass::Pull,
-        &["pull", "withdraw", "draw", "loosen", "lift", "raise", "back", "drag", "retract"],
-    ),
-    (
-        VerbClass::Push,
-        &["push", "press", "drop", "lower", "shove", "tighten", "advance", "drive"],
-    ),
-    (VerbClass::Move, &["slide", "move", "shift", "slip", "adjust"]),
-    (VerbClass::Take, &["take", "get", "bring", "grab", "pick", "hold", "select"]),
-    (
-        VerbClass::Turn,
-        &["turn", "rotate", "spin", "twist", "give", "swivel", "crank", "swing", "revolve", "pivot"],
-    ),
-    (VerbClass::Undo, &["undo", "revert"]),
-    (VerbClass::Redo, &["redo"]),
-    (
-        VerbClass::Other,
-        &[
-            "paint", "weigh", "measure", "drill", "cut", "weld", "buy", "order", "clean", "heat", "cool", "show", "tell", "make",
-            "color", "colour", "print", "delete", "save", "open", "close", "machine", "mill", "grind", "polish", "grease", "oil",
-            "glue", "bend", "break", "scale", "copy", "rename", "hide", "explain", "describe", "count", "list", "name", "find",
-            "check", "inspect", "calculate", "compute", "design", "draw up", "sell", "wash", "lubricate", "melt", "sing", "help",
-            "stop", "start", "wait", "zoom", "look", "call", "write", "read", "eat", "kick", "throw", "smash", "sharpen", "wipe",
-            "shorten", "lengthen", "stretch", "duplicate", "mirror", "highlight", "export", "think", "like", "love",
-        ],
-    ),
-];
-
-/// Words that begin a question.
-pub const QUESTIONS: &[&str] = &[
-    "how", "what", "where", "why", "which", "when", "who", "whose", "is", "are", "does", "do", "did", "will", "was", "were", "has",
-    "have", "should",
-];
+pub use crate::verbs::{QUESTIONS, VERBS, VerbClass, verb, verbs};
 
 /// Words skipped before a verb.
 pub const LEADS: &[&str] = &[
-    "please", "now", "then", "next", "ok", "okay", "so", "well", "and", "also", "first", "finally", "afterwards", "could", "can",
-    "would", "you", "i", "want", "to", "let", "us", "lets", "just", "go", "ahead", "kindly", "need", "like", "try", "we",
+    "please",
+    "now",
+    "then",
+    "next",
+    "ok",
+    "okay",
+    "so",
+    "well",
+    "and",
+    "also",
+    "first",
+    "finally",
+    "afterwards",
+    "could",
+    "can",
+    "would",
+    "you",
+    "i",
+    "want",
+    "to",
+    "let",
+    "us",
+    "lets",
+    "just",
+    "go",
+    "ahead",
+    "kindly",
+    "need",
+    "like",
+    "try",
+    "we",
 ];
 
 /// Words without effect on the meaning, anywhere between phrases.
 pub const FILLERS: &[&str] = &[
-    "please", "now", "then", "again", "too", "also", "well", "as", "carefully", "gently", "slowly", "straight", "right", "just",
-    "thanks", "first", "together", "yourself", "me", "for", "properly", "so", "there", "here", "where", "was", "were", "quickly", "away",
+    "please",
+    "now",
+    "then",
+    "again",
+    "too",
+    "also",
+    "well",
+    "as",
+    "carefully",
+    "gently",
+    "slowly",
+    "straight",
+    "right",
+    "just",
+    "thanks",
+    "first",
+    "together",
+    "yourself",
+    "me",
+    "for",
+    "properly",
+    "so",
+    "there",
+    "here",
+    "where",
+    "was",
+    "were",
+    "quickly",
+    "away",
 ];
 
 /// Articles and the like before a noun.
-pub const DETERMINERS: &[&str] = &["the", "its", "their", "this", "that", "these", "those", "my", "our", "your", "of"];
+pub const DETERMINERS: &[&str] = &[
+    "the", "its", "their", "this", "that", "these", "those", "my", "our", "your", "of",
+];
 
 /// Prepositions that name a destination; true: the part goes into it, false: around or against it.
 pub const INTO: &[(&str, Relation)] = &[
@@ -155,14 +138,20 @@ pub const PLACES: &[(Place, &[&str])] = &[
     (Place::Front, &["front", "frontmost", "forward", "foremost"]),
     (Place::Rear, &["rear", "back", "hind", "rearmost", "behind"]),
     (Place::Upper, &["upper", "top", "topmost", "uppermost", "highest"]),
-    (Place::Lower, &["lower", "bottom", "lowest", "bottommost", "underside"]),
+    (
+        Place::Lower,
+        &["lower", "bottom", "lowest", "bottommost", "underside"],
+    ),
     (Place::Middle, &["middle", "center", "centre", "central", "mid"]),
 ];
 
 /// Words for directions: where "from …" comes from.
 pub const SIDES: &[(Place, &[&str])] = &[
     (Place::Upper, &["above", "top", "overhead"]),
-    (Place::Lower, &["below", "underneath", "beneath", "bottom", "under"]),
+    (
+        Place::Lower,
+        &["below", "underneath", "beneath", "bottom", "under"],
+    ),
     (Place::Left, &["left"]),
     (Place::Right, &["right"]),
     (Place::Front, &["front"]),
@@ -194,8 +183,18 @@ pub enum Size {
 
 /// Words for sizes.
 pub const SIZES: &[(Size, &[&str])] = &[
-    (Size::Large, &["large", "big", "larger", "largest", "bigger", "biggest", "huge", "heavy", "thick", "thickest"]),
-    (Size::Small, &["small", "little", "smaller", "smallest", "littlest", "tiny", "thin", "thinnest"]),
+    (
+        Size::Large,
+        &[
+            "large", "big", "larger", "largest", "bigger", "biggest", "huge", "heavy", "thick", "thickest",
+        ],
+    ),
+    (
+        Size::Small,
+        &[
+            "small", "little", "smaller", "smallest", "littlest", "tiny", "thin", "thinnest",
+        ],
+    ),
     (Size::Long, &["long", "longer", "longest"]),
     (Size::Short, &["short", "shorter", "shortest"]),
 ];
@@ -284,8 +283,30 @@ pub const SYNONYMS: &[&[&str]] = &[
 
 /// Modifiers that name a kind of part and are no part's distinction: "ball bearing", "circuit board".
 pub const KINDS: &[&str] = &[
-    "ball", "circuit", "base", "retaining", "snap", "hex", "cap", "machine", "end", "fixing", "roller", "guide", "mounting", "main",
-    "set", "cylinder", "socket", "hinge", "retainer", "permanent", "whole", "entire", "same", "remaining",
+    "ball",
+    "circuit",
+    "base",
+    "retaining",
+    "snap",
+    "hex",
+    "cap",
+    "machine",
+    "end",
+    "fixing",
+    "roller",
+    "guide",
+    "mounting",
+    "main",
+    "set",
+    "cylinder",
+    "socket",
+    "hinge",
+    "retainer",
+    "permanent",
+    "whole",
+    "entire",
+    "same",
+    "remaining",
 ];
 
 /// Nouns for a piece of a divided part: "the upper half of the housing".
@@ -293,42 +314,163 @@ pub const PIECES: &[&str] = &["half", "part", "piece", "section", "side"];
 
 /// Other words that are well spelt, so that they are never corrected into something else.
 pub const WELL_SPELT: &[&str] = &[
-    "motor", "engine", "machine", "assembly", "subassembly", "washer", "spring", "crank", "handle", "lever", "wheel", "fan", "battery",
-    "cable", "wire", "nut", "bolt", "stud", "rivet", "key", "gearbox", "hinge", "fixture", "table", "tool", "hammer", "wrench",
-    "coffee", "weather", "joke", "part", "parts", "thing", "everything", "nothing", "something", "step", "action", "move", "change",
-    "operation", "side", "end", "axis", "direction", "clockwise", "anticlockwise", "counterclockwise", "way", "far", "bit", "little",
-    "quarter", "half", "halfway", "turns", "other", "others", "rest", "one", "ones", "it", "them", "they", "both", "all", "every",
-    "each", "any", "some", "an", "number", "no", "nr", "from", "by", "about", "approximately", "roughly", "along", "own", "until", "if",
-    "not", "dont", "never", "red", "blue", "green", "steel", "plastic", "long", "house", "door", "car", "bracket", "piston", "valve",
-    "pump", "flange", "pulley", "belt", "chain", "coupling", "clutch", "brake", "clamp", "lock", "knob", "button", "switch", "rotor",
-    "stator", "coil", "magnet", "frame", "chassis", "panel", "foot", "leg", "arm", "head", "today", "tomorrow", "sleep", "ideas",
+    "motor",
+    "engine",
+    "machine",
+    "assembly",
+    "subassembly",
+    "washer",
+    "spring",
+    "crank",
+    "handle",
+    "lever",
+    "wheel",
+    "fan",
+    "battery",
+    "cable",
+    "wire",
+    "nut",
+    "bolt",
+    "stud",
+    "rivet",
+    "key",
+    "gearbox",
+    "hinge",
+    "fixture",
+    "table",
+    "tool",
+    "hammer",
+    "wrench",
+    "coffee",
+    "weather",
+    "joke",
+    "part",
+    "parts",
+    "thing",
+    "everything",
+    "nothing",
+    "something",
+    "step",
+    "action",
+    "move",
+    "change",
+    "operation",
+    "side",
+    "end",
+    "axis",
+    "direction",
+    "clockwise",
+    "anticlockwise",
+    "counterclockwise",
+    "way",
+    "far",
+    "bit",
+    "little",
+    "quarter",
+    "half",
+    "halfway",
+    "turns",
+    "other",
+    "others",
+    "rest",
+    "one",
+    "ones",
+    "it",
+    "them",
+    "they",
+    "both",
+    "all",
+    "every",
+    "each",
+    "any",
+    "some",
+    "an",
+    "number",
+    "no",
+    "nr",
+    "from",
+    "by",
+    "about",
+    "approximately",
+    "roughly",
+    "along",
+    "own",
+    "until",
+    "if",
+    "not",
+    "dont",
+    "never",
+    "red",
+    "blue",
+    "green",
+    "steel",
+    "plastic",
+    "long",
+    "house",
+    "door",
+    "car",
+    "bracket",
+    "piston",
+    "valve",
+    "pump",
+    "flange",
+    "pulley",
+    "belt",
+    "chain",
+    "coupling",
+    "clutch",
+    "brake",
+    "clamp",
+    "lock",
+    "knob",
+    "button",
+    "switch",
+    "rotor",
+    "stator",
+    "coil",
+    "magnet",
+    "frame",
+    "chassis",
+    "panel",
+    "foot",
+    "leg",
+    "arm",
+    "head",
+    "today",
+    "tomorrow",
+    "sleep",
+    "ideas",
 ];
 
 /// Whether `word` is in the closed vocabulary.
 pub fn known(word: &str) -> bool {
     let pairs = |table: &[&[&str]]| table.iter().any(|words| words.contains(&word));
     verb(word).is_some()
-        || [QUESTIONS, LEADS, FILLERS, DETERMINERS, OUT, IN, FULLY, HOLES, KINDS, PIECES, WELL_SPELT]
-            .iter()
-            .any(|words| words.contains(&word))
+        || [
+            QUESTIONS,
+            LEADS,
+            FILLERS,
+            DETERMINERS,
+            OUT,
+            IN,
+            FULLY,
+            HOLES,
+            KINDS,
+            PIECES,
+            WELL_SPELT,
+        ]
+        .iter()
+        .any(|words| words.contains(&word))
         || pairs(SYNONYMS)
         || INTO.iter().any(|(w, _)| *w == word)
-        || [PLACES, SIDES, WAYS].iter().any(|table| find(table, word).is_some())
+        || [PLACES, SIDES, WAYS]
+            .iter()
+            .any(|table| find(table, word).is_some())
         || find(SIZES, word).is_some()
         || find(ORDINALS, word).is_some()
         || NUMBERS.iter().any(|(_, w)| *w == word)
         || find(LENGTHS, word).is_some()
         || find(ANGLES, word).is_some()
-}
-
-/// All verbs, for corrections of the first word.
-pub fn verbs() -> impl Iterator<Item = &'static str> {
-    VERBS.iter().flat_map(|(_, words)| words.iter().copied())
-}
-
-/// Class of a verb.
-pub fn verb(word: &str) -> Option<VerbClass> {
-    find(VERBS, word)
 }
 
 /// The value beside the list that holds `word`.
@@ -341,7 +483,9 @@ pub fn find<T: Copy>(table: &[(T, &[&str])], word: &str) -> Option<T> {
 
 /// Whether two nouns mean the same kind of part.
 pub fn same_kind(a: &str, b: &str) -> bool {
-    SYNONYMS.iter().any(|group| group.contains(&a) && group.contains(&b))
+    SYNONYMS
+        .iter()
+        .any(|group| group.contains(&a) && group.contains(&b))
 }
 
 /// Singular of a plural noun, by the regular endings; other words unchanged.

@@ -10,6 +10,7 @@
 //! Nothing here reads or writes files. Lengths are in millimetres in the assembly's frame, angles in radians unless a name says degrees.
 
 pub mod adjust;
+mod clause;
 pub mod connect;
 pub mod disconnect;
 pub mod grammar;
@@ -22,6 +23,7 @@ pub mod reference;
 pub mod session;
 pub mod token;
 pub mod turn;
+mod verbs;
 pub mod world;
 
 pub use session::Session;

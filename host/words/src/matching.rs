@@ -35,7 +35,13 @@ struct Match {
 /// Placements of `part` with a port matched to one of `into`, the best first. Parts met before the ports engage are added to `blockers`.
 ///
 /// Cost: one sweep for each insertion tried, at most [`MOST_TRIED`].
-pub fn matches(world: &mut World, part: usize, into: usize, wish: &Wish, blockers: &mut Vec<usize>) -> Vec<DAffine3> {
+pub fn matches(
+    world: &mut World,
+    part: usize,
+    into: usize,
+    wish: &Wish,
+    blockers: &mut Vec<usize>,
+) -> Vec<DAffine3> {
     let now = world.placement(part);
     let mut found = lines(world, part, into, wish);
     let most = found.iter().map(|m| m.pairs).max().unwrap_or(0);
@@ -71,7 +77,13 @@ pub fn matches(world: &mut World, part: usize, into: usize, wish: &Wish, blocker
 
 /// All ways to bring a port of `part` on one line with a port of `into`, in both senses, with the angle about it from a second pair where there is one.
 fn lines(world: &World, part: usize, into: usize, wish: &Wish) -> Vec<Match> {
-    let place = |p: usize| -> Vec<Port> { world.ports(p).iter().map(|q| q.placed(&world.placement(p))).collect() };
+    let place = |p: usize| -> Vec<Port> {
+        world
+            .ports(p)
+            .iter()
+            .map(|q| q.placed(&world.placement(p)))
+            .collect()
+    };
     let (own, others) = (place(part), place(into));
     let mut out = Vec::new();
     for p in &own {
@@ -81,7 +93,10 @@ fn lines(world: &World, part: usize, into: usize, wish: &Wish) -> Vec<Match> {
             Relation::Any => true,
         };
         for q in others.iter().filter(|q| allowed && p.takes(q)) {
-            if wish.hole.is_some_and(|hole| hole.middle().distance(q.middle()) > 1e-6 || hole.radius != q.radius) {
+            if wish
+                .hole
+                .is_some_and(|hole| hole.middle().distance(q.middle()) > 1e-6 || hole.radius != q.radius)
+            {
                 continue;
             }
             for sense in [1.0, -1.0] {
@@ -134,8 +149,12 @@ fn pairs(own: &[Port], others: &[Port], p: &Port, q: &Port, rotation: DQuat) -> 
         let direction = rotation * p2.direction;
         let offset = rotation * (p2.origin - p.origin);
         let hit = others.iter().position(|q2| {
-            let aside = (q.origin + offset - q2.origin).reject_from_normalized(q.direction).length();
-            p2.takes(q2) && direction.cross(q2.direction).length() < 2e-3 && aside <= (p2.radius - q2.radius).abs() + 0.01
+            let aside = (q.origin + offset - q2.origin)
+                .reject_from_normalized(q.direction)
+                .length();
+            p2.takes(q2)
+                && direction.cross(q2.direction).length() < 2e-3
+                && aside <= (p2.radius - q2.radius).abs() + 0.01
         });
         if let Some(hit) = hit
             && !std::mem::replace(&mut used[hit], true)
@@ -211,10 +230,21 @@ fn flush(own: &Port, other: &Port, inwards: DVec3) -> f64 {
 /// A sweep ends within the overlap that counts as contact; the part is set back by what it overlaps at its stop.
 fn settle(world: &mut World, part: usize, entry: DVec3) {
     let moving = [part];
-    let found = world.assembly().clearance(&Moved { parts: &moving, by: DAffine3::IDENTITY }, &world.others(&moving), 0.0, false);
+    let found = world.assembly().clearance(
+        &Moved {
+            parts: &moving,
+            by: DAffine3::IDENTITY,
+        },
+        &world.others(&moving),
+        0.0,
+        false,
+    );
     if let Some(found) = found
         && found.gap.away.dot(entry) > 0.5
     {
-        world.shift(&moving, entry * (-found.gap.distance_mm / found.gap.away.dot(entry)));
+        world.shift(
+            &moving,
+            entry * (-found.gap.distance_mm / found.gap.away.dot(entry)),
+        );
     }
 }

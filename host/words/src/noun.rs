@@ -12,9 +12,54 @@ use crate::token::Token;
 
 /// Words that can never be a noun.
 const NEVER: &[&str] = &[
-    "and", "or", "by", "from", "to", "into", "onto", "through", "with", "until", "if", "not", "dont", "never", "off", "out", "along", "it", "them",
-    "they", "then", "is", "are", "but", "while", "without", "than", "up", "down", "upwards", "downwards", "about", "around", "own",
-    "towards", "toward", "next", "near", "beside", "between", "under", "above", "below", "behind", "except", "instead", "before", "after",
+    "and",
+    "or",
+    "by",
+    "from",
+    "to",
+    "into",
+    "onto",
+    "through",
+    "with",
+    "until",
+    "if",
+    "not",
+    "dont",
+    "never",
+    "off",
+    "out",
+    "along",
+    "it",
+    "them",
+    "they",
+    "then",
+    "is",
+    "are",
+    "but",
+    "while",
+    "without",
+    "than",
+    "up",
+    "down",
+    "upwards",
+    "downwards",
+    "about",
+    "around",
+    "own",
+    "towards",
+    "toward",
+    "next",
+    "near",
+    "beside",
+    "between",
+    "under",
+    "above",
+    "below",
+    "behind",
+    "except",
+    "instead",
+    "before",
+    "after",
 ];
 
 /// Words for a part that is connected to nothing.
@@ -23,7 +68,10 @@ const FREE: &[&str] = &["free", "loose", "unused", "spare", "remaining"];
 /// Whether `word` may be a noun of a part.
 pub(crate) fn is_noun(word: &str) -> bool {
     let one = lexicon::singular(word);
-    lexicon::SYNONYMS.iter().any(|group| group.contains(&one.as_str())) || lexicon::HOLES.contains(&one.as_str())
+    lexicon::SYNONYMS
+        .iter()
+        .any(|group| group.contains(&one.as_str()))
+        || lexicon::HOLES.contains(&one.as_str())
 }
 
 /// A noun phrase, with those that "and" adds; `loose_in`: "in" after the noun says where the part is ("the pin in hole 4").
@@ -75,11 +123,25 @@ fn simple(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
 fn pronoun(input: &mut Input<'_>) -> winnow::Result<Phrase> {
     let start = *input;
     let found = alt((
-        (opt(one_of(&["all"])), opt(one_of(&["of"])), one_of(&["them", "they"])).value((Pronoun::Them, Quantity::All)),
+        (
+            opt(one_of(&["all"])),
+            opt(one_of(&["of"])),
+            one_of(&["them", "they"]),
+        )
+            .value((Pronoun::Them, Quantity::All)),
         (one_of(&["both"]), opt(one_of(&["of"])), one_of(&["them"])).value((Pronoun::Them, Quantity::Both)),
         one_of(&["it", "itself"]).value((Pronoun::It, Quantity::One)),
-        (opt(one_of(&["all"])), opt(one_of(&["the"])), one_of(&["others", "rest"])).value((Pronoun::Others, Quantity::All)),
-        (one_of(&["the", "that"]), one_of(&["other"]), opt(one_of(&["one"])))
+        (
+            opt(one_of(&["all"])),
+            opt(one_of(&["the"])),
+            one_of(&["others", "rest"]),
+        )
+            .value((Pronoun::Others, Quantity::All)),
+        (
+            one_of(&["the", "that"]),
+            one_of(&["other"]),
+            opt(one_of(&["one"])),
+        )
             .verify(|_| true)
             .value((Pronoun::Other, Quantity::One)),
         (one_of(&["these", "those"]), opt(one_of(&["ones"]))).value((Pronoun::Them, Quantity::All)),
@@ -122,8 +184,23 @@ fn pronoun(input: &mut Input<'_>) -> winnow::Result<Phrase> {
 fn starts_constituent(word: &str) -> bool {
     NEVER.contains(&word)
         || lexicon::INTO.iter().any(|(w, _)| *w == word)
-        || [lexicon::FILLERS, lexicon::OUT, lexicon::IN, lexicon::FULLY].iter().any(|list| list.contains(&word))
-        || ["a", "an", "half", "halfway", "quarter", "one", "all", "slightly", "clockwise", "anticlockwise", "counterclockwise"].contains(&word)
+        || [lexicon::FILLERS, lexicon::OUT, lexicon::IN, lexicon::FULLY]
+            .iter()
+            .any(|list| list.contains(&word))
+        || [
+            "a",
+            "an",
+            "half",
+            "halfway",
+            "quarter",
+            "one",
+            "all",
+            "slightly",
+            "clockwise",
+            "anticlockwise",
+            "counterclockwise",
+        ]
+        .contains(&word)
 }
 
 fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
@@ -133,7 +210,12 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
     let mut one = false;
     loop {
         let start = *input;
-        let ends = |rest: Input<'_>| !rest.iter().take_while(|t| !matches!(t, Token::Comma | Token::Stop)).any(may_be_noun);
+        let ends = |rest: Input<'_>| {
+            !rest
+                .iter()
+                .take_while(|t| !matches!(t, Token::Comma | Token::Stop))
+                .any(may_be_noun)
+        };
         let Some(token) = input.first() else { break };
         match token {
             Token::Name { part, .. } => {
@@ -158,7 +240,10 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
                 }
                 let rest = &input[1..];
                 let last = ends(rest);
-                if let (Some(ordinal), true) = (lexicon::find(lexicon::ORDINALS, &text), phrase.nouns.is_empty() || !last) {
+                if let (Some(ordinal), true) = (
+                    lexicon::find(lexicon::ORDINALS, &text),
+                    phrase.nouns.is_empty() || !last,
+                ) {
                     phrase.ordinals.push(ordinal);
                 } else if let (Some(place), false) = (lexicon::find(lexicon::PLACES, &text), last) {
                     if phrase.nouns.is_empty() {
@@ -170,7 +255,9 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
                     }
                 } else if let (Some(size), false) = (lexicon::find(lexicon::SIZES, &text), last) {
                     phrase.sizes.push(size);
-                } else if let (true, Some(n)) = (phrase.nouns.is_empty() && counted.is_none(), count_word(&text)) {
+                } else if let (true, Some(n)) =
+                    (phrase.nouns.is_empty() && counted.is_none(), count_word(&text))
+                {
                     phrase.quantity = Quantity::Count(n);
                 } else if phrase.nouns.is_empty() && !last && FREE.contains(&text.as_str()) {
                     phrase.free = true;
@@ -185,9 +272,13 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
                     break;
                 } else if !phrase.nouns.is_empty() && starts_constituent(&text) {
                     break;
-                } else if !phrase.nouns.is_empty() && ["the", "of", "number", "no", "nr"].contains(&text.as_str()) {
+                } else if !phrase.nouns.is_empty()
+                    && ["the", "of", "number", "no", "nr"].contains(&text.as_str())
+                {
                     break;
-                } else if starts_constituent(&text) && !(lexicon::PLACES.iter().any(|(_, w)| w.contains(&text.as_str())) && !last) {
+                } else if starts_constituent(&text)
+                    && !(lexicon::PLACES.iter().any(|(_, w)| w.contains(&text.as_str())) && !last)
+                {
                     break;
                 } else {
                     plural = word != text;
@@ -212,7 +303,12 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
     if plural && phrase.quantity == Quantity::One {
         phrase.quantity = Quantity::All;
     }
-    if one && counted.is_none() && phrase.ordinals.is_empty() && phrase.places.is_empty() && phrase.sizes.is_empty() {
+    if one
+        && counted.is_none()
+        && phrase.ordinals.is_empty()
+        && phrase.places.is_empty()
+        && phrase.sizes.is_empty()
+    {
         return Err(ContextError::new());
     }
     after(input, &mut phrase, loose_in);
@@ -245,11 +341,20 @@ fn quantity(input: &mut Input<'_>, phrase: &mut Phrase) -> winnow::Result<Option
     let total = opt(one_of(&["all", "every", "each"])).parse_next(input)?;
     let both = opt(one_of(&["both"])).parse_next(input)?;
     let any_one = opt(one_of(&["any", "some", "whichever"])).parse_next(input)?;
-    let _: Vec<()> = repeat(0..3, one_of(&["of", "the", "a", "an", "its", "their", "these", "those", "another", "single"])).parse_next(input)?;
+    let _: Vec<()> = repeat(
+        0..3,
+        one_of(&[
+            "of", "the", "a", "an", "its", "their", "these", "those", "another", "single",
+        ]),
+    )
+    .parse_next(input)?;
     let start = *input;
-    let count = opt(number).parse_next(input)?.map(|n| n as u32);
+    let count = opt(number.verify(|n| (0.0..=1e6).contains(n)))
+        .parse_next(input)?
+        .map(|n| n as u32);
     // "one" alone, a number with a unit, or a number joined to a noun is no count.
-    let noun_follows = input.first().is_some_and(may_be_noun) || matches!(input.first(), Some(Token::Word { text, .. }) if text == "of");
+    let noun_follows = input.first().is_some_and(may_be_noun)
+        || matches!(input.first(), Some(Token::Word { text, .. }) if text == "of");
     let joined = matches!(start.first(), Some(Token::Number { joined: true, .. }));
     let unit = input.first().and_then(Token::word).is_some_and(|w| {
         let w = lexicon::singular(w);
@@ -282,7 +387,10 @@ fn after(input: &mut Input<'_>, phrase: &mut Phrase, loose_in: bool) {
         phrase.numbers.push(n);
         let start = *input;
         let comma = matches!(input.first(), Some(Token::Comma)).then(|| *input = &input[1..]);
-        let and = opt(one_of(&["and", "to", "through"])).parse_next(input).ok().flatten();
+        let and = opt(one_of(&["and", "to", "through"]))
+            .parse_next(input)
+            .ok()
+            .flatten();
         let range = and.is_some() && start.first().and_then(Token::word).is_some_and(|w| w != "and");
         if comma.is_none() && and.is_none() {
             break;
@@ -359,7 +467,7 @@ fn number_without_unit(input: &mut Input<'_>) -> winnow::Result<u32> {
             || w == "third"
             || w == "full"
     });
-    if unit || n.fract() != 0.0 || n > 1e6 {
+    if unit || n.fract() != 0.0 || !(0.0..=1e6).contains(&n) {
         *input = start;
         return Err(ContextError::new());
     }
@@ -370,9 +478,7 @@ fn number_without_unit(input: &mut Input<'_>) -> winnow::Result<u32> {
 fn state_words(phrase: &mut Phrase) {
     if phrase.nouns.len() > 1 {
         let before = phrase.nouns.len();
-        phrase
-            .nouns
-            .retain(|word| !FREE.contains(&word.as_str()));
+        phrase.nouns.retain(|word| !FREE.contains(&word.as_str()));
         phrase.free |= phrase.nouns.len() < before;
     }
 }

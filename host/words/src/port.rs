@@ -90,7 +90,13 @@ pub fn ports(shape: &Shape) -> Vec<Port> {
         };
         let patches = merged.patches.iter().max().map_or(0, |&last| last + 1);
         for patch in 0..patches {
-            let of_patch = |face: u32| merged.faces.iter().zip(&merged.patches).any(|(&f, &p)| f == face && p == patch);
+            let of_patch = |face: u32| {
+                merged
+                    .faces
+                    .iter()
+                    .zip(&merged.patches)
+                    .any(|(&f, &p)| f == face && p == patch)
+            };
             let area: f64 = (0..shape.faces.len() as u32)
                 .filter(|&face| of_patch(face))
                 .map(|face| shape.faces[face as usize].area_mm2)
@@ -154,6 +160,9 @@ mod tests {
         let (shaft, bore) = (port(5.0, true, 0.0, 30.0), port(5.1, false, -10.0, 20.0));
         let turned = DAffine3::from_rotation_x(std::f64::consts::PI);
         let (low, high) = shaft.connected(&bore.placed(&turned)).unwrap();
-        assert!((low - 0.0).abs() < 1e-9 && (high - 10.0).abs() < 1e-9, "{low} {high}");
+        assert!(
+            (low - 0.0).abs() < 1e-9 && (high - 10.0).abs() < 1e-9,
+            "{low} {high}"
+        );
     }
 }

@@ -101,7 +101,13 @@ impl Scene<'_> {
         Ok(meant)
     }
 
-    fn single(&self, phrase: &Phrase, memory: &Memory, purpose: Purpose, near: &[usize]) -> Result<Meant, Trouble> {
+    fn single(
+        &self,
+        phrase: &Phrase,
+        memory: &Memory,
+        purpose: Purpose,
+        near: &[usize],
+    ) -> Result<Meant, Trouble> {
         if phrase.pronoun.is_some() {
             return self.pronoun(phrase, memory);
         }
@@ -121,24 +127,40 @@ impl Scene<'_> {
         candidates = self.located(phrase, candidates)?;
         if let Some(owner) = &phrase.of {
             let owners = self.single(owner, memory, Purpose::Owner, &[])?.parts;
-            candidates = self.prefer(candidates, |p| owners.iter().any(|o| self.parts[p].connected.contains(o) || p == *o));
+            candidates = self.prefer(candidates, |p| {
+                owners
+                    .iter()
+                    .any(|o| self.parts[p].connected.contains(o) || p == *o)
+            });
         }
         if phrase.free {
             let said = |p: usize| self.names.words(p).iter().any(|w| w == "free" || w == "loose");
             let by_name = candidates.iter().any(|&p| said(p));
-            candidates.retain(|&p| if by_name { said(p) } else { self.parts[p].connected.is_empty() });
+            candidates.retain(|&p| {
+                if by_name {
+                    said(p)
+                } else {
+                    self.parts[p].connected.is_empty()
+                }
+            });
             if candidates.is_empty() {
                 return Err(self.none(phrase, "is loose"));
             }
         }
         if !near.is_empty() {
-            candidates = self.prefer(candidates, |p| near.iter().any(|o| self.parts[p].connected.contains(o)));
+            candidates = self.prefer(candidates, |p| {
+                near.iter().any(|o| self.parts[p].connected.contains(o))
+            });
         }
         if purpose == Purpose::Remove && phrase.quantity != Quantity::One {
             candidates = self.prefer(candidates, |p| !self.parts[p].connected.is_empty());
         }
         if purpose != Purpose::Owner && phrase.nouns.is_empty() && candidates.is_empty() {
-            return Err(Trouble::Refuse(Code::NoReferent, format!("nothing was named that \"{}\" could mean", phrase.text), vec![]));
+            return Err(Trouble::Refuse(
+                Code::NoReferent,
+                format!("nothing was named that \"{}\" could mean", phrase.text),
+                vec![],
+            ));
         }
         let parts = self.counted(phrase, candidates)?;
         Ok(Meant { parts, class })
@@ -161,7 +183,12 @@ impl Scene<'_> {
         if memory.last.is_empty() {
             return Err(none());
         }
-        let mut others: Vec<usize> = memory.class.iter().copied().filter(|p| !memory.last.contains(p)).collect();
+        let mut others: Vec<usize> = memory
+            .class
+            .iter()
+            .copied()
+            .filter(|p| !memory.last.contains(p))
+            .collect();
         if !phrase.nouns.is_empty() {
             let named = self.named(phrase)?;
             others = named.into_iter().filter(|p| !memory.last.contains(p)).collect();
@@ -189,7 +216,11 @@ impl Scene<'_> {
 
     /// "the second one": of the parts spoken of.
     fn again(&self, phrase: &Phrase, memory: &Memory) -> Result<Vec<usize>, Trouble> {
-        let found = if memory.last.len() > 1 { &memory.last } else { &memory.class };
+        let found = if memory.last.len() > 1 {
+            &memory.last
+        } else {
+            &memory.class
+        };
         if found.is_empty() {
             return Err(Trouble::Refuse(
                 Code::NoReferent,
@@ -212,12 +243,16 @@ impl Scene<'_> {
     /// kind.
     fn named(&self, phrase: &Phrase) -> Result<Vec<usize>, Trouble> {
         let mut words: Vec<&str> = phrase.nouns.iter().map(String::as_str).collect();
-        let Some(head) = words.pop() else { return Ok(Vec::new()) };
+        let Some(head) = words.pop() else {
+            return Ok(Vec::new());
+        };
         let all = 0..self.parts.len();
         let has = |part: usize, word: &str| self.names.words(part).iter().any(|w| w == word);
-        let similar = |part: usize, word: &str| self.names.words(part).iter().any(|w| lexicon::same_kind(w, word));
+        let similar =
+            |part: usize, word: &str| self.names.words(part).iter().any(|w| lexicon::same_kind(w, word));
         let numbered = |part: usize, word: &str| {
-            word.parse::<f64>().is_ok_and(|n| self.names.numbers(part).iter().any(|&m| f64::from(m) == n))
+            word.parse::<f64>()
+                .is_ok_and(|n| self.names.numbers(part).iter().any(|&m| f64::from(m) == n))
         };
         let mut found: Vec<usize> = all.clone().filter(|&p| has(p, head)).collect();
         if found.is_empty() && ["part", "component", "everything"].contains(&head) {
@@ -230,7 +265,11 @@ impl Scene<'_> {
             return Err(self.none(phrase, "is in the assembly"));
         }
         for word in words {
-            let direct: Vec<usize> = found.iter().copied().filter(|&p| has(p, word) || numbered(p, word)).collect();
+            let direct: Vec<usize> = found
+                .iter()
+                .copied()
+                .filter(|&p| has(p, word) || numbered(p, word))
+                .collect();
             let alike: Vec<usize> = found.iter().copied().filter(|&p| similar(p, word)).collect();
             let place = lexicon::find(lexicon::PLACES, word).is_some();
             if !direct.is_empty() {
@@ -257,12 +296,19 @@ impl Scene<'_> {
         let names: Vec<&str> = self.parts.iter().take(SHOWN).map(|p| p.name.as_str()).collect();
         let more = self.parts.len().saturating_sub(SHOWN);
         let names = names.join(", ");
-        if more > 0 { format!("{names} and {more} more") } else { names }
+        if more > 0 {
+            format!("{names} and {more} more")
+        } else {
+            names
+        }
     }
 
     fn ask(&self, phrase: &Phrase, candidates: Vec<usize>) -> Trouble {
         let names: Vec<&str> = candidates.iter().map(|&p| self.name(p)).collect();
-        Trouble::Ask(format!("which is meant by \"{}\": {}?", phrase.text, names.join(", ")), candidates)
+        Trouble::Ask(
+            format!("which is meant by \"{}\": {}?", phrase.text, names.join(", ")),
+            candidates,
+        )
     }
 
     /// Orders parts by name without numbers, then by their numbers, then as in the file.
@@ -290,10 +336,18 @@ impl Scene<'_> {
                 Quantity::Count(n) | Quantity::AllOf(n) => n as usize,
                 _ => 1,
             };
-            let from = if ordinal == 0 { candidates.len().saturating_sub(count) } else { ordinal - 1 };
+            let from = if ordinal == 0 {
+                candidates.len().saturating_sub(count)
+            } else {
+                ordinal - 1
+            };
             let taken: Vec<usize> = candidates.iter().copied().skip(from).take(count).collect();
             if taken.len() < count {
-                let code = if count == 1 { Code::NoSuchPart } else { Code::NotEnough };
+                let code = if count == 1 {
+                    Code::NoSuchPart
+                } else {
+                    Code::NotEnough
+                };
                 let words = format!("\"{}\": there are only {}", phrase.text, candidates.len());
                 return Err(Trouble::Refuse(code, words, candidates));
             }
@@ -304,9 +358,20 @@ impl Scene<'_> {
 
     /// A place or size that all candidates share distinguishes none of them: a question.
     fn distinguished(&self, phrase: &Phrase, before: &[usize], after: &[usize]) -> Result<(), Trouble> {
-        let by_name = |p: &usize| self.names.words(*p).iter().any(|w| phrase.text.split_whitespace().any(|t| lexicon::singular(t) == *w && lexicon::find(lexicon::PLACES, t).is_some()));
+        let by_name = |p: &usize| {
+            self.names.words(*p).iter().any(|w| {
+                phrase
+                    .text
+                    .split_whitespace()
+                    .any(|t| lexicon::singular(t) == *w && lexicon::find(lexicon::PLACES, t).is_some())
+            })
+        };
         let all = before.len() > 1 && before.len() == after.len();
-        if all && !before.iter().all(by_name) { Err(self.ask(phrase, before.to_vec())) } else { Ok(()) }
+        if all && !before.iter().all(by_name) {
+            Err(self.ask(phrase, before.to_vec()))
+        } else {
+            Ok(())
+        }
     }
 
     fn numbered(&self, phrase: &Phrase, candidates: &[usize]) -> Result<Vec<usize>, Trouble> {
@@ -324,7 +389,11 @@ impl Scene<'_> {
             match found.len() {
                 0 => {
                     let names: Vec<&str> = candidates.iter().map(|&p| self.name(p)).collect();
-                    let words = format!("no \"{}\" with the number {n}; there are {}", phrase.text, names.join(", "));
+                    let words = format!(
+                        "no \"{}\" with the number {n}; there are {}",
+                        phrase.text,
+                        names.join(", ")
+                    );
                     return Err(Trouble::Refuse(Code::NoSuchPart, words, candidates.to_vec()));
                 }
                 1 => out.extend(found),
@@ -336,7 +405,10 @@ impl Scene<'_> {
 
     /// Those at a place: by their names, else by the middles of their boxes; within a hundredth of the spread they are equal.
     fn at_place(&self, candidates: Vec<usize>, place: Place) -> Vec<usize> {
-        let words = lexicon::PLACES.iter().find(|(p, _)| *p == place).map_or(&[][..], |(_, words)| words);
+        let words = lexicon::PLACES
+            .iter()
+            .find(|(p, _)| *p == place)
+            .map_or(&[][..], |(_, words)| words);
         let by_name: Vec<usize> = candidates
             .iter()
             .copied()
@@ -366,7 +438,12 @@ impl Scene<'_> {
         if spread.reject_from_normalized(axis).length() > ROW * spread.dot(axis) {
             return candidates;
         }
-        candidates.sort_by(|&p, &q| self.parts[p].center.dot(axis).total_cmp(&self.parts[q].center.dot(axis)));
+        candidates.sort_by(|&p, &q| {
+            self.parts[p]
+                .center
+                .dot(axis)
+                .total_cmp(&self.parts[q].center.dot(axis))
+        });
         let n = candidates.len();
         match n {
             0..=2 => candidates,
@@ -420,7 +497,10 @@ impl Scene<'_> {
             Quantity::Both if n == 2 => Ok(candidates),
             Quantity::Count(m) | Quantity::AllOf(m) if n < m as usize => {
                 // "the two-pin link": the number belongs to the name.
-                let word = lexicon::NUMBERS.iter().find(|(v, _)| *v == f64::from(m)).map_or("", |(_, w)| w);
+                let word = lexicon::NUMBERS
+                    .iter()
+                    .find(|(v, _)| *v == f64::from(m))
+                    .map_or("", |(_, w)| w);
                 let named = n == 1 && self.names.words(candidates[0]).iter().any(|w| w == word);
                 if named { Ok(candidates) } else { few(m) }
             }

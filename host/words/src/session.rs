@@ -115,7 +115,9 @@ impl Session {
     }
 
     fn troubled(&mut self, trouble: Trouble) -> Turn {
-        let names = |parts: &[usize]| -> Vec<String> { parts.iter().map(|&p| self.world.name(p).to_owned()).collect() };
+        let names = |parts: &[usize]| -> Vec<String> {
+            parts.iter().map(|&p| self.world.name(p).to_owned()).collect()
+        };
         let mut turn = Turn {
             outcome: Outcome::Refuse,
             acts: Vec::new(),
@@ -172,7 +174,10 @@ impl Session {
     /// Acts, what was spoken of (`None`: unchanged), and whether the history was used.
     fn carry_out(&mut self, text: &str) -> Result<(Vec<Act>, Option<Memory>, bool), Trouble> {
         if text.len() > LONGEST {
-            let words = format!("the instruction has {} bytes; at most {LONGEST} are read, so say less at once", text.len());
+            let words = format!(
+                "the instruction has {} bytes; at most {LONGEST} are read, so say less at once",
+                text.len()
+            );
             return Err(Trouble::Refuse(Code::NotUnderstood, words, vec![]));
         }
         let tokens = read(text, &self.names);
@@ -206,7 +211,11 @@ impl Session {
     fn rewind(&mut self, back: bool) -> Result<(), Trouble> {
         let from = if back { &mut self.done } else { &mut self.undone };
         let Some(snapshot) = from.pop() else {
-            let words = if back { "there is nothing to undo" } else { "there is nothing to redo" };
+            let words = if back {
+                "there is nothing to undo"
+            } else {
+                "there is nothing to redo"
+            };
             return Err(Trouble::Refuse(Code::NoReferent, words.into(), vec![]));
         };
         let now = self.snapshot();
@@ -222,7 +231,9 @@ impl Session {
         let (what, purpose) = match command {
             Command::Connect { what, .. } => (what, Purpose::Connect),
             Command::Disconnect { what, .. } => (what, Purpose::Remove),
-            Command::Adjust { what, .. } | Command::Turn { what, .. } | Command::Pick { what } => (what, Purpose::Move),
+            Command::Adjust { what, .. } | Command::Turn { what, .. } | Command::Pick { what } => {
+                (what, Purpose::Move)
+            }
             Command::Undo | Command::Redo => {
                 let words = "undo and redo stand alone; say them one after another".to_owned();
                 return Err(Trouble::Refuse(Code::NotUnderstood, words, vec![]));
@@ -239,7 +250,13 @@ impl Session {
         self.slot = None;
         for &part in &parts {
             match command {
-                Command::Connect { into, relation, from, extent, .. } => {
+                Command::Connect {
+                    into,
+                    relation,
+                    from,
+                    extent,
+                    ..
+                } => {
                     self.slot = into.as_ref().is_none_or(|i| !i.hole).then_some(Slot::Into);
                     let (into, hole) = self.destination(part, &parts, into.as_ref())?;
                     self.slot = None;
@@ -252,7 +269,11 @@ impl Session {
                     acts.push(connect(&mut self.world, part, into, &wish)?);
                 }
                 Command::Disconnect { way, .. } => {
-                    let from = near.iter().copied().find(|&b| self.world.connected(part, b)).or(near.first().copied());
+                    let from = near
+                        .iter()
+                        .copied()
+                        .find(|&b| self.world.connected(part, b))
+                        .or(near.first().copied());
                     acts.push(disconnect(&mut self.world, part, from, way.map(direction))?);
                 }
                 Command::Adjust { out, way, amount, .. } => {
@@ -281,16 +302,29 @@ impl Session {
                 }
             })
             .collect();
-        Scene { names: &self.names, parts }
+        Scene {
+            names: &self.names,
+            parts,
+        }
     }
 
-    fn resolve(&self, phrase: &Phrase, purpose: Purpose, near: &[usize]) -> Result<(Vec<usize>, Vec<usize>), Trouble> {
+    fn resolve(
+        &self,
+        phrase: &Phrase,
+        purpose: Purpose,
+        near: &[usize],
+    ) -> Result<(Vec<usize>, Vec<usize>), Trouble> {
         let meant = self.scene().resolve(phrase, &self.memory, purpose, near)?;
         Ok((meant.parts, meant.class))
     }
 
     /// The part to connect to, and its bore when one is stated.
-    fn destination(&self, part: usize, moving: &[usize], into: Option<&Phrase>) -> Result<(usize, Option<Port>), Trouble> {
+    fn destination(
+        &self,
+        part: usize,
+        moving: &[usize],
+        into: Option<&Phrase>,
+    ) -> Result<(usize, Option<Port>), Trouble> {
         let Some(phrase) = into else {
             return Ok((self.obvious(part, moving)?, None));
         };
@@ -308,28 +342,45 @@ impl Session {
         let (parts, _) = self.resolve(phrase, Purpose::Owner, &[])?;
         match parts[..] {
             [one] => Ok(one),
-            _ => Err(Trouble::Ask(format!("which of them is meant by \"{}\"?", phrase.text), parts)),
+            _ => Err(Trouble::Ask(
+                format!("which of them is meant by \"{}\"?", phrase.text),
+                parts,
+            )),
         }
     }
 
     /// The part to which `part` belongs: that of the file, else the only one whose ports fit.
     fn obvious(&self, part: usize, moving: &[usize]) -> Result<usize, Trouble> {
-        let others: Vec<usize> = (0..self.world.count()).filter(|p| !moving.contains(p) && *p != part).collect();
-        let joined: Vec<usize> = others.iter().copied().filter(|&b| self.world.joined_at_home(part, b)).collect();
+        let others: Vec<usize> = (0..self.world.count())
+            .filter(|p| !moving.contains(p) && *p != part)
+            .collect();
+        let joined: Vec<usize> = others
+            .iter()
+            .copied()
+            .filter(|&b| self.world.joined_at_home(part, b))
+            .collect();
         if let Some(&first) = joined.first() {
             // All of them agree on the place as long as they stand to each other as in the file; the one that has most of the part is named.
             let here = self.world.home(part);
             let center = here.translation;
-            let nearest = joined
-                .iter()
-                .copied()
-                .min_by(|&a, &b| self.world.home(a).translation.distance(center).total_cmp(&self.world.home(b).translation.distance(center)));
+            let nearest = joined.iter().copied().min_by(|&a, &b| {
+                self.world
+                    .home(a)
+                    .translation
+                    .distance(center)
+                    .total_cmp(&self.world.home(b).translation.distance(center))
+            });
             return Ok(nearest.unwrap_or(first));
         }
         let fitting: Vec<usize> = others
             .iter()
             .copied()
-            .filter(|&b| self.world.ports(part).iter().any(|p| self.world.ports(b).iter().any(|q| p.takes(q))))
+            .filter(|&b| {
+                self.world
+                    .ports(part)
+                    .iter()
+                    .any(|p| self.world.ports(b).iter().any(|q| p.takes(q)))
+            })
             .collect();
         match (&fitting[..], &others[..]) {
             ([one], _) | ([], [one]) => Ok(*one),
@@ -338,15 +389,28 @@ impl Session {
                 format!("no part has a surface that fits {}", self.world.name(part)),
                 vec![part],
             )),
-            _ => Err(Trouble::Ask(format!("into which part does {} go?", self.world.name(part)), fitting)),
+            _ => Err(Trouble::Ask(
+                format!("into which part does {} go?", self.world.name(part)),
+                fitting,
+            )),
         }
     }
 
     /// The bore of `owner` that the phrase states; `None` when any will do.
     fn hole(&self, part: usize, owner: usize, phrase: &Phrase) -> Result<Option<Port>, Trouble> {
         let place = self.world.placement(owner);
-        let shafts: Vec<Port> = self.world.ports(part).iter().filter(|p| p.male).copied().collect();
-        let bores = self.world.ports(owner).iter().filter(|q| shafts.iter().any(|p| p.takes(q)));
+        let shafts: Vec<Port> = self
+            .world
+            .ports(part)
+            .iter()
+            .filter(|p| p.male)
+            .copied()
+            .collect();
+        let bores = self
+            .world
+            .ports(owner)
+            .iter()
+            .filter(|q| shafts.iter().any(|p| p.takes(q)));
         let mut bores: Vec<Port> = bores.map(|q| q.placed(&place)).collect();
         let name = self.world.name(owner);
         let none = |words: String| Err(Trouble::Refuse(Code::NoSuchPart, words, vec![owner]));
@@ -355,13 +419,30 @@ impl Session {
             return Err(Trouble::Refuse(Code::NoFit, words, vec![part, owner]));
         }
         let axis = longest_axis(&bores.iter().map(Port::middle).collect::<Vec<_>>());
-        bores.sort_by(|p, q| p.middle().dot(axis).total_cmp(&q.middle().dot(axis)).then(p.middle().y.total_cmp(&q.middle().y)));
-        let counted = phrase.ordinals.first().copied().or(phrase.numbers.first().map(|&n| n as usize));
+        bores.sort_by(|p, q| {
+            p.middle()
+                .dot(axis)
+                .total_cmp(&q.middle().dot(axis))
+                .then(p.middle().y.total_cmp(&q.middle().y))
+        });
+        let counted = phrase
+            .ordinals
+            .first()
+            .copied()
+            .or(phrase.numbers.first().map(|&n| n as usize));
         if let Some(n) = counted {
-            let index = if n == 0 && !phrase.ordinals.is_empty() { bores.len() } else { n };
+            let index = if n == 0 && !phrase.ordinals.is_empty() {
+                bores.len()
+            } else {
+                n
+            };
             return match index.checked_sub(1).and_then(|i| bores.get(i)) {
                 Some(bore) => Ok(Some(*bore)),
-                None => none(format!("{name} has {} holes that take {}, no number {n}", bores.len(), self.world.name(part))),
+                None => none(format!(
+                    "{name} has {} holes that take {}, no number {n}",
+                    bores.len(),
+                    self.world.name(part)
+                )),
             };
         }
         if let Some(&place) = phrase.places.first() {
@@ -370,14 +451,20 @@ impl Session {
                 if n % 2 == 1 {
                     return Ok(Some(bores[n / 2]));
                 }
-                return Err(Trouble::Ask(format!("{name} has {n} holes in a row and none in the middle; which one?"), vec![owner]));
+                return Err(Trouble::Ask(
+                    format!("{name} has {n} holes in a row and none in the middle; which one?"),
+                    vec![owner],
+                ));
             }
             let heights: Vec<f64> = bores.iter().map(|b| b.middle().dot(direction(place))).collect();
             let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let top: Vec<usize> = (0..bores.len()).filter(|&i| heights[i] > high - 1e-3).collect();
             return match top[..] {
                 [one] => Ok(Some(bores[one])),
-                _ => Err(Trouble::Ask(format!("{} holes of {name} are there; which one?", top.len()), vec![owner])),
+                _ => Err(Trouble::Ask(
+                    format!("{} holes of {name} are there; which one?", top.len()),
+                    vec![owner],
+                )),
             };
         }
         Ok(None)

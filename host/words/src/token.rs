@@ -98,8 +98,13 @@ fn ordinal(input: &mut &str) -> winnow::Result<Token> {
 }
 
 fn number(input: &mut &str) -> winnow::Result<Token> {
-    let text = (digit1, opt((alt(('.', ',')), digit1))).take().parse_next(input)?;
-    let value = text.replace(',', ".").parse().unwrap_or(f64::INFINITY);
+    // A hyphen after a word is taken with the word, so this one is a sign.
+    let sign = opt(alt(('-', '−'))).parse_next(input)?;
+    let text = (digit1, opt((alt(('.', ',')), digit1)))
+        .take()
+        .parse_next(input)?;
+    let value: f64 = text.replace(',', ".").parse().unwrap_or(f64::INFINITY);
+    let value = if sign.is_some() { -value } else { value };
     let joined = hyphen(input);
     Ok(Token::Number { value, joined })
 }
@@ -132,7 +137,10 @@ impl Names {
     /// Of the parts in file order.
     pub fn new<'a>(parts: impl IntoIterator<Item = &'a str>) -> Self {
         Self {
-            parts: parts.into_iter().map(|name| (name.to_owned(), split(name))).collect(),
+            parts: parts
+                .into_iter()
+                .map(|name| (name.to_owned(), split(name)))
+                .collect(),
         }
     }
 
@@ -195,11 +203,18 @@ pub fn read(text: &str, names: &Names) -> Vec<Token> {
 fn correct(word: &str, names: &Names, verb_expected: bool) -> Option<String> {
     let one = lexicon::singular(word);
     let length = word.chars().count();
-    if length < 4 || [word, &one].iter().any(|w| lexicon::known(w) || names.has_word(w)) {
+    if length < 4
+        || [word, &one]
+            .iter()
+            .any(|w| lexicon::known(w) || names.has_word(w))
+    {
         return None;
     }
     let slips = if length >= 8 { 2 } else { 1 };
-    let of_parts = names.parts.iter().flat_map(|(_, tokens)| tokens.iter().filter_map(Token::word));
+    let of_parts = names
+        .parts
+        .iter()
+        .flat_map(|(_, tokens)| tokens.iter().filter_map(Token::word));
     let nouns = lexicon::SYNONYMS.iter().flat_map(|group| group.iter().copied());
     let verbs: Vec<&str> = lexicon::verbs().collect();
     let others = lexicon::SIZES
@@ -210,7 +225,12 @@ fn correct(word: &str, names: &Names, verb_expected: bool) -> Option<String> {
         .chain(lexicon::LENGTHS.iter().flat_map(|(_, w)| w.iter()))
         .chain(lexicon::ANGLES.iter().flat_map(|(_, w)| w.iter()))
         .chain(lexicon::FULLY.iter())
-        .chain(["quarter", "halfway", "other", "another", "above", "below", "into", "from"].iter())
+        .chain(
+            [
+                "quarter", "halfway", "other", "another", "above", "below", "into", "from",
+            ]
+            .iter(),
+        )
         .copied();
     let candidates: Vec<&str> = if verb_expected {
         verbs
@@ -237,7 +257,11 @@ fn correct(word: &str, names: &Names, verb_expected: bool) -> Option<String> {
     let (distance, found) = best?;
     (distance <= slips && !tied).then(|| {
         let plural = word.ends_with('s') && !found.ends_with('s');
-        if plural { format!("{found}s") } else { found.to_owned() }
+        if plural {
+            format!("{found}s")
+        } else {
+            found.to_owned()
+        }
     })
 }
 
@@ -255,7 +279,8 @@ fn named(tokens: Vec<Token>, names: &Names) -> Vec<Token> {
         let fits = |name: &[Token]| {
             let unit = rest.get(name.len()).and_then(Token::word).is_some_and(|word| {
                 let word = lexicon::singular(word);
-                lexicon::find(lexicon::LENGTHS, &word).is_some() || lexicon::find(lexicon::ANGLES, &word).is_some()
+                lexicon::find(lexicon::LENGTHS, &word).is_some()
+                    || lexicon::find(lexicon::ANGLES, &word).is_some()
             });
             let counted = matches!(name.last(), Some(Token::Number { .. })) && unit;
             name.len() >= 2
@@ -291,7 +316,10 @@ mod tests {
     use super::*;
 
     fn shown(text: &str, names: &[&str]) -> Vec<String> {
-        read(text, &Names::new(names.iter().copied())).iter().map(Token::shown).collect()
+        read(text, &Names::new(names.iter().copied()))
+            .iter()
+            .map(Token::shown)
+            .collect()
     }
 
     #[test]
@@ -300,7 +328,10 @@ mod tests {
         assert_eq!(shown("take screw 1 out", &names), ["take", "screw-1", "out"]);
         assert_eq!(shown("nut 3 (2)", &names), ["nut_3 (2)"]);
         assert_eq!(shown("the pin in hole 3", &names), ["the", "pin-in-hole-3"]);
-        assert_eq!(shown("pull the nut 3 mm", &names), ["pull", "the", "nut", "3", "mm"]);
+        assert_eq!(
+            shown("pull the nut 3 mm", &names),
+            ["pull", "the", "nut", "3", "mm"]
+        );
     }
 
     #[test]

@@ -64,7 +64,12 @@ impl World {
         let home: Vec<DAffine3> = (0..count).map(|p| assembly.placement(p)).collect();
         let all: Vec<usize> = (0..count).collect();
         let (low, high) = assembly.bounds_of(&all, DAffine3::IDENTITY);
-        let ports = assembly.model.parts.iter().map(|p| of_shapes[p.shape].clone()).collect();
+        let ports = assembly
+            .model
+            .parts
+            .iter()
+            .map(|p| of_shapes[p.shape].clone())
+            .collect();
         let mut world = Self {
             assembly,
             home,
@@ -150,9 +155,14 @@ impl World {
     /// Whether a part placed at `x` is where it would be at `y`.
     pub fn same(&self, part: usize, x: &DAffine3, y: &DAffine3) -> bool {
         let (low, high) = self.assembly.body(part).bounds();
-        [low, high, DVec3::new(low.x, high.y, low.z), DVec3::new(high.x, low.y, low.z)]
-            .into_iter()
-            .all(|p| x.transform_point3(p).distance(y.transform_point3(p)) < SAME_MM)
+        [
+            low,
+            high,
+            DVec3::new(low.x, high.y, low.z),
+            DVec3::new(high.x, low.y, low.z),
+        ]
+        .into_iter()
+        .all(|p| x.transform_point3(p).distance(y.transform_point3(p)) < SAME_MM)
     }
 
     /// Connected ports of two parts as placed now.
@@ -164,7 +174,12 @@ impl World {
             for other in self.ports(b) {
                 let other = other.placed(&pb);
                 if let Some(common) = port.connected(&other) {
-                    out.push(Fit { port, other, common, with: b });
+                    out.push(Fit {
+                        port,
+                        other,
+                        common,
+                        with: b,
+                    });
                 }
             }
         }
@@ -173,7 +188,10 @@ impl World {
 
     /// Connected ports of a part with all others, the longest common interval first.
     pub fn fits(&self, a: usize) -> Vec<Fit> {
-        let mut fits: Vec<Fit> = (0..self.count()).filter(|&b| b != a).flat_map(|b| self.fits_between(a, b)).collect();
+        let mut fits: Vec<Fit> = (0..self.count())
+            .filter(|&b| b != a)
+            .flat_map(|b| self.fits_between(a, b))
+            .collect();
         let area = |f: &Fit| (f.common.1 - f.common.0) * f.port.radius;
         fits.sort_by(|f, g| area(g).total_cmp(&area(f)));
         fits
@@ -190,7 +208,9 @@ impl World {
 
     /// Parts connected to `a` now.
     pub fn connections(&self, a: usize) -> Vec<usize> {
-        (0..self.count()).filter(|&b| b != a && self.connected(a, b)).collect()
+        (0..self.count())
+            .filter(|&b| b != a && self.connected(a, b))
+            .collect()
     }
 
     /// Box of a part now.
@@ -213,18 +233,28 @@ impl World {
     /// micrometre.
     pub fn travel(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
         let near = self.on_the_way(moving, direction, limit);
-        let group = Moved { parts: moving, by: DAffine3::IDENTITY };
-        let (share, pair) = self.assembly.touch_share(&group, &near, &Motion::slide(direction * limit), STEP_MM);
+        let group = Moved {
+            parts: moving,
+            by: DAffine3::IDENTITY,
+        };
+        let (share, pair) =
+            self.assembly
+                .touch_share(&group, &near, &Motion::slide(direction * limit), STEP_MM);
         (share * limit, pair)
     }
 
     /// As [`Self::travel`], found to [`COARSE_MM`] only: for questions whether a way is free. A way blocked at its start costs little.
     pub fn free(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
-        let group = Moved { parts: moving, by: DAffine3::IDENTITY };
+        let group = Moved {
+            parts: moving,
+            by: DAffine3::IDENTITY,
+        };
         for length in [START_MM.min(limit), limit] {
             let near = self.on_the_way(moving, direction, length);
             let step = COARSE_MM.min(length / 2.0);
-            let (share, pair) = self.assembly.free_share(&group, &near, &Motion::slide(direction * length), step);
+            let (share, pair) =
+                self.assembly
+                    .free_share(&group, &near, &Motion::slide(direction * length), step);
             if pair.is_some() {
                 return (share * length, pair);
             }
@@ -248,14 +278,24 @@ impl World {
     /// Share of a motion that `part` makes before it meets another part, and the pair.
     pub fn share(&self, part: usize, motion: &Motion) -> (f64, Option<[usize; 2]>) {
         let moving = [part];
-        let group = Moved { parts: &moving, by: DAffine3::IDENTITY };
-        self.assembly.touch_share(&group, &self.others(&moving), motion, STEP_MM)
+        let group = Moved {
+            parts: &moving,
+            by: DAffine3::IDENTITY,
+        };
+        self.assembly
+            .touch_share(&group, &self.others(&moving), motion, STEP_MM)
     }
 
     /// A part that overlaps `part` where it is now.
     pub fn blocker(&self, part: usize) -> Option<Clearance> {
         let moving = [part];
-        self.assembly.blocker(&Moved { parts: &moving, by: DAffine3::IDENTITY }, &self.others(&moving))
+        self.assembly.blocker(
+            &Moved {
+                parts: &moving,
+                by: DAffine3::IDENTITY,
+            },
+            &self.others(&moving),
+        )
     }
 
     /// Shortest travel along `direction` at which the box of `moving` is apart from the boxes of `from`, mm.
@@ -311,7 +351,9 @@ impl World {
             let [a, b] = contact.parts;
             if self.connected(a, b) {
                 let turned = self.placement(a) * self.home[a].inverse();
-                add(turned.transform_vector3(contact.axis.direction).normalize_or_zero());
+                add(turned
+                    .transform_vector3(contact.axis.direction)
+                    .normalize_or_zero());
             }
         }
         for axis in DVec3::AXES {

@@ -42,10 +42,16 @@ fn lines() -> Vec<Line<'static>> {
         .filter(|line| !line.trim().is_empty() && !line.starts_with('#'))
         .map(|line| {
             let cells: Vec<&str> = line.split('|').map(str::trim).collect();
-            let [file, before, say, expected] = cells[..] else { panic!("four cells: {line}") };
+            let [file, before, say, expected] = cells[..] else {
+                panic!("four cells: {line}")
+            };
             Line {
                 file,
-                before: before.split('/').map(str::trim).filter(|b| !b.is_empty()).collect(),
+                before: before
+                    .split('/')
+                    .map(str::trim)
+                    .filter(|b| !b.is_empty())
+                    .collect(),
                 say,
                 expected,
             }
@@ -55,7 +61,13 @@ fn lines() -> Vec<Line<'static>> {
 
 /// What a turn came to, in the words of the list.
 fn came_to(turn: &Turn) -> String {
-    let joined = |names: &[String]| names.iter().map(|n| n.replace(' ', "~")).collect::<Vec<_>>().join(" ");
+    let joined = |names: &[String]| {
+        names
+            .iter()
+            .map(|n| n.replace(' ', "~"))
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
     match turn.outcome {
         Outcome::Done => {
             let acts: Vec<String> = turn
@@ -92,10 +104,12 @@ fn agrees(got: &str, expected: &str) -> bool {
     };
     match (got.strip_prefix("done"), expected.strip_prefix("done")) {
         (Some(got), Some(expected)) => {
-            let (got, expected): (Vec<&str>, Vec<&str>) = (got.split(',').collect(), expected.split(',').collect());
+            let (got, expected): (Vec<&str>, Vec<&str>) =
+                (got.split(',').collect(), expected.split(',').collect());
             got.len() == expected.len()
                 && got.iter().zip(&expected).all(|(g, e)| {
-                    let (g, e): (Vec<&str>, Vec<&str>) = (g.split_whitespace().collect(), e.split_whitespace().collect());
+                    let (g, e): (Vec<&str>, Vec<&str>) =
+                        (g.split_whitespace().collect(), e.split_whitespace().collect());
                     g.starts_with(&e)
                 })
         }
@@ -107,14 +121,21 @@ fn agrees(got: &str, expected: &str) -> bool {
 #[test]
 fn instructions_come_out_as_a_technician_expects() {
     let Some(cad) = shared() else {
-        println!("skipped {} instructions: no shared test parts (set MORTISE_SHARED)", lines().len());
+        println!(
+            "skipped {} instructions: no shared test parts (set MORTISE_SHARED)",
+            lines().len()
+        );
         return;
     };
     let mut sessions: BTreeMap<&str, Session> = BTreeMap::new();
     let (mut right, mut done_wrong, mut skipped, mut longest) = (0, Vec::new(), 0, Duration::ZERO);
     let mut slow = Vec::new();
     for line in lines() {
-        let path = FILES.iter().find(|(name, _)| *name == line.file).expect("a file of the list").1;
+        let path = FILES
+            .iter()
+            .find(|(name, _)| *name == line.file)
+            .expect("a file of the list")
+            .1;
         if !cad.join(path).is_file() {
             skipped += 1;
             continue;
@@ -127,7 +148,12 @@ fn instructions_come_out_as_a_technician_expects() {
         for before in &line.before {
             let turn = session.say(before);
             if turn.outcome != Outcome::Done {
-                println!("  before: {} | {before}: {:?} {:?}", line.file, came_to(&turn), turn.reason.map(|r| r.words));
+                println!(
+                    "  before: {} | {before}: {:?} {:?}",
+                    line.file,
+                    came_to(&turn),
+                    turn.reason.map(|r| r.words)
+                );
             }
         }
         let placements = session.world().placements();
@@ -138,16 +164,26 @@ fn instructions_come_out_as_a_technician_expects() {
         if std::env::var_os("MORTISE_WORDS_SLOW").is_some() {
             println!("{took:?} {} | {} -> {}", line.file, line.say, came_to(&turn));
         }
-        slow.push((took / turn.acts.len().max(1) as u32, format!("{} | {}", line.file, line.say)));
+        slow.push((
+            took / turn.acts.len().max(1) as u32,
+            format!("{} | {}", line.file, line.say),
+        ));
         if turn.outcome != Outcome::Done {
-            assert!(turn.moved.is_empty() && placements == session.world().placements(), "moved: {}", line.say);
+            assert!(
+                turn.moved.is_empty() && placements == session.world().placements(),
+                "moved: {}",
+                line.say
+            );
         }
         let got = came_to(&turn);
         if agrees(&got, line.expected) {
             right += 1;
         } else {
             let words = turn.reason.map(|r| r.words).or(turn.question).unwrap_or_default();
-            println!("  {} | {} | expected {} | got {got} {words}", line.file, line.say, line.expected);
+            println!(
+                "  {} | {} | expected {} | got {got} {words}",
+                line.file, line.say, line.expected
+            );
             if turn.outcome == Outcome::Done {
                 done_wrong.push(line.say);
             }
@@ -157,7 +193,10 @@ fn instructions_come_out_as_a_technician_expects() {
     for (took, say) in slow.iter().rev().take(8) {
         println!("  {took:?} per act: {say}");
     }
-    println!("{right} of {} as expected, {skipped} skipped, longest turn {longest:?}", lines().len());
+    println!(
+        "{right} of {} as expected, {skipped} skipped, longest turn {longest:?}",
+        lines().len()
+    );
     assert!(done_wrong.is_empty(), "done wrong: {done_wrong:?}");
     assert!(right + skipped >= EXPECTED, "{right} as expected");
 }

@@ -48,7 +48,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if instructions.is_empty() {
         bail!("no instruction given; write one, such as \"remove the cover\"");
     }
-    let inputs: Vec<&Path> = [Some(args.file.as_path()), args.script.as_deref()].into_iter().flatten().collect();
+    let inputs: Vec<&Path> = [Some(args.file.as_path()), args.script.as_deref()]
+        .into_iter()
+        .flatten()
+        .collect();
     let mut output = match &args.output {
         Some(path) => Some(Output::new(path, Existing::from_force(args.force), &inputs)?),
         None => None,
@@ -73,7 +76,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let text = mortise_brep::write::step_text(&args.file, &options, session.parts())?;
         output.write(&text)?;
     }
-    Ok(if all_done { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    Ok(if all_done {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(1)
+    })
 }
 
 fn read_script(path: &Path) -> anyhow::Result<Vec<String>> {
@@ -86,7 +93,10 @@ fn read_script(path: &Path) -> anyhow::Result<Vec<String>> {
         bail!("{shown}: larger than {LARGEST_SCRIPT} bytes; split it");
     }
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
-    Ok(lines.filter(|line| !line.is_empty() && !line.starts_with('#')).map(str::to_owned).collect())
+    Ok(lines
+        .filter(|line| !line.is_empty() && !line.starts_with('#'))
+        .map(str::to_owned)
+        .collect())
 }
 
 /// A turn in one line.
@@ -110,11 +120,17 @@ fn shown(turn: &Turn) -> String {
                     };
                     let unit = if act.verb == Verb::Turn { "°" } else { " mm" };
                     let to = act.b.as_ref().map_or(String::new(), |b| format!(" – {b}"));
-                    let by = act.amount.map_or(String::new(), |amount| format!(", {amount:.3}{unit}"));
+                    let by = act
+                        .amount
+                        .map_or(String::new(), |amount| format!(", {amount:.3}{unit}"));
                     format!("{verb} {}{to}{by}", act.a)
                 })
                 .collect();
-            let what = if acts.is_empty() { "nothing to connect or move".to_owned() } else { acts.join("; ") };
+            let what = if acts.is_empty() {
+                "nothing to connect or move".to_owned()
+            } else {
+                acts.join("; ")
+            };
             match (acts.is_empty(), turn.moved.len()) {
                 (true, 1..) => format!("done: {} parts moved back", turn.moved.len()),
                 _ => format!("done: {what}"),
