@@ -42,6 +42,7 @@ fn main() {
         "src/kernel_shape.cc",
         "src/kernel_oracle.cc",
         "src/kernel_spline.cc",
+        "src/kernel_write.cc",
         "build.rs",
     ] {
         println!("cargo:rerun-if-changed={file}");
@@ -61,6 +62,7 @@ fn main() {
         .file("src/kernel_shape.cc")
         .file("src/kernel_oracle.cc")
         .file("src/kernel_spline.cc")
+        .file("src/kernel_write.cc")
         .include("src")
         .include(&include)
         .std("c++17")

@@ -34,6 +34,7 @@ struct RawPart;
 struct RawResult;
 struct RawShape;
 struct RawFreeForms;
+struct RawPlace;
 
 // A STEP file after transfer: its distinct shapes and where they are placed.
 class Document {
@@ -48,6 +49,7 @@ class Document {
   RawFreeForms free_forms(std::size_t index, double tolerance_mm) const;
   rust::Vec<std::uint8_t> sides(std::size_t index, rust::Slice<const double> points, double tolerance_mm) const;
   rust::Vec<double> feet(std::size_t index, rust::Slice<const double> points) const;
+  rust::Vec<std::uint8_t> write(const rust::Vec<RawPlace>& places) const;
 
  private:
   std::unique_ptr<Content> content_;

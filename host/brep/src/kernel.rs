@@ -140,6 +140,17 @@ mod ffi {
         curves: Vec<RawCurve>,
     }
 
+    /// A shape to be written at a placement.
+    #[derive(Clone, Debug)]
+    struct RawPlace {
+        shape: usize,
+        name: String,
+        /// Rotation row by row with the translation as fourth column, mm.
+        placement: [f64; 12],
+        has_color: bool,
+        color: [f32; 3],
+    }
+
     // SAFETY: the signatures of kernel.h, which cxx checks when it compiles the bridge; none of the functions keeps a reference after it returns.
     unsafe extern "C++" {
         include!("kernel.h");
@@ -165,6 +176,8 @@ mod ffi {
         fn sides(self: &Document, index: usize, points: &[f64], tolerance_mm: f64) -> Result<Vec<u8>>;
         /// Nearest point of the shape's faces to each point, by the kernel: distance, x, y, z; the distance is -1 where it finds none.
         fn feet(self: &Document, index: usize, points: &[f64]) -> Result<Vec<f64>>;
+        /// STEP text (AP214, mm) of an assembly of one level with these parts.
+        fn write(self: &Document, places: &Vec<RawPlace>) -> Result<Vec<u8>>;
 
         /// Limits address space (bytes) and processor time (seconds) of this process where the system supports it; 0 for no limit.
         fn limit_process(memory_bytes: u64, cpu_seconds: u64) -> bool;

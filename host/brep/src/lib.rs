@@ -34,6 +34,7 @@ mod recognise;
 mod recognise_curve;
 mod shape;
 mod topology;
+pub mod write;
 
 pub use error::BrepError;
 pub use load::{load_step, load_step_until, load_step_with};

@@ -46,7 +46,7 @@ pub fn nearest(
     }
 }
 
-fn ask(
+pub(crate) fn ask(
     path: &Path,
     options: &LoadOptions,
     kind: Kind,
@@ -65,7 +65,7 @@ fn ask(
     }
 }
 
-fn mismatch(path: &Path) -> BrepError {
+pub(crate) fn mismatch(path: &Path) -> BrepError {
     BrepError::Process {
         path: path.display().to_string(),
         reason: "its answer does not fit the question".into(),

@@ -1,6 +1,7 @@
 //! A query to the CAD kernel and its answer, by the process that has the kernel.
 
-use crate::{BrepError, LoadOptions, assemble};
+use crate::kernel::RawPlace;
+use crate::{BrepError, LoadOptions, Part, assemble};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -35,10 +36,14 @@ pub(crate) struct Question {
     pub points: Vec<DVec3>,
 }
 
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) enum Kind {
-    Sides { tolerance_mm: f64 },
+    Sides {
+        tolerance_mm: f64,
+    },
     Feet,
+    /// The STEP text of an assembly with these parts.
+    Write(Vec<Part>),
 }
 
 /// Answer with one entry for each point.
@@ -46,6 +51,7 @@ pub(crate) enum Kind {
 pub(crate) enum Answer {
     Sides(Vec<Side>),
     Feet(Vec<Option<Foot>>),
+    Text(Vec<u8>),
 }
 
 /// Queries the kernel in this process.
@@ -53,10 +59,10 @@ pub(crate) fn answer(path: &Path, options: &LoadOptions, question: &Question) ->
     let flat: Vec<f64> = question.points.iter().flat_map(|p| p.to_array()).collect();
     let shape = question.shape;
     assemble::ask(path, options, shape, |document| {
-        Ok(match question.kind {
+        Ok(match &question.kind {
             Kind::Sides { tolerance_mm } => Answer::Sides(
                 document
-                    .sides(shape, &flat, tolerance_mm)?
+                    .sides(shape, &flat, *tolerance_mm)?
                     .into_iter()
                     .map(|code| match code {
                         0 => Side::In,
@@ -66,6 +72,7 @@ pub(crate) fn answer(path: &Path, options: &LoadOptions, question: &Question) ->
                     })
                     .collect(),
             ),
+            Kind::Write(parts) => Answer::Text(document.write(&parts.iter().map(raw).collect())?),
             Kind::Feet => Answer::Feet(
                 document
                     .feet(shape, &flat)?
@@ -82,4 +89,20 @@ pub(crate) fn answer(path: &Path, options: &LoadOptions, question: &Question) ->
             ),
         })
     })
+}
+
+fn raw(part: &Part) -> RawPlace {
+    let (m, t) = (part.placement.matrix3, part.placement.translation);
+    let row = |i: usize| [m.x_axis[i], m.y_axis[i], m.z_axis[i], t[i]];
+    let mut placement = [0.0; 12];
+    for i in 0..3 {
+        placement[4 * i..4 * i + 4].copy_from_slice(&row(i));
+    }
+    RawPlace {
+        shape: part.shape,
+        name: part.name.clone(),
+        placement,
+        has_color: part.color.is_some(),
+        color: part.color.unwrap_or_default(),
+    }
 }

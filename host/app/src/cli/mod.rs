@@ -1,7 +1,7 @@
 //! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: the insertion was not completed, or parts do not go together; 2: not possible, with one line on standard error that
-//! gives the reason.
+//! Exit code 0: done; 1: the insertion was not completed, an instruction not carried out, or parts do not go together; 2: not possible, with one line
+//! on standard error that gives the reason.
 
 mod assembly;
 mod bake;
@@ -14,6 +14,7 @@ mod ports;
 mod probe;
 mod reading;
 mod rig;
+mod task;
 mod units;
 mod window;
 
@@ -65,6 +66,8 @@ enum Command {
     Ports(ports::Args),
     /// Check, send or show the description of a rig
     Rig(rig::Args),
+    /// Take an assembly apart and together by instructions in plain words
+    Task(task::Args),
     /// Open the window
     Open(window::Open),
 }
@@ -107,6 +110,7 @@ pub fn main() -> ExitCode {
             Command::Probe(args) => probe::run(&args),
             Command::Ports(args) => ports::run(&args),
             Command::Rig(args) => rig::run(&args),
+            Command::Task(args) => task::run(&args),
         },
     };
     program::end(NAME, result)

@@ -1,0 +1,388 @@
+//! The assembly as it stands during a session: placements, ports, connections, and free travel by the exact distance.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+use mortise_brep::{CadModel, Shape};
+use mortise_task::{Assembly, Clearance, Motion, Moved, TaskError};
+
+use crate::port::{Port, ports};
+
+/// Distance within which two placements are the same, mm at the corners of the part's box: well below the micrometre promised.
+const SAME_MM: f64 = 1e-4;
+/// Gap up to which the file has two parts together, mm: the clearance of a ring in its groove.
+const NEAR_MM: f64 = 0.35;
+/// Travel between two checks of samples that stay in contact, mm; others are bounded without a gap.
+const STEP_MM: f64 = 0.5;
+/// The same for questions whether a way is free, which are long.
+const COARSE_MM: f64 = 1.0;
+/// Travel that is tried first, mm.
+const START_MM: f64 = 0.25;
+/// Relative difference up to which volumes, areas and moments are equal.
+const EQUAL_SHARE: f64 = 1e-7;
+/// Room around a part that has left the others, mm.
+pub const ROOM_MM: f64 = 5.0;
+
+/// Connection of two ports, placed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Port of the first part.
+    pub port: Port,
+    /// Port of the second.
+    pub other: Port,
+    /// Common interval on the first port's axis, mm from its origin.
+    pub common: (f64, f64),
+    /// The second part.
+    pub with: usize,
+}
+
+/// An assembly with movable parts. Lengths mm, assembly frame.
+pub struct World {
+    assembly: Assembly,
+    /// Placements in the file.
+    home: Vec<DAffine3>,
+    ports: Vec<Arc<[Port]>>,
+    /// Number of the first equal shape.
+    kinds: Vec<usize>,
+    /// Pairs together in the file: in contact, a shaft in a bore, or within [`NEAR_MM`].
+    joined: Vec<Vec<bool>>,
+    diagonal: f64,
+}
+
+impl World {
+    /// Prepares `model`.
+    ///
+    /// # Errors
+    /// [`TaskError`]: fewer than two parts, or a part without a surface.
+    ///
+    /// Cost: as [`Assembly::new`], and the fits of each pair.
+    pub fn new(model: CadModel) -> Result<Self, TaskError> {
+        let of_shapes: Vec<Arc<[Port]>> = model.shapes.iter().map(|shape| ports(shape).into()).collect();
+        let kinds = model.parts.iter().map(|p| kind(&model.shapes, p.shape)).collect();
+        let assembly = Assembly::new(model)?;
+        let count = assembly.count();
+        let home: Vec<DAffine3> = (0..count).map(|p| assembly.placement(p)).collect();
+        let all: Vec<usize> = (0..count).collect();
+        let (low, high) = assembly.bounds_of(&all, DAffine3::IDENTITY);
+        let ports = assembly
+            .model
+            .parts
+            .iter()
+            .map(|p| of_shapes[p.shape].clone())
+            .collect();
+        let mut world = Self {
+            assembly,
+            home,
+            ports,
+            kinds,
+            joined: vec![vec![false; count]; count],
+            diagonal: low.distance(high),
+        };
+        for contact in world.assembly.contacts.clone() {
+            world.join(contact.parts);
+        }
+        for a in 0..count {
+            for b in a + 1..count {
+                let near = world.assembly.pair_gap(a, b, NEAR_MM).is_some();
+                if near || !world.fits_between(a, b).is_empty() {
+                    world.join([a, b]);
+                }
+            }
+        }
+        Ok(world)
+    }
+
+    fn join(&mut self, [a, b]: [usize; 2]) {
+        self.joined[a][b] = true;
+        self.joined[b][a] = true;
+    }
+
+    /// The prepared assembly.
+    pub fn assembly(&self) -> &Assembly {
+        &self.assembly
+    }
+
+    /// Number of parts.
+    pub fn count(&self) -> usize {
+        self.home.len()
+    }
+
+    /// Name of a part.
+    pub fn name(&self, part: usize) -> &str {
+        self.assembly.name(part)
+    }
+
+    /// Placement of a part now.
+    pub fn placement(&self, part: usize) -> DAffine3 {
+        self.assembly.placement(part)
+    }
+
+    /// Placement of a part in the file.
+    pub fn home(&self, part: usize) -> DAffine3 {
+        self.home[part]
+    }
+
+    /// Places a part.
+    pub fn set_placement(&mut self, part: usize, placement: DAffine3) {
+        self.assembly.model.parts[part].placement = placement;
+    }
+
+    /// All placements now.
+    pub fn placements(&self) -> Vec<DAffine3> {
+        (0..self.count()).map(|p| self.placement(p)).collect()
+    }
+
+    /// Number of a part's kind: parts of equal shape in equal frames have the same, however often a file writes the shape.
+    pub fn kind(&self, part: usize) -> usize {
+        self.kinds[part]
+    }
+
+    /// Ports of a part, in its own frame.
+    pub fn ports(&self, part: usize) -> &[Port] {
+        &self.ports[part]
+    }
+
+    /// Size of the assembly in the file, mm.
+    pub fn diagonal(&self) -> f64 {
+        self.diagonal
+    }
+
+    /// Whether the file has the two parts connected.
+    pub fn joined_at_home(&self, a: usize, b: usize) -> bool {
+        self.joined[a][b]
+    }
+
+    /// Whether a part placed at `x` is where it would be at `y`.
+    pub fn same(&self, part: usize, x: &DAffine3, y: &DAffine3) -> bool {
+        let (low, high) = self.assembly.body(part).bounds();
+        [
+            low,
+            high,
+            DVec3::new(low.x, high.y, low.z),
+            DVec3::new(high.x, low.y, low.z),
+        ]
+        .into_iter()
+        .all(|p| x.transform_point3(p).distance(y.transform_point3(p)) < SAME_MM)
+    }
+
+    /// Connected ports of two parts as placed now.
+    pub fn fits_between(&self, a: usize, b: usize) -> Vec<Fit> {
+        let (pa, pb) = (self.placement(a), self.placement(b));
+        let mut out = Vec::new();
+        for port in self.ports(a) {
+            let port = port.placed(&pa);
+            for other in self.ports(b) {
+                let other = other.placed(&pb);
+                if let Some(common) = port.connected(&other) {
+                    out.push(Fit {
+                        port,
+                        other,
+                        common,
+                        with: b,
+                    });
+                }
+            }
+        }
+        out
+    }
+
+    /// Connected ports of a part with all others, the longest common interval first.
+    pub fn fits(&self, a: usize) -> Vec<Fit> {
+        let mut fits: Vec<Fit> = (0..self.count())
+            .filter(|&b| b != a)
+            .flat_map(|b| self.fits_between(a, b))
+            .collect();
+        let area = |f: &Fit| (f.common.1 - f.common.0) * f.port.radius;
+        fits.sort_by(|f, g| area(g).total_cmp(&area(f)));
+        fits
+    }
+
+    /// Whether two parts are connected now: ports in one another, or placed to each other as in a file that has them in contact.
+    pub fn connected(&self, a: usize, b: usize) -> bool {
+        let as_at_home = self.joined[a][b] && {
+            let wanted = self.placement(b) * self.home[b].inverse() * self.home[a];
+            self.same(a, &self.placement(a), &wanted)
+        };
+        as_at_home || !self.fits_between(a, b).is_empty()
+    }
+
+    /// Parts connected to `a` now.
+    pub fn connections(&self, a: usize) -> Vec<usize> {
+        (0..self.count())
+            .filter(|&b| b != a && self.connected(a, b))
+            .collect()
+    }
+
+    /// Box of a part now.
+    pub fn bounds(&self, part: usize) -> (DVec3, DVec3) {
+        self.assembly.bounds(part, DAffine3::IDENTITY)
+    }
+
+    /// Middle of a part's box now.
+    pub fn center(&self, part: usize) -> DVec3 {
+        let (low, high) = self.bounds(part);
+        (low + high) / 2.0
+    }
+
+    /// All parts but `moving`.
+    pub fn others(&self, moving: &[usize]) -> Vec<usize> {
+        (0..self.count()).filter(|p| !moving.contains(p)).collect()
+    }
+
+    /// Travel of `moving` along the unit vector `direction`, at most `limit` mm, until it meets another part; and the pair that meets. Found to a
+    /// micrometre.
+    pub fn travel(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
+        let near = self.on_the_way(moving, direction, limit);
+        let group = Moved {
+            parts: moving,
+            by: DAffine3::IDENTITY,
+        };
+        let (share, pair) =
+            self.assembly
+                .touch_share(&group, &near, &Motion::slide(direction * limit), STEP_MM);
+        (share * limit, pair)
+    }
+
+    /// As [`Self::travel`], found to [`COARSE_MM`] only: for questions whether a way is free. A way blocked at its start costs little.
+    pub fn free(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
+        let group = Moved {
+            parts: moving,
+            by: DAffine3::IDENTITY,
+        };
+        for length in [START_MM.min(limit), limit] {
+            let near = self.on_the_way(moving, direction, length);
+            let step = COARSE_MM.min(length / 2.0);
+            let (share, pair) =
+                self.assembly
+                    .free_share(&group, &near, &Motion::slide(direction * length), step);
+            if pair.is_some() {
+                return (share * length, pair);
+            }
+        }
+        (limit, None)
+    }
+
+    /// Parts whose boxes meet the box of the motion.
+    fn on_the_way(&self, moving: &[usize], direction: DVec3, limit: f64) -> Vec<usize> {
+        let (mut low, mut high) = self.assembly.bounds_of(moving, DAffine3::IDENTITY);
+        low = low.min(low + direction * limit);
+        high = high.max(high + direction * limit);
+        let mut near = self.others(moving);
+        near.retain(|&o| {
+            let (l, h) = self.bounds(o);
+            low.cmple(h).all() && l.cmple(high).all()
+        });
+        near
+    }
+
+    /// Share of a motion that `part` makes before it meets another part, and the pair.
+    pub fn share(&self, part: usize, motion: &Motion) -> (f64, Option<[usize; 2]>) {
+        let moving = [part];
+        let group = Moved {
+            parts: &moving,
+            by: DAffine3::IDENTITY,
+        };
+        self.assembly
+            .touch_share(&group, &self.others(&moving), motion, STEP_MM)
+    }
+
+    /// A part that overlaps `part` where it is now.
+    pub fn blocker(&self, part: usize) -> Option<Clearance> {
+        let moving = [part];
+        self.assembly.blocker(
+            &Moved {
+                parts: &moving,
+                by: DAffine3::IDENTITY,
+            },
+            &self.others(&moving),
+        )
+    }
+
+    /// Shortest travel along `direction` at which the box of `moving` is apart from the boxes of `from`, mm.
+    pub fn exit_mm(&self, moving: &[usize], from: &[usize], direction: DVec3) -> f64 {
+        let (low, high) = self.assembly.bounds_of(moving, DAffine3::IDENTITY);
+        // Stretches of the travel in which the boxes meet.
+        let mut meets: Vec<(f64, f64)> = Vec::new();
+        for &other in from {
+            let (l, h) = self.bounds(other);
+            let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
+            for axis in 0..3 {
+                let d = direction[axis];
+                let (gap_low, gap_high) = (l[axis] - high[axis], h[axis] - low[axis]);
+                if d.abs() < 1e-9 {
+                    if gap_low > 0.0 || gap_high < 0.0 {
+                        (start, end) = (1.0, 0.0);
+                    }
+                } else {
+                    let (a, b) = (gap_low / d, gap_high / d);
+                    start = f64::max(start, a.min(b));
+                    end = f64::min(end, a.max(b));
+                }
+            }
+            if end > start && end > 0.0 {
+                meets.push((start, end));
+            }
+        }
+        meets.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut at = 0.0;
+        for (start, end) in meets {
+            if start > at {
+                break;
+            }
+            at = f64::max(at, end);
+        }
+        at
+    }
+
+    /// Directions in which a part may leave: axes of its connected ports, normals and axes of its contacts, and the file's axes; both ways.
+    pub fn ways(&self, part: usize) -> Vec<DVec3> {
+        let mut ways: Vec<DVec3> = Vec::new();
+        let mut add = |d: DVec3| {
+            for d in [d, -d] {
+                if !ways.iter().any(|w| w.dot(d) > 0.999_999) {
+                    ways.push(d);
+                }
+            }
+        };
+        for fit in self.fits(part) {
+            add(fit.port.direction);
+        }
+        for contact in self.assembly.contacts.iter().filter(|c| c.parts.contains(&part)) {
+            let [a, b] = contact.parts;
+            if self.connected(a, b) {
+                let turned = self.placement(a) * self.home[a].inverse();
+                add(turned
+                    .transform_vector3(contact.axis.direction)
+                    .normalize_or_zero());
+            }
+        }
+        for axis in DVec3::AXES {
+            add(axis);
+        }
+        ways.retain(|w| w.is_normalized());
+        ways
+    }
+
+    /// Moves parts by a translation.
+    pub fn shift(&mut self, parts: &[usize], by: DVec3) {
+        for &part in parts {
+            let moved = DAffine3::from_translation(by) * self.placement(part);
+            self.set_placement(part, moved);
+        }
+    }
+}
+
+/// The first shape that is equal to shape `index` in its own frame: same faces, volume, area and centre of mass.
+fn kind(shapes: &[Shape], index: usize) -> usize {
+    let this = &shapes[index];
+    let close = |a: f64, b: f64| (a - b).abs() <= EQUAL_SHARE * a.abs().max(b.abs());
+    let equal = |other: &Shape| {
+        other.faces.len() == this.faces.len()
+            && other.edges.len() == this.edges.len()
+            && close(other.volume_mm3, this.volume_mm3)
+            && close(other.area_mm2, this.area_mm2)
+            && other.center_of_mass.distance(this.center_of_mass) < SAME_MM
+            && (0..3).all(|i| close(other.inertia_mm5[i][i], this.inertia_mm5[i][i]))
+    };
+    shapes.iter().position(equal).unwrap_or(index)
+}
