@@ -9,13 +9,19 @@ fn main() {
         eprintln!("usage: fit FILE MOVING AGAINST");
         std::process::exit(2);
     };
-    let model = match mortise_brep::load_step(file) {
+    let n = |name: &str, or: f64| std::env::var(name).ok().and_then(|t| t.parse().ok()).unwrap_or(or);
+    let options = mortise_brep::LoadOptions { relative_deflection: n("REL", 5e-4), angular_deflection_rad: n("ANG", 0.2), ..Default::default() };
+    let started = std::time::Instant::now();
+    let loaded = mortise_brep::load_step_with(file, &options);
+    println!("read {:.2} s", started.elapsed().as_secs_f64());
+    let model = match loaded {
         Ok(model) => model,
         Err(error) => {
             eprintln!("{error}");
             std::process::exit(2);
         }
     };
+    for shape in &model.shapes { println!("{} triangles, deflection {:.4}", shape.mesh.triangles.len(), shape.deflection_mm); }
     let index = |name: &str| model.parts.iter().position(|part| part.name == name).unwrap_or(usize::MAX);
     let started = std::time::Instant::now();
     match find(&model, index(moving), index(against), &FitOptions::default()) {

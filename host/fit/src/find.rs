@@ -1,6 +1,8 @@
 //! The search: candidates, refinement, what is kept, and in which order.
 
-use glam::{DAffine3, DVec3};
+use std::f64::consts::{PI, TAU};
+
+use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::CadModel;
 use nalgebra::Vector6;
 use rayon::prelude::*;
@@ -9,8 +11,8 @@ use crate::error::FitError;
 use crate::frames;
 use crate::gaps::{Gap, Pair};
 use crate::mobility::Cone;
-use crate::path::{Path, way_in};
-use crate::refine::{Effort, Refined, refine};
+use crate::path::{Path, PathKind, way_in};
+use crate::refine::{Refined, refine, refine_roughly};
 use crate::rotations::rotations;
 use crate::screen::Screen;
 use crate::solid::Solid;
@@ -26,7 +28,11 @@ const LEAST_RATE: f64 = 0.01;
 /// Share of all directions that may be free in a fit: less than a corner leaves.
 const MOST_FREE: f64 = 0.1;
 /// Share of the best score below which a fit is not reported.
-const LEAST_SCORE: f64 = 0.1;
+const LEAST_SCORE: f64 = 0.35;
+
+/// Fits from which symmetries are taken, and rounds of that.
+const MOST_ALIKE: usize = 7;
+const SYMMETRY_ROUNDS: usize = 2;
 
 /// What is a fit, and how much is returned.
 #[derive(Clone, Copy, Debug)]
@@ -186,9 +192,33 @@ impl Search<'_> {
         rated += free_form.0;
         jobs.extend(free_form.1);
         let refined = jobs.len();
-        let mut found: Vec<Found> = (jobs.par_iter())
-            .filter_map(|&(pose, reach)| self.fit(pose, reach))
-            .collect();
+        let mut kept = self.best((jobs.par_iter()).filter_map(|&(pose, reach)| self.fit(pose, reach)).collect());
+        for _ in 0..SYMMETRY_ROUNDS {
+            let more = self.symmetric(&kept);
+            if more.is_empty() {
+                break;
+            }
+            let before = kept.len();
+            kept.extend(
+                (more.into_par_iter())
+                    .filter_map(|pose| self.fit(pose, self.window))
+                    .collect::<Vec<_>>(),
+            );
+            kept = self.best(kept);
+            if kept.len() == before {
+                break;
+            }
+        }
+        let fits = self.reports(&kept);
+        Fits {
+            fits,
+            rated,
+            refined,
+        }
+    }
+
+    /// The distinct ones, the best first.
+    fn best(&self, mut found: Vec<Found>) -> Vec<Found> {
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         let best = found.first().map_or(0.0, |found| found.score);
         let mut kept: Vec<Found> = Vec::new();
@@ -200,14 +230,53 @@ impl Search<'_> {
                 kept.push(candidate);
             }
         }
-        let fits = (kept.par_iter().enumerate())
-            .map(|(rank, found)| self.report(found, rank < self.options.most_paths))
+        kept
+    }
+
+    /// Poses that follow from the symmetry of what was found: where Pᵢ and Pⱼ fit alike, Pᵢ⁻¹Pⱼ may be a symmetry of the moving part, so that PₖPᵢ⁻¹Pⱼ
+    /// fits too.
+    fn symmetric(&self, kept: &[Found]) -> Vec<DAffine3> {
+        let best = kept.first().map_or(0.0, |found| found.score);
+        let alike: Vec<&Found> = (kept.iter())
+            .filter(|found| found.score > 0.9 * best)
+            .take(MOST_ALIKE)
             .collect();
-        Fits {
-            fits,
-            rated,
-            refined,
+        let mut out: Vec<DAffine3> = Vec::new();
+        for p in &alike {
+            for q in &alike {
+                let symmetry = p.refined.pose.inverse() * q.refined.pose;
+                for r in &alike {
+                    let pose = r.refined.pose * symmetry;
+                    let known = kept.iter().any(|found| follows(pose, &found.refined, self.window / 4.0))
+                        || out.iter().any(|other| self.travel(other, &pose) < self.window / 4.0);
+                    if !known && out.len() < MOST_ALIKE * MOST_ALIKE {
+                        out.push(pose);
+                    }
+                }
+            }
         }
+        out
+    }
+
+    /// What is returned. The ways in are searched for the best alone, each with the directions that led to the others.
+    fn reports(&self, kept: &[Found]) -> Vec<Fit> {
+        let mut ways: Vec<DVec3> = Vec::new();
+        (kept.iter().enumerate())
+            .map(|(rank, found)| {
+                let mut fit = report(found);
+                if rank < self.options.most_paths {
+                    let (min, overlap) = (found.clearance.min_mm, self.options.overlap_mm);
+                    fit.path = way_in(self.pair, &found.refined, min, overlap, &ways);
+                }
+                if let Some(path) = &fit.path
+                    && path.kind == PathKind::Line
+                    && ways.iter().all(|way| way.distance(-path.direction) > 1e-3)
+                {
+                    ways.push(-path.direction);
+                }
+                fit
+            })
+            .collect()
     }
 
     /// Candidates of walls and of the assembly, with the reach of their refinement.
@@ -240,11 +309,8 @@ impl Search<'_> {
         let best = self.rate(screen, &candidates, window, MOST_OF_FRAMES[0]);
         let rough: Vec<Candidate> = (best.par_iter())
             .filter_map(|candidate| {
-                let refined = refine(self.pair, candidate.pose, 2.0 * window, &Effort::ROUGH)?;
-                Some(Candidate {
-                    pose: refined.pose,
-                    ..*candidate
-                })
+                let pose = refine_roughly(self.pair, candidate.pose, 2.0 * window)?;
+                Some(Candidate { pose, ..*candidate })
             })
             .collect();
         let best = self.rate(screen, &rough, self.window, MOST_OF_FRAMES[1]);
@@ -287,14 +353,14 @@ impl Search<'_> {
 
     /// Refines a pose and decides whether it is a fit.
     fn fit(&self, pose: DAffine3, reach: f64) -> Option<Found> {
-        let refined = refine(self.pair, pose, reach, &Effort::FULL)?;
+        let refined = refine(self.pair, pose, reach)?;
         let refined = self.centred(refined);
         let enough = -self.options.overlap_mm;
-        let min = self.pair.least(&refined.pose, 3, enough);
+        let min = self.pair.least(&refined.pose, 3, 100, enough);
         if min < enough || Cone::new(&refined.mating).share() > MOST_FREE {
             return None;
         }
-        let min = min.min(self.pair.least(&refined.pose, 1, enough));
+        let min = min.min(self.pair.least(&refined.pose, 1, 2000, enough));
         if min < enough {
             return None;
         }
@@ -306,9 +372,11 @@ impl Search<'_> {
         };
         let smaller = self.pair.moving.area.min(self.pair.fixed.area);
         let loose = median.max(0.0) / (0.02 * self.pair.moving.size().min(self.pair.fixed.size()));
+        // Gaps that differ among themselves: a chance contact.
+        let uneven = refined.deviation / (0.2 * refined.common.abs() + 3e-3);
         let held = 1.0 - refined.free.len() as f64 / 6.0;
         Some(Found {
-            score: area / smaller * held / (1.0 + loose),
+            score: area / smaller * held / (1.0 + loose) / (1.0 + uneven * uneven),
             area,
             clearance: Clearance {
                 min_mm: min,
@@ -343,29 +411,27 @@ impl Search<'_> {
         let theirs = extent(self.pair.fixed, 1, &DAffine3::IDENTITY);
         let by = (theirs[0] + theirs[1] - ours[0] - ours[1]) / 2.0;
         let pose = DAffine3::from_translation(by * u) * refined.pose;
-        match refine(self.pair, pose, refined.common.abs() + 0.2 * self.window, &Effort::FULL) {
+        match refine(self.pair, pose, refined.common.abs() + 0.2 * self.window) {
             Some(there) if area(&there.mating) > 0.98 * area(&refined.mating) => there,
             _ => refined,
         }
     }
+}
 
-    fn report(&self, found: &Found, with_path: bool) -> Fit {
-        let refined = &found.refined;
-        let mut faces: Vec<[u32; 2]> = refined.mating.iter().map(|g| g.faces).collect();
-        faces.sort_unstable();
-        faces.dedup();
-        Fit {
-            placement: refined.pose,
-            score: found.score,
-            area_mm2: found.area,
-            clearance: found.clearance,
-            residual_mm: refined.deviation,
-            freedom: refined.free.len(),
-            faces,
-            path: with_path
-                .then(|| way_in(self.pair, refined, found.clearance.min_mm, self.options.overlap_mm))
-                .flatten(),
-        }
+fn report(found: &Found) -> Fit {
+    let refined = &found.refined;
+    let mut faces: Vec<[u32; 2]> = refined.mating.iter().map(|g| g.faces).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    Fit {
+        placement: refined.pose,
+        score: found.score,
+        area_mm2: found.area,
+        clearance: found.clearance,
+        residual_mm: refined.deviation,
+        freedom: refined.free.len(),
+        faces,
+        path: None,
     }
 }
 
@@ -383,30 +449,24 @@ fn area(mating: &[Gap]) -> f64 {
 /// Whether the worse of two fits is the better one moved along what its faces leave free.
 fn same(better: &Found, worse: &Found) -> bool {
     const SAME_MM: f64 = 0.02;
-    let (a, b) = (&better.refined, &worse.refined);
-    let step = a.pose * b.pose.inverse();
-    // The motion between them as a twist about the worse one's centre.
-    let (axis, angle) = glam::DQuat::from_mat3(&step.matrix3).normalize().to_axis_angle();
-    let angle = if angle > std::f64::consts::PI {
-        angle - std::f64::consts::TAU
-    } else {
-        angle
-    };
+    follows(better.refined.pose, &worse.refined, SAME_MM)
+}
+
+/// Whether `pose` is reached from a refined pose by what its faces leave free, within `near` mm.
+fn follows(pose: DAffine3, refined: &Refined, near: f64) -> bool {
+    let step = pose * refined.pose.inverse();
+    // The motion between them as a twist about the refined one's centre.
+    let (axis, angle) = DQuat::from_mat3(&step.matrix3).normalize().to_axis_angle();
+    let angle = if angle > PI { angle - TAU } else { angle };
     let turn = angle * axis;
-    let shift = shift_of(step.transform_point3(b.center) - b.center, turn);
-    let mut twist = Vector6::new(
-        turn.x * b.length,
-        turn.y * b.length,
-        turn.z * b.length,
-        shift.x,
-        shift.y,
-        shift.z,
-    );
-    for free in &b.free {
+    let shift = shift_of(step.transform_point3(refined.center) - refined.center, turn);
+    let [u, v] = [turn * refined.length, shift];
+    let mut twist = Vector6::new(u.x, u.y, u.z, v.x, v.y, v.z);
+    for free in &refined.free {
         let along = twist.dot(free);
         twist -= along * free;
     }
-    twist.norm() < SAME_MM
+    twist.norm() < near
 }
 
 /// Linear part of the twist whose exponential moves the centre by `moved` while it turns by `turn`: V(turn)⁻¹·moved (Murray, Li & Sastry 1994, A.12).

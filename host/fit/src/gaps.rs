@@ -13,6 +13,15 @@ pub(crate) struct Pair<'a> {
     pub fixed: &'a Solid,
 }
 
+/// Which surface distances are taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum By {
+    /// The tessellation.
+    Facets,
+    /// The exact surface.
+    Exact,
+}
+
 /// A sample of one solid that faces the other: an item of the fit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item {
@@ -39,17 +48,30 @@ pub(crate) struct Gap {
 }
 
 impl Pair<'_> {
-    /// The gap at an item, where its faces face each other; `None` where they do not, or where the foot is on an edge.
-    pub fn gap(&self, pose: &DAffine3, item: &Item) -> Option<Gap> {
+    /// The gap at an item within `reach` mm, where its faces face each other; `None` where they do not, or where the foot is on an edge.
+    pub fn gap(&self, pose: &DAffine3, item: &Item, reach: f64, by: By) -> Option<Gap> {
         let Item { of_moving, sample } = *item;
         let (other, to) = if of_moving {
             (self.fixed, *pose)
         } else {
             (self.moving, pose.inverse())
         };
-        let n = to.transform_vector3(sample.n);
-        let hit = other.hit(to.transform_point3(sample.p))?;
-        if n.dot(hit.normal) > -FACING || !self.flat_on(other, &hit) {
+        let (p, n) = (to.transform_point3(sample.p), to.transform_vector3(sample.n));
+        // Facets first: most samples face nothing.
+        let near = other.facets.hit(p, reach + other.facets.error_mm())?;
+        let hit = match by {
+            By::Facets => near,
+            By::Exact => {
+                if near.normal.dot(n) > -0.7 {
+                    return None;
+                }
+                other.hit(p)?
+            }
+        };
+        if hit.distance.abs() > reach
+            || n.dot(hit.normal) > -FACING
+            || by == By::Exact && !inside_face(other, &hit)
+        {
             return None;
         }
         let (at, away, faces) = if of_moving {
@@ -71,16 +93,8 @@ impl Pair<'_> {
         })
     }
 
-    /// Whether the foot is inside its face: there the direction to it is the surface's normal. Free-form faces are not checked.
-    fn flat_on(&self, other: &Solid, hit: &Hit) -> bool {
-        let surface = &other.exact.shape().faces[hit.face as usize].surface;
-        surface
-            .distance(hit.foot)
-            .is_none_or(|(_, natural)| natural.dot(hit.normal).abs() > 0.9999)
-    }
-
     /// Items of both solids whose gap at `pose` is below `reach` mm in size, from every `stride`-th sample.
-    pub fn items(&self, pose: &DAffine3, reach: f64, stride: usize) -> Vec<Item> {
+    pub fn items(&self, pose: &DAffine3, reach: f64, stride: usize, by: By) -> Vec<Item> {
         let back = pose.inverse();
         let near = |of_moving: bool, sample: &Sample| {
             let bound = if of_moving {
@@ -92,35 +106,56 @@ impl Pair<'_> {
                 of_moving,
                 sample: *sample,
             };
-            (bound < reach && self.gap(pose, &item).is_some_and(|g| g.gap.abs() < reach)).then_some(item)
+            (bound < reach && self.gap(pose, &item, reach, by).is_some()).then_some(item)
         };
-        let ours = self.moving.samples.iter().step_by(stride).filter_map(|s| near(true, s));
-        let theirs = self.fixed.samples.iter().step_by(stride).filter_map(|s| near(false, s));
-        ours.chain(theirs).collect()
+        let ours = self.moving.samples.iter().step_by(stride);
+        let theirs = self.fixed.samples.iter().step_by(stride);
+        (ours.filter_map(|s| near(true, s)))
+            .chain(theirs.filter_map(|s| near(false, s)))
+            .collect()
     }
 
-    /// Least signed distance of any sample or edge point of either solid from the other, mm, or the first found below `enough`; every `stride`-th
-    /// sample is taken.
-    pub fn least(&self, pose: &DAffine3, stride: usize, enough: f64) -> f64 {
+    /// Least signed distance of samples and edge points of either solid from the other, mm, or one found below `enough`; every `stride`-th point is
+    /// taken. Facets order the points; at most `most` that could be nearest are measured on the exact surfaces.
+    pub fn least(&self, pose: &DAffine3, stride: usize, most: usize, enough: f64) -> f64 {
         let back = pose.inverse();
-        let mut least = f64::INFINITY;
-        for (of, other, to) in [
-            (self.moving, self.fixed, pose),
-            (self.fixed, self.moving, &back),
+        // Lower bound, whether the point is the moving solid's, and the point in the other's frame.
+        let mut near: Vec<(f64, bool, DVec3)> = Vec::new();
+        let mut upper = f64::INFINITY;
+        for (of_moving, of, other, to) in [
+            (true, self.moving, self.fixed, pose),
+            (false, self.fixed, self.moving, &back),
         ] {
+            let error = other.facets.error_mm();
             let points = (of.samples.iter().step_by(stride).map(|s| s.p))
                 .chain(of.edge_points.iter().step_by(stride).copied());
             for p in points {
                 let q = to.transform_point3(p);
-                if other.box_distance(q) >= least {
+                let within = upper + 2.0 * error;
+                if other.box_distance(q) >= within {
                     continue;
                 }
-                least = least.min(other.distance(q));
-                if least < enough {
-                    return least;
+                if let Some(hit) = other.facets.hit(q, within.min(f64::MAX)) {
+                    near.push((hit.distance - error, of_moving, q));
+                    upper = upper.min(hit.distance.abs() + error);
                 }
             }
         }
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut least = f64::INFINITY;
+        for (bound, of_moving, q) in near.into_iter().take(most) {
+            if bound >= least || least < enough {
+                break;
+            }
+            let other = if of_moving { self.fixed } else { self.moving };
+            least = least.min(other.distance(q));
+        }
         least
     }
+}
+
+/// Whether the foot is inside its face: there the direction to it is the surface's normal. Free-form faces are not checked.
+fn inside_face(other: &Solid, hit: &Hit) -> bool {
+    let surface = &other.exact.shape().faces[hit.face as usize].surface;
+    (surface.distance(hit.foot)).is_none_or(|(_, natural)| natural.dot(hit.normal).abs() > 0.9999)
 }

@@ -11,6 +11,7 @@
 //! correlation of densities is not used: it is tens of micrometres off in a 20 µm fit.
 
 mod error;
+mod facets;
 mod find;
 mod frames;
 mod gaps;

@@ -12,6 +12,8 @@ const SAME_RAD: f64 = 0.02;
 const LATTICE: usize = 4000;
 /// Approach of a face along a direction that still counts as along it.
 const ALONG: f64 = 2e-3;
+/// Approach of a face along a suggested direction beyond which it is not tried: play lets a part pass a lip.
+const RESISTS: f64 = 0.3;
 
 /// The cone of translations that no mating face resists: d with n·d ≥ 0 for every direction n in which a face pushes the moving solid.
 pub(crate) struct Cone {
@@ -48,7 +50,8 @@ impl Cone {
         directions(LATTICE).filter(|&d| self.opening(d) > 0.0).count() as f64 / LATTICE as f64
     }
 
-    /// Directions worth a try, the widest opening first: of the lattice, the normals themselves, and the edges of the cone (n × m).
+    /// Directions worth a try: first those of `more` that little resists, either way round, then the normals themselves, the middle of the cone and its
+    /// edges (n × m), each the widest opening first.
     pub fn candidates(&self, more: &[DVec3]) -> Vec<DVec3> {
         let mut out: Vec<(f64, DVec3)> = Vec::new();
         let mut add = |d: DVec3| {
@@ -57,7 +60,7 @@ impl Cone {
                 out.push((opening, d));
             }
         };
-        for d in more.iter().flat_map(|&d| [d, -d]).chain(self.normals.iter().copied()) {
+        for &d in &self.normals {
             add(d);
         }
         if let Some(widest) = directions(LATTICE).max_by(|a, b| self.opening(*a).total_cmp(&self.opening(*b))) {
@@ -73,7 +76,13 @@ impl Cone {
             }
         }
         out.sort_by(|a, b| b.0.total_cmp(&a.0));
-        out.into_iter().map(|(_, d)| d).collect()
+        let mut first: Vec<(f64, DVec3)> = (more.iter().flat_map(|&d| [d, -d]))
+            .map(|d| (self.opening(d), d))
+            .filter(|(opening, _)| *opening > -RESISTS)
+            .collect();
+        first.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let others = (out.into_iter()).filter(|(_, d)| first.iter().all(|(_, e)| e.distance(*d) > 0.02));
+        (first.iter().copied().chain(others)).map(|(_, d)| d).collect()
     }
 }
 

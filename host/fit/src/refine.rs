@@ -10,33 +10,38 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use nalgebra::{Matrix6, SMatrix, SVector, SymmetricEigen, Vector6};
 
-use crate::gaps::{Gap, Item, Pair};
+use crate::gaps::{By, Gap, Item, Pair};
 
 /// Work of a refinement.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Effort {
+struct Effort {
     /// Gauss–Newton steps at most.
     steps: usize,
     /// Items at most, of one in so many samples.
     items: usize,
     stride: usize,
+    by: By,
 }
 
 impl Effort {
     /// To the bottom.
-    pub const FULL: Self = Self {
-        steps: 14,
-        items: 500,
+    const FULL: Self = Self {
+        steps: 12,
+        items: 240,
         stride: 1,
+        by: By::Exact,
     };
-    /// Near enough to be rated.
-    pub const ROUGH: Self = Self {
-        steps: 7,
-        items: 120,
-        stride: 5,
+    /// Within the error of the tessellation.
+    const ROUGH: Self = Self {
+        steps: 12,
+        items: 300,
+        stride: 2,
+        by: By::Facets,
     };
 }
 
+/// Items at least.
+const LEAST_ITEMS: usize = 12;
 /// Share of the largest eigenvalue below which a motion is free.
 const FREE: f64 = 1e-5;
 /// Scale of deviations at least, mm: a few rounding errors of free-form faces.
@@ -54,40 +59,33 @@ pub(crate) struct Refined {
     pub deviation: f64,
     /// Motions that the mating faces leave free, unit twists (ω·L, v) at `center`.
     pub free: Vec<Vector6<f64>>,
+    /// The twist that opens all mating gaps as evenly as one can, if any opens them.
+    pub opening: Option<Vector6<f64>>,
     /// Point about which twists are taken, and their length L, mm.
     pub center: DVec3,
     pub length: f64,
 }
 
-/// Refines `pose`; items are taken within `reach` mm. `None` where too few faces face each other.
-pub(crate) fn refine(pair: &Pair<'_>, pose: DAffine3, reach: f64, effort: &Effort) -> Option<Refined> {
-    let mut state = Refinement {
-        pair,
-        pose,
-        items: Vec::new(),
-        common: 0.0,
-        scale: reach,
-        seats: Vec::new(),
-        fixed_common: false,
-        effort: *effort,
-    };
-    state.take(reach)?;
-    for step in 0..effort.steps {
-        if step == 2 || step == 5 {
-            state.take(reach.min(state.common.abs() + (6.0 * state.scale).max(0.2 * reach)))?;
-        }
-        let moved = state.step(step >= 5)?;
-        if step > 7 && moved < 1e-7 {
-            break;
-        }
-    }
-    state.finish()
+/// Refines `pose` on the exact surfaces; items are taken within `reach` mm. `None` where too few faces face each other.
+pub(crate) fn refine(pair: &Pair<'_>, pose: DAffine3, reach: f64) -> Option<Refined> {
+    let rough = Refinement::new(pair, pose, reach, &Effort::ROUGH).run(reach)?;
+    let error = pair.moving.facets.error_mm().max(pair.fixed.facets.error_mm());
+    let near = rough.common.abs() + 6.0 * rough.scale + 2.0 * error;
+    let mut full = Refinement::new(pair, rough.pose, near.min(reach), &Effort::FULL);
+    full.common = rough.common;
+    full.run(6.0 * rough.scale + 2.0 * error)?.finish()
+}
+
+/// The pose refined on the tessellations alone, within their error.
+pub(crate) fn refine_roughly(pair: &Pair<'_>, pose: DAffine3, reach: f64) -> Option<DAffine3> {
+    (Refinement::new(pair, pose, reach, &Effort::ROUGH).run(reach)).map(|state| state.pose)
 }
 
 struct Refinement<'a> {
     pair: &'a Pair<'a>,
     pose: DAffine3,
     items: Vec<Item>,
+    reach: f64,
     common: f64,
     scale: f64,
     /// Face pairs that are seats.
@@ -96,17 +94,50 @@ struct Refinement<'a> {
     effort: Effort,
 }
 
-impl Refinement<'_> {
-    fn take(&mut self, reach: f64) -> Option<()> {
-        let all = self.pair.items(&self.pose, reach, self.effort.stride);
+impl<'a> Refinement<'a> {
+    fn new(pair: &'a Pair<'a>, pose: DAffine3, reach: f64, effort: &Effort) -> Self {
+        Self {
+            pair,
+            pose,
+            items: Vec::new(),
+            reach,
+            common: 0.0,
+            scale: reach,
+            seats: Vec::new(),
+            fixed_common: false,
+            effort: *effort,
+        }
+    }
+
+    /// Steps until nothing moves; deviations of `widest` mm count in full at first, and half of that after each step (graduated non-convexity,
+    /// Blake & Zisserman 1987): a few faces that agree must not win before the others are heard.
+    fn run(mut self, mut widest: f64) -> Option<Self> {
+        self.take()?;
+        for step in 0..self.effort.steps {
+            if step == self.effort.steps / 3 {
+                self.take()?;
+            }
+            let moved = self.step(step > 1, widest)?;
+            widest /= 2.0;
+            if moved < 1e-7 && widest < SCALE_MM {
+                break;
+            }
+        }
+        Some(self)
+    }
+
+    fn take(&mut self) -> Option<()> {
+        let all = self
+            .pair
+            .items(&self.pose, self.reach, self.effort.stride, self.effort.by);
         let stride = all.len().div_ceil(self.effort.items).max(1);
         self.items = all.into_iter().step_by(stride).collect();
-        (self.items.len() >= 12).then_some(())
+        (self.items.len() >= LEAST_ITEMS).then_some(())
     }
 
     fn gaps(&self) -> Vec<Gap> {
         (self.items.iter())
-            .filter_map(|item| self.pair.gap(&self.pose, item))
+            .filter_map(|item| self.pair.gap(&self.pose, item, 2.0 * self.reach, self.effort.by))
             .collect()
     }
 
@@ -119,9 +150,9 @@ impl Refinement<'_> {
     }
 
     /// One Gauss–Newton step; the largest displacement of a mating point, mm.
-    fn step(&mut self, seated: bool) -> Option<f64> {
+    fn step(&mut self, seated: bool, widest: f64) -> Option<f64> {
         let gaps = self.gaps();
-        if gaps.len() < 12 {
+        if gaps.len() < LEAST_ITEMS {
             return None;
         }
         if !self.fixed_common {
@@ -133,7 +164,7 @@ impl Refinement<'_> {
             .collect();
         self.scale = (1.5 * weighted_median(deviations.iter().copied())?)
             .max(SCALE_MM)
-            .min(self.scale.max(SCALE_MM));
+            .max(widest);
         if seated {
             self.seats = seats(&gaps, self.common, 6.0 * self.scale);
         }
@@ -169,7 +200,7 @@ impl Refinement<'_> {
                     // A motion has the same effect as the common gap: the faces touch.
                     self.fixed_common = true;
                     self.common = 0.0;
-                    return self.step(seated);
+                    return self.step(seated, widest);
                 }
                 continue;
             }
@@ -182,31 +213,41 @@ impl Refinement<'_> {
         Some(moved)
     }
 
-    fn finish(mut self) -> Option<Refined> {
+    fn finish(self) -> Option<Refined> {
         let mut mating = Vec::new();
         let wide = (8.0 * self.scale).max(1e-3);
-        for item in self.pair.items(&self.pose, self.common.abs() + wide.max(0.01), self.effort.stride) {
-            if let Some(gap) = self.pair.gap(&self.pose, &item)
+        let within = self.common.abs() + wide;
+        for item in self.pair.items(&self.pose, within, 1, By::Exact) {
+            if let Some(gap) = self.pair.gap(&self.pose, &item, within, By::Exact)
                 && (gap.gap - self.target(&gap)).abs() < wide
             {
                 mating.push(gap);
             }
         }
-        if mating.len() < 12 {
+        if mating.len() < LEAST_ITEMS {
             return None;
         }
-        self.items.clear();
         let frame = Frame::of(&mating);
         let (mut area, mut square) = (0.0, 0.0);
         let mut normal = Matrix6::<f64>::zeros();
+        let mut opened = Vector6::zeros();
         for gap in &mating {
             let row = frame.row(gap);
+            opened += gap.area * row;
             normal += gap.area * row * row.transpose();
             area += gap.area;
             square += gap.area * (gap.gap - self.target(gap)).powi(2);
         }
         let eigen = SymmetricEigen::new(normal);
         let largest = eigen.eigenvalues.max();
+        let mut opening = Vector6::zeros();
+        for k in (0..6).filter(|&k| eigen.eigenvalues[k] >= FREE * largest) {
+            let vector = eigen.eigenvectors.column(k);
+            opening += vector * (vector.dot(&opened) / eigen.eigenvalues[k]);
+        }
+        let least = (mating.iter())
+            .map(|gap| frame.row(gap).dot(&opening))
+            .fold(f64::INFINITY, f64::min);
         let free = (0..6)
             .filter(|&k| eigen.eigenvalues[k] < FREE * largest)
             .map(|k| eigen.eigenvectors.column(k).into_owned())
@@ -217,6 +258,7 @@ impl Refinement<'_> {
             deviation: (square / area).sqrt(),
             mating,
             free,
+            opening: (least > 0.05).then_some(opening),
             center: frame.center,
             length: frame.length,
         })
@@ -280,7 +322,7 @@ fn seats(gaps: &[Gap], common: f64, band: f64) -> Vec<[u32; 2]> {
                 let along = g.away.dot(u);
                 along > 1.0 - PARALLEL || along.abs() < PARALLEL || (g.gap - common).abs() > band.max(0.05)
             });
-            alone && guides(u).count() >= 12
+            alone && guides(u).count() >= LEAST_ITEMS
         })
         .map(|(faces, ..)| *faces)
         .collect()

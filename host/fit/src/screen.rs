@@ -1,7 +1,7 @@
 //! Quick rating of candidate poses: how much of one solid's surface then lies against the other, and whether they overlap deeply.
 //!
 //! Some hundred samples of the solid with the smaller surface, each face with at least its share by the square root of its area, so that a small key or
-//! boss counts. Cost: at most one exact distance a sample; a pose with a deep overlap ends after some.
+//! boss counts. Cost: at most one distance to the facets a sample; a pose with a deep overlap ends after some.
 
 use glam::DAffine3;
 
@@ -67,7 +67,7 @@ impl Screen {
             if other.box_distance(p) > gap + window {
                 continue;
             }
-            let Some(near) = other.exact.nearest(p) else {
+            let Some(near) = other.facets.hit(p, f64::MAX) else {
                 continue;
             };
             if near.distance < -window {
@@ -76,14 +76,10 @@ impl Screen {
                     return 0.0;
                 }
             }
-            if near.distance < gap + window && near.distance > -window {
-                let n = to.transform_vector3(sample.n);
-                // The foot lies ahead of the surface, or the other surface's normal is against its own.
-                let facing = other.hit(p).is_some_and(|hit| hit.normal.dot(n) < -0.85);
-                if facing {
-                    let off = (near.distance - gap).abs().min(near.distance.abs()) / window;
-                    against += sample.area * (1.0 - 0.5 * off.min(1.0));
-                }
+            let n = to.transform_vector3(sample.n);
+            if near.distance < gap + window && near.distance > -window && near.normal.dot(n) < -0.85 {
+                let off = (near.distance - gap).abs().min(near.distance.abs()) / window;
+                against += sample.area * (1.0 - 0.5 * off.min(1.0));
             }
         }
         (against - 2.0 * inside).max(0.0) / self.total

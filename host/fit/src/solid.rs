@@ -10,6 +10,8 @@ use mortise_bake::ExactSurface;
 use mortise_brep::{Shape, Surface};
 use mortise_mating::{Side, Tolerances, merge};
 
+use crate::facets::Facets;
+
 /// Samples of a face at least, where it has triangles.
 const LEAST_PER_FACE: usize = 8;
 /// Distance below which the direction to the foot is rounding, mm.
@@ -59,6 +61,7 @@ pub(crate) struct Wall {
 /// A solid prepared for the search.
 pub(crate) struct Solid {
     pub exact: ExactSurface,
+    pub facets: Facets,
     pub samples: Vec<Sample>,
     pub walls: Vec<Wall>,
     /// Points along the edges, mm.
@@ -80,7 +83,9 @@ impl Solid {
             low = low.min(v);
             high = high.max(v);
         }
+        let error = shape.deflection_mm.max(exact.chord_error_mm()) + exact.surface_error_mm();
         let mut solid = Self {
+            facets: Facets::new(exact.shape(), error),
             exact,
             samples: Vec::new(),
             walls: walls(shape),
