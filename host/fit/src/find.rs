@@ -12,7 +12,7 @@ use crate::frames;
 use crate::gaps::{Gap, Pair};
 use crate::mobility::Cone;
 use crate::path::{Path, PathKind, way_in};
-use crate::refine::{Refined, refine, refine_roughly};
+use crate::refine::{Frame, Refined, refine, refine_roughly};
 use crate::rotations::rotations;
 use crate::screen::Screen;
 use crate::solid::Solid;
@@ -33,6 +33,9 @@ const LEAST_SCORE: f64 = 0.35;
 /// Fits from which symmetries are taken, and rounds of that.
 const MOST_ALIKE: usize = 7;
 const SYMMETRY_ROUNDS: usize = 2;
+
+/// Motion along the normals of the mating faces below which two fits are one, mm, beside a tenth of their clearance.
+const SAME_MM: f64 = 5e-3;
 
 /// What is a fit, and how much is returned.
 #[derive(Clone, Copy, Debug)]
@@ -448,11 +451,11 @@ fn area(mating: &[Gap]) -> f64 {
 
 /// Whether the worse of two fits is the better one moved along what its faces leave free.
 fn same(better: &Found, worse: &Found) -> bool {
-    const SAME_MM: f64 = 0.02;
-    follows(better.refined.pose, &worse.refined, SAME_MM)
+    let near = SAME_MM + 0.1 * worse.refined.common.abs();
+    follows(better.refined.pose, &worse.refined, near)
 }
 
-/// Whether `pose` is reached from a refined pose by what its faces leave free, within `near` mm.
+/// Whether `pose` is a refined pose moved along what its faces leave free: the root mean square motion along their normals is below `near` mm.
 fn follows(pose: DAffine3, refined: &Refined, near: f64) -> bool {
     let step = pose * refined.pose.inverse();
     // The motion between them as a twist about the refined one's centre.
@@ -461,12 +464,13 @@ fn follows(pose: DAffine3, refined: &Refined, near: f64) -> bool {
     let turn = angle * axis;
     let shift = shift_of(step.transform_point3(refined.center) - refined.center, turn);
     let [u, v] = [turn * refined.length, shift];
-    let mut twist = Vector6::new(u.x, u.y, u.z, v.x, v.y, v.z);
-    for free in &refined.free {
-        let along = twist.dot(free);
-        twist -= along * free;
-    }
-    twist.norm() < near
+    let twist = Vector6::new(u.x, u.y, u.z, v.x, v.y, v.z);
+    let frame = Frame {
+        center: refined.center,
+        length: refined.length,
+    };
+    let square = (refined.mating.iter()).map(|gap| frame.row(gap).dot(&twist).powi(2));
+    (square.sum::<f64>() / refined.mating.len() as f64).sqrt() < near
 }
 
 /// Linear part of the twist whose exponential moves the centre by `moved` while it turns by `turn`: V(turn)⁻¹·moved (Murray, Li & Sastry 1994, A.12).

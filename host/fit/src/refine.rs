@@ -3,7 +3,8 @@
 //! Minimises Σ wᵢ·(gᵢ − c)² over the pose and the common gap c, where gᵢ is the exact gap at sample i (point to plane, Chen & Medioni 1992, from both
 //! sides) and the weights are areas times Tukey's biweight, whose scale falls with the median deviation. Gauss–Newton steps are solved by the
 //! eigenvectors of the normal matrix: motions that no face resists stay as they are. Where c cannot be distinguished from a motion (a cone, a plane
-//! alone), it is 0. A face that resists in a direction that all others are parallel to, and against which none pushes back, is a seat: it touches.
+//! alone), it is 0. A plane that resists in a direction to which
+//! the others are parallel, and against which none pushes back, is a seat: of several the first touches, and the others take no part.
 //!
 //! Cost: some 10 steps of some hundred exact distances each.
 
@@ -88,8 +89,7 @@ struct Refinement<'a> {
     reach: f64,
     common: f64,
     scale: f64,
-    /// Face pairs that are seats.
-    seats: Vec<[u32; 2]>,
+    seats: Seats,
     fixed_common: bool,
     effort: Effort,
 }
@@ -103,7 +103,7 @@ impl<'a> Refinement<'a> {
             reach,
             common: 0.0,
             scale: reach,
-            seats: Vec::new(),
+            seats: Seats::default(),
             fixed_common: false,
             effort: *effort,
         }
@@ -117,7 +117,7 @@ impl<'a> Refinement<'a> {
             if step == self.effort.steps / 3 {
                 self.take()?;
             }
-            let moved = self.step(step > 1, widest)?;
+            let moved = self.step(widest)?;
             widest /= 2.0;
             if moved < 1e-7 && widest < SCALE_MM {
                 break;
@@ -142,7 +142,7 @@ impl<'a> Refinement<'a> {
     }
 
     fn target(&self, gap: &Gap) -> f64 {
-        if self.seats.contains(&gap.faces) {
+        if self.seats.touching.contains(&gap.faces) {
             0.0
         } else {
             self.common
@@ -150,14 +150,16 @@ impl<'a> Refinement<'a> {
     }
 
     /// One Gauss–Newton step; the largest displacement of a mating point, mm.
-    fn step(&mut self, seated: bool, widest: f64) -> Option<f64> {
-        let gaps = self.gaps();
+    fn step(&mut self, widest: f64) -> Option<f64> {
+        let mut gaps = self.gaps();
+        self.seats = Seats::of(&gaps, (0.1 * widest).max(2e-3));
+        gaps.retain(|gap| !self.seats.idle.contains(&gap.faces));
         if gaps.len() < LEAST_ITEMS {
             return None;
         }
         if !self.fixed_common {
-            self.common = weighted_median(gaps.iter().filter(|g| !self.seats.contains(&g.faces)).map(|g| (g.gap, g.area)))
-                .unwrap_or(0.0);
+            let loose = gaps.iter().filter(|g| !self.seats.touching.contains(&g.faces));
+            self.common = weighted_median(loose.map(|g| (g.gap, g.area))).unwrap_or(0.0);
         }
         let deviations: Vec<(f64, f64)> = (gaps.iter())
             .map(|g| ((g.gap - self.target(g)).abs(), g.area))
@@ -165,15 +167,12 @@ impl<'a> Refinement<'a> {
         self.scale = (1.5 * weighted_median(deviations.iter().copied())?)
             .max(SCALE_MM)
             .max(widest);
-        if seated {
-            self.seats = seats(&gaps, self.common, 6.0 * self.scale);
-        }
         let frame = Frame::of(&gaps);
         let mut normal = SMatrix::<f64, 7, 7>::zeros();
         let mut right = SVector::<f64, 7>::zeros();
         for gap in &gaps {
             let deviation = gap.gap - self.target(gap);
-            let seat = self.seats.contains(&gap.faces);
+            let seat = self.seats.touching.contains(&gap.faces);
             let weight = gap.area
                 * if seat {
                     1.0
@@ -200,7 +199,7 @@ impl<'a> Refinement<'a> {
                     // A motion has the same effect as the common gap: the faces touch.
                     self.fixed_common = true;
                     self.common = 0.0;
-                    return self.step(seated, widest);
+                    return self.step(widest);
                 }
                 continue;
             }
@@ -220,6 +219,7 @@ impl<'a> Refinement<'a> {
         for item in self.pair.items(&self.pose, within, 1, By::Exact) {
             if let Some(gap) = self.pair.gap(&self.pose, &item, within, By::Exact)
                 && (gap.gap - self.target(&gap)).abs() < wide
+                && !self.seats.idle.contains(&gap.faces)
             {
                 mating.push(gap);
             }
@@ -273,7 +273,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    fn of(gaps: &[Gap]) -> Self {
+    pub fn of(gaps: &[Gap]) -> Self {
         let center = gaps.iter().map(|g| g.at).sum::<DVec3>() / gaps.len() as f64;
         let square = gaps.iter().map(|g| g.at.distance_squared(center)).sum::<f64>() / gaps.len() as f64;
         Self {
@@ -283,7 +283,7 @@ impl Frame {
     }
 
     /// Rate of a gap with the twist (ω·L, v).
-    fn row(&self, gap: &Gap) -> Vector6<f64> {
+    pub fn row(&self, gap: &Gap) -> Vector6<f64> {
         let turn = (gap.at - self.center).cross(gap.away) / self.length;
         Vector6::new(turn.x, turn.y, turn.z, gap.away.x, gap.away.y, gap.away.z)
     }
@@ -297,35 +297,88 @@ impl Frame {
     }
 }
 
-/// Face pairs that resist alone along a direction to which all other mating faces are parallel.
-fn seats(gaps: &[Gap], common: f64, band: f64) -> Vec<[u32; 2]> {
-    const PARALLEL: f64 = 0.02;
-    let mut pairs: Vec<([u32; 2], DVec3, f64)> = Vec::new();
-    for gap in gaps {
-        match pairs.iter_mut().find(|(faces, ..)| *faces == gap.faces) {
-            Some((_, sum, area)) => {
-                *sum += gap.area * gap.away;
-                *area += gap.area;
+/// Pairs of plane faces that resist alone along a direction to which the others are parallel: those that touch first, and those that do not touch.
+#[derive(Clone, Debug, Default)]
+struct Seats {
+    touching: Vec<[u32; 2]>,
+    idle: Vec<[u32; 2]>,
+}
+
+impl Seats {
+    /// The seats among `gaps`; gaps within `band` mm of each other touch together.
+    fn of(gaps: &[Gap], band: f64) -> Self {
+        const PARALLEL: f64 = 0.02;
+        // Shares of the area that may be inclined, may push back, and must guide.
+        const INCLINED: f64 = 0.15;
+        const BACK: f64 = 0.02;
+        const GUIDES: f64 = 0.1;
+        let mut pairs: Vec<PairSum> = Vec::new();
+        for gap in gaps {
+            let index = match pairs.iter().position(|pair| pair.faces == gap.faces) {
+                Some(index) => index,
+                None => {
+                    pairs.push(PairSum::new(gap.faces));
+                    pairs.len() - 1
+                }
+            };
+            pairs[index].add(gap);
+        }
+        let total: f64 = gaps.iter().map(|g| g.area).sum();
+        let mut flat: Vec<(DVec3, f64, [u32; 2])> = (pairs.iter())
+            .filter(|pair| pair.normal.length() > 0.9999 * pair.area)
+            .map(|pair| (pair.normal / pair.normal.length(), pair.gap / pair.area, pair.faces))
+            .filter(|(u, ..)| {
+                let share = |counts: &dyn Fn(f64) -> bool| -> f64 {
+                    (pairs.iter())
+                        .filter(|pair| counts(pair.normal.dot(*u) / pair.area))
+                        .map(|pair| pair.area / total)
+                        .sum()
+                };
+                share(&|along| along < PARALLEL - 1.0) < BACK
+                    && share(&|along| along.abs() < 1.0 - PARALLEL && along.abs() > PARALLEL) < INCLINED
+                    && share(&|along| along.abs() < PARALLEL) > GUIDES
+            })
+            .collect();
+        flat.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut out = Self::default();
+        for &(u, gap, faces) in &flat {
+            let first = (flat.iter())
+                .filter(|(v, ..)| v.dot(u) > 1.0 - PARALLEL)
+                .map(|(_, gap, _)| *gap)
+                .fold(f64::INFINITY, f64::min);
+            if gap < first + band {
+                out.touching.push(faces);
+            } else {
+                out.idle.push(faces);
             }
-            None => pairs.push((gap.faces, gap.area * gap.away, gap.area)),
+        }
+        out
+    }
+}
+
+/// Sums over the gaps of a pair of faces, weighted by area.
+struct PairSum {
+    faces: [u32; 2],
+    normal: DVec3,
+    gap: f64,
+    area: f64,
+}
+
+impl PairSum {
+    fn new(faces: [u32; 2]) -> Self {
+        Self {
+            faces,
+            normal: DVec3::ZERO,
+            gap: 0.0,
+            area: 0.0,
         }
     }
-    let guides = |u: DVec3| {
-        (gaps.iter()).filter(move |g| (g.gap - common).abs() < band && g.away.dot(u).abs() < PARALLEL)
-    };
-    (pairs.iter())
-        .filter(|(_, sum, area)| sum.length() > 0.9999 * area)
-        .filter(|(_, sum, _)| {
-            let u = sum.normalize();
-            // Nothing pushes back, and nothing that is inclined takes part.
-            let alone = gaps.iter().all(|g| {
-                let along = g.away.dot(u);
-                along > 1.0 - PARALLEL || along.abs() < PARALLEL || (g.gap - common).abs() > band.max(0.05)
-            });
-            alone && guides(u).count() >= LEAST_ITEMS
-        })
-        .map(|(faces, ..)| *faces)
-        .collect()
+
+    fn add(&mut self, gap: &Gap) {
+        self.normal += gap.area * gap.away;
+        self.gap += gap.area * gap.gap;
+        self.area += gap.area;
+    }
 }
 
 fn biweight(x: f64) -> f64 {
