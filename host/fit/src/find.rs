@@ -135,7 +135,7 @@ pub fn find(model: &CadModel, moving: usize, against: usize, options: &FitOption
     };
     let search = Search {
         pair: &pair,
-        window: (0.01 * first.size().min(second.size())).clamp(0.1, 1.0),
+        window: (0.006 * first.size().min(second.size())).clamp(0.1, 0.6),
         options,
     };
     let placed = placed(model, moving, against);
@@ -268,7 +268,7 @@ impl Search<'_> {
             .map(|(rank, found)| {
                 let mut fit = report(found);
                 if rank < self.options.most_paths {
-                    let (min, overlap) = (found.clearance.min_mm, self.options.overlap_mm);
+                    let (min, overlap) = (found.clearance.min_mm, self.overlap_mm());
                     fit.path = way_in(self.pair, &found.refined, min, overlap, &ways);
                 }
                 if let Some(path) = &fit.path
@@ -354,11 +354,17 @@ impl Search<'_> {
             .fold(0.0, f64::max)
     }
 
+    /// Overlap that is tolerated, mm: as asked, and the error of distances.
+    fn overlap_mm(&self) -> f64 {
+        let error = |solid: &Solid| solid.exact.surface_error_mm();
+        self.options.overlap_mm + error(self.pair.moving) + error(self.pair.fixed)
+    }
+
     /// Refines a pose and decides whether it is a fit.
     fn fit(&self, pose: DAffine3, reach: f64) -> Option<Found> {
         let refined = refine(self.pair, pose, reach)?;
         let refined = self.centred(refined);
-        let enough = -self.options.overlap_mm;
+        let enough = -self.overlap_mm();
         let min = self.pair.least(&refined.pose, 3, 100, enough);
         if min < enough || Cone::new(&refined.mating).share() > MOST_FREE {
             return None;

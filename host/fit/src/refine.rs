@@ -9,9 +9,11 @@
 //! Cost: some 10 steps of some hundred exact distances each.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
+use mortise_brep::Surface;
 use nalgebra::{Matrix6, SMatrix, SVector, SymmetricEigen, Vector6};
 
 use crate::gaps::{By, Gap, Item, Pair};
+use crate::solid::Solid;
 
 /// Work of a refinement.
 #[derive(Clone, Copy, Debug)]
@@ -22,15 +24,18 @@ struct Effort {
     items: usize,
     stride: usize,
     by: By,
+    /// Factor by which the deviations that count in full shrink from step to step.
+    narrowing: f64,
 }
 
 impl Effort {
     /// To the bottom.
     const FULL: Self = Self {
-        steps: 12,
+        steps: 16,
         items: 240,
         stride: 1,
         by: By::Exact,
+        narrowing: 3.0,
     };
     /// Within the error of the tessellation.
     const ROUGH: Self = Self {
@@ -38,6 +43,7 @@ impl Effort {
         items: 300,
         stride: 2,
         by: By::Facets,
+        narrowing: 2.0,
     };
 }
 
@@ -45,8 +51,10 @@ impl Effort {
 const LEAST_ITEMS: usize = 12;
 /// Share of the largest eigenvalue below which a motion is free.
 const FREE: f64 = 1e-5;
+/// Share below which the common gap and a motion have the same effect on the gaps.
+const SAME_EFFECT: f64 = 1e-4;
 /// Scale of deviations at least, mm: a few rounding errors of free-form faces.
-const SCALE_MM: f64 = 5e-5;
+const SCALE_MM: f64 = 1e-5;
 
 /// A refined pose.
 #[derive(Clone, Debug)]
@@ -70,7 +78,7 @@ pub(crate) struct Refined {
 /// Refines `pose` on the exact surfaces; items are taken within `reach` mm. `None` where too few faces face each other.
 pub(crate) fn refine(pair: &Pair<'_>, pose: DAffine3, reach: f64) -> Option<Refined> {
     let rough = Refinement::new(pair, pose, reach, &Effort::ROUGH).run(reach)?;
-    let error = pair.moving.facets.error_mm().max(pair.fixed.facets.error_mm());
+    let error = facets_error(pair);
     let near = rough.common.abs() + 6.0 * rough.scale + 2.0 * error;
     let mut full = Refinement::new(pair, rough.pose, near.min(reach), &Effort::FULL);
     full.common = rough.common;
@@ -80,6 +88,10 @@ pub(crate) fn refine(pair: &Pair<'_>, pose: DAffine3, reach: f64) -> Option<Refi
 /// The pose refined on the tessellations alone, within their error.
 pub(crate) fn refine_roughly(pair: &Pair<'_>, pose: DAffine3, reach: f64) -> Option<DAffine3> {
     (Refinement::new(pair, pose, reach, &Effort::ROUGH).run(reach)).map(|state| state.pose)
+}
+
+fn facets_error(pair: &Pair<'_>) -> f64 {
+    pair.moving.facets.error_mm().max(pair.fixed.facets.error_mm())
 }
 
 struct Refinement<'a> {
@@ -109,7 +121,7 @@ impl<'a> Refinement<'a> {
         }
     }
 
-    /// Steps until nothing moves; deviations of `widest` mm count in full at first, and half of that after each step (graduated non-convexity,
+    /// Steps until nothing moves; deviations of `widest` mm count in full at first, and a share of that after each step (graduated non-convexity,
     /// Blake & Zisserman 1987): a few faces that agree must not win before the others are heard.
     fn run(mut self, mut widest: f64) -> Option<Self> {
         self.take()?;
@@ -118,8 +130,8 @@ impl<'a> Refinement<'a> {
                 self.take()?;
             }
             let moved = self.step(widest)?;
-            widest /= 2.0;
-            if moved < 1e-7 && widest < SCALE_MM {
+            widest /= self.effort.narrowing;
+            if moved < 1e-8 && widest < self.finest() {
                 break;
             }
         }
@@ -141,6 +153,14 @@ impl<'a> Refinement<'a> {
             .collect()
     }
 
+    /// Smallest scale of deviations, mm: no smaller than the error of the distances.
+    fn finest(&self) -> f64 {
+        match self.effort.by {
+            By::Exact => SCALE_MM,
+            By::Facets => SCALE_MM.max(facets_error(self.pair)),
+        }
+    }
+
     fn target(&self, gap: &Gap) -> f64 {
         if self.seats.touching.contains(&gap.faces) {
             0.0
@@ -152,7 +172,7 @@ impl<'a> Refinement<'a> {
     /// One Gauss–Newton step; the largest displacement of a mating point, mm.
     fn step(&mut self, widest: f64) -> Option<f64> {
         let mut gaps = self.gaps();
-        self.seats = Seats::of(&gaps, (0.1 * widest).max(2e-3));
+        self.seats = Seats::of(self.pair, &gaps, (0.1 * widest).max(2e-3));
         gaps.retain(|gap| !self.seats.idle.contains(&gap.faces));
         if gaps.len() < LEAST_ITEMS {
             return None;
@@ -165,7 +185,7 @@ impl<'a> Refinement<'a> {
             .map(|g| ((g.gap - self.target(g)).abs(), g.area))
             .collect();
         self.scale = (1.5 * weighted_median(deviations.iter().copied())?)
-            .max(SCALE_MM)
+            .max(self.finest())
             .max(widest);
         let frame = Frame::of(&gaps);
         let mut normal = SMatrix::<f64, 7, 7>::zeros();
@@ -194,13 +214,14 @@ impl<'a> Refinement<'a> {
         let mut solution = SVector::<f64, 7>::zeros();
         for k in 0..7 {
             let vector = eigen.eigenvectors.column(k);
-            if eigen.eigenvalues[k] < FREE * largest {
-                if !self.fixed_common && vector[6].abs() > 0.1 {
-                    // A motion has the same effect as the common gap: the faces touch.
-                    self.fixed_common = true;
-                    self.common = 0.0;
-                    return self.step(widest);
-                }
+            let weak = eigen.eigenvalues[k] / largest;
+            if !self.fixed_common && weak < SAME_EFFECT && vector[6].abs() > 1e-3 {
+                // A motion has the same effect as the common gap: the faces touch.
+                self.fixed_common = true;
+                self.common = 0.0;
+                return self.step(widest);
+            }
+            if weak < FREE {
                 continue;
             }
             solution += vector * (vector.dot(&right) / eigen.eigenvalues[k]);
@@ -306,12 +327,12 @@ struct Seats {
 
 impl Seats {
     /// The seats among `gaps`; gaps within `band` mm of each other touch together.
-    fn of(gaps: &[Gap], band: f64) -> Self {
+    fn of(solids: &Pair<'_>, gaps: &[Gap], band: f64) -> Self {
         const PARALLEL: f64 = 0.02;
         // Shares of the area that may be inclined, may push back, and must guide.
         const INCLINED: f64 = 0.15;
         const BACK: f64 = 0.02;
-        const GUIDES: f64 = 0.1;
+        const GUIDES: f64 = 0.01;
         let mut pairs: Vec<PairSum> = Vec::new();
         for gap in gaps {
             let index = match pairs.iter().position(|pair| pair.faces == gap.faces) {
@@ -325,7 +346,7 @@ impl Seats {
         }
         let total: f64 = gaps.iter().map(|g| g.area).sum();
         let mut flat: Vec<(DVec3, f64, [u32; 2])> = (pairs.iter())
-            .filter(|pair| pair.normal.length() > 0.9999 * pair.area)
+            .filter(|pair| pair.is_plane(solids) && pair.normal.length() > 0.9999 * pair.area)
             .map(|pair| (pair.normal / pair.normal.length(), pair.gap / pair.area, pair.faces))
             .filter(|(u, ..)| {
                 let share = |counts: &dyn Fn(f64) -> bool| -> f64 {
@@ -372,6 +393,13 @@ impl PairSum {
             gap: 0.0,
             area: 0.0,
         }
+    }
+
+    fn is_plane(&self, solids: &Pair<'_>) -> bool {
+        let plane = |solid: &Solid, face: u32| {
+            matches!(solid.exact.shape().faces[face as usize].surface, Surface::Plane { .. })
+        };
+        plane(solids.moving, self.faces[0]) && plane(solids.fixed, self.faces[1])
     }
 
     fn add(&mut self, gap: &Gap) {

@@ -89,12 +89,16 @@ impl Solid {
             exact,
             samples: Vec::new(),
             walls: walls(shape),
-            edge_points: edge_points(shape, count / 2),
+            edge_points: Vec::new(),
             low,
             high,
             area: shape.faces.iter().map(|face| face.area_mm2).sum(),
         };
         solid.samples = solid.sampled(count);
+        // Points of free-form edges are off by the tessellation's error: their feet are not.
+        solid.edge_points = (edge_points(shape, count / 2).into_iter())
+            .filter_map(|p| solid.exact.nearest(p).map(|near| near.point))
+            .collect();
         solid
     }
 

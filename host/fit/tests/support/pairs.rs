@@ -443,12 +443,13 @@ fn equal_holes(r: &mut Rng) -> Designed {
     out
 }
 
-/// Bulged, twisted and tapered sides of Bézier patches, through a plate: without clearance, or with one along the radius, which is not the same along
-/// every normal, so that the evenest pose is a little beside the designed one.
+/// Bulged sides of Bézier patches, through a plate: twisted and tapered without clearance, or straight with one along the radius, which is not the same
+/// along every normal, so that the evenest pose is a little beside the designed one.
 fn lobed(r: &mut Rng) -> Designed {
     let sides = r.usize(3..7);
     let (radius, height, c) = (within(r, 8.0, 18.0), within(r, 15.0, 30.0), if r.bool() { clearance(r) } else { 0.0 });
-    let (twist, narrower) = (within(r, -0.3, 0.3), within(r, 0.03, 0.1));
+    let exact = if c == 0.0 { 1.0 } else { 0.0 };
+    let (twist, narrower) = (exact * within(r, -0.3, 0.3), exact * within(r, 0.03, 0.1));
     let chord = 2.0 * radius * (TAU / 2.0 / sides as f64).sin();
     let bulges: Vec<f64> = (0..sides).map(|_| chord * within(r, 0.05, 0.25)).collect();
     let corner = |k: usize, j: usize| {
