@@ -154,6 +154,20 @@ pub fn find(model: &CadModel, moving: usize, against: usize, options: &FitOption
     Ok(out)
 }
 
+/// Index of the part of `model` with this name.
+///
+/// # Errors
+/// [`FitError::NoSuchPart`].
+pub fn part_named(model: &CadModel, name: &str) -> Result<usize, FitError> {
+    (model.parts.iter().position(|part| part.name == name)).ok_or_else(|| {
+        let names: Vec<&str> = model.parts.iter().map(|part| part.name.as_str()).collect();
+        FitError::NoSuchPart {
+            part: name.to_owned(),
+            known: names.join(", "),
+        }
+    })
+}
+
 /// Poses that the assembly itself gives: its own, and those of parts with the same shapes.
 fn placed(model: &CadModel, moving: usize, against: usize) -> Vec<DAffine3> {
     let shapes = [moving, against].map(|part| model.parts[part].shape);

@@ -24,5 +24,5 @@ mod solid;
 mod translations;
 
 pub use error::FitError;
-pub use find::{Clearance, Fit, FitOptions, Fits, find};
+pub use find::{Clearance, Fit, FitOptions, Fits, find, part_named};
 pub use path::{Path, PathKind};

@@ -1,11 +1,12 @@
 //! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: the insertion was not completed; 2: not possible, with one line on standard error that
+//! Exit code 0: done; 1: the insertion was not completed, or nothing fits; 2: not possible, with one line on standard error that
 //! gives the reason.
 
 mod bake;
 mod contacts;
 mod demo;
+mod fit;
 mod inspect;
 mod lab;
 mod mistyped;
@@ -43,6 +44,8 @@ enum Command {
     Inspect(inspect::Args),
     /// Find which faces of which parts touch, and the kinds of contact
     Contacts(contacts::Args),
+    /// Find the poses at which two parts fit, and the way in
+    Fit(fit::Args),
     /// Convert a STEP file to a scene image (collision model) for the board
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
@@ -88,6 +91,7 @@ pub fn main() -> ExitCode {
             }
             Command::Inspect(args) => inspect::run(&args),
             Command::Contacts(args) => contacts::run(&args),
+            Command::Fit(args) => fit::run(&args),
             Command::Bake(args) => bake::run(&args),
             Command::Demo(args) => demo::run(args),
             Command::Lab(args) => lab::run(&args),

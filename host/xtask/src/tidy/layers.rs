@@ -76,6 +76,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("protocol", &[]),
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
     (
+        "host/fit",
+        &["mortise-bake", "mortise-brep", "mortise-mating"],
+    ),
+    (
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],
     ),
@@ -99,6 +103,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         &[
             "mortise-bake",
             "mortise-brep",
+            "mortise-fit",
             "mortise-guide",
             "mortise-mating",
             "mortise-output",
