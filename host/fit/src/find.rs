@@ -30,6 +30,8 @@ const MOST_FREE: f64 = 0.1;
 /// Share of the best score below which a fit is not reported.
 const LEAST_SCORE: f64 = 0.35;
 
+/// Weight of a seat's area in the score.
+const SEAT: f64 = 0.3;
 /// Fits from which symmetries are taken, and rounds of that.
 const MOST_ALIKE: usize = 7;
 const SYMMETRY_ROUNDS: usize = 2;
@@ -74,7 +76,7 @@ pub struct Clearance {
 pub struct Fit {
     /// Placement of the moving part in the assembly's frame; the other part stays where the file has it.
     pub placement: DAffine3,
-    /// Rank: mating area as a share of the smaller surface, less for loose fits and for motions that stay free.
+    /// Rank: mating area as a share of the smaller surface, less for seats, for loose fits and for motions that stay free.
     pub score: f64,
     /// Area of the mating faces, mm²: the larger of both parts' samples.
     pub area_mm2: f64,
@@ -145,7 +147,9 @@ pub fn find(model: &CadModel, moving: usize, against: usize, options: &FitOption
         if let Some(path) = &mut fit.path {
             let turn = b.placement.matrix3;
             path.direction = turn * path.direction;
-            path.corners_mm.iter_mut().for_each(|corner| *corner = turn * *corner);
+            path.corners_mm
+                .iter_mut()
+                .for_each(|corner| *corner = turn * *corner);
             if let Some((point, _)) = &mut path.screw {
                 *point = b.placement.transform_point3(*point);
             }
@@ -209,9 +213,13 @@ impl Search<'_> {
         rated += free_form.0;
         jobs.extend(free_form.1);
         let refined = jobs.len();
-        let mut kept = self.best((jobs.par_iter()).filter_map(|&(pose, reach)| self.fit(pose, reach)).collect());
+        let mut kept = self.best(
+            (jobs.par_iter())
+                .filter_map(|&(pose, reach)| self.fit(pose, reach))
+                .collect(),
+        );
         for _ in 0..SYMMETRY_ROUNDS {
-            let more = self.symmetric(&kept);
+            let more = self.symmetric(&screen, &kept);
             if more.is_empty() {
                 break;
             }
@@ -227,11 +235,7 @@ impl Search<'_> {
             }
         }
         let fits = self.reports(&kept);
-        Fits {
-            fits,
-            rated,
-            refined,
-        }
+        Fits { fits, rated, refined }
     }
 
     /// The distinct ones, the best first.
@@ -252,7 +256,7 @@ impl Search<'_> {
 
     /// Poses that follow from the symmetry of what was found: where Pᵢ and Pⱼ fit alike, Pᵢ⁻¹Pⱼ may be a symmetry of the moving part, so that PₖPᵢ⁻¹Pⱼ
     /// fits too.
-    fn symmetric(&self, kept: &[Found]) -> Vec<DAffine3> {
+    fn symmetric(&self, screen: &Screen, kept: &[Found]) -> Vec<DAffine3> {
         let best = kept.first().map_or(0.0, |found| found.score);
         let alike: Vec<&Found> = (kept.iter())
             .filter(|found| found.score > 0.9 * best)
@@ -264,9 +268,17 @@ impl Search<'_> {
                 let symmetry = p.refined.pose.inverse() * q.refined.pose;
                 for r in &alike {
                     let pose = r.refined.pose * symmetry;
-                    let known = kept.iter().any(|found| follows(pose, &found.refined, self.window / 4.0))
-                        || out.iter().any(|other| self.travel(other, &pose) < self.window / 4.0);
-                    if !known && out.len() < MOST_ALIKE * MOST_ALIKE {
+                    let known = kept
+                        .iter()
+                        .any(|found| follows(pose, &found.refined, self.window / 4.0))
+                        || out
+                            .iter()
+                            .any(|other| self.travel(other, &pose) < self.window / 4.0);
+                    let fits = |pose: &DAffine3| {
+                        let (gap, window) = (r.refined.common.abs(), self.window);
+                        screen.rate(self.pair, pose, gap, window) > LEAST_RATE
+                    };
+                    if !known && out.len() < MOST_ALIKE * MOST_ALIKE && fits(&pose) {
                         out.push(pose);
                     }
                 }
@@ -305,11 +317,13 @@ impl Search<'_> {
     ) -> (usize, Vec<(DAffine3, f64)>) {
         let rotations = rotations(self.pair.moving, self.pair.fixed, current.matrix3);
         let mut candidates: Vec<Candidate> = (rotations.par_iter())
-            .flat_map_iter(|&rotation| {
-                translations(self.pair.moving, self.pair.fixed, rotation, self.window)
-            })
+            .flat_map_iter(|&rotation| translations(self.pair.moving, self.pair.fixed, rotation, self.window))
             .collect();
-        candidates.extend(placed.iter().map(|&pose| Candidate { pose, gap: 0.0 , rating: f64::INFINITY }));
+        candidates.extend(placed.iter().map(|&pose| Candidate {
+            pose,
+            gap: 0.0,
+            rating: f64::INFINITY,
+        }));
         candidates.sort_by(|a, b| b.rating.total_cmp(&a.rating));
         let rated = self.rate(screen, &candidates, self.window, MOST_OF_WALLS);
         let reach = |candidate: &Candidate| candidate.gap + 1.5 * self.window;
@@ -388,6 +402,12 @@ impl Search<'_> {
             return None;
         }
         let area = area(&refined.mating);
+        let seated: Vec<Gap> = (refined.mating.iter())
+            .filter(|g| refined.seats.contains(&g.faces))
+            .copied()
+            .collect();
+        // Plane lies on plane anywhere: a seat says less of a fit than what holds from both sides.
+        let telling = area - (1.0 - SEAT) * self::area(&seated);
         let mut gaps: Vec<f64> = refined.mating.iter().map(|g| g.gap).collect();
         gaps.sort_by(f64::total_cmp);
         let (Some(&median), Some(&max)) = (gaps.get(gaps.len() / 2), gaps.last()) else {
@@ -399,7 +419,7 @@ impl Search<'_> {
         let uneven = refined.deviation / (0.2 * refined.common.abs() + 3e-3);
         let held = 1.0 - refined.free.len() as f64 / 6.0;
         Some(Found {
-            score: area / smaller * held / (1.0 + loose) / (1.0 + uneven * uneven),
+            score: telling / smaller * held / (1.0 + loose) / (1.0 + uneven * uneven),
             area,
             clearance: Clearance {
                 min_mm: min,

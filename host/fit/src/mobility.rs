@@ -63,7 +63,8 @@ impl Cone {
         for &d in &self.normals {
             add(d);
         }
-        if let Some(widest) = directions(LATTICE).max_by(|a, b| self.opening(*a).total_cmp(&self.opening(*b))) {
+        if let Some(widest) = directions(LATTICE).max_by(|a, b| self.opening(*a).total_cmp(&self.opening(*b)))
+        {
             add(widest);
         }
         let few = &self.normals[..self.normals.len().min(40)];
@@ -118,7 +119,13 @@ mod tests {
     #[test]
     fn a_bore_is_left_along_its_axis() {
         let gaps: Vec<Gap> = (0..36)
-            .map(|k| gap(DVec3::new((f64::from(k) / 5.7).cos(), (f64::from(k) / 5.7).sin(), 0.0)))
+            .map(|k| {
+                gap(DVec3::new(
+                    (f64::from(k) / 5.7).cos(),
+                    (f64::from(k) / 5.7).sin(),
+                    0.0,
+                ))
+            })
             .collect();
         let found = Cone::new(&gaps).candidates(&[DVec3::Z]);
         assert_eq!(found.len(), 2, "{found:?}");

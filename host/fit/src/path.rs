@@ -249,7 +249,8 @@ fn along_screw(
         // Mixed, so that a blocked way ends early.
         let share = ((k * 7919) % steps + 1) as f64 / steps as f64;
         let rotation = DMat3::from_quat(DQuat::from_axis_angle(axis, share * angle));
-        let moved = DAffine3::from_mat3_translation(rotation, point + share * length * out - rotation * point);
+        let moved =
+            DAffine3::from_mat3_translation(rotation, point + share * length * out - rotation * point);
         smallest = smallest.min(pair.least(&(moved * fit.pose), 2 * STRIDE, MEASURED, enough));
         if smallest < enough {
             return None;

@@ -62,6 +62,8 @@ pub(crate) struct Refined {
     pub pose: DAffine3,
     /// Common gap, mm.
     pub common: f64,
+    /// Pairs of faces that are seats.
+    pub seats: Vec<[u32; 2]>,
     /// Gaps of the mating faces, within a few deviations of the common gap, or seated.
     pub mating: Vec<Gap>,
     /// Root mean square deviation of those gaps from the common gap, mm.
@@ -228,7 +230,10 @@ impl<'a> Refinement<'a> {
         }
         let twist = Vector6::from_iterator(solution.iter().take(6).copied());
         self.common += if self.fixed_common { 0.0 } else { solution[6] };
-        let moved = gaps.iter().map(|g| frame.row(g).dot(&twist).abs()).fold(0.0, f64::max);
+        let moved = gaps
+            .iter()
+            .map(|g| frame.row(g).dot(&twist).abs())
+            .fold(0.0, f64::max);
         self.pose = frame.displaced(&twist) * self.pose;
         Some(moved)
     }
@@ -276,6 +281,7 @@ impl<'a> Refinement<'a> {
         Some(Refined {
             pose: self.pose,
             common: self.common,
+            seats: self.seats.touching.clone(),
             deviation: (square / area).sqrt(),
             mating,
             free,
@@ -347,7 +353,13 @@ impl Seats {
         let total: f64 = gaps.iter().map(|g| g.area).sum();
         let mut flat: Vec<(DVec3, f64, [u32; 2])> = (pairs.iter())
             .filter(|pair| pair.is_plane(solids) && pair.normal.length() > 0.9999 * pair.area)
-            .map(|pair| (pair.normal / pair.normal.length(), pair.gap / pair.area, pair.faces))
+            .map(|pair| {
+                (
+                    pair.normal / pair.normal.length(),
+                    pair.gap / pair.area,
+                    pair.faces,
+                )
+            })
             .filter(|(u, ..)| {
                 let share = |counts: &dyn Fn(f64) -> bool| -> f64 {
                     (pairs.iter())
@@ -397,7 +409,10 @@ impl PairSum {
 
     fn is_plane(&self, solids: &Pair<'_>) -> bool {
         let plane = |solid: &Solid, face: u32| {
-            matches!(solid.exact.shape().faces[face as usize].surface, Surface::Plane { .. })
+            matches!(
+                solid.exact.shape().faces[face as usize].surface,
+                Surface::Plane { .. }
+            )
         };
         plane(solids.moving, self.faces[0]) && plane(solids.fixed, self.faces[1])
     }

@@ -126,10 +126,7 @@ fn along_axes(moving: &Solid, fixed: &Solid, current: DMat3) -> Vec<DMat3> {
             out.push(turned);
             for &(_, f2, g2) in &pairs {
                 let across = |a: DVec3, b: DVec3, z: DVec3| (b - a).reject_from_normalized(z);
-                let (u, v) = (
-                    across(f.origin, f2.origin, f.z),
-                    across(g.origin, g2.origin, g.z),
-                );
+                let (u, v) = (across(f.origin, f2.origin, f.z), across(g.origin, g2.origin, g.z));
                 let parallel =
                     f.z.cross(f2.z).length() < PARALLEL_RAD && g.z.cross(g2.z).length() < PARALLEL_RAD;
                 if parallel && u.length() > 1.0 && (u.length() - v.length()).abs() < 0.25 {

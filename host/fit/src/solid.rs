@@ -119,9 +119,7 @@ impl Solid {
 
     /// Signed distance of `p`, mm; infinite without triangles.
     pub fn distance(&self, p: DVec3) -> f64 {
-        self.exact
-            .nearest(p)
-            .map_or(f64::INFINITY, |near| near.distance)
+        self.exact.nearest(p).map_or(f64::INFINITY, |near| near.distance)
     }
 
     /// Nearest point of the surface to `p`, with the outward normal there.

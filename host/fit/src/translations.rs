@@ -11,10 +11,10 @@ use mortise_brep::Surface;
 use crate::rotations::{PARALLEL_RAD, axis, shaft_in_bore};
 use crate::solid::{Solid, Wall};
 
-/// Directions of planes that are combined, clusters of each, and points returned for a rotation.
+/// Directions of planes that are combined, clusters of each, and points of each kind returned for a rotation.
 const MOST_GROUPS: usize = 10;
 const MOST_CLUSTERS: usize = 10;
-const MOST_POINTS: usize = 20;
+const MOST_POINTS: usize = 24;
 
 /// A candidate pose.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +56,8 @@ pub(crate) fn translations(moving: &Solid, fixed: &Solid, rotation: DMat3, windo
     let groups = groups(moving, fixed, rotation, window);
     let ties = ties(moving, fixed, rotation);
     let mut points: Vec<(DVec3, f64)> = Vec::new();
+    // Tied in two directions only: what else touches by chance would be rated higher.
+    let mut slides: Vec<(DVec3, f64)> = Vec::new();
     for tie in &ties {
         match tie.along {
             None => points.push((tie.at, tie.gap)),
@@ -94,37 +96,36 @@ pub(crate) fn translations(moving: &Solid, fixed: &Solid, rotation: DMat3, windo
                 }
             }
             let along = across.normalize();
-            // Nothing ties the third direction: the boxes' middles do.
-            if groups.iter().all(|group| group.m.dot(along).abs() < 0.1) || i == 0 {
-                let rows = DMat3::from_cols(a.m, b.m, along).transpose();
-                let inverse = rows.inverse();
-                let middle = along.dot(fixed.middle() - rotation * moving.middle());
-                for x in a.clusters.iter().take(MOST_CLUSTERS) {
-                    for y in b.clusters.iter().take(MOST_CLUSTERS) {
-                        points.push((inverse * DVec3::new(x.value, y.value, middle), 0.0));
-                    }
+            // The third direction may be a slide: the boxes' middles tie it.
+            let rows = DMat3::from_cols(a.m, b.m, along).transpose();
+            let inverse = rows.inverse();
+            let middle = along.dot(fixed.middle() - rotation * moving.middle());
+            for x in a.clusters.iter().take(MOST_CLUSTERS) {
+                for y in b.clusters.iter().take(MOST_CLUSTERS) {
+                    slides.push((inverse * DVec3::new(x.value, y.value, middle), 0.0));
                 }
             }
         }
     }
-    let mut rated: Vec<(f64, DVec3, f64)> = (points.into_iter())
-        .map(|(t, gap)| (rating(t, &groups, &ties, window), t, gap))
-        .collect();
-    rated.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<Candidate> = Vec::new();
-    for (rating, t, gap) in rated {
-        if kept.len() == MOST_POINTS {
-            break;
-        }
-        if kept
-            .iter()
-            .all(|known| known.pose.translation.distance(t) > 0.5 * window)
-        {
-            kept.push(Candidate {
-                pose: DAffine3::from_mat3_translation(rotation, t),
-                gap,
-                rating,
-            });
+    for points in [points, slides] {
+        let mut rated: Vec<(f64, DVec3, f64)> = (points.into_iter())
+            .map(|(t, gap)| (rating(t, &groups, &ties, window), t, gap))
+            .collect();
+        rated.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let most = kept.len() + MOST_POINTS;
+        for (rating, t, gap) in rated {
+            if kept.len() == most {
+                break;
+            }
+            let near = |known: &Candidate| known.pose.translation.distance(t) < 0.5 * window;
+            if !kept.iter().any(near) {
+                kept.push(Candidate {
+                    pose: DAffine3::from_mat3_translation(rotation, t),
+                    gap,
+                    rating,
+                });
+            }
         }
     }
     kept
@@ -177,7 +178,10 @@ fn groups(moving: &Solid, fixed: &Solid, rotation: DMat3, window: f64) -> Vec<Gr
             if n.dot(g.z) > 0.0 || n.cross(g.z).length() > 2.0 * PARALLEL_RAD {
                 continue;
             }
-            let index = match raw.iter().position(|(m, _)| m.cross(g.z).length() < 2.0 * PARALLEL_RAD) {
+            let index = match raw
+                .iter()
+                .position(|(m, _)| m.cross(g.z).length() < 2.0 * PARALLEL_RAD)
+            {
                 Some(index) => index,
                 None => {
                     raw.push((g.z, Vec::new()));
@@ -282,13 +286,8 @@ fn ties(moving: &Solid, fixed: &Solid, rotation: DMat3) -> Vec<Tie> {
                     } else {
                         r - s
                     };
-                    (play > -1e-3 && play < 0.05 * r.min(s)).then(|| {
-                        (
-                            g.origin - rotation * f.origin,
-                            None,
-                            play,
-                        )
-                    })
+                    (play > -1e-3 && play < 0.05 * r.min(s))
+                        .then(|| (g.origin - rotation * f.origin, None, play))
                 }
                 (
                     Surface::Torus {
@@ -301,13 +300,8 @@ fn ties(moving: &Solid, fixed: &Solid, rotation: DMat3) -> Vec<Tie> {
                         major: s,
                         minor: y,
                     },
-                ) => ((r - s).abs() < 0.02 * r && (x - y).abs() < 0.1 * x).then(|| {
-                    (
-                        g.origin - rotation * f.origin,
-                        None,
-                        (x - y).abs(),
-                    )
-                }),
+                ) => ((r - s).abs() < 0.02 * r && (x - y).abs() < 0.1 * x)
+                    .then(|| (g.origin - rotation * f.origin, None, (x - y).abs())),
                 _ => None,
             };
             if let Some((at, along, gap)) = tied {

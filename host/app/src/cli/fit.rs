@@ -113,7 +113,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..LoadOptions::default()
     };
     let model = mortise_brep::load_step_with(&args.file, &reading)?;
-    let [moving, against] = [part_named(&model, &args.moving)?, part_named(&model, &args.against)?];
+    let [moving, against] = [
+        part_named(&model, &args.moving)?,
+        part_named(&model, &args.against)?,
+    ];
     let options = FitOptions {
         overlap_mm: 1e-3 * args.overlap,
         ..FitOptions::default()

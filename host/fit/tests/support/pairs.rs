@@ -257,7 +257,11 @@ fn round_flange(r: &mut Rng) -> Designed {
 fn d_profile(radius: f64, flat: f64) -> Profile {
     let half = (radius * radius - flat * flat).sqrt();
     let (a, b) = (DVec2::new(flat, half), DVec2::new(flat, -half));
-    vec![(a, Some(DVec2::ZERO)), (DVec2::new(-radius, 0.0), Some(DVec2::ZERO)), (b, None)]
+    vec![
+        (a, Some(DVec2::ZERO)),
+        (DVec2::new(-radius, 0.0), Some(DVec2::ZERO)),
+        (b, None),
+    ]
 }
 
 fn d_plug(r: &mut Rng) -> Designed {
@@ -271,9 +275,8 @@ fn d_plug(r: &mut Rng) -> Designed {
     let corners: Vec<DVec2> = profile.iter().map(|p| p.0).collect();
     let mut out = designed("D plug", [moving, fixed], Free::Nothing, ends(&corners, depth), c);
     // Upside down, turned about the flat's normal: the other end goes in.
-    out.alternatives.push(
-        DAffine3::from_translation(DVec3::Z * (height - depth)) * DAffine3::from_rotation_x(TAU / 2.0),
-    );
+    out.alternatives
+        .push(DAffine3::from_translation(DVec3::Z * (height - depth)) * DAffine3::from_rotation_x(TAU / 2.0));
     out
 }
 
@@ -295,10 +298,20 @@ fn keyed_shaft(r: &mut Rng) -> Designed {
     let profile = keyed_profile(radius, half, top);
     let over = within(r, 3.0, 10.0);
     let moving = prism(&profile, [-depth - over, over]);
-    let hole = straight(&keyed_profile(radius + c, half + c, top + c), [-depth, 0.0], false);
+    let hole = straight(
+        &keyed_profile(radius + c, half + c, top + c),
+        [-depth, 0.0],
+        false,
+    );
     let fixed = block(r, vec![hole], top, depth, true);
     let corners: Vec<DVec2> = profile.iter().map(|p| p.0).collect();
-    let mut out = designed("keyed shaft", [moving, fixed], Free::SlideZ, ends(&corners, depth), c);
+    let mut out = designed(
+        "keyed shaft",
+        [moving, fixed],
+        Free::SlideZ,
+        ends(&corners, depth),
+        c,
+    );
     out.alternatives.push(DAffine3::from_rotation_y(TAU / 2.0));
     out
 }
@@ -319,7 +332,13 @@ fn polygon_plug(r: &mut Rng) -> Designed {
     let moving = prism(&polygon(&corners), [-depth, within(r, 4.0, 12.0)]);
     let hole = straight(&polygon(&offset(&corners, c)), [-depth, 0.0], false);
     let fixed = block(r, vec![hole], radius, depth + 5.0, false);
-    designed("polygonal plug", [moving, fixed], Free::Nothing, ends(&corners, depth), c)
+    designed(
+        "polygonal plug",
+        [moving, fixed],
+        Free::Nothing,
+        ends(&corners, depth),
+        c,
+    )
 }
 
 fn star_flange(r: &mut Rng) -> Designed {
@@ -331,7 +350,13 @@ fn star_flange(r: &mut Rng) -> Designed {
     let hole = straight(&polygon(&offset(&corners, c)), [-depth - 0.5, 0.0], false);
     let moving = flange(r, vec![boss], radius);
     let fixed = block(r, vec![hole], radius, depth + 6.0, false);
-    designed("star flange", [moving, fixed], Free::Nothing, ends(&corners, depth), c)
+    designed(
+        "star flange",
+        [moving, fixed],
+        Free::Nothing,
+        ends(&corners, depth),
+        c,
+    )
 }
 
 fn regular_flange(r: &mut Rng) -> Designed {
@@ -344,7 +369,13 @@ fn regular_flange(r: &mut Rng) -> Designed {
     let hole = straight(&polygon(&offset(&corners, c)), [-depth - 0.5, 0.0], false);
     let moving = flange(r, vec![boss], radius);
     let fixed = block(r, vec![hole], radius, depth + 6.0, false);
-    let mut out = designed("regular flange", [moving, fixed], Free::Nothing, ends(&corners, depth), c);
+    let mut out = designed(
+        "regular flange",
+        [moving, fixed],
+        Free::Nothing,
+        ends(&corners, depth),
+        c,
+    );
     out.alternatives = turns(count);
     out
 }
@@ -383,7 +414,13 @@ fn dovetail(r: &mut Rng) -> Designed {
     let moving = prism(&polygon(&slider), [-long / 2.0, long / 2.0]);
     let fixed = prism(&polygon(&rail), [-longer / 2.0, longer / 2.0]);
     let corners = [slider[0], slider[1], a, b];
-    designed("dovetail", [moving, fixed], Free::SlideZ, ends(&corners, long / 3.0), c)
+    designed(
+        "dovetail",
+        [moving, fixed],
+        Free::SlideZ,
+        ends(&corners, long / 3.0),
+        c,
+    )
 }
 
 fn pins(r: &mut Rng) -> Designed {
@@ -423,7 +460,13 @@ fn taper(r: &mut Rng) -> Designed {
     };
     let hole = tube(&at(-c, c), &at(depth, c), [-depth - c, 0.0], false);
     let fixed = block(r, vec![hole], radius + 4.0, depth + 6.0, false);
-    designed("taper plug", [moving, fixed], Free::Nothing, ends(&corners, depth), c)
+    designed(
+        "taper plug",
+        [moving, fixed],
+        Free::Nothing,
+        ends(&corners, depth),
+        c,
+    )
 }
 
 fn equal_holes(r: &mut Rng) -> Designed {
@@ -439,7 +482,10 @@ fn equal_holes(r: &mut Rng) -> Designed {
     let fixed = block(r, holes, pitch * count as f64, depth + 6.0, false);
     let points = vec![DVec3::ZERO, DVec3::new(0.0, 0.0, -depth)];
     let mut out = designed("equal holes", [moving, fixed], Free::Spin, points, c);
-    out.alternatives = places.iter().map(|p| DAffine3::from_translation(p.extend(0.0))).collect();
+    out.alternatives = places
+        .iter()
+        .map(|p| DAffine3::from_translation(p.extend(0.0)))
+        .collect();
     out
 }
 
@@ -447,7 +493,11 @@ fn equal_holes(r: &mut Rng) -> Designed {
 /// along every normal, so that the evenest pose is a little beside the designed one.
 fn lobed(r: &mut Rng) -> Designed {
     let sides = r.usize(3..7);
-    let (radius, height, c) = (within(r, 8.0, 18.0), within(r, 15.0, 30.0), if r.bool() { clearance(r) } else { 0.0 });
+    let (radius, height, c) = (
+        within(r, 8.0, 18.0),
+        within(r, 15.0, 30.0),
+        if r.bool() { clearance(r) } else { 0.0 },
+    );
     let exact = if c == 0.0 { 1.0 } else { 0.0 };
     let (twist, narrower) = (exact * within(r, -0.3, 0.3), exact * within(r, 0.03, 0.1));
     let chord = 2.0 * radius * (TAU / 2.0 / sides as f64).sin();
@@ -469,9 +519,7 @@ fn lobed(r: &mut Rng) -> Designed {
     let patches: Vec<Patch> = (0..sides).map(patch).collect();
     let span = [within(r, 0.15, 0.35), within(r, 0.6, 0.8)];
     let hole: Vec<Patch> = (patches.iter())
-        .map(|patch| {
-            patch.map(|row| cut(row, span).map(|p| p + (p.truncate().normalize() * c).extend(0.0)))
-        })
+        .map(|patch| patch.map(|row| cut(row, span).map(|p| p + (p.truncate().normalize() * c).extend(0.0))))
         .collect();
     let free = |patches: &[Patch], solid: bool| Tube {
         sides: patches.iter().map(|p| Side::Free(Box::new(*p))).collect(),

@@ -171,7 +171,10 @@ impl Text {
         for tube in &solid.tubes {
             let count = tube.sides.len();
             let ends: Vec<[[u64; 2]; 2]> = (tube.sides.iter())
-                .map(|side| side.corners().map(|row| row.map(|p| self.vertex(&mut vertices, p))))
+                .map(|side| {
+                    side.corners()
+                        .map(|row| row.map(|p| self.vertex(&mut vertices, p)))
+                })
                 .collect();
             let posts: Edges = (0..count)
                 .map(|k| match &tube.sides[k] {
@@ -228,7 +231,11 @@ impl Text {
             let plane = self.plane(at, if cap.up { DVec3::Z } else { DVec3::NEG_Z });
             let ring = |(tube, end): (usize, usize), forward: bool| -> Vec<(u64, bool)> {
                 let edges = rings[tube][end].iter().map(|&edge| (edge, forward));
-                if forward { edges.collect() } else { edges.rev().collect() }
+                if forward {
+                    edges.collect()
+                } else {
+                    edges.rev().collect()
+                }
             };
             let mut loops = vec![ring(cap.outer, cap.up)];
             loops.extend(cap.holes.iter().map(|&hole| ring(hole, !cap.up)));
