@@ -22,7 +22,7 @@ use crate::translations::{Candidate, translations};
 const SAMPLES: usize = 1500;
 /// Candidates refined: of walls, and of free-form faces roughly and then fully.
 const MOST_OF_WALLS: usize = 72;
-const MOST_OF_FRAMES: [usize; 2] = [64, 16];
+const MOST_OF_FRAMES: [usize; 2] = [96, 20];
 /// Smallest rating by samples for which a candidate is refined.
 const LEAST_RATE: f64 = 0.01;
 /// Share of all directions that may be free in a fit: less than a corner leaves.
@@ -336,7 +336,7 @@ impl Search<'_> {
     /// Candidates of free-form faces, refined roughly.
     fn of_frames(&self, screen: &Screen) -> (usize, Vec<(DAffine3, f64)>) {
         let candidates = frames::poses(self.pair.moving, self.pair.fixed);
-        let window = 2.0 * self.window;
+        let window = 3.5 * self.window;
         let best = self.rate(screen, &candidates, window, MOST_OF_FRAMES[0]);
         let rough: Vec<Candidate> = (best.par_iter())
             .filter_map(|candidate| {

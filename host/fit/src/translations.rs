@@ -30,7 +30,6 @@ pub(crate) struct Candidate {
 /// Translations tied by parallel planes: t·m ≈ one of the values.
 struct Group {
     m: DVec3,
-    /// Value, rating, sum of the walls' middles' products for the free direction.
     clusters: Vec<Cluster>,
     total: f64,
 }
@@ -165,7 +164,7 @@ fn rating(t: DVec3, groups: &[Group], ties: &[Tie], window: f64) -> f64 {
 
 fn groups(moving: &Solid, fixed: &Solid, rotation: DMat3, window: f64) -> Vec<Group> {
     // Value and rating of every pair of opposite planes, by direction.
-    let mut raw: Vec<(DVec3, Vec<(f64, f64, bool)>)> = Vec::new();
+    let mut raw: Vec<(DVec3, Vec<Opposite>)> = Vec::new();
     for a in &moving.walls {
         let Surface::Plane { frame: f } = a.surface else {
             continue;
@@ -189,10 +188,11 @@ fn groups(moving: &Solid, fixed: &Solid, rotation: DMat3, window: f64) -> Vec<Gr
                 }
             };
             let m = raw[index].0;
-            let value = m.dot(g.origin - rotation * f.origin);
-            raw[index]
-                .1
-                .push((value, a.area.min(b.area).sqrt(), m.dot(g.z) > 0.0));
+            raw[index].1.push(Opposite {
+                value: m.dot(g.origin - rotation * f.origin),
+                rating: a.area.min(b.area).sqrt(),
+                up: m.dot(g.z) > 0.0,
+            });
         }
     }
     let mut out: Vec<Group> = raw
@@ -203,23 +203,31 @@ fn groups(moving: &Solid, fixed: &Solid, rotation: DMat3, window: f64) -> Vec<Gr
     out
 }
 
+/// Two planes that face each other: the translation along the group's direction at which they touch.
+struct Opposite {
+    value: f64,
+    rating: f64,
+    /// Whether the fixed one's outward normal is along the group's direction.
+    up: bool,
+}
+
 /// Clusters of values within `window`; a cluster held from both sides counts double.
-fn group(m: DVec3, mut values: Vec<(f64, f64, bool)>, window: f64) -> Group {
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+fn group(m: DVec3, mut values: Vec<Opposite>, window: f64) -> Group {
+    values.sort_by(|a, b| a.value.total_cmp(&b.value));
     let mut clusters = Vec::new();
     let mut start = 0;
     while start < values.len() {
         let mut end = start + 1;
-        while end < values.len() && values[end].0 - values[start].0 < window {
+        while end < values.len() && values[end].value - values[start].value < window {
             end += 1;
         }
         let members = &values[start..end];
         let side = |up: bool| -> (f64, f64) {
             let mut weight = 0.0;
             let mut sum = 0.0;
-            for &(value, rating, _) in members.iter().filter(|member| member.2 == up) {
-                weight += rating;
-                sum += rating * value;
+            for member in members.iter().filter(|member| member.up == up) {
+                weight += member.rating;
+                sum += member.rating * member.value;
             }
             (weight, sum)
         };
