@@ -50,9 +50,9 @@ impl Effort {
 /// Items at least.
 const LEAST_ITEMS: usize = 12;
 /// Share of the largest eigenvalue below which a motion is free.
-const FREE: f64 = 1e-5;
+const FREE: f64 = 1e-6;
 /// Share below which the common gap and a motion have the same effect on the gaps.
-const SAME_EFFECT: f64 = 1e-4;
+const SAME_EFFECT: f64 = 1e-6;
 /// Scale of deviations at least, mm: a few rounding errors of free-form faces.
 const SCALE_MM: f64 = 1e-5;
 
