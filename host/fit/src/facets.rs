@@ -5,7 +5,7 @@ use mortise_brep::Shape;
 use parry3d_f64::query::PointQueryWithLocation as _;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
-use crate::solid::Hit;
+use crate::hit::Hit;
 
 /// Triangles of a shape in a tree of boxes. Cost: about a microsecond a query.
 pub(crate) struct Facets {

@@ -2,7 +2,8 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::solid::{Hit, Sample, Solid};
+use crate::hit::Hit;
+use crate::solid::{Sample, Solid};
 
 /// Cosine of the angle between a sample's normal and the opposite of the normal at its foot above which the faces face each other.
 const FACING: f64 = 0.85;

@@ -15,6 +15,7 @@ mod facets;
 mod find;
 mod frames;
 mod gaps;
+mod hit;
 mod mobility;
 mod path;
 mod refine;

@@ -11,6 +11,7 @@ use mortise_brep::{Shape, Surface};
 use mortise_mating::{Side, Tolerances, merge};
 
 use crate::facets::Facets;
+use crate::hit::Hit;
 
 /// Samples of a face at least, where it has triangles.
 const LEAST_PER_FACE: usize = 8;
@@ -30,19 +31,6 @@ pub(crate) struct Sample {
     pub face: u32,
     /// Area that it stands for, mm².
     pub area: f64,
-}
-
-/// Nearest point of a solid's exact surface.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Hit {
-    /// Signed distance, mm, negative inside.
-    pub distance: f64,
-    /// The nearest point, mm.
-    pub foot: DVec3,
-    /// Outward unit normal there.
-    pub normal: DVec3,
-    /// A face it lies on.
-    pub face: u32,
 }
 
 /// Faces of one surface, as a feature that can mate with another.
