@@ -139,6 +139,53 @@ fn contacts_of_two_pins_in_their_holes() {
     refused(&["contacts", "no-such-file.step", "--json"], "no-such-file.step");
 }
 
+/// The sample's peg is beside its block: it is put on the hole's axis, either way round.
+#[test]
+fn a_fit_of_the_sample_is_on_the_holes_axis() {
+    let output = mortise(&["fit", SAMPLE, "--moving", "peg", "--against", "block", "--json"]);
+    let report = json(&output);
+    let fits = report["fits"].as_array().expect("fits");
+    assert_eq!(fits.len(), 2, "{report}");
+    for fit in fits {
+        for gap in ["min", "median", "max"] {
+            let um = fit["clearance_um"][gap].as_f64().expect("number");
+            assert!((um - 500.0).abs() < 1.0, "{fit}");
+        }
+        assert_eq!(
+            (&fit["freedom"], &fit["path"]["kind"]),
+            (&2.into(), &"line".into()),
+            "{fit}"
+        );
+        let rotation = fit["pose"]["rotation"].as_array().expect("rotation");
+        assert_eq!(rotation.len(), 9);
+        assert!(
+            (rotation[8].as_f64().expect("number").abs() - 1.0).abs() < 1e-6,
+            "{fit}"
+        );
+    }
+    refused(
+        &["fit", SAMPLE, "--moving", "pg", "--against", "block"],
+        "no part `pg`",
+    );
+    refused(
+        &["fit", SAMPLE, "--moving", "peg", "--against", "peg"],
+        "choose two parts",
+    );
+    refused(
+        &[
+            "fit",
+            SAMPLE,
+            "--moving",
+            "peg",
+            "--against",
+            "block",
+            "--overlap",
+            "-1",
+        ],
+        "0 to 100",
+    );
+}
+
 #[test]
 fn what_cannot_be_read_is_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("temporary folder");

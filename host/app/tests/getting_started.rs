@@ -212,6 +212,13 @@ const COMMANDS: [(&str, Run); 19] = [
         Run::Here(&["contacts", SAMPLE, "--json"], "\"contacts\""),
     ),
     (
+        "mortise fit",
+        Run::Here(
+            &["fit", SAMPLE, "--moving", "peg", "--against", "block", "--json"],
+            "\"fits\"",
+        ),
+    ),
+    (
         "mortise bake",
         Run::Here(
             &["bake", SAMPLE, "--no-cache", "-o", "OUT", "--json"],

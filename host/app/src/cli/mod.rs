@@ -1,12 +1,13 @@
 //! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: the insertion was not completed, an instruction not carried out, or parts do not go together; 2: not possible, with one line
-//! on standard error that gives the reason.
+//! Exit code 0: done; 1: the insertion was not completed, an instruction not carried out, parts do not go together, or nothing fits; 2: not possible, with
+//! one line on standard error that gives the reason.
 
 mod assembly;
 mod bake;
 mod contacts;
 mod demo;
+mod fit;
 mod inspect;
 mod lab;
 mod mistyped;
@@ -53,6 +54,8 @@ enum Command {
     Assemble(assembly::AssembleArgs),
     /// Find collision-free ways out: of one part, or of all in order; exit code 1 when something stays in
     Disassemble(assembly::DisassembleArgs),
+    /// Find the poses at which two parts fit, and the way in
+    Fit(fit::Args),
     /// Convert a STEP file to a scene image (collision model) for the board
     Bake(bake::Args),
     /// Insert a peg into its hole with a simulated hand, in the window or without one
@@ -104,6 +107,7 @@ pub fn main() -> ExitCode {
             Command::Features(args) => assembly::features(&args),
             Command::Assemble(args) => assembly::assemble(&args),
             Command::Disassemble(args) => assembly::disassemble(&args),
+            Command::Fit(args) => fit::run(&args),
             Command::Bake(args) => bake::run(&args),
             Command::Demo(args) => demo::run(args),
             Command::Lab(args) => lab::run(&args),

@@ -77,6 +77,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     (
+        "host/fit",
+        &["mortise-bake", "mortise-brep", "mortise-mating"],
+    ),
+    (
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],
     ),
@@ -100,6 +104,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         &[
             "mortise-bake",
             "mortise-brep",
+            "mortise-fit",
             "mortise-guide",
             "mortise-mating",
             "mortise-output",
