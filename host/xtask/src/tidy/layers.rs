@@ -76,10 +76,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("protocol", &[]),
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
-    (
-        "host/fit",
-        &["mortise-bake", "mortise-brep", "mortise-mating"],
-    ),
+    ("host/fit", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     (
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],
