@@ -7,7 +7,7 @@
 use glam::{DAffine3, DVec3};
 
 use crate::adjust::range_mm;
-use crate::lexicon::{Place, Relation};
+use crate::manner::Manner;
 use crate::matching::matches;
 use crate::phrase::Amount;
 use crate::port::Port;
@@ -19,19 +19,6 @@ use crate::world::World;
 const AGREES: f64 = 0.7;
 /// Distance within which two bores are equal, mm.
 const EQUAL_MM: f64 = 1e-3;
-
-/// What is asked of a connection.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
-    /// Into, onto, or either.
-    pub relation: Relation,
-    /// Side from which the part comes.
-    pub from: Option<Place>,
-    /// How far in.
-    pub extent: Amount,
-    /// The bore of `b`, placed.
-    pub hole: Option<Port>,
-}
 
 /// A seat that the search has found: placement, and the direction in which the part leaves it.
 struct Seat {
@@ -46,7 +33,7 @@ struct Seat {
 /// [`Trouble::Refuse`]: `Blocked` with the parts in the way, `NoFit` when nothing fits, `NotUnderstood` for a vague extent.
 ///
 /// Cost: for each seat tried one overlap query and some sweeps.
-pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Result<Act, Trouble> {
+pub fn connect(world: &mut World, part: usize, into: usize, manner: &Manner) -> Result<Act, Trouble> {
     let name = world.name(part).to_owned();
     let target = world.name(into).to_owned();
     if part == into {
@@ -65,7 +52,7 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
         amount: None,
     };
     if world.connected(part, into)
-        && wish.hole.is_none()
+        && manner.hole.is_none()
         && seats(world, part, into).iter().any(|s| world.same(part, &now, s))
     {
         return Ok(act);
@@ -74,21 +61,21 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
     let mut tried = false;
     let mut found = None;
     for pose in seats(world, part, into) {
-        if !in_hole(world, part, &pose, wish.hole) {
+        if !in_hole(world, part, &pose, manner.hole) {
             continue;
         }
         tried = true;
-        if let Some(seat) = enter(world, [part, into], &pose, wish, &mut blockers) {
+        if let Some(seat) = enter(world, [part, into], &pose, manner, &mut blockers) {
             found = Some(seat);
             break;
         }
     }
     if found.is_none() {
-        let poses = matches(world, part, into, wish, &mut blockers);
+        let poses = matches(world, part, into, manner, &mut blockers);
         tried |= !poses.is_empty();
         found = poses
             .into_iter()
-            .find_map(|pose| enter(world, [part, into], &pose, wish, &mut blockers));
+            .find_map(|pose| enter(world, [part, into], &pose, manner, &mut blockers));
     }
     world.set_placement(part, now);
     let Some(seat) = found else {
@@ -110,7 +97,7 @@ pub fn connect(world: &mut World, part: usize, into: usize, wish: &Wish) -> Resu
         return Err(Trouble::Refuse(Code::NoFit, words, vec![part, into]));
     };
     world.set_placement(part, seat.pose);
-    match wish.extent {
+    match manner.extent {
         Amount::Half => {
             let back = range_mm(world, part, seat.way) / 2.0;
             world.shift(&[part], seat.way * back);
@@ -198,7 +185,7 @@ fn enter(
     world: &mut World,
     [part, into]: [usize; 2],
     pose: &DAffine3,
-    wish: &Wish,
+    manner: &Manner,
     blockers: &mut Vec<usize>,
 ) -> Option<Seat> {
     world.set_placement(part, *pose);
@@ -217,7 +204,11 @@ fn enter(
     let mut ways: Vec<(f64, DVec3)> = world
         .ways(part)
         .into_iter()
-        .filter(|way| wish.from.is_none_or(|place| direction(place).dot(*way) > AGREES))
+        .filter(|way| {
+            manner
+                .from
+                .is_none_or(|place| direction(place).dot(*way) > AGREES)
+        })
         .map(|way| (world.exit_mm(&[part], &fixed, way), way))
         .collect();
     ways.sort_by(|(s, v), (t, w)| {

@@ -15,6 +15,7 @@ pub mod connect;
 pub mod disconnect;
 pub mod grammar;
 pub mod lexicon;
+pub mod manner;
 pub mod matching;
 mod noun;
 pub mod phrase;
@@ -24,6 +25,7 @@ pub mod session;
 pub mod token;
 pub mod turn;
 mod verbs;
+mod word;
 pub mod world;
 
 pub use session::Session;

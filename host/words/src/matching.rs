@@ -7,8 +7,8 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use mortise_task::Moved;
 
-use crate::connect::Wish;
 use crate::lexicon::Relation;
+use crate::manner::Manner;
 use crate::port::Port;
 use crate::reference::direction;
 use crate::world::World;
@@ -39,11 +39,11 @@ pub fn matches(
     world: &mut World,
     part: usize,
     into: usize,
-    wish: &Wish,
+    manner: &Manner,
     blockers: &mut Vec<usize>,
 ) -> Vec<DAffine3> {
     let now = world.placement(part);
-    let mut found = lines(world, part, into, wish);
+    let mut found = lines(world, part, into, manner);
     let most = found.iter().map(|m| m.pairs).max().unwrap_or(0);
     found.retain(|m| m.pairs == most);
     let tightest = found.iter().map(|m| m.gap).fold(f64::INFINITY, f64::min);
@@ -62,7 +62,7 @@ pub fn matches(
         let side = (here - m.other.middle()).dot(m.other.direction);
         let near = m.other.direction * if side < 0.0 { -1.0 } else { 1.0 };
         for entry in [near, -near] {
-            if wish.from.is_some_and(|place| direction(place).dot(entry) < 0.7) {
+            if manner.from.is_some_and(|place| direction(place).dot(entry) < 0.7) {
                 continue;
             }
             out.extend(insert(world, [part, into], now, m, entry, blockers));
@@ -76,7 +76,7 @@ pub fn matches(
 }
 
 /// All ways to bring a port of `part` on one line with a port of `into`, in both senses, with the angle about it from a second pair where there is one.
-fn lines(world: &World, part: usize, into: usize, wish: &Wish) -> Vec<Match> {
+fn lines(world: &World, part: usize, into: usize, manner: &Manner) -> Vec<Match> {
     let place = |p: usize| -> Vec<Port> {
         world
             .ports(p)
@@ -87,13 +87,13 @@ fn lines(world: &World, part: usize, into: usize, wish: &Wish) -> Vec<Match> {
     let (own, others) = (place(part), place(into));
     let mut out = Vec::new();
     for p in &own {
-        let allowed = match wish.relation {
+        let allowed = match manner.relation {
             Relation::Inside => p.male,
             Relation::Around => !p.male,
             Relation::Any => true,
         };
         for q in others.iter().filter(|q| allowed && p.takes(q)) {
-            if wish
+            if manner
                 .hole
                 .is_some_and(|hole| hole.middle().distance(q.middle()) > 1e-6 || hole.radius != q.radius)
             {

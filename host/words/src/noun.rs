@@ -5,10 +5,10 @@ use winnow::error::ContextError;
 use winnow::prelude::*;
 use winnow::token::any;
 
-use crate::grammar::{Input, number, of_table, one_of};
 use crate::lexicon;
 use crate::phrase::{Phrase, Pronoun, Quantity};
 use crate::token::Token;
+use crate::word::{Input, number, of_table, one_of};
 
 /// Words that can never be a noun.
 const NEVER: &[&str] = &[
@@ -180,6 +180,16 @@ fn pronoun(input: &mut Input<'_>) -> winnow::Result<Phrase> {
     })
 }
 
+/// Whether a word stands behind the phrase before it, which has its noun or not; `last` is whether no other word follows.
+fn ends_phrase(text: &str, has_noun: bool, last: bool) -> bool {
+    const BEHIND_NOUNS: [&str; 5] = ["the", "of", "number", "no", "nr"];
+    let is_never = NEVER.contains(&text) || lexicon::INTO.iter().any(|(w, _)| *w == text);
+    let is_place = || lexicon::PLACES.iter().any(|(_, w)| w.contains(&text));
+    is_never
+        || (has_noun && BEHIND_NOUNS.contains(&text))
+        || (starts_constituent(text) && (has_noun || last || !is_place()))
+}
+
 /// Whether `word` begins something other than a noun.
 fn starts_constituent(word: &str) -> bool {
     NEVER.contains(&word)
@@ -268,17 +278,7 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
                     break;
                 } else if phrase.nouns.is_empty() && ["the", "of"].contains(&text.as_str()) {
                     // "all of the screws".
-                } else if NEVER.contains(&text.as_str()) || lexicon::INTO.iter().any(|(w, _)| *w == text) {
-                    break;
-                } else if !phrase.nouns.is_empty() && starts_constituent(&text) {
-                    break;
-                } else if !phrase.nouns.is_empty()
-                    && ["the", "of", "number", "no", "nr"].contains(&text.as_str())
-                {
-                    break;
-                } else if starts_constituent(&text)
-                    && !(lexicon::PLACES.iter().any(|(_, w)| w.contains(&text.as_str())) && !last)
-                {
+                } else if ends_phrase(&text, !phrase.nouns.is_empty(), last) {
                     break;
                 } else {
                     plural = word != text;
@@ -293,11 +293,10 @@ fn noun(input: &mut Input<'_>, loose_in: bool) -> winnow::Result<Phrase> {
             _ => break,
         }
     }
-    if phrase.nouns.is_empty() && phrase.names.is_empty() && !one {
-        if phrase.ordinals.is_empty() || phrase.quantity == Quantity::Any {
-            return Err(ContextError::new());
-        }
-        // "the last", "the second".
+    let is_empty = phrase.nouns.is_empty() && phrase.names.is_empty() && !one;
+    // An ordinal alone is a phrase: "the last", "the second".
+    if is_empty && (phrase.ordinals.is_empty() || phrase.quantity == Quantity::Any) {
+        return Err(ContextError::new());
     }
     plural |= phrase.nouns.last().is_some_and(|head| head == "everything");
     if plural && phrase.quantity == Quantity::One {

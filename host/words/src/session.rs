@@ -7,9 +7,10 @@ use mortise_brep::{CadModel, Part};
 use mortise_task::TaskError;
 
 use crate::adjust::{adjust, turn};
-use crate::connect::{Wish, connect};
+use crate::connect::connect;
 use crate::disconnect::disconnect;
 use crate::grammar::{only_phrase, parse};
+use crate::manner::Manner;
 use crate::phrase::{Command, Phrase, Puzzle};
 use crate::port::Port;
 use crate::reference::{Memory, Purpose, Scene, Seen, direction, longest_axis};
@@ -260,13 +261,13 @@ impl Session {
                     self.slot = into.as_ref().is_none_or(|i| !i.hole).then_some(Slot::Into);
                     let (into, hole) = self.destination(part, &parts, into.as_ref())?;
                     self.slot = None;
-                    let wish = Wish {
+                    let manner = Manner {
                         relation: *relation,
                         from: *from,
                         extent: *extent,
                         hole,
                     };
-                    acts.push(connect(&mut self.world, part, into, &wish)?);
+                    acts.push(connect(&mut self.world, part, into, &manner)?);
                 }
                 Command::Disconnect { way, .. } => {
                     let from = near

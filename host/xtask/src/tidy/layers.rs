@@ -77,6 +77,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/fit", &["mortise-bake", "mortise-brep", "mortise-mating"]),
+    ("host/words", &["mortise-brep", "mortise-mating", "mortise-task"]),
     (
         "host/guide",
         &["mortise-brep", "mortise-mating", "mortise-protocol"],
@@ -109,6 +110,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-rig",
             "mortise-scenario",
             "mortise-task",
+            "mortise-words",
         ],
     ),
     (
