@@ -189,7 +189,7 @@ enum Run {
 
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 
-const COMMANDS: [(&str, Run); 20] = [
+const COMMANDS: [(&str, Run); 24] = [
     ("cargo xtask setup", Run::Elsewhere("CI, before anything else")),
     ("cargo xtask demo", Run::Elsewhere("the step `window` plays it")),
     (
@@ -217,6 +217,25 @@ const COMMANDS: [(&str, Run); 20] = [
             &["fit", SAMPLE, "--moving", "peg", "--against", "block", "--json"],
             "\"fits\"",
         ),
+    ),
+    (
+        "mortise features FILE",
+        Run::Here(&["features", SAMPLE, "--json"], "\"ports\""),
+    ),
+    (
+        "mortise mobility FILE",
+        Run::Here(&["mobility", SAMPLE, "--json"], "\"translations\""),
+    ),
+    (
+        "mortise disassemble FILE --part PART",
+        Run::Here(
+            &["disassemble", SAMPLE, "--part", "peg", "--json"],
+            "\"comes_out\"",
+        ),
+    ),
+    (
+        "mortise assemble FILE",
+        Run::Here(&["assemble", SAMPLE, "--json"], "\"assembles\""),
     ),
     (
         "mortise bake",
