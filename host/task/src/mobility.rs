@@ -1,6 +1,6 @@
 //! Freedoms of a part or group: directions and axes along which it moves, and how far.
 //!
-//! 1. The normals of its contacts leave a cone of translations ([`crate::cone()`]): free both ways along its lines, one way along its extreme rays. A complete
+//! 1. The normals of its contacts leave a cone of translations (`cone`): free both ways along its lines, one way along its extreme rays. A complete
 //!    bore leaves its axis, a part of one a wedge, a plane a half-space (Iacob, Mitrouchev & Léon 2008 call the first kind joints, the others fits).
 //! 2. Candidates are those lines and rays, the axes and normals of the surfaces beside it, and the axes about which it could turn.
 //! 3. Each candidate must hold over a finite step of the exact distance, [`STEP_MM`]: a freedom to first order alone is none. It is then followed until it

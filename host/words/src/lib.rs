@@ -2,7 +2,7 @@
 //!
 //! 1. [`token`]: words, numbers and part names; misspelt words corrected.
 //! 2. [`grammar`]: verb, noun phrases, places, amounts, to [`phrase::Command`].
-//! 3. [`reference`]: noun phrases to parts; what is ambiguous becomes a question.
+//! 3. [`mod@reference`]: noun phrases to parts; what is ambiguous becomes a question.
 //! 4. [`mod@connect`], [`mod@disconnect`], [`mod@adjust`]: the operations of Jung, "Task-Level Assembly Modeling in Virtual Environments"
 //!    (2003), figs. 5 and 8, on exact geometry by [`mortise_task`].
 //! 5. [`session`]: one turn after another, with undo and redo.

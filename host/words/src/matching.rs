@@ -34,7 +34,7 @@ struct Match {
 
 /// Placements of `part` with a port matched to one of `into`, the best first. Parts met before the ports engage are added to `blockers`.
 ///
-/// Cost: one sweep for each insertion tried, at most [`MOST_TRIED`].
+/// Cost: one sweep for each insertion tried, at most `MOST_TRIED`.
 pub fn matches(
     world: &mut World,
     part: usize,

@@ -243,7 +243,7 @@ impl World {
         (share * limit, pair)
     }
 
-    /// As [`Self::travel`], found to [`COARSE_MM`] only: for questions whether a way is free. A way blocked at its start costs little.
+    /// As [`Self::travel`], found to `COARSE_MM` only: for questions whether a way is free. A way blocked at its start costs little.
     pub fn free(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
         let group = Moved {
             parts: moving,
