@@ -23,9 +23,9 @@ use super::work::{Cancel, Outbox, Update};
 /// Ticks between telemetry messages: some 60 messages a second, half of what an emulated UART carries.
 pub const TELEMETRY_TICKS: u16 = 16;
 
-/// Time between redraws for samples while the motors are off and the handle rests; equals the span of the readout of loop overruns. With
-/// software rendering a frame of 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
-const CALM: Duration = Duration::from_secs(10);
+/// Time between redraws while the motors are off and the handle rests; equals the span of the readout of loop overruns. With software
+/// rendering a frame of 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
+pub const CALM: Duration = Duration::from_secs(10);
 
 /// Time after the first missing answer within which a silent link is noticed.
 const NOTICED: Duration = Duration::from_secs(1);
@@ -303,11 +303,10 @@ fn is_live(state: DeviceState) -> bool {
 
 /// Forwards events until there are no more.
 ///
-/// While the motors are off and the handle rests, samples change nothing on screen but the traces, so only one of many wakes the window:
-/// drawing each would keep a core busy on a computer without a graphics card.
+/// While the motors are off and the handle rests, samples change nothing on screen but the traces, so none wakes the window, which takes them in
+/// every [`CALM`]: drawing each would keep a core busy on a computer without a graphics card.
 fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, state: DeviceState) {
     let mut live = is_live(state);
-    let mut woken = Instant::now();
     let mut seen = [0.0; 3];
     loop {
         match events.recv_timeout(Duration::from_secs(1)) {
@@ -319,7 +318,7 @@ fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, st
                     live = is_live(*state);
                 }
                 let quiet = match &event {
-                    Event::Telemetry(sample) if !live && woken.elapsed() < CALM => {
+                    Event::Telemetry(sample) if !live => {
                         let at = sample.handle.position;
                         at.iter()
                             .zip(seen)
@@ -335,7 +334,6 @@ fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, st
                 let heard = if quiet {
                     outbox.send_quietly(update)
                 } else {
-                    woken = Instant::now();
                     outbox.send(update)
                 };
                 if !heard {

@@ -24,7 +24,7 @@ const COLOURS_MIN: u32 = 64;
 /// Size of the virtual screen, pixels.
 const SCREEN: (u32, u32) = (1600, 1000);
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
-/// Largest share of a core that an idle window may use with software rendering: a frame every ten seconds, and 1,000 ticks a second.
+/// Largest share of a core that an idle window may use with software rendering: one frame every ten seconds, and 1,000 ticks a second.
 const IDLE_MAX: f64 = 0.10;
 /// Name of the in-process rig's thread, which exists once the rig is connected.
 const BOARD_THREAD: &str = "mortise-board";
