@@ -52,7 +52,7 @@ fn a_finer_brick_has_a_smaller_number_and_is_whole() {
     let good = scene::finer_bytes();
     let aligned = Aligned::new(&good);
     let header = *SceneImage::open(aligned.bytes()).unwrap().header();
-    let number = |palette: usize| header.palette.offset as usize + 2 * (1 + 4 * palette + 3);
+    let number = |palette: usize| header.palette.offset as usize + 2 * (1 + 3 * palette + 2);
     let brick = |index: usize| header.bricks.offset as usize + index * size_of::<BrickRecord>();
     let refused = |change: &dyn Fn(&mut [u8])| {
         let mut other = Aligned::new(&good);
@@ -85,13 +85,14 @@ fn any_words_end() {
     for seed in 0..2000u32 {
         let mut other = Aligned::new(&good);
         // The words of the last palette; those of its entries stay.
-        let own = &mut other.bytes_mut()[words.clone()][2 * 7..2 * 23];
+        let own = &mut other.bytes_mut()[words.clone()][2 * 6..2 * 22];
         let mut state = seed.wrapping_mul(0x9e37_79b9) | 1;
         for word in own.chunks_exact_mut(2) {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let finer = Nearby::finer_bits((state >> 20 & 15) as u16);
             let bits = [
-                FINER,
-                0x8000 | (5 + (state >> 20 & 15)) as u16,
+                finer,
+                0x8000 | (state >> 20 & 15) as u16,
                 (state >> 16 & 7) as u16,
                 NO_FACE,
             ];

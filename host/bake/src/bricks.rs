@@ -3,7 +3,7 @@
 use glam::DVec3;
 use mortise_brep::Surface;
 use mortise_protocol::image::{
-    BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, COARSE_UNITS, FINER, NO_FACE, Nearby, SAMPLES_PER_BRICK,
+    BRICK_CELLS, BRICK_SAMPLES, CELLS_PER_BRICK, COARSE_UNITS, Group, NO_FACE, Nearby, SAMPLES_PER_BRICK,
 };
 
 use crate::cell_samples::{ExactSample, corner_places, index};
@@ -340,6 +340,8 @@ pub(crate) fn pack(cells: &[Nearby; CELLS_PER_BRICK]) -> Packed {
 
 /// With more than 256 entries in one brick the most frequent 255 are kept; the others become [`Nearby::Unknown`].
 fn pack_entries(cells: &[Entry; CELLS_PER_BRICK]) -> Packed {
+    // The index of a finer brick's number has 13 bits.
+    const _: () = assert!(256 * (2 + Group::MOST) < 1 << 13);
     const UNKNOWN: Entry = Entry::Named(Nearby::Unknown);
     let mut entries = cells.to_vec();
     entries.sort_unstable();
@@ -380,7 +382,7 @@ fn pack_entries(cells: &[Entry; CELLS_PER_BRICK]) -> Packed {
             }
             Entry::Finer(number) => {
                 palette.push(Nearby::finer_bits(at));
-                groups.extend([FINER, *number]);
+                groups.push(*number);
             }
         }
     }
@@ -397,8 +399,6 @@ fn pack_entries(cells: &[Entry; CELLS_PER_BRICK]) -> Packed {
 
 #[cfg(test)]
 mod tests {
-    use mortise_protocol::image::Group;
-
     use super::*;
 
     #[test]

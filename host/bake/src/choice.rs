@@ -28,9 +28,7 @@ const FIELD_SHARE_ELSEWHERE: f64 = 0.5;
 const MOST_EPSILON_CELLS: f64 = 0.5;
 /// Measured errors are stated with this margin: between the places measured they may be larger.
 const SAFETY: f64 = 1.5;
-/// Proved bound of a field's error, cells. Interpolated distances err by at most √3/2 (see [`crate::sign_check`]). A rule is right on the lattice of half
-/// steps at least, of which every point of a cell is within √3/4; beyond a point at which it is right, both it and the distance change at most by
-/// the way there.
+/// Proved bound of the error of interpolated distances, cells: √3/2 (see [`crate::sign_check`]).
 const PROVED_CELLS: f64 = 0.8661;
 /// Cells along a shape's longest side from which larger cells are tried, and the factor from one to the next.
 const FEWEST_CELLS: f64 = 4.0;

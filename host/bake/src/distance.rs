@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
-use mortise_brep::{Shape, Surface};
+use mortise_brep::{EDGE_TOLERANCE_MM, Shape, Surface};
 
 use crate::piece::OnPiece;
 use crate::surface::project;
@@ -265,7 +265,9 @@ impl ExactSurface {
                         // At a pole, at a crease inside the surface, and on its border, the line to the foot is not along the normal there: that would
                         // give the wrong sign beside an acute edge, of which the piece of the border knows both faces.
                         let along = (p - q.point).dot(normal).abs() >= ALONG * d;
-                        if !along && d > SAME_MM && matches!(feature, Some(Feature::Piece { .. })) {
+                        let is_border = best <= d + SAME_MM + EDGE_TOLERANCE_MM
+                            && matches!(feature, Some(Feature::Piece { .. }));
+                        if !along && d > SAME_MM && is_border {
                             return;
                         }
                         (best, at, face) = (d, q.point, f);

@@ -26,7 +26,7 @@ use crate::options::{BakeOptions, Progress};
 use crate::plan::{ELSEWHERE, Limit, PartTick, Plan, Planned, Request, ShapePlan};
 use crate::scene::Scene;
 use crate::ticks::Ticks;
-use crate::trials::{Bench, Clock, End, Fielded, Found, Trials};
+use crate::trials::{Bench, Clock, End, Fielded, Found, Rated, Trials};
 
 /// Attempts to find an accuracy that fits, and then one between that and the last that did not fit.
 const ATTEMPTS: usize = 12;
@@ -411,34 +411,35 @@ impl<'a> Planner<'a> {
         let flash = self.request.flash_bytes;
         let mut room = flash;
         for _ in 0..MIXES {
-            let Some(chosen) = mix(&rated, room) else { break };
-            let fields =
-                (self.shapes.iter().zip(chosen)).map(|(shape, number)| shape.taken(number, accuracy_mm));
-            let Some(fields) = fields.collect::<Option<Vec<Fielded>>>() else {
-                break;
+            let (tried, bytes) = self.mixed_within(&rated, room, accuracy_mm)?;
+            let rest = match &tried {
+                Tried::Image(attempt) if attempt.over.bytes <= 1.0 => return Ok(tried),
+                Tried::Image(attempt) => (attempt.baked.image.len() as u64).saturating_sub(bytes),
+                Tried::Over(_) => 0,
             };
-            let bytes: u64 = fields.iter().map(Fielded::bytes).sum();
-            let tried = self.assemble(accuracy_mm, fields, None)?;
-            match &tried {
-                Tried::Image(attempt) if !attempt.over.fits() && bytes > 0 && room > 0 => {
-                    // What is no field takes the rest.
-                    let rest = (attempt.baked.image.len() as u64).saturating_sub(bytes);
-                    let less = flash.saturating_sub(rest + rest / 8).min(room - room / 8);
-                    room = if attempt.over.bytes > 1.0 { less } else { 0 };
-                    if room == 0 {
-                        return Ok(tried);
-                    }
-                }
-                _ => return Ok(tried),
-            }
+            // What is no field takes the rest.
+            room = flash.saturating_sub(rest + rest / 8).min(room - room / 8);
         }
-        let smallest = mix(&rated, 0).unwrap_or_default();
-        let fields =
-            (self.shapes.iter().zip(smallest)).map(|(shape, number)| shape.taken(number, accuracy_mm));
-        match fields.collect::<Option<Vec<Fielded>>>() {
-            Some(fields) if fields.len() == self.shapes.len() => self.assemble(accuracy_mm, fields, None),
-            _ => Ok(Tried::Over(HOPELESS)),
-        }
+        Ok(self.mixed_within(&rated, 0, accuracy_mm)?.0)
+    }
+
+    /// The image of the best mix of fields within `room` bytes, and the bytes of the fields.
+    fn mixed_within(
+        &self,
+        rated: &[Vec<Rated>],
+        room: u64,
+        accuracy_mm: f64,
+    ) -> Result<(Tried, u64), BakeError> {
+        let fields: Option<Vec<Fielded>> = mix(rated, room).and_then(|chosen| {
+            let each = self.shapes.iter().zip(chosen);
+            each.map(|(shape, number)| shape.taken(number, accuracy_mm))
+                .collect()
+        });
+        let Some(fields) = fields else {
+            return Ok((Tried::Over(HOPELESS), 0));
+        };
+        let bytes = fields.iter().map(Fielded::bytes).sum();
+        Ok((self.assemble(accuracy_mm, fields, None)?, bytes))
     }
 
     /// The result of each shape, all at the same time.
@@ -469,7 +470,7 @@ impl<'a> Planner<'a> {
                 let found = &field.errors;
                 let free_form = &field.baked.free_form;
                 // What ended early, or was taken whatever its error, was not refined until its errors were small.
-                let ended = shape.ended.is_some() || field.is_smallest;
+                let ended = shape.ended.is_some() || field.is_mixed;
                 let trusted_mm = if ended {
                     self.request.accuracy_mm
                 } else {

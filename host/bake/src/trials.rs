@@ -84,8 +84,8 @@ pub(crate) struct Fielded {
     tolerance_mm: f64,
     /// Reach of the places at which its errors were measured, mm.
     reach_mm: f64,
-    /// Whether it was taken as the smallest, whatever its error.
-    pub is_smallest: bool,
+    /// Whether it was taken into a mix, whatever its error.
+    pub is_mixed: bool,
     pub errors: Arc<Vec<FaceError>>,
     pub baked: Arc<BakedField>,
 }
@@ -310,7 +310,7 @@ impl Trials {
 
     /// A known field, stated for another accuracy with the errors near enough for it.
     fn restated(&self, mut field: Fielded, finest: Choice) -> Fielded {
-        field.is_smallest = true;
+        field.is_mixed = true;
         field.choice.resolution_mm = finest.resolution_mm;
         field.choice.edges = finest.edges;
         let reach_mm = field.choice.reach_mm();
@@ -402,7 +402,7 @@ impl Trials {
             choice: choice.clone(),
             tolerance_mm,
             reach_mm: choice.reach_mm(),
-            is_smallest: false,
+            is_mixed: false,
             errors: Arc::new(made.errors),
             baked: Arc::new(made.field),
         });

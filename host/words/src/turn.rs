@@ -28,6 +28,18 @@ pub enum Verb {
     Turn,
 }
 
+impl Verb {
+    /// Its word, in lower case.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Connect => "connect",
+            Self::Disconnect => "disconnect",
+            Self::Adjust => "adjust",
+            Self::Turn => "turn",
+        }
+    }
+}
+
 /// Why a turn is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

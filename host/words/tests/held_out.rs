@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use mortise_words::{Outcome, Session, Turn, Verb};
+use mortise_words::{Outcome, Session, Turn};
 
 const LIST: &str = include_str!("data/held_out.txt");
 /// Instructions that must come out as expected.
@@ -74,14 +74,8 @@ fn came_to(turn: &Turn) -> String {
                 .acts
                 .iter()
                 .map(|act| {
-                    let verb = match act.verb {
-                        Verb::Connect => "connect",
-                        Verb::Disconnect => "disconnect",
-                        Verb::Adjust => "adjust",
-                        Verb::Turn => "turn",
-                    };
                     let b = act.b.as_deref().unwrap_or("-").replace(' ', "~");
-                    format!("{verb} {} {b}", act.a.replace(' ', "~"))
+                    format!("{} {} {b}", act.verb.word(), act.a.replace(' ', "~"))
                 })
                 .collect();
             format!("done {}", acts.join(", ")).trim().to_owned()

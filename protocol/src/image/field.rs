@@ -58,12 +58,12 @@ pub struct Cell<'a> {
     brick: &'a BrickRecord,
     /// Palette entry: the nearest faces of the cell.
     entry: u16,
+    /// Number of finer bricks that it is in.
+    level: u16,
     /// Index of the cell in the brick.
     index: usize,
     /// The position, in cells from the corner of the grid, or of the finer brick.
     at: [f32; 3],
-    /// Edge of the cell over that of the field's cells: less than 1 in a finer brick.
-    scale: f32,
 }
 
 /// Distance and gradient at a position.
@@ -137,13 +137,12 @@ impl<'a> Field<'a> {
                     index,
                     at: g,
                     entry: self.palette_entry(brick, index),
-                    scale: 1.0,
+                    level: 0,
                 };
-                Place::Cell(if Nearby::may_be_finer(cell.entry) {
-                    self.finest(cell)
-                } else {
-                    cell
-                })
+                if Nearby::is_finer(cell.entry) {
+                    return Place::Cell(self.finest(&cell));
+                }
+                Place::Cell(cell)
             }
             GridEntry::Empty { inside, cells } => Place::Far {
                 inside,
@@ -153,8 +152,9 @@ impl<'a> Field<'a> {
     }
 
     /// The cell at the same position in the finest brick that covers this one.
-    #[inline(never)]
-    fn finest(&self, mut cell: Cell<'a>) -> Cell<'a> {
+    #[cold]
+    fn finest(&self, cell: &Cell<'a>) -> Cell<'a> {
+        let mut cell = *cell;
         for _ in 0..MOST_LEVELS {
             let Some(brick) = self.finer(&cell) else { break };
             // Below 8: the fraction is below 1 by at least a rounding step.
@@ -165,7 +165,7 @@ impl<'a> Field<'a> {
                 index,
                 at,
                 entry: self.palette_entry(brick, index),
-                scale: cell.scale * (1.0 / BRICK_CELLS as f32),
+                level: cell.level + 1,
             };
         }
         cell
@@ -206,7 +206,7 @@ impl<'a> Field<'a> {
     /// Interpolated distance in a cell, m; 0 without samples.
     #[inline(always)]
     pub fn distance(&self, cell: &Cell<'_>) -> f32 {
-        value(&self.corners(cell.brick, cell.index), within(cell.at)) * (self.record.scale * cell.scale)
+        value(&self.corners(cell.brick, cell.index), within(cell.at)) * (self.record.scale * cell.scale())
     }
 
     /// Interpolated distance and its gradient in a cell; 0 without samples.
@@ -216,7 +216,7 @@ impl<'a> Field<'a> {
         let per_cell = self.record.scale * self.inverse_cell;
         let nearby = self.nearby(cell);
         FieldSample {
-            distance: value(&corners, within(cell.at)) * (self.record.scale * cell.scale),
+            distance: value(&corners, within(cell.at)) * (self.record.scale * cell.scale()),
             gradient: gradient(&corners, within(cell.at)).map(|x| x * per_cell),
             face: nearby.face(),
             nearby,
@@ -272,10 +272,12 @@ impl<'a> Field<'a> {
         let mut c = [0f32; 8];
         // All eight are in the run from the first to the last: one bounds check for the run instead of one for each.
         if self.record.format == FORMAT_I8 || brick.coarse != 0 {
-            let unit = if brick.coarse != 0 { COARSE_UNITS } else { 1.0 };
             let run: &[u8; RUN] = chunk(self.blob, brick.samples as usize + first);
             for (c, corner) in c.iter_mut().zip(CORNERS) {
-                *c = f32::from(run[corner] as i8) * unit;
+                *c = f32::from(run[corner] as i8);
+            }
+            if brick.coarse != 0 {
+                c = c.map(|c| c * COARSE_UNITS);
             }
         } else {
             let run: &[u8; 2 * RUN] = chunk(self.blob, brick.samples as usize + 2 * first);
@@ -304,7 +306,8 @@ impl Cell<'_> {
     /// Its edge over that of the field's cells: less than 1 in a finer brick.
     #[inline(always)]
     pub fn scale(&self) -> f32 {
-        self.scale
+        // 2⁻³ for each level, by the exponent's bits.
+        f32::from_bits((127 - u32::from(BRICK_SHIFT as u16 * self.level)) << 23)
     }
 
     /// Whether its brick stores samples: if not, the surfaces that the cell names give the distance.

@@ -24,7 +24,7 @@ mod surfaces;
 pub use edge::{EdgeRecord, NO_SPAN, SpanRecord};
 pub use error::ImageError;
 pub use field::{COARSE_UNITS, Cell, EDGE_ERROR_CELLS, Field, FieldSample, Lookup, Place};
-pub use nearby::{FINER, Group, MOST_LEVELS, Nearby};
+pub use nearby::{Group, MOST_LEVELS, Nearby};
 pub use occupancy::{VOXEL_BRICK_BYTES, Voxel, VoxelSample};
 pub use open::{CRC, SceneImage, Shape};
 pub use records::*;

@@ -2,10 +2,6 @@
 
 use super::records::NO_FACE;
 
-/// First word of a group of kind [`Nearby::Convex`] that is no group: a *finer brick* covers the cell, and the next word is its number. No group of
-/// faces begins with it, for a last face is not joined to another.
-pub const FINER: u16 = 0xffff;
-
 /// Most finer bricks in one another.
 pub const MOST_LEVELS: usize = 4;
 
@@ -87,7 +83,8 @@ impl Group {
 /// A palette entry: the faces nearest to a cell, and whether their exact surfaces give the distance there.
 ///
 /// Of the 16 bits the upper two are the kind: 00 [`Self::Face`], 01 [`Self::Roughly`], 10 [`Self::Convex`], 11 [`Self::Reentrant`]. The others are
-/// the face, or the index in the brick's palette of its [`Group`]. [`NO_FACE`] as a whole is [`Self::Unknown`].
+/// the face, or the index in the brick's palette of its [`Group`]. [`NO_FACE`] as a whole is [`Self::Unknown`]. Upper bits 101 are none of these kinds: a
+/// *finer brick* covers the cell ([`Self::finer`]); no palette is so long that the index of a group reaches bit 13.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Nearby {
     /// Nearest face unknown.
@@ -109,6 +106,8 @@ impl Nearby {
     /// Most faces and patches of a shape whose palettes state more than [`Self::Unknown`].
     pub const MAX_FACES: u16 = 0x3fff;
     const KIND: u16 = 0xc000;
+    const FINER: u16 = 0xa000;
+    const FINER_MASK: u16 = 0xe000;
 
     /// From a palette entry; `group` reads a group from an index in the brick's palette.
     #[inline]
@@ -123,27 +122,24 @@ impl Nearby {
         }
     }
 
-    /// Whether a palette entry may name a finer brick.
+    /// Whether a palette entry names a finer brick.
     #[inline(always)]
-    pub const fn may_be_finer(bits: u16) -> bool {
-        bits & Self::KIND == 0x8000
+    pub const fn is_finer(bits: u16) -> bool {
+        bits & Self::FINER_MASK == Self::FINER
     }
 
     /// Number of the finer brick that a palette entry names, if it does; `palette` begins with the brick's own.
     #[inline]
     pub fn finer(bits: u16, palette: &[u16]) -> Option<u16> {
-        if !Self::may_be_finer(bits) {
+        if !Self::is_finer(bits) {
             return None;
         }
-        match palette.get(usize::from(bits & Self::MAX_FACES)..)? {
-            [FINER, number, ..] => Some(*number),
-            _ => None,
-        }
+        palette.get(usize::from(bits & !Self::FINER_MASK)).copied()
     }
 
-    /// Palette entry of a cell under a finer brick; `at` is the index in the brick's palette of [`FINER`] and the number.
+    /// Palette entry of a cell under a finer brick; `at` is the index in the brick's palette of its number.
     pub const fn finer_bits(at: u16) -> u16 {
-        0x8000 | at & Self::MAX_FACES
+        Self::FINER | at & !Self::FINER_MASK
     }
 
     /// To a palette entry; `at` is the index in the brick's palette of the group, for the kinds that have one.

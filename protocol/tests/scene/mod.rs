@@ -370,7 +370,7 @@ pub fn finer_bytes() -> Vec<u8> {
     let roughly = Nearby::Roughly(0).to_bits(0);
     let mut palette = vec![roughly];
     for number in 0..2 {
-        palette.extend([roughly, Nearby::finer_bits(2), FINER, number]);
+        palette.extend([roughly, Nearby::finer_bits(2), number]);
     }
     palette.resize(palette.len() + 256, NO_FACE);
     let brick = |samples: u32, coarse: u8, palette: u32, indices: Option<u32>| BrickRecord {
@@ -416,7 +416,7 @@ pub fn finer_bytes() -> Vec<u8> {
         bricks: &[
             brick(finest, 0, 0, None),
             brick(middle, 1, 1, Some(in_middle)),
-            brick(coarsest, 0, 5, Some(in_coarsest)),
+            brick(coarsest, 0, 4, Some(in_coarsest)),
         ],
         palette: &palette,
         grid: &[GridEntry::Brick(2).to_bits()],

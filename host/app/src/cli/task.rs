@@ -112,18 +112,12 @@ fn shown(turn: &Turn) -> String {
                 .acts
                 .iter()
                 .map(|act| {
-                    let verb = match act.verb {
-                        Verb::Connect => "connect",
-                        Verb::Disconnect => "disconnect",
-                        Verb::Adjust => "adjust",
-                        Verb::Turn => "turn",
-                    };
                     let unit = if act.verb == Verb::Turn { "°" } else { " mm" };
                     let to = act.b.as_ref().map_or(String::new(), |b| format!(" – {b}"));
                     let by = act
                         .amount
                         .map_or(String::new(), |amount| format!(", {amount:.3}{unit}"));
-                    format!("{verb} {}{to}{by}", act.a)
+                    format!("{} {}{to}{by}", act.verb.word(), act.a)
                 })
                 .collect();
             let what = if acts.is_empty() {
