@@ -59,7 +59,9 @@ fn spread_on_face(parts: &[FacePart]) -> impl Iterator<Item = DVec3> {
 /// Parts in a cube of the triangles within `radius` of its centre, by face; `near` receives the face of each such triangle.
 fn parts_in(surface: &ExactSurface, cube: Cube, radius: f64, mut near: impl FnMut(u16)) -> Vec<FacePart> {
     let mut parts = Vec::new();
+    let mut examined = 0;
     surface.triangles.within(cube.center, radius, |triangle, _, _| {
+        examined += 1;
         let face = surface.shape.mesh.triangle_face[triangle as usize] as u16;
         near(face);
         let corners = cube.clip(surface.triangles.corners(triangle));
@@ -71,6 +73,7 @@ fn parts_in(surface: &ExactSurface, cube: Cube, radius: f64, mut near: impl FnMu
             });
         }
     });
+    surface.work().add(examined);
     parts.sort_by_key(|part| (part.face, part.triangle));
     parts
 }

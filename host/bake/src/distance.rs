@@ -78,10 +78,17 @@ impl Work {
     pub fn add(&self, triangles: u64) {
         self.0.fetch_add(triangles, Ordering::Relaxed);
     }
+
+    /// Takes back what exceeds `limit`.
+    pub fn at_most(&self, limit: u64) {
+        self.0.fetch_min(limit, Ordering::Relaxed);
+    }
 }
 
 /// Work of a query beside the triangles that it examines.
 const QUERY_WORK: u64 = 16;
+/// Work of a search for a foot on a free-form face.
+const FOOT_WORK: u64 = 12;
 
 /// Buffers reused between queries: one set for each thread.
 #[derive(Default)]
@@ -225,8 +232,7 @@ impl ExactSurface {
                     .filter(|&&i| i != NONE),
             );
         }
-        let examined = QUERY_WORK + near.len() as u64;
-        self.work.0.fetch_add(examined, Ordering::Relaxed);
+        let mut examined = QUERY_WORK + near.len() as u64;
         faces.sort_unstable();
         faces.dedup();
         pieces.sort_unstable();
@@ -259,6 +265,7 @@ impl ExactSurface {
                 let chord = self.topology.chord[f as usize];
                 let triangles = &self.shape.mesh.triangles;
                 self.topology.free_forms.feet(f, p, chord, triangles, near, |q| {
+                    examined += FOOT_WORK;
                     let d = p.distance(q.point);
                     if d <= best + SAME_MM && self.in_trim(f, q.point, near) {
                         let normal = q.normal * self.topology.sense[f as usize];
@@ -302,6 +309,7 @@ impl ExactSurface {
                 }
             }
         }
+        self.work.add(examined);
         let Some(feature) = feature else {
             // Every projection fell outside its trim and no boundary is near (the tessellation does not approximate its face): fall back to the
             // tessellation.

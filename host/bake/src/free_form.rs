@@ -21,10 +21,56 @@ pub(crate) struct FreeForms {
     seeds: Vec<[f64; 2]>,
 }
 
+/// Samples of a patch, sorted along the axis in which they extend farthest.
+struct Samples {
+    axis: usize,
+    /// Parameters and place, and the number in the order of the patch.
+    sorted: Vec<([f64; 2], DVec3, usize)>,
+}
+
+impl Samples {
+    fn new(samples: Vec<([f64; 2], DVec3)>) -> Self {
+        let (least, most) = (samples.iter())
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(least, most), (_, p)| {
+                (least.min(*p), most.max(*p))
+            });
+        let axis = (most - least).max_position();
+        let numbered = samples.into_iter().enumerate();
+        let mut sorted: Vec<_> = numbered.map(|(number, (uv, p))| (uv, p, number)).collect();
+        sorted.sort_by(|(_, a, _), (_, b, _)| a[axis].total_cmp(&b[axis]));
+        Self { axis, sorted }
+    }
+
+    /// Parameters of the sample nearest to `p`, searched outwards from it along the axis; of equal ones, as at a pole, the first of the patch.
+    fn nearest(&self, p: DVec3) -> Option<[f64; 2]> {
+        let from = (self.sorted).partition_point(|(_, q, _)| q[self.axis] < p[self.axis]);
+        let (below, above) = self.sorted.split_at(from);
+        let (mut best, mut first, mut found) = (f64::INFINITY, usize::MAX, None);
+        let mut search = |side: &mut dyn Iterator<Item = &([f64; 2], DVec3, usize)>| {
+            for (uv, q, number) in side {
+                if (q[self.axis] - p[self.axis]).powi(2) > best {
+                    break;
+                }
+                let far = q.distance_squared(p);
+                if far < best || far == best && *number < first {
+                    (best, first, found) = (far, *number, Some(*uv));
+                }
+            }
+        };
+        search(&mut above.iter());
+        search(&mut below.iter().rev());
+        found
+    }
+}
+
 impl FreeForms {
-    /// Locates each triangle on the patch of its face. Cost: triangles times samples of the patch, 5 ns each.
+    /// Locates each triangle on the patch of its face. Cost: for each triangle about the square root of the number of samples of the patch, 5 ns each.
     pub fn new(shape: &Shape) -> Self {
         let mesh = &shape.mesh;
+        let mut of_face: Vec<Vec<usize>> = vec![Vec::new(); shape.faces.len()];
+        for (t, face) in mesh.triangle_face.iter().enumerate() {
+            of_face[*face as usize].push(t);
+        }
         let mut patches: Vec<Option<Patch>> = shape.faces.iter().map(|_| None).collect();
         let mut seeds = vec![[0.0; 2]; mesh.triangles.len()];
         let found: Vec<_> = shape
@@ -36,18 +82,12 @@ impl FreeForms {
             })
             .filter_map(|surface| {
                 let patch = Patch::new(surface)?;
-                let grid = patch.grid();
+                let samples = Samples::new(patch.grid());
                 let mut own = Vec::new();
-                for (t, triangle) in mesh.triangles.iter().enumerate() {
-                    if mesh.triangle_face[t] != surface.face {
-                        continue;
-                    }
-                    let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
+                for &t in &of_face[surface.face as usize] {
+                    let [a, b, c] = mesh.triangles[t].map(|v| mesh.vertices[v as usize]);
                     let middle = (a + b + c) / 3.0;
-                    let (start, _) = grid.iter().min_by(|(_, p), (_, q)| {
-                        p.distance_squared(middle).total_cmp(&q.distance_squared(middle))
-                    })?;
-                    let on = patch.project(middle, *start);
+                    let on = patch.project(middle, samples.nearest(middle)?);
                     if on.point.distance(middle) > STRANGE_MM + 4.0 * shape.deflection_mm {
                         return None;
                     }

@@ -37,6 +37,17 @@ const COARSER_CROSSINGS: usize = 4;
 const MIXES: usize = 4;
 /// Coarsest accuracy tried.
 const COARSEST_MM: f64 = 2.0;
+/// Part of the work and time that is left which the accuracy asked may take, and then each coarser one.
+const PART_OF_ASKED: f64 = 0.75;
+const PART_OF_COARSER: f64 = 0.9;
+/// A shape's stopgap may take this part of all work, or its share.
+const STOPGAP_PART: u64 = 4;
+/// Factor by which the accuracy is lowered where work or time ended the search of fields.
+const COARSER_WHERE_ENDED: f64 = 5.0;
+/// The same where finer bricks take too many bytes: these fall slowly with the accuracy.
+const COARSER_WHERE_FINER: f64 = 8.0;
+/// Error reached over the accuracy tried up to which the search goes on from there.
+const NEAR: f64 = 2.0;
 
 /// What may be spent on planning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,10 +59,10 @@ pub struct Effort {
 }
 
 impl Default for Effort {
-    /// Work of about 20 s on two cores, and a time that only much slower machines reach.
+    /// Work of about 40 s on two cores, and a time that only much slower machines reach.
     fn default() -> Self {
         Self {
-            work: 500_000_000,
+            work: 600_000_000,
             time: Duration::from_secs(55),
         }
     }
@@ -123,12 +134,15 @@ pub fn plan_within(
 struct Over {
     bytes: f64,
     instructions: f64,
+    /// Whether finer bricks are part of the bytes.
+    finer: bool,
 }
 
 /// Excess assumed for an attempt that the layout itself cannot hold.
 const HOPELESS: Over = Over {
     bytes: 4.0,
     instructions: 1.0,
+    finer: false,
 };
 
 impl Over {
@@ -138,6 +152,9 @@ impl Over {
 
     /// Factor by which to lower the accuracy: bytes grow at most with its inverse, points with the square root of its inverse.
     fn coarser(self) -> f64 {
+        if self.finer && self.bytes > 1.0 {
+            return COARSER_WHERE_FINER;
+        }
         (1.05 * self.bytes)
             .max(1.1 * self.instructions * self.instructions)
             .clamp(1.25, 8.0)
@@ -167,6 +184,11 @@ impl Attempt {
         let plan = &self.plan;
         plan.error_in_fits_mm().max(plan.error_elsewhere_mm() / ELSEWHERE)
     }
+
+    /// Whether work or time ended the search of its fields.
+    fn is_ended(&self) -> bool {
+        matches!(self.limit, Some(Limit::Work | Limit::Time))
+    }
 }
 
 /// Result of trying an accuracy.
@@ -193,6 +215,8 @@ struct Planner<'a> {
     progress: &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync),
     cache: &'a dyn Cache,
     clock: Clock,
+    /// End of the present accuracy's trials.
+    until: Clock,
     /// What ended a search, the clock before the work.
     ended: Option<End>,
     scene: Scene,
@@ -232,7 +256,9 @@ impl<'a> Planner<'a> {
                 let share = surface.shape().faces.len() as f64 / faces.max(1) as f64;
                 let share = share.max(0.5 / scene.shapes.len() as f64);
                 let name = shape_name(surface.shape());
-                Trials::new(i, surface, demand, name, (share * effort.work as f64) as u64)
+                let share = (share * effort.work as f64) as u64;
+                let stopgap = share.max(effort.work / STOPGAP_PART);
+                Trials::new(i, surface, demand, name, [share, stopgap])
             })
             .collect();
         Ok(Self {
@@ -241,6 +267,7 @@ impl<'a> Planner<'a> {
             progress,
             cache,
             clock,
+            until: clock,
             ended: None,
             scene,
             shapes,
@@ -255,28 +282,41 @@ impl<'a> Planner<'a> {
         let mut best: Option<Box<Attempt>> = None;
         let mut last: Option<Box<Attempt>> = None;
         let mut over = None;
-        for _ in 0..=ATTEMPTS {
-            let tried = self.attempt(accuracy)?;
+        for attempt in 0..=ATTEMPTS {
+            let tried = self.attempt(
+                accuracy,
+                if attempt == 0 {
+                    PART_OF_ASKED
+                } else {
+                    PART_OF_COARSER
+                },
+            )?;
             let found = tried.over();
             match tried {
                 Tried::Image(attempt) if found.fits() => {
                     let enough = attempt.limit.is_none();
+                    let ended = attempt.is_ended();
+                    let reached = attempt.reached_mm();
                     best = better(best, attempt);
                     // Coarser fields can only be smaller, not better, once one of the shapes is what limits it.
-                    if enough
-                        || best
-                            .as_ref()
-                            .is_some_and(|best| 2.0 * accuracy >= best.reached_mm())
-                    {
+                    if enough || NEAR * accuracy >= reached {
                         break;
                     }
-                    accuracy *= 2.0;
+                    if ended {
+                        failed = accuracy;
+                    }
+                    accuracy *= if ended { COARSER_WHERE_ENDED } else { 2.0 };
+                    if accuracy > COARSEST_MM {
+                        break;
+                    }
                     continue;
                 }
                 Tried::Image(attempt) => last = Some(attempt),
                 Tried::Over(_) => {}
             }
-            over = Some(found.limit());
+            if self.shapes.iter().all(|shape| shape.ended.is_none()) {
+                over = Some(found.limit());
+            }
             if accuracy > COARSEST_MM || best.is_some() {
                 break;
             }
@@ -292,9 +332,13 @@ impl<'a> Planner<'a> {
                 break;
             }
             let between = (accuracy * failed).sqrt();
-            match self.attempt(between)? {
+            match self.attempt(between, 1.0)? {
                 Tried::Image(attempt) if attempt.over.fits() => {
-                    accuracy = between;
+                    if attempt.reached_mm() <= NEAR * between {
+                        accuracy = between;
+                    } else {
+                        failed = between;
+                    }
                     best = better(best, attempt);
                 }
                 _ => failed = between,
@@ -331,7 +375,8 @@ impl<'a> Planner<'a> {
         } else if self.ended == Some(End::Time) {
             Limit::Time
         } else {
-            (over.or(found.limit)).unwrap_or_else(|| Limit::Shape(found.plan.least_accurate()))
+            let work = self.ended.map(|_| Limit::Work);
+            (over.or(found.limit).or(work)).unwrap_or_else(|| Limit::Shape(found.plan.least_accurate()))
         };
         Planned {
             met,
@@ -342,8 +387,9 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Bakes for `accuracy_mm`.
-    fn attempt(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
+    /// Bakes for `accuracy_mm` within this part of the work and time that are left.
+    fn attempt(&mut self, accuracy_mm: f64, part: f64) -> Result<Tried, BakeError> {
+        self.begin(part);
         let room = self.request.flash_bytes;
         let found = self.find(accuracy_mm)?;
         self.note_end();
@@ -375,13 +421,23 @@ impl<'a> Planner<'a> {
         }
         let bytes: u64 = fields.iter().map(Fielded::bytes).sum();
         if bytes > room {
-            let bytes = bytes as f64 / room.max(1) as f64;
-            return Ok(Tried::Over(Over { bytes, ..HOPELESS }));
+            return Ok(Tried::Over(Over {
+                bytes: bytes as f64 / room.max(1) as f64,
+                finer: has_finer(&fields),
+                ..HOPELESS
+            }));
         }
         if too_large {
             limit = Some(Limit::Bytes);
         }
         self.assemble(accuracy_mm, fields, limit)
+    }
+
+    /// Begins an accuracy with this part of the work and time that are left.
+    fn begin(&mut self, part: f64) {
+        self.shapes.iter_mut().for_each(|shape| shape.begin(part));
+        // Work is what ends an accuracy; less of the clock is kept for others, as it only ends what much slower machines do.
+        self.until = self.clock.part(0.5 * (1.0 + part));
     }
 
     /// Notes what ended the trials of any shape.
@@ -406,6 +462,7 @@ impl<'a> Planner<'a> {
 
     /// The best mix of the fields found of all shapes that fits the flash; the smallest one where none does.
     fn mixed(&mut self, accuracy_mm: f64) -> Result<Tried, BakeError> {
+        self.begin(1.0);
         let rated = self.each(|shape, bench| shape.rated(bench, accuracy_mm))?;
         self.note_end();
         let flash = self.request.flash_bytes;
@@ -452,7 +509,7 @@ impl<'a> Planner<'a> {
             cache: self.cache,
             progress: self.progress,
             tolerance_mm: PATCH_SHARE * self.request.accuracy_mm,
-            clock: self.clock,
+            clock: self.until,
             room: self.request.flash_bytes,
         };
         (self.shapes.par_iter_mut().map(|shape| of(shape, &bench))).collect()
@@ -465,6 +522,7 @@ impl<'a> Planner<'a> {
         fielded: Vec<Fielded>,
         limit: Option<Limit>,
     ) -> Result<Tried, BakeError> {
+        let finer = has_finer(&fielded);
         let mut shapes: Vec<ShapePlan> = (self.shapes.iter().zip(&fielded))
             .map(|(shape, field)| {
                 let found = &field.errors;
@@ -515,7 +573,10 @@ impl<'a> Planner<'a> {
             baked => baked?,
         };
         self.scene.done(self.progress);
-        let over = self.over(baked.image.len(), longest(&ticks));
+        let over = Over {
+            finer,
+            ..self.over(baked.image.len(), longest(&ticks))
+        };
         let plan = Plan {
             accuracy_mm,
             shapes,
@@ -549,6 +610,7 @@ impl<'a> Planner<'a> {
         Over {
             bytes: bytes as f64 / self.request.flash_bytes.max(1) as f64,
             instructions: allowed.map_or(0.0, |most| instructions as f64 / most.max(1) as f64),
+            finer: false,
         }
     }
 }
@@ -559,6 +621,10 @@ fn better(best: Option<Box<Attempt>>, attempt: Box<Attempt>) -> Option<Box<Attem
         Some(best) if best.reached_mm() <= attempt.reached_mm() => Some(best),
         _ => Some(attempt),
     }
+}
+
+fn has_finer(fields: &[Fielded]) -> bool {
+    fields.iter().any(|field| field.baked.finer_bricks > 0)
 }
 
 fn longest(ticks: &[PartTick]) -> u64 {

@@ -4,10 +4,11 @@
 //! interpolation alone follow in closed form ([`crate::choice`]) and are tried last. What was tried is kept: a coarser accuracy costs little after a
 //! finer one.
 //!
-//! Work is counted in triangles that distance queries examine ([`ExactSurface::work`]). A shape has a share of it; when that is used up, the
-//! most accurate field found so far is taken. A field that exceeds the share is not used, however much of it was done, and one from the cache counts as
-//! when it was baked. So the result depends on the model alone, not on the machine, unless the clock ends the planning: that is the last resort.
-//! Whatever ends it, only fields whose errors were measured completely are used.
+//! Work is counted in triangles that distance queries examine ([`ExactSurface::work`]). A shape has a share of it, and each accuracy a part of that
+//! ([`Trials::begin`]), so that work is left for a coarser accuracy; when the part is used up, the most accurate field found so far is taken. A field that
+//! exceeds the part is not used, however much of it was done, and one from the cache counts as when it was baked. So the result depends on the model
+//! alone, not on the machine, unless the clock ends the planning: that is the last resort. Whatever ends it, only fields whose errors were measured
+//! completely are used.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
@@ -32,6 +33,10 @@ const FINER: f64 = 0.7;
 const HELPS: f64 = 0.9;
 /// A field with finer bricks of more than this share of the image is kept without them, too.
 const LARGE_SHARE: u64 = 4;
+/// Most work of a shape's first field over its share: with more of it the accuracy is out of reach.
+const FIRST_PART: f64 = 0.35;
+/// Accuracy of the patches of a shape's first field over the one asked, where that takes too much work.
+const STOPGAP: f64 = 25.0;
 /// Smallest cell tried, mm.
 const LEAST_CELL_MM: f64 = 1e-3;
 
@@ -62,6 +67,15 @@ impl Clock {
         }
     }
 
+    /// Ends after this part of the time that is left.
+    pub fn part(self, part: f64) -> Self {
+        let now = Instant::now();
+        let left = |until: Instant| until.saturating_duration_since(now).mul_f64(part);
+        Self {
+            until: self.until.map(|until| now + left(until)),
+        }
+    }
+
     /// Whether it has ended.
     pub fn is_over(self) -> bool {
         self.until.is_some_and(|until| Instant::now() >= until)
@@ -84,6 +98,8 @@ pub(crate) struct Fielded {
     tolerance_mm: f64,
     /// Reach of the places at which its errors were measured, mm.
     reach_mm: f64,
+    /// Whether it was made because there was no other.
+    is_stopgap: bool,
     /// Whether it was taken into a mix, whatever its error.
     pub is_mixed: bool,
     pub errors: Arc<Vec<FaceError>>,
@@ -146,8 +162,11 @@ pub(crate) struct Trials {
     /// Name of its geometry in the cache.
     name: Option<String>,
     known: Vec<Fielded>,
-    /// Most work.
+    /// Most work of all accuracies, and that of a stopgap beside it.
     share: u64,
+    stopgap: u64,
+    /// Count of work at which the trials of the present accuracy end.
+    limit: u64,
     /// What ended them, if anything has.
     pub ended: Option<End>,
 }
@@ -158,7 +177,7 @@ impl Trials {
         surface: ExactSurface,
         demand: Demand,
         name: Option<String>,
-        share: u64,
+        [share, stopgap]: [u64; 2],
     ) -> Self {
         Self {
             number,
@@ -167,8 +186,25 @@ impl Trials {
             name,
             known: Vec::new(),
             share,
+            stopgap,
+            limit: share,
             ended: None,
         }
+    }
+
+    /// Begins the trials of an accuracy, with this part of the work that is left.
+    pub fn begin(&mut self, part: f64) {
+        let used = self.surface.work().so_far().min(self.share);
+        self.limit = used + (part * (self.share - used) as f64) as u64;
+        self.ended = None;
+    }
+
+    /// Ends the trials of an accuracy. The count does not depend on how far the work went that is not used.
+    fn end(&mut self, end: End) {
+        if end == End::Work {
+            self.surface.work().at_most(self.limit);
+        }
+        self.ended = Some(end);
     }
 
     /// The smallest field found that is as accurate as `accuracy_mm` requires, of at most about `room` bytes, within so many steps from coarse to fine.
@@ -358,11 +394,14 @@ impl Trials {
         choice: &Choice,
         accuracy_mm: f64,
     ) -> Result<Option<Fielded>, BakeError> {
-        let tolerance_mm = bench.tolerance(accuracy_mm);
+        let mut tolerance_mm = bench.tolerance(accuracy_mm);
+        let has_ended = self.ended.is_some();
         let same = |field: &&mut Fielded| {
+            let is_as_fine = field.tolerance_mm == tolerance_mm || !field.baked.has_local_patches();
+            let may_be_finer = field.is_stopgap && field.baked.finer_bricks == 0;
             field.choice.cell_mm == choice.cell_mm
                 && field.choice.format == choice.format
-                && (field.tolerance_mm == tolerance_mm || !field.baked.has_local_patches())
+                && (is_as_fine && !may_be_finer || field.is_stopgap && has_ended)
         };
         if let Some(known) = self.known.iter_mut().find(same) {
             known.measure_to(&self.surface, choice.reach_mm());
@@ -374,34 +413,35 @@ impl Trials {
         if choice.cell_mm < LEAST_CELL_MM {
             return Ok(None);
         }
-        // The first field is baked regardless of its cost, if without finer bricks, so that there is one.
         let is_first = self.known.is_empty();
         if !is_first && self.ended.is_some() {
             return Ok(None);
         }
         let factors = self.demand.factors();
-        let mut made = self.kept_or_made(bench, choice, tolerance_mm, Some(&factors))?;
-        if made.is_none() && is_first {
-            made = self.kept_or_made(bench, choice, tolerance_mm, None)?;
-        }
+        let (made, is_stopgap) = if is_first {
+            self.first(bench, choice, &mut tolerance_mm, accuracy_mm)?
+        } else {
+            (self.within_limit(bench, choice, (tolerance_mm, &factors))?, false)
+        };
         let Some(made) = made else { return Ok(None) };
         let bytes = field_bytes(&made.field);
         let mut found = vec![made];
         // Where finer bricks take much, the same field without them may be what fits beside the other shapes.
         if found[0].field.finer_bricks > 0 && bytes > bench.room / LARGE_SHARE {
-            found.extend(self.kept_or_made(bench, choice, tolerance_mm, None)?);
+            found.extend(self.kept_or_made(bench, choice, (tolerance_mm, None), false)?);
             if bytes > bench.room {
                 found.remove(0);
             }
         }
-        if !is_first && self.surface.work().so_far() > self.share {
-            self.ended = Some(End::Work);
+        if !is_first && self.surface.work().so_far() > self.limit {
+            self.end(End::Work);
             return Ok(None);
         }
         let fields = found.into_iter().map(|made| Fielded {
             choice: choice.clone(),
             tolerance_mm,
             reach_mm: choice.reach_mm(),
+            is_stopgap,
             is_mixed: false,
             errors: Arc::new(made.errors),
             baked: Arc::new(made.field),
@@ -411,13 +451,57 @@ impl Trials {
         Ok(self.known.get(first).cloned())
     }
 
-    /// The field with its errors from the cache, or made; `None` as for [`Self::tried`].
+    /// A shape's first field, with finer bricks if it takes no more than its part of the work; else, as a stopgap, with patches and finer bricks for a
+    /// coarse accuracy, for which it has work of its own; else without finer bricks, whatever the work, so that there is one. Whether it is a stopgap.
+    fn first(
+        &mut self,
+        bench: &Bench<'_>,
+        choice: &Choice,
+        tolerance_mm: &mut f64,
+        accuracy_mm: f64,
+    ) -> Result<(Option<KeptField>, bool), BakeError> {
+        let factors = self.demand.factors();
+        let whole = self.limit;
+        let most = (FIRST_PART * self.share as f64) as u64;
+        self.limit = whole.min(most);
+        let mut made = self.within_limit(bench, choice, (*tolerance_mm, &factors))?;
+        let is_stopgap = self.ended.is_some();
+        if is_stopgap {
+            *tolerance_mm = bench.tolerance(STOPGAP * accuracy_mm);
+            self.limit += self.stopgap;
+            made = self.within_limit(bench, choice, (*tolerance_mm, &factors))?;
+        }
+        self.limit = whole;
+        let fits = |made: &KeptField| field_bytes(&made.field) <= bench.room;
+        if !made.as_ref().is_some_and(fits) {
+            let plain = self.kept_or_made(bench, choice, (*tolerance_mm, None), true)?;
+            made = plain.or(made);
+        }
+        Ok((made, is_stopgap))
+    }
+
+    /// The field with finer bricks, unless it takes more work than there is.
+    fn within_limit(
+        &mut self,
+        bench: &Bench<'_>,
+        choice: &Choice,
+        (tolerance_mm, factors): (f64, &[f64]),
+    ) -> Result<Option<KeptField>, BakeError> {
+        let made = self.kept_or_made(bench, choice, (tolerance_mm, Some(factors)), false)?;
+        if self.surface.work().so_far() > self.limit {
+            self.end(End::Work);
+            return Ok(None);
+        }
+        Ok(made)
+    }
+
+    /// The field with its errors from the cache, or made, if need be `regardless` of work and time; `None` as for [`Self::tried`].
     fn kept_or_made(
         &mut self,
         bench: &Bench<'_>,
         choice: &Choice,
-        tolerance_mm: f64,
-        finer: Option<&[f64]>,
+        (tolerance_mm, finer): (f64, Option<&[f64]>),
+        regardless: bool,
     ) -> Result<Option<KeptField>, BakeError> {
         let name = field_name(self.name.as_ref(), choice, tolerance_mm, finer);
         let faces = self.surface.shape().faces.len();
@@ -431,7 +515,7 @@ impl Trials {
             }
             return Ok(Some(kept));
         }
-        let made = self.made(bench, choice, tolerance_mm, finer)?;
+        let made = self.made(bench, choice, (tolerance_mm, finer), regardless)?;
         if let Some((name, bytes)) = name.zip(made.as_ref().and_then(KeptField::to_bytes)) {
             bench.cache.put(&name, &bytes);
         }
@@ -443,12 +527,11 @@ impl Trials {
         &mut self,
         bench: &Bench<'_>,
         choice: &Choice,
-        tolerance_mm: f64,
-        finer: Option<&[f64]>,
+        (tolerance_mm, finer): (f64, Option<&[f64]>),
+        regardless: bool,
     ) -> Result<Option<KeptField>, BakeError> {
-        let is_first = self.known.is_empty() && finer.is_none();
-        if !is_first && bench.clock.is_over() {
-            self.ended = Some(End::Time);
+        if !regardless && bench.clock.is_over() {
+            self.end(End::Time);
             return Ok(None);
         }
         let options = BakeOptions {
@@ -458,21 +541,21 @@ impl Trials {
             patch_tolerance_mm: tolerance_mm,
             ..BakeOptions::default()
         };
-        let (work, share) = (self.surface.work(), self.share);
+        let (work, limit) = (self.surface.work(), self.limit);
         let before = work.so_far();
         let stopped = Mutex::new(None);
         let progress = |progress: Progress| {
             (bench.progress)(progress)?;
-            let end = if work.so_far() > share {
+            if regardless {
+                return ControlFlow::Continue(());
+            }
+            let end = if work.so_far() > limit {
                 End::Work
             } else if bench.clock.is_over() {
                 End::Time
             } else {
                 return ControlFlow::Continue(());
             };
-            if is_first {
-                return ControlFlow::Continue(());
-            }
             if let Ok(mut stopped) = stopped.lock() {
                 stopped.get_or_insert(end);
             }
@@ -489,8 +572,11 @@ impl Trials {
         let field = match baked {
             Err(BakeError::CellTooSmall { .. }) => return Ok(None),
             Err(BakeError::Cancelled) => {
-                self.ended = stopped.lock().ok().and_then(|end| *end);
-                return self.ended.map_or(Err(BakeError::Cancelled), |_| Ok(None));
+                let Some(end) = stopped.lock().ok().and_then(|end| *end) else {
+                    return Err(BakeError::Cancelled);
+                };
+                self.end(end);
+                return Ok(None);
             }
             done => done?,
         };
