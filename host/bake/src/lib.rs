@@ -11,6 +11,7 @@
 
 mod accuracy;
 mod area_curvatures;
+mod attempt;
 mod bake;
 mod bounds;
 mod bricks;

@@ -13,7 +13,8 @@ use mortise_brep::CadModel;
 use mortise_haptics::LEAST_CROSSING_SINE;
 use rayon::prelude::*;
 
-use crate::bake::{Baked, Made};
+use crate::attempt::{Attempt, HOPELESS, Over, Tried, better};
+use crate::bake::Made;
 use crate::cache::{Cache, NoCache, plan_from_bytes, plan_name, plan_to_bytes, shape_name};
 use crate::choice::PATCH_SHARE;
 use crate::demands::{all_fits, demand, reached_surface};
@@ -23,7 +24,7 @@ use crate::field::BakedField;
 use crate::fits::Fit;
 use crate::mix::mix;
 use crate::options::{BakeOptions, Progress};
-use crate::plan::{ELSEWHERE, Limit, PartTick, Plan, Planned, Request, ShapePlan};
+use crate::plan::{Limit, PartTick, Plan, Planned, Request, ShapePlan};
 use crate::scene::Scene;
 use crate::ticks::Ticks;
 use crate::trials::{Bench, Clock, End, Fielded, Found, Rated, Trials};
@@ -44,8 +45,6 @@ const PART_OF_COARSER: f64 = 0.9;
 const STOPGAP_PART: u64 = 4;
 /// Factor by which the accuracy is lowered where work or time ended the search of fields.
 const COARSER_WHERE_ENDED: f64 = 5.0;
-/// The same where finer bricks take too many bytes: these fall slowly with the accuracy.
-const COARSER_WHERE_FINER: f64 = 8.0;
 /// Error reached over the accuracy tried up to which the search goes on from there.
 const NEAR: f64 = 2.0;
 
@@ -127,85 +126,6 @@ pub fn plan_within(
         cache.put(&name, &bytes);
     }
     Ok(planned)
-}
-
-/// Size and cost of an attempt as multiples of their limits.
-#[derive(Clone, Copy)]
-struct Over {
-    bytes: f64,
-    instructions: f64,
-    /// Whether finer bricks are part of the bytes.
-    finer: bool,
-}
-
-/// Excess assumed for an attempt that the layout itself cannot hold.
-const HOPELESS: Over = Over {
-    bytes: 4.0,
-    instructions: 1.0,
-    finer: false,
-};
-
-impl Over {
-    fn fits(self) -> bool {
-        self.bytes <= 1.0 && self.instructions <= 1.0
-    }
-
-    /// Factor by which to lower the accuracy: bytes grow at most with its inverse, points with the square root of its inverse.
-    fn coarser(self) -> f64 {
-        if self.finer && self.bytes > 1.0 {
-            return COARSER_WHERE_FINER;
-        }
-        (1.05 * self.bytes)
-            .max(1.1 * self.instructions * self.instructions)
-            .clamp(1.25, 8.0)
-    }
-
-    fn limit(self) -> Limit {
-        if self.bytes >= self.instructions {
-            Limit::Bytes
-        } else {
-            Limit::Tick
-        }
-    }
-}
-
-/// An image for an accuracy.
-struct Attempt {
-    baked: Baked,
-    plan: Plan,
-    over: Over,
-    /// What keeps a shape from the accuracy, if anything.
-    limit: Option<Limit>,
-}
-
-impl Attempt {
-    /// The accuracy in fits that it reaches, mm.
-    fn reached_mm(&self) -> f64 {
-        let plan = &self.plan;
-        plan.error_in_fits_mm().max(plan.error_elsewhere_mm() / ELSEWHERE)
-    }
-
-    /// Whether work or time ended the search of its fields.
-    fn is_ended(&self) -> bool {
-        matches!(self.limit, Some(Limit::Work | Limit::Time))
-    }
-}
-
-/// Result of trying an accuracy.
-enum Tried {
-    /// An image, which may not fit.
-    Image(Box<Attempt>),
-    /// The fields alone are too large.
-    Over(Over),
-}
-
-impl Tried {
-    fn over(&self) -> Over {
-        match self {
-            Self::Image(attempt) => attempt.over,
-            Self::Over(over) => *over,
-        }
-    }
 }
 
 /// State that does not change between attempts.
@@ -612,14 +532,6 @@ impl<'a> Planner<'a> {
             instructions: allowed.map_or(0.0, |most| instructions as f64 / most.max(1) as f64),
             finer: false,
         }
-    }
-}
-
-/// The attempt that reaches the finer accuracy.
-fn better(best: Option<Box<Attempt>>, attempt: Box<Attempt>) -> Option<Box<Attempt>> {
-    match best {
-        Some(best) if best.reached_mm() <= attempt.reached_mm() => Some(best),
-        _ => Some(attempt),
     }
 }
 
