@@ -158,10 +158,10 @@ fn sending_the_scene_can_be_cancelled_and_begun_again() {
     });
 }
 
-/// With the motors off and no motion, the window is woken every ten seconds and not by every sample: with software rendering each frame
-/// costs up to half a second of a core.
+/// With the motors off and no motion no sample wakes the window, which draws every ten seconds by itself: with software rendering each frame costs up to
+/// half a second of a core.
 #[test]
-fn an_idle_rig_hardly_wakes_the_window() {
+fn an_idle_rig_does_not_wake_the_window() {
     let woken = Arc::new(AtomicU32::new(0));
     let count = Arc::clone(&woken);
     let mut session = Session::new(Arc::new(move || {
@@ -185,10 +185,8 @@ fn an_idle_rig_hardly_wakes_the_window() {
     let wakes = woken.load(Ordering::Relaxed) - wakes;
     // 62.5 samples per second.
     assert!(samples > 360, "{samples} samples arrive nevertheless");
-    assert!(
-        (1..=2).contains(&wakes),
-        "woken {wakes} times in 12 s by {samples} samples"
-    );
+    // A change of state may be among them.
+    assert!(wakes <= 1, "woken {wakes} times in 12 s by {samples} samples");
 }
 
 #[test]
