@@ -189,6 +189,30 @@ fn an_idle_rig_does_not_wake_the_window() {
     assert!(wakes <= 1, "woken {wakes} times in 12 s by {samples} samples");
 }
 
+/// What a resting rig sends is drawn every ten seconds: with a rig connected the window asks for its next frame itself, without one it does not.
+#[test]
+fn a_connected_window_draws_every_ten_seconds() {
+    let mut harness = harness();
+    let next = |harness: &mut Harness<'_, Window>| {
+        // Frames in which something moves ask for the next one at once.
+        for _ in 0..200 {
+            harness.step();
+            let delay = (harness.output().viewport_output.values())
+                .map(|output| output.repaint_delay)
+                .min();
+            match delay {
+                Some(delay) if delay > Duration::from_secs(1) => return delay,
+                _ => {}
+            }
+        }
+        panic!("the window never rests");
+    };
+    open_sample(&mut harness);
+    assert_eq!(next(&mut harness), Duration::MAX);
+    connect(&mut harness);
+    assert_eq!(next(&mut harness), Duration::from_secs(10));
+}
+
 #[test]
 fn space_and_escape_stop() {
     for key in [egui::Key::Space, egui::Key::Escape] {

@@ -154,3 +154,28 @@ impl FreeForms {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against all samples; places of a coarse grid, so that many are equal and many are equally far.
+        #[test]
+        fn the_nearest_sample_is_the_first_of_the_nearest(
+            places in prop::collection::vec(prop::array::uniform3(0u8..4), 0..60),
+            p in prop::array::uniform3(-1i8..5),
+        ) {
+            let samples: Vec<([f64; 2], DVec3)> = (places.iter().enumerate())
+                .map(|(number, place)| ([number as f64, 0.0], DVec3::from_array(place.map(f64::from))))
+                .collect();
+            let p = DVec3::from_array(p.map(f64::from));
+            let brute = samples.iter().min_by(|(_, a), (_, b)| {
+                a.distance_squared(p).total_cmp(&b.distance_squared(p))
+            });
+            let brute = brute.map(|(uv, _)| *uv);
+            prop_assert_eq!(Samples::new(samples).nearest(p), brute);
+        }
+    }
+}

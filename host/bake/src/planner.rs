@@ -1,8 +1,8 @@
 //! The smallest scene image that meets a request, the choices made with their reasons, and its cost.
 //!
 //! Each shape gets the smallest field found that is accurate enough ([`crate::trials`]), all shapes at the same time. When the image does not fit the
-//! flash, or the worst-case tick exceeds its budget, the accuracy is lowered until both fit; at last the smallest fields are taken, whatever their
-//! error. The result is reported as the best possible, with what limits it.
+//! flash, the worst-case tick exceeds its budget, or the work for it ends, a coarser accuracy is tried with the work that is left, and then ones between;
+//! at last the best mix of the fields found is taken, whatever their error. The result is reported as the best possible, with what limits it.
 //!
 //! Cost: a bake of each cell tried, the finest of which takes most of the time; bounded by [`Effort`].
 
@@ -173,10 +173,10 @@ impl<'a> Planner<'a> {
             .map(|(i, (surface, left_out))| {
                 let demand = demand(&scene, i, &surface, &fits, left_out);
                 // By the number of faces, and half of an equal share at least.
-                let share = surface.shape().faces.len() as f64 / faces.max(1) as f64;
-                let share = share.max(0.5 / scene.shapes.len() as f64);
+                let part = surface.shape().faces.len() as f64 / faces.max(1) as f64;
+                let part = part.max(0.5 / scene.shapes.len() as f64);
                 let name = shape_name(surface.shape());
-                let share = (share * effort.work as f64) as u64;
+                let share = (part * effort.work as f64) as u64;
                 let stopgap = share.max(effort.work / STOPGAP_PART);
                 Trials::new(i, surface, demand, name, [share, stopgap])
             })
@@ -202,15 +202,9 @@ impl<'a> Planner<'a> {
         let mut best: Option<Box<Attempt>> = None;
         let mut last: Option<Box<Attempt>> = None;
         let mut over = None;
-        for attempt in 0..=ATTEMPTS {
-            let tried = self.attempt(
-                accuracy,
-                if attempt == 0 {
-                    PART_OF_ASKED
-                } else {
-                    PART_OF_COARSER
-                },
-            )?;
+        let parts = std::iter::once(PART_OF_ASKED).chain([PART_OF_COARSER; ATTEMPTS]);
+        for part in parts {
+            let tried = self.attempt(accuracy, part)?;
             let found = tried.over();
             match tried {
                 Tried::Image(attempt) if found.fits() => {
@@ -442,7 +436,6 @@ impl<'a> Planner<'a> {
         fielded: Vec<Fielded>,
         limit: Option<Limit>,
     ) -> Result<Tried, BakeError> {
-        let finer = has_finer(&fielded);
         let mut shapes: Vec<ShapePlan> = (self.shapes.iter().zip(&fielded))
             .map(|(shape, field)| {
                 let found = &field.errors;
@@ -493,10 +486,7 @@ impl<'a> Planner<'a> {
             baked => baked?,
         };
         self.scene.done(self.progress);
-        let over = Over {
-            finer,
-            ..self.over(baked.image.len(), longest(&ticks))
-        };
+        let over = self.over(baked.image.len(), longest(&ticks), has_finer(&fielded));
         let plan = Plan {
             accuracy_mm,
             shapes,
@@ -525,12 +515,12 @@ impl<'a> Planner<'a> {
         }
     }
 
-    fn over(&self, bytes: usize, instructions: u64) -> Over {
+    fn over(&self, bytes: usize, instructions: u64, finer: bool) -> Over {
         let allowed = self.request.tick_instructions;
         Over {
             bytes: bytes as f64 / self.request.flash_bytes.max(1) as f64,
             instructions: allowed.map_or(0.0, |most| instructions as f64 / most.max(1) as f64),
-            finer: false,
+            finer,
         }
     }
 }

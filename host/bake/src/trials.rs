@@ -162,8 +162,9 @@ pub(crate) struct Trials {
     /// Name of its geometry in the cache.
     name: Option<String>,
     known: Vec<Fielded>,
-    /// Most work of all accuracies, and that of a stopgap beside it.
+    /// Most work of all accuracies.
     share: u64,
+    /// Most work of a stopgap, which may exceed the share.
     stopgap: u64,
     /// Count of work at which the trials of the present accuracy end.
     limit: u64,
@@ -394,7 +395,7 @@ impl Trials {
         choice: &Choice,
         accuracy_mm: f64,
     ) -> Result<Option<Fielded>, BakeError> {
-        let mut tolerance_mm = bench.tolerance(accuracy_mm);
+        let tolerance_mm = bench.tolerance(accuracy_mm);
         let has_ended = self.ended.is_some();
         let same = |field: &&mut Fielded| {
             let is_as_fine = field.tolerance_mm == tolerance_mm || !field.baked.has_local_patches();
@@ -417,13 +418,13 @@ impl Trials {
         if !is_first && self.ended.is_some() {
             return Ok(None);
         }
-        let factors = self.demand.factors();
-        let (made, is_stopgap) = if is_first {
-            self.first(bench, choice, &mut tolerance_mm, accuracy_mm)?
+        let (made, tolerance_mm) = if is_first {
+            self.first(bench, choice, accuracy_mm)?
         } else {
-            (self.within_limit(bench, choice, (tolerance_mm, &factors))?, false)
+            (self.within_limit(bench, choice, tolerance_mm)?, tolerance_mm)
         };
         let Some(made) = made else { return Ok(None) };
+        let is_stopgap = is_first && self.ended.is_some();
         let bytes = field_bytes(&made.field);
         let mut found = vec![made];
         // Where finer bricks take much, the same field without them may be what fits beside the other shapes.
@@ -451,33 +452,30 @@ impl Trials {
         Ok(self.known.get(first).cloned())
     }
 
-    /// A shape's first field, with finer bricks if it takes no more than its part of the work; else, as a stopgap, with patches and finer bricks for a
-    /// coarse accuracy, for which it has work of its own; else without finer bricks, whatever the work, so that there is one. Whether it is a stopgap.
+    /// A shape's first field and the tolerance of its patches, mm: with finer bricks if it takes no more than its part of the work; else a stopgap, with
+    /// patches and finer bricks for a coarse accuracy; else without finer bricks, whatever the work, so that there is one.
     fn first(
         &mut self,
         bench: &Bench<'_>,
         choice: &Choice,
-        tolerance_mm: &mut f64,
         accuracy_mm: f64,
-    ) -> Result<(Option<KeptField>, bool), BakeError> {
-        let factors = self.demand.factors();
+    ) -> Result<(Option<KeptField>, f64), BakeError> {
+        let mut tolerance_mm = bench.tolerance(accuracy_mm);
         let whole = self.limit;
-        let most = (FIRST_PART * self.share as f64) as u64;
-        self.limit = whole.min(most);
-        let mut made = self.within_limit(bench, choice, (*tolerance_mm, &factors))?;
-        let is_stopgap = self.ended.is_some();
-        if is_stopgap {
-            *tolerance_mm = bench.tolerance(STOPGAP * accuracy_mm);
+        self.limit = whole.min((FIRST_PART * self.share as f64) as u64);
+        let mut made = self.within_limit(bench, choice, tolerance_mm)?;
+        if self.ended.is_some() {
+            tolerance_mm = bench.tolerance(STOPGAP * accuracy_mm);
             self.limit += self.stopgap;
-            made = self.within_limit(bench, choice, (*tolerance_mm, &factors))?;
+            made = self.within_limit(bench, choice, tolerance_mm)?;
         }
         self.limit = whole;
         let fits = |made: &KeptField| field_bytes(&made.field) <= bench.room;
         if !made.as_ref().is_some_and(fits) {
-            let plain = self.kept_or_made(bench, choice, (*tolerance_mm, None), true)?;
+            let plain = self.kept_or_made(bench, choice, (tolerance_mm, None), true)?;
             made = plain.or(made);
         }
-        Ok((made, is_stopgap))
+        Ok((made, tolerance_mm))
     }
 
     /// The field with finer bricks, unless it takes more work than there is.
@@ -485,9 +483,10 @@ impl Trials {
         &mut self,
         bench: &Bench<'_>,
         choice: &Choice,
-        (tolerance_mm, factors): (f64, &[f64]),
+        tolerance_mm: f64,
     ) -> Result<Option<KeptField>, BakeError> {
-        let made = self.kept_or_made(bench, choice, (tolerance_mm, Some(factors)), false)?;
+        let factors = self.demand.factors();
+        let made = self.kept_or_made(bench, choice, (tolerance_mm, Some(&factors)), false)?;
         if self.surface.work().so_far() > self.limit {
             self.end(End::Work);
             return Ok(None);

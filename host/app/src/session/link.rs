@@ -23,10 +23,6 @@ use super::work::{Cancel, Outbox, Update};
 /// Ticks between telemetry messages: some 60 messages a second, half of what an emulated UART carries.
 pub const TELEMETRY_TICKS: u16 = 16;
 
-/// Time between redraws while the motors are off and the handle rests; equals the span of the readout of loop overruns. With software
-/// rendering a frame of 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
-pub const CALM: Duration = Duration::from_secs(10);
-
 /// Time after the first missing answer within which a silent link is noticed.
 const NOTICED: Duration = Duration::from_secs(1);
 
@@ -303,8 +299,8 @@ fn is_live(state: DeviceState) -> bool {
 
 /// Forwards events until there are no more.
 ///
-/// While the motors are off and the handle rests, samples change nothing on screen but the traces, so none wakes the window, which takes them in
-/// every [`CALM`]: drawing each would keep a core busy on a computer without a graphics card.
+/// While the motors are off and the handle rests, samples change nothing on screen but the traces, so none wakes the window: drawing each
+/// would keep a core busy on a computer without a graphics card. It takes them in when it draws next.
 fn pass_on(outbox: &Outbox, id: u64, events: &mortise_rig::Events, tap: &Tap, state: DeviceState) {
     let mut live = is_live(state);
     let mut seen = [0.0; 3];

@@ -9,7 +9,6 @@ use mortise_output::Output;
 
 use super::{Window, fonts, theme};
 use crate::folder_cache::FolderCache;
-use crate::session::link::{CALM, Link};
 use crate::session::{Intent, Session};
 use crate::viewport::surface::Surface;
 
@@ -113,10 +112,6 @@ impl eframe::App for App {
         self.window.show(ui, self.surface.as_mut());
         self.name_window(ui.ctx());
         self.take_screenshot(ui.ctx());
-        if !matches!(self.window.session.link, Link::None) {
-            // One frame; a request without delay draws two.
-            ui.ctx().request_repaint_after(CALM);
-        }
     }
 
     fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
