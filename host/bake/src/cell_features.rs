@@ -2,11 +2,14 @@
 //!
 //! A rule that omits a face, or that continues a face beyond its edge, errs next to that face or edge. So every face, edge and corner that enters the
 //! cell contributes places on itself and beside itself, however little of it the cell contains: a lattice alone misses a slot narrower than its step.
+//! A face beyond the cell may be nearest to points in it: next to its own corners and edges, and where a thin wall or slot leaves the cell, nowhere
+//! more than in its middle. Those are places too.
 
 use glam::DVec3;
 use mortise_protocol::image::{NO_FACE, Nearby};
 
 use crate::distance::ExactSurface;
+use crate::rule::SAME_MM;
 use crate::topology::NONE;
 
 /// Most places on each face, for tests and for fits, and most places along each edge and corners.
@@ -14,6 +17,16 @@ const MOST_ON_FACE: usize = 8;
 const MOST_FOR_FIT: usize = 24;
 const MOST_ON_EDGE: usize = 3;
 const MOST_CORNERS: usize = 6;
+/// Most places in the middle of walls and slots, and most on each face from which they are found.
+const MOST_MIDDLES: usize = 12;
+const MOST_AT_BORDER: usize = 12;
+/// Most places next to features beyond the cell, and distance of those from the cell, as a share of it.
+const MOST_BESIDE_CELL: usize = 24;
+const BEYOND_CELL: f64 = 0.5;
+/// Thickness up to which a wall or slot has such places, as a share of the cell: a lattice finds thicker ones.
+const THIN: f64 = 0.5;
+/// Largest product of the normals of a wall's two sides.
+const OPPOSITE: f64 = -0.5;
 /// Distance of places beside an edge or corner from it, as a share of the cell.
 const BESIDE: f64 = 0.05;
 
@@ -56,14 +69,19 @@ fn spread_on_face(parts: &[FacePart]) -> impl Iterator<Item = DVec3> {
     spread(middles.collect(), few).chain(spread(corners.collect(), few))
 }
 
-/// Parts in a cube of the triangles within `radius` of its centre, by face; `near` receives the face of each such triangle.
-fn parts_in(surface: &ExactSurface, cube: Cube, radius: f64, mut near: impl FnMut(u16)) -> Vec<FacePart> {
+/// Parts in a cube of the triangles within `radius` of its centre, by face; `near` receives the face and number of each such triangle.
+fn parts_in(
+    surface: &ExactSurface,
+    cube: Cube,
+    radius: f64,
+    mut near: impl FnMut(u16, u32),
+) -> Vec<FacePart> {
     let mut parts = Vec::new();
     let mut examined = 0;
     surface.triangles.within(cube.center, radius, |triangle, _, _| {
         examined += 1;
         let face = surface.shape.mesh.triangle_face[triangle as usize] as u16;
-        near(face);
+        near(face, triangle);
         let corners = cube.clip(surface.triangles.corners(triangle));
         if !corners.is_empty() {
             parts.push(FacePart {
@@ -84,7 +102,7 @@ pub(crate) fn places_on_faces(surface: &ExactSurface, center: DVec3, edge: f64) 
         center,
         half: 0.5 * edge,
     };
-    let parts = parts_in(surface, cube, 0.8661 * edge, |_| ());
+    let parts = parts_in(surface, cube, 0.8661 * edge, |_, _| ());
     (parts.chunk_by(|a, b| a.face == b.face))
         .flat_map(|of_face| {
             let all: Vec<(u16, u32, DVec3)> = of_face.iter().flat_map(FacePart::places).collect();
@@ -108,7 +126,11 @@ impl CellFeatures {
             half: 0.5 * edge,
         };
         let mut faces = Vec::new();
-        let parts = parts_in(surface, cube, radius, |face| faces.push(face));
+        let mut triangles = Vec::new();
+        let parts = parts_in(surface, cube, radius, |face, triangle| {
+            faces.push(face);
+            triangles.push((face, triangle));
+        });
         faces.sort_unstable();
         faces.dedup();
         faces.retain(|&face| face <= Nearby::MAX_FACES && face != NO_FACE);
@@ -127,6 +149,9 @@ impl CellFeatures {
             all.places.extend(spread_on_face(of_face));
         }
         all.add_edges(surface, cube, &pieces);
+        all.places.extend(middles(surface, cube, &parts));
+        triangles.retain(|(face, _)| all.entering.binary_search(face).is_err());
+        all.places.extend(beside_cell(surface, cube, triangles));
         all
     }
 
@@ -181,6 +206,66 @@ impl CellFeatures {
     }
 }
 
+/// Places in the middle of the thin walls and slots between `parts`, where those leave the cube and a third face is nearer than both.
+fn middles(surface: &ExactSurface, cube: Cube, parts: &[FacePart]) -> Vec<DVec3> {
+    let normal = |part: &FacePart| {
+        let [a, b, c] = surface.triangles.corners(part.triangle);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let mut found = Vec::new();
+    for of_face in parts.chunk_by(|a, b| a.face == b.face) {
+        let places = of_face.iter().flat_map(|part| {
+            let own = normal(part);
+            (part.places()).map(move |(face, _, p)| (face, p, own))
+        });
+        let at_border = places.filter(|(_, p, _)| cube.is_border(*p)).collect();
+        for (face, p, own) in spread(at_border, MOST_AT_BORDER) {
+            let across = parts.iter().filter(|part| part.face >= face).filter_map(|part| {
+                let other = normal(part);
+                let half_way = 0.5 * other * other.dot(part.corners[0] - p);
+                let is_wall = own.dot(other) < OPPOSITE
+                    && half_way.length() < THIN * cube.half
+                    && cube.holds(p + half_way);
+                is_wall.then_some((half_way, part.face))
+            });
+            let thinnest = across.min_by(|a, b| a.0.length().total_cmp(&b.0.length()));
+            let Some((half_way, other)) = thinnest else {
+                continue;
+            };
+            let middle = p + half_way;
+            let mut has_third = false;
+            (surface.triangles).within(middle, half_way.length() - SAME_MM, |triangle, _, _| {
+                let third = surface.shape.mesh.triangle_face[triangle as usize] as u16;
+                has_third |= third != face && third != other;
+            });
+            if has_third {
+                found.push(middle);
+            }
+        }
+    }
+    spread(found, MOST_MIDDLES).collect()
+}
+
+/// Places on the cube's border next to parts of `triangles`, which are beyond it.
+fn beside_cell(surface: &ExactSurface, cube: Cube, mut triangles: Vec<(u16, u32)>) -> Vec<DVec3> {
+    triangles.sort_unstable();
+    let about = Cube {
+        half: cube.half * (1.0 + 2.0 * BEYOND_CELL),
+        ..cube
+    };
+    let parts = triangles.iter().map(|&(face, triangle)| FacePart {
+        face,
+        triangle,
+        corners: about.clip(surface.triangles.corners(triangle)),
+    });
+    let places = parts.filter(|part| !part.corners.is_empty());
+    let places: Vec<DVec3> = places
+        .flat_map(|part| part.places().map(|(_, _, p)| p).collect::<Vec<_>>())
+        .map(|p| p.clamp(cube.center - cube.half, cube.center + cube.half))
+        .collect();
+    spread(places, MOST_BESIDE_CELL).collect()
+}
+
 fn mean(points: &[DVec3]) -> DVec3 {
     points.iter().sum::<DVec3>() / points.len() as f64
 }
@@ -194,6 +279,11 @@ fn spread<T>(all: Vec<T>, most: usize) -> impl Iterator<Item = T> {
 impl Cube {
     fn holds(self, p: DVec3) -> bool {
         (p - self.center).abs().max_element() <= self.half
+    }
+
+    /// Whether a point in the cube is on its border.
+    fn is_border(self, p: DVec3) -> bool {
+        (p - self.center).abs().max_element() >= self.half * (1.0 - 1e-6)
     }
 
     /// The part of a triangle in the cube: corners of a convex polygon.

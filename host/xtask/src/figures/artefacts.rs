@@ -129,7 +129,7 @@ pub const ARTEFACTS: &[Artefact] = &[
     },
     Artefact {
         name: "promises",
-        made: Made::Page { quick: true },
+        made: Made::Page { quick: false },
         sources: &[
             LAW,
             LOOP,

@@ -38,7 +38,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
         let worst = of.iter().map(|seen| 1e6 * seen.given_j).fold(f64::NAN, f64::max);
         out(Row::at_most(
             format!(
-                "energy given to a {hand} hand beyond what it brought, every accepted target, both methods, worst of random sequences, outside observer ({} played)",
+                "energy given to a {hand} hand beyond what it brought, every accepted target, both methods, worst of {count} random sequences to hands of both kinds, outside observer ({} of them)",
                 of.len()
             ),
             worst,

@@ -13,7 +13,7 @@ use crate::LabError;
 
 /// Measures every row.
 pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
-    orders::measure(out);
+    orders::measure(plan, out);
     stop::measure(plan, out)?;
     watch::measure(plan, out)?;
     energy::measure(plan, out)?;

@@ -38,7 +38,7 @@ pub fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError
             None => missed += 1,
         }
     }
-    let what = format!("an encoder frozen under motion ({cases} random hands, motions, axes and moments)");
+    let what = format!("an encoder frozen under motion, {cases} random hands, motions, axes and moments");
     out(Row::at_most(
         format!("{what}: longest time to the fault"),
         worst_ms,
