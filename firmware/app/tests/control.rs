@@ -2,7 +2,7 @@
 
 mod support;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use mortise_firmware::board::{Drive, DriverFault, DriverFaultKind, Sensed};
 use mortise_firmware::control::{FADE_TICKS, RAMP_TICKS, SOFT_STOP_TICKS, Ticked};
 use mortise_haptics::Wrench;
@@ -505,4 +505,28 @@ fn resetting_is_refused_while_live_and_puts_everything_back() {
     bench.request(&ToDevice::Stop).unwrap();
     bench.tick();
     bench.request(&ToDevice::ResetScene).unwrap();
+}
+
+/// A reading that is no number is replaced before the force law sees it, a rotation that is none is refused by the law. Either is told as a bad reading,
+/// by the fault and by the sample's flag, and not as a force that could not be computed.
+#[test]
+fn a_bad_reading_is_reported_as_itself() {
+    let bad: [fn(&mut Sensed); 2] = [
+        |s| s.handle.position.z = f32::NAN,
+        |s| s.handle.orientation = Quat::from_xyzw(0.0, 0.0, 0.0, 2.0),
+    ];
+    for spoil in bad {
+        let mut bench = active();
+        bench.request(&ToDevice::SetTelemetry { every_ticks: 1 }).unwrap();
+        bench.forget();
+        bench.strings.pull(spoil);
+        bench.tick();
+        assert_eq!(bench.strings.last(), Drive::Off);
+        assert_eq!(bench.fault_heard(), Some(Fault::BadReading));
+        let flags = bench.heard.iter().find_map(|m| match m {
+            FromDevice::Telemetry(sample) => Some(Flags::from_bits(sample.flags)),
+            _ => None,
+        });
+        assert_eq!(flags, Some(Flags::BAD_INPUT));
+    }
 }

@@ -387,3 +387,47 @@ fn a_blow_at_a_metre_a_second_does_not_go_through_a_millimetre() {
     assert!(seen.peak_force_n <= Settings::default().limits.force_n);
     assert!(seen.made_j < 1e-6, "{seen:?}");
 }
+
+/// Force and torque have a flag of their own at each of the three places where they are limited: the coupling, the limits, and their slew.
+#[test]
+fn each_limit_that_acts_is_reported_as_itself() {
+    let image = support::slab_and_box(20e-3, 5);
+    let scene = image.open();
+    let free = {
+        let mut settings = Settings::default();
+        settings.coupling.force_max_n = 1e6;
+        settings.coupling.torque_max_nm = 1e6;
+        settings.limits.force_n = 1e6;
+        settings.limits.torque_nm = 1e6;
+        settings.limits.force_slew_n_per_s = 1e9;
+        settings.limits.torque_slew_nm_per_s = 1e9;
+        settings
+    };
+    let limits: [(Flags, fn(&mut Settings)); 6] = [
+        (Flags::FORCE_LIMIT, |s| s.limits.force_n = 1e-3),
+        (Flags::TORQUE_LIMIT, |s| s.limits.torque_nm = 1e-5),
+        (Flags::FORCE_SLEW, |s| s.limits.force_slew_n_per_s = 1.0),
+        (Flags::TORQUE_SLEW, |s| s.limits.torque_slew_nm_per_s = 1e-2),
+        (Flags::COUPLING_FORCE, |s| s.coupling.force_max_n = 1e-3),
+        (Flags::COUPLING_TORQUE, |s| s.coupling.torque_max_nm = 1e-5),
+    ];
+    // Nothing, then each alone.
+    let cases = std::iter::once((Flags::empty(), (|_| ()) as fn(&mut Settings))).chain(limits);
+    for (expected, limit) in cases {
+        let mut settings = free;
+        limit(&mut settings);
+        let mut state = State::new();
+        state.load_scene(&scene);
+        let start = Vec3::new(0.0, 0.0, 0.1);
+        let still = |x: f32, turn: f32| {
+            let turn = Quat::from_rotation_z(turn);
+            moving(start + x * Vec3::X, turn, Vec3::ZERO, Vec3::ZERO)
+        };
+        state.grab(&scene, 1, &still(0.0, 0.0).handle).unwrap();
+        tick(&mut state, &scene, &settings, &still(0.0, 0.0));
+        let flags = tick(&mut state, &scene, &settings, &still(1e-3, 0.05)).work.flags;
+        for (flag, _) in limits {
+            assert_eq!(flags.contains(flag), flag == expected, "{flag:?}: {flags:?}");
+        }
+    }
+}

@@ -40,6 +40,10 @@ fn main() -> ExitCode {
             "closing_the_window_ends_the_reading_process",
             closing_the_window_ends_the_reading_process,
         ),
+        trial(
+            "a_time_limit_on_the_command_line_ends_the_reading",
+            a_time_limit_on_the_command_line_ends_the_reading,
+        ),
     ];
     let mut arguments = Arguments::from_args();
     // Each test searches for the reader of its own file; running two at once would only slow both.
@@ -140,4 +144,16 @@ fn closing_the_window_ends_the_reading_process() {
     let begun = Instant::now();
     drop(session);
     gone_soon(&file, begun);
+}
+
+fn a_time_limit_on_the_command_line_ends_the_reading() {
+    let file = slow_file();
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_mortise"))
+        .args(["inspect", "--timeout", "1"])
+        .arg(&file)
+        .output()
+        .expect("the program starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("1 s") && said.lines().count() == 1, "{said}");
 }

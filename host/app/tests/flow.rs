@@ -11,6 +11,7 @@ use common::{arm, click, connect, harness, open_sample, until, worst};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
+use mortise::session::history::Sample;
 use mortise::session::insertion::hold;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
@@ -156,6 +157,32 @@ fn sending_the_scene_can_be_cancelled_and_begun_again() {
             .newest()
             .is_some_and(|n| n.text == "The collision model is on the board")
     });
+}
+
+/// Overruns of long ago are not shown: a sum since the start would only grow.
+#[test]
+fn loop_overruns_are_those_of_the_last_ten_seconds() {
+    let mut harness = harness();
+    // In lockstep no tick runs by itself, so every sample is the test's.
+    let session = &mut harness.state_mut().session;
+    session.act(Intent::ChooseRig(RigSpec::Simulated { realtime: false }));
+    session.act(Intent::Connect);
+    until(&mut harness, "connected", |s| s.connection().is_some());
+    for time_s in [0.0, 1.0] {
+        harness.state_mut().session.history.add(Sample {
+            time_s,
+            handle_n: 0.0,
+            contact_n: 0.0,
+            handle_nm: 0.0,
+            contact_nm: 0.0,
+            cost: 0.0,
+            late: 31,
+        });
+    }
+    harness.run_steps(2);
+    harness.get_by_label("Loop overruns, last 10 s");
+    assert!(harness.query_by_label("31").is_none());
+    harness.get_by_label("none");
 }
 
 /// With the motors off and no motion no sample wakes the window, which draws every ten seconds by itself: with software rendering each frame costs up to

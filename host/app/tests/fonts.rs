@@ -13,7 +13,7 @@ use egui::{Color32, ColorImage, FontFamily, FontId};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use egui_system_font_provider::SystemFontProvider;
-use mortise::ui::{Window, fonts, theme};
+use mortise::ui::{Window, set_up};
 
 const NAMES: [(&str, &str); 7] = [
     ("Latin", "Gehäuse"),
@@ -26,10 +26,7 @@ const NAMES: [(&str, &str); 7] = [
 ];
 
 fn window() -> Harness<'static, Window> {
-    harness_with(|ctx| {
-        theme::apply(ctx);
-        fonts::install(ctx);
-    })
+    harness_with(set_up)
 }
 
 fn is_on_this_system(name: &str) -> bool {

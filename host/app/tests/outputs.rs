@@ -107,6 +107,47 @@ fn a_picture_is_refused_before_the_window_opens() {
         &mortise(place.path(), &["demo", "--screenshot", "absent/x.png"]),
         "cannot be written",
     );
+    std::fs::copy(SAMPLE, place.path().join("x.step")).expect("copied");
+    for command in ["open", "demo"] {
+        refused(
+            &mortise(
+                place.path(),
+                &[command, "x.step", "--screenshot", "x.step", "--force"],
+            ),
+            "is the input",
+        );
+    }
+}
+
+/// A file that cannot be read is found out by reading it, so an answer about the output instead shows that this was looked at before.
+#[test]
+fn an_output_is_refused_before_the_input_is_read() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    let at = |name: &str| place.path().join(name);
+    std::fs::write(at("x.step"), "no STEP file").expect("written");
+    std::fs::write(at("victim"), "precious").expect("written");
+    std::fs::write(at("script"), "remove the peg").expect("written");
+    let cases: &[(&[&str], &str)] = &[
+        (&["bake", "x.step", "-o", "absent/x.image"], "cannot be written"),
+        (&["bake", "x.step", "-o", "victim"], "--force"),
+        (&["bake", "x.step", "-o", "x.step", "--force"], "is the input"),
+        (
+            &["task", "x.step", "remove the peg", "-o", "absent/y.step"],
+            "cannot be written",
+        ),
+        (&["task", "x.step", "remove the peg", "-o", "victim"], "--force"),
+        (
+            &["task", "x.step", "remove the peg", "-o", "x.step", "--force"],
+            "is the input",
+        ),
+        (
+            &["task", "x.step", "--script", "script", "-o", "script", "--force"],
+            "is the input",
+        ),
+    ];
+    for (arguments, what) in cases {
+        refused(&mortise(place.path(), arguments), what);
+    }
 }
 
 #[test]

@@ -39,6 +39,10 @@ fn main() -> ExitCode {
             processor_time_is_limited_and_the_process_ends_with_its_parent,
         ),
         (
+            "the_system_holds_the_limits_of_a_reading_process",
+            the_system_holds_the_limits_of_a_reading_process,
+        ),
+        (
             "a_reading_that_is_cancelled_leaves_no_process",
             a_reading_that_is_cancelled_leaves_no_process,
         ),
@@ -217,6 +221,57 @@ fn a_reading_that_is_cancelled_leaves_no_process() {
     assert!(matches!(error, BrepError::Cancelled { .. }), "{error}");
     assert!(took < Duration::from_secs(1), "{took:?}");
     assert_eq!(readers_of(&file), 0, "it reads on");
+}
+
+/// A wall clock ends a reading too, later; and no file here needs more memory than a machine has. So the limits are read from the system.
+fn the_system_holds_the_limits_of_a_reading_process() {
+    if !cfg!(target_os = "linux") {
+        println!("skipped: limits are read from /proc");
+        return;
+    }
+    let file = slow_file();
+    let cancel = AtomicBool::new(false);
+    let options = LoadOptions {
+        time_limit_s: 7,
+        ..LoadOptions::default()
+    };
+    let limits = std::thread::scope(|scope| {
+        let reading =
+            scope.spawn(|| load_step_until(&file, &options, &cancel).map(|model| model.parts.len()));
+        // The process sets them at its start; before that they are the test's own.
+        let mut limits = [None, None];
+        for _ in 0..500 {
+            std::thread::sleep(Duration::from_millis(2));
+            limits = ["Max cpu time", "Max address space"].map(|name| limit_of_reader(&file, name));
+            if limits.iter().all(Option::is_some) {
+                break;
+            }
+        }
+        cancel.store(true, Ordering::Release);
+        let _ = reading.join().unwrap();
+        limits
+    });
+    assert_eq!(limits[0], Some(7), "seconds of processor time");
+    let machine = std::fs::read_to_string("/proc/meminfo").unwrap();
+    let total = machine
+        .lines()
+        .find_map(|line| line.strip_prefix("MemTotal:"))
+        .unwrap();
+    let kibibytes: u64 = total.trim().trim_end_matches("kB").trim().parse().unwrap();
+    let memory = limits[1].expect("a limit of memory");
+    assert!(memory <= (kibibytes * 1024 / 2).max(1 << 30), "{memory} bytes");
+}
+
+/// A soft limit of the process that reads this file; `None` without such a process, or when it is unlimited.
+fn limit_of_reader(file: &std::path::Path, name: &str) -> Option<u64> {
+    let wanted = format!("MORTISE_BREP_CHILD_PATH={}\0", file.display());
+    let reader = std::fs::read_dir("/proc").ok()?.flatten().find(|process| {
+        std::fs::read(process.path().join("environ"))
+            .is_ok_and(|all| all.windows(wanted.len()).any(|part| part == wanted.as_bytes()))
+    })?;
+    let limits = std::fs::read_to_string(reader.path().join("limits")).ok()?;
+    let row = limits.lines().find_map(|line| line.strip_prefix(name))?;
+    row.split_whitespace().next()?.parse().ok()
 }
 
 /// Number of processes that read this file; 0 if there is no /proc.

@@ -59,7 +59,7 @@ pub fn demo(file: Option<PathBuf>, rig: Option<RigSpec>, picture: Picture) -> an
 
 #[cfg(feature = "window")]
 mod shown {
-    use std::path::PathBuf;
+    use std::path::{Path, PathBuf};
     use std::process::ExitCode;
     use std::time::Duration;
 
@@ -71,33 +71,36 @@ mod shown {
     use crate::ui::app::{self, Options, Screenshot};
 
     pub fn open(file: Option<PathBuf>, picture: Picture) -> anyhow::Result<ExitCode> {
-        let first = file.map(Intent::Open).into_iter().collect();
-        app::run(options(picture, first)?)?;
+        let options = options(picture, file.as_deref(), Vec::new())?;
+        app::run(options)?;
         Ok(ExitCode::SUCCESS)
     }
 
     pub fn demo(file: Option<PathBuf>, rig: Option<RigSpec>, picture: Picture) -> anyhow::Result<ExitCode> {
-        let mut first = Vec::new();
-        first.extend(file.map(Intent::Open));
-        first.push(Intent::Demo(rig));
-        let mut options = options(picture, first)?;
+        let mut options = options(picture, file.as_deref(), vec![Intent::Demo(rig)])?;
         // Transparent walls show the insertion inside the hole.
         options.see_through = true;
         app::run(options)?;
         Ok(ExitCode::SUCCESS)
     }
 
-    fn options(picture: Picture, mut first: Vec<Intent>) -> anyhow::Result<Options> {
+    /// Options that open `file`, then handle `next`.
+    fn options(picture: Picture, file: Option<&Path>, next: Vec<Intent>) -> anyhow::Result<Options> {
+        let inputs: Vec<&Path> = file.into_iter().collect();
+        let mut first: Vec<Intent> = (inputs.iter())
+            .map(|file| Intent::Open(file.to_path_buf()))
+            .collect();
+        first.extend(next);
         if let Some(rig) = picture.connect {
             first.extend([Intent::ChooseRig(rig), Intent::Connect]);
         }
         let existing = Existing::from_force(picture.force);
-        let check = |file| Output::new(file, existing, &[""; 0]);
-        let file = picture.screenshot.map(check).transpose()?;
+        let check = |png| Output::new(png, existing, &inputs);
+        let png = picture.screenshot.map(check).transpose()?;
         let after = Duration::try_from_secs_f64(picture.after).unwrap_or_default();
         Ok(Options {
             first,
-            screenshot: file.map(|file| Screenshot { file, after }),
+            screenshot: png.map(|file| Screenshot { file, after }),
             see_through: picture.see_through,
         })
     }

@@ -313,3 +313,30 @@ pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) {
         work();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cancelled_bake_ends_without_a_report() {
+        let document = Document::sample(1, &AtomicBool::new(false)).expect("the sample");
+        for (cancelled, reports) in [(true, 0), (false, 1)] {
+            let (outbox, updates) = Outbox::new(Arc::new(|| {}));
+            let cancel = Cancel::default();
+            if cancelled {
+                cancel.set();
+            }
+            let wanted = Wanted::Described(BakeOptions {
+                cell_mm: Some(4.0),
+                ..BakeOptions::default()
+            });
+            bake(&outbox, Arc::clone(&document.model), 1, wanted, None, cancel);
+            drop(outbox);
+            let baked = updates
+                .iter()
+                .filter(|update| matches!(update, Update::Baked { .. }));
+            assert_eq!(baked.count(), reports);
+        }
+    }
+}

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use egui::{ColorImage, Vec2, ViewportCommand};
 use mortise_output::Output;
 
-use super::{Window, fonts, theme};
+use super::{Window, theme};
 use crate::folder_cache::FolderCache;
 use crate::session::{Intent, Session};
 use crate::viewport::surface::Surface;
@@ -52,16 +52,9 @@ pub fn run(options: Options) -> anyhow::Result<()> {
     let failed = Arc::new(Mutex::new(None));
     let report = Arc::clone(&failed);
     let native = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("Mortise")
-            .with_app_id("mortise")
-            .with_inner_size(Vec2::new(1520.0, 940.0))
-            // Small enough for the smallest screen at the largest scale; a larger minimum would exceed that screen.
-            .with_min_inner_size(Vec2::new(240.0, 180.0))
-            .with_clamp_size_to_monitor_size(true)
-            .with_icon(icon()),
+        viewport: viewport(),
         renderer: eframe::Renderer::Wgpu,
-        // `fonts::install` does this, also in tests.
+        // `set_up` does this, also in tests.
         system_font_fallback: false,
         ..Default::default()
     };
@@ -69,10 +62,9 @@ pub fn run(options: Options) -> anyhow::Result<()> {
         "Mortise",
         native,
         Box::new(move |creation| {
-            theme::apply(&creation.egui_ctx);
+            super::set_up(&creation.egui_ctx);
             #[cfg(target_os = "linux")]
             super::appearance::follow(&creation.egui_ctx);
-            fonts::install(&creation.egui_ctx);
             let ctx = creation.egui_ctx.clone();
             let session = Session::new(Arc::new(move || ctx.request_repaint()));
             let mut window = Window::new(session.with_cache(FolderCache::of_user()));
@@ -100,6 +92,18 @@ pub fn run(options: Options) -> anyhow::Result<()> {
     })?;
     let failure = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
     failure.map_or(Ok(()), Err)
+}
+
+/// The window that the system is asked for.
+fn viewport() -> egui::ViewportBuilder {
+    egui::ViewportBuilder::default()
+        .with_title("Mortise")
+        .with_app_id("mortise")
+        .with_inner_size(Vec2::new(1520.0, 940.0))
+        // Small enough for the smallest screen at the largest scale; a larger minimum would exceed that screen.
+        .with_min_inner_size(Vec2::new(240.0, 180.0))
+        .with_clamp_size_to_monitor_size(true)
+        .with_icon(icon())
 }
 
 impl eframe::App for App {
@@ -199,5 +203,19 @@ fn icon() -> egui::IconData {
         rgba,
         width: SIDE as u32,
         height: SIDE as u32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_window_is_never_larger_than_the_monitor() {
+        let viewport = viewport();
+        assert_eq!(viewport.clamp_size_to_monitor_size, Some(true));
+        // 800 × 600 pixels, three to the point.
+        let least = viewport.min_inner_size.expect("a least size");
+        assert!(least.x <= 266.0 && least.y <= 200.0, "{least}");
     }
 }

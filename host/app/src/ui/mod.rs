@@ -30,6 +30,12 @@ use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 use crate::viewport::surface::Surface;
 
+/// Style, colours and fonts of the window, also in tests.
+pub fn set_up(ctx: &egui::Context) {
+    theme::apply(ctx);
+    fonts::install(ctx);
+}
+
 /// Time between redraws while the motors are off and the handle rests; equals the span of the readout of loop overruns. With software rendering a frame of
 /// 1600 × 1000 pixels costs up to 0.45 s of a core. Motion and changes of state are drawn at once.
 const CALM: Duration = Duration::from_secs(10);

@@ -229,6 +229,26 @@ mod tests {
         (a.max(b) + 0.05) / (a.min(b) + 0.05)
     }
 
+    /// Where the window library does not know it, what [`super::super::appearance`] found counts.
+    #[test]
+    fn the_theme_is_the_systems() {
+        let ctx = egui::Context::default();
+        apply(&ctx);
+        let shown = |system_theme| {
+            let input = egui::RawInput {
+                system_theme,
+                ..Default::default()
+            };
+            let _ = ctx.run_ui(input, |_| {});
+            ctx.theme()
+        };
+        assert_eq!(shown(None), Theme::Dark);
+        assert_eq!(shown(Some(Theme::Light)), Theme::Light);
+        assert_eq!(shown(Some(Theme::Dark)), Theme::Dark);
+        ctx.options_mut(|options| options.fallback_theme = Theme::Light);
+        assert_eq!(shown(None), Theme::Light);
+    }
+
     /// WCAG 2 requires 4.5 for text of this size and 3 for large text: STOP is 21 points.
     #[test]
     fn text_can_be_read_in_both_themes() {

@@ -96,7 +96,7 @@ pub struct Count {
     pub unbounded: usize,
     /// Rows that cannot be measured here.
     pub skipped: usize,
-    /// Rows whose bound is farther from their claim than allowed, or that have no claim.
+    /// Rows that do not fail and whose bound is farther from their claim than allowed, or that have no claim: what fails states no figure.
     pub far: usize,
 }
 
@@ -112,7 +112,9 @@ impl Count {
             Verdict::Unbounded => self.unbounded += 1,
             Verdict::Skipped => self.skipped += 1,
         }
-        if let Some(ratio) = row.bound_over_claim() {
+        if row.verdict() != Verdict::Fails
+            && let Some(ratio) = row.bound_over_claim()
+        {
             self.far += usize::from(ratio.is_nan() || ratio > MOST_BOUND_OVER_CLAIM * ROUNDING);
         }
     }
@@ -167,6 +169,8 @@ mod tests {
         assert!(!far(&Claims::completed().expect("reads"), row()));
         let exact = Row::exactly("a row of a test", 1.0, "mm", 1.0);
         assert!(!far(&Claims::kept().expect("reads"), exact));
+        let failing = Row::at_most("a row of a test", 6.0, "mm", 5.0);
+        assert!(!far(&Claims::measured(), failing));
     }
 
     #[test]

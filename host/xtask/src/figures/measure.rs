@@ -8,6 +8,9 @@ use anyhow::{Result, bail};
 use super::row::Row;
 use crate::shell;
 
+/// Beginning of the last row of every run: without it an error ended the run before.
+const LAST_ROW: &str = "rows that have no claim";
+
 /// What one run of `mortise-lab figures` gave.
 #[derive(Debug)]
 pub struct Measured {
@@ -41,14 +44,45 @@ impl By {
 /// Runs `mortise-lab figures NAME --json` and prints each row as it comes.
 ///
 /// # Errors
-/// When the program cannot be started or prints no rows, or something that is not a row.
+/// When the program cannot be started, prints no rows or something that is not a row, or ends before the table does.
 pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> Result<Measured> {
+    measure_part(root, program, name, None, quick, by)
+}
+
+/// As [`measure`], of some parts of the shorter form alone, one after the other.
+///
+/// # Errors
+/// As [`measure`].
+pub fn measure_parts(root: &Path, program: &Path, name: &str, parts: &[&str], by: By) -> Result<Measured> {
+    let mut all = Measured {
+        rows: Vec::new(),
+        success: true,
+    };
+    for part in parts {
+        let measured = measure_part(root, program, name, Some(part), true, by)?;
+        all.rows.extend(measured.rows);
+        all.success &= measured.success;
+    }
+    Ok(all)
+}
+
+fn measure_part(
+    root: &Path,
+    program: &Path,
+    name: &str,
+    part: Option<&str>,
+    quick: bool,
+    by: By,
+) -> Result<Measured> {
     let mut command = Command::new(program);
     command
         .current_dir(root)
         .args(["figures", name, "--json", "--claims", by.option()]);
     if quick {
         command.arg("--quick");
+    }
+    if let Some(part) = part {
+        command.args(["--only", part]);
     }
     let mut rows = Vec::new();
     let mut foreign = Vec::new();
@@ -66,6 +100,12 @@ pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> 
     if rows.is_empty() {
         run?;
         bail!("`mortise-lab figures {name} --json` printed no row");
+    }
+    if !rows.last().is_some_and(|row| row.what.starts_with(LAST_ROW)) {
+        bail!(
+            "`mortise-lab figures {name}` ended with an error behind its row {}: nothing is written",
+            rows.len()
+        );
     }
     Ok(Measured {
         rows,
