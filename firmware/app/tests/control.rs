@@ -507,7 +507,7 @@ fn resetting_is_refused_while_live_and_puts_everything_back() {
     bench.request(&ToDevice::ResetScene).unwrap();
 }
 
-/// A reading that is no number is replaced before the force law sees it, a rotation that is none is refused by the law. Either is told as a bad reading,
+/// A reading that is no number is replaced before the force law sees it, a rotation that is none is refused by the law. Either is reported as a bad reading,
 /// by the fault and by the sample's flag, and not as a force that could not be computed.
 #[test]
 fn a_bad_reading_is_reported_as_itself() {

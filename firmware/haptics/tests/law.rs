@@ -391,6 +391,7 @@ fn a_blow_at_a_metre_a_second_does_not_go_through_a_millimetre() {
 /// Force and torque have a flag of their own at each of the three places where they are limited: the coupling, the limits, and their slew.
 #[test]
 fn each_limit_that_acts_is_reported_as_itself() {
+    type Limit = fn(&mut Settings);
     let image = support::slab_and_box(20e-3, 5);
     let scene = image.open();
     let free = {
@@ -403,7 +404,7 @@ fn each_limit_that_acts_is_reported_as_itself() {
         settings.limits.torque_slew_nm_per_s = 1e9;
         settings
     };
-    let limits: [(Flags, fn(&mut Settings)); 6] = [
+    let limits: [(Flags, Limit); 6] = [
         (Flags::FORCE_LIMIT, |s| s.limits.force_n = 1e-3),
         (Flags::TORQUE_LIMIT, |s| s.limits.torque_nm = 1e-5),
         (Flags::FORCE_SLEW, |s| s.limits.force_slew_n_per_s = 1.0),
@@ -412,7 +413,7 @@ fn each_limit_that_acts_is_reported_as_itself() {
         (Flags::COUPLING_TORQUE, |s| s.coupling.torque_max_nm = 1e-5),
     ];
     // Nothing, then each alone.
-    let cases = std::iter::once((Flags::empty(), (|_| ()) as fn(&mut Settings))).chain(limits);
+    let cases = std::iter::once((Flags::empty(), (|_| ()) as Limit)).chain(limits);
     for (expected, limit) in cases {
         let mut settings = free;
         limit(&mut settings);

@@ -1,4 +1,4 @@
-//! The in-process rig's thread runs at real-time priority, or the operator is told that the system refused it. Linux only: the priority is read from
+//! The in-process rig's thread runs at real-time priority, or a message says that the system refused it. Linux only: the priority is read from
 //! `/proc`.
 #![cfg(target_os = "linux")]
 
@@ -11,10 +11,10 @@ const WITHOUT: &str = "MORTISE_TEST_WITHOUT_REAL_TIME";
 /// `SCHED_RR`.
 const ROUND_ROBIN: &str = "2";
 
-/// Whether the board's thread runs at real-time priority, and whether a refusal was told.
-fn granted_and_told() -> (bool, bool) {
+/// Whether the board's thread runs at real-time priority, and whether a refusal was reported.
+fn granted_and_reported() -> (bool, bool) {
     let client = Client::connect(&RigSpec::Simulated { realtime: true }).expect("the rig greets");
-    let told = (client.events().try_iter())
+    let reported = (client.events().try_iter())
         .any(|event| matches!(event, Event::Log(line) if line.contains("no real-time priority")));
     let board = (std::fs::read_dir("/proc/self/task").expect("threads").flatten())
         .map(|thread| thread.path())
@@ -25,15 +25,18 @@ fn granted_and_told() -> (bool, bool) {
     let stat = std::fs::read_to_string(board.join("stat")).expect("it runs");
     // proc(5): field 41 is the policy; fields are counted behind the name, which is field 2.
     let policy = (stat.rsplit(')').next()).and_then(|rest| rest.split_whitespace().nth(41 - 3));
-    (policy == Some(ROUND_ROBIN), told)
+    (policy == Some(ROUND_ROBIN), reported)
 }
 
 #[test]
-fn real_time_priority_is_granted_or_its_refusal_is_told() {
-    let (granted, told) = granted_and_told();
-    assert_eq!(told, !granted, "granted: {granted}, a refusal told: {told}");
+fn real_time_priority_is_granted_or_its_refusal_is_reported() {
+    let (granted, reported) = granted_and_reported();
+    assert_eq!(
+        reported, !granted,
+        "granted: {granted}, a refusal reported: {reported}"
+    );
     if std::env::var_os(WITHOUT).is_some() {
-        assert!(told);
+        assert!(reported);
         return;
     }
     // Once more without the right to it.
