@@ -20,8 +20,11 @@ const MOST_CORNERS: usize = 6;
 /// Most places in the middle of walls and slots, and most on each face from which they are found.
 const MOST_MIDDLES: usize = 12;
 const MOST_AT_BORDER: usize = 12;
-/// Most places next to features beyond the cell, and distance of those from the cell, as a share of it.
+/// Most places on features beyond the cell that are tried, most of the cell's places next to them, the same where no face enters the cell, and distance of
+/// the features from the cell, as a share of it. Each place costs an exact query in every cell.
+const MOST_BEYOND: usize = 48;
 const MOST_BESIDE_CELL: usize = 24;
+const MOST_BESIDE_UNCROSSED: usize = 8;
 const BEYOND_CELL: f64 = 0.5;
 /// Thickness up to which a wall or slot has such places, as a share of the cell: a lattice finds thicker ones.
 const THIN: f64 = 0.5;
@@ -151,7 +154,12 @@ impl CellFeatures {
         all.add_edges(surface, cube, &pieces);
         all.places.extend(middles(surface, cube, &parts));
         triangles.retain(|(face, _)| all.entering.binary_search(face).is_err());
-        all.places.extend(beside_cell(surface, cube, triangles));
+        let most = if all.entering.is_empty() {
+            MOST_BESIDE_UNCROSSED
+        } else {
+            MOST_BESIDE_CELL
+        };
+        all.places.extend(beside_cell(surface, cube, triangles, most));
         all
     }
 
@@ -246,8 +254,13 @@ fn middles(surface: &ExactSurface, cube: Cube, parts: &[FacePart]) -> Vec<DVec3>
     spread(found, MOST_MIDDLES).collect()
 }
 
-/// Places on the cube's border next to parts of `triangles`, which are beyond it.
-fn beside_cell(surface: &ExactSurface, cube: Cube, mut triangles: Vec<(u16, u32)>) -> Vec<DVec3> {
+/// Places on the cube's border, at most `most`, whose nearest points are on parts of `triangles`, which are beyond it.
+fn beside_cell(
+    surface: &ExactSurface,
+    cube: Cube,
+    mut triangles: Vec<(u16, u32)>,
+    most: usize,
+) -> Vec<DVec3> {
     triangles.sort_unstable();
     let about = Cube {
         half: cube.half * (1.0 + 2.0 * BEYOND_CELL),
@@ -258,12 +271,22 @@ fn beside_cell(surface: &ExactSurface, cube: Cube, mut triangles: Vec<(u16, u32)
         triangle,
         corners: about.clip(surface.triangles.corners(triangle)),
     });
-    let places = parts.filter(|part| !part.corners.is_empty());
-    let places: Vec<DVec3> = places
-        .flat_map(|part| part.places().map(|(_, _, p)| p).collect::<Vec<_>>())
-        .map(|p| p.clamp(cube.center - cube.half, cube.center + cube.half))
+    let mut beyond: Vec<DVec3> = Vec::new();
+    for part in parts.filter(|part| !part.corners.is_empty()) {
+        beyond.extend(part.places().map(|(_, _, p)| p));
+    }
+    let is_nearest = |at: DVec3, p: DVec3| {
+        let mut nearer = false;
+        let radius = at.distance(p) - SAME_MM;
+        (surface.triangles).within(at, radius, |_, _, _| nearer = true);
+        !nearer
+    };
+    let found = (spread(beyond, MOST_BEYOND))
+        .map(|p| (p.clamp(cube.center - cube.half, cube.center + cube.half), p))
+        .filter(|&(at, p)| is_nearest(at, p))
+        .map(|(at, _)| at)
         .collect();
-    spread(places, MOST_BESIDE_CELL).collect()
+    spread(found, most).collect()
 }
 
 fn mean(points: &[DVec3]) -> DVec3 {

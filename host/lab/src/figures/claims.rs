@@ -96,7 +96,7 @@ pub struct Count {
     pub unbounded: usize,
     /// Rows that cannot be measured here.
     pub skipped: usize,
-    /// Rows that do not fail and whose bound is farther from their claim than allowed, or that have no claim: what fails states no figure.
+    /// Rows whose bound is farther from their claim than allowed, or that hold and have no claim: what fails may state no figure.
     pub far: usize,
 }
 
@@ -112,10 +112,11 @@ impl Count {
             Verdict::Unbounded => self.unbounded += 1,
             Verdict::Skipped => self.skipped += 1,
         }
-        if row.verdict() != Verdict::Fails
-            && let Some(ratio) = row.bound_over_claim()
-        {
-            self.far += usize::from(ratio.is_nan() || ratio > MOST_BOUND_OVER_CLAIM * ROUNDING);
+        if let Some(ratio) = row.bound_over_claim() {
+            // Without a claim the ratio is infinite.
+            let states_none = ratio.is_infinite() && row.verdict() == Verdict::Fails;
+            let is_far = ratio.is_nan() || ratio > MOST_BOUND_OVER_CLAIM * ROUNDING;
+            self.far += usize::from(is_far && !states_none);
         }
     }
 

@@ -31,7 +31,7 @@ use crate::{firmware, shell};
 /// The table that is judged in every run of the tests.
 const END_TO_END: &str = "end-to-end";
 
-/// Parts of tables whose other parts hold no quoted row: a check measures these alone, a whole table takes a quarter of an hour.
+/// Parts of tables whose other parts hold no quoted row: the tests measure these alone, a whole table takes a quarter of an hour.
 const QUOTED_PARTS: &[(&str, &[&str])] = &[("contact", &["accuracy", "insertion", "ticks"])];
 
 /// `cargo xtask figures [NAME] [--quick] [--claim]`, `--check`, `--renew [NAME]... [--claim]` or `--record NAME...`. A page written in its own form is recorded.
@@ -68,7 +68,7 @@ pub fn command(arguments: &Figures) -> Result<ExitCode> {
             all_hold
         }
         None if arguments.check => {
-            println!("{}", check(&root, &lab, |_| true)?);
+            println!("{}", check(&root, &lab, |_| true, &[])?);
             true
         }
         None => renew::run(&root, &lab, names, by)?,
@@ -96,17 +96,22 @@ pub fn step(root: &Path, program: &Path) -> Result<String> {
         }
         said.push(format!("{END_TO_END}: {count}"));
     }
-    said.push(check(root, program, recorded)?);
+    said.push(check(root, program, recorded, QUOTED_PARTS)?);
     Ok(said.join("; "))
 }
 
-/// Measures the shorter form of every table that README quotes and that is to be `compared` (of a table in [`QUOTED_PARTS`] these parts), and compares
+/// Measures the shorter form of every table that README quotes and that is to be `compared` (of a table named in `parts` these alone), and compares
 /// bounds, claims, quoted numbers, and the pages of figures; numbers of the other tables are compared with their pages. Bounds of machine-dependent values are reported, not judged: another or a
 /// busy machine breaks no promise. Rows that fail on the page of figures are reported as well.
 ///
 /// # Errors
 /// When a bound does not hold, or a number differs; the details were printed.
-pub fn check(root: &Path, program: &Path, compared: impl Fn(&str) -> bool) -> Result<String> {
+pub fn check(
+    root: &Path,
+    program: &Path,
+    compared: impl Fn(&str) -> bool,
+    parts: &[(&str, &[&str])],
+) -> Result<String> {
     let quoted = quoted::of_pages(root)?;
     let claims = Claims::read(root)?;
     let (mut said, mut wrong) = (Vec::new(), Vec::new());
@@ -121,7 +126,7 @@ pub fn check(root: &Path, program: &Path, compared: impl Fn(&str) -> bool) -> Re
         wanted
     });
     for table in &tables {
-        let parts = QUOTED_PARTS.iter().find(|(name, _)| name == table);
+        let parts = parts.iter().find(|(name, _)| name == table);
         let measured = match parts {
             Some((_, parts)) => measure_parts(root, program, table, parts, By::Kept)?,
             None => measure(root, program, table, true, By::Kept)?,
