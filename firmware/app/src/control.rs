@@ -12,6 +12,8 @@ pub mod fingerprint;
 mod parts;
 mod report;
 mod simulation;
+#[cfg(test)]
+mod tests;
 mod watch;
 
 use mortise_haptics::{self as haptics, GrabError, Input, TargetError, Twist, Wrench};

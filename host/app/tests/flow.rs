@@ -1,18 +1,21 @@
 //! The complete operation through the window without a display: open, choose a rig, connect, arm, grab, play, STOP. Controls are found by
 //! their accessible names, as a screen reader finds them.
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 mod common;
 
 use common::{arm, click, connect, harness, open_sample, until, worst};
+use egui::Role;
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use glam::DVec3;
 use mortise::session::history::Sample;
 use mortise::session::insertion::hold;
+use mortise::session::link::Link;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
@@ -20,7 +23,7 @@ use mortise::viewport::gesture::on_screen;
 use mortise_bake::Method;
 use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
-use mortise_rig::RigSpec;
+use mortise_rig::{RigSpec, UploadProgress};
 
 #[test]
 fn from_an_empty_window_to_a_felt_insertion_and_stop() {
@@ -159,6 +162,68 @@ fn sending_the_scene_can_be_cancelled_and_begun_again() {
     });
 }
 
+/// Percentage and text of every progress bar.
+fn bars(harness: &Harness<'_, Window>) -> Vec<(f64, String)> {
+    harness
+        .get_all_by_role(Role::ProgressIndicator)
+        .map(|shown| shown.accesskit_node())
+        .filter_map(|bar| Some((bar.numeric_value()?, bar.label().unwrap_or_default())))
+        .collect()
+}
+
+/// A reading shows its time limit, a bake and an upload their progress and the time left, each with its *Cancel*.
+#[test]
+fn progress_and_the_time_left_are_shown() {
+    let ten_seconds_ago = || Instant::now() - Duration::from_secs(10);
+    let mut harness = harness();
+    click(&mut harness, "Open the sample");
+    let mut job = (harness.state().session.job.clone()).expect("reading, without a fraction");
+    until(&mut harness, "the sample is baked", |s| !s.is_busy());
+    assert!(harness.query_by_label("Cancel").is_none());
+
+    // The work is over and reports no more: what is shown is this job.
+    job.since = ten_seconds_ago();
+    harness.state_mut().session.job = Some(job.clone());
+    harness.run_steps(2);
+    harness.get_by_label("Cancel");
+    harness.get_by_label_contains(" s, at most 60 s");
+    job.fraction = Some(0.25);
+    harness.state_mut().session.job = Some(job);
+    harness.run_steps(2);
+    harness.get_by_label("Cancel");
+    let drawn = bars(&harness);
+    assert!(drawn.iter().any(|bar| bar.0 == 25.0), "{drawn:?}");
+    // 10 s for a quarter; the clock runs on.
+    harness.get_by_label_contains("5 s left");
+    harness.state_mut().session.job = None;
+    // A bake that takes a second.
+    (harness.state_mut().session).act(Intent::ChooseMethod(Method::Occupancy));
+    let reached = Cell::new(0.0f32);
+    until(&mut harness, "baked again", |s| {
+        let fraction = s.job.as_ref().and_then(|job| job.fraction);
+        reached.set(fraction.unwrap_or(0.0).max(reached.get()));
+        !s.is_busy()
+    });
+    assert!(reached.get() > 0.0, "no progress of the bake was seen");
+
+    connect(&mut harness);
+    let Link::Connected(connection) = &mut harness.state_mut().session.link else {
+        panic!("connected");
+    };
+    connection.upload = Some(UploadProgress {
+        sent: 64 << 10,
+        total: 256 << 10,
+    });
+    connection.upload_since = ten_seconds_ago();
+    harness.run_steps(2);
+    harness.get_by_label("Cancel upload");
+    let drawn = bars(&harness);
+    let is_the_uploads = |(percent, said): &(f64, String)| {
+        *percent == 25.0 && said.starts_with("64 of 256 KiB, ") && said.ends_with("5 s left")
+    };
+    assert!(drawn.iter().any(is_the_uploads), "{drawn:?}");
+}
+
 /// Overruns of long ago are not shown: a sum since the start would only grow.
 #[test]
 fn loop_overruns_are_those_of_the_last_ten_seconds() {
@@ -196,7 +261,7 @@ fn an_idle_rig_does_not_wake_the_window() {
     }));
     session.act(Intent::Connect);
     let wait = |session: &mut Session, seconds: f64| {
-        let begun = std::time::Instant::now();
+        let begun = Instant::now();
         while begun.elapsed().as_secs_f64() < seconds {
             session.poll();
             std::thread::sleep(Duration::from_millis(5));

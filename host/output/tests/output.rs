@@ -177,3 +177,35 @@ fn a_folder_is_made_and_each_of_its_files_checked_first() {
     out.write("x.csv", b"3,4").expect("written");
     assert_eq!(std::fs::read(path.join("x.csv")).expect("read"), b"3,4");
 }
+
+/// A name that can be predicted could be planted as a link or taken in advance. Each file's temporary name is listed while the file is written.
+#[test]
+fn temporary_names_are_never_repeated() {
+    let folder = folder();
+    let bytes = vec![7u8; 8 << 20];
+    let mut seen: Vec<String> = Vec::new();
+    for round in 0..12 {
+        let target = format!("{round}.image");
+        let output = Output::new(folder.path().join(&target), Existing::Keep, NONE).expect("free");
+        let mut beside = std::thread::scope(|scope| {
+            let writing = scope.spawn(|| output.write(&bytes).expect("written"));
+            let mut beside = Vec::new();
+            while !writing.is_finished() {
+                beside.extend(
+                    names(folder.path())
+                        .into_iter()
+                        .filter(|name| !name.ends_with(".image")),
+                );
+            }
+            beside
+        });
+        beside.sort();
+        beside.dedup();
+        seen.append(&mut beside);
+    }
+    assert!(seen.len() >= 3, "{seen:?} were seen: too few to compare");
+    let count = seen.len();
+    seen.sort();
+    seen.dedup();
+    assert_eq!(seen.len(), count, "a name was used twice: {seen:?}");
+}

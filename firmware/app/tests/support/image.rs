@@ -1,5 +1,7 @@
 //! The smallest scene images that pass every check.
 
+use std::vec::Vec;
+
 use bytemuck::{bytes_of, cast_slice};
 use mortise_protocol::image::*;
 

@@ -339,4 +339,31 @@ mod tests {
             assert_eq!(baked.count(), reports);
         }
     }
+
+    #[test]
+    fn a_bake_reports_rising_progress() {
+        let document = Document::sample(1, &AtomicBool::new(false)).expect("the sample");
+        let (outbox, updates) = Outbox::new(Arc::new(|| {}));
+        let wanted = Wanted::Described(BakeOptions {
+            cell_mm: Some(1.0),
+            ..BakeOptions::default()
+        });
+        bake(
+            &outbox,
+            Arc::clone(&document.model),
+            1,
+            wanted,
+            None,
+            Cancel::default(),
+        );
+        drop(outbox);
+        let reported: Vec<f32> = (updates.iter())
+            .filter_map(|update| match update {
+                Update::Baking { fraction, .. } => Some(fraction),
+                _ => None,
+            })
+            .collect();
+        assert!(reported.is_sorted(), "{reported:?}");
+        assert!(reported.iter().any(|&f| f > 0.15 && f < 1.0), "{reported:?}");
+    }
 }

@@ -63,8 +63,6 @@ pub fn run(options: Options) -> anyhow::Result<()> {
         native,
         Box::new(move |creation| {
             super::set_up(&creation.egui_ctx);
-            #[cfg(target_os = "linux")]
-            super::appearance::follow(&creation.egui_ctx);
             let ctx = creation.egui_ctx.clone();
             let session = Session::new(Arc::new(move || ctx.request_repaint()));
             let mut window = Window::new(session.with_cache(FolderCache::of_user()));

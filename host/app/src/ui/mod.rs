@@ -30,10 +30,12 @@ use crate::session::{Intent, Session};
 use crate::viewport::gesture::Viewpoint;
 use crate::viewport::surface::Surface;
 
-/// Style, colours and fonts of the window, also in tests.
+/// Style, colours and fonts of the window; from then on dark or light follows the desktop.
 pub fn set_up(ctx: &egui::Context) {
     theme::apply(ctx);
     fonts::install(ctx);
+    #[cfg(target_os = "linux")]
+    appearance::follow(ctx);
 }
 
 /// Time between redraws while the motors are off and the handle rests; equals the span of the readout of loop overruns. With software rendering a frame of

@@ -32,7 +32,7 @@ impl Group {
             Self::Board => "for the emulated board: QEMU, and Rust's target for the microcontroller",
             Self::Window => "to open a window: graphics drivers and input libraries",
             Self::Screen => {
-                "to test the window without a display: Xvfb, xdotool, ImageMagick, a Japanese font"
+                "to test the window without a display: Xvfb, xdotool, ImageMagick, a message bus, a Japanese font"
             }
         }
     }
@@ -114,6 +114,7 @@ pub const PACKAGES: &[Package] = &[
     package(Group::Window, "libxrandr2", Sign::Library("libXrandr.so.2"), "libXrandr", "libxrandr"),
     package(Group::Window, "libfontconfig1", Sign::Library("libfontconfig.so.1"), "fontconfig", "fontconfig"),
     package(Group::Window, "libx11-xcb1", Sign::Library("libX11-xcb.so.1"), "libX11-xcb", "libx11"),
+    package(Group::Screen, "dbus-daemon", Sign::Program("dbus-daemon"), "dbus-daemon", "dbus"),
     package(Group::Screen, "xvfb", Sign::Program("Xvfb"), "xorg-x11-server-Xvfb", "xorg-server-xvfb"),
     package(Group::Screen, "xdotool", Sign::Program("xdotool"), "xdotool", "xdotool"),
     package(Group::Screen, "imagemagick", Sign::Program("import"), "ImageMagick", "imagemagick"),
