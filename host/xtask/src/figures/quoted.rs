@@ -1,11 +1,12 @@
-//! Figures quoted by pages: each measured number in README or `docs/*.md` is followed by a comment that names its row,
+//! Figures quoted by pages: each measured number in README, `docs/*.md` or the page of sweeps is followed by a comment that names its row,
 //!
 //! ```text
 //! stay within 9.06 µm<!-- row end-to-end: hole wall, 5 N + penetration -->
 //! ```
 //!
 //! with the table, then parts of the row's text that together match exactly one row. The number is right when the row's value, in the unit that
-//! follows the number, rounds to it at its written precision; a machine-dependent value, when the two differ by at most a factor of two.
+//! follows the number, rounds to it at its written precision; a machine-dependent value that is measured anew, when the two differ by at most a factor
+//! of two. Notes are not read: they are dated.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,8 @@ use anyhow::{Context, Result, bail};
 use super::row::Row;
 
 const README: &str = "README.md";
+const PAGES: &str = "docs";
+const SWEEPS: &str = "docs/figures/sweeps.md";
 const PAGE: &str = "the page of figures";
 const START: &str = "<!-- row ";
 const END: &str = "-->";
@@ -39,18 +42,19 @@ pub struct Quoted {
     parts: Vec<String>,
 }
 
-/// All numbers quoted by README and the pages beside `docs/figures`.
+/// All numbers quoted by README, the pages in `docs`, and that of the sweeps.
 ///
 /// # Errors
 /// When a page cannot be read or a comment is malformed.
 pub fn of_pages(root: &Path) -> Result<Vec<Quoted>> {
-    let mut pages = vec![PathBuf::from(README), PathBuf::from("docs/figures/sweeps.md")];
-    for entry in std::fs::read_dir(root.join("docs"))? {
-        let path = Path::new("docs").join(entry?.file_name());
+    let mut pages = vec![PathBuf::from(README), PathBuf::from(SWEEPS)];
+    for entry in std::fs::read_dir(root.join(PAGES)).with_context(|| format!("reading {PAGES}"))? {
+        let path = Path::new(PAGES).join(entry?.file_name());
         if path.extension().is_some_and(|end| end == "md") {
             pages.push(path);
         }
     }
+    pages.sort();
     let mut found = Vec::new();
     for page in pages {
         let text = std::fs::read_to_string(root.join(&page))
@@ -105,6 +109,11 @@ fn last_number(text: &str) -> Option<(String, String)> {
 }
 
 impl Quoted {
+    /// True if README quotes it: it is compared with what is measured anew as well.
+    pub fn is_of_readme(&self) -> bool {
+        self.page == Path::new(README)
+    }
+
     /// The one row that contains all of its parts.
     fn row<'a>(&self, rows: &'a [Row], place: &str) -> Result<&'a Row> {
         let fits = |row: &&Row| self.parts.iter().all(|part| row.what.contains(part.as_str()));
@@ -125,7 +134,10 @@ impl Quoted {
         let value = row
             .number()
             .with_context(|| format!("{self}: {place} has `{}`", row.value))?;
-        let value = value * scale(&row.unit, &self.unit);
+        let Some(scale) = scale(&row.unit, &self.unit) else {
+            bail!("{self}: {place} has {value} {}", row.unit);
+        };
+        let value = value * scale;
         let digits = self.number.split_once('.').map_or(0, |(_, behind)| behind.len());
         let agree = if row.varies {
             value > 0.0 && written > 0.0 && (value / written).max(written / value) <= VARIES
@@ -178,24 +190,29 @@ impl std::fmt::Display for Quoted {
     }
 }
 
-/// Factor from one unit of length to another; 1 for all other units.
-fn scale(from: &str, to: &str) -> f64 {
-    let metres = |unit: &str| match unit {
-        "µm" => Some(1e-6),
-        "mm" => Some(1e-3),
-        "m" => Some(1.0),
-        _ => None,
-    };
-    match (metres(from), metres(to)) {
-        (Some(from), Some(to)) => from / to,
-        _ => 1.0,
+/// Factor from one unit to another; 1 where either is a word, `None` where they measure different things.
+fn scale(from: &str, to: &str) -> Option<f64> {
+    match (of_base(from), of_base(to)) {
+        (Some((from, base)), Some((to, other))) => (base == other).then_some(from / to),
+        _ => Some(1.0),
     }
+}
+
+/// The factor of a unit's prefix, and the unit without it.
+fn of_base(unit: &str) -> Option<(f64, &'static str)> {
+    const BASES: [&str; 6] = ["m", "s", "N", "J", "N/m", "Hz"];
+    const PREFIXES: [(&str, f64); 4] = [("µ", 1e-6), ("m", 1e-3), ("", 1.0), ("k", 1e3)];
+    PREFIXES.iter().find_map(|(prefix, factor)| {
+        let rest = unit.strip_prefix(prefix)?;
+        let base = BASES.iter().find(|base| **base == rest)?;
+        Some((*factor, *base))
+    })
 }
 
 /// Tables that README quotes, and those of promises: they are measured whenever figures are checked. Numbers on other pages are compared with the
 /// pages of figures, whose own sources are recorded.
 pub fn measured(quoted: &[Quoted]) -> BTreeSet<String> {
-    let of_readme = quoted.iter().filter(|quoted| quoted.page == Path::new(README));
+    let of_readme = quoted.iter().filter(|quoted| quoted.is_of_readme());
     let mut tables: BTreeSet<String> = of_readme.map(|quoted| quoted.table.clone()).collect();
     tables.extend(["end-to-end", "promises"].map(str::to_owned));
     tables
@@ -332,8 +349,51 @@ mod tests {
     }
 
     #[test]
+    fn a_number_may_have_another_prefix_than_its_row_but_not_another_unit() {
+        let energy = [row("at the handle", 0.002_573, "mJ")];
+        let said = |text: &str| quoted(&format!("{text}<!-- row a: handle -->")).remove(0);
+        assert!(said("2.57 µJ").check_page(&energy).is_ok());
+        assert!(said("2.8 µJ").check_page(&energy).is_err());
+        assert!(said("0 µm").check_page(&energy).is_err());
+        let stiffness = [row("at the handle", 18_481.9, "N/m")];
+        assert!(said("18.5 kN/m").check_page(&stiffness).is_ok());
+        assert!(said("18.5 N/m").check_page(&stiffness).is_err());
+    }
+
+    /// README alone decides what is measured anew: pages in `docs` may quote rows that only a whole page holds.
+    #[test]
+    fn pages_of_docs_are_read_and_their_tables_are_not_measured() {
+        let root = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(root.path().join("docs/figures")).unwrap();
+        std::fs::create_dir_all(root.path().join("docs/notes")).unwrap();
+        for (page, table) in [
+            ("README.md", "contact"),
+            ("docs/stability.md", "stability"),
+            ("docs/figures/sweeps.md", "constraints"),
+            ("docs/figures/plan.md", "plan"),
+            ("docs/notes/2026-11-21-first.md", "notes"),
+        ] {
+            std::fs::write(root.path().join(page), format!("1 µm<!-- row {table}: a -->\n")).unwrap();
+        }
+        let found = of_pages(root.path()).unwrap();
+        let tables: Vec<&str> = found.iter().map(|quoted| quoted.table.as_str()).collect();
+        assert_eq!(tables, ["contact", "constraints", "stability"]);
+        let measured = measured(&found);
+        assert_eq!(
+            measured.iter().map(String::as_str).collect::<Vec<_>>(),
+            ["contact", "end-to-end", "promises"]
+        );
+    }
+
+    #[test]
     fn the_repositorys_own_comments_are_read() {
         let root = crate::shell::root().unwrap();
-        assert!(!of_pages(&root).unwrap().is_empty());
+        let found = of_pages(&root).unwrap();
+        for page in [README, "docs/stability.md"] {
+            assert!(
+                found.iter().any(|quoted| quoted.page == Path::new(page)),
+                "{page}"
+            );
+        }
     }
 }
