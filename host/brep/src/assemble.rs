@@ -4,7 +4,7 @@ use crate::external::{self, Joined, text_error};
 use crate::kernel::{self, RawPart, RawResult};
 use crate::part21::check::{self, Content};
 use crate::part21::structure::Structure;
-use crate::part21::{Exchange, operators, render, text};
+use crate::part21::{Exchange, operators, pcurves, render, text};
 use crate::{BrepError, CadModel, EDGE_TOLERANCE_MM, LoadOptions, Part, free_form, shape};
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
@@ -49,9 +49,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
         });
     }
     operators::split(&mut file).map_err(|e| text_error(&shown, e))?;
-    let rendered = render::render(&file);
-    let document =
-        kernel::read_document(&rendered, options.max_parts).map_err(|e| kernel_error(&shown, &e))?;
+    let document = transfer(&shown, &mut file, options)?;
     Ok(Source {
         file,
         content,
@@ -59,6 +57,26 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
         files,
         document,
     })
+}
+
+/// Passes the text to the kernel. By images of edges on faces (pcurves) kernels before version 7.9 can take the wrong side of a face: a ball at the end of a
+/// bar becomes a dimple. Where the orientation of faces tells that, the text is read again without them, if that is better.
+fn transfer(
+    shown: &str,
+    file: &mut Exchange,
+    options: &LoadOptions,
+) -> Result<cxx::UniquePtr<kernel::Document>, BrepError> {
+    let read = |file: &Exchange| {
+        kernel::read_document(&render::render(file), options.max_parts).map_err(|e| kernel_error(shown, &e))
+    };
+    let turned = |document: &kernel::Document| document.results().iter().map(|r| r.turned).sum::<usize>();
+    let first = read(file)?;
+    let before = turned(&first);
+    if before == 0 || !pcurves::drop(file) {
+        return Ok(first);
+    }
+    let second = read(file)?;
+    Ok(if turned(&second) < before { second } else { first })
 }
 
 /// Reads a STEP file and queries the kernel about its shape `shape`, numbered as in [`CadModel::shapes`].
@@ -225,6 +243,13 @@ fn account(
     for &entity in content.solids.iter().chain(&content.surfaces) {
         let is_solid = content.solids.contains(&entity);
         let listed = check::faces_listed(file, entity);
+        if let Some(result) = results.get(&entity).filter(|result| result.turned > 0) {
+            warnings.push(format!(
+                "{}: the kernel took {} faces for the other side of their edges; compare the volume with that of the CAD system",
+                label(entity),
+                result.turned
+            ));
+        }
         match results.get(&entity) {
             Some(result) if result.placed && (result.solids > 0 || !is_solid) => {
                 if let Some(listed) = listed.filter(|&listed| result.faces < listed) {

@@ -15,6 +15,7 @@
 #include <STEPControl_Reader.hxx>
 #include <StepData_StepModel.hxx>
 #include <StepShape_FaceBasedSurfaceModel.hxx>
+#include <StepShape_FaceSurface.hxx>
 #include <StepShape_ShellBasedSurfaceModel.hxx>
 #include <StepShape_SolidModel.hxx>
 #include <TCollection_AsciiString.hxx>
@@ -47,6 +48,7 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
@@ -304,12 +306,48 @@ class Walker {
   std::unordered_set<const void*> placed_;
 };
 
+// Sense of each face in the text, by the identity of its geometry.
+using Senses = std::unordered_map<const void*, bool>;
+
+Senses senses(const Handle(StepData_StepModel) & model, const Handle(Transfer_TransientProcess) & process) {
+  Senses found;
+  for (int i = 1; i <= model->NbEntities(); ++i) {
+    const Handle(StepShape_FaceSurface) entity = Handle(StepShape_FaceSurface)::DownCast(model->Value(i));
+    if (entity.IsNull()) continue;
+    const TopoDS_Shape shape = TransferBRep::ShapeResult(process, entity);
+    if (shape.IsNull()) continue;
+    for (TopExp_Explorer it(shape, TopAbs_FACE); it.More(); it.Next())
+      found[it.Current().TShape().get()] = entity->SameSense();
+  }
+  return found;
+}
+
+// See RawResult::turned.
+std::size_t turned(const TopoDS_Shape& shape, const Senses& senses) {
+  std::size_t sum = 0;
+  for (TopExp_Explorer solid(shape, TopAbs_SOLID); solid.More(); solid.Next()) {
+    // A cavity may have its shell reversed as a whole, so each shell is judged by itself.
+    for (TopExp_Explorer shell(solid.Current(), TopAbs_SHELL); shell.More(); shell.Next()) {
+      std::size_t all = 0, other = 0;
+      for (TopExp_Explorer face(shell.Current(), TopAbs_FACE); face.More(); face.Next()) {
+        const auto sense = senses.find(face.Current().TShape().get());
+        if (sense == senses.end()) continue;
+        ++all;
+        if ((face.Current().Orientation() == TopAbs_FORWARD) != sense->second) ++other;
+      }
+      if (other < all) sum += other;
+    }
+  }
+  return sum;
+}
+
 // Result for each solid and surface model.
 rust::Vec<RawResult> outcome(const Handle(XSControl_WorkSession) & session, const std::unordered_set<const void*>& placed) {
   rust::Vec<RawResult> results;
   const Handle(StepData_StepModel) model = Handle(StepData_StepModel)::DownCast(session->Model());
   const Handle(Transfer_TransientProcess) process = session->TransferReader()->TransientProcess();
   if (model.IsNull() || process.IsNull()) return results;
+  const Senses faces = senses(model, process);
   for (int i = 1; i <= model->NbEntities(); ++i) {
     const Handle(Standard_Transient) entity = model->Value(i);
     if (!entity->IsKind(STANDARD_TYPE(StepShape_SolidModel)) &&
@@ -322,6 +360,7 @@ rust::Vec<RawResult> outcome(const Handle(XSControl_WorkSession) & session, cons
     if (!shape.IsNull()) {
       result.faces = count(shape, TopAbs_FACE);
       result.solids = count(shape, TopAbs_SOLID);
+      result.turned = turned(shape, faces);
       for (TopExp_Explorer it(shape, TopAbs_FACE); it.More() && !result.placed; it.Next())
         result.placed = placed.count(it.Current().TShape().get()) != 0;
     }

@@ -54,6 +54,9 @@ mod ffi {
         solids: usize,
         /// Whether at least one of its solids or faces is in a part.
         placed: bool,
+        /// Faces whose orientation in its solids is opposite to the text's, if it is so of some and not of all: the kernel has taken the other side of
+        /// their edges.
+        turned: usize,
         /// The kernel's message about it, if any.
         message: String,
     }

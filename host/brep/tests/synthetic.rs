@@ -2,6 +2,8 @@
 
 mod support;
 
+use std::f64::consts::PI;
+
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use mortise_brep::{BrepError, CadModel, LoadOptions, Surface, load_step, load_step_with};
 use proptest::prelude::*;
@@ -486,4 +488,20 @@ proptest! {
         let want = whole.matrix3 * corner + whole.translation * mm;
         prop_assert!(placed.distance(want) < 1e-9 * (1.0 + want.length()), "{} is not {}", placed, want);
     }
+}
+
+/// A bar of radius 3 that ends in a ball of radius 6.5; the circle between them crosses the ball's seam, and its edges have pcurves. Kernels before version
+/// 7.9 take the ball for the dimple that it would leave in the bar.
+#[test]
+fn a_ball_on_a_bar_is_no_dimple() {
+    let model = load(include_str!("data/ball_on_bar.step")).unwrap();
+    let (bar, ball, length) = (3.0f64, 6.5f64, 14.0);
+    let along = (ball * ball - bar * bar).sqrt();
+    let common = 2.0 / 3.0 * PI * (ball.powi(3) - along.powi(3));
+    let volume = 4.0 / 3.0 * PI * ball.powi(3) + PI * bar * bar * length - common;
+    let found = model.shapes[0].volume_mm3;
+    assert!((found - volume).abs() < 1e-6 * volume, "{found} is not {volume}");
+    let (low, high) = placed_box(&model, 0);
+    assert!((high.x - low.x - length - ball).abs() < 0.1, "{low} to {high}");
+    assert_eq!(model.warnings, [""; 0]);
 }

@@ -11,6 +11,7 @@ pub mod exchange;
 mod lexer;
 mod merge;
 pub mod operators;
+pub mod pcurves;
 mod placements;
 pub mod render;
 pub mod schema;
