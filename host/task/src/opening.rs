@@ -30,26 +30,41 @@ const HELD_TIME: Duration = Duration::from_secs(4);
 type Least = (f64, f64, [usize; 2]);
 
 impl Search<'_> {
-    /// Where along leg `p` motion `q` goes beyond its `range` by at least the displacement of an opening.
+    /// Where along leg `p` motion `q`, possible at its start, is possible again behind a stretch on which it is not: a key turns before a ward and behind it.
+    pub fn reopening(&mut self, group: &Moved<'_>, p: &Kind, reach: f64, q: &Kind) -> Option<Opening> {
+        if same_axis(p, q) {
+            return None;
+        }
+        let (start, end) = self
+            .clear_stretch(group, p, [0.0, reach], q, self.opening_mm)
+            .ok()?;
+        let blocked = end + SCAN_MM;
+        if start > 0.0 || blocked >= reach {
+            return None;
+        }
+        self.opening(group, p, [blocked, reach], q, 0.0)
+    }
+
+    /// Where along leg `p`, within `within` mm of its travel, motion `q` goes beyond its `range` by at least the displacement of an opening.
     pub fn opening(
         &mut self,
         group: &Moved<'_>,
         p: &Kind,
-        reach: f64,
+        within: [f64; 2],
         q: &Kind,
         range: f64,
     ) -> Option<Opening> {
         if same_axis(p, q) {
             return None;
         }
-        let (mut low, mut high) = (0.0, reach);
+        let [mut low, mut high] = within;
         let mut found = None;
         let mut gain = self.opening_mm;
         // The displacement doubles while there is a clear stretch.
         let most = self.most(group, q);
         while range + gain <= most {
             let travel = range + gain;
-            let (at, shift) = match self.clear_stretch(group, p, low, high, q, travel) {
+            let (at, shift) = match self.clear_stretch(group, p, [low, high], q, travel) {
                 Ok((from, to)) => {
                     (low, high) = (from, to);
                     ((from + to) / 2.0, None)
@@ -234,8 +249,7 @@ impl Search<'_> {
         &self,
         group: &Moved<'_>,
         p: &Kind,
-        low: f64,
-        high: f64,
+        [low, high]: [f64; 2],
         q: &Kind,
         travel: f64,
     ) -> Result<(f64, f64), Option<Least>> {

@@ -180,10 +180,14 @@ impl Search<'_> {
                     self.out_of_time = true;
                     return found;
                 }
-                if pair.is_none() {
-                    continue;
+                let mut reached = Vec::new();
+                if pair.is_some() {
+                    reached.extend(self.opening(&group, p, [0.0, reach], q, range));
                 }
-                if let Some(opening) = self.opening(&group, p, reach, q, range) {
+                if range >= self.opening_mm {
+                    reached.extend(self.reopening(&group, p, reach, q));
+                }
+                for opening in reached {
                     let leg = p.over(opening.at);
                     let by = opening.shift() * leg.at(1.0) * place.by;
                     if self.is_new(by) {
