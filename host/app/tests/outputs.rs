@@ -187,6 +187,10 @@ fn every_bad_option_value_is_one_line() {
         (&["rig", "show", "--rig", "emulated:q"], "emulated:lockstep"),
         (&["ports", "--jsn"], "--json"),
         (&["open", SAMPLE, "--timeout", "soon"], "1 to 86400"),
+        (
+            &["open", SAMPLE, "--screenshot", "q", "--after", "nan"],
+            "0 to 3600",
+        ),
     ];
     for (arguments, what) in cases {
         let output = mortise(place.path(), arguments);

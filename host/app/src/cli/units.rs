@@ -1,4 +1,6 @@
-//! Lengths and sizes with their units, as written on the command line.
+//! Lengths, sizes and times with their units, as written on the command line.
+
+use std::time::Duration;
 
 /// Millimetres of `5um`, `5µm` or `0.005mm`.
 pub fn length_mm(text: &str) -> Result<f64, String> {
@@ -37,6 +39,14 @@ fn number(text: &str, units: &[(&str, f64)]) -> Option<f64> {
         let value: f64 = digits.parse().ok()?;
         value.is_finite().then_some(value * scale)
     })
+}
+
+/// A delay in seconds: 0 to 3600.
+pub fn delay(text: &str) -> Result<Duration, String> {
+    let seconds: Option<f64> = text.parse().ok().filter(|s| (0.0..=3600.0).contains(s));
+    seconds
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| "give a number of seconds, 0 to 3600".to_owned())
 }
 
 #[cfg(test)]

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Args;
 use mortise_rig::RigSpec;
 
 use super::reading::Reading;
+use super::units;
 
 /// Contents of the window at the start.
 #[derive(Debug, Args)]
@@ -36,8 +38,8 @@ pub struct Picture {
     #[arg(long, hide = true, requires = "screenshot")]
     force: bool,
     /// Seconds from the start to the screenshot
-    #[arg(long, hide = true, default_value_t = 3.0, value_name = "SECONDS")]
-    after: f64,
+    #[arg(long, hide = true, default_value = "3", value_name = "SECONDS", value_parser = units::delay, allow_negative_numbers = true)]
+    after: Duration,
     /// Draw fixed parts as glass
     #[arg(long, hide = true)]
     see_through: bool,
@@ -61,7 +63,6 @@ pub fn demo(file: Option<PathBuf>, rig: Option<RigSpec>, picture: Picture) -> an
 mod shown {
     use std::path::{Path, PathBuf};
     use std::process::ExitCode;
-    use std::time::Duration;
 
     use mortise_output::{Existing, Output};
     use mortise_rig::RigSpec;
@@ -97,10 +98,12 @@ mod shown {
         let existing = Existing::from_force(picture.force);
         let check = |png| Output::new(png, existing, &inputs);
         let png = picture.screenshot.map(check).transpose()?;
-        let after = Duration::try_from_secs_f64(picture.after).unwrap_or_default();
         Ok(Options {
             first,
-            screenshot: png.map(|file| Screenshot { file, after }),
+            screenshot: png.map(|file| Screenshot {
+                file,
+                after: picture.after,
+            }),
             see_through: picture.see_through,
         })
     }

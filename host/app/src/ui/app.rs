@@ -1,5 +1,6 @@
 //! The program's window: runs a [`Window`] under eframe and takes the screenshots that automation requests.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -154,7 +155,9 @@ impl App {
         let image = self.taken.lock().unwrap_or_else(PoisonError::into_inner).take();
         match image {
             Some(image) => {
-                if let Err(error) = write_png(&screenshot.file, &image) {
+                let document = self.window.session.document.as_ref();
+                let files = document.map_or(&[][..], |document| &document.model.files);
+                if let Err(error) = write_png(screenshot.file.clone(), files, &image) {
                     *self.failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                 }
                 self.screenshot = None;
@@ -165,7 +168,9 @@ impl App {
     }
 }
 
-fn write_png(target: &Output, image: &ColorImage) -> anyhow::Result<()> {
+/// Writes the picture, unless the target is one of the `files` that were read: those beside the opened one are known only now.
+fn write_png(mut target: Output, files: &[PathBuf], image: &ColorImage) -> anyhow::Result<()> {
+    target.add_inputs(files)?;
     let what = || format!("cannot write the screenshot to {}", target.path().display());
     let [width, height] = image.size.map(|n| n as u32);
     let mut file = Vec::new();
@@ -206,6 +211,8 @@ fn icon() -> egui::IconData {
 
 #[cfg(test)]
 mod tests {
+    use mortise_output::Existing;
+
     use super::*;
 
     #[test]
@@ -215,5 +222,20 @@ mod tests {
         // 800 × 600 pixels, three to the point.
         let least = viewport.min_inner_size.expect("a least size");
         assert!(least.x <= 266.0 && least.y <= 200.0, "{least}");
+    }
+
+    #[test]
+    fn a_picture_replaces_no_file_that_was_read() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let [beside, other] = ["part.step", "other.png"].map(|name| place.path().join(name));
+        std::fs::write(&beside, "a part").expect("written");
+        let image = ColorImage::filled([2, 2], egui::Color32::WHITE);
+        let output = |path| Output::new(path, Existing::Replace, &[] as &[PathBuf]).expect("may be written");
+        let files = [beside.clone()];
+        let error = write_png(output(beside.clone()), &files, &image).expect_err("it was read");
+        assert!(error.to_string().contains("is the input"), "{error}");
+        assert_eq!(std::fs::read(&beside).expect("still there"), b"a part");
+        write_png(output(other.clone()), &files, &image).expect("another file");
+        assert!(std::fs::read(&other).expect("written").starts_with(b"\x89PNG"));
     }
 }
