@@ -20,7 +20,7 @@ const COMPLY_MM: f64 = 0.6;
 const PUSHES: usize = 40;
 const PUSH_MM: f64 = 5e-3;
 /// Missed openings that are kept, the part of a leg around one that is searched for the place with the least overlap, and steps of its motion, mm.
-const MOST_MISSED: usize = 6;
+const MOST_MISSED: usize = 12;
 const NEAR_MM: f64 = 0.2;
 const NEEDED_STEP_MM: f64 = 0.1;
 /// Time after the end of a search for the question by how much the group is held.
@@ -172,9 +172,20 @@ impl Search<'_> {
         None
     }
 
-    /// Keeps an opening that was missed by the overlap `excess`.
+    /// Keeps an opening that was missed by the overlap `excess`: from each start of a leg, of a pair of a leg and a motion the one that was missed by the
+    /// least; those from the place of the group itself first, as what holds it is most often found there.
     fn note(&mut self, missed: Missed) {
-        let at = self.missed.partition_point(|m| m.excess <= missed.excess);
+        let same = |m: &Missed| {
+            m.by == missed.by && same_axis(&m.leg, &missed.leg) && same_axis(&m.motion, &missed.motion)
+        };
+        if let Some(known) = self.missed.iter().position(same) {
+            if self.missed[known].excess <= missed.excess {
+                return;
+            }
+            self.missed.remove(known);
+        }
+        let rank = |m: &Missed| (m.by != DAffine3::IDENTITY, m.excess);
+        let at = (self.missed).partition_point(|m| rank(m) <= rank(&missed));
         self.missed.insert(at, missed);
         self.missed.truncate(MOST_MISSED);
     }

@@ -1,5 +1,7 @@
 //! The search for a way of several legs: places, the motions from each, and the order in which they are tried.
 
+use std::collections::VecDeque;
+
 use glam::{DAffine3, DVec3};
 
 use crate::assembly::{Assembly, Moved, SEARCH_STEP_MM};
@@ -124,11 +126,15 @@ impl Search<'_> {
     }
 
     pub fn legs(&mut self) -> Option<Path> {
-        let mut open = vec![Place {
+        let mut open = VecDeque::from([Place {
             by: DAffine3::IDENTITY,
             legs: Vec::new(),
-        }];
-        while let Some(place) = open.pop() {
+        }]);
+        // In turn the newest place and the oldest one: a maze is deep, and beside a shallow way out a turn that is free everywhere leads nowhere, far.
+        let mut deep = false;
+        loop {
+            deep = !deep;
+            let place = (if deep { open.pop_back() } else { open.pop_front() })?;
             if self.budget.is_over() {
                 self.out_of_time = true;
                 return None;
@@ -136,23 +142,22 @@ impl Search<'_> {
             if place.legs.len() + 1 > self.budget.legs {
                 continue;
             }
-            let group = Moved {
-                parts: self.parts,
-                by: place.by,
-            };
-            if !place.legs.is_empty()
-                && let Some(last) = self.straight(&group)
-            {
-                let mut legs = place.legs;
-                legs.push(last);
-                return Some(Path { legs });
-            }
             let mut next = self.openings(&place);
             // The largest gain is expanded first.
             next.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (_, place) in next.iter().rev() {
+                let group = Moved {
+                    parts: self.parts,
+                    by: place.by,
+                };
+                if let Some(last) = self.straight(&group) {
+                    let mut legs = place.legs.clone();
+                    legs.push(last);
+                    return Some(Path { legs });
+                }
+            }
             open.extend(next.into_iter().map(|(_, place)| place));
         }
-        None
     }
 
     /// Places reached by one leg at which another motion opens, with the gain of that motion in mm.

@@ -41,10 +41,44 @@ fn straight_and_turned_ways_out_are_found() {
         return;
     };
     // Behind each ward of the maze the key turns again, where it could not within the ward.
-    for (name, legs) in [("ubolt_plate", 1), ("cross_pin", 3), ("lock_maze", 8)] {
+    for (name, legs) in [
+        ("ubolt_plate", 1),
+        ("cross_pin", 3),
+        ("keyhole_loose_30um", 2),
+        ("lock_maze", 8),
+    ] {
         let assembly = support::load(&folder.join("10_extraction"), &format!("{name}.step"));
         let path = out(&assembly, 240).unwrap_or_else(|| panic!("{name} stays in"));
         assert_eq!(path.legs.len(), legs, "{name}: {path:?}");
+    }
+}
+
+/// The ball is 30 µm larger than the hole: 15 µm on each side. The other two can never come apart.
+#[test]
+fn interlocked_pairs_stay_together_and_state_by_how_much() {
+    let Some(folder) = support::shared("interlocked_pairs_stay_together_and_state_by_how_much") else {
+        return;
+    };
+    for (name, time_s, held_um) in [
+        ("keyhole_locked_30um", 30, Some(15.0)),
+        ("ring_on_dumbbell", 5, None),
+        ("linked_rings", 5, None),
+    ] {
+        let assembly = support::load(&folder.join("10_extraction"), &format!("{name}.step"));
+        let budget = Budget::lasting(Duration::from_secs(time_s));
+        let (Removal::Blocked(blocked) | Removal::TimedOut(blocked)) =
+            remove(&assembly, &[1], &[0], &[], &budget)
+        else {
+            panic!("{name} comes out");
+        };
+        assert_eq!(blocked.pair, [1, 0]);
+        if let Some(um) = held_um {
+            let found = blocked.overlap_mm.map(|mm| mm * 1e3);
+            assert!(
+                found.is_some_and(|found| (found - um).abs() < 1.0),
+                "{name}: {found:?}"
+            );
+        }
     }
 }
 
