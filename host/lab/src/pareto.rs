@@ -20,6 +20,7 @@ use crate::fit::Fit;
 use crate::motion::{Motion, play};
 use crate::peer;
 use crate::scene_p::{self, By};
+use crate::table::rounded;
 use crate::variant::Variant;
 
 /// Clearance of the peg whose ticks are measured, mm.
@@ -50,6 +51,8 @@ pub struct Entry {
     pub smallest_clearance_um: Option<f64>,
     /// Instructions of the longest tick on the emulated board.
     pub instructions: Option<u32>,
+    /// Ticks of that motion that left out points, %.
+    pub left_out_percent: Option<f64>,
     /// Median query on scene P on this computer, ns.
     pub query_ns: f64,
     /// Bytes of scene P's image.
@@ -108,6 +111,7 @@ pub fn sweep(quick: bool, out: &mut dyn FnMut(&Entry)) -> Result<Vec<Entry>, Lab
             penetration_error_um: 1e3 * answers.depth_error_mm,
             smallest_clearance_um: None,
             instructions: None,
+            left_out_percent: None,
             query_ns: answers.median_ns,
             image_bytes: None,
             on_frontier: false,
@@ -126,8 +130,8 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
     let pressed = Motion::Pressed {
         mm_per_s: SLIDE_MM_PER_S,
     };
-    let instructions = match play(variant, &Fit::thesis(COUNTED_MM), pressed, None, &board) {
-        Ok((outcome, _)) => outcome.instructions_per_tick_max,
+    let outcome = match play(variant, &Fit::thesis(COUNTED_MM), pressed, None, &board) {
+        Ok((outcome, _)) => Some(outcome),
         // A model too coarse for the fit pushes until the board faults: it has no cost.
         Err(LabError::Scenario(ScenarioError::Fault { .. })) => None,
         // A model too large for the board has no cost either.
@@ -149,7 +153,8 @@ fn measure(variant: &Variant, looked_for: bool) -> Result<Entry, LabError> {
         gap_error_um: 1e3 * asked.worst(By::Field, true).0,
         penetration_error_um: 1e3 * asked.worst(By::Field, false).0,
         smallest_clearance_um: smallest.map(|clearance| 1e3 * clearance),
-        instructions,
+        instructions: (outcome.as_ref()).and_then(|outcome| outcome.instructions_per_tick_max),
+        left_out_percent: (outcome.as_ref()).map(|outcome| rounded(outcome.degraded_percent, 1)),
         query_ns: asked.median_ns(),
         image_bytes: Some(asked.image_bytes),
         on_frontier: false,
@@ -266,6 +271,9 @@ impl fmt::Display for Entry {
         if let Some(instructions) = self.instructions {
             write!(f, "; {instructions} instructions")?;
         }
+        if let Some(percent) = self.left_out_percent {
+            write!(f, ", {percent} % of ticks left out points")?;
+        }
         if let Some(bytes) = self.image_bytes {
             write!(f, "; {bytes} bytes")?;
         }
@@ -349,6 +357,7 @@ mod tests {
             penetration_error_um: 0.5 * error,
             smallest_clearance_um: None,
             instructions,
+            left_out_percent: instructions.map(|_| 0.0),
             query_ns: 1.0,
             image_bytes: Some(1),
             on_frontier: false,

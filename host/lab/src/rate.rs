@@ -12,7 +12,7 @@ use mortise_bake::Grabbable;
 use mortise_guide::GuideSettings;
 use mortise_protocol::message::{Telemetry, ToDevice};
 use mortise_protocol::parameter::ParameterId;
-use mortise_scenario::measure::depth;
+use mortise_scenario::measure::{depth, left_out_percent};
 use mortise_scenario::wire::pose_mm;
 use mortise_scenario::{PreparedScene, Recording, Scenario};
 use serde::Serialize;
@@ -110,7 +110,9 @@ pub struct Window {
     pub instructions_mean: f64,
     /// Instructions of the slowest tick.
     pub instructions_max: u32,
-    /// The rate that this tick allows, Hz.
+    /// Ticks with decimated points, %.
+    pub left_out_percent: f64,
+    /// The rate that the slowest tick allows, Hz.
     pub rate_hz: f64,
     /// Targets in force at the end.
     pub targets: u8,
@@ -279,6 +281,7 @@ fn windows(
                 depth_mm: rounded(deep, 3),
                 instructions_mean: rounded(sum / ticks.len() as f64, 0),
                 instructions_max: most,
+                left_out_percent: rounded(left_out_percent(ticks), 1),
                 rate_hz: allowed_hz(most),
                 targets: last.guidance.active,
             })
@@ -364,7 +367,7 @@ impl fmt::Display for Course {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{}, {}: {:.1} mm in of {:.0}; mean {} and at most {} instructions a tick, which allows {} Hz; {} ticks missed",
+            "{}, {}: {:.1} mm in of {:.0}; mean {} and at most {} instructions a tick, which allows {} Hz; {} % of ticks left out points, {} ticks missed",
             self.pair,
             self.mode.name(),
             self.depth_mm,
@@ -372,6 +375,7 @@ impl fmt::Display for Course {
             self.instructions_mean,
             self.instructions_max,
             self.slowest_hz,
+            self.left_out_percent,
             self.missed_ticks
         )
     }

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_haptics::{Settings, Twist};
-use mortise_protocol::message::{Telemetry, WirePose, WireWrench};
+use mortise_protocol::message::{Flags, Telemetry, WirePose, WireWrench};
 
 use crate::port::Port;
 use crate::scenario::{Depth, Press};
@@ -35,6 +35,14 @@ pub fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<
     let center = moving.transform_point3(part.surface.shape().center_of_mass);
     let off = center - DVec3::from_array(depth.through_mm);
     Some((tip - mouth, bottom - mouth, (off - off.dot(axis) * axis).length()))
+}
+
+/// Share of ticks that left out points: thinned where they did not fit the budget, or contacts beyond the most that are kept, %.
+pub fn left_out_percent(samples: &[Telemetry]) -> f64 {
+    let mut incomplete = Flags::BUDGET;
+    incomplete.insert(Flags::CONTACTS);
+    let left_out = (samples.iter()).filter(|sample| Flags::from_bits(sample.flags).intersects(incomplete));
+    100.0 * left_out.count() as f64 / samples.len().max(1) as f64
 }
 
 /// Deepest penetration reported by the board, mm.

@@ -3,7 +3,7 @@
 use mortise_guide::GuideSettings;
 use mortise_protocol::image::CRC;
 use mortise_protocol::message::{
-    Capabilities, CostUnit, DeviceState, Fault, Flags, FromDevice, Statistics, Telemetry, ToDevice,
+    Capabilities, CostUnit, DeviceState, Fault, FromDevice, Statistics, Telemetry, ToDevice,
 };
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, FaultCounts, FaultLine, Ran, RigSpec, describe};
@@ -412,12 +412,7 @@ fn outcome(
         bad_frames: statistics.bad_frames,
         parameter_messages: play.messages,
         flags: samples.iter().fold(0, |flags, sample| flags | sample.flags),
-        degraded_percent: {
-            let mut incomplete = Flags::BUDGET;
-            incomplete.insert(Flags::CONTACTS);
-            let degraded = (samples.iter()).filter(|s| Flags::from_bits(s.flags).intersects(incomplete));
-            100.0 * degraded.count() as f64 / samples.len().max(1) as f64
-        },
+        degraded_percent: measure::left_out_percent(samples),
         fault: play.fault.map(|(_, fault)| describe(fault)),
         fault_at_ms: play
             .fault

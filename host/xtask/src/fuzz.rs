@@ -100,12 +100,13 @@ impl Fuzzed {
                 "= 0",
                 Some(crashes == 0),
             ),
-            row(format!("{what}: inputs"), self.runs, "≥ 1", Some(self.runs > 0)),
+            // How many there are depends on the machine and on chance: a run without any is refused, nothing else bounds them.
+            row(format!("{what}: inputs"), self.runs, "none", None),
             row(
                 format!("{what}: edges of the program taken, of {all}"),
                 taken,
-                "≥ 1",
-                Some(taken > 0),
+                "none",
+                None,
             ),
         ]
         .join("\n")
@@ -319,7 +320,10 @@ mod tests {
             rows.contains("fuzzing frame, 600 s in 2 processes: edges of the program taken, of 53"),
             "{rows}"
         );
-        assert!(!rows.contains(r#""holds":false"#), "{rows}");
+        // The numbers of inputs and edges are not bounded, and count as nothing that holds.
+        let unbounded = |row: &&str| row.contains(r#""bound":"none","holds":null"#);
+        assert_eq!(rows.lines().filter(unbounded).count(), 2, "{rows}");
+        assert_eq!(rows.matches(r#""bound":"= 0","holds":true"#).count(), 1, "{rows}");
         fuzzed.crash = Some("SUMMARY: heap-buffer-overflow".into());
         assert!(fuzzed.rows(Duration::from_secs(600)).contains(r#""holds":false"#));
     }
