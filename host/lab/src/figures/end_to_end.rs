@@ -100,11 +100,11 @@ fn insertion(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> 
     let scenario = Scenario::insertion(plan.pair)?;
     let scene = PreparedScene::of(&scenario)?;
     let board = play(&scenario, &scene, &emulated())?;
-    // Every tick of the second run is looked at. That it ends in the same state shows that both went the same way; a tick that is told costs some
-    // instructions more.
-    let mut told = scenario.clone();
-    told.run.telemetry_every_ticks = 1;
-    let again = play(&told, &scene, &emulated())?;
+    // Every tick of the second run is looked at. That it ends in the same state shows that both went the same way; a tick that is reported costs
+    // some instructions more.
+    let mut every_tick = scenario.clone();
+    every_tick.run.telemetry_every_ticks = 1;
+    let again = play(&every_tick, &scene, &emulated())?;
     let here = play(&scenario, &scene, &SIM)?;
     let hole = board.hole_mm.unwrap_or(f64::NAN);
     let what =
