@@ -37,7 +37,7 @@ pub fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<
     Some((tip - mouth, bottom - mouth, (off - off.dot(axis) * axis).length()))
 }
 
-/// Share of ticks that left out points: thinned where they did not fit the budget, or contacts beyond the most that are kept, %.
+/// Share of ticks that left out points: decimated where they did not fit the budget, or contacts beyond the most that are kept, %.
 pub fn left_out_percent(samples: &[Telemetry]) -> f64 {
     let mut incomplete = Flags::BUDGET;
     incomplete.insert(Flags::CONTACTS);
