@@ -75,8 +75,11 @@ fn transfer(
     if before == 0 || !pcurves::drop(file) {
         return Ok(first);
     }
-    let second = read(file)?;
-    Ok(if turned(&second) < before { second } else { first })
+    // What cannot be read without them is kept as first read, with its warning.
+    Ok(match read(file) {
+        Ok(second) if turned(&second) < before => second,
+        _ => first,
+    })
 }
 
 /// Reads a STEP file and queries the kernel about its shape `shape`, numbered as in [`CadModel::shapes`].

@@ -169,6 +169,10 @@ fn run<T: DeserializeOwned>(
         path: path.display().to_string(),
         seconds: options.time_limit_s,
     };
+    let too_long = || BrepError::AnswerTooLong {
+        path: path.display().to_string(),
+        megabytes: answer_limit >> 20,
+    };
     let status = match wait(&mut child.0, limit, &[&flooded, cancel]) {
         Ok(Some(status)) => status,
         Ok(None) if cancel.load(Ordering::Acquire) => {
@@ -176,12 +180,7 @@ fn run<T: DeserializeOwned>(
                 path: path.display().to_string(),
             });
         }
-        Ok(None) if flooded.load(Ordering::Acquire) => {
-            return Err(BrepError::AnswerTooLong {
-                path: path.display().to_string(),
-                megabytes: answer_limit >> 20,
-            });
-        }
+        Ok(None) if flooded.load(Ordering::Acquire) => return Err(too_long()),
         Ok(None) => return Err(timed_out()),
         Err(e) => return Err(process_error(path, &e.to_string())),
     };
@@ -189,6 +188,10 @@ fn run<T: DeserializeOwned>(
         return Err(timed_out());
     }
     let output = output.and_then(|t| t.join().ok()).unwrap_or_default();
+    // The child may end before its answer, still in the pipe, is found to be too long.
+    if flooded.load(Ordering::Acquire) {
+        return Err(too_long());
+    }
     let errors = errors.and_then(|t| t.join().ok()).unwrap_or_default();
     match payload(&output) {
         Some(payload) => postcard::from_bytes(payload)

@@ -110,7 +110,7 @@ pub struct Window {
     pub instructions_mean: f64,
     /// Instructions of the slowest tick.
     pub instructions_max: u32,
-    /// Ticks with decimated points, %.
+    /// Ticks that left out points, %.
     pub left_out_percent: f64,
     /// The rate that the slowest tick allows, Hz.
     pub rate_hz: f64,
@@ -135,7 +135,7 @@ pub struct Course {
     pub instructions_max: u32,
     /// The rate that this tick allows, Hz.
     pub slowest_hz: f64,
-    /// Ticks with decimated points, %.
+    /// Ticks that left out points, %.
     pub left_out_percent: f64,
     /// Missed ticks on the emulated board.
     pub missed_ticks: u32,

@@ -130,7 +130,8 @@ impl Search<'_> {
             by: DAffine3::IDENTITY,
             legs: Vec::new(),
         }]);
-        // In turn the newest place and the oldest one: a maze is deep, and beside a shallow way out a turn that is free everywhere leads nowhere, far.
+        // The newest place and the oldest one in turn. The way through a maze is deep; but where a part turns freely everywhere, depth first adds turn after turn
+        // and misses a way of two legs.
         let mut deep = false;
         loop {
             deep = !deep;
