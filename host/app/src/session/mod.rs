@@ -10,6 +10,7 @@ pub mod insertion;
 pub mod intent;
 pub mod link;
 pub mod notes;
+mod place;
 pub mod pose;
 pub mod remaining;
 pub mod touch;

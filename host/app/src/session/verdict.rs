@@ -1,7 +1,8 @@
 //! Outcome of an insertion in words: inserted, stuck (and on what), or released on the way. Pure.
 //!
 //! A shaft and a bore are an outer and a wider inner cylinder of two parts, one of them held. The depth is the length over which the two
-//! overlap along the bore's axis; the full depth is the shorter length of both. Cost: one pass over the pairs of the held part.
+//! overlap along the bore's axis; the full depth is the shorter length of both. A part of any other shape is watched on the way to its place in the
+//! file ([`super::place`]). Cost: one pass over the pairs of the held part.
 
 use std::fmt;
 
@@ -10,9 +11,12 @@ use mortise_brep::CadModel;
 
 use super::insertion::{Wall, local_walls};
 use super::notes::Severity;
+use super::place::{Away, Places};
 
 /// Distance from the end that counts as fully inserted, mm: the lag of the coupling's spring behind a hand that arrives.
 const NEAR_END_MM: f64 = 0.1;
+/// Distance from its place at which a part that comes to rest is in it, mm: a loose fit lets it lie anywhere in its play.
+const IN_PLACE_MM: f64 = 0.5;
 /// Motion along the axis that counts as progress, mm.
 const PROGRESS_MM: f64 = 0.05;
 /// Time without progress near the end after which the part has arrived, s.
@@ -42,10 +46,24 @@ pub enum Verdict {
         /// Largest force on the handle on the way, N.
         peak_n: f64,
     },
-    /// Pushed without progress.
+    /// Back where the file puts it.
+    InPlace {
+        /// Distance from the place, mm.
+        away_mm: f64,
+        /// Largest force on the handle on the way, N.
+        peak_n: f64,
+    },
+    /// Pushed without progress in a bore.
     Stuck {
         /// Depth, mm.
         depth_mm: f64,
+        /// The feature it meets.
+        on: String,
+    },
+    /// Pushed without progress on the way to its place.
+    StuckAway {
+        /// Distance from the place, mm.
+        away_mm: f64,
         /// The feature it meets.
         on: String,
     },
@@ -62,8 +80,8 @@ impl Verdict {
     /// Severity of the message.
     pub fn severity(&self) -> Severity {
         match self {
-            Self::GoesIn { .. } => Severity::Good,
-            Self::Stuck { .. } => Severity::Warning,
+            Self::GoesIn { .. } | Self::InPlace { .. } => Severity::Good,
+            Self::Stuck { .. } | Self::StuckAway { .. } => Severity::Warning,
             Self::LetGo { .. } => Severity::Info,
         }
     }
@@ -81,6 +99,12 @@ impl fmt::Display for Verdict {
                 "Goes in: {depth_mm:.1} mm, clearance {clearance_mm:.3} mm, peak {} N",
                 two_digits(*peak_n)
             ),
+            Self::InPlace { away_mm, peak_n } => write!(
+                f,
+                "In place: {away_mm:.2} mm from where the file puts it, peak {} N",
+                two_digits(*peak_n)
+            ),
+            Self::StuckAway { away_mm, on } => write!(f, "Stuck {away_mm:.1} mm from its place: {on}"),
             Self::Stuck { depth_mm, on } => write!(f, "Stuck at {depth_mm:.1} mm: {on}"),
             Self::LetGo { depth_mm, full_mm } => write!(f, "Released at {depth_mm:.1} of {full_mm:.1} mm"),
         }
@@ -111,19 +135,30 @@ pub struct Moment {
     pub handle_n: f64,
 }
 
-/// Position of a shaft in a bore.
+/// What the held part is on the way to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Goal {
+    /// A shaft and a bore.
+    Bore(usize, usize),
+    /// The place in the file.
+    Place,
+}
+
+/// Position of a part relative to its goal.
 #[derive(Clone, Copy, Debug)]
 struct Depth {
-    /// Insertion depth, mm; negative: distance still in front of the bore.
+    /// Insertion depth, mm; negative: distance still in front of the bore, or from the place.
     depth_mm: f64,
     full_mm: f64,
+    /// Distance from the full depth that counts as arrived, mm.
+    near_mm: f64,
     /// Direction of extraction of the held part, unit vector.
     out: DVec3,
 }
 
 #[derive(Clone, Debug)]
 struct Attempt {
-    pair: (usize, usize),
+    goal: Goal,
     deepest_mm: f64,
     since_s: f64,
     peak_n: f64,
@@ -138,6 +173,7 @@ pub struct Watch {
     walls: Vec<Wall>,
     held: Option<usize>,
     pairs: Vec<(usize, usize)>,
+    places: Places,
     attempt: Option<Attempt>,
 }
 
@@ -146,6 +182,7 @@ impl Watch {
     pub fn of(model: &CadModel) -> Self {
         Self {
             walls: local_walls(model),
+            places: Places::of(model),
             ..Self::default()
         }
     }
@@ -162,16 +199,17 @@ impl Watch {
             self.attempt = None;
             self.pairs = self.pairs_of(moment.held);
         }
-        let (pair, now) = self.nearest(poses, moment.held)?;
+        let (goal, now) = (self.nearest(poses, moment.held)).or_else(|| self.place(poses, moment.held))?;
+        let arrived_mm = now.full_mm - now.near_mm;
         let attempt = match &mut self.attempt {
-            Some(attempt) if attempt.pair == pair => attempt,
+            Some(attempt) if attempt.goal == goal => attempt,
             other => other.insert(Attempt {
-                pair,
+                goal,
                 deepest_mm: now.depth_mm,
                 since_s: moment.time_s,
                 peak_n: 0.0,
                 // A part grabbed at its full depth has not been inserted.
-                reported_at_mm: (now.depth_mm > now.full_mm - NEAR_END_MM).then_some(now.depth_mm),
+                reported_at_mm: (now.depth_mm > arrived_mm).then_some(now.depth_mm),
                 last: now,
             }),
         };
@@ -193,21 +231,34 @@ impl Watch {
             attempt.since_s = moment.time_s;
         }
         let still_s = moment.time_s - attempt.since_s;
-        let near_end = now.depth_mm > now.full_mm - NEAR_END_MM;
+        let near_end = now.depth_mm > arrived_mm;
         let pushed = moment.contact_n.dot(now.out) > PUSH_N;
         let verdict = if attempt.reported_at_mm.is_some() {
             None
         } else if near_end && (still_s > ARRIVED_S || now.depth_mm >= now.full_mm) {
-            let [shaft, bore] = [pair.0, pair.1].map(|i| self.walls[i].radius);
-            Some(Verdict::GoesIn {
-                depth_mm: now.depth_mm,
-                clearance_mm: 2.0 * (bore - shaft),
-                peak_n: attempt.peak_n,
+            let peak_n = attempt.peak_n;
+            Some(match goal {
+                Goal::Bore(shaft, bore) => Verdict::GoesIn {
+                    depth_mm: now.depth_mm,
+                    clearance_mm: 2.0 * (self.walls[bore].radius - self.walls[shaft].radius),
+                    peak_n,
+                },
+                Goal::Place => Verdict::InPlace {
+                    away_mm: -now.depth_mm,
+                    peak_n,
+                },
             })
         } else if !near_end && pushed && still_s > STUCK_S {
-            Some(Verdict::Stuck {
-                depth_mm: now.depth_mm.max(0.0),
-                on: on(&self.walls),
+            let on = on(&self.walls);
+            Some(match goal {
+                Goal::Bore(..) => Verdict::Stuck {
+                    depth_mm: now.depth_mm.max(0.0),
+                    on,
+                },
+                Goal::Place => Verdict::StuckAway {
+                    away_mm: -now.depth_mm,
+                    on,
+                },
             })
         } else {
             None
@@ -225,6 +276,7 @@ impl Watch {
         let Depth {
             depth_mm, full_mm, ..
         } = attempt.last;
+        // A part that is taken apart has a positive depth in a bore only.
         let on_the_way = depth_mm > PROGRESS_MM && depth_mm <= full_mm - NEAR_END_MM;
         (on_the_way && attempt.reported_at_mm.is_none()).then_some(Verdict::LetGo { depth_mm, full_mm })
     }
@@ -246,8 +298,20 @@ impl Watch {
             .collect()
     }
 
+    /// The held part on the way to its place.
+    fn place(&self, poses: &[DAffine3], held: usize) -> Option<(Goal, Depth)> {
+        let Away { mm, out } = self.places.away(held, poses, BEGUN_MM)?;
+        let depth = Depth {
+            depth_mm: -mm,
+            full_mm: 0.0,
+            near_mm: IN_PLACE_MM,
+            out,
+        };
+        Some((Goal::Place, depth))
+    }
+
     /// The pair with the largest depth; among equals the one with the least clearance.
-    fn nearest(&self, poses: &[DAffine3], held: usize) -> Option<((usize, usize), Depth)> {
+    fn nearest(&self, poses: &[DAffine3], held: usize) -> Option<(Goal, Depth)> {
         let mut best: Option<((usize, usize), Depth, f64)> = None;
         for &(i, j) in &self.pairs {
             let (shaft, bore) = (&self.walls[i], &self.walls[j]);
@@ -260,7 +324,7 @@ impl Watch {
                 best = Some(((i, j), now, play));
             }
         }
-        best.map(|(pair, depth, _)| (pair, depth))
+        best.map(|((shaft, bore), depth, _)| (Goal::Bore(shaft, bore), depth))
     }
 }
 
@@ -287,6 +351,7 @@ fn depth(shaft: &Wall, bore: &Wall, poses: &[DAffine3], held: usize) -> Option<D
     (depth_mm > -BEGUN_MM).then_some(Depth {
         depth_mm,
         full_mm,
+        near_mm: NEAR_END_MM,
         out,
     })
 }
@@ -408,6 +473,51 @@ mod tests {
         let mut bench = Bench::new();
         assert_eq!(bench.hold(-40.0, 1.0, 3.0), []);
         assert_eq!(bench.watch.let_go(), None);
+    }
+
+    /// Cubes of 2 mm side, the second's place inside the first; its offset along z over time, with a push.
+    fn cube(path: &[(f64, f64)]) -> Vec<String> {
+        let mut watch = Watch {
+            places: Places::of_cubes(vec![None, Some((0, DAffine3::IDENTITY))]),
+            ..Watch::default()
+        };
+        let sample = |(i, &(z, push_n)): (usize, &(f64, f64))| {
+            let poses = [0.0, z].map(|z| DAffine3::from_translation(z * DVec3::Z));
+            let moment = Moment {
+                time_s: 0.016 * i as f64,
+                held: 1,
+                contact_n: push_n * DVec3::Z,
+                handle_n: push_n,
+            };
+            watch.sample(&poses, &moment, |_| "rim of plate".to_owned())
+        };
+        let said = path.iter().enumerate().filter_map(sample);
+        said.map(|verdict| verdict.to_string()).collect()
+    }
+
+    #[test]
+    fn a_part_of_any_shape_is_in_its_place_or_stuck_on_the_way_there() {
+        let down =
+            |from: f64, to: f64| (0..=100).map(move |i| (from + (to - from) * f64::from(i) / 100.0, 0.2));
+        let rest = |z: f64, push_n: f64| std::iter::repeat_n((z, push_n), 100);
+        let path: Vec<_> = down(2.5, 0.04).chain(rest(0.04, 0.84)).collect();
+        assert_eq!(
+            cube(&path),
+            ["In place: 0.04 mm from where the file puts it, peak 0.84 N"]
+        );
+        let path: Vec<_> = down(2.5, 1.26).chain(rest(1.26, 1.0)).collect();
+        assert_eq!(cube(&path), ["Stuck 1.3 mm from its place: rim of plate"]);
+        // Without a push it only rests; a push outwards is a pull.
+        for push_n in [0.0, -1.0] {
+            let path: Vec<_> = down(2.5, 1.26).chain(rest(1.26, push_n)).collect();
+            assert_eq!(cube(&path), [""; 0]);
+        }
+        // Taken from its place and not brought back.
+        let path: Vec<_> = rest(0.0, 1.0)
+            .chain(down(0.0, 2.9))
+            .chain(rest(5.0, 1.0))
+            .collect();
+        assert_eq!(cube(&path), [""; 0]);
     }
 
     #[test]
