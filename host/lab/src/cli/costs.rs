@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use mortise_lab::costs;
-use mortise_output::lines;
+use mortise_output::{Existing, Output, lines};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -23,6 +23,10 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    // Refused before the motions are played, not after.
+    let table = (args.write.as_ref())
+        .map(|path| Output::new(path, Existing::Replace, &[""; 0]))
+        .transpose()?;
     let costs = costs::measure(args.quick, &mut |motion, ticks| {
         eprintln!("{motion}: {ticks} ticks")
     })?;
@@ -38,10 +42,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             costs.ticks, costs.mean, costs.residual
         ))?;
     }
-    if let Some(path) = &args.write {
+    if let Some(table) = &table {
         let rows = costs.for_the_table()?;
-        costs::rewrite(path, &rows)?;
-        eprintln!("{}: {} rows written", path.display(), rows.len());
+        costs::rewrite(table, &rows)?;
+        eprintln!("{}: {} rows written", table.path().display(), rows.len());
     }
     Ok(ExitCode::SUCCESS)
 }

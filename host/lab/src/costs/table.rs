@@ -1,6 +1,6 @@
 //! The board's cost table in its source: measured numbers in place of its own.
 
-use std::path::Path;
+use mortise_output::Output;
 
 use crate::LabError;
 
@@ -22,11 +22,12 @@ pub fn rewritten<'n>(source: &str, rows: &[(&'n str, u32)]) -> Result<String, &'
     Ok(text)
 }
 
-/// Writes the measured instructions into the table's file.
+/// Writes the measured instructions into the table's file, all or nothing.
 ///
 /// # Errors
-/// `Unreadable`, `Unwritable`; `Input` when the file has no such table.
-pub fn rewrite(path: &Path, rows: &[(&str, u32)]) -> Result<(), LabError> {
+/// `Unreadable`, `Output`; `Input` when the file has no such table.
+pub fn rewrite(table: &Output, rows: &[(&str, u32)]) -> Result<(), LabError> {
+    let path = table.path();
     let source = std::fs::read_to_string(path).map_err(|source| LabError::Unreadable {
         path: path.to_owned(),
         source,
@@ -35,10 +36,7 @@ pub fn rewrite(path: &Path, rows: &[(&str, u32)]) -> Result<(), LabError> {
         name: path.display().to_string(),
         what: format!("it has no row {row}: name firmware/haptics/src/collision/cost.rs"),
     })?;
-    std::fs::write(path, text).map_err(|source| LabError::Unwritable {
-        path: path.to_owned(),
-        source,
-    })
+    Ok(table.write(text.as_bytes())?)
 }
 
 #[cfg(test)]
