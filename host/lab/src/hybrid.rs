@@ -455,9 +455,10 @@ pub fn chart(courses: &[Course]) -> Chart {
         });
     }
     Chart {
-        title: "Update rate over her course: peg of 0.69 m, hole of 0.7 m, voxels of 10 mm".into(),
+        title: "Update rate over the course of Faas 2010: peg of 0.69 m, hole of 0.7 m, voxels of 10 mm"
+            .into(),
         note: format!(
-            "On the face beside the hole, over the hole, into it. Median tick of {WINDOW_TICKS}, in-process on one core of this computer; hers are those of her computer of 2010."
+            "On the face beside the hole, over the hole, into it. Median tick of {WINDOW_TICKS}, in-process on one core of this computer; those of Faas 2010 are of a computer of that time."
         ),
         x: Axis::new("time, s").linear(),
         y: Axis::new("rate that a tick allows, Hz"),
