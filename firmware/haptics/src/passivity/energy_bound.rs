@@ -31,8 +31,14 @@
 //! never exceeds the true credit by more than F·u/2, however long it sums. The `quantised_work` integrator, correct on average for a hand
 //! with tremor, has no such bound: it misses 100 of the 128 µJ delivered to a handle of 67 g that swings at 60 Hz.
 //!
+//! The last part of the budget, E₀/64, is reserved for a handle that moves against the wrench, which supplies energy within the tick: slip and bound
+//! use E₀ + B with it, and less E₀/64 otherwise. Without the reserve B = −E₀ would be final: the coupling would slip by all of the operator's motion, its
+//! force would be zero, and a motion against no force supplies nothing. With it the force of a handle that moves at v grows from √(2·k·E₀/64) = 0.01 N
+//! by the factor e in each (A·h² + u)/v, 4 ms at 6 mm/s without counts; what comes and goes with the sense of the motion is no more than 0.01 N (k is
+//! 400 N/m here).
+//!
 //! Without targets the account is only kept, and the tick's output is the same to the bit as without it. Then the coupling is passive by itself and
-//! the valve of the tank limits it; B falls no lower than −E₀. The slip recovers at once where neither target nor contact acts on the part, which
+//! the valve of the tank limits it; B falls no lower than to the reserve. The slip recovers at once where neither target nor contact acts on the part, which
 //! then has nothing to push the hand from. A negative B remains owed: a grab or a fault does not cancel it, only work by the operator does.
 //!
 //! The account is that of Ferraguti, Secchi and Fantuzzi, ICRA 2013 (see [`super::tank`]); slip in place of a softer spring is ours. Cost: 20
@@ -55,6 +61,8 @@ const FILTER_S: f32 = 3e-3;
 /// m and I, kg and kg m²: the lightest handle.
 const LEAST_MASS_KG: f32 = 0.05;
 const LEAST_INERTIA_KG_M2: f32 = 5e-5;
+/// Share of the initial budget that is reserved for a handle that moves against the wrench.
+const RESERVE: f32 = 1.0 / 64.0;
 /// Slip below this counts as zero, m and rad.
 const NEGLIGIBLE_SLIP: Twist = Twist {
     linear: Vec3::splat(1e-8),
@@ -110,12 +118,22 @@ impl EnergyBound {
 
     /// Books the work of the wrench that `acted` while the reading changed by `moved` and `turned`.
     pub fn account(&mut self, acted: Wrench, moved: Vec3, turned: Vec3, passivity: &PassivitySettings) {
+        let before = self.credit_j;
         self.credit_j -= acted.force.dot(moved) + acted.torque.dot(turned);
         if self.active {
             let changed = acted + -self.acted;
             self.credit_j -= 0.5
                 * (passivity.position_count_m * sum(changed.force.abs())
                     + passivity.angle_count_rad * sum(changed.torque.abs()));
+        } else {
+            // Energy that the coupling generates by itself is limited by the tank's valve.
+            let floor = (RESERVE - 1.0) * passivity.initial_budget_j;
+            let least = if before < floor { before } else { floor };
+            self.credit_j = if self.credit_j > least {
+                self.credit_j
+            } else {
+                least
+            };
         }
         self.acted = acted;
     }
@@ -128,7 +146,14 @@ impl EnergyBound {
         }
     }
 
-    /// Slips `coupling`, which stores `stored` (J), to within the bound, or lets the slip recover; `open` is the opening of the tank's valve.
+    /// Energy that may be delivered, J; `given_w` is the power that the wrench delivers to the handle at its measured speed.
+    fn available(&self, given_w: f32, initial: f32) -> f32 {
+        let reserved = if given_w < 0.0 { 0.0 } else { RESERVE * initial };
+        initial - reserved + self.credit_j
+    }
+
+    /// Slips `coupling`, which stores `stored` (J), to within the bound, or lets the slip recover; `handle` is the handle's orientation,
+    /// `open` the opening of the tank's valve.
     pub fn slip_to_bound(
         &mut self,
         coupling: &mut Coupling,
@@ -142,16 +167,12 @@ impl EnergyBound {
         let held_firmly = self.slip == Twist::ZERO;
         self.active = hold == Hold::Targets || !held_firmly;
         if !self.active {
-            // Energy that the coupling generates by itself is limited by the tank's valve.
-            self.credit_j = if self.credit_j > -initial {
-                self.credit_j
-            } else {
-                -initial
-            };
             return;
         }
-        let available = initial + self.credit_j;
         let before = *coupling;
+        let pull_w = settings.coupling.k_t_n_per_m * before.stretch.dot(before.target.linear)
+            + settings.coupling.k_r * before.angle.dot(before.target.angular);
+        let available = self.available(-pull_w, initial);
         if hold == Hold::Nothing {
             recover_slip(coupling, handle, &self.slip, settings.period_s);
         } else if open * *stored > available {
@@ -209,17 +230,15 @@ impl EnergyBound {
         } else {
             h * ticks
         };
+        let power = |w: &Wrench| w.force.dot(motion.linear) + w.torque.dot(motion.angular);
         // s·straight + s²·squared: largest work of s times a wrench until the next tick.
-        let straight = |w: &Wrench| {
-            h * (w.force.dot(motion.linear) + w.torque.dot(motion.angular))
-                + w.force.abs().dot(slack.linear)
-                + w.torque.abs().dot(slack.angular)
-        };
+        let straight =
+            |w: &Wrench| h * power(w) + w.force.abs().dot(slack.linear) + w.torque.abs().dot(slack.angular);
         let squared = |w: &Wrench| {
             h * delay
                 * (w.force.length_squared() / LEAST_MASS_KG + w.torque.length_squared() / LEAST_INERTIA_KG_M2)
         };
-        let mut available = passivity.initial_budget_j + self.credit_j;
+        let mut available = self.available(power(&wrench), passivity.initial_budget_j);
         for w in pending {
             let worst_case = straight(w) + squared(w);
             available -= if worst_case > 0.0 { worst_case } else { 0.0 };
@@ -276,5 +295,109 @@ fn limit_energy(coupling: &mut Coupling, max_j: f32, settings: &CouplingSettings
         };
         coupling.stretch *= share;
         coupling.angle *= share;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const H: f32 = 1e-3;
+
+    fn settings() -> Settings {
+        let mut settings = Settings::default();
+        settings.coupling.k_t_n_per_m = 400.0;
+        settings.period_s = H;
+        settings
+    }
+
+    /// A handle that moves along x at `speed`, m/s, coupled to a part that targets hold in place: the handle's force after `ticks`, N, and the largest
+    /// energy delivered since the start, J.
+    fn moved(
+        bound: &mut EnergyBound,
+        settings: &Settings,
+        ticks: usize,
+        speed: impl Fn(usize) -> f32,
+    ) -> (f32, f64) {
+        let (mut x, mut force) = (0.0, 0.0f32);
+        let (mut given, mut most) = (0.0f64, 0.0f64);
+        for t in 0..ticks {
+            let v = speed(t);
+            let step = v * H;
+            x += step;
+            given += f64::from(force) * f64::from(step);
+            most = most.max(given);
+            let acted = Wrench {
+                force: Vec3::X * force,
+                torque: Vec3::ZERO,
+            };
+            bound.account(acted, Vec3::X * step, Vec3::ZERO, &settings.passivity);
+            let motion = Twist {
+                linear: Vec3::X * v,
+                angular: Vec3::ZERO,
+            };
+            let mut coupling = Coupling::stretched(Vec3::X * x, Vec3::ZERO);
+            coupling.target = motion;
+            bound.measure(&mut coupling, Quat::IDENTITY);
+            let mut stored = potential(&coupling, &settings.coupling);
+            bound.slip_to_bound(
+                &mut coupling,
+                &mut stored,
+                Quat::IDENTITY,
+                Hold::Targets,
+                1.0,
+                settings,
+            );
+            bound.keep(stored);
+            let wanted = Wrench {
+                force: -settings.coupling.k_t_n_per_m * coupling.stretch,
+                torque: Vec3::ZERO,
+            };
+            force = bound.bound(wanted, &[], motion, settings).force.x;
+        }
+        (force, most)
+    }
+
+    /// What is left of the budget where it is spent, J, with the rounding of sums.
+    fn reserve(settings: &Settings) -> f64 {
+        1.001 * f64::from(RESERVE * settings.passivity.initial_budget_j)
+    }
+
+    fn spent(settings: &Settings) -> EnergyBound {
+        let mut bound = EnergyBound::new();
+        // Without targets any energy delivered leaves the reserve.
+        let acted = Wrench {
+            force: Vec3::X,
+            torque: Vec3::ZERO,
+        };
+        bound.account(acted, Vec3::X, Vec3::ZERO, &settings.passivity);
+        bound
+    }
+
+    #[test]
+    fn a_moving_hand_feels_a_target_although_its_budget_is_spent() {
+        for count in [0.0, 10e-6] {
+            let mut settings = settings();
+            settings.passivity.position_count_m = count;
+            for mm_per_s in [1.0f32, 3.0, 7.0, 50.0] {
+                // 5 mm, where a coupling without slip pulls with 2 N.
+                let ticks = (5.0 / mm_per_s / H) as usize;
+                let (force, given) = moved(&mut spent(&settings), &settings, ticks, |_| 1e-3 * mm_per_s);
+                assert!(force < -1.0, "{force} N at {mm_per_s} mm/s, counts of {count} m");
+                assert!(given <= reserve(&settings), "{given} J");
+            }
+        }
+    }
+
+    #[test]
+    fn a_hand_that_turns_about_receives_no_more_than_it_brought() {
+        let settings = settings();
+        let mut bound = spent(&settings);
+        // To and fro by 4 mm.
+        let speed = |t: usize| 0.04 * libm::cosf(0.01 * t as f32);
+        let (_, given) = moved(&mut bound, &settings, 20_000, speed);
+        assert!(given <= reserve(&settings), "{given} J");
+        let mut bound = spent(&settings);
+        assert_eq!(moved(&mut bound, &settings, 100, |_| 0.0), (0.0, 0.0), "at rest");
     }
 }
