@@ -131,6 +131,56 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
     }
 }
 
+/// A tapered plug is no shaft in a bore: its outcome is told by its place in the file.
+#[test]
+fn a_part_of_another_shape_is_in_its_place_or_stuck_on_the_way() {
+    let mut harness = harness();
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../mating/tests/data/cone_in_cone.step"
+    );
+    harness.state_mut().session.act(Intent::Open(file.into()));
+    until(&mut harness, "the file is baked", |s| {
+        s.document.as_ref().is_some_and(|d| d.baked.is_some())
+    });
+    connect(&mut harness);
+    let off = Intent::SetParameter(ParameterId::Guidance, 0.0);
+    harness.state_mut().session.act(off);
+    arm(&mut harness);
+    harness.state_mut().session.act(Intent::Grab(1));
+    until(&mut harness, "the plug is held", |s| s.grabbed() == Some(1));
+    let handle = harness.state().session.handle().expect("reported");
+    // A hand that jumps loses its grip, so it goes by single millimetres.
+    let go = |harness: &mut Harness<'_, Window>, from: DVec3, to: DVec3| {
+        for part in 1..=32 {
+            let mut pose = handle;
+            pose.translation += from.lerp(to, f64::from(part) / 32.0);
+            harness.state_mut().session.move_hand(hold(&pose));
+            (0..5).for_each(|_| {
+                harness.step();
+                std::thread::sleep(Duration::from_millis(10));
+            });
+        }
+    };
+    let (home, up) = (DVec3::ZERO, 32.0 * DVec3::Z);
+    let aside = 6.0 * DVec3::X;
+    go(&mut harness, home, up);
+    assert_eq!(harness.state().session.verdict, None, "taken apart");
+    for (to, end) in [(home, "In place: 0."), (aside, "Stuck ")] {
+        let above = to + up;
+        go(&mut harness, up, above);
+        // Beside its place the plug stands on the socket, and the hand goes on.
+        go(&mut harness, above, to);
+        until(&mut harness, "the verdict", |s| s.verdict.is_some());
+        let said = harness.state().session.verdict.as_ref().map(ToString::to_string);
+        let said = said.expect("just seen");
+        assert!(said.starts_with(end), "{said}");
+        harness.state_mut().session.verdict = None;
+        go(&mut harness, to, above);
+        go(&mut harness, above, up);
+    }
+}
+
 #[test]
 fn sending_the_scene_can_be_cancelled_and_begun_again() {
     let mut harness = harness();
