@@ -8,7 +8,7 @@ use mortise_firmware::board::{
 };
 use mortise_firmware::store::{IMAGE_OFFSET, commit_record};
 use mortise_mechanism::hardware_limits::HardwareLimits;
-use mortise_protocol::image::CRC;
+use mortise_protocol::image::{CRC, PART_GRABBABLE, PartRecord};
 use mortise_protocol::limits::MAX_FRAME;
 use mortise_protocol::message::{CostUnit, ResetReason};
 
@@ -28,13 +28,27 @@ pub(crate) const IDENTITY: Identity = Identity {
     entropy: 0,
 };
 
-/// The smallest scene of the protocol's tests, with its one part made grabbable.
+/// The smallest scene of the protocol's tests with its one part twice: one to grab, and one a metre away to guide it to.
 pub(crate) fn scene() -> Vec<u8> {
     let mut image = include_bytes!("../../../protocol/tests/golden/occupancy.scene").to_vec();
-    let word = |at: usize| u32::from_le_bytes([image[at], image[at + 1], image[at + 2], image[at + 3]]);
-    // The parts' section is the first after magic, layout, length, checksum and a reserved word.
-    let flags = word(24) as usize + 4;
-    image[flags] |= mortise_protocol::image::PART_GRABBABLE as u8;
+    let word = |image: &[u8], at: usize| {
+        u32::from_le_bytes([image[at], image[at + 1], image[at + 2], image[at + 3]])
+    };
+    let size = size_of::<PartRecord>();
+    // The parts' section is the first of all: its place in the header comes after magic, layout, length, checksum and a reserved word.
+    let first = word(&image, 24) as usize;
+    let mut fixed = image[first..first + size].to_vec();
+    // After its shape, flags and x, y.
+    fixed[16..20].copy_from_slice(&1f32.to_le_bytes());
+    image[first + 4] |= PART_GRABBABLE as u8;
+    image.splice(first + size..first + size, fixed);
+    image[28..32].copy_from_slice(&2u32.to_le_bytes());
+    for section in (32..first).step_by(8) {
+        let moved = word(&image, section) + size as u32;
+        image[section..section + 4].copy_from_slice(&moved.to_le_bytes());
+    }
+    let length = image.len() as u32;
+    image[12..16].copy_from_slice(&length.to_le_bytes());
     let crc = CRC.checksum(&image[20..]);
     image[16..20].copy_from_slice(&crc.to_le_bytes());
     image
@@ -92,6 +106,31 @@ impl Chip {
             }
             *self.words[1].get() = words;
         }
+    }
+
+    /// The slot of the scene whose image begins at this address, before or after damage.
+    pub fn slot_at(&self, image: *const u8) -> Option<usize> {
+        let slots = (0..SLOTS).map(|slot| (slot, slot * SLOT + IMAGE_OFFSET));
+        slots
+            .filter(|(_, at)| {
+                let chips = self.words.iter();
+                chips
+                    .map(|words| words.get().cast::<u8>().wrapping_add(*at))
+                    .any(|first| std::ptr::eq(first, image))
+            })
+            .map(|(slot, _)| slot)
+            .next()
+    }
+
+    /// Whether this slot holds exactly these bytes as its image now.
+    pub fn holds(&self, slot: usize, image: &[u8]) -> bool {
+        // SAFETY: one thread, and nothing is written while the slice lives.
+        let words = unsafe { &*self.words[self.in_use.get()].get() };
+        let bytes = words.iter().flat_map(|word| word.0);
+        bytes
+            .skip(slot * SLOT + IMAGE_OFFSET)
+            .take(image.len())
+            .eq(image.iter().copied())
     }
 
     /// Takes the content of `other`.

@@ -28,10 +28,12 @@ pub enum Order {
     Upload,
     /// Put the scene in use.
     Commit,
+    /// Restart the board.
+    Restart,
 }
 
 /// Number of orders, as [`Order`] numbers them.
-pub(crate) const ORDERS: usize = 7;
+pub(crate) const ORDERS: usize = 8;
 
 /// One step of the environment of the two planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,6 +50,12 @@ pub enum Event {
     Read,
     /// STOP arrives.
     Stop,
+    /// A host disarms. Like the next two it needs no stamp: one that comes late or again is one more.
+    Disarm,
+    /// A host lets the part go.
+    Release,
+    /// A host sends a constraint target.
+    Target,
     /// A byte of the scenes in flash changes.
     Damage,
     /// The encoders lose their reference.
@@ -78,8 +86,8 @@ impl Event {
     }
 }
 
-/// Every event.
-pub const ALPHABET: [Event; 29] = [
+/// Every event, except that a restart is ordered: that adds more than half as many states again, and has a topic.
+pub const ALPHABET: [Event; 32] = [
     Event::Hello(Host::A),
     Event::Hello(Host::B),
     Event::Send(Host::A, Order::Clear),
@@ -102,6 +110,9 @@ pub const ALPHABET: [Event; 29] = [
     Event::Deliver(Order::Commit),
     Event::Read,
     Event::Stop,
+    Event::Disarm,
+    Event::Release,
+    Event::Target,
     Event::Damage,
     Event::Lose,
     Event::StopInput,
@@ -120,8 +131,8 @@ pub struct Topic {
     pub events: &'static [Event],
 }
 
-/// The topics, each with so few events that sequences of eight can be enumerated.
-pub const TOPICS: [Topic; 4] = [
+/// The topics, each with so few events that sequences of ten can be enumerated.
+pub const TOPICS: [Topic; 6] = [
     Topic {
         name: "checksum",
         events: &[
@@ -164,6 +175,30 @@ pub const TOPICS: [Topic; 4] = [
             Event::Deliver(Order::Set),
             Event::Read,
             Event::Full,
+            Event::Tick,
+            Event::Poll,
+        ],
+    },
+    Topic {
+        name: "disarming",
+        events: &[
+            Event::Send(Host::A, Order::Arm),
+            Event::Send(Host::A, Order::Grab),
+            Event::Deliver(Order::Grab),
+            Event::Disarm,
+            Event::Release,
+            Event::Tick,
+            Event::Wait,
+        ],
+    },
+    Topic {
+        name: "restart",
+        events: &[
+            Event::Hello(Host::A),
+            Event::Send(Host::A, Order::Arm),
+            Event::Send(Host::A, Order::Restart),
+            Event::Deliver(Order::Restart),
+            Event::Disarm,
             Event::Tick,
             Event::Poll,
         ],

@@ -117,14 +117,14 @@ pub fn enumerate_of(events: &[Event], depth: usize) -> Report {
     search(events, depth, None)
 }
 
-/// As [`enumerate`]; also tests the fingerprint itself: for every `each`-th sequence that is not continued because an equal one is, each event must
+/// As [`enumerate_of`]; also tests the fingerprint itself: for every `each`-th sequence that is not continued because an equal one is, each event must
 /// have the same outcome in both, fingerprints included. Returns the number of such comparisons and those that differ.
-pub fn compare_equals(depth: usize, each: u64) -> (u64, Vec<String>) {
+pub fn compare_equals(events: &[Event], depth: usize, each: u64) -> (u64, Vec<String>) {
     let mut equals = Equals {
         each,
         ..Equals::default()
     };
-    search(&ALPHABET, depth, Some(&mut equals));
+    search(events, depth, Some(&mut equals));
     (equals.compared, equals.differ)
 }
 

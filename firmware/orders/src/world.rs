@@ -3,17 +3,17 @@
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 
-use mortise_firmware::channel::{EVENTS, EVENTS_AT_ONCE};
-use mortise_firmware::safety::{AfterSoftStop, Safety};
+use mortise_firmware::channel::{COMMANDS, EVENTS, EVENTS_AT_ONCE};
+use mortise_firmware::safety::{AfterSoftStop, Motors, Safety};
 use mortise_protocol::frame::{Decoder, Stamp, encode_stamped};
 use mortise_protocol::image::{CRC, LAYOUT_VERSION};
 use mortise_protocol::limits::{MAX_CHUNK, MAX_FRAME};
-use mortise_protocol::message::{FromDevice, ToDevice, Version};
+use mortise_protocol::message::{ConstraintKind, ConstraintTarget, Feature, FromDevice, ToDevice, Version};
 use mortise_protocol::parameter::ParameterId;
 
 use crate::board::Line;
 use crate::event::{Event, Host, ORDERS, Order};
-use crate::oracle::{Broken, Oracle};
+use crate::oracle::{Broken, Oracle, Seen};
 use crate::planes::{Planes, Saved};
 
 /// The parameter that is set and read; its values, m: the default, and another. The rig is at the origin, within both.
@@ -25,6 +25,8 @@ const WAIT_TICKS: u32 = 120;
 const FADE_TICKS: u32 = 99;
 /// Largest number of reports to the host that one event can cause, now or by the commands it queues (checked in every step).
 const REPORTS_AN_EVENT: usize = 4;
+/// Largest number of commands that one event can queue (checked likewise).
+const COMMANDS_AN_EVENT: usize = 1;
 /// Reports that one queued command can cause.
 const REPORTS_A_COMMAND: usize = 3;
 /// Largest number of answers that one event can leave waiting: both frames of an upload.
@@ -39,6 +41,14 @@ struct Sent {
     /// Session in which it was sent: number of the greeting.
     session: u32,
     arrived: bool,
+}
+
+/// Lengths of the queues of reports, answers and commands.
+struct Queues {
+    /// 0 for one that cannot be filled.
+    lengths: [usize; 3],
+    /// Each queued command counts, whatever it does.
+    counted: bool,
 }
 
 /// State of a host.
@@ -64,6 +74,8 @@ struct Outside {
     value: usize,
     /// Of [`VALUES`], those in effect since the parameter was queried.
     in_force: [bool; VALUES.len()],
+    /// Number of constraint targets sent.
+    targets: u16,
     /// Number of queries of the parameter without an answer yet.
     questions: u32,
     oracle: Oracle,
@@ -102,6 +114,7 @@ impl<'i> World<'i> {
                 newest: 0,
                 value: 0,
                 in_force: [false; VALUES.len()],
+                targets: 0,
                 questions: 0,
                 oracle: Oracle::default(),
             },
@@ -136,8 +149,35 @@ impl<'i> World<'i> {
 
     /// Executes the event; returns the promise that it broke, if any.
     pub fn step(&mut self, event: Event) -> Option<Broken> {
-        let room = self.reports_at_most();
-        let mut broken = None;
+        let (room, waiting) = (self.reports_at_most(), self.planes.link.waiting());
+        let restarting = self.planes.link.restart_requested();
+        let mut broken = self.execute(event);
+        assert!(
+            self.reports_at_most() <= room + REPORTS_AN_EVENT,
+            "{event} causes more reports than REPORTS_AN_EVENT"
+        );
+        assert!(
+            self.planes.link.waiting() <= waiting + COMMANDS_AN_EVENT,
+            "{event} queues more commands than COMMANDS_AN_EVENT"
+        );
+        if self.outside.questions > 0 {
+            self.note_value();
+        }
+        broken = broken.or(self.listen());
+        if self.planes.rig.flash_while_driven.get() {
+            broken = broken.or(Some(Broken::FlashWhileLive));
+        }
+        let live = self.planes.control.safety().live();
+        if self.planes.link.restart_requested()
+            && (live || !(restarting || self.outside.oracle.may_restart()))
+        {
+            broken = broken.or(Some(Broken::Restart));
+        }
+        broken
+    }
+
+    /// Executes the event; returns the promise that a tick broke.
+    fn execute(&mut self, event: Event) -> Option<Broken> {
         match event {
             Event::Hello(host) => self.greet(host),
             Event::Send(host, order) => {
@@ -158,6 +198,20 @@ impl<'i> World<'i> {
                 self.outside.oracle.stop();
                 self.receive(None, &ToDevice::Stop);
             }
+            Event::Disarm => {
+                if self.is_queued(&ToDevice::Disarm) {
+                    self.outside.oracle.disarm();
+                }
+            }
+            Event::Release => {
+                if self.is_queued(&ToDevice::Release) {
+                    self.outside.oracle.release();
+                }
+            }
+            Event::Target => {
+                self.outside.targets += 1;
+                self.receive(None, &ToDevice::SetTarget(target(self.outside.targets)));
+            }
             Event::Damage => self.planes.chip.damage(),
             Event::Lose => self.planes.rig.sense(|sensed| sensed.referenced = false),
             Event::StopInput => self.planes.rig.sense(|sensed| sensed.stop_open ^= true),
@@ -165,28 +219,20 @@ impl<'i> World<'i> {
                 self.outside.full ^= true;
                 self.line.full = self.outside.full;
             }
-            Event::Tick => broken = self.tick(),
+            Event::Tick => return self.tick(),
             Event::Poll => {
                 self.planes.link.poll(&mut self.line);
             }
-            Event::Wait => {
-                for _ in 0..WAIT_TICKS {
-                    broken = broken.or(self.tick());
-                }
-            }
+            Event::Wait => return self.wait(),
         }
-        assert!(
-            self.reports_at_most() <= room + REPORTS_AN_EVENT,
-            "{event} causes more reports than REPORTS_AN_EVENT"
-        );
-        if self.outside.questions > 0 {
-            self.note_value();
-        }
-        broken = broken.or(self.listen());
-        if self.planes.rig.flash_while_driven.get() {
-            broken = broken.or(Some(Broken::FlashWhileLive));
-        }
-        broken
+        None
+    }
+
+    /// Delivers a message; whether the control plane will receive it.
+    fn is_queued(&mut self, message: &ToDevice) -> bool {
+        let before = self.planes.link.waiting();
+        self.receive(None, message);
+        self.planes.link.waiting() > before
     }
 
     /// Reports that wait, and those that the queued commands can cause.
@@ -261,16 +307,18 @@ impl<'i> World<'i> {
     }
 
     fn arrive(&mut self, order: Order, mut sent: Sent) -> Sent {
-        let fresh = self.is_fresh(&sent);
-        match order {
-            Order::Arm => {
-                let sound = self.planes.link.store().is_sound();
-                self.outside.oracle.arm(fresh, sound);
+        if self.is_fresh(&sent) {
+            match order {
+                Order::Arm => {
+                    let slot = self.slot_in_use();
+                    let sound = slot.is_some_and(|slot| self.planes.chip.holds(slot, self.scene));
+                    self.outside.oracle.arm(sound);
+                }
+                Order::Clear => self.outside.oracle.clear(),
+                Order::Grab => self.outside.oracle.grab(),
+                Order::Restart => self.outside.oracle.restart(),
+                Order::Home | Order::Set | Order::Upload | Order::Commit => {}
             }
-            Order::Clear => self.outside.oracle.clear(fresh),
-            _ => {}
-        }
-        if fresh {
             self.outside.newest = sent.stamp.count;
         }
         sent.arrived = true;
@@ -289,6 +337,7 @@ impl<'i> World<'i> {
                 layout: LAYOUT_VERSION,
             },
             Order::Commit => ToDevice::SceneCommit,
+            Order::Restart => ToDevice::Restart,
         };
         self.receive(Some(sent.stamp), &message);
         if order == Order::Upload {
@@ -312,8 +361,33 @@ impl<'i> World<'i> {
         }
     }
 
+    /// Runs more ticks than a soft stop takes.
+    fn wait(&mut self) -> Option<Broken> {
+        let mut broken = self.tick();
+        let fades = self.planes.control.safety().motors() == Motors::Fading;
+        for _ in 1..WAIT_TICKS {
+            broken = broken.or(self.tick());
+        }
+        let late = fades && self.planes.control.safety().live();
+        broken.or(late.then_some(Broken::FadeLate))
+    }
+
+    /// The slot in flash of the scene that the control plane uses.
+    fn slot_in_use(&self) -> Option<usize> {
+        let scene = self.planes.control.scene()?;
+        self.planes
+            .chip
+            .slot_at(std::ptr::from_ref(scene.header()).cast())
+    }
+
     fn tick(&mut self) -> Option<Broken> {
+        let slot = self.slot_in_use();
+        let booting = self.planes.control.safety() == Safety::Boot;
         self.planes.tick();
+        assert!(
+            booting || self.planes.link.waiting() == 0,
+            "a tick takes every command"
+        );
         let state = self.planes.control.safety();
         let live = state.live();
         let halted = matches!(
@@ -321,10 +395,15 @@ impl<'i> World<'i> {
             Safety::Stopped | Safety::Fault(_) | Safety::SoftStop(AfterSoftStop::Fault(_))
         );
         let rig = &self.planes.rig;
-        let broken = self
-            .outside
-            .oracle
-            .tick(live, halted, rig.sensed.get().referenced);
+        let seen = Seen {
+            live,
+            held: live && state.motors() != Motors::Fading,
+            active: state == Safety::Active,
+            halted,
+            referenced: rig.sensed.get().referenced,
+            other_scene: self.slot_in_use() != slot,
+        };
+        let broken = self.outside.oracle.tick(&seen);
         let differs = live != rig.driven.get();
         // Every queued command has been executed: the value assumed by the link plane must be in effect.
         let believed = self.planes.link.parameters().get(PARAMETER) == self.acting();
@@ -360,9 +439,10 @@ impl<'i> World<'i> {
     pub fn fingerprint(&mut self, left: usize) -> u64 {
         let mut hasher = DefaultHasher::new();
         self.timers(left).hash(&mut hasher);
-        self.queues(left).hash(&mut hasher);
+        let queues = self.queues(left);
+        queues.lengths.hash(&mut hasher);
         let number = self.planes.control.scene_number();
-        self.planes.control.fingerprint(&mut hasher);
+        self.planes.control.fingerprint(queues.counted, &mut hasher);
         self.planes.link.fingerprint(number, &mut hasher);
         self.outside_fingerprint(left, &mut hasher);
         hasher.finish()
@@ -381,15 +461,21 @@ impl<'i> World<'i> {
         )
     }
 
-    /// The lengths of the queues to the host, as far as `left` events can fill them.
-    fn queues(&self, left: usize) -> (usize, usize) {
-        let (reports, answers) = (self.reports_at_most(), self.planes.link.unsent());
+    /// The lengths of the queues, as far as `left` events can fill them.
+    fn queues(&self, left: usize) -> Queues {
+        let (reports, link) = (self.reports_at_most(), &self.planes.link);
+        let (commands, answers) = (link.waiting(), link.unsent());
         let has_room = reports + left * REPORTS_AN_EVENT <= EVENTS - EVENTS_AT_ONCE;
         let has_places = answers + left * ANSWERS_AN_EVENT < ANSWERS;
-        (
-            if has_room { 0 } else { self.planes.link.reported() },
-            if has_places { 0 } else { answers },
-        )
+        let has_space = commands + left * COMMANDS_AN_EVENT <= COMMANDS;
+        Queues {
+            lengths: [
+                if has_room { 0 } else { link.reported() },
+                if has_places { 0 } else { answers },
+                if has_space { 0 } else { commands },
+            ],
+            counted: !has_room || !has_space,
+        }
     }
 
     fn outside_fingerprint(&self, left: usize, hash: &mut impl Hasher) {
@@ -422,6 +508,27 @@ impl<'i> World<'i> {
         for (_, index, fresh) in order.into_iter().flatten() {
             (index, fresh).hash(hash);
         }
+    }
+}
+
+/// A constraint target that guides the grabbed part; the numbers increase as a host's do.
+fn target(sequence: u16) -> ConstraintTarget {
+    let feature = Feature {
+        point: [0.0; 3],
+        direction: [0.0, 0.0, 1.0],
+    };
+    ConstraintTarget {
+        id: 0,
+        sequence,
+        kind: ConstraintKind::Concentric,
+        moving: feature,
+        static_part: 1,
+        fixed: feature,
+        stiffness: 1000.0,
+        force_cap: 1.0,
+        torque_cap: 0.01,
+        expiry_ticks: 200,
+        faces: Default::default(),
     }
 }
 

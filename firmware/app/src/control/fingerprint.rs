@@ -3,10 +3,41 @@
 use core::hash::{Hash, Hasher};
 use core::mem::discriminant;
 
+use heapless::Vec;
+use mortise_protocol::image::SceneImage;
+use mortise_protocol::message::Fault;
+
 use super::ControlPlane;
 use crate::board::{Clock, Mechanism};
-use crate::channel::{Command, CommandKind};
-use crate::safety::{AfterSoftStop, Motors, Safety};
+use crate::channel::{COMMANDS, Command, CommandKind};
+use crate::safety::{AfterSoftStop, Event as SafetyEvent, Motors, Safety};
+
+/// The states that the queued commands so far can lead to.
+struct Possible {
+    states: Vec<Safety, 8>,
+    /// There are more.
+    all: bool,
+}
+
+impl Possible {
+    fn new(state: Safety) -> Self {
+        let states = [state].into_iter().collect();
+        Self { states, all: false }
+    }
+
+    /// Adds the states that the event leads to; whether it can change the state.
+    fn step(&mut self, event: SafetyEvent) -> bool {
+        let mut changes = self.all;
+        for at in 0..self.states.len() {
+            let (next, _) = self.states[at].step(event);
+            changes |= next != self.states[at];
+            if !self.states.contains(&next) {
+                self.all |= self.states.push(next).is_err();
+            }
+        }
+        changes
+    }
+}
 
 /// Counters of ticks that decide when a state ends by itself. A counter that decides nothing in the present state is 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +53,9 @@ pub struct Timers {
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     /// Adds to `hasher` the state that decides when motors are driven, and the queued commands: without [`Timers`], the force law's state, what is
     /// only reported, and event counters. Takes the commands out of the queue, so the planes must be dropped or restored afterwards.
-    pub fn fingerprint(&mut self, hasher: &mut impl Hasher) {
+    ///
+    /// `counted`: every queued command counts, also one that does nothing.
+    pub fn fingerprint(&mut self, counted: bool, hasher: &mut impl Hasher) {
         discriminant(&self.safety).hash(hasher);
         if let Safety::Fault(fault) | Safety::SoftStop(AfterSoftStop::Fault(fault)) = &self.safety {
             discriminant(fault).hash(hasher);
@@ -39,22 +72,60 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
         ];
         (flags, self.lockstep.credit).hash(hasher);
         self.settings.parameters.fingerprint(hasher);
+        let mut possible = Possible::new(self.safety);
+        let mut settings: Vec<Command<'_>, COMMANDS> = Vec::new();
         while let Some(command) = self.ends.commands.dequeue() {
-            self.command_fingerprint(&command, hasher);
+            if counted {
+                0u8.hash(hasher);
+            }
+            // Settings take effect behind all commands of their tick: only their order among themselves and with queries counts.
+            if matches!(command.kind, CommandKind::Settings(_) | CommandKind::Parameter(_)) {
+                // No longer than the queue.
+                let _ = settings.push(command);
+            } else {
+                self.command_fingerprint(&command, &mut possible, hasher);
+            }
+        }
+        for command in &settings {
+            self.command_fingerprint(command, &mut possible, hasher);
         }
     }
 
-    /// Adds the effect that a queued command can have.
-    fn command_fingerprint(&self, command: &Command<'_>, hasher: &mut impl Hasher) {
+    /// Adds the effect that a queued command can have, and to `possible` the states that it can lead to. A command that could bring the motors nearer to
+    /// being driven counts even when it will be dropped or refused: whether it is must be checked, not assumed.
+    fn command_fingerprint(&self, command: &Command<'_>, possible: &mut Possible, hasher: &mut impl Hasher) {
         let shared = self.ends.shared;
         let in_session = command.session == shared.sessions();
         // A stop, a halt and a greeting outdate a command for good.
         let current = in_session && command.epoch == shared.epoch();
+        let event = match &command.kind {
+            CommandKind::Arm(_) => SafetyEvent::Arm {
+                scene: true,
+                referenced: true,
+            },
+            CommandKind::ClearFault => SafetyEvent::Clear { cause_gone: true },
+            CommandKind::Grab(_) => SafetyEvent::Grab,
+            CommandKind::Disarm => SafetyEvent::Disarm,
+            CommandKind::Release => SafetyEvent::Release,
+            CommandKind::SceneDamaged => SafetyEvent::Fault(Fault::SceneDamaged),
+            _ => SafetyEvent::Ready,
+        };
+        let changes = possible.step(event);
+        let idle = match &command.kind {
+            CommandKind::Disarm | CommandKind::Release => !changes,
+            // Changes the force law only.
+            CommandKind::SetTarget(_) => true,
+            _ => false,
+        };
+        if idle {
+            return;
+        }
         discriminant(&command.kind).hash(hasher);
         match &command.kind {
             CommandKind::Arm(number) => (current, number.wrapping_sub(self.scene_number)).hash(hasher),
             CommandKind::Grab(part) => (current, part).hash(hasher),
             CommandKind::ClearFault | CommandKind::Home => current.hash(hasher),
+            CommandKind::Disarm | CommandKind::Release | CommandKind::Restart => in_session.hash(hasher),
             CommandKind::Settings(settings) => settings.parameters.fingerprint(hasher),
             CommandKind::Parameter(id) => (in_session, id).hash(hasher),
             CommandKind::UseScene { number, .. } => number.wrapping_sub(self.scene_number).hash(hasher),
@@ -77,6 +148,11 @@ impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
             },
             timeout: self.settings.safety.host_timeout.0 + 1,
         }
+    }
+
+    /// The scene in use.
+    pub fn scene(&self) -> Option<&SceneImage<'_>> {
+        self.scene.as_ref()
     }
 
     /// Number of the scene in use, see [`CommandKind::Arm`].

@@ -2,11 +2,13 @@
 
 use core::hash::{Hash, Hasher};
 
+use heapless::Vec;
 use mortise_protocol::frame::Stamp;
+use mortise_protocol::parameter::ParameterId;
 
 use super::LinkPlane;
 use crate::board::Flash;
-use crate::channel::{Event, Reply};
+use crate::channel::{EVENTS, Event, Reply};
 use crate::parameters::Parameters;
 
 impl<'s, F: Flash<'s>> LinkPlane<'_, 's, F> {
@@ -19,6 +21,7 @@ impl<'s, F: Flash<'s>> LinkPlane<'_, 's, F> {
         (flags, self.arms.wrapping_sub(shared.arms())).hash(hasher);
         self.store.fingerprint(scene_number, hasher);
         self.parameters.fingerprint(hasher);
+        let mut values: Vec<(ParameterId, u32), EVENTS> = Vec::new();
         while let Some(event) = self.ends.events.dequeue() {
             match event {
                 // The host's, which needs none of it.
@@ -33,11 +36,20 @@ impl<'s, F: Flash<'s>> LinkPlane<'_, 's, F> {
                 Event::Reply {
                     reply: Reply::Parameter { id, value },
                     ..
-                } => (1u8, id, value.to_bits()).hash(hasher),
+                } => {
+                    // No longer than the queue.
+                    let _ = values.push((id, value.to_bits()));
+                }
+                Event::Reply {
+                    reply: Reply::MayRestart,
+                    ..
+                } => 1u8.hash(hasher),
                 // Equal to no other: the enumeration causes none of these.
                 Event::Reply { seq, session, .. } => (2u8, seq, session).hash(hasher),
             }
         }
+        // Their order among the others does not count.
+        values.hash(hasher);
     }
 
     /// Commands queued for the control plane.

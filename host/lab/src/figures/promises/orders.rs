@@ -4,7 +4,7 @@ use mortise_orders::{Broken, PROMISES, Report, enumerate, enumerate_topics};
 
 use crate::figures::{Plan, Row};
 
-/// Events in the longest orders over the whole alphabet: some minutes in the full form, some seconds in the shorter one.
+/// Events in the longest orders over the whole alphabet, which orders no restart: some minutes in the full form, some seconds in the shorter one.
 const DEPTH: usize = 8;
 const DEPTH_QUICK: usize = 6;
 /// Events in the longest orders over one topic.
@@ -19,7 +19,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) {
         (DEPTH, TOPIC_DEPTH)
     };
     rows(
-        &format!("orders of messages, all events, to depth {depth}"),
+        &format!("orders of messages, all events but restarts, to depth {depth}"),
         &enumerate(depth),
         out,
     );
@@ -60,5 +60,13 @@ fn words(promise: Broken) -> &'static str {
         Broken::ReadBack => "a parameter read back that is not in force",
         Broken::FlashWhileLive => "flash written while motors are driven",
         Broken::StateDiffers => "motors and reported state differ",
+        Broken::AfterDisarm => "motors driven behind a disarming or a greeting, other than to fade out",
+        Broken::FadeLate => "motors live longer than a soft stop takes",
+        Broken::NotGrabbed => {
+            "a part felt behind a release, or by a command that was late, repeated or of another session"
+        }
+        Broken::Restart => {
+            "restart with motors live, or by a command that was late, repeated or of another session"
+        }
     }
 }
