@@ -1,4 +1,4 @@
-//! Cancelling a reading in the window leaves no process behind, and its file does not open afterwards.
+//! A reading in the window shows its progress; cancelling it leaves no process behind, and its file does not open afterwards.
 //!
 //! The test program starts itself as the reading process, so it defines its own `main` and calls [`child::init`] first.
 
@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         })
     };
     let tests = vec![
+        trial("a_reading_reports_its_progress", a_reading_reports_its_progress),
         trial(
             "cancelling_ends_the_reading_process",
             cancelling_ends_the_reading_process,
@@ -115,6 +116,27 @@ fn gone_soon(file: &Path, begun: Instant) {
         std::thread::sleep(Duration::from_millis(2));
     }
     println!("ended after {:?}", begun.elapsed());
+}
+
+fn a_reading_reports_its_progress() {
+    let file = slow_file();
+    let Some(mut session) = reading(&file) else { return };
+    let mut seen = Vec::new();
+    while session.is_busy() && session.document.is_none() {
+        let job = session.job.as_ref().expect("busy");
+        assert!(job.doing.starts_with("Reading "), "{}", job.doing);
+        seen.extend(job.fraction);
+        std::thread::sleep(Duration::from_millis(2));
+        session.poll();
+    }
+    assert!(session.document.is_some(), "read");
+    assert!(
+        seen.is_sorted() && seen.iter().all(|f| (0.0..=1.0).contains(f)),
+        "{seen:?}"
+    );
+    seen.dedup();
+    let between = seen.iter().filter(|&&f| 0.1 < f && f < 0.9).count();
+    assert!(between > 5, "{seen:?}");
 }
 
 fn cancelling_ends_the_reading_process() {

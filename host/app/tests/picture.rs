@@ -1,7 +1,7 @@
 //! The 3D view's renderer on any available graphics device, including a software one, without a window.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use eframe::wgpu;
 use glam::DVec3;
@@ -103,7 +103,7 @@ fn pixel(pixels: &[[u8; 4]], x: u32, y: u32) -> [i32; 3] {
 #[test]
 fn parts_are_where_the_camera_looks_in_their_colours() {
     let Some((device, queue)) = device() else { return };
-    let document = Document::sample(1, &AtomicBool::default()).expect("the sample opens");
+    let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample opens");
     let mut renderer = Renderer::new(&device, &queue);
     renderer.set_shapes(&document.meshes);
     assert!(renderer.resize(SIZE));
@@ -180,7 +180,7 @@ fn parts_are_where_the_camera_looks_in_their_colours() {
 #[test]
 fn an_edge_that_touches_stands_out_and_no_other_does() {
     let Some((device, queue)) = device() else { return };
-    let document = Document::sample(1, &AtomicBool::default()).expect("the sample opens");
+    let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample opens");
     let mut renderer = Renderer::new(&device, &queue);
     renderer.set_shapes(&document.meshes);
     renderer.resize(SIZE);

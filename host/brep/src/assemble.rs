@@ -5,13 +5,19 @@ use crate::kernel::{self, RawPart, RawResult};
 use crate::part21::check::{self, Content};
 use crate::part21::structure::Structure;
 use crate::part21::{Exchange, operators, pcurves, render, text};
+use crate::progress::Progress;
 use crate::{BrepError, CadModel, EDGE_TOLERANCE_MM, LoadOptions, Part, free_form, shape};
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Placeholder names that writers use for a body or occurrence without its own name.
 const MEANINGLESS: &[&str] = &["", "NONE", "SOLID", "COMPOUND", "COMPSOLID", "SHELL", "SHAPE"];
+
+/// Part of the kernel's reading in the whole: before it the text is read and checked, after it the shapes are described one by one. A text of planes and
+/// cylinders takes longer to read than its shapes to describe, splines the reverse.
+const KERNEL: Range<f64> = 0.05..0.4;
 
 /// A text that the kernel has read, and the data collected about it.
 struct Source {
@@ -23,7 +29,7 @@ struct Source {
 }
 
 /// Checks and rewrites a STEP file and the files it refers to, and passes them to the kernel. The caller holds [`kernel::lock`].
-fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
+fn read(path: &Path, options: &LoadOptions, progress: &Progress<'_>) -> Result<Source, BrepError> {
     let shown = path.display().to_string();
     let Joined {
         mut file,
@@ -49,7 +55,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Source, BrepError> {
         });
     }
     operators::split(&mut file).map_err(|e| text_error(&shown, e))?;
-    let document = transfer(&shown, &mut file, options)?;
+    let document = transfer(&shown, &mut file, options, progress)?;
     Ok(Source {
         file,
         content,
@@ -65,9 +71,12 @@ fn transfer(
     shown: &str,
     file: &mut Exchange,
     options: &LoadOptions,
+    progress: &Progress<'_>,
 ) -> Result<cxx::UniquePtr<kernel::Document>, BrepError> {
     let read = |file: &Exchange| {
-        kernel::read_document(&render::render(file), options.max_parts).map_err(|e| kernel_error(shown, &e))
+        progress.begin(KERNEL);
+        kernel::read_document(&render::render(file), options.max_parts, progress)
+            .map_err(|e| kernel_error(shown, &e))
     };
     let turned = |document: &kernel::Document| document.results().iter().map(|r| r.turned).sum::<usize>();
     let first = read(file)?;
@@ -90,7 +99,7 @@ pub fn ask<T>(
     question: impl FnOnce(&kernel::Document) -> Result<T, cxx::Exception>,
 ) -> Result<T, BrepError> {
     let _kernel = kernel::lock();
-    let document = read(path, options)?.document;
+    let document = read(path, options, &Progress::new(&|_| ()))?.document;
     let shown = path.display().to_string();
     let count = document.shape_count();
     if shape >= count {
@@ -115,7 +124,7 @@ fn kernel_error(path: &str, e: &cxx::Exception) -> BrepError {
 }
 
 /// Reads a STEP file and the files it refers to.
-pub fn assemble(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepError> {
+pub fn assemble(path: &Path, options: &LoadOptions, progress: &Progress<'_>) -> Result<CadModel, BrepError> {
     let _kernel = kernel::lock();
     let Source {
         file,
@@ -123,7 +132,7 @@ pub fn assemble(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepErro
         units,
         files,
         document,
-    } = read(path, options)?;
+    } = read(path, options, progress)?;
     let path = path.display().to_string();
     let path = path.as_str();
 
@@ -147,7 +156,15 @@ pub fn assemble(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepErro
 
     let parts = name_parts(&file, &raw_parts);
     let mut shapes = Vec::with_capacity(document.shape_count());
-    for index in 0..document.shape_count() {
+    let effort: Vec<usize> = (0..document.shape_count())
+        .map(|index| document.effort(index))
+        .collect();
+    let all = effort.iter().sum::<usize>().max(1) as f64;
+    let reached = |done: usize| KERNEL.end + (1.0 - KERNEL.end) * done as f64 / all;
+    let mut done = 0;
+    for (index, effort) in effort.into_iter().enumerate() {
+        progress.begin(reached(done)..reached(done + effort));
+        done += effort;
         let linear = options.linear_deflection_mm.unwrap_or(0.0);
         let raw = document
             .shape(
@@ -155,6 +172,7 @@ pub fn assemble(path: &Path, options: &LoadOptions) -> Result<CadModel, BrepErro
                 linear,
                 options.relative_deflection,
                 options.angular_deflection_rad,
+                progress,
             )
             .map_err(|e| kernel_error(path, &e))?;
         let mut notes = Vec::new();

@@ -6,26 +6,35 @@
 //! the parent lives: when it closes the copy ends, however the parent ended. On Linux the system also kills the copy when the thread that started it
 //! ends; that thread waits here until the copy is gone.
 //!
+//! Ahead of the answer come reports of the progress: eight other bytes of magic and the parts per million that are done (32 bits, little-endian). A
+//! larger number is ignored; of the others the largest is kept.
+//!
 //! Limits: processor time ([`LoadOptions::time_limit_s`]) and address space, enforced by the system; `PATIENCE` times the processor time, by the
-//! parent's clock; and the length of the answer.
+//! parent's clock; and the length of the output.
 
 use crate::assemble::assemble;
+use crate::progress::Progress;
 use crate::question::{Answer, Question, answer};
 use crate::{BrepError, CadModel, LoadOptions, kernel};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
-use std::io::{Read, Write};
+use std::io::{BufReader, Read, Write};
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 const PATH_VARIABLE: &str = "MORTISE_BREP_CHILD_PATH";
 const REQUEST_VARIABLE: &str = "MORTISE_BREP_CHILD_REQUEST";
 const MAGIC: &[u8; 8] = b"\x93MTBREP1";
+/// Begins a report of the progress.
+const PROGRESS_MAGIC: &[u8; 8] = b"\x93MTBPRG1";
+/// What a report states when all is done.
+const MILLION: u32 = 1_000_000;
 /// Length of the end of the child's standard error that is kept for the message.
 const STDERR_TAIL: usize = 4096;
 /// Interval at which the parent checks whether the child has ended.
@@ -83,7 +92,7 @@ fn serve(path: &Path, request: &OsStr) -> ! {
             // Without the thread the system still ends this process when its processor time is used up.
             let _ = thread::Builder::new().spawn(|| end_with_pipe(std::io::stdin().lock()));
             match question {
-                None => respond(&assemble(path, &options)),
+                None => respond(&assemble(path, &options, &Progress::new(&report))),
                 Some(None) => respond(&Err::<(), _>(damaged())),
                 Some(Some(question)) => respond(&answer(path, &options, &question)),
             }
@@ -101,13 +110,27 @@ fn end_with_pipe(mut pipe: impl Read) {
 }
 
 fn read_question(mut pipe: impl Read) -> Option<Question> {
+    postcard::from_bytes(&payload(&mut pipe)?).ok()
+}
+
+/// A payload preceded by its length; `None` when it is incomplete.
+fn payload(pipe: &mut impl Read) -> Option<Vec<u8>> {
     let mut length = [0; 8];
     pipe.read_exact(&mut length).ok()?;
-    let mut question = Vec::new();
     let length = u64::from_le_bytes(length);
-    (pipe.take(length).read_to_end(&mut question).ok()? as u64 == length)
-        .then(|| postcard::from_bytes(&question).ok())
-        .flatten()
+    let mut payload = Vec::new();
+    (pipe.take(length).read_to_end(&mut payload).ok()? as u64 == length).then_some(payload)
+}
+
+/// Writes a report of the progress, 0 to 1.
+fn report(fraction: f64) {
+    let millionths = (fraction * f64::from(MILLION)) as u32;
+    let mut out = std::io::stdout().lock();
+    // A broken pipe shows when the answer is written.
+    let _ = out
+        .write_all(PROGRESS_MAGIC)
+        .and_then(|()| out.write_all(&millionths.to_le_bytes()))
+        .and_then(|()| out.flush());
 }
 
 /// Writes the result as a frame; returns whether that succeeded.
@@ -123,22 +146,26 @@ fn respond<T: Serialize>(result: &Result<T, BrepError>) -> bool {
     })
 }
 
-/// Reads `path` in a child process, which ends when `cancel` is set.
-pub(crate) fn load(path: &Path, options: &LoadOptions, cancel: &AtomicBool) -> Result<CadModel, BrepError> {
-    run(path, options, None, cancel)
+/// Reads `path` in a child process, which ends when `progress` does.
+pub(crate) fn load(
+    path: &Path,
+    options: &LoadOptions,
+    progress: &dyn Fn(f64) -> ControlFlow<()>,
+) -> Result<CadModel, BrepError> {
+    run(path, options, None, progress)
 }
 
 /// Queries a shape of `path` in a child process.
 pub(crate) fn ask(path: &Path, options: &LoadOptions, question: &Question) -> Result<Answer, BrepError> {
     let question = postcard::to_allocvec(question).map_err(|e| process_error(path, &e.to_string()))?;
-    run(path, options, Some(question), &AtomicBool::new(false))
+    run(path, options, Some(question), &|_| ControlFlow::Continue(()))
 }
 
 fn run<T: DeserializeOwned>(
     path: &Path,
     options: &LoadOptions,
     question: Option<Vec<u8>>,
-    cancel: &AtomicBool,
+    progress: &dyn Fn(f64) -> ControlFlow<()>,
 ) -> Result<T, BrepError> {
     let child = spawn(path, options, question.is_some()).map_err(|e| process_error(path, &e.to_string()))?;
     let mut child = Reader(child);
@@ -153,11 +180,11 @@ fn run<T: DeserializeOwned>(
             pipe
         })
     });
-    let flooded = Arc::new(AtomicBool::new(false));
+    let seen = Arc::new(Seen::default());
     let answer_limit = options.answer_limit_bytes;
     let output = child.0.stdout.take().map(|pipe| {
-        let flooded = Arc::clone(&flooded);
-        thread::spawn(move || read_answer(pipe, answer_limit, &flooded))
+        let seen = Arc::clone(&seen);
+        thread::spawn(move || read_answer(pipe, answer_limit, &seen))
     });
     let errors = child
         .0
@@ -173,28 +200,34 @@ fn run<T: DeserializeOwned>(
         path: path.display().to_string(),
         megabytes: answer_limit >> 20,
     };
-    let status = match wait(&mut child.0, limit, &[&flooded, cancel]) {
+    let flooded = || seen.flooded.load(Ordering::Acquire);
+    let mut cancelled = false;
+    let status = match wait(&mut child.0, limit, || {
+        let done = f64::from(seen.millionths.load(Ordering::Relaxed)) / f64::from(MILLION);
+        cancelled = progress(done).is_break();
+        cancelled || flooded()
+    }) {
         Ok(Some(status)) => status,
-        Ok(None) if cancel.load(Ordering::Acquire) => {
+        Ok(None) if cancelled => {
             return Err(BrepError::Cancelled {
                 path: path.display().to_string(),
             });
         }
-        Ok(None) if flooded.load(Ordering::Acquire) => return Err(too_long()),
+        Ok(None) if flooded() => return Err(too_long()),
         Ok(None) => return Err(timed_out()),
         Err(e) => return Err(process_error(path, &e.to_string())),
     };
     if used_up_its_time(status) {
         return Err(timed_out());
     }
-    let output = output.and_then(|t| t.join().ok()).unwrap_or_default();
+    let output = output.and_then(|t| t.join().ok()).flatten();
     // The child may end before its answer, still in the pipe, is found to be too long.
-    if flooded.load(Ordering::Acquire) {
+    if flooded() {
         return Err(too_long());
     }
     let errors = errors.and_then(|t| t.join().ok()).unwrap_or_default();
-    match payload(&output) {
-        Some(payload) => postcard::from_bytes(payload)
+    match output {
+        Some(payload) => postcard::from_bytes(&payload)
             .unwrap_or_else(|e| Err(process_error(path, &format!("its answer is damaged: {e}")))),
         None => Err(BrepError::Crashed {
             path: path.display().to_string(),
@@ -230,30 +263,60 @@ fn spawn(path: &Path, options: &LoadOptions, question: bool) -> std::io::Result<
         .spawn()
 }
 
-/// `None` when the child is still running after `limit`, or when one of `ends` is set.
-fn wait(child: &mut Child, limit: Duration, ends: &[&AtomicBool]) -> std::io::Result<Option<ExitStatus>> {
+/// `None` when the child is still running after `limit`, or when `ends` says so.
+fn wait(
+    child: &mut Child,
+    limit: Duration,
+    mut ends: impl FnMut() -> bool,
+) -> std::io::Result<Option<ExitStatus>> {
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(Some(status));
         }
-        if start.elapsed() >= limit || ends.iter().any(|end| end.load(Ordering::Acquire)) {
+        if start.elapsed() >= limit || ends() {
             return Ok(None);
         }
         thread::sleep(POLL);
     }
 }
 
-/// At most `limit` bytes; sets `flooded` when there are more.
-fn read_answer(pipe: impl Read, limit: u64, flooded: &AtomicBool) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    // A broken pipe gives an incomplete frame, which is rejected later.
-    let _ = pipe.take(limit.saturating_add(1)).read_to_end(&mut bytes);
-    if bytes.len() as u64 > limit {
-        flooded.store(true, Ordering::Release);
-        bytes.clear();
+/// What the child's output has shown so far.
+#[derive(Default)]
+struct Seen {
+    /// It is longer than allowed.
+    flooded: AtomicBool,
+    /// Progress, parts per million.
+    millionths: AtomicU32,
+}
+
+/// The answer in at most `limit` bytes of output; `None` when it is incomplete, or when there are more bytes.
+fn read_answer(pipe: impl Read, limit: u64, seen: &Seen) -> Option<Vec<u8>> {
+    let mut pipe = BufReader::new(pipe.take(limit.saturating_add(1)));
+    let answer = find_answer(&mut pipe, &seen.millionths);
+    // What follows counts as well.
+    let _ = std::io::copy(&mut pipe, &mut std::io::sink());
+    let flooded = pipe.get_ref().limit() == 0;
+    seen.flooded.store(flooded, Ordering::Release);
+    answer.filter(|_| !flooded)
+}
+
+fn find_answer(pipe: &mut impl Read, millionths: &AtomicU32) -> Option<Vec<u8>> {
+    let mut last = [0; MAGIC.len()];
+    loop {
+        last.rotate_left(1);
+        pipe.read_exact(&mut last[MAGIC.len() - 1..]).ok()?;
+        if last == *PROGRESS_MAGIC {
+            let mut done = [0; 4];
+            pipe.read_exact(&mut done).ok()?;
+            let done = u32::from_le_bytes(done);
+            if done <= MILLION {
+                millionths.fetch_max(done, Ordering::Relaxed);
+            }
+        } else if last == *MAGIC {
+            return payload(pipe);
+        }
     }
-    bytes
 }
 
 fn read_tail(mut pipe: impl Read) -> Vec<u8> {
@@ -265,13 +328,6 @@ fn read_tail(mut pipe: impl Read) -> Vec<u8> {
         tail.drain(..surplus);
     }
     tail
-}
-
-fn payload(output: &[u8]) -> Option<&[u8]> {
-    let start = output.windows(MAGIC.len()).position(|w| w == MAGIC)? + MAGIC.len();
-    let length = output.get(start..start + 8)?;
-    let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
-    output.get(start + 8..)?.get(..length)
 }
 
 /// How the child ended, with the last line it wrote.
@@ -339,17 +395,44 @@ fn from_hex(text: &str) -> Option<Vec<u8>> {
 mod tests {
     use super::*;
 
+    fn read(output: &[u8], limit: u64) -> (Option<Vec<u8>>, Seen) {
+        let seen = Seen::default();
+        (read_answer(output, limit, &seen), seen)
+    }
+
     #[test]
     fn a_frame_is_found_amid_what_the_kernel_prints() {
+        let answer = |output: &[u8]| read(output, 1000).0;
         let mut output = b"*** ERR ***\n".to_vec();
         output.extend_from_slice(MAGIC);
         output.extend_from_slice(&3u64.to_le_bytes());
         output.extend_from_slice(b"abc");
-        assert_eq!(payload(&output), Some(&b"abc"[..]));
+        assert_eq!(answer(&output).as_deref(), Some(&b"abc"[..]));
         output.extend_from_slice(b"bye\n");
-        assert_eq!(payload(&output), Some(&b"abc"[..]));
-        assert_eq!(payload(&output[..output.len() - 5]), None);
-        assert_eq!(payload(b"nothing"), None);
+        assert_eq!(answer(&output).as_deref(), Some(&b"abc"[..]));
+        assert_eq!(answer(&output[..output.len() - 5]), None);
+        assert_eq!(answer(b"nothing"), None);
+    }
+
+    /// Noise, a report cut off by the end and an impossible one change nothing; what looks like a report within the answer is part of it.
+    #[test]
+    fn the_largest_report_ahead_of_the_answer_is_kept() {
+        let report = |done: u32| [&PROGRESS_MAGIC[..], &done.to_le_bytes()].concat();
+        let answer = [report(900_000), b"abc".to_vec()].concat();
+        let length = (answer.len() as u64).to_le_bytes();
+        let reports = [
+            report(250_000),
+            b"*** ERR".to_vec(),
+            report(200_000),
+            report(MILLION + 1),
+        ]
+        .concat();
+        let output = [&reports, &MAGIC[..], &length, &answer].concat();
+        let (found, seen) = read(&output, 1000);
+        assert_eq!(found, Some(answer));
+        assert_eq!(seen.millionths.into_inner(), 250_000);
+        let (found, seen) = read(&[report(3), report(7)[..11].to_vec()].concat(), 1000);
+        assert_eq!((found, seen.millionths.into_inner()), (None, 3));
     }
 
     #[test]
@@ -369,11 +452,15 @@ mod tests {
 
     #[test]
     fn an_answer_that_is_too_long_is_cut_off() {
-        let flooded = AtomicBool::new(false);
-        assert_eq!(read_answer(&[7; 100][..], 100, &flooded), [7; 100]);
-        assert!(!flooded.load(Ordering::Acquire));
-        assert!(read_answer(std::io::repeat(7), 100, &flooded).is_empty());
-        assert!(flooded.load(Ordering::Acquire));
+        let output = [&MAGIC[..], &4u64.to_le_bytes(), b"abcd"].concat();
+        for (limit, cut_off) in [(20, false), (19, true), (9, true)] {
+            let (answer, seen) = read(&output, limit);
+            assert_eq!((answer.is_none(), seen.flooded.into_inner()), (cut_off, cut_off));
+        }
+        // Noise without end.
+        let seen = Seen::default();
+        assert_eq!(read_answer(std::io::repeat(7), 100, &seen), None);
+        assert!(seen.flooded.into_inner());
     }
 
     #[test]

@@ -37,7 +37,9 @@
 #include <XSControl_WorkSession.hxx>
 #include <gp_Trsf.hxx>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
@@ -374,13 +376,31 @@ rust::Vec<RawResult> outcome(const Handle(XSControl_WorkSession) & session, cons
   return results;
 }
 
-// A stream over memory, without a copy.
+// Share of parsing in reading a document; the rest is the transfer.
+constexpr double kParsing = 0.4;
+// Part of its range that the kernel passes while it transfers shapes, as measured; it jumps over the rest at the end.
+constexpr double kTransferring = 0.25;
+
+// A stream over memory, without a copy, that reports how much of the text has been taken.
 class View : public std::streambuf {
  public:
-  explicit View(rust::Slice<const std::uint8_t> text) {
-    char* begin = reinterpret_cast<char*>(const_cast<std::uint8_t*>(text.data()));
-    setg(begin, begin, begin + text.size());
+  View(rust::Slice<const std::uint8_t> text, const Progress& progress) : progress_(progress) {
+    begin_ = reinterpret_cast<char*>(const_cast<std::uint8_t*>(text.data()));
+    end_ = begin_ + text.size();
+    setg(begin_, begin_, begin_);
   }
+
+ protected:
+  int_type underflow() override {
+    if (egptr() == end_) return traits_type::eof();
+    progress_.advance(kParsing * double(egptr() - begin_) / double(end_ - begin_));
+    setg(egptr(), egptr(), egptr() + std::min<std::ptrdiff_t>(end_ - egptr(), 1 << 16));
+    return traits_type::to_int_type(*gptr());
+  }
+
+ private:
+  const Progress& progress_;
+  char *begin_, *end_;
 };
 
 }  // namespace
@@ -390,11 +410,13 @@ Document::~Document() = default;
 rust::Vec<RawPart> Document::parts() const { return content_->parts; }
 rust::Vec<RawResult> Document::results() const { return content_->results; }
 std::size_t Document::shape_count() const { return content_->shapes.size(); }
-RawShape Document::shape(std::size_t index, double linear_mm, double relative, double angular_rad) const {
-  return describe(content_->shapes.at(index), content_->colors, linear_mm, relative, angular_rad);
+RawShape Document::shape(std::size_t index, double linear_mm, double relative, double angular_rad,
+                         const Progress& progress) const {
+  return describe(content_->shapes.at(index), content_->colors, linear_mm, relative, angular_rad, progress);
 }
 
-std::unique_ptr<Document> read_document(rust::Slice<const std::uint8_t> text, std::size_t max_parts) {
+std::unique_ptr<Document> read_document(rust::Slice<const std::uint8_t> text, std::size_t max_parts,
+                                        const Progress& progress) {
   // The kernel writes to standard output, which belongs to the program.
   Message::DefaultMessenger()->ChangePrinters().Clear();
   STEPCAFControl_Reader reader;
@@ -403,14 +425,15 @@ std::unique_ptr<Document> read_document(rust::Slice<const std::uint8_t> text, st
   reader.SetNameMode(true);
   reader.SetLayerMode(false);
   reader.SetPropsMode(false);
-  View view(text);
+  View view(text, progress);
   std::istream stream(&view);
   const IFSelect_ReturnStatus status = reader.ChangeReader().ReadStream("model.step", stream);
   if (status != IFSelect_RetDone) throw std::runtime_error("the kernel cannot parse it");
   Handle(TDocStd_Document) document = new TDocStd_Document("MDTV-XCAF");
   // The tools of the document's main label must exist before the transfer fills them.
   XCAFDoc_DocumentTool::ShapeTool(document->Main());
-  const bool transferred = reader.Transfer(document);
+  const Handle(Indicator) indicator = new Indicator(progress, kParsing, kParsing + (1 - kParsing) / kTransferring);
+  const bool transferred = reader.Transfer(document, indicator->Start());
   auto content = std::make_unique<Document::Content>();
   const Handle(XCAFDoc_ShapeTool) shapes = XCAFDoc_DocumentTool::ShapeTool(document->Main());
   const Handle(XCAFDoc_ColorTool) colors = XCAFDoc_DocumentTool::ColorTool(document->Main());

@@ -35,6 +35,7 @@ struct RawResult;
 struct RawShape;
 struct RawFreeForms;
 struct RawPlace;
+struct Progress;
 
 // A STEP file after transfer: its distinct shapes and where they are placed.
 class Document {
@@ -45,7 +46,9 @@ class Document {
   rust::Vec<RawPart> parts() const;
   rust::Vec<RawResult> results() const;
   std::size_t shape_count() const;
-  RawShape shape(std::size_t index, double linear_mm, double relative, double angular_rad) const;
+  std::size_t effort(std::size_t index) const;
+  RawShape shape(std::size_t index, double linear_mm, double relative, double angular_rad,
+                 const Progress& progress) const;
   RawFreeForms free_forms(std::size_t index, double tolerance_mm) const;
   rust::Vec<std::uint8_t> sides(std::size_t index, rust::Slice<const double> points, double tolerance_mm) const;
   rust::Vec<double> feet(std::size_t index, rust::Slice<const double> points) const;
@@ -55,7 +58,8 @@ class Document {
   std::unique_ptr<Content> content_;
 };
 
-std::unique_ptr<Document> read_document(rust::Slice<const std::uint8_t> text, std::size_t max_parts);
+std::unique_ptr<Document> read_document(rust::Slice<const std::uint8_t> text, std::size_t max_parts,
+                                        const Progress& progress);
 bool limit_process(std::uint64_t memory_bytes, std::uint64_t cpu_seconds);
 void flush_output();
 void end_with_parent(std::uint32_t parent);

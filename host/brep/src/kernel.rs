@@ -3,6 +3,7 @@
 //! Everything crosses the bridge as flat numbers and strings; the Rust side interprets them. Names are the tokens that [`crate::part21`] put into the
 //! text, so that the kernel decodes no name. The kernel keeps global state while it reads: callers hold [`lock`].
 
+use crate::progress::Progress;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 static KERNEL: Mutex<()> = Mutex::new(());
@@ -154,22 +155,35 @@ mod ffi {
         color: [f32; 3],
     }
 
+    extern "Rust" {
+        type Progress<'a>;
+        /// States how much of the present phase is done, 0 to 1.
+        fn advance(self: &Progress<'_>, done: f64);
+    }
+
     // SAFETY: the signatures of kernel.h, which cxx checks when it compiles the bridge; none of the functions keeps a reference after it returns.
     unsafe extern "C++" {
         include!("kernel.h");
 
         type Document;
 
-        fn read_document(text: &[u8], max_parts: usize) -> Result<UniquePtr<Document>>;
+        fn read_document(
+            text: &[u8],
+            max_parts: usize,
+            progress: &Progress<'_>,
+        ) -> Result<UniquePtr<Document>>;
         fn parts(self: &Document) -> Vec<RawPart>;
         fn results(self: &Document) -> Vec<RawResult>;
         fn shape_count(self: &Document) -> usize;
+        /// Estimated effort of describing a shape, in plain faces.
+        fn effort(self: &Document, index: usize) -> usize;
         fn shape(
             self: &Document,
             index: usize,
             linear_mm: f64,
             relative: f64,
             angular_rad: f64,
+            progress: &Progress<'_>,
         ) -> Result<RawShape>;
 
         /// Faces and edges without a closed form, of a shape that [`Document::shape`] has tessellated; edges are followed within the tolerance.

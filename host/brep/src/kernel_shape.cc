@@ -12,6 +12,7 @@
 #include <GCPnts_AbscissaPoint.hxx>
 #include <GCPnts_TangentialDeflection.hxx>
 #include <GProp_GProps.hxx>
+#include <IMeshTools_Parameters.hxx>
 #include <Poly_PolygonOnTriangulation.hxx>
 #include <Poly_Triangulation.hxx>
 #include <Standard_Version.hxx>
@@ -44,6 +45,10 @@ namespace mortise {
 namespace brep {
 namespace {
 
+// Parts of describing a shape: the mesh, its mass properties, and last its faces one by one.
+constexpr double kMeshed = 0.7, kWeighed = 0.85;
+// Effort of describing a spline face, in plain faces: it has thousands of triangles.
+constexpr std::size_t kSpline = 100;
 constexpr std::uint32_t kNone = 0xffffffffu;
 // Relative error required of each adaptive integral; 1e-9 costs six times as much on large spline models.
 constexpr double kQuadrature = 1e-6;
@@ -95,12 +100,16 @@ class Describer {
     edge_nodes_.resize(std::size_t(all_edges_.Extent()));
   }
 
-  RawShape run() {
+  RawShape run(const Progress& progress) {
     mass();
+    progress.advance(kWeighed);
     number_edges();
     // Faces have the orientation with which they first occur in the shape.
     out_.faces.reserve(std::size_t(face_index_.Extent()));
-    for (int i = 1; i <= face_index_.Extent(); ++i) face(TopoDS::Face(face_index_(i)), std::uint32_t(i - 1));
+    for (int i = 1; i <= face_index_.Extent(); ++i) {
+      face(TopoDS::Face(face_index_(i)), std::uint32_t(i - 1));
+      progress.advance(kWeighed + (1 - kWeighed) * i / face_index_.Extent());
+    }
     for (int i = 1; i <= all_edges_.Extent(); ++i) finish_edge(i);
     return std::move(out_);
   }
@@ -465,8 +474,15 @@ double deviation(const TopoDS_Shape& shape) {
 
 }  // namespace
 
+std::size_t Document::effort(std::size_t index) const {
+  std::size_t sum = 0;
+  for (TopExp_Explorer it(content_->shapes.at(index), TopAbs_FACE); it.More(); it.Next())
+    sum += BRepAdaptor_Surface(TopoDS::Face(it.Current()), false).GetType() > GeomAbs_Torus ? kSpline : 1;
+  return sum;
+}
+
 RawShape describe(const TopoDS_Shape& shape, const std::unordered_map<const void*, Color>& colors, double linear_mm,
-                  double relative, double angular_rad) {
+                  double relative, double angular_rad, const Progress& progress) {
   double linear = linear_mm;
   if (!(linear > 0)) {
     Bnd_Box box;
@@ -477,19 +493,23 @@ RawShape describe(const TopoDS_Shape& shape, const std::unordered_map<const void
   // The mesher can miss its bound on splines, so the error is measured and a finer mesh requested. The error decreases
   // with the square of a segment's length; if it does not decrease, the geometry is faulty and a finer mesh would only
   // grow without limit.
-  double ask_linear = linear, ask_angular = angular_rad, found = 0;
+  IMeshTools_Parameters ask;
+  ask.Deflection = linear;
+  ask.Angle = angular_rad;
+  double found = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
     // Discard meshes left from an earlier call or read from the file.
     BRepTools::Clean(shape);
-    BRepMesh_IncrementalMesh mesher(shape, ask_linear, false, ask_angular, false);
+    const Handle(Indicator) indicator = new Indicator(progress, 0, kMeshed);
+    BRepMesh_IncrementalMesh mesher(shape, ask, indicator->Start());
     const double before = found;
     found = deviation(shape);
     if (found <= 1.01 * linear || (attempt > 0 && found > 0.8 * before)) break;
     const double shrink = std::max(0.25, 0.9 * linear / found);
-    ask_linear *= shrink;
-    ask_angular *= std::sqrt(shrink);
+    ask.Deflection *= shrink;
+    ask.Angle *= std::sqrt(shrink);
   }
-  RawShape out = Describer(shape, colors, linear, angular_rad).run();
+  RawShape out = Describer(shape, colors, linear, angular_rad).run(progress);
   out.deflection = found;
   out.deflection_asked = linear;
   return out;

@@ -29,6 +29,7 @@ mod model;
 mod options;
 pub mod oracle;
 mod part21;
+mod progress;
 mod question;
 mod recognise;
 mod recognise_curve;
@@ -37,6 +38,6 @@ mod topology;
 pub mod write;
 
 pub use error::BrepError;
-pub use load::{load_step, load_step_until, load_step_with};
+pub use load::{load_step, load_step_while, load_step_with};
 pub use model::*;
 pub use options::{LoadOptions, set_time_limit_s};

@@ -7,7 +7,9 @@ mod support;
 use glam::{DAffine3, DVec3};
 use libtest_mimic::{Arguments, Failed, Trial};
 use mortise_brep::oracle::{self, Side};
-use mortise_brep::{BrepError, LoadOptions, child, load_step, load_step_until, load_step_with};
+use mortise_brep::{BrepError, LoadOptions, child, load_step, load_step_while, load_step_with};
+use std::cell::RefCell;
+use std::ops::ControlFlow;
 use std::process::{Command, ExitCode, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -41,6 +43,10 @@ fn main() -> ExitCode {
         (
             "the_system_holds_the_limits_of_a_reading_process",
             the_system_holds_the_limits_of_a_reading_process,
+        ),
+        (
+            "a_reading_reports_rising_progress",
+            a_reading_reports_rising_progress,
         ),
         (
             "a_reading_that_is_cancelled_leaves_no_process",
@@ -198,12 +204,41 @@ fn processor_time_is_limited_and_the_process_ends_with_its_parent() {
     }
 }
 
+/// Goes on unless the flag is set.
+fn unless(cancel: &AtomicBool) -> impl Fn(f64) -> ControlFlow<()> {
+    |_| match cancel.load(Ordering::Acquire) {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    }
+}
+
+/// Parsing, transfer and description of the shapes each have their part.
+fn a_reading_reports_rising_progress() {
+    let file = slow_file();
+    let seen = RefCell::new(Vec::new());
+    let model = load_step_while(&file, &LoadOptions::default(), &|fraction| {
+        seen.borrow_mut().push(fraction);
+        ControlFlow::Continue(())
+    });
+    let mut seen = seen.into_inner();
+    assert!(seen.is_sorted(), "{seen:?}");
+    assert!(seen.iter().all(|f| (0.0..=1.0).contains(f)), "{seen:?}");
+    seen.dedup();
+    for part in [0.05..0.2, 0.2..0.4, 0.4..1.0] {
+        let within = seen.iter().filter(|&f| part.start < *f && *f < part.end);
+        assert!(within.count() > 1, "{part:?} of {seen:?}");
+    }
+    let model = model.unwrap();
+    assert_eq!(model.parts.len(), 2500);
+    assert!(model.shapes.iter().all(|shape| shape.closed));
+}
+
 /// The test program's own children are identified by the name of the file they read.
 fn a_reading_that_is_cancelled_leaves_no_process() {
     let file = slow_file();
     let cancel = AtomicBool::new(false);
     let (result, took) = std::thread::scope(|scope| {
-        let reading = scope.spawn(|| load_step_until(&file, &LoadOptions::default(), &cancel));
+        let reading = scope.spawn(|| load_step_while(&file, &LoadOptions::default(), &unless(&cancel)));
         if cfg!(target_os = "linux") {
             let started = (0..1000).any(|_| {
                 std::thread::sleep(Duration::from_millis(2));
@@ -237,7 +272,7 @@ fn the_system_holds_the_limits_of_a_reading_process() {
     };
     let limits = std::thread::scope(|scope| {
         let reading =
-            scope.spawn(|| load_step_until(&file, &options, &cancel).map(|model| model.parts.len()));
+            scope.spawn(|| load_step_while(&file, &options, &unless(&cancel)).map(|model| model.parts.len()));
         // The process sets them at its start; before that they are the test's own.
         let mut limits = [None, None];
         for _ in 0..500 {

@@ -1,13 +1,13 @@
 //! A STEP file that has been read and prepared for display.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use anyhow::Context as _;
 use glam::DAffine3;
 use mortise_bake::Baked;
-use mortise_brep::{CadModel, LoadOptions, load_step_until};
+use mortise_brep::{CadModel, LoadOptions, load_step_while};
 
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
@@ -59,12 +59,16 @@ pub struct Document {
 }
 
 impl Document {
-    /// Reads a STEP file. Takes as long as the CAD kernel does, or until `cancel` is set: call it outside the window's thread.
+    /// Reads a STEP file. Takes as long as the CAD kernel does, or until `progress` ends it: call it outside the window's thread.
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn read(path: &Path, generation: u64, cancel: &AtomicBool) -> anyhow::Result<Self> {
-        let model = load_step_until(path, &LoadOptions::default(), cancel)?;
+    pub fn read(
+        path: &Path,
+        generation: u64,
+        progress: &dyn Fn(f64) -> ControlFlow<()>,
+    ) -> anyhow::Result<Self> {
+        let model = load_step_while(path, &LoadOptions::default(), progress)?;
         let title = (path.file_name()).map_or_else(
             || path.display().to_string(),
             |n| n.to_string_lossy().into_owned(),
@@ -76,9 +80,9 @@ impl Document {
     ///
     /// # Errors
     /// The sample cannot be written to the folder for temporary files, or not be read.
-    pub fn sample(generation: u64, cancel: &AtomicBool) -> anyhow::Result<Self> {
+    pub fn sample(generation: u64, progress: &dyn Fn(f64) -> ControlFlow<()>) -> anyhow::Result<Self> {
         let file = mortise_scenario::sample::File::write().context("the sample could not be unpacked")?;
-        let model = load_step_until(file.path(), &LoadOptions::default(), cancel)?;
+        let model = load_step_while(file.path(), &LoadOptions::default(), progress)?;
         Ok(Self::of(
             model,
             None,

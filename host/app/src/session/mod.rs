@@ -56,6 +56,8 @@ pub struct Job {
     pub fraction: Option<f32>,
     /// Start of the job.
     pub since: Instant,
+    /// Longest time that it may take, where it is limited.
+    pub limit: Option<Duration>,
     generation: u64,
     cancel: Cancel,
 }
@@ -263,7 +265,8 @@ impl Session {
             .as_ref()
             .and_then(|p| p.file_name())
             .map_or_else(|| "the sample".to_owned(), |n| n.to_string_lossy().into_owned());
-        let cancel = self.start_job(format!("Reading {name}"), self.generation);
+        let limit = Duration::from_secs(mortise_brep::LoadOptions::default().time_limit_s);
+        let cancel = self.start_job(format!("Reading {name}"), self.generation, Some(limit));
         work::import(&self.outbox, path, self.generation, cancel);
     }
 
@@ -279,7 +282,7 @@ impl Session {
             connection.scene_of = None;
             connection.refused_scene_of = None;
         }
-        let cancel = self.start_job("Baking the collision model".to_owned(), generation);
+        let cancel = self.start_job("Baking the collision model".to_owned(), generation, None);
         let wanted = match self.method {
             Method::DistanceField => Wanted::Planned(Request {
                 flash_bytes: slot,
@@ -301,7 +304,7 @@ impl Session {
         );
     }
 
-    fn start_job(&mut self, doing: String, generation: u64) -> Cancel {
+    fn start_job(&mut self, doing: String, generation: u64, limit: Option<Duration>) -> Cancel {
         if let Some(job) = self.job.take() {
             job.cancel.set();
         }
@@ -310,6 +313,7 @@ impl Session {
             doing,
             fraction: None,
             since: Instant::now(),
+            limit,
             generation,
             cancel: cancel.clone(),
         });
@@ -356,11 +360,6 @@ impl Session {
             self.notes.add(verdict.severity(), verdict.to_string());
             self.verdict = Some(verdict);
         }
-    }
-
-    /// Longest time that reading a file may take.
-    pub fn reading_limit(&self) -> Duration {
-        Duration::from_secs(mortise_brep::LoadOptions::default().time_limit_s)
     }
 
     /// Starts guidance in the scene that is now on the board.

@@ -34,7 +34,7 @@ pub fn take(session: &mut Session, update: Update) {
                 }
             }
         }
-        Update::Baking {
+        Update::Working {
             generation,
             doing,
             fraction,
@@ -42,7 +42,9 @@ pub fn take(session: &mut Session, update: Update) {
             if let Some(job) = &mut session.job
                 && job.generation == generation
             {
-                job.doing = doing;
+                if let Some(doing) = doing {
+                    job.doing = doing;
+                }
                 job.fraction = Some(fraction);
             }
         }

@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::thread;
+use std::time::Instant;
 
 use mortise_bake::{
     BakeError, BakeOptions, Baked, Cache, NoCache, Planned, Progress, Request, Stage,
@@ -31,13 +32,13 @@ pub enum Update {
         /// The document, or one line with the reason of the failure.
         result: Result<Box<Document>, String>,
     },
-    /// Progress of a bake.
-    Baking {
-        /// Id of the document.
+    /// Progress of reading or baking.
+    Working {
+        /// Id of the file or document.
         generation: u64,
-        /// Description of the current stage.
-        doing: String,
-        /// Progress of the whole bake, 0 to 1.
+        /// Description of the current stage, where the job has several.
+        doing: Option<String>,
+        /// Progress of the whole job, 0 to 1.
         fraction: f32,
     },
     /// A bake ended.
@@ -137,14 +138,48 @@ impl Cancel {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// The flag itself, for code that polls it.
-    pub fn flag(&self) -> &AtomicBool {
-        &self.0
-    }
-
     /// Whether the end was requested.
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Sends the progress of a job, which it ends when it is cancelled.
+struct Reports<'a> {
+    outbox: &'a Outbox,
+    generation: u64,
+    cancel: &'a Cancel,
+    /// Time and fraction of the last report.
+    last: Mutex<(Instant, f32)>,
+}
+
+impl<'a> Reports<'a> {
+    fn new(outbox: &'a Outbox, generation: u64, cancel: &'a Cancel) -> Self {
+        Self {
+            outbox,
+            generation,
+            cancel,
+            last: Mutex::new((Instant::now(), 0.0)),
+        }
+    }
+
+    /// At most some thirty reports a second are sent: a job may produce thousands.
+    fn send(&self, fraction: f32, doing: impl FnOnce() -> Option<String>) -> ControlFlow<()> {
+        if self.cancel.is_set() {
+            return ControlFlow::Break(());
+        }
+        if let Ok(mut last) = self.last.try_lock()
+            && last.0.elapsed().as_millis() > 30
+        {
+            let fraction = fraction.max(last.1);
+            *last = (Instant::now(), fraction);
+            self.outbox.offer(Update::Working {
+                generation: self.generation,
+                doing: doing(),
+                fraction,
+            });
+        }
+        ControlFlow::Continue(())
     }
 }
 
@@ -152,9 +187,11 @@ impl Cancel {
 pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64, cancel: Cancel) {
     let outbox = outbox.clone();
     spawn("mortise-import", move || {
+        let reports = Reports::new(&outbox, generation, &cancel);
+        let progress = |fraction: f64| reports.send(fraction as f32, || None);
         let read = match &path {
-            Some(path) => Document::read(path, generation, cancel.flag()),
-            None => Document::sample(generation, cancel.flag()),
+            Some(path) => Document::read(path, generation, &progress),
+            None => Document::sample(generation, &progress),
         };
         if cancel.is_set() {
             return;
@@ -175,26 +212,8 @@ pub fn bake(
 ) {
     let outbox = outbox.clone();
     spawn("mortise-bake", move || {
-        let throttle = std::sync::Mutex::new((std::time::Instant::now(), 0.0f32));
-        let progress = |progress: Progress| {
-            if cancel.is_set() {
-                return ControlFlow::Break(());
-            }
-            // At most some thirty reports a second: a bake may produce thousands.
-            if let Ok(mut last) = throttle.try_lock() {
-                let fraction = overall(&progress).max(last.1);
-                if last.0.elapsed().as_millis() > 30 {
-                    *last = (std::time::Instant::now(), fraction);
-                    let doing = doing(&progress);
-                    outbox.send(Update::Baking {
-                        generation,
-                        doing,
-                        fraction,
-                    });
-                }
-            }
-            ControlFlow::Continue(())
-        };
+        let reports = Reports::new(&outbox, generation, &cancel);
+        let progress = |progress: Progress| reports.send(overall(&progress), || Some(doing(&progress)));
         let result = match collision_model(&model, &wanted, cache.as_deref(), &progress) {
             Err(BakeError::Cancelled) => return,
             Err(error) => Err(error.to_string()),
@@ -281,7 +300,7 @@ pub fn choose_file(outbox: &Outbox, folder: Option<PathBuf>) {
     };
     let outbox = outbox.clone();
     let ask = move || {
-        let asked = std::time::Instant::now();
+        let asked = Instant::now();
         match dialog().pick_file() {
             Some(path) => outbox.send(Update::Chosen(path)),
             // A dialog that closes within 0.5 s was never shown: none is available.
@@ -299,8 +318,8 @@ pub fn choose_file(outbox: &Outbox, folder: Option<PathBuf>) {
 
 /// Starts a thread. If the system cannot start one, the work runs here, later but not lost.
 pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) {
-    let work = Arc::new(std::sync::Mutex::new(Some(work)));
-    let take = |work: &Arc<std::sync::Mutex<Option<_>>>| work.lock().ok().and_then(|mut w| w.take());
+    let work = Arc::new(Mutex::new(Some(work)));
+    let take = |work: &Arc<Mutex<Option<_>>>| work.lock().ok().and_then(|mut w| w.take());
     let theirs = Arc::clone(&work);
     let spawned = thread::Builder::new().name(name.to_owned()).spawn(move || {
         if let Some(work) = take(&theirs) {
@@ -320,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_cancelled_bake_ends_without_a_report() {
-        let document = Document::sample(1, &AtomicBool::new(false)).expect("the sample");
+        let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
         for (cancelled, reports) in [(true, 0), (false, 1)] {
             let (outbox, updates) = Outbox::new(Arc::new(|| {}));
             let cancel = Cancel::default();
@@ -342,7 +361,7 @@ mod tests {
 
     #[test]
     fn a_bake_reports_rising_progress() {
-        let document = Document::sample(1, &AtomicBool::new(false)).expect("the sample");
+        let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample");
         let (outbox, updates) = Outbox::new(Arc::new(|| {}));
         let wanted = Wanted::Described(BakeOptions {
             cell_mm: Some(1.0),
@@ -359,7 +378,7 @@ mod tests {
         drop(outbox);
         let reported: Vec<f32> = (updates.iter())
             .filter_map(|update| match update {
-                Update::Baking { fraction, .. } => Some(fraction),
+                Update::Working { fraction, .. } => Some(fraction),
                 _ => None,
             })
             .collect();

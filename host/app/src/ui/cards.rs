@@ -73,19 +73,18 @@ fn job(ui: &mut Ui, session: &Session, job: &Job, wanted: &mut Vec<Intent>) {
         control::intent_button(ui, session, wanted, cancel, Intent::CancelWork, "");
     });
     let elapsed = job.since.elapsed();
-    let (bar, time) = match job.fraction {
-        Some(fraction) => {
-            let left = remaining::left(elapsed, fraction).map(remaining::words);
-            (egui::ProgressBar::new(fraction), left)
-        }
-        // The CAD kernel reports no progress; only the time limit is known.
-        None => {
-            let limit = session.reading_limit();
-            let text = format!("{} s, at most {} s", elapsed.as_secs(), limit.as_secs());
-            (egui::ProgressBar::new(1.0).animate(true), Some(text))
-        }
+    let bar = match job.fraction {
+        Some(fraction) => egui::ProgressBar::new(fraction),
+        None => egui::ProgressBar::new(1.0).animate(true),
     };
     ui.add(bar.desired_height(6.0).fill(ink.accent));
-    let time = time.unwrap_or_else(|| "…".to_owned());
+    let left = job
+        .fraction
+        .and_then(|fraction| remaining::left(elapsed, fraction));
+    let time = match (left, job.limit) {
+        (Some(left), _) => remaining::words(left),
+        (None, Some(limit)) => format!("{} s, at most {} s", elapsed.as_secs(), limit.as_secs()),
+        (None, None) => "…".to_owned(),
+    };
     ui.label(RichText::new(time).small().color(ink.text_weak));
 }
