@@ -131,7 +131,7 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
     }
 }
 
-/// A tapered plug is no shaft in a bore: its outcome is told by its place in the file.
+/// A tapered plug is no shaft in a bore: its outcome is stated by its place in the file.
 #[test]
 fn a_part_of_another_shape_is_in_its_place_or_stuck_on_the_way() {
     let mut harness = harness();
