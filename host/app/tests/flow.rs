@@ -12,7 +12,7 @@ use common::{arm, click, connect, harness, open_sample, until, worst};
 use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use mortise::session::history::Sample;
 use mortise::session::insertion::hold;
 use mortise::session::link::Link;
@@ -109,18 +109,9 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
         until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
         let handle = harness.state().session.handle().expect("reported");
         // 20 mm down to the block, and 4 mm further: 1.6 N at the hand's 400 N/m.
-        let shifted = |down_mm: f64| {
-            let mut pose = handle;
-            pose.translation += DVec3::new(aside_mm, 0.0, -down_mm);
-            pose
-        };
-        harness.state_mut().session.move_hand(hold(&shifted(10.0)));
-        until(&mut harness, "beside the axis", |s| {
-            s.document
-                .as_ref()
-                .is_some_and(|d| d.poses[1].translation.z < 71.0)
-        });
-        harness.state_mut().session.move_hand(hold(&shifted(24.0)));
+        let beside = DVec3::new(aside_mm, 0.0, -10.0);
+        go(&mut harness, &handle, DVec3::ZERO, beside);
+        go(&mut harness, &handle, beside, beside - 14.0 * DVec3::Z);
         until(&mut harness, "the verdict", |s| s.verdict.is_some());
         let said = harness.state().session.verdict.as_ref().map(ToString::to_string);
         let said = said.expect("just seen");
@@ -128,6 +119,20 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
         let dips = ["0.0", "0.1", "0.2"].map(|mm| format!("Stuck at {mm} mm: "));
         let at_the_mouth = dips.iter().any(|dip| said.starts_with(dip));
         assert!(at_the_mouth && said.ends_with(" of block"), "{said}");
+    }
+}
+
+/// Moves the simulated hand from one displacement of `handle` to another by single millimetres, mm: a hand that jumps loses its grip.
+fn go(harness: &mut Harness<'_, Window>, handle: &DAffine3, from: DVec3, to: DVec3) {
+    let steps = (to - from).length().ceil();
+    for step in 1..=steps as u32 {
+        let mut pose = *handle;
+        pose.translation += from.lerp(to, f64::from(step) / steps);
+        harness.state_mut().session.move_hand(hold(&pose));
+        for _ in 0..5 {
+            harness.step();
+            std::thread::sleep(Duration::from_millis(10));
+        }
     }
 }
 
@@ -150,34 +155,22 @@ fn a_part_of_another_shape_is_in_its_place_or_stuck_on_the_way() {
     harness.state_mut().session.act(Intent::Grab(1));
     until(&mut harness, "the plug is held", |s| s.grabbed() == Some(1));
     let handle = harness.state().session.handle().expect("reported");
-    // A hand that jumps loses its grip, so it goes by single millimetres.
-    let go = |harness: &mut Harness<'_, Window>, from: DVec3, to: DVec3| {
-        for part in 1..=32 {
-            let mut pose = handle;
-            pose.translation += from.lerp(to, f64::from(part) / 32.0);
-            harness.state_mut().session.move_hand(hold(&pose));
-            (0..5).for_each(|_| {
-                harness.step();
-                std::thread::sleep(Duration::from_millis(10));
-            });
-        }
-    };
     let (home, up) = (DVec3::ZERO, 32.0 * DVec3::Z);
     let aside = 6.0 * DVec3::X;
-    go(&mut harness, home, up);
+    go(&mut harness, &handle, home, up);
     assert_eq!(harness.state().session.verdict, None, "taken apart");
     for (to, end) in [(home, "In place: 0."), (aside, "Stuck ")] {
         let above = to + up;
-        go(&mut harness, up, above);
+        go(&mut harness, &handle, up, above);
         // Beside its place the plug stands on the socket, and the hand goes on.
-        go(&mut harness, above, to);
+        go(&mut harness, &handle, above, to);
         until(&mut harness, "the verdict", |s| s.verdict.is_some());
         let said = harness.state().session.verdict.as_ref().map(ToString::to_string);
         let said = said.expect("just seen");
         assert!(said.starts_with(end), "{said}");
         harness.state_mut().session.verdict = None;
-        go(&mut harness, to, above);
-        go(&mut harness, above, up);
+        go(&mut harness, &handle, to, above);
+        go(&mut harness, &handle, above, up);
     }
 }
 
