@@ -2,7 +2,7 @@
 //!
 //! A shaft and a bore are an outer and a wider inner cylinder of two parts, one of them held. The depth is the length over which the two
 //! overlap along the bore's axis; the full depth is the shorter length of both. A part of any other shape is watched on the way to its place in the
-//! file ([`super::place`]). Cost: one pass over the pairs of the held part.
+//! file (`place.rs`). Cost: one pass over the pairs of the held part.
 
 use std::fmt;
 
