@@ -101,13 +101,7 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
     for aside_mm in [0.9, 6.0] {
         let mut harness = harness();
         open_sample(&mut harness);
-        connect(&mut harness);
-        let off = Intent::SetParameter(ParameterId::Guidance, 0.0);
-        harness.state_mut().session.act(off);
-        arm(&mut harness);
-        harness.state_mut().session.act(Intent::Grab(1));
-        until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
-        let handle = harness.state().session.handle().expect("reported");
+        let handle = take_unguided(&mut harness);
         // 20 mm down to the block, and 4 mm further: 1.6 N at the hand's 400 N/m.
         let beside = DVec3::new(aside_mm, 0.0, -10.0);
         go(&mut harness, &handle, DVec3::ZERO, beside);
@@ -120,6 +114,17 @@ fn a_part_that_does_not_go_in_is_stuck_and_on_what() {
         let at_the_mouth = dips.iter().any(|dip| said.starts_with(dip));
         assert!(at_the_mouth && said.ends_with(" of block"), "{said}");
     }
+}
+
+/// Connects the simulation, turns guidance off and takes part 1 in hand: the pose of the handle.
+fn take_unguided(harness: &mut Harness<'_, Window>) -> DAffine3 {
+    connect(harness);
+    let off = Intent::SetParameter(ParameterId::Guidance, 0.0);
+    harness.state_mut().session.act(off);
+    arm(harness);
+    harness.state_mut().session.act(Intent::Grab(1));
+    until(harness, "the part is held", |s| s.grabbed() == Some(1));
+    harness.state().session.handle().expect("reported")
 }
 
 /// Moves the simulated hand from one displacement of `handle` to another by single millimetres, mm: a hand that jumps loses its grip.
@@ -148,13 +153,7 @@ fn a_part_of_another_shape_is_in_its_place_or_stuck_on_the_way() {
     until(&mut harness, "the file is baked", |s| {
         s.document.as_ref().is_some_and(|d| d.baked.is_some())
     });
-    connect(&mut harness);
-    let off = Intent::SetParameter(ParameterId::Guidance, 0.0);
-    harness.state_mut().session.act(off);
-    arm(&mut harness);
-    harness.state_mut().session.act(Intent::Grab(1));
-    until(&mut harness, "the plug is held", |s| s.grabbed() == Some(1));
-    let handle = harness.state().session.handle().expect("reported");
+    let handle = take_unguided(&mut harness);
     let (home, up) = (DVec3::ZERO, 32.0 * DVec3::Z);
     let aside = 6.0 * DVec3::X;
     go(&mut harness, &handle, home, up);

@@ -32,7 +32,7 @@
 //! with tremor, has no such bound: it misses 100 of the 128 µJ delivered to a handle of 67 g that swings at 60 Hz.
 //!
 //! The last part of the budget, E₀/64, is reserved for a handle that moves against the wrench, which supplies energy within the tick: slip and bound
-//! use E₀ + B with it, and less E₀/64 otherwise. Without the reserve B = −E₀ would be final: the coupling would slip by all of the operator's motion, its
+//! use E₀ + B while it does so, and E₀/64 less otherwise. Without the reserve B = −E₀ would be final: the coupling would slip by all of the operator's motion, its
 //! force would be zero, and a motion against no force supplies nothing. With it the force of a handle that moves at v grows from √(2·k·E₀/64) = 0.01 N
 //! by the factor e in each (A·h² + u)/v, 4 ms at 6 mm/s without counts; what comes and goes with the sense of the motion is no more than 0.01 N (k is
 //! 400 N/m here).

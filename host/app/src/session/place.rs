@@ -9,14 +9,14 @@ use mortise_brep::CadModel;
 /// Least overlap of two bounding boxes that makes their parts neighbours, mm.
 const REACH_MM: f64 = 0.1;
 
-/// Corners of an axis-parallel box.
+/// An axis-aligned bounding box, mm.
 #[derive(Clone, Copy, Debug)]
-struct Span {
+struct BoundingBox {
     min: DVec3,
     max: DVec3,
 }
 
-impl Span {
+impl BoundingBox {
     fn of(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
         let mut points = points.into_iter();
         let first = points.next()?;
@@ -59,7 +59,7 @@ pub struct Away {
 #[derive(Clone, Debug, Default)]
 pub struct Places {
     /// Bounding box of each part, in its frame.
-    spans: Vec<Option<Span>>,
+    boxes: Vec<Option<BoundingBox>>,
     /// For each part its neighbour, and the part's pose in the neighbour's frame.
     homes: Vec<Option<(usize, DAffine3)>>,
 }
@@ -67,15 +67,15 @@ pub struct Places {
 impl Places {
     /// The places in the file. Cost: one pass over the vertices and one over the pairs of parts.
     pub fn of(model: &CadModel) -> Self {
-        let spans: Vec<Option<Span>> = (model.parts.iter())
-            .map(|part| Span::of(model.shapes.get(part.shape)?.mesh.vertices.iter().copied()))
+        let boxes: Vec<Option<BoundingBox>> = (model.parts.iter())
+            .map(|part| BoundingBox::of(model.shapes.get(part.shape)?.mesh.vertices.iter().copied()))
             .collect();
-        let placed: Vec<Option<Span>> = (model.parts.iter().zip(&spans))
-            .map(|(part, span)| (*span)?.moved(&part.placement))
+        let placed: Vec<Option<BoundingBox>> = (model.parts.iter().zip(&boxes))
+            .map(|(part, own)| (*own)?.moved(&part.placement))
             .collect();
         let home = |part: usize| {
-            let span = placed[part]?;
-            let reach = |other: usize| Some((other, span.overlap(placed[other]?)));
+            let own = placed[part]?;
+            let reach = |other: usize| Some((other, own.overlap(placed[other]?)));
             let (neighbour, _) = (0..placed.len())
                 .filter(|&other| other != part)
                 .filter_map(reach)
@@ -85,23 +85,23 @@ impl Places {
             relative.is_finite().then_some((neighbour, relative))
         };
         let homes = (0..placed.len()).map(home).collect();
-        Self { spans, homes }
+        Self { boxes, homes }
     }
 
     /// How far `part` is from its place; `None` without a place, and when it is more than `near_mm` outside of its neighbour's bounding box.
     pub fn away(&self, part: usize, poses: &[DAffine3], near_mm: f64) -> Option<Away> {
         let (neighbour, relative) = (*self.homes.get(part)?)?;
         let (now, around) = (poses.get(part)?, poses.get(neighbour)?);
-        let span = (*self.spans.get(part)?)?;
-        let reach = span
+        let own = (*self.boxes.get(part)?)?;
+        let reach = own
             .moved(now)?
-            .overlap((*self.spans.get(neighbour)?)?.moved(around)?);
+            .overlap((*self.boxes.get(neighbour)?)?.moved(around)?);
         let home = *around * relative;
         let shift = |point: DVec3| now.transform_point3(point) - home.transform_point3(point);
-        let mm = (span.corners().into_iter()).map(|corner| shift(corner).length());
+        let mm = (own.corners().into_iter()).map(|corner| shift(corner).length());
         (reach > -near_mm).then_some(Away {
             mm: mm.fold(0.0, f64::max),
-            out: shift(0.5 * (span.min + span.max)).normalize_or_zero(),
+            out: shift(0.5 * (own.min + own.max)).normalize_or_zero(),
         })
     }
 }
@@ -110,12 +110,12 @@ impl Places {
 impl Places {
     /// Cubes with sides of 2 mm.
     pub fn of_cubes(homes: Vec<Option<(usize, DAffine3)>>) -> Self {
-        let cube = Span {
+        let cube = BoundingBox {
             min: DVec3::splat(-1.0),
             max: DVec3::ONE,
         };
         Self {
-            spans: vec![Some(cube); homes.len()],
+            boxes: vec![Some(cube); homes.len()],
             homes,
         }
     }

@@ -215,15 +215,16 @@ impl Watch {
         };
         attempt.last = now;
         attempt.peak_n = attempt.peak_n.max(moment.handle_n);
-        if attempt
-            .reported_at_mm
-            .is_some_and(|at| (now.depth_mm - at).abs() > BEGUN_MM)
-        {
+        let left = (attempt.reported_at_mm).is_some_and(|at| (now.depth_mm - at).abs() > BEGUN_MM);
+        // A part that goes back begins anew: neither its time without progress nor its force counts for the next way in.
+        if left || now.depth_mm < attempt.deepest_mm - BEGUN_MM {
             *attempt = Attempt {
+                goal,
                 deepest_mm: now.depth_mm,
                 since_s: moment.time_s,
-                reported_at_mm: None,
-                ..attempt.clone()
+                peak_n: moment.handle_n,
+                last: now,
+                reported_at_mm: attempt.reported_at_mm.filter(|_| !left),
             };
         }
         if now.depth_mm > attempt.deepest_mm + PROGRESS_MM {
@@ -276,7 +277,7 @@ impl Watch {
         let Depth {
             depth_mm, full_mm, ..
         } = attempt.last;
-        // A part that is taken apart has a positive depth in a bore only.
+        // On the way to its place a part has no positive depth, and its release is not reported.
         let on_the_way = depth_mm > PROGRESS_MM && depth_mm <= full_mm - NEAR_END_MM;
         (on_the_way && attempt.reported_at_mm.is_none()).then_some(Verdict::LetGo { depth_mm, full_mm })
     }
@@ -428,6 +429,26 @@ mod tests {
         // A second insertion is reported again.
         assert_eq!(bench.hold(-20.0, 0.0, 0.2), []);
         assert_eq!(bench.hold(-40.0, 0.0, 0.2).len(), 1);
+    }
+
+    #[test]
+    fn a_part_that_is_taken_out_and_touches_on_its_way_back_is_not_stuck() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.hold(-40.0, 0.0, 1.0), []);
+        for step in 0..=400 {
+            let push_n = if step < 350 { 5.0 } else { 0.0 };
+            assert_eq!(bench.at(-40.0 + 0.1 * f64::from(step), push_n), None, "out");
+        }
+        let mut said = Vec::new();
+        for step in 0..=400 {
+            said.extend(bench.at(-0.1 * f64::from(step), 1.0));
+        }
+        let words: Vec<_> = said.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            words,
+            ["Goes in: 40.0 mm, clearance 1.000 mm, peak 1.0 N"],
+            "of the way in"
+        );
     }
 
     #[test]
