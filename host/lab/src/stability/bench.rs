@@ -16,32 +16,13 @@ use mortise_protocol::image::SceneImage;
 use mortise_scenario::port::Port;
 
 use super::oracle::Plant;
+use super::sensor::{Readout, Sensor, Speed};
 
 /// Integration steps a tick.
 const SUBSTEPS: u32 = 4;
 
-/// Measurement of the handle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sensor {
-    /// Δ, the encoder's resolution, m; 0: exact.
-    pub resolution_m: f64,
-    /// Time constant of the low-pass on the difference quotient, s.
-    pub filter_s: f64,
-    /// Share of the measured speed that the tick receives: 1, unless it sets a wall's damping.
-    pub share: f64,
-}
-
-impl Sensor {
-    /// Exact positions and their difference quotient.
-    pub const EXACT: Self = Self {
-        resolution_m: 0.0,
-        filter_s: 0.0,
-        share: 1.0,
-    };
-}
-
 /// The loop's fixed parts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Rig {
     /// Handle and hand; the hand's spring pulls to the commanded position.
     pub plant: Plant,
@@ -83,7 +64,7 @@ impl Rig {
             coulomb_n: 0.01,
             sensor: Sensor {
                 resolution_m: 5e-6,
-                filter_s: 3e-3,
+                speed: Speed::Filtered { filter_s: 3e-3 },
                 share: 1.0,
             },
             delay_ticks: 0,
@@ -116,8 +97,7 @@ pub struct Bench<'a> {
     pub speed: f64,
     /// Orientation of the handle, which this loop does not change.
     pub orientation: Quat,
-    last_read: f64,
-    estimate: f64,
+    readout: Readout,
     under_way: Vec<f64>,
     /// Observer of the device's work on the handle; `None` only if nothing could be grabbed.
     observer: Option<Observer>,
@@ -144,8 +124,7 @@ impl<'a> Bench<'a> {
             position: 0.0,
             speed: 0.0,
             orientation: Quat::IDENTITY,
-            last_read: 0.0,
-            estimate: 0.0,
+            readout: Readout::new(&rig.sensor),
             under_way: vec![0.0; rig.delay_ticks],
             observer,
             contact: Port::default(),
@@ -177,19 +156,12 @@ impl<'a> Bench<'a> {
     pub fn step(&mut self, command: &HandCommand) -> Output {
         let period = f64::from(self.settings.period_s);
         let sensor = self.rig.sensor;
-        let read = if sensor.resolution_m > 0.0 {
-            (self.position / sensor.resolution_m).round() * sensor.resolution_m
-        } else {
-            self.position
-        };
-        let gain = period / (sensor.filter_s + period);
-        self.estimate += gain * ((read - self.last_read) / period - self.estimate);
-        self.last_read = read;
+        let (read, speed) = self.readout.read(&sensor, self.position, period);
         let along = |z: f64| Vec3::new(0.0, 0.0, z as f32);
         let input = Input {
             handle: Pose::new(along(read), self.orientation),
             handle_twist: Twist {
-                linear: along(self.estimate * sensor.share),
+                linear: along(speed),
                 angular: Vec3::ZERO,
             },
             enabled: true,

@@ -6,8 +6,9 @@
 use mortise_haptics::Settings;
 use mortise_protocol::image::SceneImage;
 
-use super::bench::{Bench, HandCommand, Rig, Sensor};
+use super::bench::{Bench, HandCommand, Rig};
 use super::oracle::{Law, Search, Wall, limit};
+use super::sensor::{Sensor, Speed};
 
 /// Press force, N.
 const PRESS_N: f64 = 5.0;
@@ -36,7 +37,9 @@ pub fn settings(law: Law, wall: &Wall, stiffness: f64) -> (Settings, Sensor) {
     };
     settings.coupling.b_t = damping as f32;
     let sensor = Sensor {
-        filter_s: wall.filter_s,
+        speed: Speed::Filtered {
+            filter_s: wall.filter_s,
+        },
         share,
         ..Sensor::EXACT
     };
@@ -65,6 +68,8 @@ pub struct Flick {
     pub first_m: f64,
     /// Largest deviation at the end, m.
     pub last_m: f64,
+    /// Half of the range in which the handle moves at the end, m, wherever it came to rest; infinite when it has grown.
+    pub ripple_m: f64,
     /// Deviation after the flick in a linear loop without damping, v·√(m/K), m: a vibration that has grown until limits saturate it may shrink again,
     /// but not as far as this.
     pub linear_m: f64,
@@ -103,6 +108,7 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
     let watch = ticks(WATCH_S);
     let part = (PART * f64::from(watch)) as u32;
     let (mut first_m, mut last_m) = (0.0f64, 0.0f64);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for i in 0..watch {
         bench.step(&press);
         let off = (bench.position - rest).abs();
@@ -110,7 +116,10 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
             first_m = first_m.max(off);
         } else if i >= watch - part || off > GROWN * first_m {
             last_m = last_m.max(off);
+            low = low.min(bench.position);
+            high = high.max(bench.position);
             if off > GROWN * first_m {
+                high = f64::INFINITY;
                 break;
             }
         }
@@ -118,6 +127,7 @@ pub fn flick(scene: &SceneImage<'_>, part: u16, settings: &Settings, rig: &Rig) 
     Flick {
         first_m,
         last_m,
+        ripple_m: 0.5 * (high - low),
         linear_m: FLICK_M_PER_S * (rig.plant.mass_kg / f64::from(settings.coupling.k_t_n_per_m)).sqrt(),
     }
 }

@@ -2,10 +2,11 @@
 //!
 //! [`mod@bench`] closes a loop around the product's tick on one axis; [`oracle`] predicts the behaviour of the linear loop; [`boundary`] measures
 //! that of the whole loop. The maps of [`limits`] and [`quantisation`] compare the two; those of [`press`], [`impact`], [`shell`] and [`jam`] compare
-//! methods; [`lapses`] concerns targets that are late or lost.
+//! methods; [`estimators`] chooses the estimator of speeds; [`lapses`] concerns targets that are late or lost.
 
 pub mod bench;
 pub mod boundary;
+pub mod estimators;
 pub mod impact;
 pub mod jam;
 pub mod lapses;
@@ -13,6 +14,7 @@ pub mod limits;
 pub mod oracle;
 pub mod press;
 pub mod quantisation;
+pub mod sensor;
 pub mod shell;
 pub mod slab;
 
@@ -38,6 +40,8 @@ pub enum Trial {
     Felt(shell::Felt),
     /// Result of [`quantisation`].
     Rest(quantisation::Rest),
+    /// Result of [`estimators`].
+    Bound(estimators::Bound),
     /// Result of [`jam`].
     Push(jam::Push),
     /// Result of [`lapses`].
@@ -52,6 +56,7 @@ impl std::fmt::Display for Trial {
             Self::Blow(trial) => trial.fmt(f),
             Self::Felt(trial) => trial.fmt(f),
             Self::Rest(trial) => trial.fmt(f),
+            Self::Bound(trial) => trial.fmt(f),
             Self::Push(trial) => trial.fmt(f),
             Self::Held(trial) => trial.fmt(f),
         }
@@ -104,6 +109,9 @@ fn recipes() -> Vec<(&'static str, Make)> {
     all.extend([
         recipe("stability-encoder", quantisation::sweep, Trial::Rest, |f| {
             vec![quantisation::chart(f)]
+        }),
+        recipe("stability-estimator", estimators::sweep, Trial::Bound, |f| {
+            vec![estimators::chart(f)]
         }),
         recipe("stability-jam", jam::sweep, Trial::Push, |f| vec![jam::chart(f)]),
         recipe("stability-contacts", press::sweep, Trial::Press, |f| {

@@ -13,9 +13,10 @@
 use mortise_protocol::image::SceneImage;
 use serde::Serialize;
 
-use super::bench::{Bench, HandCommand, Rig, Sensor};
+use super::bench::{Bench, HandCommand, Rig};
 use super::boundary::settings;
 use super::oracle::{COARSE, Law, Wall, limit};
+use super::sensor::Sensor;
 use super::slab::Slab;
 use crate::chart::{Axis, Chart, Line, Look, Point, Series};
 use crate::error::LabError;

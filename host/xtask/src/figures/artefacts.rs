@@ -244,6 +244,14 @@ impl Artefact {
         }
     }
 
+    /// What makes it anew and records it, as a person types it.
+    fn renewal(&self) -> String {
+        match self.made {
+            Made::Page { .. } | Made::Sweep { .. } => format!("cargo xtask figures --renew {}", self.name),
+            Made::Compared | Made::ByHand => self.command(),
+        }
+    }
+
     fn owns(&self, file: &str) -> bool {
         let is_page = file.strip_suffix(".md") == Some(self.name);
         match self.made {
@@ -370,30 +378,22 @@ pub fn stale(root: &Path, artefact: &Artefact, manifest: &Manifest) -> Result<Op
     })
 }
 
-/// All problems in `docs/figures`, each with the file it concerns. Artefacts that were never recorded are named on standard error and not judged: each is
-/// recorded by itself, when it is renewed.
+/// All problems in `docs/figures`, each with the file it concerns: artefacts that are stale or were never recorded, and files that no command makes.
 ///
 /// # Errors
 /// When a file cannot be read.
 pub fn complaints(root: &Path) -> Result<Vec<(PathBuf, String)>> {
     let manifest = Manifest::read(root)?;
-    let (mut found, mut unknown) = (Vec::new(), Vec::new());
+    let mut found = Vec::new();
     for artefact in ARTEFACTS {
-        if !manifest.0.contains_key(artefact.name) {
-            unknown.push(artefact.name);
-        } else if let Some(why) = stale(root, artefact, &manifest)? {
+        if let Some(why) = stale(root, artefact, &manifest)? {
             let what = format!(
-                "`{0}` {why}; `cargo xtask figures --renew {0}` makes it anew",
-                artefact.name
+                "`{}` {why}; `{}` makes it anew",
+                artefact.name,
+                artefact.renewal()
             );
             found.push((PathBuf::from(MANIFEST), what));
         }
-    }
-    if !unknown.is_empty() {
-        eprintln!(
-            "Not checked whether they are stale, as {MANIFEST} does not have them (`cargo xtask figures --renew NAME` records one): {}.",
-            unknown.join(", ")
-        );
     }
     for file in files(root)? {
         if !WRITTEN.contains(&file.as_str()) && !ARTEFACTS.iter().any(|artefact| artefact.owns(&file)) {

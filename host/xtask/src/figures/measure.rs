@@ -1,7 +1,10 @@
 //! One run of `mortise-lab figures`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
 
@@ -49,19 +52,50 @@ pub fn measure(root: &Path, program: &Path, name: &str, quick: bool, by: By) -> 
     measure_part(root, program, name, None, quick, by)
 }
 
-/// As [`measure`], of some parts of the shorter form alone, one after the other.
+/// As [`measure`], of the shorter form of several tables; of a table with parts these alone. As many runs at a time as the computer has cores, since
+/// nearly all rows are counted or simulated; values that depend on the machine are worth less for it.
 ///
 /// # Errors
 /// As [`measure`].
-pub fn measure_parts(root: &Path, program: &Path, name: &str, parts: &[&str], by: By) -> Result<Measured> {
-    let mut all = Measured {
-        rows: Vec::new(),
-        success: true,
-    };
-    for part in parts {
-        let measured = measure_part(root, program, name, Some(part), true, by)?;
-        all.rows.extend(measured.rows);
-        all.success &= measured.success;
+pub fn measure_tables(
+    root: &Path,
+    program: &Path,
+    tables: &[(&str, Option<&[&str]>)],
+    by: By,
+) -> Result<Vec<Measured>> {
+    let runs: Vec<(usize, &str, Option<&str>)> = (tables.iter().enumerate())
+        .flat_map(|(index, (name, parts))| {
+            let parts = parts.map_or_else(|| vec![None], |parts| parts.iter().copied().map(Some).collect());
+            parts.into_iter().map(move |part| (index, *name, part))
+        })
+        .collect();
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(BTreeMap::new());
+    let workers = std::thread::available_parallelism().map_or(1, |cores| cores.get().min(runs.len()));
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                loop {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(&(_, name, part)) = runs.get(number) else {
+                        break;
+                    };
+                    let measured = measure_part(root, program, name, part, true, by);
+                    done.lock().expect("no run panics").insert(number, measured);
+                }
+            });
+        }
+    });
+    let mut all: Vec<Measured> = (tables.iter())
+        .map(|_| Measured {
+            rows: Vec::new(),
+            success: true,
+        })
+        .collect();
+    for (number, measured) in done.into_inner().expect("no run panics") {
+        let (measured, table) = (measured?, runs[number].0);
+        all[table].rows.extend(measured.rows);
+        all[table].success &= measured.success;
     }
     Ok(all)
 }
@@ -88,7 +122,7 @@ fn measure_part(
     let mut foreign = Vec::new();
     let run = shell::run_lines(&mut command, |line| match Row::parse(line) {
         Ok(row) => {
-            println!("  {}", row.line());
+            println!("  {name}: {}", row.line());
             rows.push(row);
         }
         Err(_) if line.trim().is_empty() => {}

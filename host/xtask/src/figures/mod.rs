@@ -19,7 +19,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 
 use self::claims::Claims;
-use self::measure::{By, measure, measure_parts};
+use self::measure::{By, measure, measure_tables};
 pub use self::page::today;
 use self::quoted::Quoted;
 pub use self::row::{Row, count};
@@ -127,12 +127,18 @@ pub fn check(
         }
         wanted
     });
-    for table in &tables {
-        let parts = parts.iter().find(|(name, _)| name == table);
-        let measured = match parts {
-            Some((_, parts)) => measure_parts(root, program, table, parts, By::Kept)?,
-            None => measure(root, program, table, true, By::Kept)?,
-        };
+    let parts_of = |table: &str| {
+        parts
+            .iter()
+            .find(|(name, _)| *name == table)
+            .map(|(_, parts)| *parts)
+    };
+    let wanted: Vec<_> = tables
+        .iter()
+        .map(|table| (table.as_str(), parts_of(table)))
+        .collect();
+    let all_measured = measure_tables(root, program, &wanted, By::Kept)?;
+    for ((table, parts), measured) in wanted.into_iter().zip(all_measured) {
         let page = page_of(root, table)?;
         for row in measured.rows.iter().filter(|row| row.fails()) {
             let reported = page.iter().any(|kept| kept.key() == row.key() && kept.fails());
@@ -158,7 +164,7 @@ pub fn check(
             );
         }
         wrong.extend(quoted::differences(table, &measured.rows, &page));
-        let of_table = |quoted: &&Quoted| quoted.is_of_readme() && quoted.table == *table;
+        let of_table = |quoted: &&Quoted| quoted.is_of_readme() && quoted.table == table;
         for quoted in quoted.iter().filter(of_table) {
             let agrees = quoted.check(&measured.rows, &page);
             wrong.extend(agrees.err().map(|error| format!("{error:#}")));

@@ -4,6 +4,7 @@ mod boundary;
 mod contacts;
 mod endurance;
 mod energy;
+mod estimators;
 pub mod faults;
 mod fuzzing;
 mod impact;
@@ -20,6 +21,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     contacts::measure(out)?;
     impact::measure(out)?;
     rate::measure(out)?;
+    estimators::measure(out)?;
     faults::measure(plan, out)?;
     unsafe_commands::measure(plan, out)?;
     fuzzing::measure(plan, out)?;
