@@ -1,9 +1,12 @@
-//! The program `mortise`: the window, the commands, and the state that both share.
+//! The program `mortise`: the window and the commands.
 //!
-//! [`session`] holds the state and does not depend on the window; [`ui`] draws it; [`viewport`] draws the parts; [`cli`] is the same without a
-//! window, and the whole program in a build without the feature `window`.
+//! Layers, each of which imports only earlier ones: [`folder_cache`] keeps results of bakes; [`display`] prepares parts for display; [`session`] is
+//! the window's state and does not depend on the window; [`viewport`] draws the parts; [`ui`] draws the rest; [`cli`] is the command line, and the
+//! whole program in a build without the feature `window`.
 
 pub mod cli;
+#[cfg(feature = "window")]
+pub mod display;
 pub mod folder_cache;
 mod kept_model;
 #[cfg(feature = "window")]

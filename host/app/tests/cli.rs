@@ -64,9 +64,10 @@ fn a_value_that_no_option_takes_is_refused_for_what_it_is() {
         ("--accuracy", "-5um", "accuracy = -0.005 is out of range"),
         ("--accuracy", "nan", "is not a length"),
         ("--flash", "-1", "is not a size"),
-        ("--tick", "-5", "invalid digit"),
+        ("--tick", "-5", "not a number of instructions"),
         ("--cell", "1e-300", "cell_mm = 1e-300 is out of range"),
         ("--cell", "nan", "is out of range"),
+        ("--cell", "abc", "`abc` is not a number"),
         ("--timeout", "0", "is not a time limit"),
     ] {
         refused(

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use eframe::wgpu;
 use glam::DVec3;
+use mortise::display::mesh::meeting;
 use mortise::session::document::Document;
 use mortise::viewport::camera::{Camera, View};
-use mortise::viewport::mesh::meeting;
 use mortise::viewport::picture::{Arrow, Ground, Item, Picture};
 use mortise::viewport::renderer::Renderer;
 

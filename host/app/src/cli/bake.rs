@@ -34,13 +34,14 @@ pub struct Args {
     #[arg(long, value_name = "BYTES", alias = "limit", value_parser = units::bytes, allow_hyphen_values = true)]
     flash: Option<u64>,
     /// Largest estimated number of instructions per tick
-    #[arg(long, value_name = "INSTRUCTIONS", conflicts_with_all = EXPLICIT, value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
+    #[arg(long, value_name = "INSTRUCTIONS", conflicts_with_all = EXPLICIT, value_parser = units::instructions, allow_negative_numbers = true)]
     tick: Option<u64>,
     /// Cell edge, mm, instead of a plan by accuracy
     #[arg(
         long,
         value_name = "MM",
         conflicts_with = "accuracy",
+        value_parser = units::real,
         allow_negative_numbers = true
     )]
     cell: Option<f64>,
@@ -51,13 +52,14 @@ pub struct Args {
     #[arg(long, value_name = "SHELL", value_parser = ["error-bounded", "classic"], conflicts_with = "accuracy")]
     shell: Option<String>,
     /// Voxel edge of the classic shell, mm [default: the cell]
-    #[arg(long, value_name = "MM", requires = "shell", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", requires = "shell", value_parser = units::real, allow_negative_numbers = true)]
     voxel: Option<f64>,
     /// Inward shift of the classic shell's points, percent of a voxel [default: 0]
     #[arg(
         long,
         value_name = "PERCENT",
         requires = "shell",
+        value_parser = units::real,
         allow_negative_numbers = true
     )]
     shrink: Option<f64>,

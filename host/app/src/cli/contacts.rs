@@ -10,6 +10,7 @@ use mortise_output::lines;
 use serde::Serialize;
 
 use super::reading::Reading;
+use super::units;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -30,7 +31,7 @@ pub struct Args {
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    let number = units::real(text)?;
     if number > 0.0 && number.is_finite() {
         Ok(number)
     } else {

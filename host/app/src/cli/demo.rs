@@ -9,7 +9,7 @@ use mortise_rig::{EmulatedMode, RigSpec};
 use mortise_scenario::{PreparedScene, Scenario, connect_with_scene, report, run_on};
 
 use super::reading::Reading;
-use super::{mistyped, window};
+use super::{mistyped, units, window};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(long)]
     headless: bool,
     /// sim, emulated, or a serial port [default: emulated if it is there, else sim]
-    #[arg(long, value_parser = super::rig)]
+    #[arg(long, value_parser = units::rig)]
     rig: Option<RigSpec>,
     /// One JSON object (with --headless)
     #[arg(long, requires = "headless")]

@@ -11,6 +11,7 @@ use mortise_output::lines;
 use serde::Serialize;
 
 use super::reading::Reading;
+use super::units;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -37,7 +38,7 @@ pub struct Args {
 const MOST_OVERLAP_UM: f64 = 100.0;
 
 fn overlap(text: &str) -> Result<f64, String> {
-    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    let number = units::real(text)?;
     if (0.0..=MOST_OVERLAP_UM).contains(&number) {
         Ok(number)
     } else {

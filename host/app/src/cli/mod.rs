@@ -23,7 +23,6 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 use mortise_output::program;
-use mortise_rig::RigSpec;
 
 /// Name of the program.
 const NAME: &str = "mortise";
@@ -118,10 +117,4 @@ pub fn main() -> ExitCode {
         },
     };
     program::end(NAME, result)
-}
-
-/// Reads a rig from the command line.
-fn rig(text: &str) -> Result<RigSpec, String> {
-    text.parse()
-        .map_err(|error: mortise_rig::SpecError| error.to_string())
 }

@@ -9,6 +9,7 @@ use mortise_scenario::probe::{self, Model, ProbeScene};
 use mortise_scenario::sweep::Along;
 
 use super::reading::Reading;
+use super::units;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -28,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "DX,DY,DZ[,RX,RY,RZ]", allow_hyphen_values = true)]
     along: Option<Along>,
     /// Cell edge of a STEP file's scene, mm [default: chosen so that the image fits]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", value_parser = units::real, allow_negative_numbers = true)]
     cell: Option<f64>,
     /// Contact method for a STEP file's scene: distance-field or occupancy [default: distance-field]
     #[arg(long, value_name = "METHOD")]
@@ -40,7 +41,8 @@ pub struct Args {
     #[arg(
         long,
         value_name = "PERCENT",
-        default_value_t = 0.0,
+        default_value = "0",
+        value_parser = units::real,
         allow_negative_numbers = true
     )]
     shrink: f64,

@@ -8,6 +8,8 @@ use mortise_output::lines;
 use mortise_protocol::message::{DeviceState, ToDevice};
 use mortise_rig::{Abilities, Client, RigSpec, abilities, load_rig, write_rig};
 
+use super::units;
+
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -30,13 +32,13 @@ enum Action {
         /// Description (TOML; see docs/rigs.md)
         file: PathBuf,
         /// sim, emulated, or a serial port
-        #[arg(long, value_parser = super::rig)]
+        #[arg(long, value_parser = units::rig)]
         rig: RigSpec,
     },
     /// Print the description stored on a board, as a file
     Show {
         /// sim, emulated, or a serial port
-        #[arg(long, value_parser = super::rig)]
+        #[arg(long, value_parser = units::rig)]
         rig: RigSpec,
     },
 }

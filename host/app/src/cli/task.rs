@@ -85,6 +85,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn read_script(path: &Path) -> anyhow::Result<Vec<String>> {
     let shown = path.display();
+    if path.is_dir() {
+        bail!("{shown}: is a folder; name a text file");
+    }
     let file = std::fs::File::open(path).with_context(|| format!("{shown}: cannot be read"))?;
     let mut text = String::new();
     let read = file.take(LARGEST_SCRIPT + 1).read_to_string(&mut text);

@@ -1,6 +1,8 @@
-//! Lengths, sizes and times with their units, as written on the command line.
+//! Values as written on the command line: lengths, sizes and times with their units, numbers, rigs.
 
 use std::time::Duration;
+
+use mortise_rig::RigSpec;
 
 /// Millimetres of `5um`, `5µm` or `0.005mm`.
 pub fn length_mm(text: &str) -> Result<f64, String> {
@@ -49,6 +51,25 @@ pub fn delay(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "give a number of seconds, 0 to 3600".to_owned())
 }
 
+/// A number.
+pub fn real(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| format!("`{text}` is not a number"))
+}
+
+/// A number of instructions, at least 1.
+pub fn instructions(text: &str) -> Result<u64, String> {
+    let value = text.parse().ok().filter(|&v| v > 0);
+    value.ok_or_else(|| {
+        format!("`{text}` is not a number of instructions; write a whole number, such as 120000")
+    })
+}
+
+/// A rig.
+pub fn rig(text: &str) -> Result<RigSpec, String> {
+    text.parse()
+        .map_err(|error: mortise_rig::SpecError| error.to_string())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,6 +89,16 @@ mod tests {
         assert_eq!((seconds("1"), seconds("90s")), (Ok(1), Ok(90)));
         for text in ["", "0", "-1", "1.5", "NaN", "86401", "1e9", "s"] {
             assert!(seconds(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers() {
+        assert_eq!((real("0.5"), real("-1e3")), (Ok(0.5), Ok(-1e3)));
+        assert_eq!(real("abc"), Err("`abc` is not a number".to_owned()));
+        assert_eq!(instructions("120000"), Ok(120_000));
+        for text in ["", "0", "-5", "1e5", "1.5", "120,000"] {
+            assert!(instructions(text).is_err(), "{text}");
         }
     }
 

@@ -44,7 +44,7 @@ pub struct Picture {
     #[arg(long, hide = true)]
     see_through: bool,
     /// Connect to a rig at once
-    #[arg(long, hide = true, value_name = "RIG", value_parser = super::rig)]
+    #[arg(long, hide = true, value_name = "RIG", value_parser = units::rig)]
     connect: Option<RigSpec>,
 }
 

@@ -12,8 +12,8 @@ use mortise_brep::{CadModel, LoadOptions, load_step_while};
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
 use super::verdict::Watch;
-use crate::viewport::camera::Extent;
-use crate::viewport::mesh::{ShapeMesh, shown};
+use crate::display::extent::Extent;
+use crate::display::mesh::{ShapeMesh, shown};
 
 /// Colours of parts that have none, sRGB: muted, distinguishable on a dark ground, none of them red (stop) or orange (held part).
 const PALETTE: [[u8; 3]; 8] = [

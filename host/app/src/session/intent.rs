@@ -12,8 +12,8 @@ use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 
-use super::Session;
 use super::link::Link;
+use super::state::Session;
 
 /// An action that the operator requests.
 #[derive(Clone, Debug, PartialEq)]

@@ -17,8 +17,10 @@ use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 
 use super::document::Document;
-use super::guidance::Tap;
-use super::work::{Cancel, Outbox, Update};
+use super::guidance;
+use super::outbox::{LinkUpdate, Outbox, Update};
+use super::tap::Tap;
+use super::threads::{Cancel, spawn};
 
 /// Ticks between telemetry messages: some 60 messages a second, half of what an emulated UART carries.
 pub const TELEMETRY_TICKS: u16 = 16;
@@ -48,44 +50,6 @@ pub enum Command {
     },
     /// Query the counters.
     Statistics,
-}
-
-/// A report of the link.
-pub enum LinkUpdate {
-    /// Connected.
-    Connected {
-        /// Sends messages.
-        client: Arc<Client>,
-        /// The board's parameters.
-        parameters: Vec<(ParameterId, f32)>,
-        /// Input of the guidance thread for samples.
-        tap: Tap,
-    },
-    /// The connection failed, and why.
-    Failed(String),
-    /// An unsolicited event of the board.
-    Event(Event),
-    /// A request was executed or refused.
-    Answered {
-        /// The request.
-        message: Box<ToDevice>,
-        /// One line with the reason of a refusal.
-        result: Result<(), String>,
-    },
-    /// No answer because the link is lost, which [`Event::LinkLost`] reports once; or the answer to a query of the window itself that
-    /// nothing waits for.
-    Unanswered,
-    /// Progress of an upload.
-    Uploading(UploadProgress),
-    /// An upload ended.
-    Uploaded {
-        /// The scene's document.
-        generation: u64,
-        /// `false`: the operator cancelled it. An error is one line with the reason.
-        result: Result<bool, String>,
-    },
-    /// The counters.
-    Statistics(Statistics),
 }
 
 /// State of the connection.
@@ -159,7 +123,7 @@ pub fn connect(outbox: &Outbox, id: u64, spec: RigSpec) -> Link {
         },
         Err(error) => {
             let update = LinkUpdate::Failed(RigError::Thread(error).to_string());
-            super::work::spawn("mortise-report", move || {
+            spawn("mortise-report", move || {
                 report.send(Update::Link { id, update });
             });
             Link::Connecting {
@@ -407,7 +371,8 @@ impl Connection {
     pub fn guide(&self, document: &Document, settings: GuideSettings, outbox: &Outbox) {
         let Some(baked) = &document.baked else { return };
         let parts = baked.report.parts.iter().map(|part| part.model_part).collect();
-        self.tap.start(
+        guidance::start(
+            &self.tap,
             Arc::clone(&document.model),
             parts,
             settings,
@@ -420,7 +385,7 @@ impl Connection {
     /// Motors off, now: written from a separate thread, ahead of everything queued.
     pub fn stop(&self, outbox: &Outbox) {
         let (client, outbox, id) = (Arc::clone(&self.client), outbox.clone(), self.id);
-        super::work::spawn("mortise-stop", move || {
+        spawn("mortise-stop", move || {
             let update = match client.stop() {
                 Err(RigError::LinkLost { .. }) => LinkUpdate::Unanswered,
                 result => LinkUpdate::Answered {
@@ -545,7 +510,7 @@ impl Link {
         if wait {
             end();
         } else {
-            super::work::spawn("mortise-disconnect", end);
+            spawn("mortise-disconnect", end);
         }
     }
 }

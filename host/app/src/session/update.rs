@@ -8,21 +8,23 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
 use super::document::Document;
-use super::guidance::{GuidanceCommand, Tap};
 use super::history::Sample;
 use super::insertion::Wall;
-use super::link::{Command, Connection, Link, LinkUpdate};
+use super::intent::Intent;
+use super::link::{Command, Connection, Link};
 use super::notes::Severity;
+use super::outbox::{CollisionModel, LinkUpdate, Update};
+use super::pose;
+use super::state::{Lost, Session};
+use super::tap::{GuidanceCommand, Tap};
 use super::touch::Touch;
 use super::verdict::Moment;
-use super::work::{CollisionModel, Update};
-use super::{Intent, Lost, Session, pose};
 
 /// Samples between two queries of the counters: about two seconds.
 const STATISTICS_EVERY: u32 = 120;
 
-/// Applies one message. Messages of a file or connection that no longer exists are dropped.
-pub fn take(session: &mut Session, update: Update) {
+/// Applies one message; returns the intent that it stands for, if any. Messages of a file or connection that no longer exists are dropped.
+pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
     match update {
         Update::Imported { generation, result } if is_awaited(session, generation) => {
             session.job = None;
@@ -75,9 +77,10 @@ pub fn take(session: &mut Session, update: Update) {
                 session.guidance = list;
             }
         }
-        Update::Chosen(path) => session.act(Intent::Open(path)),
+        Update::Chosen(path) => return Some(Intent::Open(path)),
         Update::NoDialog => session.wants_path = true,
     }
+    None
 }
 
 fn is_awaited(session: &Session, generation: u64) -> bool {

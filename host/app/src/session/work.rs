@@ -2,10 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
-use std::thread;
 use std::time::Instant;
 
 use mortise_bake::{
@@ -13,62 +10,11 @@ use mortise_bake::{
     bake as bake_as_described, plan_with,
 };
 use mortise_brep::CadModel;
-use mortise_guide::List;
-use mortise_rig::RigEntry;
 
 use super::document::Document;
-use super::link::LinkUpdate;
+use super::outbox::{CollisionModel, Outbox, Update};
+use super::threads::{Cancel, spawn};
 use crate::folder_cache::FolderCache;
-
-/// Capacity of the window's queue; a sender blocks when it is full.
-const MAX_WAITING: usize = 1024;
-
-/// A report of a job.
-pub enum Update {
-    /// Reading a file ended.
-    Imported {
-        /// Id of the file.
-        generation: u64,
-        /// The document, or one line with the reason of the failure.
-        result: Result<Box<Document>, String>,
-    },
-    /// Progress of reading or baking.
-    Working {
-        /// Id of the file or document.
-        generation: u64,
-        /// Description of the current stage, where the job has several.
-        doing: Option<String>,
-        /// Progress of the whole job, 0 to 1.
-        fraction: f32,
-    },
-    /// A bake ended.
-    Baked {
-        /// Id of the document.
-        generation: u64,
-        /// The collision model, or one line with the reason of the failure.
-        result: Result<CollisionModel, String>,
-    },
-    /// The available rigs.
-    Rigs(Vec<RigEntry>),
-    /// A report of the link.
-    Link {
-        /// Id of the connection.
-        id: u64,
-        /// The report.
-        update: LinkUpdate,
-    },
-    /// Targets that guidance recognised.
-    Guidance {
-        /// Id of the connection.
-        link: u64,
-        /// The targets.
-        list: List,
-    },
-    /// A file was chosen in a dialog.
-    Chosen(PathBuf),
-    /// No file dialog is available: the window must ask for a path.
-    NoDialog,
-}
 
 /// What a bake is to give.
 #[derive(Clone, Debug)]
@@ -77,71 +23,6 @@ pub enum Wanted {
     Planned(Request),
     /// A model as described.
     Described(BakeOptions),
-}
-
-/// A baked model.
-pub struct CollisionModel {
-    /// The image and its report.
-    pub baked: Arc<Baked>,
-    /// What a plan reached and what limits it, in one line.
-    pub reached: Option<String>,
-}
-
-/// Sending end of the window's queue. Wakes the window after each message.
-#[derive(Clone)]
-pub struct Outbox {
-    sender: SyncSender<Update>,
-    wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-impl Outbox {
-    /// Both ends of a new queue.
-    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> (Self, Receiver<Update>) {
-        let (sender, receiver) = sync_channel(MAX_WAITING);
-        (Self { sender, wake }, receiver)
-    }
-
-    /// Sends a message; `false` when the receiver is gone.
-    pub fn send(&self, update: Update) -> bool {
-        let sent = self.sender.send(update).is_ok();
-        (self.wake)();
-        sent
-    }
-
-    /// Sends a message without waking the window, which takes it in at its next wake-up. `false` when the receiver is gone.
-    pub fn send_quietly(&self, update: Update) -> bool {
-        match self.sender.try_send(update) {
-            Ok(()) => true,
-            // If the queue is full, the window is woken and waited for.
-            Err(TrySendError::Full(update)) => self.send(update),
-            Err(TrySendError::Disconnected(_)) => false,
-        }
-    }
-
-    /// Sends a message unless the queue is full; returns whether it did.
-    pub fn offer(&self, update: Update) -> bool {
-        let sent = self.sender.try_send(update).is_ok();
-        if sent {
-            (self.wake)();
-        }
-        sent
-    }
-}
-
-/// A flag that requests the early end of a job.
-#[derive(Clone, Debug, Default)]
-pub struct Cancel(Arc<AtomicBool>);
-
-impl Cancel {
-    /// Requests the end.
-    pub fn set(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether the end was requested.
-    pub fn is_set(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
 }
 
 /// Sends the progress of a job, which it ends when it is cancelled.
@@ -313,23 +194,6 @@ pub fn choose_file(outbox: &Outbox, folder: Option<PathBuf>) {
         ask();
     } else {
         spawn("mortise-dialog", ask);
-    }
-}
-
-/// Starts a thread. If the system cannot start one, the work runs here, later but not lost.
-pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) {
-    let work = Arc::new(Mutex::new(Some(work)));
-    let take = |work: &Arc<Mutex<Option<_>>>| work.lock().ok().and_then(|mut w| w.take());
-    let theirs = Arc::clone(&work);
-    let spawned = thread::Builder::new().name(name.to_owned()).spawn(move || {
-        if let Some(work) = take(&theirs) {
-            work();
-        }
-    });
-    if spawned.is_err()
-        && let Some(work) = take(&work)
-    {
-        work();
     }
 }
 

@@ -85,12 +85,21 @@ pub fn run(options: Options) -> anyhow::Result<()> {
     )
     .map_err(|error| {
         anyhow::anyhow!(
-            "the window cannot be opened: {error}; it needs a display and Vulkan, OpenGL, Metal or DirectX (on Debian without a \
-             graphics card: mesa-vulkan-drivers); `mortise demo --headless` needs neither"
+            "the window cannot be opened: {}; it needs a display and Vulkan, OpenGL, Metal or DirectX (on Debian without a \
+             graphics card: mesa-vulkan-drivers); `mortise demo --headless` needs neither",
+            reason(&error.to_string())
         )
     })?;
     let failure = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
     failure.map_or(Ok(()), Err)
+}
+
+/// What an error of the window library states, without the place in that library's source which it begins with.
+fn reason(error: &str) -> &str {
+    let after_place = error
+        .rsplit_once(".rs:")
+        .and_then(|(_, after)| after.split_once(": "));
+    after_place.map_or(error, |(_, text)| text).trim_end_matches('.')
 }
 
 /// The window that the system is asked for.
@@ -222,6 +231,13 @@ mod tests {
         // 800 × 600 pixels, three to the point.
         let least = viewport.min_inner_size.expect("a least size");
         assert!(least.x <= 266.0 && least.y <= 200.0, "{least}");
+    }
+
+    #[test]
+    fn an_error_of_the_window_library_is_given_without_its_source() {
+        let with_place = "winit EventLoopError: os error at /src/linux/mod.rs:765: DISPLAY is not set.";
+        assert_eq!(reason(with_place), "DISPLAY is not set");
+        assert_eq!(reason("no adapter was found"), "no adapter was found");
     }
 
     #[test]

@@ -211,7 +211,112 @@ fn short(value: f32) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+    use std::time::{Duration, Instant};
+
+    use egui_kittest::Harness;
+    use egui_kittest::kittest::{NodeT as _, Queryable as _};
+    use mortise_protocol::parameter::ParameterId;
+
     use super::*;
+
+    /// A session with a simulated rig, so that parameters can be changed.
+    fn connected() -> Session {
+        let mut session = Session::new(Arc::new(|| {}));
+        session.act(Intent::Connect);
+        let begun = Instant::now();
+        while session.connection().is_none() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "no simulated rig");
+            std::thread::sleep(Duration::from_millis(5));
+            session.poll();
+        }
+        session
+    }
+
+    /// All texts of the window for a parameter with this row, its tooltip's included.
+    fn texts(session: &Session, row: &Parameter) -> Vec<String> {
+        let mut harness = Harness::builder()
+            .with_size(Vec2::new(500.0, 400.0))
+            .build_ui(|ui| {
+                ui.style_mut().interaction.tooltip_delay = 0.0;
+                one(ui, session, &mut Vec::new(), row);
+            });
+        harness
+            .get_all_by_label(&words(row.name))
+            .next()
+            .expect("its name")
+            .hover();
+        harness.run_steps(4);
+        let root = harness.root();
+        let nodes = root.children_recursive().map(|node| {
+            let node = node.accesskit_node();
+            [node.label(), node.value()]
+        });
+        nodes.flatten().flatten().collect()
+    }
+
+    /// What [`texts`] must have for a row.
+    fn expected(row: &Parameter) -> Vec<String> {
+        let range = format!(
+            "{}\n{} to {} {}, at start {}",
+            row.description.trim(),
+            short(row.min),
+            short(row.max),
+            row.unit,
+            short(row.default)
+        );
+        vec![words(row.name), range]
+    }
+
+    #[test]
+    fn the_window_says_of_a_parameter_what_its_row_says() {
+        let session = connected();
+        let known = ParameterId::ForceLimit.row();
+        let changed = [
+            Parameter {
+                name: "ForceBound",
+                ..*known
+            },
+            Parameter {
+                description: " Another meaning.",
+                ..*known
+            },
+            Parameter {
+                unit: "lbf",
+                ..*known
+            },
+            Parameter { min: 3.0, ..*known },
+            Parameter { max: 77.0, ..*known },
+            Parameter {
+                default: 4.0,
+                ..*known
+            },
+        ];
+        let quantities = PARAMETERS.iter().filter(|row| row.choices.is_empty());
+        for row in quantities.chain(&changed) {
+            let found = texts(&session, row);
+            for text in expected(row) {
+                assert!(found.contains(&text), "{text:?} is not in {found:?}");
+            }
+        }
+        // Each change is seen: the window has none of the unchanged row's texts that differ.
+        for row in &changed {
+            assert_ne!(expected(row), expected(known));
+        }
+    }
+
+    #[test]
+    fn a_choice_is_shown_by_its_name() {
+        let session = connected();
+        for row in PARAMETERS.iter().filter(|row| !row.choices.is_empty()) {
+            let found = texts(&session, row);
+            let chosen = label(row.choice(row.default).expect("a choice"));
+            assert!(
+                found.iter().any(|text| text == chosen),
+                "{chosen} is not in {found:?}"
+            );
+        }
+    }
 
     #[test]
     fn names_read_as_words() {

@@ -9,44 +9,12 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::dcamera::rh::proj::directx::perspective;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
+use crate::display::extent::Extent;
+
 /// Vertical angle of view, rad: narrow enough that round parts look round at the rim of the picture.
 pub const FIELD_OF_VIEW: f64 = 0.55;
 /// Smallest and largest distance of the camera, in radii of the scene.
 const REACH: (f64, f64) = (1e-3, 40.0);
-
-/// A bounding sphere of everything visible.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
-    /// Centre, mm.
-    pub center: DVec3,
-    /// Radius, mm, above 0.
-    pub radius: f64,
-}
-
-impl Default for Extent {
-    fn default() -> Self {
-        Self {
-            center: DVec3::ZERO,
-            radius: 50.0,
-        }
-    }
-}
-
-impl Extent {
-    /// Smallest sphere about `points` from the centre of their axis-parallel box; the default when there are none.
-    pub fn of_points(points: impl Iterator<Item = DVec3> + Clone) -> Self {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in points.clone() {
-            (low, high) = (low.min(p), high.max(p));
-        }
-        let center = 0.5 * (low + high);
-        if !center.is_finite() {
-            return Self::default();
-        }
-        let radius = points.map(|p| p.distance(center)).fold(1e-3, f64::max);
-        Self { center, radius }
-    }
-}
 
 /// A named viewing direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -319,10 +287,5 @@ mod tests {
         camera.look(View::Top);
         assert!((camera.right() - DVec3::X).length() < 1e-12);
         assert!((camera.up() - DVec3::Y).length() < 1e-12);
-    }
-
-    #[test]
-    fn no_points_have_the_default_extent() {
-        assert_eq!(Extent::of_points(std::iter::empty()), Extent::default());
     }
 }

@@ -5,9 +5,10 @@ use mortise_guide::Standing;
 use mortise_protocol::image::NO_FACE;
 use mortise_protocol::message::Telemetry;
 
-use super::camera::{Camera, Extent};
-use super::mesh::meeting;
+use super::camera::Camera;
 use super::picture::{Arrow, Ground, Item, MAX_LIT, MAX_LIT_EDGES, Picture};
+use crate::display::extent::Extent;
+use crate::display::mesh::meeting;
 use crate::session::Session;
 use crate::session::document::Document;
 use crate::session::pose::point_from_wire;

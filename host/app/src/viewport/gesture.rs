@@ -3,8 +3,9 @@
 use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Response, Ui};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
-use super::camera::{Camera, Extent, View};
+use super::camera::{Camera, View};
 use super::pick::{Pick, pick};
+use crate::display::extent::Extent;
 use crate::session::document::Document;
 use crate::session::insertion::hold;
 use crate::session::pose::moved;

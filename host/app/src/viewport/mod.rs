@@ -1,9 +1,8 @@
-//! The 3D view. Camera, picking and meshes are pure; one file draws with wgpu, another connects the view to the window.
+//! The 3D view. Camera and picking are pure; one file draws with wgpu, another connects the view to the window.
 
 pub mod camera;
 pub mod compose;
 pub mod gesture;
-pub mod mesh;
 pub mod pick;
 pub mod picture;
 mod pipelines;

@@ -5,7 +5,7 @@
 use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Mesh};
 
-use super::camera::Extent;
+use crate::display::extent::Extent;
 
 /// The nearest point of a part's surface on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,8 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::camera::{Camera, Extent};
+use super::camera::Camera;
+use crate::display::extent::Extent;
 
 /// Largest number of highlighted faces of one part; the wire carries fewer pairs of one part that are worth distinguishing.
 pub const MAX_LIT: usize = 8;

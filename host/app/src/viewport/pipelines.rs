@@ -4,7 +4,7 @@ use std::num::NonZeroU64;
 
 use eframe::wgpu;
 
-use super::mesh::{Segment, Vertex};
+use crate::display::mesh::{Segment, Vertex};
 
 /// Texture format that the window displays: sRGB values, stored unconverted.
 pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

@@ -8,10 +8,10 @@ use eframe::wgpu;
 use glam::{DAffine3, DMat4, DVec3};
 use wgpu::util::DeviceExt as _;
 
-use super::mesh::ShapeMesh;
 use super::picture::{Item, MAX_LIT, MAX_LIT_EDGES, Picture, arrow_poses};
 use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
 use super::solids;
+use crate::display::mesh::ShapeMesh;
 
 /// Bytes reserved for one item's values; a multiple of every device's alignment for uniform buffers.
 const DRAW_STRIDE: u64 = 512;

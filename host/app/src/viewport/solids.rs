@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use super::mesh::{ShapeMesh, Vertex};
+use crate::display::mesh::{ShapeMesh, Vertex};
 
 const SIDES: u32 = 24;
 

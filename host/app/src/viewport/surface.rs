@@ -6,9 +6,9 @@ use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use egui::TextureId;
 
-use super::mesh::ShapeMesh;
 use super::picture::Picture;
 use super::renderer::Renderer;
+use crate::display::mesh::ShapeMesh;
 
 /// Draws pictures into a texture that the window displays; an unchanged picture is not drawn again.
 pub struct Surface {

@@ -13,9 +13,6 @@ use super::finding::Finding;
 use super::tree;
 use crate::modules::{Crate, MAX_HOPS, Name, collect, resolve};
 
-/// Folders of crates that have circles still, and are not checked until these are taken out. The list only shrinks.
-const NOT_YET: &[&str] = &["host/app"];
-
 /// Circles in every crate whose root is among `files`.
 ///
 /// # Errors
@@ -23,9 +20,6 @@ const NOT_YET: &[&str] = &["host/app"];
 pub fn check(root: &Path, files: &[PathBuf]) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
     for file in files.iter().filter(|file| is_root(file)) {
-        if NOT_YET.iter().any(|folder| file.starts_with(folder)) {
-            continue;
-        }
         let read = |file: &Path| -> Result<Option<String>> {
             let known = files.binary_search(&file.to_path_buf()).is_ok();
             known.then(|| tree::read(root, file)).transpose()

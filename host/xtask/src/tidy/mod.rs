@@ -7,6 +7,7 @@ mod finding;
 mod functions;
 mod layers;
 mod sources;
+mod subjects;
 mod tree;
 mod unsafety;
 mod words;
@@ -39,7 +40,8 @@ pub fn command() -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, import circles, what figures were made from.
+/// Checks that need no program: paths in docs, length and words of sources, reasons for `unsafe`, layers, import circles, subjects of commits, what
+/// figures were made from.
 ///
 /// # Errors
 /// When a file cannot be read, or cargo cannot describe the workspace.
@@ -55,6 +57,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
     findings.extend(layers::check(root, &files)?);
     findings.extend(circles::check(root, &files)?);
     findings.extend(functions::check(root, &files)?);
+    findings.extend(subjects::check(root)?);
     let stale = figures::artefacts::complaints(root)?;
     findings.extend(
         stale

@@ -1,0 +1,48 @@
+//! What the window calls: an intent is executed, messages are taken in, and the actions that follow from either.
+
+use mortise_protocol::message::DeviceState;
+
+use super::advance::advance;
+use super::intent::{Intent, obstacle};
+use super::notes::Severity;
+use super::state::Session;
+use super::update::take;
+
+impl Session {
+    /// Executes an intent, or reports why it is not possible.
+    pub fn act(&mut self, intent: Intent) {
+        if let Some(reason) = obstacle(self, &intent) {
+            self.notes.add(Severity::Warning, reason);
+            return;
+        }
+        if !intent.is_passive() {
+            self.tour = None;
+        }
+        self.perform(intent);
+        self.follow();
+    }
+
+    /// Takes in the messages of other threads. Call it before each frame.
+    pub fn poll(&mut self) {
+        while let Ok(update) = self.inbox.try_recv() {
+            if let Some(intent) = take(self, update) {
+                self.act(intent);
+            }
+        }
+        self.follow();
+    }
+
+    /// Actions that follow from the state: upload once document and board are present; next step of a demonstration.
+    fn follow(&mut self) {
+        let ready = (self.document.as_ref()).is_some_and(|d| d.baked.is_some());
+        if ready
+            && !self.scene_is_on_board()
+            && !self.scene_was_refused()
+            && self.device() == Some(DeviceState::Idle)
+            && obstacle(self, &Intent::Upload).is_none()
+        {
+            self.upload();
+        }
+        advance(self);
+    }
+}

@@ -1,0 +1,151 @@
+//! The window's queue: what other threads report to the session.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+
+use mortise_bake::Baked;
+use mortise_guide::List;
+use mortise_protocol::message::{Statistics, ToDevice};
+use mortise_protocol::parameter::ParameterId;
+use mortise_rig::{Client, Event, RigEntry, UploadProgress};
+
+use super::document::Document;
+use super::tap::Tap;
+
+/// Capacity of the window's queue; a sender blocks when it is full.
+const MAX_WAITING: usize = 1024;
+
+/// A report of another thread.
+pub enum Update {
+    /// Reading a file ended.
+    Imported {
+        /// Id of the file.
+        generation: u64,
+        /// The document, or one line with the reason of the failure.
+        result: Result<Box<Document>, String>,
+    },
+    /// Progress of reading or baking.
+    Working {
+        /// Id of the file or document.
+        generation: u64,
+        /// Description of the current stage, where the job has several.
+        doing: Option<String>,
+        /// Progress of the whole job, 0 to 1.
+        fraction: f32,
+    },
+    /// A bake ended.
+    Baked {
+        /// Id of the document.
+        generation: u64,
+        /// The collision model, or one line with the reason of the failure.
+        result: Result<CollisionModel, String>,
+    },
+    /// The available rigs.
+    Rigs(Vec<RigEntry>),
+    /// A report of the link.
+    Link {
+        /// Id of the connection.
+        id: u64,
+        /// The report.
+        update: LinkUpdate,
+    },
+    /// Targets that guidance recognised.
+    Guidance {
+        /// Id of the connection.
+        link: u64,
+        /// The targets.
+        list: List,
+    },
+    /// A file was chosen in a dialog.
+    Chosen(PathBuf),
+    /// No file dialog is available: the window must ask for a path.
+    NoDialog,
+}
+
+/// A baked model.
+pub struct CollisionModel {
+    /// The image and its report.
+    pub baked: Arc<Baked>,
+    /// What a plan reached and what limits it, in one line.
+    pub reached: Option<String>,
+}
+
+/// A report of the link.
+pub enum LinkUpdate {
+    /// Connected.
+    Connected {
+        /// Sends messages.
+        client: Arc<Client>,
+        /// The board's parameters.
+        parameters: Vec<(ParameterId, f32)>,
+        /// Input of the guidance thread for samples.
+        tap: Tap,
+    },
+    /// The connection failed, and why.
+    Failed(String),
+    /// An unsolicited event of the board.
+    Event(Event),
+    /// A request was executed or refused.
+    Answered {
+        /// The request.
+        message: Box<ToDevice>,
+        /// One line with the reason of a refusal.
+        result: Result<(), String>,
+    },
+    /// No answer because the link is lost, which [`Event::LinkLost`] reports once; or the answer to a query of the window itself that
+    /// nothing waits for.
+    Unanswered,
+    /// Progress of an upload.
+    Uploading(UploadProgress),
+    /// An upload ended.
+    Uploaded {
+        /// The scene's document.
+        generation: u64,
+        /// `false`: the operator cancelled it. An error is one line with the reason.
+        result: Result<bool, String>,
+    },
+    /// The counters.
+    Statistics(Statistics),
+}
+
+/// Sending end of the window's queue. Wakes the window after each message.
+#[derive(Clone)]
+pub struct Outbox {
+    sender: SyncSender<Update>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl Outbox {
+    /// Both ends of a new queue.
+    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> (Self, Receiver<Update>) {
+        let (sender, receiver) = sync_channel(MAX_WAITING);
+        (Self { sender, wake }, receiver)
+    }
+
+    /// Sends a message; `false` when the receiver is gone.
+    pub fn send(&self, update: Update) -> bool {
+        let sent = self.sender.send(update).is_ok();
+        (self.wake)();
+        sent
+    }
+
+    /// Sends a message without waking the window, which takes it in at its next wake-up. `false` when the receiver is gone.
+    pub fn send_quietly(&self, update: Update) -> bool {
+        match self.sender.try_send(update) {
+            Ok(()) => true,
+            // If the queue is full, the window is woken and waited for.
+            Err(TrySendError::Full(update)) => self.send(update),
+            Err(TrySendError::Disconnected(_)) => false,
+        }
+    }
+
+    /// Sends a message unless the queue is full; returns whether it did.
+    pub fn offer(&self, update: Update) -> bool {
+        let sent = self.sender.try_send(update).is_ok();
+        if sent {
+            (self.wake)();
+        }
+        sent
+    }
+}

@@ -1,0 +1,310 @@
+//! What each intent does.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use mortise_bake::{BakeOptions, Method, Request};
+use mortise_guide::List;
+use mortise_protocol::message::{DeviceState, HandScript, ToDevice};
+use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_rig::{EmulatedMode, RigSpec};
+
+use super::intent::Intent;
+use super::link::{self, Link};
+use super::notes::Severity;
+use super::state::{GUIDE_CAP_N, Job, Session};
+use super::tap::GuidanceCommand;
+use super::threads::Cancel;
+use super::tour::Tour;
+use super::verdict::Verdict;
+use super::work::{self, Wanted};
+
+impl Session {
+    /// Does what `intent` says, which must be possible.
+    pub(super) fn perform(&mut self, intent: Intent) {
+        match intent {
+            Intent::Browse => work::choose_file(&self.outbox, self.folder()),
+            Intent::Open(path) => self.open(Some(path)),
+            Intent::OpenSample => self.open(None),
+            Intent::Bake => self.bake(),
+            Intent::ChooseMethod(method) => {
+                let changed = std::mem::replace(&mut self.method, method) != method;
+                if changed {
+                    self.bake();
+                }
+            }
+            Intent::CancelWork => {
+                if let Some(job) = self.job.take() {
+                    job.cancel.set();
+                    self.notes.add(Severity::Info, "Cancelled");
+                }
+            }
+            Intent::RefreshRigs => work::list_rigs(&self.outbox),
+            Intent::ChooseRig(spec) => self.chosen = spec,
+            Intent::Connect => self.connect(),
+            Intent::Reconnect => {
+                if let Some(lost) = &self.lost {
+                    self.chosen = lost.spec.clone();
+                    self.connect();
+                }
+            }
+            Intent::Disconnect => self.disconnect(),
+            Intent::Upload => self.upload(),
+            Intent::CancelUpload => {
+                if let Some(connection) = self.connection() {
+                    connection.cancel_upload();
+                }
+            }
+            Intent::Arm => self.request(ToDevice::Arm),
+            Intent::Disarm => self.request(ToDevice::Disarm),
+            Intent::Stop => self.stop(),
+            Intent::ClearFault => self.request(ToDevice::ClearFault),
+            Intent::Home => self.request(ToDevice::Home),
+            Intent::Select(part) => self.selected = part,
+            Intent::Grab(part) => self.grab(part),
+            Intent::Release => self.request(ToDevice::Release),
+            Intent::ResetScene => self.request(ToDevice::ResetScene),
+            Intent::SetParameter(id, value) => self.set_parameter(id, value),
+            Intent::ResetParameters => {
+                for row in PARAMETERS {
+                    if self.parameters[row.id as usize] != row.default {
+                        self.set_parameter(row.id, row.default);
+                    }
+                }
+            }
+            Intent::PinTarget(id, pinned) => self.command_guidance(GuidanceCommand::Pin(id, pinned)),
+            Intent::SwitchTargetOff(id, off) => self.command_guidance(GuidanceCommand::SwitchOff(id, off)),
+            Intent::GuideWhen(when) => {
+                self.guide.when = when;
+                self.command_guidance(GuidanceCommand::Set(self.guide));
+            }
+            Intent::GuideCap(newton) => {
+                if newton.is_finite() {
+                    self.guide.force_cap_n = newton.clamp(*GUIDE_CAP_N.start(), *GUIDE_CAP_N.end());
+                    self.command_guidance(GuidanceCommand::Set(self.guide));
+                }
+            }
+            Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
+            Intent::Demo(rig) => self.demo(rig),
+        }
+    }
+
+    fn open(&mut self, path: Option<PathBuf>) {
+        self.generation += 1;
+        let name = path
+            .as_ref()
+            .and_then(|p| p.file_name())
+            .map_or_else(|| "the sample".to_owned(), |n| n.to_string_lossy().into_owned());
+        let limit = Duration::from_secs(mortise_brep::LoadOptions::default().time_limit_s);
+        let cancel = self.start_job(format!("Reading {name}"), self.generation, Some(limit));
+        work::import(&self.outbox, path, self.generation, cancel);
+    }
+
+    pub(super) fn bake(&mut self) {
+        let Some(document) = &mut self.document else {
+            return;
+        };
+        document.baked = None;
+        let (model, generation) = (Arc::clone(&document.model), document.generation);
+        let mut slot = mortise_bake::SLOT_BYTES;
+        if let Some(connection) = self.connection_mut() {
+            slot = u64::from(connection.capabilities.scene_capacity);
+            connection.scene_of = None;
+            connection.refused_scene_of = None;
+        }
+        let cancel = self.start_job("Baking the collision model".to_owned(), generation, None);
+        let wanted = match self.method {
+            Method::DistanceField => Wanted::Planned(Request {
+                flash_bytes: slot,
+                ..Request::default()
+            }),
+            method => Wanted::Described(BakeOptions {
+                method,
+                image_limit_bytes: slot,
+                ..BakeOptions::default()
+            }),
+        };
+        work::bake(
+            &self.outbox,
+            model,
+            generation,
+            wanted,
+            self.cache.clone(),
+            cancel,
+        );
+    }
+
+    fn start_job(&mut self, doing: String, generation: u64, limit: Option<Duration>) -> Cancel {
+        if let Some(job) = self.job.take() {
+            job.cancel.set();
+        }
+        let cancel = Cancel::default();
+        self.job = Some(Job {
+            doing,
+            fraction: None,
+            since: Instant::now(),
+            limit,
+            generation,
+            cancel: cancel.clone(),
+        });
+        cancel
+    }
+
+    fn connect(&mut self) {
+        self.link_id += 1;
+        self.link = link::connect(&self.outbox, self.link_id, self.chosen.clone());
+    }
+
+    fn disconnect(&mut self) {
+        let link = std::mem::replace(&mut self.link, Link::None);
+        let name = match &link {
+            Link::Connected(connection) => Some(connection.capabilities.board.to_string()),
+            _ => None,
+        };
+        link.close(false);
+        self.clear_board();
+        if let Some(name) = name {
+            self.notes
+                .add(Severity::Info, format!("Disconnected from {name}"));
+        }
+    }
+
+    /// Clears the state that only a connection provides; parts stay at their last known poses.
+    pub(super) fn clear_board(&mut self) {
+        self.telemetry = None;
+        self.let_go();
+        self.history.clear();
+        self.guidance = List::default();
+    }
+
+    /// Clears the held part.
+    pub(super) fn let_go(&mut self) {
+        self.held = None;
+        let verdict = self.document.as_mut().and_then(|d| d.watch.let_go());
+        self.report(verdict);
+    }
+
+    /// Reports the outcome of an insertion as a message, and as a card until the next one.
+    pub(super) fn report(&mut self, verdict: Option<Verdict>) {
+        if let Some(verdict) = verdict {
+            self.notes.add(verdict.severity(), verdict.to_string());
+            self.verdict = Some(verdict);
+        }
+    }
+
+    /// Starts guidance in the scene that is now on the board.
+    pub(super) fn start_guidance(&mut self) {
+        self.guidance = List::default();
+        self.guide.sending = self.guides();
+        if let (Some(connection), Some(document)) = (self.connection(), &self.document) {
+            connection.guide(document, self.guide, &self.outbox);
+        }
+    }
+
+    pub(super) fn command_guidance(&mut self, command: GuidanceCommand) {
+        let taken = self.connection().is_none_or(|c| c.tap.command(command));
+        if !taken && self.scene_is_on_board() {
+            self.notes.add(Severity::Warning, "Guidance is busy: try again");
+        }
+    }
+
+    pub(super) fn upload(&mut self) {
+        let Some(document) = &self.document else { return };
+        let (Some(baked), generation) = (document.baked.clone(), document.generation) else {
+            return;
+        };
+        if let Some(connection) = self.connection_mut() {
+            connection.send_scene(baked, generation);
+        }
+    }
+
+    fn stop(&mut self) {
+        match self.connection() {
+            Some(connection) => {
+                connection.stop(&self.outbox);
+                self.notes.add(Severity::Error, "STOP: motors off");
+            }
+            None => self
+                .notes
+                .add(Severity::Info, "STOP: no rig is connected, nothing moves"),
+        }
+    }
+
+    fn grab(&mut self, part: usize) {
+        self.selected = Some(part);
+        let Some(scene_part) = self.document.as_ref().and_then(|d| d.scene_part(part)) else {
+            return;
+        };
+        if self.device() == Some(DeviceState::Active) {
+            self.request(ToDevice::Release);
+        }
+        self.request(ToDevice::Grab { part: scene_part });
+    }
+
+    fn set_parameter(&mut self, id: ParameterId, value: f32) {
+        let row = id.row();
+        let value = if value.is_finite() {
+            value.clamp(row.min, row.max)
+        } else {
+            row.default
+        };
+        if let Some(known) = self.parameters.get_mut(id as usize) {
+            *known = value;
+        }
+        if let Some(connection) = self.connection_mut() {
+            connection.set_parameter(id, value);
+        }
+        if id == ParameterId::Guidance {
+            self.guide.sending = self.guides();
+            self.command_guidance(GuidanceCommand::Set(self.guide));
+        }
+    }
+
+    fn demo(&mut self, rig: Option<RigSpec>) {
+        let rig = rig.unwrap_or_else(|| self.demo_rig());
+        self.tour = Some(Tour::from_the_start(rig));
+        if self.document.is_none() && self.job.is_none() {
+            self.open(None);
+        }
+    }
+
+    /// The emulated board if it is available, else the in-process simulation, with a message.
+    fn demo_rig(&mut self) -> RigSpec {
+        let emulated = RigSpec::Emulated {
+            mode: EmulatedMode::Interactive,
+            firmware: None,
+        };
+        let rigs = mortise_rig::list();
+        match rigs.iter().find(|entry| entry.spec == emulated) {
+            Some(entry) if entry.available.is_ok() => emulated,
+            other => {
+                let why = other.and_then(|entry| entry.available.clone().err());
+                self.notes.add(
+                    Severity::Warning,
+                    format!(
+                        "The emulated board is not available, so the simulation in this program is used: {}",
+                        why.unwrap_or_else(|| "run `cargo xtask demo`".to_owned())
+                    ),
+                );
+                RigSpec::Simulated { realtime: true }
+            }
+        }
+    }
+
+    fn request(&self, message: ToDevice) {
+        if let Some(connection) = self.connection() {
+            connection.request(message);
+        }
+    }
+
+    /// Moves the simulated hand; no effect on a rig with a real one.
+    pub fn move_hand(&mut self, script: HandScript) {
+        self.tour = None;
+        if let Some(connection) = self.connection_mut()
+            && connection.capabilities.simulated
+        {
+            connection.set_hand(script);
+        }
+    }
+}

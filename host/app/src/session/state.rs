@@ -1,0 +1,239 @@
+//! The window's state, and what follows from it without a change.
+
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use glam::DAffine3;
+use mortise_bake::Method;
+use mortise_guide::{GuideSettings, List};
+use mortise_protocol::message::{DeviceState, Telemetry};
+use mortise_protocol::parameter::{PARAMETERS, ParameterId};
+use mortise_rig::{RigEntry, RigSpec};
+
+use super::document::Document;
+use super::history::History;
+use super::link::{Connection, Link};
+use super::notes::Notes;
+use super::outbox::{Outbox, Update};
+use super::threads::Cancel;
+use super::tour::Tour;
+use super::verdict::Verdict;
+use super::{pose, work};
+use crate::folder_cache::FolderCache;
+
+/// Range of the guidance force limit, N: from barely perceptible to well below the coupling's limit.
+pub const GUIDE_CAP_N: RangeInclusive<f32> = 0.2..=8.0;
+
+/// Reading or baking under way.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Description of the job.
+    pub doing: String,
+    /// Progress from 0 to 1, where known.
+    pub fraction: Option<f32>,
+    /// Start of the job.
+    pub since: Instant,
+    /// Longest time that it may take, where it is limited.
+    pub limit: Option<Duration>,
+    pub(super) generation: u64,
+    pub(super) cancel: Cancel,
+}
+
+/// A link that was lost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lost {
+    /// The rig.
+    pub spec: RigSpec,
+    /// The reason, as a sentence.
+    pub why: String,
+}
+
+/// Everything the window shows.
+pub struct Session {
+    /// The open document.
+    pub document: Option<Document>,
+    /// Reading or baking under way.
+    pub job: Option<Job>,
+    /// Rigs that can be chosen.
+    pub rigs: Vec<RigEntry>,
+    /// The chosen rig.
+    pub chosen: RigSpec,
+    /// The connection.
+    pub link: Link,
+    /// Set while the link is lost and not yet replaced.
+    pub lost: Option<Lost>,
+    /// Outcome of the last insertion, until the next one.
+    pub verdict: Option<Verdict>,
+    /// Selected part.
+    pub selected: Option<usize>,
+    /// The last sample of the loop.
+    pub telemetry: Option<Box<Telemetry>>,
+    /// The samples of the last seconds.
+    pub history: History,
+    /// The board's parameters, in the order of [`PARAMETERS`].
+    pub parameters: Vec<f32>,
+    /// How targets are found and sent.
+    pub guide: GuideSettings,
+    /// Candidate and active targets.
+    pub guidance: List,
+    /// Messages.
+    pub notes: Notes,
+    /// Contact method of the next bake.
+    pub method: Method,
+    /// Set when this desktop offers no file dialog: the window asks for a path instead.
+    pub wants_path: bool,
+    /// Where results of bakes are kept.
+    pub(super) cache: Option<Arc<FolderCache>>,
+    pub(super) tour: Option<Tour>,
+    /// Held part, and its pose in the handle's frame when it was grabbed.
+    pub(super) held: Option<(usize, DAffine3)>,
+    pub(super) outbox: Outbox,
+    pub(super) inbox: Receiver<Update>,
+    pub(super) generation: u64,
+    pub(super) link_id: u64,
+    pub(super) samples_since_statistics: u32,
+}
+
+impl Session {
+    /// A session without document or connection. `wake` is called from other threads whenever [`Self::poll`] has messages to take in.
+    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+        let (outbox, inbox) = Outbox::new(wake);
+        work::list_rigs(&outbox);
+        Self {
+            document: None,
+            job: None,
+            rigs: Vec::new(),
+            chosen: RigSpec::Simulated { realtime: true },
+            link: Link::None,
+            lost: None,
+            verdict: None,
+            selected: None,
+            telemetry: None,
+            history: History::default(),
+            parameters: PARAMETERS.iter().map(|row| row.default).collect(),
+            guide: GuideSettings::default(),
+            guidance: List::default(),
+            notes: Notes::default(),
+            method: Method::default(),
+            wants_path: false,
+            cache: None,
+            tour: None,
+            held: None,
+            outbox,
+            inbox,
+            generation: 0,
+            link_id: 0,
+            samples_since_statistics: 0,
+        }
+    }
+
+    /// The session with a store for results of bakes.
+    pub fn with_cache(mut self, cache: Option<FolderCache>) -> Self {
+        self.cache = cache.map(Arc::new);
+        self
+    }
+
+    /// The connection, once established.
+    pub fn connection(&self) -> Option<&Connection> {
+        match &self.link {
+            Link::Connected(connection) => Some(connection),
+            _ => None,
+        }
+    }
+
+    pub(super) fn connection_mut(&mut self) -> Option<&mut Connection> {
+        match &mut self.link {
+            Link::Connected(connection) => Some(connection),
+            _ => None,
+        }
+    }
+
+    /// The board's state, once connected.
+    pub fn device(&self) -> Option<DeviceState> {
+        self.connection().map(|c| c.state)
+    }
+
+    /// Whether the motors may exert force.
+    pub fn is_armed(&self) -> bool {
+        matches!(
+            self.device(),
+            Some(DeviceState::Armed | DeviceState::Active | DeviceState::SoftStop)
+        )
+    }
+
+    /// Whether reading or baking is under way.
+    pub fn is_busy(&self) -> bool {
+        self.job.is_some()
+    }
+
+    /// Whether a demonstration is under way.
+    pub fn is_touring(&self) -> bool {
+        self.tour.is_some()
+    }
+
+    /// Whether the open document's scene is the one on the board.
+    pub fn scene_is_on_board(&self) -> bool {
+        match (&self.document, self.connection()) {
+            (Some(document), Some(connection)) => {
+                document.baked.is_some() && connection.scene_of == Some(document.generation)
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether the board guides, by either method.
+    pub fn guides(&self) -> bool {
+        self.parameters[ParameterId::Guidance as usize] >= 0.5
+    }
+
+    /// Whether the board refused the scene: it is uploaded again only on the operator's request.
+    pub(super) fn scene_was_refused(&self) -> bool {
+        match (&self.document, self.connection()) {
+            (Some(document), Some(connection)) => connection.refused_scene_of == Some(document.generation),
+            _ => false,
+        }
+    }
+
+    /// Index of the held part.
+    pub fn grabbed(&self) -> Option<usize> {
+        if self.device() != Some(DeviceState::Active) {
+            return None;
+        }
+        let (part, _) = self.telemetry.as_ref()?.object.as_ref()?;
+        self.document.as_ref()?.model_part(*part)
+    }
+
+    /// Held part and the pose that the handle commands, mm: it differs from the part's own pose by the coupling's deflection under contact.
+    pub fn ghost(&self) -> Option<(usize, DAffine3)> {
+        let part = self.grabbed()?;
+        let (held, offset) = self.held.as_ref()?;
+        let handle = pose::from_wire(&self.telemetry.as_ref()?.handle);
+        (*held == part).then(|| (part, handle * *offset))
+    }
+
+    /// Pose of the handle, mm.
+    pub fn handle(&self) -> Option<DAffine3> {
+        self.telemetry.as_ref().map(|t| pose::from_wire(&t.handle))
+    }
+
+    /// Folder of the open file.
+    pub(super) fn folder(&self) -> Option<PathBuf> {
+        let path = self.document.as_ref()?.path.as_ref()?;
+        path.parent().map(PathBuf::from)
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        if let Some(job) = &self.job {
+            job.cancel.set();
+        }
+        // Closes the queue: threads blocked on it must not delay the end.
+        self.inbox = std::sync::mpsc::sync_channel(1).1;
+        // Motors off and emulator ended before the program ends.
+        std::mem::replace(&mut self.link, Link::None).close(true);
+    }
+}
