@@ -37,6 +37,7 @@ const VERBS: &[&str] = &[
     "Call",
     "Carry",
     "Change",
+    "Chart",
     "Check",
     "Choose",
     "Claim",
