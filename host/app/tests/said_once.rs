@@ -1,5 +1,5 @@
-//! Flags and constraint kinds have one table each in `protocol`: the window's text and `docs/protocol.md` follow it. Parameters: unit tests of
-//! `src/ui/parameters.rs`, and `protocol/tests/document.rs`.
+//! Flags and constraint kinds have one table each in `protocol`: the window's text and `docs/protocol.md` follow it. Parameters in the
+//! window: unit tests of `src/ui/parameters.rs`.
 
 mod common;
 
@@ -9,6 +9,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use mortise::ui::Window;
 use mortise_protocol::message::{ConstraintKind, Flags};
+use mortise_protocol::parameter::PARAMETERS;
 
 /// Frames until a changed state is seen: the board's next sample may replace it before a frame shows it.
 const FRAMES: usize = 200;
@@ -104,10 +105,31 @@ fn the_window_names_each_constraint_kind_by_its_row() {
     click(&mut harness, "STOP");
 }
 
+fn page() -> String {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/protocol.md");
+    std::fs::read_to_string(path).expect("the page is there")
+}
+
+/// The page's range and default are compared in `protocol/tests/document.rs`.
+#[test]
+fn the_page_has_the_meaning_of_every_parameter() {
+    let page = page();
+    for row in PARAMETERS {
+        let name = format!("| `{}` |", row.name);
+        let line = page.lines().find(|line| line.starts_with(&name)).expect(row.name);
+        let rounded = if row.choices.is_empty() {
+            ""
+        } else {
+            "; values are rounded to the nearest"
+        };
+        let ends = format!("| {}{rounded} |", row.description.trim().trim_end_matches('.'));
+        assert!(line.ends_with(&ends), "{line} does not end with {ends}");
+    }
+}
+
 #[test]
 fn the_page_has_every_constraint_kind() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/protocol.md");
-    let page = std::fs::read_to_string(path).expect("the page is there");
+    let page = page();
     let (_, section) = page.split_once("\n## Constraint kinds\n").expect("the section");
     let section = section.split("\n## ").next().unwrap_or_default();
     let rows: Vec<&str> = section
