@@ -1,15 +1,16 @@
 //! An assembly prepared for questions about contact, freedom and removal.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DVec3};
 use mortise_brep::CadModel;
 use mortise_mating::{Contact, MergedSurface, Tolerances, identify, merge};
 
 use crate::body::Body;
-use crate::clearance::{Gap, Limits, Placed, free_share, gap, gap_until, least_over, refined};
+use crate::clearance::{Gap, Limits, Placed, each_near, free_share, gap, gap_until, least_over, refined};
 use crate::error::TaskError;
 use crate::motion::Motion;
+use crate::skeleton::{Skeleton, skeleton};
 
 /// Overlap accepted beyond the one that the file's placements already have, mm: twice the default distance of a contact
 /// ([`Tolerances::linear_mm`]), so that resting faces slide.
@@ -24,6 +25,8 @@ pub struct Assembly {
     /// Contacts of the parts as placed in the file.
     pub contacts: Vec<Contact>,
     bodies: Vec<Option<Arc<Body>>>,
+    /// Of each shape its inside as a graph, made when first needed.
+    skeletons: Vec<OnceLock<Skeleton>>,
     merged: Vec<Vec<MergedSurface>>,
     /// Overlap of each pair as placed, mm: allowed of it on every path.
     pressed_mm: Vec<f64>,
@@ -83,6 +86,7 @@ impl Assembly {
         let mut assembly = Self {
             model,
             contacts,
+            skeletons: bodies.iter().map(|_| OnceLock::new()).collect(),
             bodies,
             merged,
             pressed_mm: vec![0.0; count * count],
@@ -147,6 +151,11 @@ impl Assembly {
         self.bodies[shape]
             .as_deref()
             .unwrap_or_else(|| unreachable!("checked when the assembly was made"))
+    }
+
+    /// The inside of a part's shape as a graph, in its frame.
+    pub(crate) fn skeleton(&self, part: usize) -> &Skeleton {
+        self.skeletons[self.model.parts[part].shape].get_or_init(|| skeleton(self.body(part)))
     }
 
     /// Merged surfaces of a part's shape, in its frame: the indices of [`Contact::surfaces`].
@@ -297,6 +306,20 @@ impl Assembly {
         found
     }
 
+    /// Some samples of a moved group and `others` within `within` mm beyond what is allowed of the pair; their distances count from there.
+    pub(crate) fn near(&self, group: &Moved<'_>, others: &[usize], within: f64, found: &mut Vec<Gap>) {
+        for (a, b) in self.pairs(group, others, within) {
+            let allowed = self.allowed_mm(a, b);
+            let (pa, pb) = (self.placed(a, group.by), self.placed(b, DAffine3::IDENTITY));
+            each_near(pa, pb, within - allowed, true, &mut |gap| {
+                found.push(Gap {
+                    distance_mm: gap.distance_mm + allowed,
+                    ..gap
+                });
+            });
+        }
+    }
+
     /// Pairs of a moved group and `others` whose boxes are within `within`.
     fn pairs<'a>(
         &'a self,
@@ -322,14 +345,28 @@ impl Assembly {
         motion: &Motion,
         step_mm: f64,
     ) -> (f64, Option<[usize; 2]>) {
+        self.free_share_beyond(group, others, motion, step_mm, 0.0, false)
+    }
+
+    /// As [`Self::free_share`], up to where the distance falls below `margin` mm beyond what is allowed; `coarse`: by few samples.
+    pub(crate) fn free_share_beyond(
+        &self,
+        group: &Moved<'_>,
+        others: &[usize],
+        motion: &Motion,
+        step_mm: f64,
+        margin: f64,
+        coarse: bool,
+    ) -> (f64, Option<[usize; 2]>) {
         let mut motion = *motion;
         let mut share = 1.0;
         let mut pair = None;
         for &a in group.parts {
             for &b in others {
                 let limits = Limits {
-                    allow_mm: self.allowed_mm(a, b),
+                    allow_mm: self.allowed_mm(a, b) - margin,
                     step_mm,
+                    coarse,
                 };
                 let free = free_share(
                     self.placed(a, group.by),

@@ -3,11 +3,12 @@
 //! Samples inside faces are as dense as a chord error of [`SAMPLE_ERROR_MM`] requires, samples along edges no farther apart than a share of the shape's
 //! size. Lengths are mm, in the shape's frame. Cost: sampling is proportional to area over spacing²; a tree over n samples has 2n − 1 nodes.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use glam::DVec3;
 use mortise_bake::{ExactSurface, Nearest, PointshellOptions, sample_pointshell};
 use mortise_brep::{Curve, Face, Shape, Surface};
+
+use crate::kept::Kept;
+use crate::work::work;
 
 /// Chord error between neighbouring samples inside a face, mm.
 pub const SAMPLE_ERROR_MM: f64 = 0.01;
@@ -17,10 +18,12 @@ const FACE_SPACING_MM: [f64; 2] = [0.8, 8.0];
 const EDGE_SPACING_MM: [f64; 2] = [0.25, 2.0];
 /// Share of the box's diagonal that is the spacing inside faces and along edges, between these limits.
 const SHARES: [f64; 2] = [1.0 / 40.0, 1.0 / 160.0];
-/// Most kept distances of a shape: 8 MB.
-const CELLS: f64 = 2e6;
-/// Margin of the kept distances around the shape's box, as a share of its diagonal.
-const MARGIN: f64 = 0.1;
+/// Chord error and share of the diagonal that bound the spacing of the coarse samples.
+const COARSE_MM: f64 = 0.03;
+const COARSE_SHARE: f64 = 1.0 / 40.0;
+
+/// Time of a query of the exact surface in visits of a sphere.
+const NEAREST_WORK: u64 = 20;
 
 /// Distance below which the line to the nearest point has no reliable direction, mm.
 const ON_SURFACE_MM: f64 = 1e-6;
@@ -34,6 +37,20 @@ pub struct Sample {
     pub normal: Option<DVec3>,
     /// Face it lies on (one of them on an edge).
     pub face: u32,
+    spacing: Spacing,
+}
+
+/// How dense samples of a kind must be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Spacing {
+    /// As the face.
+    Inside,
+    /// On a straight edge.
+    Line,
+    /// On an edge of this radius, mm.
+    Arc(f64),
+    /// All are kept.
+    All,
 }
 
 /// A sphere that contains a consecutive range of samples.
@@ -59,47 +76,11 @@ pub struct Body {
     samples: Vec<Sample>,
     /// Tree over the samples that can be the first to meet another part.
     nodes: Vec<Node>,
+    /// Tree over some of these: as dense as a chord error of [`COARSE_MM`] requires.
+    coarse: Vec<Node>,
     low: DVec3,
     high: DVec3,
     kept: Kept,
-}
-
-/// Distances at the middles of cells, evaluated when first needed.
-struct Kept {
-    origin: DVec3,
-    cell_mm: f64,
-    counts: [usize; 3],
-    /// Bits of an `f32`; NaN: not known yet.
-    values: Vec<AtomicU32>,
-}
-
-impl Kept {
-    fn new(low: DVec3, high: DVec3) -> Self {
-        let margin = MARGIN * low.distance(high);
-        let (origin, extent) = (low - margin, high - low + 2.0 * margin);
-        let cell_mm = (extent.element_product() / CELLS).cbrt();
-        let counts = extent.to_array().map(|e| (e / cell_mm).ceil().max(1.0) as usize);
-        let values = (0..counts.iter().product())
-            .map(|_| AtomicU32::new(f32::NAN.to_bits()))
-            .collect();
-        Self {
-            origin,
-            cell_mm,
-            counts,
-            values,
-        }
-    }
-
-    /// Index of the cell of `p` and its middle; `None` outside.
-    fn cell(&self, p: DVec3) -> Option<(usize, DVec3)> {
-        let at = ((p - self.origin) / self.cell_mm).floor();
-        let inside = |i: usize| at[i] >= 0.0 && at[i] < self.counts[i] as f64;
-        if !(inside(0) && inside(1) && inside(2)) {
-            return None;
-        }
-        let index = (at.z as usize * self.counts[1] + at.y as usize) * self.counts[0] + at.x as usize;
-        Some((index, self.origin + (at + 0.5) * self.cell_mm))
-    }
 }
 
 impl Body {
@@ -130,11 +111,17 @@ impl Body {
         if !order.is_empty() {
             split(&samples, &mut order, &mut nodes);
         }
+        let mut coarse = Vec::new();
+        let mut order = thin(&surface, &samples, order, size);
+        if !order.is_empty() {
+            split(&samples, &mut order, &mut coarse);
+        }
         let chord = surface.chord_error_mm();
         Some(Self {
+            coarse,
             low: low - chord,
             high: high + chord,
-            kept: Kept::new(low, high),
+            kept: Kept::new(&surface, low, high),
             surface,
             samples,
             nodes,
@@ -156,8 +143,9 @@ impl Body {
         (self.low, self.high)
     }
 
-    pub(crate) fn nodes(&self) -> &[Node] {
-        &self.nodes
+    /// Tree over the samples; `coarse`: over few of them.
+    pub(crate) fn nodes(&self, coarse: bool) -> &[Node] {
+        if coarse { &self.coarse } else { &self.nodes }
     }
 
     /// Nearest point of the exact surface; infinitely far for a shape without triangles.
@@ -165,17 +153,53 @@ impl Body {
         self.surface.nearest(p)
     }
 
+    fn nearest_counted(&self, p: DVec3) -> Option<Nearest> {
+        work(NEAREST_WORK);
+        self.nearest(p)
+    }
+
     /// Signed distance of `p`, mm, negative inside.
     pub(crate) fn distance(&self, p: DVec3) -> f64 {
+        match self.by_face(p) {
+            Some((distance, _)) => distance,
+            None => self.nearest_counted(p).map_or(f64::INFINITY, |n| n.distance),
+        }
+    }
+
+    /// As [`Self::distance`], for points of which no others are near: keeps nothing.
+    pub(crate) fn distance_once(&self, p: DVec3) -> f64 {
         self.nearest(p).map_or(f64::INFINITY, |n| n.distance)
+    }
+
+    /// Signed distance of `p`, and the direction in which it grows as [`Self::outward`] states it.
+    pub(crate) fn distance_outward(&self, p: DVec3) -> Option<(f64, DVec3)> {
+        self.by_face(p).or_else(|| {
+            self.nearest_counted(p)
+                .map(|near| (near.distance, self.outward_at(p, &near)))
+        })
+    }
+
+    /// Signed distance and outward normal by the one face that can be nearest to `p`, where the cell of `p` has one.
+    fn by_face(&self, p: DVec3) -> Option<(f64, DVec3)> {
+        let known = self.kept.of(&self.surface, p, 2)?;
+        let face = self.surface.shape().faces.get(known.face? as usize)?;
+        let (distance, natural) = face.surface.distance(p)?;
+        Some(if face.reversed {
+            (-distance, -natural)
+        } else {
+            (distance, natural)
+        })
     }
 
     /// Direction in which the signed distance of `p` grows, unit length: from its nearest point, or the face's normal where it lies on the surface; zero
     /// where that is unknown.
     pub(crate) fn outward(&self, p: DVec3) -> DVec3 {
-        let Some(near) = self.nearest(p) else {
-            return DVec3::ZERO;
-        };
+        self.nearest(p)
+            .map_or(DVec3::ZERO, |near| self.outward_at(p, &near))
+    }
+
+    /// As [`Self::outward`], of which the nearest point is known.
+    fn outward_at(&self, p: DVec3, near: &Nearest) -> DVec3 {
         if near.distance.abs() > ON_SURFACE_MM {
             return ((p - near.point) * near.distance.signum()).normalize_or_zero();
         }
@@ -192,31 +216,30 @@ impl Body {
     /// Whether the signed distance of `p` exceeds `least`. The distance changes by no more than its point moves, so the distance at the middle of the
     /// cell of `p`, which is kept, decides most questions.
     pub(crate) fn exceeds(&self, p: DVec3, least: f64) -> bool {
+        (0..3)
+            .find_map(|level| self.by_cell(p, least, level))
+            .unwrap_or_else(|| self.distance(p) > least)
+    }
+
+    /// Whether the distances kept alone tell that the signed distance of `p` exceeds `least`.
+    pub(crate) fn surely_exceeds(&self, p: DVec3, least: f64) -> bool {
+        (0..2).any(|level| self.by_cell(p, least, level) == Some(true))
+    }
+
+    fn by_cell(&self, p: DVec3, least: f64, level: u8) -> Option<bool> {
         // Distance to the box, a lower bound outside of it.
         let off = p.clamp(self.low, self.high).distance(p);
         if off > 0.0 && off > least {
-            return true;
+            return Some(true);
         }
-        let Some((index, middle)) = self.kept.cell(p) else {
-            return self.distance(p) > least;
-        };
-        let slot = &self.kept.values[index];
-        let mut known = f32::from_bits(slot.load(Ordering::Relaxed));
-        if known.is_nan() {
-            known = self.distance(middle) as f32;
-            slot.store(known.to_bits(), Ordering::Relaxed);
-        }
+        let known = self.kept.of(&self.surface, p, level)?;
         // The value is rounded to seven digits.
-        let at_middle = f64::from(known);
-        let rounding = at_middle.abs() * 1e-6;
-        let apart = p.distance(middle) + rounding;
-        if at_middle - apart > least {
-            return true;
+        let there = f64::from(known.distance);
+        let apart = p.distance(known.at) + there.abs() * 1e-6;
+        if there - apart > least {
+            return Some(true);
         }
-        if at_middle + apart <= least {
-            return false;
-        }
-        self.distance(p) > least
+        (there + apart <= least).then_some(false)
     }
 }
 
@@ -243,18 +266,19 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
         .points
         .iter()
         .take(shell.face_points)
-        .map(|p| (p, Some(p.normal))))
+        .map(|p| (p, Some(p.normal), Spacing::Inside)))
     .chain(
         shell
             .points
             .iter()
             .skip(shell.face_points + shell.edge_points)
-            .map(|p| (p, None)),
+            .map(|p| (p, None, Spacing::All)),
     )
-    .map(|(p, normal)| Sample {
+    .map(|(p, normal, spacing)| Sample {
         position: p.position,
         normal,
         face: u32::from(p.face),
+        spacing,
     })
     .collect();
     for edge in &surface.shape().edges {
@@ -277,11 +301,64 @@ fn sample(surface: &ExactSurface, size: f64) -> Vec<Sample> {
                     position,
                     normal: None,
                     face,
+                    spacing: match edge.curve {
+                        Curve::Line { .. } => Spacing::Line,
+                        Curve::Circle { radius, .. } => Spacing::Arc(radius),
+                        Curve::Other => Spacing::All,
+                    },
                 });
             }
         }
     }
     samples
+}
+
+/// Of the samples `order` some that are as far from each other as a chord error of [`COARSE_MM`] allows; all of those at corners and on free-form faces and edges.
+fn thin(surface: &ExactSurface, samples: &[Sample], order: Vec<u32>, size: f64) -> Vec<u32> {
+    let shape = surface.shape();
+    let most = (size * COARSE_SHARE).clamp(EDGE_SPACING_MM[0], FACE_SPACING_MM[1]);
+    // An edge meets round faces of the other part, whose radius is not known here: every second sample.
+    let line = 1.9 * (size * SHARES[1]).clamp(EDGE_SPACING_MM[0], EDGE_SPACING_MM[1]);
+    // Gaps between samples that are left are up to twice the distance that all keep.
+    let arc = |radius: f64| ((8.0 * radius * COARSE_MM).sqrt() / 1.7).min(most);
+    let of_face = |face: u32| match shape.faces.get(face as usize).map(|f| &f.surface) {
+        Some(Surface::Plane { .. }) => most,
+        Some(
+            Surface::Cylinder { radius, .. } | Surface::Cone { radius, .. } | Surface::Sphere { radius, .. },
+        ) => arc(*radius),
+        Some(Surface::Torus { minor, .. }) => arc(*minor),
+        Some(Surface::Spline) | None => 0.0,
+    };
+    let mut cells: std::collections::HashMap<(u32, bool, [i64; 3]), Vec<DVec3>> =
+        std::collections::HashMap::new();
+    let mut kept = Vec::new();
+    for i in order {
+        let s = &samples[i as usize];
+        let inside = s.normal.is_some();
+        let spacing = match s.spacing {
+            Spacing::Inside => of_face(s.face),
+            Spacing::Line => line,
+            Spacing::Arc(radius) => arc(radius),
+            Spacing::All => 0.0,
+        };
+        if spacing <= 0.0 {
+            kept.push(i);
+            continue;
+        }
+        let at = (s.position / spacing).floor().to_array().map(|x| x as i64);
+        let mut near = (-1..=1).flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| [x, y, z])));
+        let taken = near.any(|d| {
+            let key = (s.face, inside, [0, 1, 2].map(|k| at[k] + d[k]));
+            cells
+                .get(&key)
+                .is_some_and(|c| c.iter().any(|p| p.distance(s.position) < spacing))
+        });
+        if !taken {
+            cells.entry((s.face, inside, at)).or_default().push(s.position);
+            kept.push(i);
+        }
+    }
+    kept
 }
 
 /// Builds the tree of `order` in preorder and returns the index of its root. Splits along the longest axis at the median.
@@ -325,4 +402,64 @@ fn split(samples: &[Sample], order: &mut [u32], nodes: &mut Vec<Node>) -> u32 {
     nodes[at as usize].first = first;
     nodes[at as usize].second = second;
     at
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::OnceLock;
+
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Bodies of shapes with planes, bores, a ball, a taper.
+    fn bodies() -> &'static Vec<Body> {
+        static BODIES: OnceLock<Vec<Body>> = OnceLock::new();
+        BODIES.get_or_init(|| {
+            let host = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+            [
+                "app/samples/pair_d18.75_clear1.00.step",
+                "mating/tests/data/ball_in_cylinder.step",
+                "mating/tests/data/cone_in_cone.step",
+            ]
+            .iter()
+            .flat_map(|file| mortise_brep::load_step(host.join(file)).unwrap().shapes)
+            .map(|shape| Body::new(&shape).unwrap())
+            .collect()
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// What is kept of a cell changes neither distances nor directions nor answers, near a sample or anywhere.
+        #[test]
+        fn kept_distances_are_exact(which in 0..6usize, sample in 0.0..1.0f64, x in prop::array::uniform3(-1.0..1.0f64), far in 0.01..8.0f64, least in -1.0..1.0f64) {
+            let bodies = bodies();
+            let body = &bodies[which % bodies.len()];
+            let from = body.samples()[(sample * body.samples().len() as f64) as usize].position;
+            let p = from + DVec3::from_array(x) * far;
+            let near = body.nearest(p).unwrap();
+            prop_assert!((body.distance(p) - near.distance).abs() < 1e-9);
+            let (distance, outward) = body.distance_outward(p).unwrap();
+            prop_assert!((distance - near.distance).abs() < 1e-9);
+            prop_assert!(outward.dot(body.outward_at(p, &near)) > 1.0 - 1e-6);
+            let least = near.distance + least * far;
+            prop_assert_eq!(body.exceeds(p, least), near.distance > least);
+            prop_assert!(!body.surely_exceeds(p, least) || near.distance > least);
+        }
+
+        /// No sample of the dense tree is far from all of the coarse one, compared with the curvature there.
+        #[test]
+        fn coarse_samples_are_everywhere(which in 0..6usize, sample in 0.0..1.0f64) {
+            let bodies = bodies();
+            let body = &bodies[which % bodies.len()];
+            let leaves = |coarse: bool| body.nodes(coarse).iter().filter(|n| n.is_leaf()).map(|n| n.center).collect::<Vec<_>>();
+            let (all, few) = (leaves(false), leaves(true));
+            prop_assert!(few.len() <= all.len());
+            let p = all[(sample * all.len() as f64) as usize];
+            let (low, high) = body.bounds();
+            let apart = few.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min);
+            prop_assert!(apart <= low.distance(high) * COARSE_SHARE + 1e-9, "{apart}");
+        }
+    }
 }

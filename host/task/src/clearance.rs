@@ -12,6 +12,7 @@ use glam::{DAffine3, DVec3};
 
 use crate::body::Body;
 use crate::motion::Motion;
+use crate::work::work;
 
 /// A body at a pose in the assembly's frame.
 #[derive(Clone, Copy)]
@@ -40,6 +41,8 @@ pub struct Limits {
     pub allow_mm: f64,
     /// Travel between two checks of a sample that stays in contact, mm.
     pub step_mm: f64,
+    /// Fewer samples: for a search, whose result is checked again.
+    pub coarse: bool,
 }
 
 /// Directions of a query: samples of the first body in the second, and the reverse.
@@ -90,9 +93,10 @@ fn least_sample(a: Placed<'_>, b: Placed<'_>, within: f64, enough: f64) -> Optio
     let mut found = None;
     for way in WAYS {
         let s = sides(way, a, b);
-        let nodes = s.of.nodes();
+        let nodes = s.of.nodes(false);
         let mut stack = if nodes.is_empty() { Vec::new() } else { vec![0u32] };
         while let Some(i) = stack.pop() {
+            work(1);
             let node = nodes[i as usize];
             let p = s.to.transform_point3(node.center);
             if s.within.exceeds(p, best + node.radius) {
@@ -129,6 +133,44 @@ fn place(way: Way, a: Placed<'_>, b: Placed<'_>, position: DVec3, distance_mm: f
         distance_mm,
         point: of.transform_point3(position),
         away: if way == Way::Forth { away } else { -away },
+    }
+}
+
+/// Calls `each` for every sample of either body within `within` mm of the other: its place, the direction in which the first body moves away there (both in
+/// the assembly's frame), and its signed distance.
+pub(crate) fn each_near(a: Placed<'_>, b: Placed<'_>, within: f64, coarse: bool, each: &mut dyn FnMut(Gap)) {
+    for way in WAYS {
+        let s = sides(way, a, b);
+        let (of, other) = match way {
+            Way::Forth => (a.pose, b.pose),
+            Way::Back => (b.pose, a.pose),
+        };
+        let nodes = s.of.nodes(coarse);
+        let mut stack = if nodes.is_empty() { Vec::new() } else { vec![0u32] };
+        while let Some(i) = stack.pop() {
+            work(1);
+            let node = nodes[i as usize];
+            let p = s.to.transform_point3(node.center);
+            if !node.is_leaf() {
+                if !s.within.exceeds(p, within + node.radius) {
+                    stack.push(node.second);
+                    stack.push(node.first);
+                }
+                continue;
+            }
+            if s.within.surely_exceeds(p, within) {
+                continue;
+            }
+            let Some((distance_mm, outward)) = s.within.distance_outward(p).filter(|d| d.0 < within) else {
+                continue;
+            };
+            let away = other.transform_vector3(outward).normalize_or_zero();
+            each(Gap {
+                distance_mm,
+                point: of.transform_point3(node.center),
+                away: if way == Way::Forth { away } else { -away },
+            });
+        }
     }
 }
 
@@ -183,7 +225,7 @@ pub fn refined(a: Placed<'_>, b: Placed<'_>, within: f64) -> Option<Gap> {
 pub fn free_share(a: Placed<'_>, b: Placed<'_>, motion: &Motion, limits: &Limits) -> f64 {
     let mut items = Vec::new();
     for way in WAYS {
-        if !sides(way, a, b).of.nodes().is_empty() {
+        if !sides(way, a, b).of.nodes(limits.coarse).is_empty() {
             items.push((way, 0));
         }
     }
@@ -203,10 +245,11 @@ pub fn least_over(
     let limits = Limits {
         allow_mm: 0.0,
         step_mm,
+        coarse: false,
     };
     let mut items = Vec::new();
     for way in WAYS {
-        if !sides(way, a, b).of.nodes().is_empty() {
+        if !sides(way, a, b).of.nodes(limits.coarse).is_empty() {
             items.push((way, 0));
         }
     }
@@ -262,7 +305,7 @@ impl<'a> Sweep<'a> {
 
     /// Place of a node in the other body's frame at `middle`, and a bound on its travel in half of the stretch.
     fn travel(&self, s: &Sides<'_>, way: Way, i: u32, middle: f64, half: f64) -> (DVec3, f64) {
-        let node = s.of.nodes()[i as usize];
+        let node = s.of.nodes(self.limits.coarse)[i as usize];
         let p = s.to.transform_point3(node.center);
         let in_assembly = if way == Way::Forth {
             self.b.pose.transform_point3(p)
@@ -286,8 +329,9 @@ impl<'a> Sweep<'a> {
         let mut stack = items.to_vec();
         let mut left: Vec<(Way, u32)> = Vec::new();
         while let Some((way, i)) = stack.pop() {
+            work(1);
             let s = &both[usize::from(way == Way::Back)];
-            let node = s.of.nodes()[i as usize];
+            let node = s.of.nodes(self.limits.coarse)[i as usize];
             let (p, travel) = self.travel(s, way, i, middle, (to - from) / 2.0);
             if s.within.exceeds(p, node.radius + travel - self.limits.allow_mm) {
                 continue;
@@ -316,8 +360,9 @@ impl<'a> Sweep<'a> {
         let mut stack = items.to_vec();
         let mut left: Vec<(Way, u32)> = Vec::new();
         while let Some((way, i)) = stack.pop() {
+            work(1);
             let s = &both[usize::from(way == Way::Back)];
-            let node = s.of.nodes()[i as usize];
+            let node = s.of.nodes(self.limits.coarse)[i as usize];
             let (p, travel) = self.travel(s, way, i, middle, (to - from) / 2.0);
             if s.within.exceeds(p, node.radius + travel + least.distance) {
                 continue;

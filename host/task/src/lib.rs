@@ -6,7 +6,7 @@
 //!    motion ([`least_over`]).
 //! 3. [`mod@graph`]: the connection graph; [`ports`]: places for connections.
 //! 4. [`mobility`]: freedoms by contact cones ([`mod@cone`]), confirmed over finite steps.
-//! 5. [`removal`]: ways out of one or several legs; [`blocking`] and [`sequence`]: whole sequences with subassemblies.
+//! 5. [`removal`]: ways out of one or several legs, and proofs that there is none ([`Proof`]); [`blocking`] and [`sequence`]: whole sequences with subassemblies.
 //! 6. [`report`]: results as values for JSON.
 //!
 //! Lengths are mm, angles radians, poses from part to assembly. Nothing here reads files, and results depend on no random numbers but those of fixed seeds; where
@@ -19,21 +19,33 @@ mod clearance;
 pub mod cone;
 pub mod directions;
 mod error;
+mod explore;
 pub mod graph;
 mod helix;
+mod hints;
+mod kept;
 mod leg;
+mod linking;
 pub mod mobility;
 mod motion;
 mod opening;
+mod passage;
 pub mod ports;
+mod proof;
+mod race;
 pub mod removal;
 pub mod report;
 mod search;
 pub mod sequence;
+mod shorten;
+mod skeleton;
+mod walk;
 mod way;
+mod work;
 
 pub use assembly::{ALLOWED_MM, Assembly, Clearance, Moved, SEARCH_STEP_MM};
 pub use body::{Body, SAMPLE_ERROR_MM, Sample};
 pub use clearance::{Gap, Limits, Placed, free_share, gap, least_over, refined};
 pub use error::TaskError;
 pub use motion::Motion;
+pub use proof::Proof;

@@ -191,7 +191,15 @@ impl Search<'_> {
     }
 
     /// What holds the group: of the missed openings the one that needs the least overlap all along its motion.
-    pub fn held(&self) -> Option<Blocked> {
+    pub fn held(&self) -> Blocked {
+        self.missed_least().unwrap_or_else(|| Blocked {
+            pair: self.nearest_pair(),
+            overlap_mm: None,
+            proof: None,
+        })
+    }
+
+    fn missed_least(&self) -> Option<Blocked> {
         let mut best: Option<Blocked> = None;
         for missed in &self.missed {
             // The place along the leg where the least is needed, by ternary search.
@@ -215,10 +223,12 @@ impl Search<'_> {
                 }
             }
             let (depth, pair) = found;
-            if depth <= 1.0 && best.is_none_or(|b| b.overlap_mm.is_none_or(|mm| depth < mm)) {
+            // A turn that is free all the way does not lead out.
+            if depth > 1e-3 && depth <= 1.0 && best.is_none_or(|b| b.overlap_mm.is_none_or(|mm| depth < mm)) {
                 best = Some(Blocked {
                     pair,
                     overlap_mm: Some(depth),
+                    proof: None,
                 });
             }
         }
@@ -233,7 +243,7 @@ impl Search<'_> {
         let mut most = (0.0, missed.pair);
         let mut travel = 0.0;
         while travel < missed.most {
-            if self.budget.until.elapsed() > HELD_TIME {
+            if self.clock.budget.until.elapsed() > HELD_TIME {
                 return (DEEP_MM, missed.pair);
             }
             let moved = Moved {

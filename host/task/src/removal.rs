@@ -1,5 +1,9 @@
 //! Removal paths of a part or group: straight ways first, then ways of several legs.
 //!
+//! Two searches run at the same time, and the one that needs less work wins (`race`, which makes the result independent of the computer): the one from opening to opening below, whose ways
+//! have few legs, and walks in contact (`explore`), which find narrow passages that no slide or turn about one axis of a surface leads through. Before it walks, the second looks for
+//! a proof that there is no way (`proof`).
+//!
 //! A leg is a slide along a candidate direction or a turn about a candidate axis ([`crate::directions`]). A way of several legs is searched from opening to
 //! opening: while the group makes one leg, another motion that was blocked becomes possible. Where it does is found by testing the group *displaced* by that
 //! motion past its present range, at places along the leg: the depth of its overlap there changes by no more than the group travels, so the next place
@@ -8,9 +12,15 @@
 //!
 //! Cost: at each place of the search one sweep per candidate, and for each pair of a free leg and a blocked motion some tens of distance queries.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
 use glam::{DAffine3, DVec3};
 
 use crate::assembly::{Assembly, Moved};
+use crate::explore::Explorer;
+use crate::proof::{Proof, locked};
+use crate::race::Clock;
 use crate::search::Search;
 pub use crate::way::{Blocked, Budget, Path, Removal};
 
@@ -22,31 +32,102 @@ pub fn remove(
     extra: &[DVec3],
     budget: &Budget,
 ) -> Removal {
-    let mut search = Search::new(assembly, parts, others, extra, budget);
+    let found_at = AtomicU64::new(u64::MAX);
     let start = Moved {
         parts,
         by: DAffine3::IDENTITY,
     };
+    let clock = Clock::new(budget, &found_at);
+    let mut search = Search::new(assembly, parts, others, extra, &clock);
     if let Some(leg) = search.straight(&start) {
         return Removal::Out(Path { legs: vec![leg] });
     }
-    let mut found = if budget.legs > 1 { search.legs() } else { None };
-    if found.is_none() && budget.legs > 1 && !search.out_of_time {
-        // Again, with more motions.
-        search.tilts = true;
-        search.seen.truncate(1);
-        found = search.legs();
+    if budget.legs <= 1 {
+        return Removal::Blocked(search.held());
     }
-    if let Some(path) = found {
-        return Removal::Out(path);
-    }
-    let blocked = search.held().unwrap_or_else(|| Blocked {
-        pair: search.nearest_pair(),
-        overlap_mm: None,
+    let (by_legs, by_walks) = std::thread::scope(|scope| {
+        let walks = scope.spawn(|| walks(assembly, parts, others, extra, budget, &found_at));
+        let by_legs = search.way().map(|path| (clock.found(), path));
+        (by_legs, walks.join().unwrap_or(Walked::Nothing))
     });
-    if search.out_of_time {
-        Removal::TimedOut(blocked)
-    } else {
-        Removal::Blocked(blocked)
+    match (by_legs, by_walks) {
+        (_, Walked::Never(blocked)) => Removal::Blocked(blocked),
+        (Some((work, _)), Walked::Out(less, path)) if less < work => Removal::Out(path),
+        (Some((_, path)), _) | (None, Walked::Out(_, path)) => Removal::Out(path),
+        (None, Walked::Nothing) if budget.is_over() => Removal::TimedOut(search.held()),
+        (None, Walked::Nothing) => Removal::Blocked(search.held()),
     }
+}
+
+/// Result of the walks.
+enum Walked {
+    /// A way, and the work that it took.
+    Out(u64, Path),
+    /// Proved that there is none.
+    Never(Blocked),
+    Nothing,
+}
+
+/// A proof that there is no way, or the search by walks.
+fn walks(
+    assembly: &Assembly,
+    parts: &[usize],
+    others: &[usize],
+    extra: &[DVec3],
+    budget: &Budget,
+    found_at: &AtomicU64,
+) -> Walked {
+    if let Some((overlap_mm, pair, proof)) = proved(assembly, parts, others, budget, found_at) {
+        // There is nothing to be found: the other search ends.
+        found_at.store(0, Ordering::Relaxed);
+        return Walked::Never(Blocked {
+            pair,
+            overlap_mm: Some(overlap_mm),
+            proof: Some(proof),
+        });
+    }
+    let clock = Clock::new(budget, found_at);
+    let found = Explorer::new(assembly, parts, others, extra, &clock).search();
+    found.map_or(Walked::Nothing, |path| Walked::Out(clock.found(), path))
+}
+
+/// Most pairs of parts for which a proof is sought, and share of the time left that it may take.
+const PROVED_PAIRS: usize = 4;
+const PROOF_SHARE: f64 = 0.2;
+
+/// A proof that the group stays: that a part of it cannot leave one of the others.
+fn proved(
+    assembly: &Assembly,
+    parts: &[usize],
+    others: &[usize],
+    budget: &Budget,
+    found_at: &AtomicU64,
+) -> Option<(f64, [usize; 2], Proof)> {
+    let now = Instant::now();
+    let until = now + budget.until.saturating_duration_since(now).mul_f64(PROOF_SHARE);
+    // A way that is found meanwhile is an answer, too: there is no proof then.
+    let over = || Instant::now() >= until || found_at.load(Ordering::Relaxed) != u64::MAX;
+    let boxed = |a: usize, b: usize| {
+        let ((al, ah), (bl, bh)) = (
+            assembly.bounds(a, DAffine3::IDENTITY),
+            assembly.bounds(b, DAffine3::IDENTITY),
+        );
+        (al - bh).max(bl - ah).max_element() < 0.0
+    };
+    let pairs = parts
+        .iter()
+        .flat_map(|&a| others.iter().map(move |&b| (a, b)))
+        .filter(|&(a, b)| boxed(a, b));
+    let mut best: Option<(f64, [usize; 2], Proof)> = None;
+    for (a, b) in pairs.take(PROVED_PAIRS) {
+        let [pa, pb] = [a, b].map(|p| (assembly.placed(p, DAffine3::IDENTITY), assembly.skeleton(p)));
+        // A way may overlap by what is allowed of the pair.
+        if let Some((depth, proof)) = locked(pa, pb, &over)
+            && depth > assembly.allowed_mm(a, b)
+            && best.is_none_or(|known| depth > known.0)
+        {
+            best = Some((depth, [a, b], proof));
+        }
+    }
+    best
 }

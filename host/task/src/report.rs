@@ -77,8 +77,10 @@ pub struct StuckReport<'a> {
     pub parts: Vec<&'a str>,
     /// The pair that blocks.
     pub pair: [&'a str; 2],
-    /// Least overlap with which the search could have gone on, µm; `None` where no opening was near.
+    /// Least overlap with which the search could have gone on, µm, or that any way would need where there is a proof; `None` where no opening was near.
     pub overlap_um: Option<f64>,
+    /// Proof that they cannot come apart; `None`: no way was found.
+    pub proof: Option<String>,
 }
 
 /// Result of `assemble` and `disassemble`.
@@ -182,6 +184,7 @@ fn stuck<'a>(assembly: &'a Assembly, parts: &[usize], blocked: &Blocked) -> Stuc
         parts: names(assembly, parts),
         pair: blocked.pair.map(|p| assembly.name(p)),
         overlap_um: blocked.overlap_mm.map(|mm| mm * 1e3),
+        proof: blocked.proof.map(|proof| proof.to_string()),
     }
 }
 

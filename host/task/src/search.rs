@@ -10,7 +10,8 @@ use crate::directions::{Line, candidates, contact_normals, same_line};
 use crate::leg::{Kind, Missed};
 use crate::mobility::{PLAY_MM, leaving_mm};
 use crate::motion::Motion;
-use crate::way::{Budget, Path};
+use crate::race::Clock;
+use crate::way::Path;
 
 /// Displacement past its present range by which a blocked motion is tested, as a share of the group's size and its limits, mm of travel: a larger one overlooks
 /// shallow openings, a smaller one takes more tests.
@@ -28,7 +29,7 @@ pub(crate) struct Search<'a> {
     pub parts: &'a [usize],
     pub others: &'a [usize],
     pub extra: &'a [DVec3],
-    pub budget: &'a Budget,
+    pub clock: &'a Clock<'a>,
     pub seen: Vec<DAffine3>,
     /// Narrowly missed openings, least overlap first.
     pub missed: Vec<Missed>,
@@ -46,7 +47,7 @@ impl<'a> Search<'a> {
         parts: &'a [usize],
         others: &'a [usize],
         extra: &'a [DVec3],
-        budget: &'a Budget,
+        clock: &'a Clock<'a>,
     ) -> Self {
         let (low, high) = assembly.bounds_of(parts, DAffine3::IDENTITY);
         Self {
@@ -54,7 +55,7 @@ impl<'a> Search<'a> {
             parts,
             others,
             extra,
-            budget,
+            clock,
             seen: vec![DAffine3::IDENTITY],
             missed: Vec::new(),
             out_of_time: false,
@@ -99,7 +100,7 @@ impl Search<'_> {
     /// A straight way out from a pose.
     pub fn straight(&self, group: &Moved<'_>) -> Option<Motion> {
         for d in self.directions(group) {
-            if self.budget.is_over() {
+            if self.clock.is_over() {
                 return None;
             }
             let first = Motion::slide(d * PLAY_MM);
@@ -125,7 +126,18 @@ impl Search<'_> {
         None
     }
 
-    pub fn legs(&mut self) -> Option<Path> {
+    /// A way of several legs, at first by the motions of the surfaces alone.
+    pub fn way(&mut self) -> Option<Path> {
+        let found = self.legs();
+        if found.is_some() || self.out_of_time {
+            return found;
+        }
+        self.tilts = true;
+        self.seen.truncate(1);
+        self.legs()
+    }
+
+    fn legs(&mut self) -> Option<Path> {
         let mut open = VecDeque::from([Place {
             by: DAffine3::IDENTITY,
             legs: Vec::new(),
@@ -136,11 +148,11 @@ impl Search<'_> {
         loop {
             deep = !deep;
             let place = (if deep { open.pop_back() } else { open.pop_front() })?;
-            if self.budget.is_over() {
+            if self.clock.is_over() {
                 self.out_of_time = true;
                 return None;
             }
-            if place.legs.len() + 1 > self.budget.legs {
+            if place.legs.len() + 1 > self.clock.budget.legs {
                 continue;
             }
             let mut next = self.openings(&place);
@@ -170,7 +182,7 @@ impl Search<'_> {
         let kinds = self.kinds(&group);
         let mut ranges = Vec::new();
         for kind in &kinds {
-            if self.budget.is_over() {
+            if self.clock.is_over() {
                 self.out_of_time = true;
                 return Vec::new();
             }
@@ -182,7 +194,7 @@ impl Search<'_> {
                 continue;
             }
             for (q, &(range, pair)) in kinds.iter().zip(&ranges) {
-                if self.budget.is_over() {
+                if self.clock.is_over() {
                     self.out_of_time = true;
                     return found;
                 }

@@ -183,6 +183,7 @@ fn split(
         let budget = Budget {
             until: Instant::now() + left.div_f64((count - i).min(3) as f64),
             legs: 12,
+            seed: 0,
         };
         match remove(assembly, &group, &onto, &[], &budget) {
             Removal::Out(path) => {
@@ -204,6 +205,7 @@ fn split(
     let blocked = worst.unwrap_or(Blocked {
         pair: [set[0], set[1]],
         overlap_mm: None,
+        proof: None,
     });
     Err((blocked, timed_out))
 }

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use glam::DAffine3;
 
 use crate::motion::Motion;
+use crate::proof::Proof;
 
 /// A collision-free way of a group from its place: legs one after another, in the assembly's frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,6 +44,8 @@ pub struct Blocked {
     /// Overlap that the group would need to leave straight, or turn by half a turn, at the most promising place found, mm: by how much it is held. `None` where
     /// no such place was within a millimetre.
     pub overlap_mm: Option<f64>,
+    /// Proof that it stays, and then the overlap is the least that it would need.
+    pub proof: Option<Proof>,
 }
 
 /// Result of a search.
@@ -50,7 +53,7 @@ pub struct Blocked {
 pub enum Removal {
     /// It comes out on this way.
     Out(Path),
-    /// All that the search knows was tried.
+    /// It is proved that it stays, or only straight ways were sought and there is none.
     Blocked(Blocked),
     /// Time ran out first.
     TimedOut(Blocked),
@@ -63,6 +66,8 @@ pub struct Budget {
     pub until: Instant,
     /// Most legs of a way; 1: straight ways only.
     pub legs: usize,
+    /// Seed of the random numbers of walks.
+    pub seed: u64,
 }
 
 impl Budget {
@@ -71,6 +76,7 @@ impl Budget {
         Self {
             until: Instant::now() + time,
             legs: 12,
+            seed: 0,
         }
     }
 

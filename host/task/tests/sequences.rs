@@ -53,32 +53,42 @@ fn straight_and_turned_ways_out_are_found() {
     }
 }
 
-/// The ball is 30 µm larger than the hole: 15 µm on each side. The other two can never come apart.
+/// Ways that bend, or lead through a place that one slide or turn does not reach, by walks; with other random numbers, too.
+#[test]
+fn bent_ways_out_are_found() {
+    let Some(folder) = support::shared("bent_ways_out_are_found") else {
+        return;
+    };
+    for name in ["gear_housing", "ring_hook"] {
+        let assembly = support::load(&folder.join("10_extraction"), &format!("{name}.step"));
+        out(&assembly, 240).unwrap_or_else(|| panic!("{name} stays in"));
+    }
+}
+
+/// The ball is 30 µm larger than the hole: 15 µm on each side. The balls of the bar are 0.5 mm larger than the ring, and the rings' bars 6 mm thick. What is
+/// proved is no more than that, and little less.
 #[test]
 fn interlocked_pairs_stay_together_and_state_by_how_much() {
     let Some(folder) = support::shared("interlocked_pairs_stay_together_and_state_by_how_much") else {
         return;
     };
-    for (name, time_s, held_um) in [
-        ("keyhole_locked_30um", 30, Some(15.0)),
-        ("ring_on_dumbbell", 5, None),
-        ("linked_rings", 5, None),
+    for (name, held_um, least_um) in [
+        ("keyhole_locked_30um", 15.0, 14.5),
+        ("ring_on_dumbbell", 500.0, 490.0),
+        ("linked_rings", 6000.0, 2900.0),
     ] {
         let assembly = support::load(&folder.join("10_extraction"), &format!("{name}.step"));
-        let budget = Budget::lasting(Duration::from_secs(time_s));
-        let (Removal::Blocked(blocked) | Removal::TimedOut(blocked)) =
-            remove(&assembly, &[1], &[0], &[], &budget)
-        else {
-            panic!("{name} comes out");
+        let budget = Budget::lasting(Duration::from_secs(240));
+        let Removal::Blocked(blocked) = remove(&assembly, &[1], &[0], &[], &budget) else {
+            panic!("{name} is not proved");
         };
         assert_eq!(blocked.pair, [1, 0]);
-        if let Some(um) = held_um {
-            let found = blocked.overlap_mm.map(|mm| mm * 1e3);
-            assert!(
-                found.is_some_and(|found| (found - um).abs() < 1.0),
-                "{name}: {found:?}"
-            );
-        }
+        assert!(blocked.proof.is_some(), "{name}");
+        let found = blocked.overlap_mm.map(|mm| mm * 1e3);
+        assert!(
+            found.is_some_and(|um| (least_um..=held_um).contains(&um)),
+            "{name}: {found:?}"
+        );
     }
 }
 
@@ -88,6 +98,7 @@ fn without_time_nothing_is_claimed() {
     let budget = Budget {
         until: Instant::now(),
         legs: 12,
+        seed: 0,
     };
     assert!(matches!(
         remove(&assembly, &[1], &[0], &[], &budget),
