@@ -213,7 +213,7 @@ pub const ARTEFACTS: &[Artefact] = &[
     Artefact {
         name: "window",
         made: Made::ByHand,
-        sources: &[&["host/app/src/ui", "host/app/src/viewport"]],
+        sources: &[&["host/app/src/display", "host/app/src/ui", "host/app/src/viewport"]],
     },
 ];
 
