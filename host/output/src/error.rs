@@ -33,6 +33,24 @@ pub enum OutputError {
         /// Target.
         path: PathBuf,
     },
+    /// The folder of the target does not exist.
+    #[error("{}: its folder {} does not exist; create it, or give another name", .path.display(), .folder.display())]
+    NoFolder {
+        /// Target.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// No file can be created in the target's folder.
+    #[error("{}: no file can be created in its folder {}: {source}; check the folder's permissions, or give another name", .path.display(), .folder.display())]
+    ClosedFolder {
+        /// Target.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+        /// The kind of the operating system's error.
+        source: std::io::Error,
+    },
     /// The system refused.
     #[error("{}: cannot be written: {source}; check the path and its permissions", .path.display())]
     Unwritable {

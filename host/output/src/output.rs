@@ -58,7 +58,7 @@ impl Output {
         };
         output.add_inputs(inputs)?;
         // Created and removed again: nothing remains if the work is interrupted.
-        output.beside().map_err(|source| output.unwritable(source))?;
+        output.beside()?;
         Ok(output)
     }
 
@@ -83,17 +83,15 @@ impl Output {
     /// As [`Output::new`]; or the disk is full.
     pub fn write(&self, bytes: &[u8]) -> Result<(), OutputError> {
         let replaced = self.check()?;
-        let file = self
-            .beside()
-            .and_then(|mut file| {
-                file.write_all(bytes)?;
-                if let Some(permissions) = replaced {
-                    file.as_file().set_permissions(permissions)?;
-                }
-                file.as_file().sync_all()?;
-                Ok(file)
-            })
-            .map_err(|source| self.unwritable(source))?;
+        let mut file = self.beside()?;
+        let mut fill = || {
+            file.write_all(bytes)?;
+            if let Some(permissions) = replaced {
+                file.as_file().set_permissions(permissions)?;
+            }
+            file.as_file().sync_all()
+        };
+        fill().map_err(|source| self.unwritable(source))?;
         let moved = match self.existing {
             Existing::Replace => file.persist(&self.path),
             Existing::Keep => file.persist_noclobber(&self.path),
@@ -142,13 +140,24 @@ impl Output {
     }
 
     /// A new file of random name in the target's folder, removed when dropped.
-    fn beside(&self) -> io::Result<NamedTempFile> {
+    fn beside(&self) -> Result<NamedTempFile, OutputError> {
         let mut builder = Builder::new();
         builder.prefix(".mortise-").suffix(".part").rand_bytes(12);
         // The permissions of any new file, reduced by the user's umask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        builder.tempfile_in(self.folder())
+        builder.tempfile_in(self.folder()).map_err(|error| {
+            let (path, folder) = (self.path.clone(), self.folder().to_owned());
+            match error.kind() {
+                io::ErrorKind::NotFound => OutputError::NoFolder { path, folder },
+                // The kind alone: the error's text names the file of random name.
+                kind => OutputError::ClosedFolder {
+                    path,
+                    folder,
+                    source: kind.into(),
+                },
+            }
+        })
     }
 
     fn folder(&self) -> &Path {

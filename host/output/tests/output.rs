@@ -46,6 +46,20 @@ fn an_existing_file_is_replaced_on_request_only() {
 }
 
 #[test]
+fn a_missing_folder_is_named_and_the_random_name_is_not() {
+    let folder = folder();
+    let missing = folder.path().join("missing");
+    let error = Output::new(missing.join("x.image"), Existing::Keep, NONE).expect_err("no folder");
+    assert!(matches!(error, OutputError::NoFolder { .. }), "{error}");
+    let words = error.to_string();
+    assert!(
+        words.contains(&format!("folder {} does not exist", missing.display())),
+        "{words}"
+    );
+    assert!(!words.contains(".part"), "{words}");
+}
+
+#[test]
 fn a_name_taken_during_the_work_is_not_replaced() {
     let folder = folder();
     let path = folder.path().join("x.image");
