@@ -5,10 +5,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::Result;
-
 use super::finding::Finding;
-use crate::shell;
 
 /// Commits checked, from the newest on, merges left out. Older ones are not all in the imperative, and cannot be changed.
 const LAST: &str = "-200";
@@ -312,18 +309,23 @@ const VERBS: &[&str] = &[
     "Zero",
 ];
 
-/// Subjects of the last commits that do not begin with a verb in the imperative. None where the sources come without their history.
-///
-/// # Errors
-/// When git cannot list the commits.
-pub fn check(root: &Path) -> Result<Vec<Finding>> {
-    if !root.join(".git").exists() || shell::find_program("git").is_none() {
-        return Ok(Vec::new());
+/// Subjects of the last commits that do not begin with a verb in the imperative. Where git cannot list them (sources without their history, a folder of
+/// another user), standard error says so.
+pub fn check(root: &Path) -> Vec<Finding> {
+    let log = Command::new("git")
+        .current_dir(root)
+        .args(["log", "--no-merges", LAST, "--format=%h %s"])
+        .output();
+    match log {
+        Ok(log) if log.status.success() => {
+            let subjects = String::from_utf8_lossy(&log.stdout);
+            subjects.lines().filter_map(complaint).collect()
+        }
+        _ => {
+            eprintln!("The subjects of commits are not checked: git lists none here.");
+            Vec::new()
+        }
     }
-    let mut log = Command::new("git");
-    log.current_dir(root)
-        .args(["log", "--no-merges", LAST, "--format=%h %s"]);
-    Ok(shell::read(&mut log)?.lines().filter_map(complaint).collect())
 }
 
 /// What is wrong with a commit, given as its number and subject.
