@@ -2,9 +2,8 @@
 
 use glam::DAffine3;
 
-use crate::assembly::SEARCH_STEP_MM;
 use crate::motion::Motion;
-use crate::walk::Walker;
+use crate::walk::{CHECK_STEP_MM, Walker};
 use crate::way::Path;
 
 /// Distances kept on a leg, in the order in which they are tried, mm.
@@ -23,7 +22,7 @@ pub(crate) fn shorten(walker: &Walker<'_>, poses: &[DAffine3]) -> Path {
                 &group,
                 walker.others,
                 &motion,
-                SEARCH_STEP_MM,
+                CHECK_STEP_MM,
                 margin,
                 false,
             );

@@ -13,6 +13,9 @@ use crate::motion::Motion;
 
 /// Distance that a walk keeps where there is room, mm.
 pub(crate) const KEEP_MM: f64 = 0.05;
+/// Travel between two checks of samples in contact on a way that is found, mm: of a turn about a corner in a narrow passage, the longer steps of a search
+/// overlook overlaps.
+pub(crate) const CHECK_STEP_MM: f64 = 0.05;
 /// Softness of the constraints, and rounds of their solution.
 const SOFT: f64 = 0.02;
 const ROUNDS: usize = 40;
@@ -205,8 +208,8 @@ impl<'a> Walker<'a> {
     /// Whether a motion from a pose is free.
     pub fn goes(&self, from: &DAffine3, motion: &Motion, coarse: bool) -> bool {
         let group = self.moved(*from);
-        let free =
-            (self.assembly).free_share_beyond(&group, self.others, motion, SEARCH_STEP_MM, 0.0, coarse);
+        let step_mm = if coarse { SEARCH_STEP_MM } else { CHECK_STEP_MM };
+        let free = (self.assembly).free_share_beyond(&group, self.others, motion, step_mm, 0.0, coarse);
         free.0 >= 1.0
     }
 
