@@ -53,7 +53,7 @@ fn bake_destroys_nothing() {
         ("folder", "a folder"),
         ("socket", "a socket"),
         ("/dev/null", "a device"),
-        ("absent/x.image", "cannot be written"),
+        ("absent/x.image", "its folder absent does not exist"),
     ] {
         refused(&bake(out, true), what);
     }
@@ -105,7 +105,7 @@ fn a_picture_is_refused_before_the_window_opens() {
     );
     refused(
         &mortise(place.path(), &["demo", "--screenshot", "absent/x.png"]),
-        "cannot be written",
+        "its folder absent does not exist",
     );
     std::fs::copy(SAMPLE, place.path().join("x.step")).expect("copied");
     for command in ["open", "demo"] {
@@ -128,12 +128,15 @@ fn an_output_is_refused_before_the_input_is_read() {
     std::fs::write(at("victim"), "precious").expect("written");
     std::fs::write(at("script"), "remove the peg").expect("written");
     let cases: &[(&[&str], &str)] = &[
-        (&["bake", "x.step", "-o", "absent/x.image"], "cannot be written"),
+        (
+            &["bake", "x.step", "-o", "absent/x.image"],
+            "its folder absent does not exist",
+        ),
         (&["bake", "x.step", "-o", "victim"], "--force"),
         (&["bake", "x.step", "-o", "x.step", "--force"], "is the input"),
         (
             &["task", "x.step", "remove the peg", "-o", "absent/y.step"],
-            "cannot be written",
+            "its folder absent does not exist",
         ),
         (&["task", "x.step", "remove the peg", "-o", "victim"], "--force"),
         (
