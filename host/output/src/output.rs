@@ -84,7 +84,7 @@ impl Output {
     pub fn write(&self, bytes: &[u8]) -> Result<(), OutputError> {
         let replaced = self.check()?;
         let mut file = self.beside()?;
-        let mut fill = || {
+        let fill = || {
             file.write_all(bytes)?;
             if let Some(permissions) = replaced {
                 file.as_file().set_permissions(permissions)?;
