@@ -366,13 +366,7 @@ fn space_and_escape_stop() {
 
 #[test]
 fn the_part_in_hand_follows_the_pointer() {
-    let mut harness = harness();
-    open_sample(&mut harness);
-    connect(&mut harness);
-    arm(&mut harness);
-    click(&mut harness, "peg");
-    click(&mut harness, "Grab");
-    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
+    let mut harness = holding();
 
     let view = harness.get_by_label("3D view").rect();
     let camera = harness.state().view.camera;

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{arm, click, connect, harness, open_sample, until};
+use common::{holding, until};
 use egui::Shape;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
@@ -13,18 +13,6 @@ use mortise_protocol::parameter::PARAMETERS;
 
 /// Frames until a changed state is seen: the board's next sample may replace it before a frame shows it.
 const FRAMES: usize = 200;
-
-/// A window with the peg of the sample in hand.
-fn holding() -> Harness<'static, Window> {
-    let mut harness = harness();
-    open_sample(&mut harness);
-    connect(&mut harness);
-    arm(&mut harness);
-    click(&mut harness, "peg");
-    click(&mut harness, "Grab");
-    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
-    harness
-}
 
 /// All text of the last frame.
 fn painted(harness: &Harness<'_, Window>) -> Vec<String> {

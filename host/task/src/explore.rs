@@ -1,7 +1,7 @@
 //! The search for a way by walks: where opening by opening finds none.
 //!
 //! A tree of poses grows from the group's place. Each walk ([`crate::walk`]) starts at a pose in a rarely visited cell of the space of poses, slides in a direction or turns about an
-//! axis of the surfaces there (or a random one), and goes on while it makes progress. From every pose in a new cell straight ways out are tried. The random numbers are those of a fixed seed.
+//! axis of the surfaces there (or a random one), and goes on while it makes progress. From every pose in a new cell straight ways out are tried. The random numbers are those of the budget's seed.
 
 use std::collections::HashMap;
 

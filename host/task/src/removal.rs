@@ -12,6 +12,7 @@
 //!
 //! Cost: at each place of the search one sweep per candidate, and for each pair of a free leg and a blocked motion some tens of distance queries.
 
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -48,7 +49,9 @@ pub fn remove(
     let (by_legs, by_walks) = std::thread::scope(|scope| {
         let walks = scope.spawn(|| walks(assembly, parts, others, extra, budget, &found_at));
         let by_legs = search.way().map(|path| (clock.found(), path));
-        (by_legs, walks.join().unwrap_or(Walked::Nothing))
+        // A panic of the walks is one of this search.
+        let by_walks = walks.join().unwrap_or_else(|panic| resume_unwind(panic));
+        (by_legs, by_walks)
     });
     match (by_legs, by_walks) {
         (_, Walked::Never(blocked)) => Removal::Blocked(blocked),

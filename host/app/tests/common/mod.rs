@@ -99,3 +99,15 @@ pub fn arm(harness: &mut Harness<'_, Window>) {
     click(harness, "Arm");
     until(harness, "armed", |s| s.device() == Some(DeviceState::Armed));
 }
+
+/// A window with the peg of the sample in hand.
+pub fn holding() -> Harness<'static, Window> {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    connect(&mut harness);
+    arm(&mut harness);
+    click(&mut harness, "peg");
+    click(&mut harness, "Grab");
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
+    harness
+}

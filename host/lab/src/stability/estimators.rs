@@ -28,7 +28,7 @@ const FINEST_M: f64 = 1e-6;
 const COARSEST_M: f64 = 50e-6;
 const STEPS: u32 = 6;
 /// Delays from reading to force, ticks.
-const DELAYS: [usize; 3] = [0, 1, 2];
+pub const DELAYS: [usize; 3] = [0, 1, 2];
 /// Range of the search, N/m.
 const LEAST_N_PER_M: f64 = 500.0;
 const MOST_N_PER_M: f64 = 40e3;
@@ -85,8 +85,17 @@ pub fn sweep(quick: bool, out: &mut dyn FnMut(&Bound)) -> Result<Vec<Bound>, Lab
     Ok(found)
 }
 
+/// Geometric mean over the encoders of the stiffness that an estimator bears, N/m.
+pub fn geometric_mean(found: &[Bound], estimator: &str, delay_ticks: usize) -> f64 {
+    let logarithms: Vec<f64> = (found.iter())
+        .filter(|bound| bound.estimator == estimator && bound.delay_ticks == delay_ticks)
+        .map(|bound| bound.stiffness_n_per_m.ln())
+        .collect();
+    (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp()
+}
+
 /// Largest stiffness (N/m) at which part `part`, pressed on its support and flicked, comes to rest; 0: none that was tried.
-pub fn largest(
+fn largest(
     scene: &SceneImage<'_>,
     part: u16,
     counted: Counted,

@@ -19,7 +19,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 
 use self::claims::Claims;
-use self::measure::{By, measure, measure_tables};
+use self::measure::{By, measure_tables};
 pub use self::page::today;
 use self::quoted::Quoted;
 pub use self::row::{Row, count};
@@ -28,9 +28,6 @@ use crate::arguments::Figures;
 use crate::program::Programs;
 use crate::setup::{self, Group};
 use crate::{firmware, shell};
-
-/// The table that is judged in every run of the tests.
-const END_TO_END: &str = "end-to-end";
 
 /// Parts of tables whose other parts hold no quoted row: the tests measure these alone, a whole table takes a quarter of an hour.
 const QUOTED_PARTS: &[(&str, &[&str])] = &[("contact", &["accuracy", "insertion", "ticks"])];
@@ -69,7 +66,7 @@ pub fn command(arguments: &Figures) -> Result<ExitCode> {
             all_hold
         }
         None if arguments.check => {
-            println!("{}", check(&root, &lab, |_| true, &[])?);
+            println!("{}", check(&root, &lab, &[])?);
             true
         }
         None => renew::run(&root, &lab, names, by)?,
@@ -81,52 +78,26 @@ pub fn command(arguments: &Figures) -> Result<ExitCode> {
     })
 }
 
-/// The step of `cargo xtask test`: [`check`] of the tables whose pages are recorded. Of `end-to-end`, if it is not, whether its bounds hold.
+/// The step of `cargo xtask test`: [`check`] of the parts that hold quoted rows.
 ///
 /// # Errors
 /// As [`check`].
 pub fn step(root: &Path, program: &Path) -> Result<String> {
-    let manifest = artefacts::Manifest::read(root)?;
-    let recorded = |table: &str| manifest.0.contains_key(table);
-    let mut said = Vec::new();
-    if !recorded(END_TO_END) {
-        let measured = measure(root, program, END_TO_END, true, By::Completed)?;
-        let count = count(&measured.rows);
-        if !measured.success || measured.rows.iter().any(Row::fails) {
-            bail!("{END_TO_END}: {count}");
-        }
-        said.push(format!("{END_TO_END}: {count}"));
-    }
-    said.push(check(root, program, recorded, QUOTED_PARTS)?);
-    Ok(said.join("; "))
+    check(root, program, QUOTED_PARTS)
 }
 
-/// Measures the shorter form of every table that README quotes and that is to be `compared` (of a table named in `parts` these alone), and compares
-/// bounds, claims, README's numbers, and the pages of figures. README's numbers of the other tables, and all numbers in `docs`, are compared with the
+/// Measures the shorter form of every table that README quotes (of a table named in `parts` these alone), and compares bounds, claims, README's
+/// numbers, and the pages of figures. README's numbers of the other tables, and all numbers in `docs`, are compared with the
 /// pages of figures. Bounds of machine-dependent values are reported, not judged: another or a busy machine breaks no promise. Rows that fail on the
 /// page of figures are reported as well.
 ///
 /// # Errors
 /// When a bound does not hold, or a number differs; the details were printed.
-pub fn check(
-    root: &Path,
-    program: &Path,
-    compared: impl Fn(&str) -> bool,
-    parts: &[(&str, &[&str])],
-) -> Result<String> {
+pub fn check(root: &Path, program: &Path, parts: &[(&str, &[&str])]) -> Result<String> {
     let quoted = quoted::of_pages(root)?;
     let claims = Claims::read(root)?;
     let (mut said, mut wrong) = (Vec::new(), Vec::new());
-    let mut tables = quoted::measured(&quoted);
-    tables.retain(|table| {
-        let wanted = compared(table);
-        if !wanted {
-            said.push(format!(
-                "{table}: not measured anew before `cargo xtask figures --renew {table}`"
-            ));
-        }
-        wanted
-    });
+    let tables = quoted::measured(&quoted);
     let parts_of = |table: &str| {
         parts
             .iter()
