@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 mod common;
 
-use common::{arm, click, connect, harness, open_sample, until, worst};
+use common::{arm, click, connect, harness, holding, open_sample, until, worst};
 use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};

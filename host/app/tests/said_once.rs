@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{holding, until};
+use common::{click, holding, until};
 use egui::Shape;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
