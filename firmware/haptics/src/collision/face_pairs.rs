@@ -194,7 +194,7 @@ impl Scenery<'_, '_> {
         } else {
             self.parts.get(index)?.pose
         };
-        (index < self.scene.parts().len()).then(|| (self.scene.shape_of_part(index).surfaces(), pose))
+        (index < self.scene.parts().len()).then(|| (self.scene.surfaces_of_part(index), pose))
     }
 
     /// Axis (world) of the first of these static faces that is a cylinder or cone, else of the first such moving face, else zero.

@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `search`, `leaf` | traversal of all trees within a work budget; the points of one leaf |
+//! | `search`, `leaf`, `boxes` | traversal of all trees within a work budget; the points of one leaf; shapes whose boxes are apart |
 //! | `edge_search`, `edge_crossing` | edges of one part against edges of the other; contact of two edges |
 //! | `span` | lowest place of a span of an edge over the other part's surface |
 //! | `directed_pair` | one part's tree against the other's field, and the transforms between their frames |
@@ -15,6 +15,7 @@
 //! | `placement`, `node_cursor` | placement of a part; position of the search in all trees |
 
 pub(crate) mod ancestors;
+mod boxes;
 pub(crate) mod coherence;
 pub(crate) mod contact;
 pub mod cost;

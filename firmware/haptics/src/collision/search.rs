@@ -30,7 +30,7 @@ use crate::collision::directed_pair::DirectedPair;
 use crate::collision::exact_surface::{OnFace, exact, exact_on_face, on_surface_of, with_allowance};
 use crate::collision::facing::faces_away;
 use crate::collision::node_cursor::NodeCursor;
-use crate::collision::node_key::{ALL, Key, SHORTEST_SHARE};
+use crate::collision::node_key::{ALL, SHORTEST_SHARE};
 use crate::collision::placement::Placed;
 use crate::collision::rules::{FacePairRules, Mating, MatingCache};
 use crate::collision::side::Sides;
@@ -192,6 +192,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
             face_searches: 0,
             mating_cache: MatingCache::NONE,
             near: 0,
+            boxes: None,
         }
     }
 }
@@ -222,6 +223,8 @@ pub(crate) struct Traversal<'w, 's, 'i, R> {
     mating_cache: MatingCache,
     /// Number of points within the margin.
     pub near: u32,
+    /// The last part of which the boxes were compared, and their gap, m.
+    pub boxes: Option<(u16, f32)>,
 }
 
 impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
@@ -370,16 +373,6 @@ impl<R: FacePairRules> Traversal<'_, '_, '_, R> {
         }
         ancestors.close(index, self.coherence);
         None
-    }
-
-    /// The bound of a tree's root whose own is not known any more, where the boxes of the two shapes are apart: else all nodes below would be looked at.
-    pub fn boxes_apart(&mut self, pair: &DirectedPair<'_>, root: Key, known: Known) -> Option<Bound> {
-        if !matches!(known, Known::Expired | Known::Nothing) {
-            return None;
-        }
-        self.spent += NODE;
-        let gap = pair.box_gap();
-        (gap > self.search.margin).then(|| self.coherence.set_distance(root, gap))
     }
 
     /// Queries one point and offers it as a contact if it lies within the margin. Returns its gap or a lower bound of it, m.
