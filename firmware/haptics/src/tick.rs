@@ -42,7 +42,7 @@ const FASTER: f32 = 2.0;
 /// **Cost**, counted on an emulated Cortex-M7 (QEMU `mps2-an500`, `-icount`) on 2026-11-25, thesis pair with 20 µm clearance baked at 0.5 mm cells
 /// with a pointshell of 25 µm: at most 72,460 instructions pressed to the wall with 5 N and slid at 10 mm/s, 15,520 in free motion; with a
 /// pointshell of 5 µm 72,760 and 15,520. A peg of 0.7 m with 0.2 mm clearance and a shell of 50 µm, pressed in the same way and slid at 20 mm/s,
-/// takes 120,340 (`mortise-lab figures contact --quick`). Into a fit of 0.02 mm: 110,660 guided, 110,640 by collision alone; 76,940 with four
+/// takes 119,820 (`mortise-lab figures contact --quick`). Into a fit of 0.02 mm: 110,660 guided, 110,640 by collision alone; 76,940 with four
 /// different targets (`mortise-lab figures constraints --quick`).
 pub fn tick(state: &mut State, scene: &SceneImage<'_>, settings: &Settings, input: &Input) -> Output {
     let mut work = Work::default();

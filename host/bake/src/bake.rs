@@ -17,11 +17,13 @@ use crate::format::FieldOptions;
 use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes, shell_bytes};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
+use crate::overload::{overloads, round_fits};
 use crate::partners::Partners;
 use crate::pointshell::sample_pointshell;
 use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
 use crate::scene::Scene;
 use crate::shell::{Pointshell, PointshellOptions};
+use crate::ticks::Ticks;
 use crate::tree::node_count;
 
 /// A scene image and what is in it.
@@ -39,7 +41,7 @@ const ATTEMPTS: usize = 12;
 const SCOUT: f64 = 4.0;
 /// Cell edge over the pointshell's default error bound. The error reaches the bound only where a lone convex edge or a curved face touches a
 /// dissimilar surface; in a fit it is smaller by the factor of the radius difference over the radius.
-const EPSILON_PER_CELL: f64 = 20.0;
+pub(crate) const EPSILON_PER_CELL: f64 = 20.0;
 /// Times that the cell of a shape is halved so that its faces settle every cell.
 const HALVINGS: usize = 2;
 /// Default for the largest spacing along edges, in cells.
@@ -76,7 +78,16 @@ pub fn bake(
         }
     };
     let surfaces: Vec<&ExactSurface> = prepared.iter().collect();
-    let baked = scene.assemble(model, &each, &surfaces, made)?;
+    let fits = round_fits(&scene, &prepared);
+    let counted = Ticks {
+        model,
+        scene: &scene,
+        surfaces: surfaces.clone(),
+        fits: &fits,
+    };
+    let overloaded = overloads(&counted, &counted.of(&made), &each, &made);
+    let mut baked = scene.assemble(model, &each, &surfaces, made)?;
+    baked.report.warnings.extend(overloaded);
     let bytes = baked.image.len() as u64;
     if bytes > options.image_limit_bytes {
         let cell = baked.report.shapes.iter().map(|s| s.cell_mm).fold(0.0, f64::max);

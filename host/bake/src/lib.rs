@@ -47,6 +47,7 @@ mod mix;
 mod nearby;
 mod occupancy;
 mod options;
+mod overload;
 mod partners;
 mod patch;
 mod piece;

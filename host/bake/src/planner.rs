@@ -24,6 +24,7 @@ use crate::field::BakedField;
 use crate::fits::Fit;
 use crate::mix::mix;
 use crate::options::{BakeOptions, Progress};
+use crate::overload::overloads;
 use crate::plan::{Limit, PartTick, Plan, Planned, Request, ShapePlan};
 use crate::scene::Scene;
 use crate::ticks::Ticks;
@@ -481,10 +482,12 @@ impl<'a> Planner<'a> {
             self.scene.shells_again(&each, &surfaces, &sizes, &mut made);
             ticks = counted.of(&made);
         }
-        let baked = match self.scene.assemble(self.model, &each, &surfaces, made) {
+        let overloaded = overloads(&counted, &ticks, &each, &made);
+        let mut baked = match self.scene.assemble(self.model, &each, &surfaces, made) {
             Err(BakeError::TooLarge { .. }) => return Ok(Tried::Over(HOPELESS)),
             baked => baked?,
         };
+        baked.report.warnings.extend(overloaded);
         self.scene.done(self.progress);
         let over = self.over(baked.image.len(), longest(&ticks), has_finer(&fielded));
         let plan = Plan {

@@ -34,6 +34,34 @@ fn quickly(model: &CadModel) -> Result<Baked, BakeError> {
     bake(model, &options, &|_| ControlFlow::Continue(()))
 }
 
+/// A ball in a socket of its radius has thousands of points near, of which a tick looks at some hundred: pressed with 10 N it lies 114 µm deep. The bake
+/// says so, and that larger cells, with fewer points, are within the budget; joints whose edges bear are.
+#[test]
+fn a_ball_in_its_socket_is_said_to_exceed_the_budget() {
+    let over = |path: &str, cell_mm: Option<f64>| {
+        let model = load_step(&shared(path)?).unwrap();
+        let options = BakeOptions {
+            cell_mm,
+            ..BakeOptions::default()
+        };
+        let baked = bake(&model, &options, &|_| ControlFlow::Continue(())).unwrap();
+        let over = |warning: &String| warning.contains("budget");
+        Some(baked.report.warnings.into_iter().filter(over).collect::<Vec<_>>())
+    };
+    let ball = "06_joints/ball_in_socket.step";
+    if let Some(warnings) = over(ball, None) {
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        assert!(warnings[0].contains("part \"ball-with-stem\""), "{warnings:?}");
+        assert_eq!(over(ball, Some(6.0)), Some(Vec::new()));
+    }
+    for path in [
+        "06_joints/two_pin_assembled.step",
+        "08_hard/pair_clear0.10_nurbs.step",
+    ] {
+        assert_eq!(over(path, None).unwrap_or_default(), [""; 0], "{path}");
+    }
+}
+
 #[test]
 fn the_thesis_pair_agrees_with_its_closed_form() {
     pair_agrees("01_thesis_pair/pair_d18.75_clear1.00.step", 8.875);
