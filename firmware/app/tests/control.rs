@@ -524,7 +524,7 @@ fn a_bad_reading_is_reported_as_itself() {
         assert_eq!(bench.strings.last(), Drive::Off);
         assert_eq!(bench.fault_heard(), Some(Fault::BadReading));
         let flags = bench.heard.iter().find_map(|m| match m {
-            FromDevice::Telemetry(sample) => Some(Flags::from_bits(sample.flags)),
+            FromDevice::Telemetry(sample) => Some(Flags::from_bits_retain(sample.flags)),
             _ => None,
         });
         assert_eq!(flags, Some(Flags::BAD_INPUT));

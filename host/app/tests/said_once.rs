@@ -53,8 +53,8 @@ fn shows(harness: &mut Harness<'_, Window>, among: &[&str], expected: &[&str], c
 #[test]
 fn the_window_shows_each_flag_in_the_words_of_its_row() {
     let mut harness = holding();
-    let all: Vec<&str> = Flags::ALL.iter().map(|row| row.words).collect();
-    for row in Flags::ALL {
+    let all: Vec<&str> = Flags::ROWS.iter().map(|row| row.words).collect();
+    for row in Flags::ROWS {
         shows(&mut harness, &all, &[row.words], |window| {
             let telemetry = window.session.telemetry.as_mut().expect("in hand");
             telemetry.flags = row.flag.bits();

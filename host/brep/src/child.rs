@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
 use std::io::{BufReader, Read, Write};
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -254,13 +254,22 @@ fn spawn(path: &Path, options: &LoadOptions, question: bool) -> std::io::Result<
         question,
     };
     let request = postcard::to_allocvec(&request).map_err(std::io::Error::other)?;
-    Command::new(std::env::current_exe()?)
+    Command::new(program()?)
         .env(PATH_VARIABLE, path)
         .env(REQUEST_VARIABLE, to_hex(&request))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
+}
+
+/// This program. On Linux by the link that leads to it even after its file was replaced, as a new build does.
+fn program() -> std::io::Result<PathBuf> {
+    let link = Path::new("/proc/self/exe");
+    if cfg!(target_os = "linux") && link.exists() {
+        return Ok(link.to_owned());
+    }
+    std::env::current_exe()
 }
 
 /// `None` when the child is still running after `limit`, or when `ends` says so.

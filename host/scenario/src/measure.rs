@@ -41,7 +41,8 @@ pub fn depth(scene: &PreparedScene, depth: &Depth, moving: &DAffine3) -> Option<
 pub fn left_out_percent(samples: &[Telemetry]) -> f64 {
     let mut incomplete = Flags::BUDGET;
     incomplete.insert(Flags::CONTACTS);
-    let left_out = (samples.iter()).filter(|sample| Flags::from_bits(sample.flags).intersects(incomplete));
+    let left_out =
+        (samples.iter()).filter(|sample| Flags::from_bits_retain(sample.flags).intersects(incomplete));
     100.0 * left_out.count() as f64 / samples.len().max(1) as f64
 }
 

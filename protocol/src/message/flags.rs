@@ -1,9 +1,5 @@
 //! Flags of a tick: the one list from force law to window.
 
-/// Set of conditions of a tick, as the force law raises them, the board adds to them, and [`super::Telemetry::flags`] carries them.
-#[derive(Clone, Copy, Default, PartialEq, Eq)]
-pub struct Flags(u16);
-
 /// A flag with what is said about it.
 #[derive(Clone, Copy, Debug)]
 pub struct FlagRow {
@@ -20,11 +16,19 @@ pub struct FlagRow {
 /// Declares every flag with its meaning (the first line of its documentation), bit and words.
 macro_rules! flags {
     ($(#[doc = $meaning:literal] $(#[doc = $detail:literal])* $name:ident = $bit:literal, $words:literal;)+) => {
-        impl Flags {
-            $(#[doc = $meaning] $(#[doc = $detail])* pub const $name: Self = Self(1 << $bit);)+
+        bitflags::bitflags! {
+            /// Set of conditions of a tick, as the force law raises them, the board adds to them, and [`super::Telemetry::flags`] carries them.
+            #[derive(Clone, Copy, Default, PartialEq, Eq)]
+            pub struct Flags: u16 {
+                $(#[doc = $meaning] $(#[doc = $detail])* const $name = 1 << $bit;)+
+                // Bits of a newer board are kept.
+                const _ = !0;
+            }
+        }
 
+        impl Flags {
             /// Every flag, most important first.
-            pub const ALL: &[FlagRow] = &[$(FlagRow {
+            pub const ROWS: &[FlagRow] = &[$(FlagRow {
                 flag: Self::$name,
                 name: stringify!($name),
                 meaning: $meaning.trim_ascii(),
@@ -83,38 +87,8 @@ flags! {
 }
 
 impl Flags {
-    /// None.
-    pub const fn empty() -> Self {
-        Self(0)
-    }
-
-    /// As sent in telemetry.
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
-    /// From telemetry; unknown bits are kept.
-    pub const fn from_bits(bits: u16) -> Self {
-        Self(bits)
-    }
-
-    /// Whether all of `other` are set.
-    pub const fn contains(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// Whether any of `other` is set.
-    pub const fn intersects(self, other: Self) -> bool {
-        self.0 & other.0 != 0
-    }
-
-    /// Sets all of `other`.
-    pub const fn insert(&mut self, other: Self) {
-        self.0 |= other.0;
-    }
-
     /// Sets all of `other` when `condition` holds.
-    pub const fn insert_if(&mut self, condition: bool, other: Self) {
+    pub fn insert_if(&mut self, condition: bool, other: Self) {
         if condition {
             self.insert(other);
         }
@@ -122,7 +96,7 @@ impl Flags {
 
     /// Rows of the flags that are set, most important first.
     pub fn rows(self) -> impl Iterator<Item = &'static FlagRow> {
-        (Self::ALL.iter()).filter(move |row| self.contains(row.flag))
+        (Self::ROWS.iter()).filter(move |row| self.contains(row.flag))
     }
 }
 
@@ -138,10 +112,10 @@ mod tests {
 
     #[test]
     fn each_flag_has_a_bit_a_name_and_words_of_its_own() {
-        for (i, row) in Flags::ALL.iter().enumerate() {
+        for (i, row) in Flags::ROWS.iter().enumerate() {
             assert_eq!(row.flag.bits().count_ones(), 1, "{}", row.name);
             assert!(row.meaning.ends_with('.') && !row.words.is_empty(), "{row:?}");
-            for other in &Flags::ALL[..i] {
+            for other in &Flags::ROWS[..i] {
                 assert!(!row.flag.intersects(other.flag), "{row:?}, {other:?}");
                 assert!(
                     row.name != other.name && row.words != other.words,
@@ -149,7 +123,10 @@ mod tests {
                 );
             }
         }
-        assert_eq!(Flags::from_bits(u16::MAX).rows().count(), Flags::ALL.len());
+        assert_eq!(
+            Flags::from_bits_retain(u16::MAX).rows().count(),
+            Flags::ROWS.len()
+        );
         assert_eq!(Flags::empty().rows().count(), 0);
     }
 }

@@ -126,7 +126,7 @@ impl Report {
     /// The run's figures with their bounds.
     pub fn rows(&self) -> Vec<Row> {
         let run = format!(
-            "endurance, {} s of virtual time on {}, {} random scenes, {} harmed frames",
+            "endurance, {} s of virtual time on {}, {} random scenes ({} harmed frames)",
             self.seconds, self.rig, self.scenes, self.harmed_frames
         );
         for fault in &self.faults {
