@@ -1,12 +1,13 @@
 //! connect(a, b): a seat for the part, checked for overlap and for a way in (Jung 2003, fig. 5).
 //!
 //! Seats, in this order: the part's own place against b in the file; places there of equal parts, nearest first; such a place carried over to an equal
-//! bore of b; then ports of a and b that match in diameter ([`crate::matching`]). A filled seat overlaps the part in it and is passed over. The way
+//! bore of b; then ports of a and b that match in diameter ([`crate::matching`]); then flats on each other with bores in line ([`crate::flange`]). A filled seat overlaps the part in it and is passed over. The way
 //! in is the way out backwards, straight, from the side asked for.
 
 use glam::{DAffine3, DVec3};
 
 use crate::adjust::range_mm;
+use crate::flange::flanges;
 use crate::manner::Manner;
 use crate::matching::matches;
 use crate::phrase::Amount;
@@ -72,6 +73,13 @@ pub fn connect(world: &mut World, part: usize, into: usize, manner: &Manner) -> 
     }
     if found.is_none() {
         let poses = matches(world, part, into, manner, &mut blockers);
+        tried |= !poses.is_empty();
+        found = poses
+            .into_iter()
+            .find_map(|pose| enter(world, [part, into], &pose, manner, &mut blockers));
+    }
+    if found.is_none() && manner.hole.is_none() {
+        let poses = flanges(world, part, into);
         tried |= !poses.is_empty();
         found = poses
             .into_iter()

@@ -13,6 +13,7 @@ pub mod adjust;
 mod clause;
 pub mod connect;
 pub mod disconnect;
+pub mod flange;
 pub mod grammar;
 pub mod lexicon;
 pub mod manner;

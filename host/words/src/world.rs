@@ -6,6 +6,7 @@ use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Shape};
 use mortise_task::{Assembly, Clearance, Motion, Moved, TaskError};
 
+use crate::flange::{self, Flat, flats};
 use crate::port::{Port, ports};
 
 /// Distance within which two placements are the same, mm at the corners of the part's box: well below the micrometre promised.
@@ -42,6 +43,7 @@ pub struct World {
     /// Placements in the file.
     home: Vec<DAffine3>,
     ports: Vec<Arc<[Port]>>,
+    flats: Vec<Arc<[Flat]>>,
     /// Number of the first equal shape.
     kinds: Vec<usize>,
     /// Pairs together in the file: in contact, a shaft in a bore, or within [`NEAR_MM`].
@@ -70,10 +72,12 @@ impl World {
             .iter()
             .map(|p| of_shapes[p.shape].clone())
             .collect();
+        let flats = (0..count).map(|p| flats(assembly.surfaces(p)).into()).collect();
         let mut world = Self {
             assembly,
             home,
             ports,
+            flats,
             kinds,
             joined: vec![vec![false; count]; count],
             diagonal: low.distance(high),
@@ -142,6 +146,11 @@ impl World {
         &self.ports[part]
     }
 
+    /// The larger flats of a part, in its own frame.
+    pub fn flats(&self, part: usize) -> &[Flat] {
+        &self.flats[part]
+    }
+
     /// Size of the assembly in the file, mm.
     pub fn diagonal(&self) -> f64 {
         self.diagonal
@@ -197,13 +206,13 @@ impl World {
         fits
     }
 
-    /// Whether two parts are connected now: ports in one another, or placed to each other as in a file that has them in contact.
+    /// Whether two parts are connected now: ports in one another, a flange, or placed to each other as in a file that has them in contact.
     pub fn connected(&self, a: usize, b: usize) -> bool {
         let as_at_home = self.joined[a][b] && {
             let wanted = self.placement(b) * self.home[b].inverse() * self.home[a];
             self.same(a, &self.placement(a), &wanted)
         };
-        as_at_home || !self.fits_between(a, b).is_empty()
+        as_at_home || !self.fits_between(a, b).is_empty() || flange::joined(self, a, b).is_some()
     }
 
     /// Parts connected to `a` now.
@@ -334,7 +343,8 @@ impl World {
         at
     }
 
-    /// Directions in which a part may leave: axes of its connected ports, normals and axes of its contacts, and the file's axes; both ways.
+    /// Directions in which a part may leave: axes of its connected ports, normals and axes of its contacts, normals of
+    /// its flanges, and the file's axes; both ways.
     pub fn ways(&self, part: usize) -> Vec<DVec3> {
         let mut ways: Vec<DVec3> = Vec::new();
         let mut add = |d: DVec3| {
@@ -354,6 +364,11 @@ impl World {
                 add(turned
                     .transform_vector3(contact.axis.direction)
                     .normalize_or_zero());
+            }
+        }
+        for other in (0..self.count()).filter(|&other| other != part) {
+            if let Some(normal) = flange::joined(self, part, other) {
+                add(normal);
             }
         }
         for axis in DVec3::AXES {

@@ -1,5 +1,6 @@
 //! Figures: the tables by which the product is measured; each row is measured on request.
 
+mod assemble;
 mod claims;
 mod constraints;
 mod contact;
@@ -27,6 +28,7 @@ const TABLES: &[(&str, Measure)] = &[
     ("stability", stability::measure),
     ("promises", promises::measure),
     ("plan", planning::measure),
+    ("assemble", assemble::measure),
 ];
 
 /// Names of all tables.

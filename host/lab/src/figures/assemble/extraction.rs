@@ -1,0 +1,117 @@
+//! Tasks of extraction, several runs each, and pairs that stay together.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use mortise_task::removal::{Budget, Removal, remove};
+
+use super::checked::{Checked, Overlap};
+use super::{load, timed};
+use crate::LabError;
+use crate::figures::{Plan, Row};
+use crate::scene_p::median;
+
+/// Tasks with a way out.
+const TASKS: [&str; 9] = [
+    "tbolt_slot",
+    "ring_hook",
+    "ubolt_plate",
+    "cross_pin",
+    "gear_housing",
+    "flange_l_passage",
+    "lock_maze",
+    "bent_tube",
+    "keyhole_loose_30um",
+];
+/// Pairs without one; by how much they overlap at the least, µm, and the least that is worth a proof.
+const LOCKED: [(&str, f64, f64); 3] = [
+    ("keyhole_locked_30um", 15.0, 14.5),
+    ("ring_on_dumbbell", 500.0, 490.0),
+    ("linked_rings", 6000.0, 2900.0),
+];
+/// Runs of each task in the full and in the shorter form, and how many of their ways are checked.
+const RUNS: u64 = 10;
+const RUNS_QUICK: u64 = 2;
+const CHECKED: u64 = 1;
+/// Time of one run, and the longest median time, s.
+const RUN_S: u64 = 240;
+const MEDIAN_S: f64 = 10.0;
+/// Largest overlap on a way, µm.
+const OVERLAP_UM: f64 = 10.0;
+
+pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), LabError> {
+    let folder = cad.join("10_extraction");
+    let runs = if plan.quick { RUNS_QUICK } else { RUNS };
+    let (mut found, mut overlap) = (0, Overlap::default());
+    for name in TASKS {
+        let checked = Checked::load(&folder.join(format!("{name}.step")))?;
+        let mut times = Vec::new();
+        for seed in 0..runs {
+            let start = Instant::now();
+            let budget = Budget {
+                seed,
+                ..Budget::lasting(Duration::from_secs(RUN_S))
+            };
+            let removal = remove(&checked.assembly, &[1], &[0], &[], &budget);
+            times.push(start.elapsed().as_secs_f64());
+            if let Removal::Out(path) = removal {
+                found += 1;
+                if seed < CHECKED {
+                    overlap = overlap.and(checked.overlap(&[1], &[0], &path));
+                }
+            } else {
+                eprintln!("{name}, seed {seed}: {removal:?}");
+            }
+        }
+        let what = format!("{name}, {runs} runs: median time to a way out");
+        out(timed(plan, what, median(times.into_iter()), MEDIAN_S));
+    }
+    let tasks = format!("{} tasks of extraction, {runs} runs each", TASKS.len());
+    let all = TASKS.len() as f64 * runs as f64;
+    out(Row::exactly(
+        format!("{tasks}: ways found"),
+        f64::from(found),
+        "ways",
+        all,
+    ));
+    overlaps(&tasks, overlap, out);
+    for (name, held_um, least_um) in LOCKED {
+        let assembly = load(&folder.join(format!("{name}.step")))?;
+        let start = Instant::now();
+        let budget = Budget::lasting(Duration::from_secs(RUN_S));
+        let removal = remove(&assembly, &[1], &[0], &[], &budget);
+        let proved_um = match removal {
+            Removal::Blocked(blocked) if blocked.proof.is_some() && blocked.pair == [1, 0] => {
+                blocked.overlap_mm.map_or(0.0, |mm| 1e3 * mm)
+            }
+            _ => 0.0,
+        };
+        out(Row::within(
+            format!("{name}: overlap proved to be needed, of {held_um} µm"),
+            proved_um,
+            "µm",
+            least_um,
+            held_um,
+        ));
+        let what = format!("{name}: time to the proof");
+        out(timed(plan, what, start.elapsed().as_secs_f64(), MEDIAN_S));
+    }
+    Ok(())
+}
+
+/// The rows of ways that were checked.
+pub(super) fn overlaps(what: &str, overlap: Overlap, out: &mut dyn FnMut(Row)) {
+    let row = |by: &str, mm: f64| {
+        let what = format!("{what}: overlap on the ways checked by {by}");
+        Row::at_most(what, 1e3 * mm, "µm", OVERLAP_UM)
+    };
+    out(row("fine meshes, every 0.1 mm", overlap.meshes_mm));
+    out(row("the exact distance, every 10 µm", overlap.exact_mm));
+    out(Row::within(
+        format!("{what}: ways checked"),
+        overlap.ways as f64,
+        "ways",
+        1.0,
+        f64::INFINITY,
+    ));
+}

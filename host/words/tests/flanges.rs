@@ -1,0 +1,88 @@
+//! Flats on flats with bores in line: the motor's covers on its body, from where the exploded file has them and from any place.
+
+use std::path::PathBuf;
+
+use glam::{DAffine3, DQuat, DVec3};
+use mortise_brep::{CadModel, load_step};
+use mortise_words::{Outcome, Session, flange};
+
+const COVERS: [&str; 2] = ["back-cover", "front-cover"];
+
+fn motor(name: &str) -> Option<CadModel> {
+    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let root = std::env::var_os("MORTISE_SHARED").map_or(beside, PathBuf::from);
+    let file = root.join("cad/05_motor").join(name);
+    if !file.is_file() {
+        println!("skipped: no {}", file.display());
+        return None;
+    }
+    Some(load_step(file).expect("the motor is read"))
+}
+
+fn number(model: &CadModel, name: &str) -> usize {
+    model
+        .parts
+        .iter()
+        .position(|part| part.name == name)
+        .expect("a part of the motor")
+}
+
+/// Places of the covers against the body.
+fn places(parts: &[mortise_brep::Part]) -> Vec<DAffine3> {
+    let place = |name: &str| {
+        parts
+            .iter()
+            .find(|part| part.name == name)
+            .expect("a part of the motor")
+            .placement
+    };
+    COVERS
+        .map(|cover| place("body").inverse() * place(cover))
+        .to_vec()
+}
+
+#[test]
+fn covers_come_to_their_designed_places() {
+    let (Some(exploded), Some(designed)) = (motor("motor_exploded.step"), motor("motor_flat.step")) else {
+        return;
+    };
+    let mut session = Session::new(exploded).expect("an assembly");
+    for cover in ["back", "front"] {
+        let turn = session.say(&format!("put the {cover} cover onto the body"));
+        assert_eq!(turn.outcome, Outcome::Done, "{turn:?}");
+    }
+    let far = (places(session.parts()).iter().zip(places(&designed.parts)))
+        .flat_map(|(found, wanted)| {
+            [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|p| {
+                found
+                    .transform_point3(60.0 * p)
+                    .distance(wanted.transform_point3(60.0 * p))
+            })
+        })
+        .fold(0.0, f64::max);
+    assert!(far < 1e-3, "{far} mm");
+    // Undone by the same words as what the file has together.
+    let turn = session.say("take off the front cover");
+    assert_eq!(turn.outcome, Outcome::Done, "{turn:?}");
+}
+
+#[test]
+fn from_any_place_flats_meet_and_bores_are_in_line() {
+    let Some(model) = motor("motor_exploded.step") else {
+        return;
+    };
+    let mut random = fastrand::Rng::with_seed(11);
+    for _ in 0..6 {
+        let mut model = model.clone();
+        let (cover, body) = (number(&model, COVERS[0]), number(&model, "body"));
+        let mut any = || 2.0 * random.f64() - 1.0;
+        let turn = DQuat::from_xyzw(any(), any(), any(), any()).normalize();
+        let at = DVec3::new(any(), any(), any()) * 200.0 + DVec3::new(900.0, 0.0, 0.0);
+        model.parts[cover].placement = DAffine3::from_rotation_translation(turn, at);
+        let mut session = Session::new(model).expect("an assembly");
+        let turn = session.say("put the back cover onto the body");
+        assert_eq!(turn.outcome, Outcome::Done, "{turn:?}");
+        assert!(flange::joined(session.world(), cover, body).is_some());
+        assert!(session.world().blocker(cover).is_none());
+    }
+}
