@@ -5,7 +5,7 @@ use winnow::combinator::{alt, opt, preceded, repeat};
 use winnow::prelude::*;
 use winnow::token::{any, take_while};
 
-use crate::lexicon;
+use crate::lexicon::{self, VerbClass};
 
 /// Longest instruction that is read, bytes: far more than a sentence, so that garbage costs nothing.
 pub const LONGEST: usize = 2000;
@@ -274,8 +274,14 @@ fn named(tokens: Vec<Token>, names: &Names) -> Vec<Token> {
     };
     let mut out = Vec::new();
     let mut at = 0;
+    // Whether the clause so far has a verb that puts something somewhere.
+    let mut puts = false;
     while at < tokens.len() {
         let rest = &tokens[at..];
+        match &rest[0] {
+            Token::Comma | Token::Stop => puts = false,
+            token => puts |= token.word().and_then(lexicon::verb) == Some(VerbClass::Connect),
+        }
         let fits = |name: &[Token]| {
             let unit = rest.get(name.len()).and_then(Token::word).is_some_and(|word| {
                 let word = lexicon::singular(word);
@@ -286,6 +292,7 @@ fn named(tokens: Vec<Token>, names: &Names) -> Vec<Token> {
             name.len() >= 2
                 && name.len() <= rest.len()
                 && !counted
+                && !(puts && ends_in_particle(name, rest))
                 && name.iter().zip(rest).all(|(a, b)| same(a, b))
         };
         let found = names
@@ -311,6 +318,17 @@ fn named(tokens: Vec<Token>, names: &Names) -> Vec<Token> {
     out
 }
 
+/// Whether the last word of a name that stands before `rest` is a particle of the clause there: "put the front rotor back", and not `rotor-back`.
+fn ends_in_particle(name: &[Token], rest: &[Token]) -> bool {
+    let is_last = matches!(rest.get(name.len()), None | Some(Token::Comma | Token::Stop));
+    let is_particle = name
+        .last()
+        .and_then(Token::word)
+        .is_some_and(|word| lexicon::IN.contains(&word));
+    let before = name.len().checked_sub(2).and_then(|at| rest.get(at));
+    is_last && is_particle && matches!(before, Some(Token::Word { joined: false, .. }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,6 +346,19 @@ mod tests {
         assert_eq!(shown("take screw 1 out", &names), ["take", "screw-1", "out"]);
         assert_eq!(shown("nut 3 (2)", &names), ["nut_3 (2)"]);
         assert_eq!(shown("the pin in hole 3", &names), ["the", "pin-in-hole-3"]);
+        let rotors = ["rotor-back", "rotor-front"];
+        assert_eq!(
+            shown("put the front rotor back", &rotors),
+            ["put", "the", "front", "rotor", "back"]
+        );
+        assert_eq!(
+            shown("put the rotor-back in", &rotors),
+            ["put", "the", "rotor-back", "in"]
+        );
+        assert_eq!(
+            shown("remove the rotor back", &rotors),
+            ["remove", "the", "rotor-back"]
+        );
         assert_eq!(
             shown("pull the nut 3 mm", &names),
             ["pull", "the", "nut", "3", "mm"]

@@ -145,23 +145,18 @@ pub(super) fn measure(cad: &Path, plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> 
         let start = Instant::now();
         let (found, whole) = apart(&assembly);
         let seconds = start.elapsed().as_secs_f64();
-        for (parts, blocked) in &found.stuck {
-            let names: Vec<&str> = parts.iter().map(|&part| assembly.name(part)).collect();
+        let stuck = found.stuck.iter().map(|(_, blocked)| {
             let [a, b] = blocked.pair.map(|part| assembly.name(part));
-            eprintln!(
-                "{file}: {} stay together, {a} against {b}, {:?} mm",
-                names.join(", "),
-                blocked.overlap_mm
-            );
-        }
-        let verdict = if whole {
-            "comes apart"
-        } else {
-            "blocked, or no way found"
+            format!("{a} does not leave {b}")
+        });
+        let verdict = match (whole, found.timed_out) {
+            (true, _) => "comes apart".to_owned(),
+            (false, true) => "time ran out".to_owned(),
+            (false, false) => stuck.collect::<Vec<_>>().join(", "),
         };
         out(Row::noted(
             format!("{file}, {} parts: verdict", assembly.count()),
-            verdict,
+            &verdict,
         ));
         out(timed(
             plan,
