@@ -28,13 +28,20 @@ struct Seat {
     travel: f64,
 }
 
-/// Puts `part` together with `into`. Nothing moves when it already is in such a seat.
+/// Puts `part`, with what is connected to it, together with `into`. Nothing moves when it already is in such a seat.
 ///
 /// # Errors
 /// [`Trouble::Refuse`]: `Blocked` with the parts in the way, `NoFit` when nothing fits, `NotUnderstood` for a vague extent.
 ///
 /// Cost: for each seat tried one overlap query and some sweeps.
 pub fn connect(world: &mut World, part: usize, into: usize, manner: &Manner) -> Result<Act, Trouble> {
+    world.attach(part, into);
+    let done = put(world, part, into, manner);
+    world.detach();
+    done
+}
+
+fn put(world: &mut World, part: usize, into: usize, manner: &Manner) -> Result<Act, Trouble> {
     let name = world.name(part).to_owned();
     let target = world.name(into).to_owned();
     if part == into {

@@ -49,6 +49,8 @@ pub struct World {
     /// Pairs together in the file: in contact, a shaft in a bore, or within [`NEAR_MM`].
     joined: Vec<Vec<bool>>,
     diagonal: f64,
+    /// A part, and the parts that move with it, while they are attached to it.
+    attached: Option<(usize, Vec<usize>)>,
 }
 
 impl World {
@@ -81,6 +83,7 @@ impl World {
             kinds,
             joined: vec![vec![false; count]; count],
             diagonal: low.distance(high),
+            attached: None,
         };
         for contact in world.assembly.contacts.clone() {
             world.join(contact.parts);
@@ -126,9 +129,58 @@ impl World {
         self.home[part]
     }
 
-    /// Places a part.
+    /// Places a part, and with it those that are attached to it.
     pub fn set_placement(&mut self, part: usize, placement: DAffine3) {
+        if let Some((leader, with)) = &self.attached
+            && *leader == part
+        {
+            let by = placement * self.placement(part).inverse();
+            for &other in with {
+                let there = by * self.placement(other);
+                self.assembly.model.parts[other].placement = there;
+            }
+        }
         self.assembly.model.parts[part].placement = placement;
+    }
+
+    /// Attaches to `part` what is connected with it, directly or by others, until [`Self::detach`]: the aggregate that moves when the part is put onto `into`
+    /// (Jung 2003, fig. 5). Where `into` belongs to it already, the part moves alone.
+    ///
+    /// Cost: the fits of each part of the aggregate with all others.
+    pub fn attach(&mut self, part: usize, into: usize) {
+        let mut with = vec![part];
+        let mut next = 0;
+        while next < with.len() {
+            let found = self.connections(with[next]);
+            if found.contains(&into) {
+                return;
+            }
+            with.extend(
+                found
+                    .into_iter()
+                    .filter(|other| !with.contains(other))
+                    .collect::<Vec<_>>(),
+            );
+            next += 1;
+        }
+        with.remove(0);
+        self.attached = (!with.is_empty()).then_some((part, with));
+    }
+
+    /// Ends what [`Self::attach`] began.
+    pub fn detach(&mut self) {
+        self.attached = None;
+    }
+
+    /// `moving`, and what is attached to them.
+    fn all_moving(&self, moving: &[usize]) -> Vec<usize> {
+        let mut all = moving.to_vec();
+        if let Some((leader, with)) = &self.attached
+            && moving.contains(leader)
+        {
+            all.extend(with.iter().filter(|other| !moving.contains(other)));
+        }
+        all
     }
 
     /// All placements now.
@@ -233,8 +285,9 @@ impl World {
         (low + high) / 2.0
     }
 
-    /// All parts but `moving`.
+    /// All parts but `moving` and what is attached to them.
     pub fn others(&self, moving: &[usize]) -> Vec<usize> {
+        let moving = self.all_moving(moving);
         (0..self.count()).filter(|p| !moving.contains(p)).collect()
     }
 
@@ -243,7 +296,7 @@ impl World {
     pub fn travel(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
         let near = self.on_the_way(moving, direction, limit);
         let group = Moved {
-            parts: moving,
+            parts: &self.all_moving(moving),
             by: DAffine3::IDENTITY,
         };
         let (share, pair) =
@@ -255,7 +308,7 @@ impl World {
     /// As [`Self::travel`], found to `COARSE_MM` only: for questions whether a way is free. A way blocked at its start costs little.
     pub fn free(&self, moving: &[usize], direction: DVec3, limit: f64) -> (f64, Option<[usize; 2]>) {
         let group = Moved {
-            parts: moving,
+            parts: &self.all_moving(moving),
             by: DAffine3::IDENTITY,
         };
         for length in [START_MM.min(limit), limit] {
@@ -273,7 +326,8 @@ impl World {
 
     /// Parts whose boxes meet the box of the motion.
     fn on_the_way(&self, moving: &[usize], direction: DVec3, limit: f64) -> Vec<usize> {
-        let (mut low, mut high) = self.assembly.bounds_of(moving, DAffine3::IDENTITY);
+        let all = self.all_moving(moving);
+        let (mut low, mut high) = self.assembly.bounds_of(&all, DAffine3::IDENTITY);
         low = low.min(low + direction * limit);
         high = high.max(high + direction * limit);
         let mut near = self.others(moving);
@@ -286,7 +340,7 @@ impl World {
 
     /// Share of a motion that `part` makes before it meets another part, and the pair.
     pub fn share(&self, part: usize, motion: &Motion) -> (f64, Option<[usize; 2]>) {
-        let moving = [part];
+        let moving = self.all_moving(&[part]);
         let group = Moved {
             parts: &moving,
             by: DAffine3::IDENTITY,
@@ -297,7 +351,7 @@ impl World {
 
     /// A part that overlaps `part` where it is now.
     pub fn blocker(&self, part: usize) -> Option<Clearance> {
-        let moving = [part];
+        let moving = self.all_moving(&[part]);
         self.assembly.blocker(
             &Moved {
                 parts: &moving,
@@ -309,7 +363,9 @@ impl World {
 
     /// Shortest travel along `direction` at which the box of `moving` is apart from the boxes of `from`, mm.
     pub fn exit_mm(&self, moving: &[usize], from: &[usize], direction: DVec3) -> f64 {
-        let (low, high) = self.assembly.bounds_of(moving, DAffine3::IDENTITY);
+        let (low, high) = self
+            .assembly
+            .bounds_of(&self.all_moving(moving), DAffine3::IDENTITY);
         // Stretches of the travel in which the boxes meet.
         let mut meets: Vec<(f64, f64)> = Vec::new();
         for &other in from {

@@ -86,3 +86,34 @@ fn from_any_place_flats_meet_and_bores_are_in_line() {
         assert!(session.world().blocker(cover).is_none());
     }
 }
+
+/// A cover brings along the bearing and the seal that are in it.
+#[test]
+fn what_is_in_a_cover_comes_along() {
+    let Some(exploded) = motor("motor_exploded.step") else {
+        return;
+    };
+    let mut session = Session::new(exploded).expect("an assembly");
+    let place = |session: &Session, name: &str| {
+        let part = session.parts().iter().find(|part| part.name == name);
+        part.expect("a part of the motor").placement
+    };
+    for words in [
+        "insert the front bearing into the front cover",
+        "insert the seal into the front cover",
+    ] {
+        let turn = session.say(words);
+        assert_eq!(turn.outcome, Outcome::Done, "{turn:?}");
+    }
+    let within =
+        |session: &Session, name: &str| place(session, "front-cover").inverse() * place(session, name);
+    let before = ["bearing-front", "seal"].map(|name| within(&session, name));
+    let turn = session.say("put the front cover onto the body");
+    assert_eq!(turn.outcome, Outcome::Done, "{turn:?}");
+    assert_eq!(turn.moved.len(), 3, "{turn:?}");
+    for (name, before) in ["bearing-front", "seal"].into_iter().zip(before) {
+        assert!(within(&session, name).abs_diff_eq(before, 1e-9), "{name}");
+    }
+    let turn = session.say("undo");
+    assert_eq!((turn.outcome, turn.moved.len()), (Outcome::Done, 3), "{turn:?}");
+}
