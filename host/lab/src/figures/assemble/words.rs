@@ -159,7 +159,7 @@ fn read_again(file: &Path, parts: &[Part]) -> Result<Vec<Part>, LabError> {
         source,
     };
     let mut written = (tempfile::Builder::new().suffix(".step").tempfile()).map_err(unwritable)?;
-    written.write_all(text.as_ref()).map_err(unwritable)?;
+    written.write_all(&text).map_err(unwritable)?;
     Ok(mortise_brep::load_step(written.path())?.parts)
 }
 
