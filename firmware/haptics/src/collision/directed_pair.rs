@@ -14,7 +14,7 @@ use crate::math::pose::Pose;
 /// Rounding error of a position in a field, relative to the lengths summed: eight roundings of 2⁻²⁴ at most.
 const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
-/// Tree of one part, field of the other, and the transforms between their frames.
+/// Tree of one part, field of the other, and the transforms between their frames, found once a tick; flat, because each query reads most of it.
 pub(crate) struct DirectedPair<'i> {
     pub index: u16,
     pub backward: bool,
