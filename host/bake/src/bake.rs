@@ -3,9 +3,7 @@
 use std::ops::ControlFlow;
 
 use mortise_brep::{CadModel, Surface};
-use mortise_protocol::image::{
-    BrickRecord, FaceRecord, FieldRecord, Header, NodeRecord, PartRecord, PatchRecord, ShapeRecord,
-};
+use mortise_protocol::image::{FaceRecord, FieldRecord, Header, PartRecord, ShapeRecord};
 use rayon::prelude::*;
 
 use crate::classic::classic_pointshell;
@@ -14,7 +12,8 @@ use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::{BakedField, bake_field};
 use crate::format::FieldOptions;
-use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes, shell_bytes};
+use crate::image::{ImageBuilder, PALETTE_PADDING, PartPlacement, edge_bytes};
+use crate::made::{EPSILON_PER_CELL, Made, field_bytes};
 use crate::occupancy::bake_occupancy;
 use crate::options::{BakeOptions, Method, PointshellKind, Progress, Stage};
 use crate::overload::{overloads, round_fits};
@@ -24,7 +23,6 @@ use crate::report::{BakeReport, ByteCount, PartReport, ShapeReport};
 use crate::scene::Scene;
 use crate::shell::{Pointshell, PointshellOptions};
 use crate::ticks::Ticks;
-use crate::tree::node_count;
 
 /// A scene image and what is in it.
 #[derive(Clone, Debug)]
@@ -39,9 +37,6 @@ pub struct Baked {
 const ATTEMPTS: usize = 12;
 /// Scale of the first, coarse attempt when cells may be chosen freely: it costs a sixteenth of the work, and its byte count shows how far to refine.
 const SCOUT: f64 = 4.0;
-/// Cell edge over the pointshell's default error bound. The error reaches the bound only where a lone convex edge or a curved face touches a
-/// dissimilar surface; in a fit it is smaller by the factor of the radius difference over the radius.
-pub(crate) const EPSILON_PER_CELL: f64 = 20.0;
 /// Times that the cell of a shape is halved so that its faces settle every cell.
 const HALVINGS: usize = 2;
 /// Default for the largest spacing along edges, in cells.
@@ -103,30 +98,6 @@ fn too_large(bytes: u64, limit: u64, cell_mm: f64) -> BakeError {
         limit,
         enough_mm: cell_mm * (bytes as f64 / limit.max(1) as f64).sqrt() * 1.05,
     }
-}
-
-/// Fields and pointshells made for the shapes.
-pub(crate) struct Made {
-    pub fields: Vec<BakedField>,
-    pub shells: Vec<Pointshell>,
-}
-
-impl Made {
-    /// Bytes of the shapes in the image, without parts and header.
-    pub fn bytes(&self) -> u64 {
-        let shells = self.shells.iter().map(|shell| {
-            (shell_bytes(shell) + node_count(shell.points.len()) * size_of::<NodeRecord>()) as u64
-        });
-        self.fields.iter().map(field_bytes).chain(shells).sum()
-    }
-}
-
-/// Bytes of a field in the image.
-pub(crate) fn field_bytes(field: &BakedField) -> u64 {
-    let bricks = field.bricks.len() * size_of::<BrickRecord>();
-    // Alignment of the blob and of the grid: less than 8 bytes.
-    let patches = field.patches.len() * size_of::<PatchRecord>();
-    (field.blob.len() + 2 * field.grid.len() + bricks + 2 * field.palette.len() + patches + 8) as u64
 }
 
 impl Scene {

@@ -43,6 +43,7 @@ mod grid;
 mod image;
 mod levels;
 mod local_patch;
+mod made;
 mod mix;
 mod nearby;
 mod occupancy;

@@ -5,9 +5,9 @@
 
 use mortise_protocol::parameter::ParameterId;
 
-use crate::bake::{EPSILON_PER_CELL, Made};
 use crate::distance::ExactSurface;
 use crate::fits::{Fit, fits};
+use crate::made::{EPSILON_PER_CELL, Made};
 use crate::options::{BakeOptions, Method, PointshellKind};
 use crate::plan::PartTick;
 use crate::scene::Scene;

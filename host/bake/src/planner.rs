@@ -14,7 +14,6 @@ use mortise_haptics::LEAST_CROSSING_SINE;
 use rayon::prelude::*;
 
 use crate::attempt::{Attempt, HOPELESS, Over, Tried, better};
-use crate::bake::Made;
 use crate::cache::{Cache, NoCache, plan_from_bytes, plan_name, plan_to_bytes, shape_name};
 use crate::choice::PATCH_SHARE;
 use crate::demands::{all_fits, demand, reached_surface};
@@ -22,6 +21,7 @@ use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::BakedField;
 use crate::fits::Fit;
+use crate::made::Made;
 use crate::mix::mix;
 use crate::options::{BakeOptions, Progress};
 use crate::overload::overloads;

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use mortise_brep::{CadModel, Surface};
 
-use crate::bake::Made;
 use crate::cost::TickCost;
 use crate::distance::ExactSurface;
 use crate::fits::Fit;
+use crate::made::Made;
 use crate::plan::PartTick;
 use crate::scene::Scene;
 use crate::shell::Pointshell;

@@ -14,13 +14,13 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use crate::bake::field_bytes;
 use crate::cache::{Cache, KeptField, field_name};
 use crate::choice::{Choice, Demand, PATCH_SHARE};
 use crate::distance::ExactSurface;
 use crate::error::BakeError;
 use crate::field::BakedField;
 use crate::field_error::{FaceError, field_errors};
+use crate::made::field_bytes;
 use crate::options::{BakeOptions, Progress};
 use crate::scene::Scene;
 

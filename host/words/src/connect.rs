@@ -7,7 +7,7 @@
 use glam::{DAffine3, DVec3};
 
 use crate::adjust::range_mm;
-use crate::flange::flanges;
+use crate::flange_seats::flanges;
 use crate::manner::Manner;
 use crate::matching::matches;
 use crate::phrase::Amount;

@@ -14,6 +14,7 @@ mod clause;
 pub mod connect;
 pub mod disconnect;
 pub mod flange;
+mod flange_seats;
 pub mod grammar;
 pub mod lexicon;
 pub mod manner;

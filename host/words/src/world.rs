@@ -258,13 +258,19 @@ impl World {
         fits
     }
 
+    /// The normal of a flat of `a` that lies on a flat of `b` now, with bores in line.
+    pub fn flange(&self, a: usize, b: usize) -> Option<DVec3> {
+        let of = |part: usize| (self.flats(part), self.ports(part), self.placement(part));
+        flange::joined(of(a), of(b))
+    }
+
     /// Whether two parts are connected now: ports in one another, a flange, or placed to each other as in a file that has them in contact.
     pub fn connected(&self, a: usize, b: usize) -> bool {
         let as_at_home = self.joined[a][b] && {
             let wanted = self.placement(b) * self.home[b].inverse() * self.home[a];
             self.same(a, &self.placement(a), &wanted)
         };
-        as_at_home || !self.fits_between(a, b).is_empty() || flange::joined(self, a, b).is_some()
+        as_at_home || !self.fits_between(a, b).is_empty() || self.flange(a, b).is_some()
     }
 
     /// Parts connected to `a` now.
@@ -423,7 +429,7 @@ impl World {
             }
         }
         for other in (0..self.count()).filter(|&other| other != part) {
-            if let Some(normal) = flange::joined(self, part, other) {
+            if let Some(normal) = self.flange(part, other) {
                 add(normal);
             }
         }

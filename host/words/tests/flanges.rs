@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, load_step};
-use mortise_words::{Outcome, Session, flange};
+use mortise_words::{Outcome, Session};
 
 const COVERS: [&str; 2] = ["back-cover", "front-cover"];
 
@@ -82,7 +82,7 @@ fn from_any_place_flats_meet_and_bores_are_in_line() {
         let mut session = Session::new(model).expect("an assembly");
         let turn = session.say("put the back cover onto the body");
         assert_eq!(turn.outcome, Outcome::Done, "{turn:?}");
-        assert!(flange::joined(session.world(), cover, body).is_some());
+        assert!(session.world().flange(cover, body).is_some());
         assert!(session.world().blocker(cover).is_none());
     }
 }

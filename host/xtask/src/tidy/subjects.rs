@@ -29,6 +29,7 @@ const VERBS: &[&str] = &[
     "Begin",
     "Bind",
     "Bound",
+    "Bring",
     "Build",
     "Bump",
     "Cache",

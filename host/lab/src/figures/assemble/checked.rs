@@ -9,7 +9,7 @@ use mortise_task::{Assembly, Moved};
 use parry3d_f64::query::PointQueryWithLocation as _;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
-use super::{load, refused};
+use super::assembly_file::{load, refused};
 use crate::LabError;
 
 /// Travel between two checks by the meshes, and by the exact distance, mm.

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use mortise_task::removal::{Budget, Removal, remove};
 
+use super::assembly_file::{load, timed};
 use super::checked::{Checked, Overlap};
-use super::{load, timed};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 use crate::scene_p::median;

@@ -7,9 +7,9 @@ use mortise_task::report::{self, Sense};
 use mortise_task::{Assembly, sequence};
 use serde::Deserialize;
 
+use super::assembly_file::{load, refused, timed};
 use super::checked::{Checked, Overlap};
 use super::extraction::overlaps;
-use super::{load, timed};
 use crate::LabError;
 use crate::figures::{Plan, Row};
 
@@ -173,5 +173,5 @@ fn read_order(path: &PathBuf) -> Result<Order, LabError> {
         path: path.clone(),
         source,
     })?;
-    serde_json::from_str(&text).map_err(|error| super::refused(path, &error))
+    serde_json::from_str(&text).map_err(|error| refused(path, &error))
 }

@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3};
 use mortise_brep::{LoadOptions, Part};
 use mortise_words::{Outcome, Session};
 
-use super::refused;
+use super::assembly_file::refused;
 use crate::LabError;
 use crate::figures::Row;
 
@@ -63,7 +63,7 @@ pub(super) fn measure(cad: &Path, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
     let designed = model.parts.clone();
     let mut session = Session::new(model).map_err(|error| refused(&file, &error))?;
     let half = SCRIPT.len() / 2;
-    let mut told = say(&mut session, &SCRIPT[..half]);
+    let mut spoken = say(&mut session, &SCRIPT[..half]);
     let what = |what: &str| {
         format!(
             "motor of {} parts apart and together by words: {what}",
@@ -84,10 +84,10 @@ pub(super) fn measure(cad: &Path, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
         "µm",
         OFF_UM,
     ));
-    told = told.and(say(&mut session, &SCRIPT[half..]));
+    spoken = spoken.and(say(&mut session, &SCRIPT[half..]));
     out(Row::exactly(
         what("instructions done"),
-        told.done as f64,
+        spoken.done as f64,
         "instructions",
         SCRIPT.len() as f64,
     ));
@@ -97,7 +97,7 @@ pub(super) fn measure(cad: &Path, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
         "µm",
         OFF_UM,
     ));
-    out(Row::at_most(what("longest act"), told.longest_ms, "ms", STEP_MS).varies());
+    out(Row::at_most(what("longest act"), spoken.longest_ms, "ms", STEP_MS).varies());
 
     let file = cad.join(SCATTERED);
     let model = mortise_brep::load_step(&file)?;
@@ -118,12 +118,12 @@ pub(super) fn measure(cad: &Path, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
 
 /// What instructions came to.
 #[derive(Default)]
-struct Told {
+struct Spoken {
     done: usize,
     longest_ms: f64,
 }
 
-impl Told {
+impl Spoken {
     fn and(self, other: Self) -> Self {
         Self {
             done: self.done + other.done,
@@ -133,8 +133,8 @@ impl Told {
 }
 
 /// Carries out instructions; the time of each counts by its acts.
-fn say(session: &mut Session, script: &[&str]) -> Told {
-    let mut told = Told::default();
+fn say(session: &mut Session, script: &[&str]) -> Spoken {
+    let mut spoken = Spoken::default();
     for instruction in script {
         let start = Instant::now();
         let turn = session.say(instruction);
@@ -143,12 +143,12 @@ fn say(session: &mut Session, script: &[&str]) -> Told {
             .reason
             .map_or_else(String::new, |reason| format!(", {}", reason.words));
         eprintln!("{instruction}: {:?}, {ms:.0} ms an act{reason}", turn.outcome);
-        told = told.and(Told {
+        spoken = spoken.and(Spoken {
             done: usize::from(turn.outcome == Outcome::Done),
             longest_ms: ms,
         });
     }
-    told
+    spoken
 }
 
 /// The parts of the file that is written with these, read again.
