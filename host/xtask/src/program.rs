@@ -101,29 +101,54 @@ pub fn pick(made: &[(String, PathBuf)], name: &str) -> Result<PathBuf> {
     }
 }
 
-/// Reads one line of cargo's JSON messages; `None` unless it names the executable of a `bin` target.
-fn executable_of(line: &str) -> Option<(String, PathBuf)> {
-    let message: JsonValue = line.parse().ok()?;
-    let text = |value: &JsonValue| value.get::<String>().cloned();
-    let object = message.get::<std::collections::HashMap<String, JsonValue>>()?;
-    if text(object.get("reason")?)? != "compiler-artifact" {
-        return None;
+/// An executable that cargo made, as its JSON messages tell.
+pub struct Artifact {
+    /// The target's name.
+    pub name: String,
+    /// The package's `Cargo.toml`.
+    pub manifest: PathBuf,
+    /// The executable.
+    pub executable: PathBuf,
+    /// A program.
+    pub is_bin: bool,
+    /// With a test harness, under the name of what it tests.
+    pub is_test: bool,
+}
+
+impl Artifact {
+    /// Reads one line of cargo's JSON messages; `None` unless it names an executable.
+    pub fn read(line: &str) -> Option<Self> {
+        let message: JsonValue = line.parse().ok()?;
+        let text = |value: &JsonValue| value.get::<String>().cloned();
+        let object = message.get::<std::collections::HashMap<String, JsonValue>>()?;
+        if text(object.get("reason")?)? != "compiler-artifact" {
+            return None;
+        }
+        let executable = PathBuf::from(text(object.get("executable")?)?);
+        let target = object
+            .get("target")?
+            .get::<std::collections::HashMap<String, JsonValue>>()?;
+        let profile = object
+            .get("profile")?
+            .get::<std::collections::HashMap<String, JsonValue>>()?;
+        Some(Self {
+            name: text(target.get("name")?)?,
+            manifest: PathBuf::from(text(object.get("manifest_path")?)?),
+            executable,
+            is_bin: target
+                .get("kind")?
+                .get::<Vec<JsonValue>>()?
+                .iter()
+                .any(|kind| text(kind).as_deref() == Some("bin")),
+            is_test: profile.get("test")?.get::<bool>().copied()?,
+        })
     }
-    let path = text(object.get("executable")?)?;
-    let target = object
-        .get("target")?
-        .get::<std::collections::HashMap<String, JsonValue>>()?;
-    // A test harness is an executable too, under the name of the crate it tests.
-    let profile = object
-        .get("profile")?
-        .get::<std::collections::HashMap<String, JsonValue>>()?;
-    let is_bin = target
-        .get("kind")?
-        .get::<Vec<JsonValue>>()?
-        .iter()
-        .any(|kind| text(kind).as_deref() == Some("bin"));
-    let is_test = profile.get("test")?.get::<bool>().copied()?;
-    (is_bin && !is_test).then_some((text(target.get("name")?)?, PathBuf::from(path)))
+}
+
+/// The executable of a `bin` target that one line of cargo's JSON messages names.
+fn executable_of(line: &str) -> Option<(String, PathBuf)> {
+    let artifact = Artifact::read(line)?;
+    (artifact.is_bin && !artifact.is_test).then_some((artifact.name, artifact.executable))
 }
 
 #[cfg(test)]
@@ -132,9 +157,9 @@ mod tests {
 
     #[test]
     fn executables_are_read_from_cargo_messages() {
-        let bin = r#"{"reason":"compiler-artifact","target":{"kind":["bin"],"name":"mortise"},"profile":{"test":false},"executable":"/t/mortise"}"#;
+        let bin = r#"{"reason":"compiler-artifact","manifest_path":"/p/Cargo.toml","target":{"kind":["bin"],"name":"mortise"},"profile":{"test":false},"executable":"/t/mortise"}"#;
         let test = bin.replace("\"test\":false", "\"test\":true");
-        let lib = r#"{"reason":"compiler-artifact","target":{"kind":["lib"],"name":"x"},"profile":{"test":false},"executable":null}"#;
+        let lib = r#"{"reason":"compiler-artifact","manifest_path":"/p/Cargo.toml","target":{"kind":["lib"],"name":"x"},"profile":{"test":false},"executable":null}"#;
         assert_eq!(
             executable_of(bin),
             Some(("mortise".into(), PathBuf::from("/t/mortise")))

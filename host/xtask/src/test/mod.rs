@@ -4,6 +4,7 @@
 //! users run.
 
 mod bench;
+mod binaries;
 mod report;
 mod steps;
 mod window;

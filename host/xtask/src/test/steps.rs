@@ -7,6 +7,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 
 use super::bench::Bench;
+use super::binaries;
 use crate::{figures, firmware as boards, fuzz, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
@@ -15,6 +16,8 @@ const FUZZ_EACH: Duration = Duration::from_secs(15);
 /// Seed of the property tests' cases, unless the environment sets another: a commit passes or fails the same everywhere. Plain `cargo test` draws new
 /// cases each time.
 const PROPERTY_SEED: (&str, &str) = ("PROPTEST_RNG_SEED", "20261122");
+/// Test programs that take longest, longest first: they are begun first, so that none of them runs alone at the end.
+const LONGEST: [&str; 3] = ["host/lab mortise_lab", "firmware/orders depth", "host/app flow"];
 const BOARD_SIDE: [&str; 5] = [
     "mortise-protocol",
     "mortise-haptics",
@@ -121,17 +124,27 @@ pub fn build(bench: &mut Bench) -> Result<String> {
     Ok(String::new())
 }
 
+/// All tests but those on a rig: programs side by side, see [`binaries`], then examples in documentation.
 pub fn unit(bench: &mut Bench) -> Result<String> {
-    let mut command = shell::cargo(&bench.root);
-    command.args([
+    let mut build = shell::cargo(&bench.root);
+    build.args([
         "test",
         "--release",
         "--workspace",
         "--exclude",
         HIL_TESTS,
-        "--no-fail-fast",
+        "--no-run",
     ]);
-    counted(bench, &mut command)
+    let counts = &mut bench.counts;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let programs = binaries::run(&bench.root, &mut build, &LONGEST, cores, seed, |line| {
+        println!("{line}");
+        counts.add_line(line);
+    });
+    let mut examples = shell::cargo(&bench.root);
+    examples.args(["test", "--release", "--workspace", "--doc", "--no-fail-fast"]);
+    let examples = counted(bench, &mut examples);
+    programs.and(examples)
 }
 
 /// Parts of boards that need no chip are libraries, tested here on the PC.
@@ -213,12 +226,17 @@ fn host_triple(root: &Path) -> Result<String> {
     Ok(host.context("`rustc -vV` names no host")?.to_owned())
 }
 
-/// Runs tests and counts them, including failed ones; a run without tests is a failure, because it shows nothing.
-fn counted(bench: &mut Bench, command: &mut Command) -> Result<String> {
+/// Sets [`PROPERTY_SEED`].
+fn seed(command: &mut Command) {
     let (name, seed) = PROPERTY_SEED;
     if std::env::var_os(name).is_none() {
         command.env(name, seed);
     }
+}
+
+/// Runs tests and counts them, including failed ones; a run without tests is a failure, because it shows nothing.
+fn counted(bench: &mut Bench, command: &mut Command) -> Result<String> {
+    seed(command);
     shell::run_lines(command, |line| {
         println!("{line}");
         bench.counts.add_line(line);
