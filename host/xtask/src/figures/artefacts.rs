@@ -145,19 +145,6 @@ pub const ARTEFACTS: &[Artefact] = &[
         sources: &[LAW, &["host/lab/src/figures/planning.rs"]],
     },
     Artefact {
-        name: "assemble",
-        made: Made::Page { quick: true },
-        sources: &[
-            LAW,
-            &[
-                "host/mating/src",
-                "host/task/src",
-                "host/words/src",
-                "host/lab/src/figures/assemble",
-            ],
-        ],
-    },
-    Artefact {
         name: "pareto",
         made: Made::Sweep { quick: false },
         sources: &[
