@@ -55,7 +55,7 @@ pub enum Ticked {
     Waiting,
 }
 
-/// Everything the 1 kHz task owns: one struct, so that the task is one resource without a lock; what belongs together is grouped in the types of its fields.
+/// Everything the 1 kHz task owns. Many fields, because nothing of it lives elsewhere; what belongs together is grouped in their types.
 pub struct ControlPlane<'c, 's, M, C> {
     ends: ControlEnds<'c, 's>,
     mechanism: M,

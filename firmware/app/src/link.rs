@@ -33,7 +33,7 @@ use freshness::Freshness;
 /// Space an empty [`Outbound`] must have: telemetry leaves space for one frame of answers.
 pub const OUTBOUND_MIN: usize = 2 * MAX_FRAME;
 
-/// Everything the low-priority task owns, about 2 kB: one struct, so that the task is one resource without a lock. Its counters are those of [`Statistics`].
+/// Everything the low-priority task owns, about 2 kB. Many fields, because nothing of it lives elsewhere.
 pub struct LinkPlane<'c, 's, F> {
     ends: LinkEnds<'c, 's>,
     store: Store<'s, F>,

@@ -106,13 +106,16 @@ pub fn joined((flats, ports, by): Placed<'_>, (others, their_ports, base): Place
             && (q.point - p.point).dot(q.normal).abs() <= ON_MM
     };
     let others: Vec<Flat> = others.iter().map(|flat| flat.placed(&base)).collect();
-    let flat = (flats.iter())
-        .map(|flat| flat.placed(&by))
-        .find(|p| others.iter().any(|q| on(p, q)))?;
     let placed =
         |ports: &[Port], by: &DAffine3| -> Vec<Port> { ports.iter().map(|port| port.placed(by)).collect() };
-    let own = bores(&placed(ports, &by), flat.normal);
-    let other = bores(&placed(their_ports, &base), flat.normal);
-    let count = in_line(&own, &other, &DAffine3::IDENTITY, flat.normal).len();
-    (count >= FEWEST).then_some(flat.normal)
+    let (own, other) = (placed(ports, &by), placed(their_ports, &base));
+    let is_flange = |normal: &DVec3| {
+        let [own, other] = [&own, &other].map(|ports| bores(ports, *normal));
+        in_line(&own, &other, &DAffine3::IDENTITY, *normal).len() >= FEWEST
+    };
+    (flats.iter())
+        .map(|flat| flat.placed(&by))
+        .filter(|p| others.iter().any(|q| on(p, q)))
+        .map(|flat| flat.normal)
+        .find(is_flange)
 }

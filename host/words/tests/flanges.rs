@@ -1,6 +1,6 @@
 //! Flats on flats with bores in line: the motor's covers on its body, from where the exploded file has them and from any place.
 
-use std::path::PathBuf;
+mod support;
 
 use glam::{DAffine3, DQuat, DVec3};
 use mortise_brep::{CadModel, load_step};
@@ -9,13 +9,11 @@ use mortise_words::{Outcome, Session};
 const COVERS: [&str; 2] = ["back-cover", "front-cover"];
 
 fn motor(name: &str) -> Option<CadModel> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let root = std::env::var_os("MORTISE_SHARED").map_or(beside, PathBuf::from);
-    let file = root.join("cad/05_motor").join(name);
-    if !file.is_file() {
-        println!("skipped: no {}", file.display());
+    let file = support::shared().map(|cad| cad.join("05_motor").join(name));
+    let Some(file) = file.filter(|file| file.is_file()) else {
+        println!("skipped: no {name} among the shared parts (set MORTISE_SHARED)");
         return None;
-    }
+    };
     Some(load_step(file).expect("the motor is read"))
 }
 

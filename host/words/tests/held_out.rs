@@ -1,8 +1,9 @@
 //! The list of instructions written before the grammar, on the shared assemblies: outcome, acts, candidates and codes as expected, and nothing done
 //! that is not expected to be done.
 
+mod support;
+
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use mortise_words::{Outcome, Session, Turn};
@@ -22,13 +23,6 @@ const FILES: &[(&str, &str)] = &[
     ("gearbox", "10_extraction/gearbox.step"),
     ("hinge", "10_extraction/hinge.step"),
 ];
-
-fn shared() -> Option<PathBuf> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let root = std::env::var_os("MORTISE_SHARED").map_or(beside, PathBuf::from);
-    let cad = root.join("cad");
-    cad.is_dir().then_some(cad)
-}
 
 struct Line<'a> {
     file: &'a str,
@@ -118,7 +112,7 @@ fn agrees(got: &str, expected: &str) -> bool {
 
 #[test]
 fn instructions_come_out_as_a_technician_expects() {
-    let Some(cad) = shared() else {
+    let Some(cad) = support::shared() else {
         println!(
             "skipped {} instructions: no shared test parts (set MORTISE_SHARED)",
             lines().len()

@@ -9,7 +9,8 @@ use crate::math::symmetric6::dot;
 /// Capacity for contacts per tick.
 pub const MAX_CONTACTS: usize = 256;
 
-/// A point near the other part or inside it, linearised about the tick's start. One record of many fields, because the solver reads all of them in each pass.
+/// A point near the other part or inside it, linearised about the tick's start. The solver's numbers and the faces stand in one record, because a contact is kept,
+/// replaced and reported as a whole.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Contact {
     /// Jacobian row of the gap's rate for the scaled twist (v, ω·L): (n, (r × n)/L), n the world normal that pushes the object away.

@@ -14,7 +14,8 @@ use crate::math::pose::Pose;
 /// Rounding error of a position in a field, relative to the lengths summed: eight roundings of 2⁻²⁴ at most.
 const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
-/// Tree of one part, field of the other, and the transforms between their frames, found once a tick; flat, because each query reads most of it.
+/// Tree of one part, field of the other, and the transforms between their frames: all that a search of this pair reads of the two parts, found once
+/// for each search.
 pub(crate) struct DirectedPair<'i> {
     pub index: u16,
     pub backward: bool,

@@ -48,7 +48,7 @@ pub(crate) const APPROACH: f32 = 2.0;
 /// Points whose bound would expire within this many more ticks like the last one count as near and are queried every tick: evaluating the whole leaf
 /// to find out costs as much.
 const NEAR_TICKS: f32 = 4.0;
-/// Inputs of one search. Its many fields are what a tick fixes before it, read in the innermost loops: flat, so that each is one load from one base.
+/// Inputs of one search: all that a tick fixes before it. Many fields, because the innermost loops read them.
 pub(crate) struct Search<'s, 'i, R> {
     pub scene: &'s SceneImage<'i>,
     pub parts: &'s [Placed],
@@ -197,7 +197,7 @@ impl<'i, R: FacePairRules> Search<'_, 'i, R> {
     }
 }
 
-/// A search in progress. Its fields are the counters and stores that every leaf updates, flat for the same reason as those of [`Search`].
+/// A search in progress: the stores that it fills, and the counts that its budget and its report need.
 pub(crate) struct Traversal<'w, 's, 'i, R> {
     pub search: &'w Search<'s, 'i, R>,
     pub coherence: &'w mut Coherence,

@@ -54,6 +54,8 @@ const TOGETHER: &[&str] = &[
 /// Largest distance of a part from its designed place, µm, and longest step, ms.
 const OFF_UM: f64 = 1.0;
 const STEP_MS: f64 = 100.0;
+/// Least distance of the farthest part when all are apart, mm.
+const APART_MM: f64 = 50.0;
 /// Points of a part whose places are compared, mm from its origin.
 const LEVER_MM: f64 = 50.0;
 
@@ -74,7 +76,7 @@ pub(super) fn measure(cad: &Path, out: &mut dyn FnMut(Row)) -> Result<(), LabErr
         what("farthest of a part from its designed place when apart"),
         farthest_mm(session.parts(), &designed),
         "mm",
-        LEVER_MM,
+        APART_MM,
         f64::INFINITY,
     ));
     let again = read_again(&file, session.parts())?;
