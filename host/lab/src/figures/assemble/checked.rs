@@ -168,3 +168,31 @@ impl Checked {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mortise_task::Motion;
+
+    /// A link on two pins leaves along them without overlap, and across them both engines see it overlap.
+    #[test]
+    fn a_way_through_the_other_part_is_found() {
+        let file = File::new(env!("CARGO_MANIFEST_DIR")).join("../mating/tests/data/two_pin_exact.step");
+        let checked = Checked::load(&file).expect("the sample is read");
+        let contacts = &checked.assembly.contacts;
+        let along = (contacts.iter().map(|contact| contact.axis.direction))
+            .next()
+            .expect("the pins touch the link");
+        let across = along.any_orthonormal_vector();
+        let overlap = |way: DVec3| {
+            let legs = vec![Motion::slide(way)];
+            checked.overlap(&[1], &[0], &Path { legs })
+        };
+        let free = [along, -along]
+            .map(|way| overlap(way * 3.0))
+            .map(|found| found.meshes_mm.max(found.exact_mm));
+        assert!(free[0].min(free[1]) < 1e-3, "{free:?}");
+        let found = overlap(across);
+        assert!(found.meshes_mm > 0.3 && found.exact_mm > 0.3, "{found:?}");
+    }
+}
