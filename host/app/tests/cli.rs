@@ -100,6 +100,57 @@ fn inspect_says_what_is_in_the_file() {
 }
 
 #[test]
+fn a_section_has_the_areas_of_the_parts() {
+    let bounds = json(&mortise(&["inspect", SAMPLE, "--json"]));
+    let com = &bounds["parts"][0]["center_of_mass_mm"];
+    let plane = format!("z={}mm", com[2].as_f64().expect("number"));
+    let report = json(&mortise(&["section", SAMPLE, "--plane", &plane, "--json"]));
+    // The block has a through hole along z: its area there is its volume over its height, 50 mm.
+    let parts = report["parts"].as_array().expect("parts");
+    let block = parts.iter().find(|p| p["name"] == "block").expect("block");
+    assert_eq!((&block["outlines"], &block["open_lines"]), (&2.into(), &0.into()));
+    let want = bounds["parts"][0]["volume_mm3"].as_f64().expect("number") / 50.0;
+    let area = block["area_mm2"].as_f64().expect("number");
+    assert!((area / want - 1.0).abs() < 1e-3, "{area} {want}");
+    let one = json(&mortise(&[
+        "section", SAMPLE, "--plane", &plane, "--part", "block", "--json",
+    ]));
+    assert_eq!(one["parts"], serde_json::json!([block]));
+    let none = json(&mortise(&["section", SAMPLE, "--plane", "x=9000mm", "--json"]));
+    assert_eq!(none["parts"], Value::Array(vec![]));
+    let said = String::from_utf8(mortise(&["section", SAMPLE, "--plane", &plane]).stdout).expect("UTF-8");
+    assert!(
+        said.contains("block: ") && said.contains(" mm², 2 outlines"),
+        "{said}"
+    );
+    refused(&["section", SAMPLE, "--plane", "q=1mm"], "is not a plane");
+    refused(
+        &["section", SAMPLE, "--plane", "z=1mm", "--part", "lid"],
+        "there is no part lid; the file has block, peg",
+    );
+}
+
+#[test]
+fn clearances_are_listed_up_to_a_gap() {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../mating/tests/data/two_pin_exact.step"
+    );
+    let report = json(&mortise(&["clearance", file, "--json", "--below", "100um"]));
+    let pair = &report["pairs"][0];
+    assert_eq!(
+        serde_json::json!([pair["a"], pair["b"], pair["state"], report["overlapping"]]),
+        serde_json::json!(["socket-plate", "two-pin-link", "touching", 0])
+    );
+    // In the sample the peg lies beside the block.
+    let apart = json(&mortise(&["clearance", SAMPLE, "--json"]));
+    assert_eq!(apart["pairs"], Value::Array(vec![]));
+    let far = json(&mortise(&["clearance", SAMPLE, "--json", "--below", "1000mm"]));
+    assert!(far["pairs"][0]["clearance_um"].as_f64().expect("number") > 1000.0);
+    refused(&["clearance", SAMPLE, "--below", "0mm"], "must be more than 0");
+}
+
+#[test]
 fn contacts_of_two_pins_in_their_holes() {
     let file = concat!(
         env!("CARGO_MANIFEST_DIR"),

@@ -208,6 +208,17 @@ const COMMANDS: [(&str, Run); 24] = [
         Run::Here(&["inspect", SAMPLE, "--json"], "\"parts\""),
     ),
     (
+        "mortise section FILE --plane x=12.5mm",
+        Run::Here(
+            &["section", SAMPLE, "--plane", "x=12.5mm", "--json"],
+            "\"area_mm2\"",
+        ),
+    ),
+    (
+        "mortise clearance FILE",
+        Run::Here(&["clearance", SAMPLE, "--json"], "\"pairs\""),
+    ),
+    (
         "mortise contacts",
         Run::Here(&["contacts", SAMPLE, "--json"], "\"contacts\""),
     ),

@@ -5,6 +5,7 @@
 
 mod assembly;
 mod bake;
+mod clearance;
 mod contacts;
 mod demo;
 mod fit;
@@ -15,6 +16,7 @@ mod ports;
 mod probe;
 mod reading;
 mod rig;
+mod section;
 mod task;
 mod units;
 mod window;
@@ -45,6 +47,10 @@ enum Command {
     Inspect(inspect::Args),
     /// Find which faces of which parts touch, and the kinds of contact
     Contacts(contacts::Args),
+    /// Measure the areas in which a plane cuts the parts
+    Section(section::Args),
+    /// Measure gaps and overlaps between the parts as placed in the file
+    Clearance(clearance::Args),
     /// Find the directions and axes along which each part of an assembly can move, and how far
     Mobility(assembly::MobilityArgs),
     /// Find ports of the parts of an assembly (shafts, bores, planes, balls) and what connects them
@@ -102,6 +108,8 @@ pub fn main() -> ExitCode {
             }
             Command::Inspect(args) => inspect::run(&args),
             Command::Contacts(args) => contacts::run(&args),
+            Command::Section(args) => section::run(&args),
+            Command::Clearance(args) => clearance::run(&args),
             Command::Mobility(args) => assembly::mobility(&args),
             Command::Features(args) => assembly::features(&args),
             Command::Assemble(args) => assembly::assemble(&args),

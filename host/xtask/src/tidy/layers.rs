@@ -77,6 +77,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/mating", &["mortise-brep", "mortise-protocol"]),
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/fit", &["mortise-bake", "mortise-brep", "mortise-mating"]),
+    ("host/inspect", &["mortise-bake", "mortise-brep", "mortise-task"]),
     ("host/words", &["mortise-brep", "mortise-mating", "mortise-task"]),
     (
         "host/guide",
@@ -104,6 +105,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-brep",
             "mortise-fit",
             "mortise-guide",
+            "mortise-inspect",
             "mortise-mating",
             "mortise-output",
             "mortise-protocol",
