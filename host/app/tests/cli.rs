@@ -131,6 +131,52 @@ fn a_section_has_the_areas_of_the_parts() {
 }
 
 #[test]
+fn a_recorded_demo_replays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("run.mcap");
+    let file = file.to_str().expect("UTF-8");
+    let demo = [
+        "demo",
+        "--headless",
+        "--rig",
+        "sim-fast",
+        "--json",
+        "--record",
+        file,
+    ];
+    json(&mortise(&demo));
+    let report = json(&mortise(&["replay", file, "--check", "--json"]));
+    assert_eq!(report["complete"], true, "{report}");
+    assert_eq!(report["replayed"]["same_bits"], true, "{report}");
+    assert_eq!(report["replayed"]["compared"], report["ticks"], "{report}");
+    assert!(
+        report["ticks"].as_u64().is_some_and(|ticks| ticks > 1000),
+        "{report}"
+    );
+    let changed = mortise(&["replay", file, "--set", "CouplingStiffness=400", "--json"]);
+    assert_eq!(changed.status.code(), Some(1), "{changed:?}");
+    let changed: Value = serde_json::from_slice(&changed.stdout).expect("JSON");
+    let tick = &changed["replayed"]["first_difference"]["tick"];
+    assert!(tick.as_u64().is_some_and(|tick| tick > 0), "{changed}");
+    let csv = folder.path().join("run.csv");
+    let path = csv.to_str().expect("UTF-8");
+    json(&mortise(&["replay", file, "--csv", path, "--json"]));
+    let table = std::fs::read_to_string(&csv).expect("a table");
+    let columns = |line: &str| line.split(',').count();
+    let mut widths = table.lines().map(columns);
+    let first = widths.next().expect("a header");
+    assert!(widths.all(|width| width == first));
+    assert_eq!(
+        table.lines().count() as u64,
+        report["telemetry"].as_u64().expect("a number") + 1
+    );
+    refused(&["replay", file, "--csv", path], "--force");
+    refused(&["replay", SAMPLE], "is not a recording");
+    refused(&["replay", file, "--set", "Nonsense=1"], "no parameter");
+    refused(&demo, "choose another");
+}
+
+#[test]
 fn clearances_are_listed_up_to_a_gap() {
     let file = concat!(
         env!("CARGO_MANIFEST_DIR"),

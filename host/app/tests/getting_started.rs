@@ -219,6 +219,14 @@ const COMMANDS: [(&str, Run); 24] = [
         Run::Here(&["clearance", SAMPLE, "--json"], "\"pairs\""),
     ),
     (
+        "mortise demo --headless --record run.mcap",
+        Run::Elsewhere("`a_recorded_demo_replays` in cli.rs records one"),
+    ),
+    (
+        "mortise replay run.mcap --check",
+        Run::Elsewhere("`a_recorded_demo_replays` in cli.rs replays one"),
+    ),
+    (
         "mortise contacts",
         Run::Here(&["contacts", SAMPLE, "--json"], "\"contacts\""),
     ),

@@ -6,6 +6,7 @@ use common::{arm, click, connect, harness, open_sample, until};
 use egui::{Rect, Role, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use mortise::session::purpose::Purpose;
 use mortise::ui::Window;
 
 /// Resolutions of common screens, pixels, from the smallest projector to 4K.
@@ -122,7 +123,7 @@ fn stop_and_the_state_are_on_screen_at_every_size_and_scale() {
     until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
     check(&mut harness, "Holding", "a part is held");
     // The path dialog lies over everything else.
-    harness.state_mut().session.wants_path = true;
+    harness.state_mut().session.wants_path = Some(Purpose::OpenModel);
     harness.run_steps(2);
     check(&mut harness, "Holding", "a dialog is open");
     click(&mut harness, "STOP");

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{BufWriter, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata};
@@ -72,7 +72,13 @@ pub(crate) struct RecordFile {
 impl RecordFile {
     /// A new file; one that exists is not replaced.
     pub fn create(path: &Path, rig: &str) -> Result<Self, RecordError> {
-        let file = fs::File::create_new(path).map_err(|error| write_error(path, &error))?;
+        let file = fs::File::create_new(path).map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => write_error(
+                path,
+                "there is a file of this name, and none is replaced; choose another",
+            ),
+            _ => write_error(path, &error),
+        })?;
         let options = WriteOptions::new()
             .profile(METADATA)
             .library(concat!("mortise ", env!("CARGO_PKG_VERSION")))

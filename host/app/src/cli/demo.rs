@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use mortise_output::lines;
+use mortise_record::Recorder;
 use mortise_rig::{EmulatedMode, RigSpec};
 use mortise_scenario::{PreparedScene, Scenario, connect_with_scene, report, run_on};
 
@@ -25,6 +26,9 @@ pub struct Args {
     /// One JSON object (with --headless)
     #[arg(long, requires = "headless")]
     json: bool,
+    /// Record the run to this new file, for `mortise replay` (with --headless)
+    #[arg(long, value_name = "FILE", requires = "headless")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     reading: Reading,
     #[command(flatten)]
@@ -64,7 +68,17 @@ fn headless(args: &Args) -> anyhow::Result<ExitCode> {
         "{rig}: ready after {:.1} s, playing",
         began.elapsed().as_secs_f64()
     );
+    let recorder = (args.record.as_ref())
+        .map(|path| Recorder::start(&client, path))
+        .transpose()?;
+    if let Some(recorder) = &recorder {
+        recorder.scene(&scene.image);
+    }
     let outcome = run_on(&client, &scenario, &scene)?;
+    if let Some(recorder) = recorder {
+        let written = recorder.finish(Some(&client))?;
+        eprintln!("recorded {} ticks to {}", written.ticks, written.path.display());
+    }
     let verdicts = outcome.verdicts(&scenario.holds);
     if args.json {
         lines::json(&outcome)?;

@@ -1,6 +1,7 @@
 //! Commands that do the window's work without a window. Each has `--json`.
 //!
-//! Exit code 0: done; 1: the insertion was not completed, an instruction not carried out, parts do not go together, or nothing fits; 2: not possible, with
+//! Exit code 0: done; 1: the insertion was not completed, an instruction not carried out, parts do not go together, nothing fits, or a
+//! replay differs; 2: not possible, with
 //! one line on standard error that gives the reason.
 
 mod assembly;
@@ -15,6 +16,7 @@ mod mistyped;
 mod ports;
 mod probe;
 mod reading;
+mod replay;
 mod rig;
 mod section;
 mod task;
@@ -70,6 +72,8 @@ enum Command {
     Lab(lab::Args),
     /// Measure gap, depth and contact forces at given poses of one part
     Probe(probe::Args),
+    /// Read a recording, and compute it again: exit code 1 when a tick's result differs
+    Replay(replay::Args),
     /// List the rigs: simulated ones and serial ports
     Ports(ports::Args),
     /// Check, send or show the description of a rig
@@ -119,6 +123,7 @@ pub fn main() -> ExitCode {
             Command::Demo(args) => demo::run(args),
             Command::Lab(args) => lab::run(&args),
             Command::Probe(args) => probe::run(&args),
+            Command::Replay(args) => replay::run(&args),
             Command::Ports(args) => ports::run(&args),
             Command::Rig(args) => rig::run(&args),
             Command::Task(args) => task::run(&args),

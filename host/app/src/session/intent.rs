@@ -74,6 +74,15 @@ pub enum Intent {
     GuideWhen(When),
     /// Set the largest guidance force, N.
     GuideCap(f32),
+    /// Make a table of traces, and ask where to write it.
+    ExportTraces(Traces),
+    /// Write that table.
+    SaveTraces {
+        /// File to write.
+        path: PathBuf,
+        /// Whether an existing file may be replaced.
+        replace: bool,
+    },
     /// Let the simulated hand insert the peg into the hole.
     PlayInsertion,
     /// Run everything from the sample to the insertion automatically. `None`: the emulated board if it is available, else in-process.
@@ -93,9 +102,20 @@ impl Intent {
                 | Self::SwitchTargetOff(..)
                 | Self::GuideWhen(_)
                 | Self::GuideCap(_)
+                | Self::ExportTraces(_)
+                | Self::SaveTraces { .. }
                 | Self::Demo(_)
         )
     }
+}
+
+/// Traces to be exported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Traces {
+    /// Times in the history, s: from, to.
+    pub range_s: [f64; 2],
+    /// Keys of the signals.
+    pub keys: Vec<&'static str>,
 }
 
 const NO_RIG: &str = "No rig is connected";
@@ -184,6 +204,15 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
                 Some(_) => None,
             }
         }
+        Intent::ExportTraces(traces) if traces.keys.is_empty() => no("No signal is chosen"),
+        Intent::ExportTraces(_) => session
+            .history
+            .is_empty()
+            .then(|| "Nothing was recorded yet: connect a rig".to_owned()),
+        Intent::SaveTraces { .. } => session
+            .table
+            .is_none()
+            .then(|| "No traces are to be written".to_owned()),
         Intent::PlayInsertion => play(session),
     }
 }

@@ -5,6 +5,7 @@
 
 mod act;
 mod advance;
+pub mod ask;
 pub mod document;
 pub mod guidance;
 pub mod history;
@@ -16,6 +17,7 @@ pub mod outbox;
 mod perform;
 mod place;
 pub mod pose;
+pub mod purpose;
 pub mod remaining;
 mod state;
 pub mod tap;

@@ -11,6 +11,7 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 
 use super::document::Document;
+use super::purpose::Purpose;
 use super::tap::Tap;
 
 /// Capacity of the window's queue; a sender blocks when it is full.
@@ -58,9 +59,11 @@ pub enum Update {
         list: List,
     },
     /// A file was chosen in a dialog.
-    Chosen(PathBuf),
+    Chosen(Purpose, PathBuf),
     /// No file dialog is available: the window must ask for a path.
-    NoDialog,
+    NoDialog(Purpose),
+    /// A file was written, or one line with the reason why not.
+    Written(Result<String, String>),
 }
 
 /// A baked model.

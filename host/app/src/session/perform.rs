@@ -13,6 +13,7 @@ use mortise_rig::{EmulatedMode, RigSpec};
 use super::intent::Intent;
 use super::link::{self, Link};
 use super::notes::Severity;
+use super::purpose::Purpose;
 use super::state::{GUIDE_CAP_N, Job, Session};
 use super::tap::GuidanceCommand;
 use super::threads::Cancel;
@@ -24,7 +25,7 @@ impl Session {
     /// Does what `intent` says, which must be possible.
     pub(super) fn perform(&mut self, intent: Intent) {
         match intent {
-            Intent::Browse => work::choose_file(&self.outbox, self.folder()),
+            Intent::Browse => self.ask_for_path(Purpose::OpenModel),
             Intent::Open(path) => self.open(Some(path)),
             Intent::OpenSample => self.open(None),
             Intent::Bake => self.bake(),
@@ -85,6 +86,8 @@ impl Session {
                     self.command_guidance(GuidanceCommand::Set(self.guide));
                 }
             }
+            Intent::ExportTraces(traces) => self.export(&traces),
+            Intent::SaveTraces { path, replace } => self.save_traces(path, replace),
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
             Intent::Demo(rig) => self.demo(rig),
         }
@@ -174,7 +177,7 @@ impl Session {
     pub(super) fn clear_board(&mut self) {
         self.telemetry = None;
         self.let_go();
-        self.history.clear();
+        self.history.interrupt();
         self.guidance = List::default();
     }
 

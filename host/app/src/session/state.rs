@@ -18,6 +18,7 @@ use super::history::History;
 use super::link::{Connection, Link};
 use super::notes::Notes;
 use super::outbox::{Outbox, Update};
+use super::purpose::Purpose;
 use super::threads::Cancel;
 use super::tour::Tour;
 use super::verdict::Verdict;
@@ -84,7 +85,9 @@ pub struct Session {
     /// Contact method of the next bake.
     pub method: Method,
     /// Set when this desktop offers no file dialog: the window asks for a path instead.
-    pub wants_path: bool,
+    pub wants_path: Option<Purpose>,
+    /// The table of traces that waits for the path of its file.
+    pub(super) table: Option<String>,
     /// Where results of bakes are kept.
     pub(super) cache: Option<Arc<FolderCache>>,
     pub(super) tour: Option<Tour>,
@@ -118,7 +121,8 @@ impl Session {
             guidance: List::default(),
             notes: Notes::default(),
             method: Method::default(),
-            wants_path: false,
+            wants_path: None,
+            table: None,
             cache: None,
             tour: None,
             held: None,

@@ -7,6 +7,7 @@ use mortise_protocol::message::{DeviceState, ResetReason, Telemetry, ToDevice, T
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, describe};
 
+use super::ask::answer;
 use super::document::Document;
 use super::history::Sample;
 use super::insertion::Wall;
@@ -77,8 +78,10 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
                 session.guidance = list;
             }
         }
-        Update::Chosen(path) => return Some(Intent::Open(path)),
-        Update::NoDialog => session.wants_path = true,
+        Update::Chosen(purpose, path) => return Some(answer(purpose, path, true)),
+        Update::NoDialog(purpose) => session.wants_path = Some(purpose),
+        Update::Written(Ok(done)) => session.notes.add(Severity::Good, done),
+        Update::Written(Err(why)) => session.notes.add(Severity::Error, why),
     }
     None
 }
@@ -200,7 +203,7 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
     }
     let capacity = u64::from(connection.capabilities.scene_capacity);
     session.link = Link::Connected(Box::new(connection));
-    session.history.clear();
+    session.history.interrupt();
     let too_large = (session.document.as_ref())
         .and_then(|d| d.baked.as_ref())
         .is_some_and(|baked| baked.image.len() as u64 > capacity);

@@ -167,36 +167,6 @@ pub fn list_rigs(outbox: &Outbox) {
     });
 }
 
-/// Opens the desktop's file dialog for a STEP file, where there is one.
-pub fn choose_file(outbox: &Outbox, folder: Option<PathBuf>) {
-    let dialog = move || {
-        let dialog = rfd::FileDialog::new()
-            .set_title("Open STEP file")
-            .add_filter("STEP", &["step", "stp", "STEP", "STP", "p21"])
-            .add_filter("All files", &["*"]);
-        match folder {
-            Some(folder) => dialog.set_directory(folder),
-            None => dialog,
-        }
-    };
-    let outbox = outbox.clone();
-    let ask = move || {
-        let asked = Instant::now();
-        match dialog().pick_file() {
-            Some(path) => outbox.send(Update::Chosen(path)),
-            // A dialog that closes within 0.5 s was never shown: none is available.
-            None if asked.elapsed().as_millis() < 500 => outbox.send(Update::NoDialog),
-            None => true,
-        };
-    };
-    if cfg!(target_os = "macos") {
-        // On macOS dialogs must run on the main thread.
-        ask();
-    } else {
-        spawn("mortise-dialog", ask);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -14,7 +14,7 @@ mod messages;
 mod open;
 mod parameters;
 mod parts;
-mod plots;
+pub mod plots;
 mod rig;
 mod stop;
 pub mod theme;
@@ -50,6 +50,8 @@ pub struct Window {
     pub view: Viewpoint,
     path: open::PathDialog,
     tab: arrange::Tab,
+    /// What the plots show.
+    pub plots: plots::View,
 }
 
 impl Window {
@@ -60,6 +62,7 @@ impl Window {
             view: Viewpoint::default(),
             path: open::PathDialog::default(),
             tab: arrange::Tab::default(),
+            plots: plots::View::default(),
         }
     }
 
@@ -110,7 +113,7 @@ impl Window {
                     .show(ui, |ui| messages::show(ui, session));
                 egui::CentralPanel::default()
                     .frame(side(0, 14))
-                    .show(ui, |ui| plots::show(ui, session));
+                    .show(ui, |ui| plots::show(ui, session, &mut self.plots, wanted));
             });
         egui::Panel::left("parts")
             .default_size(248.0)
@@ -168,7 +171,7 @@ impl Window {
             arrange::Tab::Rig => rig::show(ui, session, wanted),
             arrange::Tab::Parts => parts::show(ui, session, wanted),
             arrange::Tab::Messages => messages::show(ui, session),
-            arrange::Tab::Plots => plots::show(ui, session),
+            arrange::Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),
         }
     }
 

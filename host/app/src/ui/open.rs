@@ -1,10 +1,11 @@
-//! Dialog for opening a file by path, for desktops without a file dialog.
+//! Dialog for the path of a file, for desktops without a file dialog.
 
 use std::path::PathBuf;
 
 use egui::{Align2, Id, Key, Modal, RichText, TextEdit, Ui, Vec2};
 
 use super::{control, header, theme};
+use crate::session::ask::answer;
 use crate::session::{Intent, Session};
 
 /// Margin inside the dialog, points.
@@ -15,16 +16,18 @@ const MARGIN: f32 = 20.0;
 pub struct PathDialog {
     text: String,
     fresh: bool,
+    replace: bool,
 }
 
 impl PathDialog {
     /// Draws the dialog while the session waits for a path.
     pub fn show(&mut self, ui: &Ui, session: &mut Session, wanted: &mut Vec<Intent>) {
         let ctx = ui.ctx();
-        if !session.wants_path {
+        let Some(purpose) = session.wants_path else {
             self.fresh = true;
+            self.replace = false;
             return;
-        }
+        };
         let mut done = false;
         // Placed below the bar, so that STOP and the state stay visible.
         let size = ctx.content_rect().size();
@@ -43,17 +46,18 @@ impl PathDialog {
                 let height = (room.height() - 2.0 * MARGIN - 4.0).max(20.0);
                 egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
                 ui.label(
-                    RichText::new("Open STEP file")
+                    RichText::new(purpose.title())
                         .size(18.0)
                         .color(theme::of(ui).text_strong),
                 );
-                ui.label(
-                    RichText::new("This desktop offers no file dialog: enter the path, or drop the file onto the window.")
-                        .color(theme::of(ui).text_weak),
-                );
+                let hint = match purpose.is_saved() {
+                    true => "This desktop offers no file dialog: enter the path of the file to write.",
+                    false => "This desktop offers no file dialog: enter the path, or drop the file onto the window.",
+                };
+                ui.label(RichText::new(hint).color(theme::of(ui).text_weak));
                 ui.add_space(6.0);
                 let edit = TextEdit::singleline(&mut self.text)
-                    .hint_text("/folder/assembly.step")
+                    .hint_text(purpose.example())
                     .desired_width(f32::INFINITY)
                     .margin(Vec2::new(8.0, 7.0));
                 let field = ui.add(edit);
@@ -62,13 +66,16 @@ impl PathDialog {
                     self.fresh = false;
                 }
                 let entered = field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+                if purpose.is_saved() {
+                    ui.checkbox(&mut self.replace, "Replace an existing file");
+                }
                 ui.add_space(8.0);
                 ui.horizontal(|ui| {
                     let path = self.text.trim();
-                    let open = control::primary(ui, "Open").min_size(Vec2::new(96.0, 30.0));
+                    let open = control::primary(ui, if purpose.is_saved() { "Save" } else { "Open" }).min_size(Vec2::new(96.0, 30.0));
                     let open = ui.add_enabled(!path.is_empty(), open);
                     if (open.clicked() || entered) && !path.is_empty() {
-                        wanted.push(Intent::Open(PathBuf::from(path)));
+                        wanted.push(answer(purpose, PathBuf::from(path), self.replace));
                         done = true;
                     }
                     open.on_disabled_hover_text("Enter a path first");
@@ -82,7 +89,7 @@ impl PathDialog {
                 });
             });
         if done || modal.should_close() {
-            session.wants_path = false;
+            session.wants_path = None;
         }
     }
 }

@@ -78,6 +78,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/fit", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/inspect", &["mortise-bake", "mortise-brep", "mortise-task"]),
+    ("host/record", &["mortise-protocol", "mortise-rig"]),
     ("host/words", &["mortise-brep", "mortise-mating", "mortise-task"]),
     (
         "host/guide",
@@ -109,6 +110,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "mortise-mating",
             "mortise-output",
             "mortise-protocol",
+            "mortise-record",
             "mortise-rig",
             "mortise-scenario",
             "mortise-task",

@@ -1,0 +1,102 @@
+//! Questions for a path: by the desktop's file dialog, or where there is none by a field in the window.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use mortise_output::{Existing, Output, OutputError};
+
+use super::history::{Signal, csv};
+use super::intent::{Intent, Traces};
+use super::outbox::{Outbox, Update};
+use super::purpose::Purpose;
+use super::state::Session;
+use super::threads::spawn;
+
+/// What follows once the path is known.
+pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
+    match purpose {
+        Purpose::OpenModel => Intent::Open(path),
+        Purpose::SaveTraces => Intent::SaveTraces { path, replace },
+    }
+}
+
+impl Session {
+    /// Asks for a path by the desktop's file dialog, where there is one.
+    pub(super) fn ask_for_path(&self, purpose: Purpose) {
+        let folder = self.folder();
+        let dialog = move || {
+            let (name, endings) = purpose.filter();
+            let dialog = rfd::FileDialog::new()
+                .set_title(purpose.title())
+                .add_filter(name, endings)
+                .add_filter("All files", &["*"]);
+            let dialog = match folder {
+                Some(folder) => dialog.set_directory(folder),
+                None => dialog,
+            };
+            match purpose.is_saved() {
+                true => dialog.set_file_name(purpose.file_name()).save_file(),
+                false => dialog.pick_file(),
+            }
+        };
+        let outbox = self.outbox.clone();
+        let ask = move || {
+            let asked = Instant::now();
+            match dialog() {
+                Some(path) => outbox.send(Update::Chosen(purpose, path)),
+                // A dialog that closes within 0.5 s was never shown: none is available.
+                None if asked.elapsed().as_millis() < 500 => outbox.send(Update::NoDialog(purpose)),
+                None => true,
+            };
+        };
+        if cfg!(target_os = "macos") {
+            // On macOS dialogs must run on the main thread.
+            ask();
+        } else {
+            spawn("mortise-dialog", ask);
+        }
+    }
+
+    /// Makes a table of traces as they are now, and asks where to write it.
+    pub(super) fn export(&mut self, traces: &Traces) {
+        let signals: Vec<&Signal> = (traces.keys.iter())
+            .filter_map(|key| Signal::named(key))
+            .collect();
+        let [from_s, to_s] = traces.range_s;
+        self.table = Some(csv(&self.history, &signals, from_s, to_s));
+        self.ask_for_path(Purpose::SaveTraces);
+    }
+
+    /// Writes the table that waits for its path.
+    pub(super) fn save_traces(&mut self, path: PathBuf, replace: bool) {
+        if let Some(table) = self.table.take() {
+            write(&self.outbox, path, replace, table);
+        }
+    }
+}
+
+/// Writes a file, all or nothing, on a thread of its own, which reports the end.
+pub(super) fn write(outbox: &Outbox, path: PathBuf, replace: bool, text: String) {
+    let outbox = outbox.clone();
+    spawn("mortise-write", move || {
+        let existing = Existing::from_force(replace);
+        let written = Output::new(path, existing, &[] as &[PathBuf]).and_then(|output| {
+            output.write(text.as_bytes())?;
+            Ok(format!("Written: {}", output.path().display()))
+        });
+        outbox.send(Update::Written(written.map_err(|error| in_words(&error))));
+    });
+}
+
+/// The reason why a file is not written; the window has no options.
+fn in_words(error: &OutputError) -> String {
+    match error {
+        OutputError::Exists { path } => {
+            format!(
+                "{}: exists already; give another name, or choose to replace it",
+                path.display()
+            )
+        }
+        other => other.to_string(),
+    }
+}
