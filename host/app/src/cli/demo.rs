@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use mortise_output::lines;
+use mortise_output::{Existing, Output, lines};
 use mortise_record::Recorder;
 use mortise_rig::{EmulatedMode, RigSpec};
 use mortise_scenario::{PreparedScene, Scenario, connect_with_scene, report, run_on};
@@ -48,6 +48,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 fn headless(args: &Args) -> anyhow::Result<ExitCode> {
+    if let Some(path) = &args.record {
+        // Before the work begins.
+        Output::new(path, Existing::Keep, args.file.as_slice())?;
+    }
     let rig = args.rig.clone().unwrap_or_else(best_rig);
     // A temporary file of the sample is removed when this is dropped, after the run.
     let sample = match &args.file {
