@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use libtest_mimic::{Arguments, Completion, Failed, Trial};
 use mortise_hil_tests::checks::{CHECKS, Check};
 use mortise_hil_tests::{PORT_VARIABLE, scenarios};
+use mortise_record::{Recorder, Recording, Replayed, replay};
 use mortise_rig::{Client, RigSpec, SERIAL_VARIABLE};
 use mortise_scenario::ScenarioError;
 use mortise_scenario::{Outcome, PreparedScene, Scenario, connect, run_on};
@@ -62,7 +63,7 @@ fn rig(text: &str) -> Result<RigSpec, String> {
 }
 
 fn trials(port: Option<String>) -> Result<Vec<Trial>, String> {
-    let bench = Arc::new(Bench::default());
+    let bench = Arc::new(Bench::new().map_err(|error| error.to_string())?);
     let (sim, emulated) = (rig("sim-fast")?, rig("emulated:lockstep")?);
     let mut rigs = vec![("sim", sim.clone()), ("emulated", emulated.clone())];
     if let Some(port) = port {
@@ -147,10 +148,32 @@ impl<K: std::hash::Hash + Eq, V: Clone> Once<K, V> {
 }
 
 /// Baked scenes and measured outcomes, so that comparing two rigs does not measure them again.
-#[derive(Default)]
 struct Bench {
     scenes: Once<String, Arc<PreparedScene>>,
     outcomes: Once<(PathBuf, RigSpec), Outcome>,
+    recordings: Recordings,
+}
+
+/// Folder of the recordings of all measured runs, removed at the end.
+struct Recordings(tempfile::TempDir);
+
+impl Recordings {
+    fn path(&self, scenario: &Scenario, spec: &RigSpec) -> PathBuf {
+        let rig: String = (spec.to_string().chars())
+            .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
+            .collect();
+        self.0.path().join(format!("{rig}-{}.mcap", scenario.name))
+    }
+}
+
+impl Bench {
+    fn new() -> std::io::Result<Self> {
+        Ok(Self {
+            scenes: Once::default(),
+            outcomes: Once::default(),
+            recordings: Recordings(tempfile::tempdir()?),
+        })
+    }
 }
 
 impl Bench {
@@ -165,19 +188,55 @@ impl Bench {
         run_on(&client, scenario, &scene)
     }
 
-    fn outcome(&self, file: &Path, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError> {
+    /// As [`Self::measure`], and records it.
+    fn record(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, Failed> {
+        let scene = self.scene(scenario)?;
+        let client = connect(scenario, spec)?;
+        let recorder = Recorder::start(&client, &self.recordings.path(scenario, spec))?;
+        recorder.scene(&scene.image);
+        let outcome = run_on(&client, scenario, &scene)?;
+        recorder.finish(Some(&client))?;
+        Ok(outcome)
+    }
+
+    fn outcome(&self, file: &Path, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, Failed> {
         let key = (file.to_owned(), spec.clone());
-        self.outcomes.get(key, || self.measure(scenario, spec))
+        self.outcomes.get(key, || self.record(scenario, spec))
+    }
+
+    /// The recording of the run computes again to the same bits.
+    fn replayed(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Replayed, Failed> {
+        let recording = Recording::open(&self.recordings.path(scenario, spec))?;
+        let replayed = replay(&recording, &[])?;
+        // A line with faults loses inputs too; every other tick is compared.
+        let whole = scenario.faults.is_some() || replayed.compared == replayed.recorded;
+        if replayed.difference.is_none() && whole && replayed.compared > 0 {
+            Ok(replayed)
+        } else {
+            Err(format!("the recording replays differently: {replayed:?}").into())
+        }
     }
 
     fn scenario(&self, file: &Path, spec: &RigSpec) -> Result<Completion, Failed> {
         let scenario = Scenario::load(file)?;
-        let outcome = match self.outcome(file, &scenario, spec) {
-            Err(error @ ScenarioError::NeedsSimulatedHand { .. }) => {
-                return Ok(Completion::ignored_with(error.to_string()));
-            }
-            outcome => outcome?,
-        };
+        if matches!(spec, RigSpec::Serial { .. }) {
+            return Ok(match self.measure(&scenario, spec) {
+                Err(error @ ScenarioError::NeedsSimulatedHand { .. }) => {
+                    Completion::ignored_with(error.to_string())
+                }
+                outcome => return self.judged(&scenario, spec, outcome?),
+            });
+        }
+        let outcome = self.outcome(file, &scenario, spec)?;
+        let replayed = self.replayed(&scenario, spec)?;
+        println!(
+            "    {}: {} ticks replay to the bit",
+            scenario.name, replayed.compared
+        );
+        self.judged(&scenario, spec, outcome)
+    }
+
+    fn judged(&self, scenario: &Scenario, spec: &RigSpec, outcome: Outcome) -> Result<Completion, Failed> {
         let verdicts = outcome.verdicts(&scenario.holds);
         let lines: Vec<String> = verdicts.iter().map(|verdict| format!("    {verdict}")).collect();
         let text = format!(

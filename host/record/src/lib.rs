@@ -9,6 +9,7 @@ mod error;
 mod file;
 mod reading;
 mod recorder;
+mod records;
 mod replay;
 mod schema;
 

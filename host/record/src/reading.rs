@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use mcap::read::{ChunkFlattener, Options};
 use mcap::records::Record;
 use mortise_protocol::message::{FromDevice, SCHEMA_HASH, Telemetry, ToDevice};
 use serde::de::DeserializeOwned;
@@ -11,6 +10,7 @@ use serde::de::DeserializeOwned;
 use crate::columns::{Ticks, decode};
 use crate::error::RecordError;
 use crate::file::{FORMAT, Line, METADATA, SCENE, Topic, from_hex};
+use crate::records::Records;
 
 /// A recording in memory, as its file holds it.
 pub struct Recording {
@@ -66,7 +66,7 @@ impl Recording {
             complete: false,
             duration_s: 0.0,
         };
-        let mut records = Records::new(&recording.bytes).map_err(|error| not_ours(error.to_string()))?;
+        let mut records = Records::new(&recording.bytes);
         let (mut ours, mut times) = (false, None::<(u64, u64)>);
         let mut scenes = HashMap::new();
         for record in records.by_ref() {
@@ -104,7 +104,7 @@ impl Recording {
                 _ => {}
             }
         }
-        let complete = records.complete;
+        let complete = records.complete();
         if !ours {
             return Err(not_ours("it does not say which program made it".into()));
         }
@@ -142,26 +142,21 @@ impl Recording {
     /// All contents in their order. Contents that cannot be read are left out.
     pub fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
         let mut channels: HashMap<u16, Topic> = HashMap::new();
-        // The file was readable when it was opened.
-        let records = Records::new(&self.bytes).ok();
-        records
-            .into_iter()
-            .flatten()
-            .filter_map(move |record| match record {
-                Record::Channel(channel) => {
-                    let topic = Topic::ALL.into_iter().find(|topic| topic.name() == channel.topic);
-                    if let Some(topic) = topic {
-                        channels.insert(channel.id, topic);
-                    }
-                    None
+        Records::new(&self.bytes).filter_map(move |record| match record {
+            Record::Channel(channel) => {
+                let topic = Topic::ALL.into_iter().find(|topic| topic.name() == channel.topic);
+                if let Some(topic) = topic {
+                    channels.insert(channel.id, topic);
                 }
-                Record::Message { header, data } => {
-                    let kind = content(*channels.get(&header.channel_id)?, &data)?;
-                    let at_ns = header.log_time;
-                    Some(Entry { at_ns, kind })
-                }
-                _ => None,
-            })
+                None
+            }
+            Record::Message { header, data } => {
+                let kind = content(*channels.get(&header.channel_id)?, &data)?;
+                let at_ns = header.log_time;
+                Some(Entry { at_ns, kind })
+            }
+            _ => None,
+        })
     }
 }
 
@@ -181,43 +176,4 @@ fn line<M: DeserializeOwned>(data: &[u8]) -> Option<(u16, M)> {
     let line: Line = serde_json::from_slice(data).ok()?;
     let bytes = from_hex(&line.bytes)?;
     Some((line.sequence, postcard::from_bytes(&bytes).ok()?))
-}
-
-/// The file's records up to its end, or to the first that is damaged or cut off.
-struct Records<'a> {
-    records: ChunkFlattener<'a>,
-    ended: bool,
-    /// The record that closes the data of a file was read.
-    complete: bool,
-}
-
-impl<'a> Records<'a> {
-    fn new(bytes: &'a [u8]) -> mcap::McapResult<Self> {
-        let options = Options::IgnoreEndMagic | Options::ValidateChunkCrcs;
-        Ok(Self {
-            records: ChunkFlattener::new_with_options(bytes, options)?,
-            ended: false,
-            complete: false,
-        })
-    }
-}
-
-impl<'a> Iterator for Records<'a> {
-    type Item = Record<'a>;
-
-    fn next(&mut self) -> Option<Record<'a>> {
-        if self.ended {
-            return None;
-        }
-        match self.records.next() {
-            Some(Ok(record)) => {
-                self.complete |= matches!(record, Record::DataEnd(_));
-                Some(record)
-            }
-            _ => {
-                self.ended = true;
-                None
-            }
-        }
-    }
 }

@@ -16,9 +16,9 @@ use crate::error::RecordError;
 use crate::file::RecordFile;
 
 /// Time after which what was recorded is in the system's hands. With the time a message waits for the thread it bounds the loss of a killed program.
-const FLUSH: Duration = Duration::from_millis(300);
-/// Most ticks in a message: more compress hardly better.
-const TICKS: usize = 250;
+const FLUSH: Duration = Duration::from_millis(200);
+/// Ticks after which a chunk ends, and most in a message: those of [`FLUSH`], also where a board in lockstep runs ahead of the clock.
+const TICKS: usize = 200;
 /// Most messages that wait for the thread: about two seconds of all that a board sends.
 const WAITING: usize = 4096;
 
@@ -189,7 +189,7 @@ fn write(
             Ok(Item::End) | Err(RecvTimeoutError::Disconnected) => break,
             Err(RecvTimeoutError::Timeout) => {}
         }
-        if flushed.elapsed() >= FLUSH {
+        if flushed.elapsed() >= FLUSH || pending.full() {
             pending.write(&mut file)?;
             file.flush()?;
             flushed = Instant::now();
@@ -237,6 +237,10 @@ impl Pending {
         });
         ticks.inputs.extend_from_slice(&inputs.ticks);
         Ok(())
+    }
+
+    fn full(&self) -> bool {
+        (self.ticks.as_ref()).is_some_and(|ticks| ticks.inputs.len() >= TICKS)
     }
 
     fn write(&mut self, file: &mut RecordFile) -> Result<(), RecordError> {

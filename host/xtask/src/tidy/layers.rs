@@ -78,7 +78,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/task", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/fit", &["mortise-bake", "mortise-brep", "mortise-mating"]),
     ("host/inspect", &["mortise-bake", "mortise-brep", "mortise-task"]),
-    ("host/record", &["mortise-protocol", "mortise-rig"]),
+    (
+        "host/record",
+        &["mortise-mechanism", "mortise-protocol", "mortise-rig"],
+    ),
     ("host/words", &["mortise-brep", "mortise-mating", "mortise-task"]),
     (
         "host/guide",
@@ -122,6 +125,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         &[
             "mortise-brep",
             "mortise-protocol",
+            "mortise-record",
             "mortise-rig",
             "mortise-scenario",
         ],
