@@ -83,6 +83,10 @@ pub enum Intent {
         /// Whether an existing file may be replaced.
         replace: bool,
     },
+    /// Record everything that crosses the link, to a new file.
+    Record,
+    /// End the recording.
+    EndRecording,
     /// Let the simulated hand insert the peg into the hole.
     PlayInsertion,
     /// Run everything from the sample to the insertion automatically. `None`: the emulated board if it is available, else in-process.
@@ -104,6 +108,8 @@ impl Intent {
                 | Self::GuideCap(_)
                 | Self::ExportTraces(_)
                 | Self::SaveTraces { .. }
+                | Self::Record
+                | Self::EndRecording
                 | Self::Demo(_)
         )
     }
@@ -213,6 +219,7 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             .table
             .is_none()
             .then(|| "No traces are to be written".to_owned()),
+        Intent::Record | Intent::EndRecording => record(session, intent),
         Intent::PlayInsertion => play(session),
     }
 }
@@ -306,4 +313,15 @@ fn play(session: &Session) -> Option<String> {
         _ if !session.scene_is_on_board() => no("The collision model is not on the board yet"),
         _ => None,
     }
+}
+
+/// Why a recording cannot begin or end now.
+fn record(session: &Session, intent: &Intent) -> Option<String> {
+    let reason = match (session.connection(), &session.recording) {
+        (None, _) => NO_RIG,
+        (Some(_), Some(_)) if *intent == Intent::Record => "A recording is under way",
+        (Some(_), None) if *intent == Intent::EndRecording => "Nothing is being recorded",
+        _ => return None,
+    };
+    Some(reason.to_owned())
 }

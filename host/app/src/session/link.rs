@@ -4,6 +4,7 @@
 //! [`Connection::stop`] writes it, even during an upload.
 
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -19,6 +20,7 @@ use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 use super::document::Document;
 use super::guidance;
 use super::outbox::{LinkUpdate, Outbox, Update};
+use super::recording::{Recorded, Scene};
 use super::tap::Tap;
 use super::threads::{Cancel, spawn};
 
@@ -50,6 +52,15 @@ pub enum Command {
     },
     /// Query the counters.
     Statistics,
+    /// Record everything from now on.
+    Record {
+        /// Folder of the new file.
+        folder: PathBuf,
+        /// The collision model on the board, if it is the document's.
+        scene: Scene,
+    },
+    /// End the recording.
+    EndRecording,
 }
 
 /// State of the connection.
@@ -181,8 +192,9 @@ fn run(outbox: &Outbox, id: u64, spec: &RigSpec, todo: &Receiver<Command>) {
         )));
         return;
     }
+    let mut recorded = Recorded::default();
     while let Ok(command) = todo.recv() {
-        if !say(carry_out(&client, command, &say)) {
+        if !say(carry_out(&client, &mut recorded, command, &say)) {
             return;
         }
     }
@@ -198,7 +210,12 @@ fn introduce(client: &Client) -> Result<Vec<(ParameterId, f32)>, RigError> {
         .collect()
 }
 
-fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool) -> LinkUpdate {
+fn carry_out(
+    client: &Client,
+    recorded: &mut Recorded,
+    command: Command,
+    say: &dyn Fn(LinkUpdate) -> bool,
+) -> LinkUpdate {
     match command {
         Command::Request(message) => match client.request((*message).clone()) {
             Err(error) if is_the_links(client, &error) => LinkUpdate::Unanswered,
@@ -224,6 +241,7 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
                     false => ControlFlow::Continue(()),
                 }
             };
+            recorded.scene(&baked);
             match client.upload_while(&baked.image, &mut progress) {
                 Err(error) if is_the_links(client, &error) => LinkUpdate::Unanswered,
                 result => LinkUpdate::Uploaded {
@@ -238,6 +256,10 @@ fn carry_out(client: &Client, command: Command, say: &dyn Fn(LinkUpdate) -> bool
             Ok(statistics) => LinkUpdate::Statistics(statistics),
             Err(_) => LinkUpdate::Unanswered,
         },
+        Command::Record { folder, scene } => {
+            LinkUpdate::Recording(recorded.begin(client, &folder, scene.as_deref()))
+        }
+        Command::EndRecording => (recorded.end(client)).map_or(LinkUpdate::Unanswered, LinkUpdate::Recording),
     }
 }
 

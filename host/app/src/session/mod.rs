@@ -18,6 +18,8 @@ mod perform;
 mod place;
 pub mod pose;
 pub mod purpose;
+mod record;
+pub mod recording;
 pub mod remaining;
 mod state;
 pub mod tap;

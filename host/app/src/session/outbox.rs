@@ -12,6 +12,7 @@ use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 
 use super::document::Document;
 use super::purpose::Purpose;
+use super::recording::RecordingUpdate;
 use super::tap::Tap;
 
 /// Capacity of the window's queue; a sender blocks when it is full.
@@ -110,6 +111,8 @@ pub enum LinkUpdate {
     },
     /// The counters.
     Statistics(Statistics),
+    /// What became of a recording.
+    Recording(RecordingUpdate),
 }
 
 /// Sending end of the window's queue. Wakes the window after each message.

@@ -88,6 +88,8 @@ impl Session {
             }
             Intent::ExportTraces(traces) => self.export(&traces),
             Intent::SaveTraces { path, replace } => self.save_traces(path, replace),
+            Intent::Record => self.begin_recording(),
+            Intent::EndRecording => self.end_recording(),
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),
             Intent::Demo(rig) => self.demo(rig),
         }
@@ -178,6 +180,7 @@ impl Session {
         self.telemetry = None;
         self.let_go();
         self.history.interrupt();
+        self.recording_lost();
         self.guidance = List::default();
     }
 

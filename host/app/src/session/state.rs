@@ -19,6 +19,7 @@ use super::link::{Connection, Link};
 use super::notes::Notes;
 use super::outbox::{Outbox, Update};
 use super::purpose::Purpose;
+use super::recording::Recording;
 use super::threads::Cancel;
 use super::tour::Tour;
 use super::verdict::Verdict;
@@ -84,6 +85,8 @@ pub struct Session {
     pub notes: Notes,
     /// Contact method of the next bake.
     pub method: Method,
+    /// The recording under way.
+    pub recording: Option<Recording>,
     /// Set when this desktop offers no file dialog: the window asks for a path instead.
     pub wants_path: Option<Purpose>,
     /// The table of traces that waits for the path of its file.
@@ -121,6 +124,7 @@ impl Session {
             guidance: List::default(),
             notes: Notes::default(),
             method: Method::default(),
+            recording: None,
             wants_path: None,
             table: None,
             cache: None,

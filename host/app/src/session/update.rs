@@ -158,6 +158,7 @@ fn link(session: &mut Session, update: LinkUpdate) {
             }
         }
         LinkUpdate::Uploaded { generation, result } => uploaded(session, generation, result),
+        LinkUpdate::Recording(update) => session.recording_update(update),
         LinkUpdate::Statistics(statistics) => {
             if let Some(connection) = session.connection_mut() {
                 connection.statistics = Some(statistics);

@@ -11,6 +11,7 @@ mod plan;
 mod planning;
 pub mod promises;
 pub mod stability;
+mod workbench;
 
 pub use self::claims::{Claims, Count};
 pub use self::plan::Plan;
@@ -29,6 +30,7 @@ const TABLES: &[(&str, Measure)] = &[
     ("promises", promises::measure),
     ("plan", planning::measure),
     ("assemble", assemble::measure),
+    ("workbench", workbench::measure),
 ];
 
 /// Names of all tables.

@@ -41,12 +41,34 @@ pub fn show(ui: &mut Ui, session: &Session, view: &mut View, wanted: &mut Vec<In
         };
         let hint = "Write what is shown to a file of comma-separated values";
         control::intent_button(ui, session, wanted, small("Export…"), Intent::ExportTraces(traces), hint);
+        record(ui, session, wanted);
         if let Some(at) = view.pointed_s() {
             let text = format!("at {:.3} s", at - view.newest_s()).replace('-', "−");
             let label = RichText::new(text).size(12.0).monospace();
             ui.label(label.color(theme::of(ui).text_strong));
         }
     });
+}
+
+/// The switch of the recording; while one is under way it shows its time.
+fn record(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let (text, intent, hint) = match &session.recording {
+        None => (
+            "● Record".to_owned(),
+            Intent::Record,
+            "Record every message and the inputs of every tick to a new file, for `mortise replay` and Foxglove".to_owned(),
+        ),
+        Some(recording) => {
+            let seconds = recording.since.elapsed().as_secs();
+            (
+                format!("■ End recording {}:{:02}", seconds / 60, seconds % 60),
+                Intent::EndRecording,
+                format!("End the recording {}", recording.path.display()),
+            )
+        }
+    };
+    let button = egui::Button::new(RichText::new(text).size(12.0)).selected(session.recording.is_some());
+    control::intent_button(ui, session, wanted, button, intent, &hint);
 }
 
 /// The menu in which signals are chosen, by quantity.
