@@ -19,7 +19,7 @@ fn folder() -> Result<PathBuf, String> {
 
 impl Session {
     pub(super) fn begin_recording(&mut self) {
-        let folder = match folder() {
+        let folder = match self.recordings.clone().map_or_else(folder, Ok) {
             Ok(folder) => folder,
             Err(why) => return self.notes.add(Severity::Error, why),
         };

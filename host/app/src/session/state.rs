@@ -87,6 +87,8 @@ pub struct Session {
     pub method: Method,
     /// The recording under way.
     pub recording: Option<Recording>,
+    /// Where recordings go; `None`: a folder of the user's data.
+    pub recordings: Option<PathBuf>,
     /// Set when this desktop offers no file dialog: the window asks for a path instead.
     pub wants_path: Option<Purpose>,
     /// The table of traces that waits for the path of its file.
@@ -125,6 +127,7 @@ impl Session {
             notes: Notes::default(),
             method: Method::default(),
             recording: None,
+            recordings: None,
             wants_path: None,
             table: None,
             cache: None,

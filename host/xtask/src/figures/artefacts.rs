@@ -145,6 +145,29 @@ pub const ARTEFACTS: &[Artefact] = &[
         sources: &[LAW, &["host/lab/src/figures/planning.rs"]],
     },
     Artefact {
+        name: "assemble",
+        made: Made::Page { quick: true },
+        sources: &[
+            LAW,
+            &[
+                "host/mating/src",
+                "host/task/src",
+                "host/words/src",
+                "host/lab/src/figures/assemble",
+            ],
+        ],
+    },
+    Artefact {
+        name: "workbench",
+        made: Made::Page { quick: false },
+        sources: &[
+            LAW,
+            LOOP,
+            SCENARIO,
+            &["host/record/src", "host/lab/src/figures/workbench.rs"],
+        ],
+    },
+    Artefact {
         name: "pareto",
         made: Made::Sweep { quick: false },
         sources: &[

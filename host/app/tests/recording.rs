@@ -1,0 +1,78 @@
+//! Recording from the window: a button, a file in the user's folder, and the same bits when it is computed again.
+
+mod common;
+
+use std::path::PathBuf;
+
+use common::{arm, click, connect, harness, open_sample, until};
+use mortise::session::Session;
+use mortise::session::link::Link;
+use mortise_record::{Recording, replay};
+
+/// Files of the folder for recordings.
+fn files(data: &std::path::Path) -> Vec<PathBuf> {
+    std::fs::read_dir(data)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|file| file.path())
+        .collect()
+}
+
+#[test]
+fn a_session_is_recorded_and_replays_and_a_lost_link_ends_the_file() {
+    let data = tempfile::tempdir().expect("a folder");
+    let mut harness = harness();
+    harness.state_mut().session.recordings = Some(data.path().join("recordings"));
+    open_sample(&mut harness);
+    connect(&mut harness);
+    click(&mut harness, "● Record");
+    let recording = |session: &Session| session.recording.is_some();
+    until(&mut harness, "the recording", recording);
+    click(&mut harness, "Reset parts");
+    arm(&mut harness);
+    click(&mut harness, "peg");
+    click(&mut harness, "Grab");
+    until(&mut harness, "the peg is held", |s| s.grabbed() == Some(1));
+    click(&mut harness, "Play insertion");
+    until(&mut harness, "the verdict", |s| s.verdict.is_some());
+    let end = harness
+        .state()
+        .session
+        .recording
+        .as_ref()
+        .map(|recording| recording.path.clone());
+    harness
+        .state_mut()
+        .session
+        .act(mortise::session::Intent::EndRecording);
+    until(&mut harness, "the end", |s| s.recording.is_none());
+    let path = end.expect("just seen");
+    assert_eq!(files(&data.path().join("recordings")), [path.as_path()]);
+    let first = Recording::open(&path).expect("a recording");
+    assert!(first.complete());
+    let replayed = replay(&first, &[]).expect("it can be replayed");
+    assert_eq!(replayed.difference, None, "{replayed:?}");
+    assert!(replayed.compared > 1000, "{replayed:?}");
+
+    click(&mut harness, "● Record");
+    until(&mut harness, "another recording", recording);
+    click(&mut harness, "Disconnect");
+    until(&mut harness, "the rig is gone", |s| matches!(s.link, Link::None));
+    assert!(harness.state().session.recording.is_none());
+    // The file ends on the link's thread.
+    let begun = std::time::Instant::now();
+    let second = loop {
+        let found = files(&data.path().join("recordings"));
+        let second = found.into_iter().find(|file| *file != path);
+        let ended = second
+            .and_then(|file| Recording::open(&file).ok())
+            .filter(Recording::complete);
+        if let Some(ended) = ended {
+            break ended;
+        }
+        assert!(begun.elapsed().as_secs() < 20, "the second file was not ended");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    };
+    assert!(second.entries().count() > 0);
+}
