@@ -189,7 +189,7 @@ enum Run {
 
 const SAMPLE: &str = "host/app/samples/pair_d18.75_clear1.00.step";
 
-const COMMANDS: [(&str, Run); 24] = [
+const COMMANDS: [(&str, Run); 28] = [
     ("cargo xtask setup", Run::Elsewhere("CI, before anything else")),
     ("cargo xtask demo", Run::Elsewhere("the step `window` plays it")),
     (

@@ -286,7 +286,7 @@ fn hex(bytes: &[u8]) -> String {
 
 /// The bytes of a text by [`hex`].
 pub(crate) fn from_hex(text: &str) -> Option<Vec<u8>> {
-    (text.is_ascii() && text.len() % 2 == 0).then_some(())?;
+    (text.is_ascii() && text.len().is_multiple_of(2)).then_some(())?;
     (0..text.len() / 2)
         .map(|at| u8::from_str_radix(&text[2 * at..2 * at + 2], 16).ok())
         .collect()

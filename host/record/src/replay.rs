@@ -149,12 +149,13 @@ impl Story {
                 // Of a scene that is uploaded while recording, at its beginning nothing is known.
                 self.crc = self.crc.or(capabilities.scene).or(begun);
             }
-            FromDevice::Fault { tick, fault } => {
-                if let Fault::HostSilent { .. } | Fault::TickOverrun | Fault::SceneDamaged = fault {
-                    let why = "a fault that no reading explains";
-                    // Counted before the tick's own count.
-                    self.untimely.insert(tick.wrapping_add(1), why.to_owned());
-                }
+            FromDevice::Fault {
+                tick,
+                fault: Fault::HostSilent { .. } | Fault::TickOverrun | Fault::SceneDamaged,
+            } => {
+                let why = "a fault that no reading explains";
+                // Counted before the tick's own count.
+                self.untimely.insert(tick.wrapping_add(1), why.to_owned());
             }
             _ => {}
         }

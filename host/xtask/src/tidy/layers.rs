@@ -80,7 +80,14 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("host/inspect", &["mortise-bake", "mortise-brep", "mortise-task"]),
     (
         "host/record",
-        &["mortise-mechanism", "mortise-protocol", "mortise-rig"],
+        &[
+            // Its tests play and record scenarios.
+            "mortise-brep",
+            "mortise-mechanism",
+            "mortise-protocol",
+            "mortise-rig",
+            "mortise-scenario",
+        ],
     ),
     ("host/words", &["mortise-brep", "mortise-mating", "mortise-task"]),
     (
