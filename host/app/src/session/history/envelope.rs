@@ -154,7 +154,7 @@ mod tests {
         let rare = prop::bool::weighted(0.01);
         let time = prop_oneof![20 => 0.0..0.03f64, 1 => 0.4..0.7f64];
         // In one of two histories every sample has a value, so that whole chunks are taken.
-        let whole = (0.0..0.03f64, (-1e3f32..1e3).prop_map(Some), rare.clone());
+        let whole = (0.0..0.03f64, (-1e3f32..1e3).prop_map(Some), rare);
         prop_oneof![
             prop::collection::vec((time, value, rare), 1..700),
             prop::collection::vec(whole, 1..700),
