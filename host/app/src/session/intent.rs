@@ -74,6 +74,15 @@ pub enum Intent {
     GuideWhen(When),
     /// Set the largest guidance force, N.
     GuideCap(f32),
+    /// Take a file out of the list of recent ones.
+    ForgetRecent(PathBuf),
+    /// Keep whether a section of the window is open.
+    Fold {
+        /// Name of the section.
+        section: &'static str,
+        /// Whether it is open.
+        open: bool,
+    },
     /// Make a table of traces, and ask where to write it.
     ExportTraces(Traces),
     /// Write that table.
@@ -102,6 +111,8 @@ impl Intent {
                 | Self::SwitchTargetOff(..)
                 | Self::GuideWhen(_)
                 | Self::GuideCap(_)
+                | Self::ForgetRecent(_)
+                | Self::Fold { .. }
                 | Self::ExportTraces(_)
                 | Self::SaveTraces { .. }
                 | Self::Demo(_)
@@ -130,7 +141,9 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         | Intent::RefreshRigs
         | Intent::Select(_)
         | Intent::GuideWhen(_)
-        | Intent::GuideCap(_) => None,
+        | Intent::GuideCap(_)
+        | Intent::ForgetRecent(_)
+        | Intent::Fold { .. } => None,
         Intent::Browse | Intent::Open(_) | Intent::OpenSample => {
             armed.then(|| "The rig is armed: disarm it before another file is opened".to_owned())
         }

@@ -11,6 +11,8 @@ pub mod guidance;
 pub mod history;
 pub mod insertion;
 pub mod intent;
+mod keeper;
+mod keeping;
 pub mod link;
 pub mod notes;
 pub mod outbox;

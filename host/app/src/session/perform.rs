@@ -86,6 +86,8 @@ impl Session {
                     self.command_guidance(GuidanceCommand::Set(self.guide));
                 }
             }
+            Intent::ForgetRecent(path) => self.preferences.recent.forget(&path),
+            Intent::Fold { section, open } => _ = self.preferences.open.insert(section.to_owned(), open),
             Intent::ExportTraces(traces) => self.export(&traces),
             Intent::SaveTraces { path, replace } => self.save_traces(path, replace),
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),

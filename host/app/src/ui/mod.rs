@@ -7,6 +7,7 @@ mod arrange;
 mod cards;
 mod control;
 mod drop;
+mod file_menu;
 pub mod fonts;
 mod guidance;
 mod header;
@@ -15,6 +16,7 @@ mod open;
 mod parameters;
 mod parts;
 pub mod plots;
+mod recent;
 mod rig;
 mod stop;
 pub mod theme;
@@ -57,12 +59,16 @@ pub struct Window {
 impl Window {
     /// A window that shows `session`.
     pub fn new(session: Session) -> Self {
+        let mut plots = plots::View::default();
+        if let Some(signals) = &session.preferences.signals {
+            plots.choose(signals);
+        }
         Self {
             session,
             view: Viewpoint::default(),
             path: open::PathDialog::default(),
             tab: arrange::Tab::default(),
-            plots: plots::View::default(),
+            plots,
         }
     }
 
@@ -85,9 +91,26 @@ impl Window {
         for intent in wanted {
             self.session.act(intent);
         }
+        self.keep(ui.ctx());
         if !matches!(self.session.link, Link::None) {
             // A request without delay would draw two frames.
             ui.ctx().request_repaint_after(CALM);
+        }
+    }
+
+    /// Keeps what has changed for the next start.
+    fn keep(&mut self, ctx: &egui::Context) {
+        let keys = self.plots.keys();
+        let preferences = &mut self.session.preferences;
+        let changed = match &preferences.signals {
+            Some(kept) => *kept != keys,
+            None => keys != plots::View::default().keys(),
+        };
+        if changed {
+            preferences.signals = Some(keys.into_iter().map(str::to_owned).collect());
+        }
+        if let Some(again) = self.session.keep() {
+            ctx.request_repaint_after(again);
         }
     }
 
@@ -183,6 +206,7 @@ impl Window {
             .show(ui, |ui| {
                 let rect = ui.available_rect_before_wrap();
                 view::show(ui, session, &mut self.view, surface, wanted);
+                recent::on_empty_page(ui, rect, session, wanted);
                 cards::show(ui, rect, session, wanted);
             });
     }
