@@ -51,6 +51,8 @@ pub struct Document {
     pub colors: Vec<[u8; 3]>,
     /// SHA-256 of the files that were read, in hexadecimal digits; empty when it is unknown.
     pub sha256: String,
+    /// Whether each part is hidden.
+    pub hidden: Vec<bool>,
     /// Present pose of each part, mm.
     pub poses: Vec<DAffine3>,
     /// A peg in front of a hole, if the assembly has one.
@@ -115,6 +117,7 @@ impl Document {
             extent,
             colors: colors(&model),
             sha256: String::new(),
+            hidden: vec![false; poses.len()],
             poses,
             insertion,
             watch: Watch::of(&model),
@@ -133,6 +136,11 @@ impl Document {
     /// Name of a part.
     pub fn part_name(&self, part: usize) -> &str {
         self.model.parts.get(part).map_or("?", |p| p.name.as_str())
+    }
+
+    /// Whether a part is hidden: neither drawn nor picked.
+    pub fn is_hidden(&self, part: usize) -> bool {
+        self.hidden.get(part).is_some_and(|hidden| *hidden)
     }
 
     /// Whether a part may be grabbed; `false` until the scene is baked.

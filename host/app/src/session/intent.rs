@@ -56,6 +56,12 @@ pub enum Intent {
     Home,
     /// Select a part in the list and the view.
     Select(Option<usize>),
+    /// Hide a part in the view, or show it again.
+    Hide(usize, bool),
+    /// Hide all parts but this one and the held one.
+    Isolate(usize),
+    /// Show every part.
+    ShowAll,
     /// Grab a part.
     Grab(usize),
     /// Release the held part.
@@ -104,6 +110,9 @@ impl Intent {
         matches!(
             self,
             Self::Select(_)
+                | Self::Hide(..)
+                | Self::Isolate(_)
+                | Self::ShowAll
                 | Self::RefreshRigs
                 | Self::SetParameter(..)
                 | Self::ResetParameters
@@ -192,6 +201,13 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Home => match session.device() {
             None => no(NO_RIG),
             Some(_) if armed => no("Only while the motors are off: disarm first"),
+            Some(_) => None,
+        },
+        Intent::Hide(part, true) if session.grabbed() == Some(*part) => no("It is held: release it first"),
+        Intent::Hide(..) | Intent::Isolate(_) => session.document.is_none().then(|| NO_FILE.to_owned()),
+        Intent::ShowAll => match &session.document {
+            None => no(NO_FILE),
+            Some(document) if !document.hidden.contains(&true) => no("No part is hidden"),
             Some(_) => None,
         },
         Intent::Grab(part) => grab(session, *part),

@@ -29,6 +29,7 @@ mod tour;
 pub mod tree;
 mod update;
 pub mod verdict;
+mod visibility;
 pub mod work;
 
 pub use self::intent::{Intent, obstacle};

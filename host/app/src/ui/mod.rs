@@ -7,6 +7,7 @@ mod arrange;
 mod cards;
 mod control;
 mod drop;
+mod eye;
 mod file_menu;
 pub mod fonts;
 mod guidance;
@@ -52,6 +53,8 @@ pub struct Window {
     pub view: Viewpoint,
     path: open::PathDialog,
     tab: arrange::Tab,
+    /// What is searched for in the list of parts.
+    search: String,
     /// What the plots show.
     pub plots: plots::View,
 }
@@ -68,6 +71,7 @@ impl Window {
             view: Viewpoint::default(),
             path: open::PathDialog::default(),
             tab: arrange::Tab::default(),
+            search: String::new(),
             plots,
         }
     }
@@ -77,7 +81,7 @@ impl Window {
         self.session.poll();
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
-        shortcuts(ui, &mut wanted);
+        shortcuts(ui, &self.session, &mut wanted);
         let size = ui.max_rect().size();
         header::show(ui, &self.session, &mut wanted);
         match Arrangement::of(size) {
@@ -142,7 +146,7 @@ impl Window {
             .default_size(248.0)
             .size_range(180.0..=420.0)
             .frame(theme::panel(theme::of(ui)))
-            .show(ui, |ui| parts::show(ui, session, wanted));
+            .show(ui, |ui| parts::show(ui, session, &mut self.search, wanted));
         egui::Panel::right("rig")
             .exact_size(336.0)
             .resizable(false)
@@ -192,7 +196,7 @@ impl Window {
         match self.tab {
             arrange::Tab::View => {}
             arrange::Tab::Rig => rig::show(ui, session, wanted),
-            arrange::Tab::Parts => parts::show(ui, session, wanted),
+            arrange::Tab::Parts => parts::show(ui, session, &mut self.search, wanted),
             arrange::Tab::Messages => messages::show(ui, session),
             arrange::Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),
         }
@@ -212,10 +216,26 @@ impl Window {
     }
 }
 
-fn shortcuts(ui: &Ui, wanted: &mut Vec<Intent>) {
+fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let typing = ui.ctx().text_edit_focused();
     ui.input_mut(|input| {
         if input.consume_key(Modifiers::COMMAND, Key::O) {
             wanted.push(Intent::Browse);
+        }
+        let Some(document) = session.document.as_ref().filter(|_| !typing) else {
+            return;
+        };
+        // First, because a key without modifiers also fits the one with Shift.
+        if input.consume_key(Modifiers::SHIFT, Key::H) {
+            wanted.push(Intent::ShowAll);
+        }
+        if let Some(part) = session.selected {
+            if input.consume_key(Modifiers::NONE, Key::H) {
+                wanted.push(Intent::Hide(part, !document.is_hidden(part)));
+            }
+            if input.consume_key(Modifiers::NONE, Key::I) {
+                wanted.push(Intent::Isolate(part));
+            }
         }
     });
 }
