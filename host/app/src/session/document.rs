@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use glam::DAffine3;
 use mortise_bake::Baked;
 use mortise_brep::{CadModel, LoadOptions, load_step_while};
+use sha2::{Digest as _, Sha256};
 
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
@@ -48,6 +49,10 @@ pub struct Document {
     pub extent: Extent,
     /// sRGB of each part.
     pub colors: Vec<[u8; 3]>,
+    /// SHA-256 of the files that were read, in hexadecimal digits; empty when it is unknown.
+    pub sha256: String,
+    /// Whether each part is hidden.
+    pub hidden: Vec<bool>,
     /// Present pose of each part, mm.
     pub poses: Vec<DAffine3>,
     /// A peg in front of a hole, if the assembly has one.
@@ -73,7 +78,11 @@ impl Document {
             || path.display().to_string(),
             |n| n.to_string_lossy().into_owned(),
         );
-        Ok(Self::of(model, Some(path.to_owned()), title, generation))
+        let sha256 = sha256_of(&model.files);
+        Ok(Self {
+            sha256,
+            ..Self::of(model, Some(path.to_owned()), title, generation)
+        })
     }
 
     /// Reads the sample that is built into the program.
@@ -83,12 +92,11 @@ impl Document {
     pub fn sample(generation: u64, progress: &dyn Fn(f64) -> ControlFlow<()>) -> anyhow::Result<Self> {
         let file = mortise_scenario::sample::File::write().context("the sample could not be unpacked")?;
         let model = load_step_while(file.path(), &LoadOptions::default(), progress)?;
-        Ok(Self::of(
-            model,
-            None,
-            mortise_scenario::sample::NAME.to_owned(),
-            generation,
-        ))
+        let title = mortise_scenario::sample::NAME.to_owned();
+        Ok(Self {
+            sha256: digits(Sha256::new_with_prefix(mortise_scenario::sample::STEP)),
+            ..Self::of(model, None, title, generation)
+        })
     }
 
     /// The document of a model.
@@ -108,6 +116,8 @@ impl Document {
             extents,
             extent,
             colors: colors(&model),
+            sha256: String::new(),
+            hidden: vec![false; poses.len()],
             poses,
             insertion,
             watch: Watch::of(&model),
@@ -128,6 +138,11 @@ impl Document {
         self.model.parts.get(part).map_or("?", |p| p.name.as_str())
     }
 
+    /// Whether a part is hidden: neither drawn nor picked.
+    pub fn is_hidden(&self, part: usize) -> bool {
+        self.hidden.get(part).is_some_and(|hidden| *hidden)
+    }
+
     /// Whether a part may be grabbed; `false` until the scene is baked.
     pub fn is_grabbable(&self, part: usize) -> bool {
         let reports = self.baked.as_ref().map(|b| b.report.parts.as_slice());
@@ -146,6 +161,22 @@ impl Document {
         let reports = &self.baked.as_ref()?.report.parts;
         reports.get(usize::from(scene_part)).map(|r| r.model_part)
     }
+}
+
+/// SHA-256 of the contents of files, one after the other; empty when one cannot be read any more.
+fn sha256_of(files: &[PathBuf]) -> String {
+    let mut sum = Sha256::new();
+    for path in files {
+        let Ok(bytes) = std::fs::read(path) else {
+            return String::new();
+        };
+        sum.update(bytes);
+    }
+    digits(sum)
+}
+
+fn digits(sum: Sha256) -> String {
+    sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Bounding sphere of all parts at their present poses.

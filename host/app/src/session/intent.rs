@@ -56,6 +56,12 @@ pub enum Intent {
     Home,
     /// Select a part in the list and the view.
     Select(Option<usize>),
+    /// Hide a part in the view, or show it again.
+    Hide(usize, bool),
+    /// Hide all parts but this one and the held one.
+    Isolate(usize),
+    /// Show every part.
+    ShowAll,
     /// Grab a part.
     Grab(usize),
     /// Release the held part.
@@ -74,6 +80,15 @@ pub enum Intent {
     GuideWhen(When),
     /// Set the largest guidance force, N.
     GuideCap(f32),
+    /// Take a file out of the list of recent ones.
+    ForgetRecent(PathBuf),
+    /// Keep whether a section of the window is open.
+    Fold {
+        /// Name of the section.
+        section: &'static str,
+        /// Whether it is open.
+        open: bool,
+    },
     /// Make a table of traces, and ask where to write it.
     ExportTraces(Traces),
     /// Write that table.
@@ -99,6 +114,9 @@ impl Intent {
         matches!(
             self,
             Self::Select(_)
+                | Self::Hide(..)
+                | Self::Isolate(_)
+                | Self::ShowAll
                 | Self::RefreshRigs
                 | Self::SetParameter(..)
                 | Self::ResetParameters
@@ -106,6 +124,8 @@ impl Intent {
                 | Self::SwitchTargetOff(..)
                 | Self::GuideWhen(_)
                 | Self::GuideCap(_)
+                | Self::ForgetRecent(_)
+                | Self::Fold { .. }
                 | Self::ExportTraces(_)
                 | Self::SaveTraces { .. }
                 | Self::Record
@@ -136,7 +156,9 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         | Intent::RefreshRigs
         | Intent::Select(_)
         | Intent::GuideWhen(_)
-        | Intent::GuideCap(_) => None,
+        | Intent::GuideCap(_)
+        | Intent::ForgetRecent(_)
+        | Intent::Fold { .. } => None,
         Intent::Browse | Intent::Open(_) | Intent::OpenSample => {
             armed.then(|| "The rig is armed: disarm it before another file is opened".to_owned())
         }
@@ -185,6 +207,13 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         Intent::Home => match session.device() {
             None => no(NO_RIG),
             Some(_) if armed => no("Only while the motors are off: disarm first"),
+            Some(_) => None,
+        },
+        Intent::Hide(part, true) if session.grabbed() == Some(*part) => no("It is held: release it first"),
+        Intent::Hide(..) | Intent::Isolate(_) => session.document.is_none().then(|| NO_FILE.to_owned()),
+        Intent::ShowAll => match &session.document {
+            None => no(NO_FILE),
+            Some(document) if !document.hidden.contains(&true) => no("No part is hidden"),
             Some(_) => None,
         },
         Intent::Grab(part) => grab(session, *part),

@@ -11,6 +11,8 @@ pub mod guidance;
 pub mod history;
 pub mod insertion;
 pub mod intent;
+mod keeper;
+mod keeping;
 pub mod link;
 pub mod notes;
 pub mod outbox;
@@ -29,6 +31,7 @@ mod tour;
 pub mod tree;
 mod update;
 pub mod verdict;
+mod visibility;
 pub mod work;
 
 pub use self::intent::{Intent, obstacle};

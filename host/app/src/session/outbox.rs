@@ -63,6 +63,8 @@ pub enum Update {
     Chosen(Purpose, PathBuf),
     /// No file dialog is available: the window must ask for a path.
     NoDialog(Purpose),
+    /// Recent files that are missing.
+    Missing(Vec<PathBuf>),
     /// A file was written, or one line with the reason why not.
     Written(Result<String, String>),
 }

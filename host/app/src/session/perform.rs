@@ -63,6 +63,9 @@ impl Session {
             Intent::ClearFault => self.request(ToDevice::ClearFault),
             Intent::Home => self.request(ToDevice::Home),
             Intent::Select(part) => self.selected = part,
+            Intent::Hide(part, hidden) => self.hide(part, hidden),
+            Intent::Isolate(part) => self.isolate(part),
+            Intent::ShowAll => self.show_all(),
             Intent::Grab(part) => self.grab(part),
             Intent::Release => self.request(ToDevice::Release),
             Intent::ResetScene => self.request(ToDevice::ResetScene),
@@ -86,6 +89,8 @@ impl Session {
                     self.command_guidance(GuidanceCommand::Set(self.guide));
                 }
             }
+            Intent::ForgetRecent(path) => self.preferences.recent.forget(&path),
+            Intent::Fold { section, open } => _ = self.preferences.open.insert(section.to_owned(), open),
             Intent::ExportTraces(traces) => self.export(&traces),
             Intent::SaveTraces { path, replace } => self.save_traces(path, replace),
             Intent::Record => self.begin_recording(),
@@ -239,6 +244,8 @@ impl Session {
 
     fn grab(&mut self, part: usize) {
         self.selected = Some(part);
+        // The part in hand is always seen.
+        self.hide(part, false);
         let Some(scene_part) = self.document.as_ref().and_then(|d| d.scene_part(part)) else {
             return;
         };

@@ -15,6 +15,7 @@ use mortise_rig::{RigEntry, RigSpec};
 
 use super::document::Document;
 use super::history::History;
+use super::keeper::Keeper;
 use super::link::{Connection, Link};
 use super::notes::Notes;
 use super::outbox::{Outbox, Update};
@@ -25,6 +26,7 @@ use super::tour::Tour;
 use super::verdict::Verdict;
 use super::{pose, work};
 use crate::folder_cache::FolderCache;
+use crate::kept::Preferences;
 
 /// Range of the guidance force limit, N: from barely perceptible to well below the coupling's limit.
 pub const GUIDE_CAP_N: RangeInclusive<f32> = 0.2..=8.0;
@@ -95,6 +97,11 @@ pub struct Session {
     pub(super) table: Option<String>,
     /// Where results of bakes are kept.
     pub(super) cache: Option<Arc<FolderCache>>,
+    /// What the user prefers.
+    pub preferences: Preferences,
+    /// Recent files that are missing.
+    pub missing: Vec<PathBuf>,
+    pub(super) keeper: Keeper,
     pub(super) tour: Option<Tour>,
     /// Held part, and its pose in the handle's frame when it was grabbed.
     pub(super) held: Option<(usize, DAffine3)>,
@@ -131,6 +138,9 @@ impl Session {
             wants_path: None,
             table: None,
             cache: None,
+            preferences: Preferences::default(),
+            missing: Vec::new(),
+            keeper: Keeper::default(),
             tour: None,
             held: None,
             outbox,
@@ -246,5 +256,6 @@ impl Drop for Session {
         self.inbox = std::sync::mpsc::sync_channel(1).1;
         // Motors off and emulator ended before the program ends.
         std::mem::replace(&mut self.link, Link::None).close(true);
+        self.keep_now();
     }
 }

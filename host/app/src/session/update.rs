@@ -33,6 +33,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
                 Ok(document) => opened(session, *document),
                 Err(why) => {
                     session.tour = None;
+                    session.check_recent();
                     session.notes.add(Severity::Error, why);
                 }
             }
@@ -80,6 +81,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         }
         Update::Chosen(purpose, path) => return Some(answer(purpose, path, true)),
         Update::NoDialog(purpose) => session.wants_path = Some(purpose),
+        Update::Missing(missing) => session.missing = missing,
         Update::Written(Ok(done)) => session.notes.add(Severity::Good, done),
         Update::Written(Err(why)) => session.notes.add(Severity::Error, why),
     }
@@ -111,6 +113,7 @@ fn opened(session: &mut Session, document: Document) {
     session.verdict = None;
     session.document = Some(document);
     session.clear_board();
+    session.remember_file();
     session.bake();
 }
 

@@ -10,6 +10,7 @@ use mortise_output::Output;
 
 use super::{Window, theme};
 use crate::folder_cache::FolderCache;
+use crate::kept::{Preferences, StateFolder};
 use crate::session::{Intent, Session};
 use crate::viewport::surface::Surface;
 
@@ -50,10 +51,18 @@ struct App {
 /// # Errors
 /// No display, no graphics device, or the screenshot could not be written.
 pub fn run(options: Options) -> anyhow::Result<()> {
+    // A picture taken by automation shows the same on every computer.
+    let folder = (options.screenshot.is_none())
+        .then(StateFolder::of_user)
+        .flatten();
+    let size = folder
+        .as_ref()
+        .and_then(Preferences::of)
+        .and_then(|kept| kept.window);
     let failed = Arc::new(Mutex::new(None));
     let report = Arc::clone(&failed);
     let native = eframe::NativeOptions {
-        viewport: viewport(),
+        viewport: viewport(size),
         renderer: eframe::Renderer::Wgpu,
         // `set_up` does this, also in tests.
         system_font_fallback: false,
@@ -66,7 +75,7 @@ pub fn run(options: Options) -> anyhow::Result<()> {
             super::set_up(&creation.egui_ctx);
             let ctx = creation.egui_ctx.clone();
             let session = Session::new(Arc::new(move || ctx.request_repaint()));
-            let mut window = Window::new(session.with_cache(FolderCache::of_user()));
+            let mut window = Window::new(session.with_cache(FolderCache::of_user()).with_state(folder));
             window.view.see_through = options.see_through;
             for intent in options.first {
                 window.session.act(intent);
@@ -103,11 +112,11 @@ fn reason(error: &str) -> &str {
 }
 
 /// The window that the system is asked for.
-fn viewport() -> egui::ViewportBuilder {
+fn viewport(size: Option<[f32; 2]>) -> egui::ViewportBuilder {
     egui::ViewportBuilder::default()
         .with_title("Mortise")
         .with_app_id("mortise")
-        .with_inner_size(Vec2::new(1520.0, 940.0))
+        .with_inner_size(size.map_or(Vec2::new(1520.0, 940.0), Vec2::from))
         // Small enough for the smallest screen at the largest scale; a larger minimum would exceed that screen.
         .with_min_inner_size(Vec2::new(240.0, 180.0))
         .with_clamp_size_to_monitor_size(true)
@@ -122,6 +131,7 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         self.window.show(ui, self.surface.as_mut());
+        self.note_size(ui.ctx());
         self.name_window(ui.ctx());
         self.take_screenshot(ui.ctx());
     }
@@ -133,6 +143,18 @@ impl eframe::App for App {
 }
 
 impl App {
+    /// Notes the size of the window for the next start, unless it fills the screen.
+    fn note_size(&mut self, ctx: &egui::Context) {
+        let size = ctx.input(|i| {
+            let seen = i.viewport();
+            let fills = [seen.maximized, seen.fullscreen, seen.minimized].contains(&Some(true));
+            seen.inner_rect.filter(|_| !fills).map(|rect| rect.size().round())
+        });
+        if let Some(size) = size.filter(|size| size.min_elem() >= 100.0) {
+            self.window.session.preferences.window = Some(size.into());
+        }
+    }
+
     fn name_window(&mut self, ctx: &egui::Context) {
         let open = self.window.session.document.as_ref();
         if open.map(|d| d.generation) != self.named {
@@ -226,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_window_is_never_larger_than_the_monitor() {
-        let viewport = viewport();
+        let viewport = viewport(None);
         assert_eq!(viewport.clamp_size_to_monitor_size, Some(true));
         // 800 × 600 pixels, three to the point.
         let least = viewport.min_inner_size.expect("a least size");

@@ -4,7 +4,7 @@ use egui::{Align, Layout, RichText, Ui, Vec2};
 use mortise_protocol::message::DeviceState;
 use mortise_rig::describe;
 
-use super::{control, stop, theme};
+use super::{control, file_menu, stop, theme};
 use crate::session::link::Link;
 use crate::session::{Intent, Session};
 
@@ -99,6 +99,9 @@ fn file(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
     let open = egui::Button::new("Open…").min_size(Vec2::new(72.0, height));
     let hint = "Open a STEP file (Ctrl+O)";
     control::intent_button(ui, session, wanted, open, Intent::Browse, hint);
+    if ui.available_width() > 40.0 {
+        file_menu::show(ui, session, wanted, height);
+    }
     if ui.available_width() > 40.0 {
         title(ui, session);
     }

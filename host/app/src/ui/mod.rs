@@ -7,6 +7,8 @@ mod arrange;
 mod cards;
 mod control;
 mod drop;
+mod eye;
+mod file_menu;
 pub mod fonts;
 mod guidance;
 mod header;
@@ -15,6 +17,7 @@ mod open;
 mod parameters;
 mod parts;
 pub mod plots;
+mod recent;
 mod rig;
 mod stop;
 pub mod theme;
@@ -50,6 +53,8 @@ pub struct Window {
     pub view: Viewpoint,
     path: open::PathDialog,
     tab: arrange::Tab,
+    /// What is searched for in the list of parts.
+    search: String,
     /// What the plots show.
     pub plots: plots::View,
 }
@@ -57,12 +62,17 @@ pub struct Window {
 impl Window {
     /// A window that shows `session`.
     pub fn new(session: Session) -> Self {
+        let mut plots = plots::View::default();
+        if let Some(signals) = &session.preferences.signals {
+            plots.choose(signals);
+        }
         Self {
             session,
             view: Viewpoint::default(),
             path: open::PathDialog::default(),
             tab: arrange::Tab::default(),
-            plots: plots::View::default(),
+            search: String::new(),
+            plots,
         }
     }
 
@@ -71,7 +81,7 @@ impl Window {
         self.session.poll();
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
-        shortcuts(ui, &mut wanted);
+        shortcuts(ui, &self.session, &mut wanted);
         let size = ui.max_rect().size();
         header::show(ui, &self.session, &mut wanted);
         match Arrangement::of(size) {
@@ -85,9 +95,26 @@ impl Window {
         for intent in wanted {
             self.session.act(intent);
         }
+        self.keep(ui.ctx());
         if !matches!(self.session.link, Link::None) {
             // A request without delay would draw two frames.
             ui.ctx().request_repaint_after(CALM);
+        }
+    }
+
+    /// Keeps what has changed for the next start.
+    fn keep(&mut self, ctx: &egui::Context) {
+        let keys = self.plots.keys();
+        let preferences = &mut self.session.preferences;
+        let changed = match &preferences.signals {
+            Some(kept) => *kept != keys,
+            None => keys != plots::View::default().keys(),
+        };
+        if changed {
+            preferences.signals = Some(keys.into_iter().map(str::to_owned).collect());
+        }
+        if let Some(again) = self.session.keep() {
+            ctx.request_repaint_after(again);
         }
     }
 
@@ -119,7 +146,7 @@ impl Window {
             .default_size(248.0)
             .size_range(180.0..=420.0)
             .frame(theme::panel(theme::of(ui)))
-            .show(ui, |ui| parts::show(ui, session, wanted));
+            .show(ui, |ui| parts::show(ui, session, &mut self.search, wanted));
         egui::Panel::right("rig")
             .exact_size(336.0)
             .resizable(false)
@@ -169,7 +196,7 @@ impl Window {
         match self.tab {
             arrange::Tab::View => {}
             arrange::Tab::Rig => rig::show(ui, session, wanted),
-            arrange::Tab::Parts => parts::show(ui, session, wanted),
+            arrange::Tab::Parts => parts::show(ui, session, &mut self.search, wanted),
             arrange::Tab::Messages => messages::show(ui, session),
             arrange::Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),
         }
@@ -183,15 +210,32 @@ impl Window {
             .show(ui, |ui| {
                 let rect = ui.available_rect_before_wrap();
                 view::show(ui, session, &mut self.view, surface, wanted);
+                recent::on_empty_page(ui, rect, session, wanted);
                 cards::show(ui, rect, session, wanted);
             });
     }
 }
 
-fn shortcuts(ui: &Ui, wanted: &mut Vec<Intent>) {
+fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    let typing = ui.ctx().text_edit_focused();
     ui.input_mut(|input| {
         if input.consume_key(Modifiers::COMMAND, Key::O) {
             wanted.push(Intent::Browse);
+        }
+        let Some(document) = session.document.as_ref().filter(|_| !typing) else {
+            return;
+        };
+        // First, because a key without modifiers also fits the one with Shift.
+        if input.consume_key(Modifiers::SHIFT, Key::H) {
+            wanted.push(Intent::ShowAll);
+        }
+        if let Some(part) = session.selected {
+            if input.consume_key(Modifiers::NONE, Key::H) {
+                wanted.push(Intent::Hide(part, !document.is_hidden(part)));
+            }
+            if input.consume_key(Modifiers::NONE, Key::I) {
+                wanted.push(Intent::Isolate(part));
+            }
         }
     });
 }

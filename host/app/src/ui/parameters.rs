@@ -44,8 +44,14 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         if rows.peek().is_none() {
             continue;
         }
-        egui::CollapsingHeader::new(*heading)
-            .default_open(index < 3)
+        let open = session
+            .preferences
+            .open
+            .get(*heading)
+            .copied()
+            .unwrap_or(index < 3);
+        let section = egui::CollapsingHeader::new(*heading)
+            .default_open(open)
             .show_unindented(ui, |ui| {
                 if index == 0 {
                     method(ui, session, wanted);
@@ -55,6 +61,12 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
                 }
                 ui.add_space(4.0);
             });
+        if section.header_response.clicked() {
+            wanted.push(Intent::Fold {
+                section: *heading,
+                open: !open,
+            });
+        }
     }
 }
 

@@ -1,23 +1,28 @@
-//! The list of parts on the left: the assembly as a tree. A click selects a part, a double click grabs it.
+//! The list of parts on the left: the assembly as a tree, and a search in it. A click selects a part, a double click grabs it, the eye hides it.
 
 use egui::collapsing_header::CollapsingState;
-use egui::{Color32, CornerRadius, Id, RichText, Role, ScrollArea, Sense, Ui, Vec2, WidgetInfo};
+use egui::{
+    Align, Color32, CornerRadius, Id, Layout, RichText, Role, ScrollArea, Sense, TextEdit, Ui, Vec2,
+    WidgetInfo,
+};
 use mortise_brep::Surface;
 
-use super::{control, theme};
+use super::{control, eye, theme};
 use crate::session::document::Document;
-use crate::session::tree::Branch;
+use crate::session::tree::{self, Branch};
 use crate::session::{Intent, Session, obstacle};
 
 /// Draws the list.
-pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+pub fn show(ui: &mut Ui, session: &Session, search: &mut String, wanted: &mut Vec<Intent>) {
     ui.take_available_width();
-    control::section(ui, "Parts");
+    heading(ui, session, wanted);
     ui.add_space(4.0);
     let Some(document) = &session.document else {
         ui.label(RichText::new("Nothing is open").color(theme::of(ui).text_weak));
         return;
     };
+    field(ui, search);
+    let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
     let details = session.selected.filter(|&p| p < document.model.parts.len());
     let room = if details.is_some() { 188.0 } else { 0.0 };
     ScrollArea::vertical()
@@ -26,12 +31,59 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
         .max_height((ui.available_height() - room).max(80.0))
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 2.0;
-            branches(ui, session, document, wanted, &document.tree, Id::unique("parts"));
+            match &found {
+                None => branches(ui, session, document, wanted, &document.tree, Id::unique("parts")),
+                Some(found) if found.is_empty() => {
+                    ui.label(RichText::new("No part has this name").color(theme::of(ui).text_weak));
+                }
+                // Subassemblies are open, whichever are folded in the whole tree.
+                Some(found) => branches(ui, session, document, wanted, found, Id::unique("found parts")),
+            }
         });
     if let Some(part) = details {
         control::divider(ui);
         self::details(ui, session, document, wanted, part);
     }
+}
+
+/// The heading, and the way back to all parts while some are hidden.
+fn heading(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
+    ui.horizontal(|ui| {
+        control::section(ui, "Parts");
+        let hidden = session.document.as_ref().map_or(&[][..], |d| &d.hidden);
+        let hidden = hidden.iter().filter(|hidden| **hidden).count();
+        if hidden == 0 {
+            return;
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let button = egui::Button::new(RichText::new("Show all").small());
+            let hint = format!("{hidden} hidden (Shift+H)");
+            control::intent_button(ui, session, wanted, button, Intent::ShowAll, &hint);
+        });
+    });
+}
+
+/// The field for a search.
+fn field(ui: &mut Ui, search: &mut String) {
+    ui.horizontal(|ui| {
+        let clear = if search.is_empty() { 0.0 } else { 26.0 };
+        let edit = TextEdit::singleline(search)
+            .hint_text("Search")
+            .desired_width((ui.available_width() - clear - 12.0).max(40.0));
+        let response = ui
+            .add(edit)
+            .on_hover_text("Parts and subassemblies by words of their names");
+        response.accessible_name("Search parts");
+        if clear > 0.0
+            && ui
+                .add(egui::Button::new("×").frame(false))
+                .accessible_name("Clear search")
+                .clicked()
+        {
+            search.clear();
+        }
+    });
+    ui.add_space(4.0);
 }
 
 fn branches(
@@ -82,7 +134,7 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     } else {
         None
     };
-    let mut right = rect.right() - 8.0;
+    let mut right = rect.right() - eye::WIDTH;
     if let Some((note, color)) = note {
         let drawn = painter.text(
             egui::Pos2::new(right, rect.center().y),
@@ -93,14 +145,20 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
         );
         right = drawn.left() - 8.0;
     }
+    let ink = match document.is_hidden(part) {
+        true => theme::of(ui).text_weak,
+        false => theme::of(ui).text_strong,
+    };
     let mut job = egui::text::LayoutJob::single_section(
         name.to_owned(),
-        egui::TextFormat::simple(egui::FontId::proportional(13.5), theme::of(ui).text_strong),
+        egui::TextFormat::simple(egui::FontId::proportional(13.5), ink),
     );
     job.wrap = egui::text::TextWrapping::truncate_at_width((right - swatch.right() - 8.0).max(10.0));
     let galley = painter.layout_job(job);
     let at = egui::Pos2::new(swatch.right() + 8.0, rect.center().y - 0.5 * galley.size().y);
-    painter.galley(at, galley, theme::of(ui).text_strong);
+    painter.galley(at, galley, ink);
+    let over = response.hovered();
+    eye::show(ui, session, rect, over, part, wanted);
     if response.clicked() {
         wanted.push(Intent::Select(Some(part)));
     }

@@ -54,6 +54,7 @@ pub fn compose(
     let held = session.grabbed();
     let touching = session.telemetry.as_deref().filter(|_| held.is_some());
     let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
+        .filter(|&(index, _)| !document.is_hidden(index) || held == Some(index))
         .map(|(index, part)| {
             let in_hand = held == Some(index);
             let marked = session.selected == Some(index);

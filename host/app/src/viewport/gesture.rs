@@ -113,6 +113,7 @@ impl Viewpoint {
             &document.model,
             &document.extents,
             &document.poses,
+            &document.hidden,
             origin,
             direction,
         )

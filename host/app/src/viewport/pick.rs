@@ -22,16 +22,20 @@ pub struct Pick {
 
 /// The nearest part along the ray from `origin` in the unit direction `direction`, with each part at `poses` (shape to world).
 ///
-/// `extents` are the shapes' bounding spheres in their own frames.
+/// `extents` are the shapes' bounding spheres in their own frames; a part that is `hidden` is passed through.
 pub fn pick(
     model: &CadModel,
     extents: &[Extent],
     poses: &[DAffine3],
+    hidden: &[bool],
     origin: DVec3,
     direction: DVec3,
 ) -> Option<Pick> {
     let mut nearest: Option<Pick> = None;
     for (index, (part, pose)) in model.parts.iter().zip(poses).enumerate() {
+        if hidden.get(index).is_some_and(|hidden| *hidden) {
+            continue;
+        }
         let (Some(shape), Some(extent)) = (model.shapes.get(part.shape), extents.get(part.shape)) else {
             continue;
         };
@@ -133,7 +137,7 @@ mod tests {
         let model = model();
         let extents = [Extent::of_points(model.shapes[0].mesh.vertices.iter().copied())];
         let poses: Vec<_> = model.parts.iter().map(|p| p.placement).collect();
-        let down = |x: f64, y: f64| pick(&model, &extents, &poses, DVec3::new(x, y, 10.0), -DVec3::Z);
+        let down = |x: f64, y: f64| pick(&model, &extents, &poses, &[], DVec3::new(x, y, 10.0), -DVec3::Z);
         let hit = down(0.5, -0.5).expect("above both");
         assert_eq!((hit.part, hit.face), (1, 0));
         assert!((hit.distance - 5.0).abs() < 1e-12 && (hit.point.z - 5.0).abs() < 1e-12);
@@ -142,12 +146,35 @@ mod tests {
     }
 
     #[test]
+    fn a_hidden_part_is_passed_through() {
+        let model = model();
+        let extents = [Extent::of_points(model.shapes[0].mesh.vertices.iter().copied())];
+        let poses: Vec<_> = model.parts.iter().map(|p| p.placement).collect();
+        let from = DVec3::new(0.5, -0.5, 10.0);
+        for (hidden, part) in [
+            ([false, true], Some(0)),
+            ([true, false], Some(1)),
+            ([true, true], None),
+        ] {
+            let hit = pick(&model, &extents, &poses, &hidden, from, -DVec3::Z);
+            assert_eq!(hit.map(|hit| hit.part), part);
+        }
+    }
+
+    #[test]
     fn what_lies_behind_is_not_picked() {
         let model = model();
         let extents = [Extent::of_points(model.shapes[0].mesh.vertices.iter().copied())];
         let poses: Vec<_> = model.parts.iter().map(|p| p.placement).collect();
         assert_eq!(
-            pick(&model, &extents, &poses, DVec3::new(0.1, 0.0, 10.0), DVec3::Z),
+            pick(
+                &model,
+                &extents,
+                &poses,
+                &[],
+                DVec3::new(0.1, 0.0, 10.0),
+                DVec3::Z
+            ),
             None
         );
     }

@@ -2,11 +2,13 @@
 // Each test program uses only some of them.
 #![allow(dead_code)]
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use mortise::kept::StateFolder;
 use mortise::session::Session;
 use mortise::session::notes::Severity;
 use mortise::ui::{Window, theme};
@@ -23,13 +25,24 @@ pub fn harness() -> Harness<'static, Window> {
 
 /// A window whose egui context `setup` has configured.
 pub fn harness_with(setup: impl FnOnce(&egui::Context) + 'static) -> Harness<'static, Window> {
+    harness_of(Session::new(Arc::new(|| {})), setup)
+}
+
+/// A window that keeps what its user does in a folder.
+pub fn harness_on(folder: &Path) -> Harness<'static, Window> {
+    let session = Session::new(Arc::new(|| {}));
+    let folder = StateFolder::at(folder.to_owned());
+    harness_of(session.with_state(Some(folder)), theme::apply)
+}
+
+fn harness_of(session: Session, setup: impl FnOnce(&egui::Context) + 'static) -> Harness<'static, Window> {
     Harness::builder()
         .with_size(egui::vec2(1500.0, 940.0))
         .with_max_steps(1)
         .with_context_setup(setup)
         .build_ui_state(
             |ui, window: &mut Window| window.show(ui, None),
-            Window::new(Session::new(Arc::new(|| {}))),
+            Window::new(session),
         )
 }
 

@@ -1,0 +1,152 @@
+//! The folder of what is kept: the user's for program state.
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context as _, ensure};
+use etcetera::BaseStrategy as _;
+use mortise_output::{Existing, Output};
+
+/// Largest file that is read, bytes.
+pub const MOST_BYTES: u64 = 64 << 20;
+/// Ending of a file that is being written.
+const UNFINISHED: &str = "part";
+/// Age from which a file that an interrupted program left is removed.
+const LEFT_OVER: Duration = Duration::from_secs(24 * 3600);
+
+/// A folder of files with what is kept.
+#[derive(Clone, Debug)]
+pub struct StateFolder(PathBuf);
+
+impl StateFolder {
+    /// The user's; `None` where the system names none.
+    pub fn of_user() -> Option<Self> {
+        let base = etcetera::choose_base_strategy().ok()?;
+        let folder = base.state_dir().unwrap_or_else(|| base.data_dir());
+        Some(Self(folder.join("mortise")))
+    }
+
+    /// A folder, created with the first file.
+    pub fn at(folder: PathBuf) -> Self {
+        Self(folder)
+    }
+
+    /// The file of the preferences.
+    pub fn preferences(&self) -> PathBuf {
+        self.0.join("preferences.json")
+    }
+
+    /// Writes a file of this folder, all or nothing.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
+        let folder = path.parent().unwrap_or(&self.0);
+        std::fs::create_dir_all(folder).with_context(|| {
+            format!(
+                "{}: the folder cannot be made, so nothing is kept",
+                folder.display()
+            )
+        })?;
+        Output::new(path, Existing::Replace, &[] as &[PathBuf])?.write(text.as_bytes())?;
+        shrink(folder);
+        Ok(())
+    }
+}
+
+/// Reads a file of at most [`MOST_BYTES`]; `None` if there is none.
+///
+/// # Errors
+/// One line: what, where, what to do.
+pub fn read(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
+    let what = || {
+        format!(
+            "{}: cannot be read; check the path and its permissions",
+            path.display()
+        )
+    };
+    let found = match std::fs::metadata(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        found => found.with_context(what)?,
+    };
+    ensure!(
+        found.is_file(),
+        "{}: is not a regular file; choose a file",
+        path.display()
+    );
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).with_context(what)?;
+    file.take(MOST_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .with_context(what)?;
+    ensure!(
+        bytes.len() as u64 <= MOST_BYTES,
+        "{}: is larger than {} MiB, which no file of this kind is; choose another",
+        path.display(),
+        MOST_BYTES >> 20
+    );
+    Ok(Some(bytes))
+}
+
+/// Removes what interrupted programs left.
+fn shrink(folder: &Path) {
+    let Ok(files) = std::fs::read_dir(folder) else {
+        return;
+    };
+    for file in files.flatten() {
+        let path = file.path();
+        let written = file.metadata().and_then(|data| data.modified());
+        let is_old = written.is_ok_and(|written| written.elapsed().is_ok_and(|age| age > LEFT_OVER));
+        if is_old && path.extension().is_some_and(|ending| ending == UNFINISHED) {
+            // Another window may have removed it.
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::SystemTime;
+
+    use super::*;
+
+    #[test]
+    fn a_file_comes_back() {
+        let place = tempfile::tempdir().expect("folder");
+        let folder = StateFolder::at(place.path().join("state"));
+        let path = folder.preferences();
+        assert_eq!(read(&path).expect("none yet"), None);
+        folder.write(&path, "one").expect("written");
+        folder.write(&path, "two").expect("replaced");
+        assert_eq!(read(&path).expect("there").as_deref(), Some(&b"two"[..]));
+    }
+
+    #[test]
+    fn what_an_interrupted_program_left_goes_after_a_day() {
+        let place = tempfile::tempdir().expect("folder");
+        let folder = StateFolder::at(place.path().to_owned());
+        let [old, new] = ["old", "new"].map(|name| place.path().join(name).with_extension(UNFINISHED));
+        for (path, age) in [(&old, 2 * LEFT_OVER), (&new, LEFT_OVER / 2)] {
+            let file = std::fs::File::create(path).expect("written");
+            file.set_modified(SystemTime::now() - age)
+                .expect("times of files");
+        }
+        folder.write(&folder.preferences(), "p").expect("written");
+        assert!(!old.exists() && new.exists());
+    }
+
+    #[test]
+    fn what_is_no_file_and_what_cannot_be_written_is_said() {
+        let place = tempfile::tempdir().expect("folder");
+        let error = read(place.path()).expect_err("a folder");
+        assert!(error.to_string().contains("not a regular file"), "{error}");
+        let file = place.path().join("file");
+        std::fs::write(&file, "").expect("written");
+        let folder = StateFolder::at(file);
+        let error = folder
+            .write(&folder.preferences(), "")
+            .expect_err("a file in the way");
+        assert!(error.to_string().contains("nothing is kept"), "{error}");
+    }
+}

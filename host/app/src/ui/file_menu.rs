@@ -1,0 +1,23 @@
+//! The menu beside *Open…*: the files opened last.
+
+use egui::{Button, Shape, Stroke, Ui, Vec2};
+
+use super::{recent, theme};
+use crate::session::{Intent, Session};
+
+/// Draws the button that opens the menu.
+pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
+    let button = Button::new("").min_size(Vec2::new(26.0, height));
+    let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
+        ui.set_min_width(240.0);
+        ui.set_max_width(460.0);
+        recent::in_menu(ui, session, wanted);
+    });
+    // An arrow that points down; the fonts have none.
+    let corners = [Vec2::new(-4.0, -2.0), Vec2::new(4.0, -2.0), Vec2::new(0.0, 3.0)];
+    let corners = corners.map(|corner| response.rect.center() + corner).to_vec();
+    let ink = theme::of(ui).text_strong;
+    ui.painter()
+        .add(Shape::convex_polygon(corners, ink, Stroke::NONE));
+    response.accessible_name("File menu");
+}
