@@ -16,6 +16,8 @@ pub const MAX_TARGETS: usize = 8;
 pub const MAX_TARGET_PAIRS: usize = 8;
 /// Keyframes of the simulated operator's script.
 pub const MAX_KEYFRAMES: usize = 12;
+/// Ticks in a message of recorded inputs.
+pub const MAX_TICKS: usize = 10;
 /// Faults at the inputs of a simulated mechanism.
 pub const MAX_INPUT_FAULTS: usize = 8;
 /// Bytes of log per message.

@@ -7,6 +7,8 @@
 mod constraint;
 mod fault;
 mod flags;
+mod inputs;
+mod rigid;
 
 use heapless::{String, Vec};
 use postcard_schema::Schema;
@@ -21,6 +23,8 @@ use crate::rig::{Rig, RigFault};
 pub use self::constraint::{ConstraintKind, ConstraintTarget, Feature};
 pub use self::fault::Fault;
 pub use self::flags::{FlagRow, Flags};
+pub use self::inputs::{DriverReport, Inputs, TickInput};
+pub use self::rigid::{WirePose, WireTwist, WireWrench};
 
 /// Hash of the schemas of both message enums and of the bounds of their lists: any change to a message changes it.
 pub const SCHEMA_HASH: u64 = schema_hash();
@@ -33,7 +37,7 @@ const fn schema_hash() -> u64 {
 }
 
 /// Every bound that decides whether a message can be read.
-const WIRE_BOUNDS: [usize; 9] = [
+const WIRE_BOUNDS: [usize; 10] = [
     MAX_MESSAGE,
     MAX_CHUNK,
     MAX_PAIRS,
@@ -43,6 +47,7 @@ const WIRE_BOUNDS: [usize; 9] = [
     MAX_LOG,
     MAX_NAME,
     MAX_JOINTS,
+    MAX_TICKS,
 ];
 
 /// FNV-1a, 64 bit, one step for each number.
@@ -184,6 +189,8 @@ pub enum ToDevice {
     SetRig(Rig),
     /// Query [`FromDevice::Rig`].
     GetRig,
+    /// Send the inputs of every tick as [`FromDevice::Inputs`], or no longer. Ends with the session.
+    RecordInputs(bool),
 }
 
 impl ToDevice {
@@ -220,16 +227,13 @@ impl ToDevice {
             | Self::SimulatedInputs(_)
             | Self::Lockstep(_)
             | Self::Run { .. }
-            | Self::GetRig => false,
+            | Self::GetRig
+            | Self::RecordInputs(_) => false,
         }
     }
 }
 
 /// Board to host.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nothing to allocate from; one is made at a time, and most are telemetry"
-)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum FromDevice {
     /// Answer to Hello: the board's version.
@@ -289,6 +293,8 @@ pub enum FromDevice {
         /// Whether it is in effect; otherwise it takes effect at the next start.
         in_use: bool,
     },
+    /// Inputs of consecutive ticks.
+    Inputs(Inputs),
 }
 
 /// Capabilities of a board.
@@ -457,24 +463,6 @@ pub enum Refusal {
     RigDamaged,
     /// The command carries no stamp of this session, or one already seen, or the board has stopped or faulted since it arrived.
     Outdated,
-}
-
-/// A rigid pose.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
-pub struct WirePose {
-    /// Position, m.
-    pub position: [f32; 3],
-    /// Unit quaternion x, y, z, w.
-    pub orientation: [f32; 4],
-}
-
-/// Force and torque.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
-pub struct WireWrench {
-    /// Force, N.
-    pub force: [f32; 3],
-    /// Torque, N·m.
-    pub torque: [f32; 3],
 }
 
 /// Two faces that touch.

@@ -11,7 +11,7 @@ use mortise_haptics::State as LawState;
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::limits::MAX_INPUT_FAULTS;
 use mortise_protocol::message::{
-    ConstraintTarget, DeviceState, Fault, HandScript, InputFault, Refusal, Statistics, Telemetry,
+    ConstraintTarget, DeviceState, Fault, HandScript, InputFault, Refusal, Statistics, Telemetry, TickInput,
 };
 use mortise_protocol::parameter::ParameterId;
 
@@ -23,6 +23,8 @@ pub const COMMANDS: usize = 8;
 pub const EVENTS: usize = 32;
 /// Capacity of the telemetry queue.
 pub const SAMPLES: usize = 8;
+/// Capacity of the queue of recorded inputs: what a tick of the link plane that writes flash or sends a long message may delay, 32 ms.
+pub const RECORDED: usize = 32;
 /// Most events one command or one tick can cause: a command is taken, and a lockstep tick run, only when the event queue has that much space left.
 pub const EVENTS_AT_ONCE: usize = 8;
 
@@ -105,6 +107,23 @@ pub enum CommandKind<'s> {
     Run(u32),
     /// Ask whether the board may restart now.
     Restart,
+    /// Report the inputs of every tick, or no longer.
+    RecordInputs(bool),
+}
+
+/// Inputs of a tick, for a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recorded {
+    /// [`Shared::sessions`] at the tick; of another session it is not sent.
+    pub session: u32,
+    /// Ticks since start, this one included.
+    pub tick: u32,
+    /// Ticks lost since the recording began.
+    pub lost: u32,
+    /// See [`mortise_protocol::message::Inputs::count`].
+    pub count: [f32; 2],
+    /// The inputs.
+    pub input: TickInput,
 }
 
 /// Control plane to link plane.
@@ -310,6 +329,7 @@ pub struct Channels<'s> {
     commands: Queue<Command<'s>, { COMMANDS + 1 }>,
     events: Queue<Event, { EVENTS + 1 }>,
     samples: Queue<Telemetry, { SAMPLES + 1 }>,
+    recorded: Queue<Recorded, { RECORDED + 1 }>,
     shared: Shared,
 }
 
@@ -327,6 +347,7 @@ impl<'s> Channels<'s> {
             commands: Queue::new(),
             events: Queue::new(),
             samples: Queue::new(),
+            recorded: Queue::new(),
             shared: Shared {
                 stops: AtomicU32::new(0),
                 halts: AtomicU32::new(0),
@@ -351,12 +372,14 @@ impl<'s> Channels<'s> {
         let (commands_in, commands_out) = self.commands.split();
         let (events_in, events_out) = self.events.split();
         let (samples_in, samples_out) = self.samples.split();
+        let (recorded_in, recorded_out) = self.recorded.split();
         let shared = &self.shared;
         (
             LinkEnds {
                 commands: commands_in,
                 events: events_out,
                 samples: samples_out,
+                recorded: recorded_out,
                 shared,
             },
             ControlEnds {
@@ -364,6 +387,7 @@ impl<'s> Channels<'s> {
                 commands: commands_out,
                 events: events_in,
                 samples: samples_in,
+                recorded: recorded_in,
                 shared,
             },
         )
@@ -375,6 +399,7 @@ pub struct LinkEnds<'c, 's> {
     pub(crate) commands: Producer<'c, Command<'s>>,
     pub(crate) events: Consumer<'c, Event>,
     pub(crate) samples: Consumer<'c, Telemetry>,
+    pub(crate) recorded: Consumer<'c, Recorded>,
     /// Shared words.
     pub shared: &'c Shared,
 }
@@ -385,6 +410,7 @@ pub struct ControlEnds<'c, 's> {
     pub(crate) commands: Consumer<'c, Command<'s>>,
     pub(crate) events: Producer<'c, Event>,
     pub(crate) samples: Producer<'c, Telemetry>,
+    pub(crate) recorded: Producer<'c, Recorded>,
     /// Shared words.
     pub shared: &'c Shared,
 }

@@ -10,6 +10,7 @@
 
 pub mod fingerprint;
 mod parts;
+mod recording;
 mod report;
 mod simulation;
 #[cfg(test)]
@@ -21,7 +22,7 @@ use mortise_mechanism::hardware_limits::{HardwareLimits, restrain};
 use mortise_protocol::image::SceneImage;
 use mortise_protocol::message::{ConstraintTarget, Fault, Refusal};
 
-use self::parts::{Host, Lateness, Lockstep, Rendered, Reports, Sampling};
+use self::parts::{Host, Lateness, Lockstep, Recording, Rendered, Reports, Sampling};
 use crate::board::{Clock, Drive, Identity, Mechanism, Sensed};
 use crate::channel::{Command, CommandKind, ControlEnds, EVENTS_AT_ONCE, Epoch, Event, Reply};
 use crate::parameters::ControlSettings;
@@ -74,6 +75,7 @@ pub struct ControlPlane<'c, 's, M, C> {
     tick: u32,
     lockstep: Lockstep,
     telemetry: Sampling,
+    recording: Recording,
     late: Lateness,
     host: Host,
     reports: Reports,
@@ -105,6 +107,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             tick: 0,
             lockstep: Lockstep::default(),
             telemetry: Sampling::default(),
+            recording: Recording::default(),
             late: Lateness::default(),
             host: Host::default(),
             reports: Reports::new(),
@@ -169,6 +172,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         );
         self.tick = self.tick.wrapping_add(1);
         self.report();
+        self.record();
         self.sample();
         let points = self.rendered.output.as_ref().map_or(0, |o| o.work.points);
         let cost = self.cost();
@@ -210,6 +214,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
         if session != self.host.session {
             self.host.session = session;
             self.telemetry.every = 0;
+            self.recording = Recording::default();
             self.lockstep.on = false;
             self.lockstep.credit = 0;
             self.host.restarting = false;
@@ -248,6 +253,9 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
             session,
             kind,
         } = command;
+        if session == self.host.session {
+            self.recording.carried_out = seq;
+        }
         let now = Epoch {
             stops: self.host.stops,
             halts: self.ends.shared.halts(),
@@ -317,6 +325,7 @@ impl<'c, 's, M: Mechanism, C: Clock> ControlPlane<'c, 's, M, C> {
                 self.send_statistics(seq, reset);
                 return None;
             }
+            CommandKind::RecordInputs(on) => self.set_recording(on),
             CommandKind::Home => self.home(),
             CommandKind::Hand(script) => self.set_hand(&script),
             CommandKind::InputFaults(faults) => self.set_input_faults(&faults),

@@ -10,12 +10,13 @@
 mod answers;
 mod fingerprint;
 mod freshness;
+mod inputs;
 
 use heapless::String;
 use mortise_mechanism::kinematics::Model;
 use mortise_protocol::frame::{Decoder, FrameError, Received, encode};
 use mortise_protocol::image::LAYOUT_VERSION;
-use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS};
+use mortise_protocol::limits::{MAX_FRAME, MAX_LOG, MAX_NAME, MAX_TARGETS, MAX_TICKS};
 use mortise_protocol::message::{
     Capabilities, DeviceState, Fault, FromDevice, Refusal, Statistics, ToDevice, Version,
 };
@@ -164,6 +165,11 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             if out.room() < MAX_FRAME {
                 return passed;
             }
+            // Ahead of an answer, the inputs of all ticks before it.
+            if self.ends.events.ready() && self.send_inputs(1, out) > 0 {
+                passed += 1;
+                continue;
+            }
             let Some(event) = self.ends.events.dequeue() else {
                 break;
             };
@@ -171,6 +177,9 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             if let Some(message) = self.pass_on(event) {
                 self.send(&message, out);
             }
+        }
+        while out.room() >= OUTBOUND_MIN && self.send_inputs(MAX_TICKS, out) > 0 {
+            passed += 1;
         }
         for _ in 0..SAMPLES {
             if out.room() < OUTBOUND_MIN {
@@ -374,6 +383,7 @@ impl<'c, 's, F: Flash<'s>> LinkPlane<'c, 's, F> {
             ToDevice::Lockstep(on) => CommandKind::Lockstep(on),
             ToDevice::Run { ticks } => CommandKind::Run(ticks),
             ToDevice::Restart => CommandKind::Restart,
+            ToDevice::RecordInputs(on) => CommandKind::RecordInputs(on),
         };
         self.enqueue(seq, kind)?;
         Ok(None)

@@ -15,6 +15,7 @@ use crate::exchange::{Patience, greet, no_answer, obtain, patience_for, started_
 use crate::faults::FaultLine;
 use crate::heartbeat::{HEARTBEAT, HEARTBEAT_COUNTED, Heartbeat};
 use crate::link::{Answer, Link, Reader};
+use crate::observer::Observer;
 use crate::preload::Preload;
 use crate::spec::{EmulatedMode, RigSpec};
 use crate::transport::Transport;
@@ -197,6 +198,11 @@ impl Client {
             bad_frames: self.link.bad_frames.load(Ordering::Relaxed),
             dropped_events: self.link.events.dropped(),
         }
+    }
+
+    /// Passes every message from now on to `observer`; `None`: to nobody.
+    pub fn observe(&self, observer: Option<Arc<dyn Observer>>) {
+        self.link.observe(observer);
     }
 
     /// Sends without waiting for the answer; returns the sequence number.

@@ -75,6 +75,7 @@ fn repeatable(message: &ToDevice) -> bool {
         | ToDevice::SetTarget(_)
         | ToDevice::ClearTarget { .. }
         | ToDevice::SetTelemetry { .. }
+        | ToDevice::RecordInputs(_)
         | ToDevice::GetStatistics { reset: false }
         | ToDevice::Lockstep(_) => true,
         ToDevice::Arm

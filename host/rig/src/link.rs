@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -14,6 +14,7 @@ use mortise_protocol::parameter::ParameterId;
 use crate::error::RigError;
 use crate::event::{Event, Events};
 use crate::log::{self, LogReader};
+use crate::observer::Observer;
 use crate::transport::{Transport, is_quiet, write_whole};
 use crate::words::Words;
 
@@ -116,6 +117,7 @@ pub(crate) struct Link {
     heard: Mutex<Instant>,
     pub(crate) frames: AtomicU64,
     pub(crate) bad_frames: AtomicU64,
+    observer: RwLock<Option<Arc<dyn Observer>>>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -158,6 +160,7 @@ impl Link {
             heard: Mutex::new(Instant::now()),
             frames: AtomicU64::new(0),
             bad_frames: AtomicU64::new(0),
+            observer: RwLock::new(None),
         });
         let thread = std::thread::Builder::new()
             .name("mortise-link".into())
@@ -188,9 +191,10 @@ impl Link {
             for &byte in &bytes[..count] {
                 match decoder.push::<FromDevice>(byte) {
                     None => {}
-                    Some(Ok((_, message))) => {
+                    Some(Ok((seq, message))) => {
                         self.frames.fetch_add(1, Ordering::Relaxed);
                         *lock(&self.heard) = Instant::now();
+                        self.observed(|observer| observer.received(seq, &message));
                         self.deal(message, &mut lines);
                     }
                     Some(Err(_)) => {
@@ -229,6 +233,8 @@ impl Link {
                 self.halts.fetch_add(1, Ordering::SeqCst);
                 self.events.push(Event::Fault { tick, fault });
             }
+            // For the observer only.
+            FromDevice::Inputs(_) => {}
             FromDevice::Log(bytes) => lines.take(&bytes, |line| self.events.push(Event::Log(line))),
             value => {
                 let value = Box::new(value);
@@ -331,12 +337,25 @@ impl Link {
             what: message.words(),
         })?;
         writer.last = Instant::now();
+        // Before it is written, so that it precedes its answer.
+        self.observed(|observer| observer.sent(seq, message));
         write_whole(&mut *writer.port, bytes).map_err(|error| {
             self.lose(&error.to_string());
             RigError::LinkLost {
                 why: error.to_string(),
             }
         })
+    }
+
+    /// Passes every message from now on to `observer`; `None`: to nobody.
+    pub(crate) fn observe(&self, observer: Option<Arc<dyn Observer>>) {
+        *self.observer.write().unwrap_or_else(PoisonError::into_inner) = observer;
+    }
+
+    fn observed(&self, show: impl FnOnce(&dyn Observer)) {
+        if let Some(observer) = &*self.observer.read().unwrap_or_else(PoisonError::into_inner) {
+            show(observer.as_ref());
+        }
     }
 
     /// Writes `bytes` unchanged, then a delimiter, which ends any garbage on the wire.

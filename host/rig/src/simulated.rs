@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use mortise_firmware::board::{Clock, ERASED, FlashWord, Identity, Outbound, SLOTS, TICK_HZ};
+use mortise_firmware::board::{Clock, ERASED, FlashWord, Identity, Mechanism, Outbound, SLOTS, TICK_HZ};
 use mortise_firmware::channel::Channels;
 use mortise_firmware::control::Ticked;
 use mortise_firmware::device;
@@ -19,12 +19,14 @@ use mortise_firmware::store;
 use mortise_haptics::Work;
 use mortise_mechanism::hardware_limits::HardwareLimits;
 use mortise_protocol::message::{CostUnit, ResetReason};
+use mortise_protocol::rig::Rig;
 use mortise_simulation::ram_flash::{ERASE_SIZE, RamFlash};
 use mortise_simulation::simulated_rig::SimulatedRig;
 
 use crate::error::RigError;
 use crate::pipe::{PIPE_CAPACITY, PipeReader, PipeWriter, pipe};
 use crate::real_time;
+use crate::replayed::{Readings, Replayed};
 use crate::transport::{READ_WAIT, Transport, is_quiet};
 
 /// Bytes of a scene slot: far more than any board has, so that a PC can simulate scenes too large for present boards.
@@ -51,13 +53,24 @@ pub struct Flash(Arc<Mutex<Vec<FlashWord>>>);
 /// # Errors
 /// `Thread`.
 pub fn simulate(flash: &Flash, realtime: bool) -> Result<Transport, RigError> {
-    start(flash, realtime, |_| {})
+    start(flash, realtime, SimulatedRig::of, |_| {})
 }
 
-/// Starts the board's thread; `ticked` receives the work of every tick.
-fn start(
+/// Starts a simulated board in lockstep whose mechanism reads what a recording of another board holds, and whose motors drive nothing.
+///
+/// # Errors
+/// `Thread`.
+pub fn simulate_readings(readings: &Readings) -> Result<Transport, RigError> {
+    let readings = readings.clone();
+    let flash = Flash::default();
+    start(&flash, false, move |_| Replayed::new(readings.clone()), |_| {})
+}
+
+/// Starts the board's thread with the mechanism that `build` makes of the stored description; `ticked` receives the work of every tick.
+fn start<M: Limited>(
     flash: &Flash,
     realtime: bool,
+    build: impl Fn(Option<&Rig>) -> M + Send + 'static,
     mut ticked: impl FnMut(TickWork) + Send + 'static,
 ) -> Result<Transport, RigError> {
     let (to_board, from_host) = pipe();
@@ -66,7 +79,7 @@ fn start(
         .name("mortise-board".into())
         .spawn({
             let flash = flash.clone();
-            move || run(&flash, realtime, from_host, to_host, &mut ticked)
+            move || run(&flash, realtime, &build, (from_host, to_host), &mut ticked)
         })
         .map_err(RigError::Thread)?;
     Ok(Transport {
@@ -86,7 +99,7 @@ pub type TickWork = (u32, Option<Work>);
 pub fn simulate_counted(flash: &Flash) -> Result<(Transport, Receiver<TickWork>), RigError> {
     let (sender, receiver) = mpsc::channel();
     // A receiver that is gone needs no reports.
-    let transport = start(flash, false, move |work| _ = sender.send(work))?;
+    let transport = start(flash, false, SimulatedRig::of, move |work| _ = sender.send(work))?;
     Ok((transport, receiver))
 }
 
@@ -103,11 +116,11 @@ impl Drop for Board {
 }
 
 /// Runs the board from power-on, and again after each restart.
-fn run(
+fn run<M: Limited>(
     flash: &Flash,
     realtime: bool,
-    mut from_host: PipeReader,
-    mut to_host: PipeWriter,
+    build: &dyn Fn(Option<&Rig>) -> M,
+    (mut from_host, mut to_host): (PipeReader, PipeWriter),
     ticked: &mut dyn FnMut(TickWork),
 ) {
     if realtime {
@@ -122,6 +135,7 @@ fn run(
         &mut memory,
         reset,
         realtime,
+        build,
         (&mut from_host, &mut to_host),
         ticked,
     )
@@ -132,10 +146,11 @@ fn run(
 }
 
 /// Runs until a restart is requested or the host is gone (error).
-fn power_on(
+fn power_on<M: Limited>(
     memory: &mut [FlashWord],
     reset: ResetReason,
     realtime: bool,
+    build: &dyn Fn(Option<&Rig>) -> M,
     (from_host, to_host): (&mut PipeReader, &mut PipeWriter),
     ticked: &mut dyn FnMut(TickWork),
 ) -> io::Result<()> {
@@ -144,6 +159,7 @@ fn power_on(
     let flash = RamFlash::new(memory);
     let kept = store::rig::kept(&flash);
     let rig = kept.rig();
+    let mechanism = build(rig);
     let identity = Identity {
         board: if realtime {
             "simulation"
@@ -159,17 +175,12 @@ fn power_on(
         reset,
         // The simulated mechanism stands still while a tick is late.
         overrun_ticks: 0,
-        hardware_limits: rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of),
+        hardware_limits: mechanism.hardware_limits(rig),
         // A count suffices: frames for this board cannot reach boards of other processes.
         entropy: STARTS.fetch_add(1, Ordering::Relaxed),
     };
-    let (mut link, mut control) = device::start(
-        &mut channels,
-        flash,
-        SimulatedRig::of(rig),
-        WallClock(pace.clone()),
-        identity,
-    );
+    let (mut link, mut control) =
+        device::start(&mut channels, flash, mechanism, WallClock(pace.clone()), identity);
     let mut out = Wire {
         pending: Vec::with_capacity(OUTBOUND),
     };
@@ -204,6 +215,22 @@ fn power_on(
             // The host does not read: check again soon.
             patience = patience.min(TICK);
         }
+    }
+}
+
+/// A mechanism, and the limits of its motors and links.
+trait Limited: Mechanism + 'static {
+    /// `rig`: the description in the board's flash.
+    fn hardware_limits(&self, rig: Option<&Rig>) -> HardwareLimits {
+        rig.map_or(HardwareLimits::LARGEST, HardwareLimits::of)
+    }
+}
+
+impl Limited for SimulatedRig {}
+
+impl Limited for Replayed {
+    fn hardware_limits(&self, _rig: Option<&Rig>) -> HardwareLimits {
+        self.limits()
     }
 }
 

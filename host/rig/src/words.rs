@@ -192,6 +192,8 @@ impl Words for ToDevice {
             Self::Restart => "restarting the board".into(),
             Self::SetRig(rig) => format!("sending the description of `{}`", rig.name),
             Self::GetRig => "reading the description of the rig".into(),
+            Self::RecordInputs(true) => "recording the inputs of every tick".into(),
+            Self::RecordInputs(false) => "ending the recording of inputs".into(),
         }
     }
 }

@@ -317,6 +317,33 @@ impl Random {
         }
     }
 
+    fn tick_input(&mut self) -> TickInput {
+        let twist = self.wrench();
+        TickInput {
+            handle: self.pose(),
+            twist: WireTwist {
+                linear: twist.force,
+                angular: twist.torque,
+            },
+            bad_reading: self.bool(),
+            stop_open: self.bool(),
+            supply_low: self.bool(),
+            impossible_posture: self.bool(),
+            referenced: self.bool(),
+            driver: match self.below(4) {
+                0 => None,
+                1 => Some(DriverReport::Any(self.u8())),
+                2 => Some(DriverReport::OverCurrent(self.u8())),
+                _ => Some(DriverReport::OverTemperature(self.u8())),
+            },
+            encoder_jump: self.bool().then(|| self.u8()),
+            encoder_stuck: self.bool().then(|| self.u8()),
+            carried_out: self.u16(),
+            stops: self.u8(),
+            hash: self.u32(),
+        }
+    }
+
     fn telemetry(&mut self) -> Telemetry {
         Telemetry {
             tick: self.u32(),
@@ -391,7 +418,7 @@ impl Random {
 }
 
 /// Kinds of host message; a test compares it with the schema.
-pub const TO_DEVICE: usize = 28;
+pub const TO_DEVICE: usize = 29;
 
 /// A random host message of kind `kind < TO_DEVICE`.
 pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
@@ -433,12 +460,13 @@ pub fn to_device(kind: usize, r: &mut Random) -> ToDevice {
         24 => ToDevice::Run { ticks: r.u32() },
         25 => ToDevice::Restart,
         26 => ToDevice::SetRig(r.rig()),
-        _ => ToDevice::GetRig,
+        27 => ToDevice::GetRig,
+        _ => ToDevice::RecordInputs(r.bool()),
     }
 }
 
 /// Kinds of board message; a test compares it with the schema.
-pub const FROM_DEVICE: usize = 12;
+pub const FROM_DEVICE: usize = 13;
 
 /// A random board message of kind `kind < FROM_DEVICE`.
 pub fn from_device(kind: usize, r: &mut Random) -> FromDevice {
@@ -469,9 +497,15 @@ pub fn from_device(kind: usize, r: &mut Random) -> FromDevice {
             tick: r.u32(),
             state_hash: r.u64(),
         },
-        _ => FromDevice::Rig {
+        11 => FromDevice::Rig {
             rig: r.bool().then(|| r.rig()),
             in_use: r.bool(),
         },
+        _ => FromDevice::Inputs(Inputs {
+            first_tick: r.u32(),
+            count: [r.f32(), r.f32()],
+            lost: r.u32(),
+            ticks: r.list(Random::tick_input),
+        }),
     }
 }

@@ -22,6 +22,16 @@ pub(super) struct Sampling {
     pub left: u16,
 }
 
+/// The recording of inputs.
+#[derive(Default)]
+pub(super) struct Recording {
+    pub on: bool,
+    /// Sequence number of the last command carried out in this session.
+    pub carried_out: u16,
+    /// Ticks lost since it was switched on.
+    pub lost: u32,
+}
+
 /// What came late: ticks, and the host.
 #[derive(Default)]
 pub(super) struct Lateness {

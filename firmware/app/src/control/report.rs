@@ -11,7 +11,8 @@ use crate::wire::{guidance_to_wire, pairs_to_wire, pose_to_wire, wrench_to_wire}
 impl<M: Mechanism, C: Clock> ControlPlane<'_, '_, M, C> {
     pub(super) fn lockstep_has_room(&self) -> bool {
         let events = self.ends.events.capacity() - self.ends.events.len() >= EVENTS_AT_ONCE;
-        events && (self.telemetry.every == 0 || self.ends.samples.ready())
+        let samples = self.telemetry.every == 0 || self.ends.samples.ready();
+        events && samples && (!self.recording.on || self.ends.recorded.ready())
     }
 
     pub(super) fn send(&mut self, event: Event) {

@@ -1,0 +1,425 @@
+//! Replay by simulation: the recorded readings and messages pass through the board's own control plane again, tick by tick, and every tick's hash is
+//! compared with the recorded one.
+//!
+//! A replay begins where the state is known: at the first reset of the scene, or upload, in the recording. It is interrupted where ticks were lost on
+//! the link, and at a fault that follows from time rather than from readings (a silent host, an overrun tick), and begins again at the next reset.
+//! Cost: about 20 µs a tick.
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use mortise_protocol::message::{Fault, FromDevice, TickInput, ToDevice};
+use mortise_protocol::parameter::ParameterId;
+use mortise_protocol::rig::Rig;
+use mortise_rig::{Client, Observer, Patience, Readings, RigError, simulate_readings};
+
+use crate::error::RecordError;
+use crate::reading::{EntryKind, Recording};
+
+/// Ticks that run without a pause to look at the results.
+const AT_ONCE: usize = 1000;
+
+/// Result of a replay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replayed {
+    /// Ticks in the recording.
+    pub recorded: u64,
+    /// Ticks computed again and compared.
+    pub compared: u64,
+    /// The first tick with another result, which ends the comparison; `None`: all bits are the same.
+    pub difference: Option<Difference>,
+    /// Reasons why ticks were left out, with the tick from which.
+    pub left_out: Vec<(u32, String)>,
+}
+
+/// The first tick whose result differs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The tick, as the board counted it.
+    pub tick: u32,
+    /// Ticks since the scene was reset or loaded.
+    pub since_reset: u64,
+    /// Its hash in the recording and in the replay.
+    pub hashes: [u32; 2],
+    /// The last message that took effect before it, in words.
+    pub after: String,
+}
+
+/// A recorded tick, and what it needs.
+struct Tick {
+    number: u32,
+    count: [f32; 2],
+    lost: u32,
+    input: TickInput,
+}
+
+/// A message that the board may have carried out.
+struct Order {
+    sequence: u16,
+    message: ToDevice,
+    /// It was acknowledged; `None`: no answer is recorded.
+    done: Option<bool>,
+}
+
+/// What a recording tells, in order.
+#[derive(Default)]
+struct Story {
+    ticks: Vec<Tick>,
+    orders: VecDeque<Order>,
+    parameters: Vec<(ParameterId, f32)>,
+    rig: Option<Rig>,
+    simulated: bool,
+    /// Ticks of faults that follow from time.
+    untimely: HashMap<u32, String>,
+    crc: Option<u32>,
+}
+
+/// Computes the recording again. `changes`: parameters that have other values than in the recording, to see what they would have changed; empty for a
+/// check.
+///
+/// # Errors
+/// `NothingToReplay` when it holds no reset of the scene, no inputs, or not the scene's image; `Rig` when the simulation ends.
+pub fn replay(recording: &Recording, changes: &[(ParameterId, f32)]) -> Result<Replayed, RecordError> {
+    let nothing = |why: &str| RecordError::NothingToReplay {
+        path: recording.path().to_owned(),
+        why: why.to_owned(),
+    };
+    let story = Story::of(recording);
+    if story.ticks.is_empty() {
+        return Err(nothing("it holds no inputs of ticks"));
+    }
+    let image = (story.crc).ok_or_else(|| nothing("it names no collision model"))?;
+    let image =
+        (recording.scene(image)).ok_or_else(|| nothing("it does not hold the board's collision model"))?;
+    let mut player = Player::new(recording, &story, changes)?;
+    player.client.upload(image, &mut |_| {})?;
+    let recorded = story.ticks.len() as u64;
+    player.play(story)?;
+    let result = player.result;
+    if result.compared == 0 && result.left_out.is_empty() {
+        return Err(nothing(
+            "the scene was never reset while it was recorded, so that its state is unknown",
+        ));
+    }
+    Ok(Replayed { recorded, ..result })
+}
+
+impl Story {
+    fn of(recording: &Recording) -> Self {
+        let mut story = Self::default();
+        let mut begun: Option<u32> = None;
+        for entry in recording.entries() {
+            match entry.kind {
+                EntryKind::Inputs(ticks) => {
+                    for (at, input) in ticks.inputs.into_iter().enumerate() {
+                        story.ticks.push(Tick {
+                            number: ticks.first_tick.wrapping_add(at as u32),
+                            count: ticks.count,
+                            lost: ticks.lost,
+                            input,
+                        });
+                    }
+                }
+                EntryKind::Sent(sequence, message) => {
+                    if let ToDevice::SceneBegin { crc, .. } = message {
+                        begun = Some(crc);
+                    }
+                    let done = None;
+                    story.orders.push_back(Order {
+                        sequence,
+                        message,
+                        done,
+                    });
+                }
+                EntryKind::Received(message) => story.received(message, begun),
+                EntryKind::Telemetry(_) => {}
+            }
+        }
+        story
+    }
+
+    fn received(&mut self, message: FromDevice, begun: Option<u32>) {
+        match message {
+            FromDevice::Ack { seq } => self.answered(seq, true),
+            FromDevice::Refused { seq, .. } => self.answered(seq, false),
+            FromDevice::Parameter { id, value } => self.parameters.push((id, value)),
+            FromDevice::Rig { rig, in_use } => self.rig = rig.filter(|_| in_use),
+            FromDevice::Capabilities(capabilities) => {
+                self.simulated = capabilities.simulated;
+                // Of a scene that is uploaded while recording, at its beginning nothing is known.
+                self.crc = self.crc.or(capabilities.scene).or(begun);
+            }
+            FromDevice::Fault { tick, fault } => {
+                if let Fault::HostSilent { .. } | Fault::TickOverrun | Fault::SceneDamaged = fault {
+                    let why = "a fault that no reading explains";
+                    // Counted before the tick's own count.
+                    self.untimely.insert(tick.wrapping_add(1), why.to_owned());
+                }
+            }
+            _ => {}
+        }
+        self.crc = self.crc.or(begun);
+    }
+
+    fn answered(&mut self, seq: u16, done: bool) {
+        if let Some(order) = self.orders.iter_mut().rev().find(|order| order.sequence == seq) {
+            order.done = order.done.or(Some(done));
+        }
+    }
+}
+
+/// Collects the hashes of the simulation's ticks.
+#[derive(Default)]
+struct Hashes(Mutex<VecDeque<u32>>);
+
+impl Observer for Hashes {
+    fn sent(&self, _sequence: u16, _message: &ToDevice) {}
+
+    fn received(&self, _sequence: u16, message: &FromDevice) {
+        if let FromDevice::Inputs(inputs) = message {
+            let mut hashes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            hashes.extend(inputs.ticks.iter().map(|tick| tick.hash));
+        }
+    }
+}
+
+/// The simulation, and how far it is.
+struct Player<'r> {
+    recording: &'r Recording,
+    client: Client,
+    readings: Readings,
+    hashes: Arc<Hashes>,
+    /// Parameters that keep their changed values.
+    changed: Vec<ParameterId>,
+    /// Ticks given to the simulation but not run yet: number, hash, and ticks since the reset.
+    waiting: Vec<(u32, u32, u64)>,
+    /// The state is that of the recording: since a reset, without a gap.
+    known: bool,
+    since_reset: u64,
+    uploading: Option<u32>,
+    last: String,
+    result: Replayed,
+}
+
+impl<'r> Player<'r> {
+    fn new(
+        recording: &'r Recording,
+        story: &Story,
+        changes: &[(ParameterId, f32)],
+    ) -> Result<Self, RigError> {
+        let readings = Readings::new(story.rig.clone(), story.simulated);
+        let transport = simulate_readings(&readings)?;
+        let client = Client::over(transport, "replay", Patience::long(), None)?;
+        client.set_lockstep(true)?;
+        let hashes = Arc::new(Hashes::default());
+        client.observe(Some(hashes.clone()));
+        client.request(ToDevice::RecordInputs(true))?;
+        set_all(&client, &story.parameters)?;
+        set_all(&client, changes)?;
+        Ok(Self {
+            recording,
+            client,
+            readings,
+            hashes,
+            changed: changes.iter().map(|&(id, _)| id).collect(),
+            waiting: Vec::new(),
+            known: false,
+            since_reset: 0,
+            uploading: None,
+            last: "the beginning".into(),
+            result: Replayed {
+                recorded: 0,
+                compared: 0,
+                difference: None,
+                left_out: Vec::new(),
+            },
+        })
+    }
+
+    fn play(&mut self, mut story: Story) -> Result<(), RigError> {
+        let mut before: Option<Tick> = None;
+        for tick in story.ticks {
+            self.interrupt(before.as_ref(), &tick, &story.untimely)?;
+            let stopped = before
+                .as_ref()
+                .is_some_and(|before| before.input.stops != tick.input.stops);
+            if stopped && self.known {
+                self.run()?;
+                self.perform(&ToDevice::Stop)?;
+            }
+            while let Some(order) = due(&mut story.orders, tick.input.carried_out) {
+                // Before any tick is recorded the state is unknown, and a reset does not need it.
+                self.order(&order, before.as_ref())?;
+            }
+            if self.known {
+                self.readings.push(&tick.input, tick.count);
+                self.since_reset += 1;
+                self.waiting
+                    .push((tick.number, tick.input.hash, self.since_reset));
+                if self.waiting.len() >= AT_ONCE {
+                    self.run()?;
+                }
+            }
+            if self.result.difference.is_some() {
+                return Ok(());
+            }
+            before = Some(tick);
+        }
+        self.run()
+    }
+
+    /// Ends the comparison where the recording does not determine the next tick.
+    fn interrupt(
+        &mut self,
+        before: Option<&Tick>,
+        tick: &Tick,
+        untimely: &HashMap<u32, String>,
+    ) -> Result<(), RigError> {
+        let gap = before
+            .is_some_and(|before| before.number.wrapping_add(1) != tick.number || before.lost != tick.lost);
+        let why = match untimely.get(&tick.number) {
+            Some(why) => Some(why.clone()),
+            None => gap.then(|| "ticks before it were lost on the link".to_owned()),
+        };
+        if let Some(why) = why.filter(|_| self.known) {
+            self.run()?;
+            self.known = false;
+            self.result.left_out.push((tick.number, why));
+        }
+        Ok(())
+    }
+
+    /// Carries out a message that the board has carried out.
+    fn order(&mut self, order: &Order, before: Option<&Tick>) -> Result<(), RigError> {
+        let resets = matches!(order.message, ToDevice::ResetScene | ToDevice::SceneCommit);
+        if let ToDevice::SceneBegin { crc, .. } = order.message {
+            self.uploading = Some(crc);
+        }
+        if order.done != Some(true)
+            || !(self.known || resets || matches!(order.message, ToDevice::SetParameter { .. }))
+        {
+            return Ok(());
+        }
+        self.run()?;
+        if resets && !self.known {
+            self.begin(before)?;
+        }
+        self.perform(&order.message)?;
+        if resets {
+            self.since_reset = 0;
+        }
+        Ok(())
+    }
+
+    /// Motors off, and the readings of the tick before a reset.
+    fn begin(&mut self, before: Option<&Tick>) -> Result<(), RigError> {
+        self.client.request(ToDevice::Stop)?;
+        if let Some(before) = before {
+            self.readings.push(&before.input, before.count);
+        }
+        self.client.run(1)?;
+        self.lock().clear();
+        // Refused while the recorded readings forbid it, as it was on the board.
+        let _ = self.client.request(ToDevice::ClearFault);
+        self.known = true;
+        Ok(())
+    }
+
+    /// Sends a message that changes what a tick computes; all others change nothing.
+    fn perform(&mut self, message: &ToDevice) -> Result<(), RigError> {
+        let result = match message {
+            ToDevice::SetParameter { id, .. } if self.changed.contains(id) => return Ok(()),
+            ToDevice::SceneCommit => {
+                let Some(image) = self.uploading.take().and_then(|crc| self.recording.scene(crc)) else {
+                    return Ok(());
+                };
+                self.client.upload(image, &mut |_| {})
+            }
+            ToDevice::Stop
+            | ToDevice::Arm
+            | ToDevice::Disarm
+            | ToDevice::ClearFault
+            | ToDevice::Home
+            | ToDevice::SetParameter { .. }
+            | ToDevice::Grab { .. }
+            | ToDevice::Release
+            | ToDevice::ResetScene
+            | ToDevice::SetTarget(_)
+            | ToDevice::ClearTarget { .. } => self.client.request(message.clone()),
+            _ => return Ok(()),
+        };
+        self.last = words(message);
+        match result {
+            // The board did carry it out: the difference shows in the next tick.
+            Err(RigError::Refused { .. }) => Ok(()),
+            result => result,
+        }
+    }
+
+    /// Runs the ticks that wait, and compares.
+    fn run(&mut self) -> Result<(), RigError> {
+        if self.waiting.is_empty() || self.result.difference.is_some() {
+            return Ok(());
+        }
+        self.client.run(self.waiting.len() as u32)?;
+        let computed: Vec<u32> = self.lock().drain(..).collect();
+        for (&(tick, recorded, since_reset), &found) in self.waiting.iter().zip(&computed) {
+            self.result.compared += 1;
+            if recorded != found {
+                self.result.difference = Some(Difference {
+                    tick,
+                    since_reset,
+                    hashes: [recorded, found],
+                    after: self.last.clone(),
+                });
+                break;
+            }
+        }
+        self.waiting.clear();
+        Ok(())
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, VecDeque<u32>> {
+        self.hashes.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The next message that took effect before a tick by which the board had carried out message `carried_out`.
+fn due(orders: &mut VecDeque<Order>, carried_out: u16) -> Option<Order> {
+    let ahead = carried_out.wrapping_sub(orders.front()?.sequence);
+    // Sequence numbers are compared in a circle.
+    if carried_out == 0 || ahead >= 1 << 15 {
+        return None;
+    }
+    let mut order = orders.pop_front()?;
+    // Its answer was lost, or not yet recorded, but the tick says that it was carried out.
+    if ahead == 0 && order.done.is_none() {
+        order.done = Some(true);
+    }
+    Some(order)
+}
+
+/// Sets all parameters. One may be refused until another is set, so it is tried again as long as that helps.
+fn set_all(client: &Client, parameters: &[(ParameterId, f32)]) -> Result<(), RigError> {
+    let mut left: Vec<_> = parameters.to_vec();
+    loop {
+        let before = left.len();
+        let mut refused = Vec::new();
+        for (id, value) in left {
+            match client.request(ToDevice::SetParameter { id, value }) {
+                Ok(()) => {}
+                Err(RigError::Refused { .. }) => refused.push((id, value)),
+                Err(error) => return Err(error),
+            }
+        }
+        if refused.is_empty() || refused.len() == before {
+            return Ok(());
+        }
+        left = refused;
+    }
+}
+
+fn words(message: &ToDevice) -> String {
+    use mortise_rig::Words;
+    message.words()
+}
