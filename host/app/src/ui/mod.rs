@@ -16,6 +16,7 @@ mod parameters;
 mod parts;
 mod plots;
 mod rig;
+mod section;
 mod stop;
 pub mod theme;
 mod view;
