@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use eframe::wgpu;
 use glam::DVec3;
+use mortise::cut::areas::Cutter;
 use mortise::display::mesh::meeting;
 use mortise::session::document::Document;
 use mortise::viewport::camera::{Camera, View};
-use mortise::viewport::picture::{Arrow, Ground, Item, Picture};
+use mortise::viewport::picture::{Areas, Arrow, Cutaway, Fill, Ground, Item, Picture};
 use mortise::viewport::renderer::Renderer;
+use mortise_inspect::CutPlane;
 
 const SIZE: [u32; 2] = [320, 240];
 
@@ -90,6 +92,7 @@ fn picture(document: &Document, camera: Camera) -> Picture {
         extent: document.extent,
         ground: Ground::Dark,
         items,
+        cut: None,
         arrows: Vec::new(),
         line_width: 1.5,
     }
@@ -234,10 +237,84 @@ fn face_at(document: &Document, point: DVec3) -> u32 {
         &document.model,
         &document.extents,
         &document.poses,
+        &[],
+        None,
         point - 100.0 * DVec3::Y,
         DVec3::Y,
     );
-    hit.expect("on the block").face
+    hit.and_then(|hit| hit.face).expect("on the block")
+}
+
+/// The sample cut through its middle, seen from in front: the block has a bore.
+#[test]
+fn a_cut_block_shows_its_area_and_its_bore() {
+    let Some((device, queue)) = device() else { return };
+    let document = Document::sample(1, &|_| ControlFlow::Continue(())).expect("the sample opens");
+    let mut renderer = Renderer::new(&device, &queue);
+    renderer.set_shapes(&document.meshes);
+    renderer.resize(SIZE);
+    let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
+    let mut camera = Camera::default();
+    camera.look(View::Front);
+    camera.fit(document.extent, aspect);
+    let plane = CutPlane::new(DVec3::ZERO, -DVec3::Y).expect("a plane");
+    let cut = Arc::new(Cutter::default().cut(1, &document.model, &document.poses, plane, 1e-3));
+    let fill = |area: usize, color| Fill {
+        area,
+        color,
+        tint: [0.0; 4],
+        line: [0.0; 4],
+        hatch: 0.8,
+    };
+    let mut scene = picture(&document, camera);
+    scene.cut = Some(Cutaway {
+        plane,
+        areas: Some(Areas(Arc::clone(&cut))),
+        // Green and magenta: no surface has these.
+        fills: vec![
+            fill(0, [0.0, 1.0, 0.0]),
+            fill(1, [1.0, 0.0, 1.0]),
+            fill(9, [1.0; 3]),
+        ],
+    });
+    // Colours of a column around a point, longer than the distance of two lines of the hatching.
+    let mut around = |scene: &Picture, point: DVec3| -> Vec<[i32; 3]> {
+        renderer.render(scene);
+        let (texture, _) = renderer.texture().expect("resized");
+        let pixels = read(&device, &queue, texture);
+        let ndc = camera.project(point, aspect).expect("in front");
+        let x = (0.5 * (ndc.x + 1.0) * f64::from(SIZE[0])) as u32;
+        let y = (0.5 * (1.0 - ndc.y) * f64::from(SIZE[1])) as u32;
+        (y - 20..y + 20).map(|y| pixel(&pixels, x, y)).collect()
+    };
+    let green = |[r, g, b]: &[i32; 3]| *g > r + 80 && *g > b + 80;
+    // The bore reaches from x = -9.375 to 9.375, the block to 25.
+    let block = around(&scene, DVec3::new(17.0, 0.0, -20.0));
+    assert!(block.iter().all(green), "{block:?}");
+    let (dark, bright) = (block.iter().map(|p| p[1]).min(), block.iter().map(|p| p[1]).max());
+    assert!(bright > dark.map(|dark| dark + 60), "hatched: {block:?}");
+    let bore = around(&scene, DVec3::new(0.0, 0.0, -20.0));
+    assert!(
+        bore.iter().all(|[r, g, b]| b > r && b > g),
+        "the bore's wall is blue: {bore:?}"
+    );
+    let peg = around(&scene, DVec3::new(0.0, 0.0, 50.0));
+    assert!(
+        peg.iter().all(|[r, g, b]| r > g && b > g),
+        "the peg's area: {peg:?}"
+    );
+    // Without areas the inside of the block's back shows; without a section its front.
+    if let Some(cut) = &mut scene.cut {
+        (cut.areas, cut.fills) = (None, Vec::new());
+    }
+    let inside = around(&scene, DVec3::new(17.0, 0.0, -20.0));
+    assert!(inside.iter().all(|[r, _, b]| *b > r + 40), "{inside:?}");
+    // From the other side nothing is cut away but what lies behind.
+    if let Some(cut) = &mut scene.cut {
+        cut.plane = CutPlane::new(DVec3::ZERO, DVec3::Y).expect("a plane");
+    }
+    let front = around(&scene, DVec3::new(17.0, -25.0, -20.0));
+    assert!(front.iter().all(|[r, _, b]| *b > r + 60), "{front:?}");
 }
 
 #[test]
@@ -249,6 +326,7 @@ fn nothing_to_draw_is_no_trouble() {
         extent: Default::default(),
         ground: Ground::Dark,
         items: vec![],
+        cut: None,
         arrows: vec![],
         line_width: 1.0,
     });
@@ -282,6 +360,7 @@ fn nothing_to_draw_is_no_trouble() {
                 mates: vec![],
             },
         ],
+        cut: None,
         arrows: vec![],
         line_width: 1.0,
     });

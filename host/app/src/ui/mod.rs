@@ -19,6 +19,7 @@ mod parts;
 pub mod plots;
 mod recent;
 mod rig;
+mod section;
 mod stop;
 pub mod theme;
 mod view;

@@ -7,7 +7,7 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, theme};
+use super::{control, section, theme};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
@@ -35,6 +35,9 @@ pub fn show(
         return;
     }
     view.respond(ui, &response, session, wanted);
+    if let Some(document) = &session.document {
+        section::follow(ui, document, view);
+    }
     let Some(document) = &session.document else { return };
     if let Some(surface) = surface {
         let scale = ui.pixels_per_point();
@@ -44,7 +47,16 @@ pub fn show(
         } else {
             Ground::Light
         };
-        let picture = compose(session, document, view.camera, view.see_through, ground, scale);
+        let cut = view.section.shown(document);
+        let picture = compose(
+            session,
+            document,
+            view.camera,
+            view.see_through,
+            cut,
+            ground,
+            scale,
+        );
         if let Some(texture) = surface.show(&document.meshes, picture, size) {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(texture, rect, whole, Color32::WHITE);
@@ -52,8 +64,9 @@ pub fn show(
     }
     touching(ui, rect, session, view);
     triad(ui, rect, view);
-    toolbar(ui, rect, session, view);
-    legend(ui, rect, session);
+    let below = toolbar(ui, rect, session, view);
+    let below = section::show(ui, rect, below, session, view);
+    legend(ui, rect, below, session);
     readout(ui, rect, session);
     let hint = if view.drags_hand() {
         "Moving the hand · Ctrl turns it"
@@ -168,12 +181,15 @@ fn triad(ui: &Ui, rect: Rect, view: &Viewpoint) {
     }
 }
 
-fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
-    let Some(document) = &session.document else { return };
-    let wide = 430.0f32.min(rect.width() - 24.0).max(0.0);
+/// Draws the view's bar; returns its lower end.
+fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) -> f32 {
+    let Some(document) = &session.document else {
+        return rect.top();
+    };
+    let wide = 500.0f32.min(rect.width() - 24.0).max(0.0);
     let place = Rect::from_min_size(rect.min + Vec2::splat(12.0), Vec2::new(wide, 34.0));
     let ink = theme::of(ui);
-    ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
+    let drawn = ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = Vec2::new(9.0, 4.0);
@@ -201,16 +217,18 @@ fn toolbar(ui: &mut Ui, rect: Rect, session: &Session, view: &mut Viewpoint) {
             if ui.add(through).on_hover_text(hint).clicked() {
                 view.see_through = !view.see_through;
             }
+            section::toggle(ui, document, view);
         });
     });
+    drawn.response.rect.bottom()
 }
 
-/// Legend of the face colours, under the toolbar, while a part is held.
-fn legend(ui: &mut Ui, rect: Rect, session: &Session) {
+/// Legend of the face colours, under the bars, which end at `top`, while a part is held.
+fn legend(ui: &mut Ui, rect: Rect, top: f32, session: &Session) {
     if session.grabbed().is_none() {
         return;
     }
-    let place = Rect::from_min_size(rect.min + Vec2::new(14.0, 52.0), Vec2::new(240.0, 20.0));
+    let place = Rect::from_min_size(Pos2::new(rect.left() + 14.0, top + 8.0), Vec2::new(240.0, 20.0));
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
         ui.horizontal(|ui| {
             let touches = "Faces and edges of both parts that touch now";

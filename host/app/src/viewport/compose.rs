@@ -6,7 +6,8 @@ use mortise_protocol::image::NO_FACE;
 use mortise_protocol::message::Telemetry;
 
 use super::camera::Camera;
-use super::picture::{Arrow, Ground, Item, MAX_LIT, MAX_LIT_EDGES, Picture};
+use super::picture::{Areas, Arrow, Cutaway, Fill, Ground, Item, MAX_LIT, MAX_LIT_EDGES, Picture};
+use crate::cut::Shown;
 use crate::display::extent::Extent;
 use crate::display::mesh::meeting;
 use crate::session::Session;
@@ -29,6 +30,8 @@ const EDGE_HELD_LIGHT: [f32; 4] = [0.55, 0.28, 0.0, 1.0];
 const TINT_HELD: [f32; 4] = [0.96, 0.65, 0.26, 0.55];
 /// Colour of the ghost, which shows the pose that the handle commands for the held part.
 const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
+/// Directions across the hatching of sections, degrees, by part.
+const HATCHES: [f32; 4] = [45.0, 135.0, 20.0, 110.0];
 /// Opacity of fixed parts drawn as glass.
 const SEEN_THROUGH: f32 = 0.26;
 /// Smallest distance at which a ghost is drawn, in radii of the scene: a nearer one is indistinguishable from its part.
@@ -44,6 +47,7 @@ pub fn compose(
     document: &Document,
     camera: Camera,
     see_through: bool,
+    cut: Option<Shown<'_>>,
     ground: Ground,
     scale: f32,
 ) -> Picture {
@@ -92,14 +96,42 @@ pub fn compose(
             mates: Vec::new(),
         });
     }
+    let cut = cut.map(|shown| Cutaway {
+        plane: shown.plane,
+        areas: shown.cut.map(|cut| Areas(cut.clone())),
+        fills: fills(document, shown, held),
+    });
     Picture {
         camera,
         extent: document.extent,
         ground,
         items,
+        cut,
         arrows: touching.map_or_else(Vec::new, |t| arrows(document, t)),
         line_width: 1.25 * scale,
     }
+}
+
+/// The areas of a section, each in its part's colour and hatched in a direction of its own.
+fn fills(document: &Document, shown: Shown<'_>, held: Option<usize>) -> Vec<Fill> {
+    let areas = shown.cut.map_or(&[][..], |cut| cut.areas.as_slice());
+    (areas.iter().enumerate())
+        .filter(|(_, area)| !document.is_hidden(area.part) || held == Some(area.part))
+        .filter_map(|(index, area)| {
+            let color = document.colors.get(area.part)?;
+            Some(Fill {
+                area: index,
+                color: color.map(|c| f32::from(c) / 255.0),
+                tint: if held == Some(area.part) {
+                    TINT_HELD
+                } else {
+                    [0.0; 4]
+                },
+                line: EDGE,
+                hatch: HATCHES[area.part % HATCHES.len()].to_radians(),
+            })
+        })
+        .collect()
 }
 
 fn is_fixed(document: &Document, part: usize) -> bool {

@@ -5,6 +5,7 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use super::camera::{Camera, View};
 use super::pick::{Pick, pick};
+use crate::cut::SectionView;
 use crate::display::extent::Extent;
 use crate::session::document::Document;
 use crate::session::insertion::hold;
@@ -31,12 +32,16 @@ enum Drag {
 }
 
 /// State of the view.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub struct Viewpoint {
     /// Camera of the view.
     pub camera: Camera,
     /// Whether fixed parts are drawn as glass.
     pub see_through: bool,
+    /// The section view.
+    pub section: SectionView,
+    /// What was clicked last, in the open document.
+    pub picked: Option<Pick>,
     goal: Option<Camera>,
     drag: Option<Drag>,
     seen: Option<u64>,
@@ -85,13 +90,18 @@ impl Viewpoint {
             self.camera.look(View::Iso);
             self.camera.fit(extent, aspect(rect));
             self.goal = None;
+            self.picked = None;
         }
         let typing = ui.ctx().text_edit_focused();
         if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
             self.fit(extent, rect);
         }
+        if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::X)) {
+            self.section.toggle(document, self.camera.backward());
+        }
         if response.clicked() {
             let hit = self.pick(document, rect, response.interact_pointer_pos());
+            self.picked = hit;
             wanted.push(Intent::Select(hit.map(|h| h.part)));
         }
         if response.double_clicked()
@@ -114,6 +124,7 @@ impl Viewpoint {
             &document.extents,
             &document.poses,
             &document.hidden,
+            self.section.shown(document),
             origin,
             direction,
         )

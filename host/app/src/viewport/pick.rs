@@ -5,6 +5,7 @@
 use glam::{DAffine3, DVec3};
 use mortise_brep::{CadModel, Mesh};
 
+use crate::cut::Shown;
 use crate::display::extent::Extent;
 
 /// The nearest point of a part's surface on a ray.
@@ -12,8 +13,8 @@ use crate::display::extent::Extent;
 pub struct Pick {
     /// Index of the part.
     pub part: usize,
-    /// Face of the part.
-    pub face: u32,
+    /// Face of the part; `None`: the area in which a section cuts it.
+    pub face: Option<u32>,
     /// The point, world, mm.
     pub point: DVec3,
     /// Distance from the ray's start, mm.
@@ -22,12 +23,14 @@ pub struct Pick {
 
 /// The nearest part along the ray from `origin` in the unit direction `direction`, with each part at `poses` (shape to world).
 ///
-/// `extents` are the shapes' bounding spheres in their own frames; a part that is `hidden` is passed through.
+/// `extents` are the shapes' bounding spheres in their own frames; a part that is `hidden` is passed through. What a section cuts away is not met; its
+/// areas are.
 pub fn pick(
     model: &CadModel,
     extents: &[Extent],
     poses: &[DAffine3],
     hidden: &[bool],
+    cut: Option<Shown<'_>>,
     origin: DVec3,
     direction: DVec3,
 ) -> Option<Pick> {
@@ -46,18 +49,42 @@ pub fn pick(
         if !meets(extent, from, along) {
             continue;
         }
-        if let Some((face, distance)) = nearest_triangle(&shape.mesh, from, along)
+        let below = cut.map(|shown| shown.plane.seen_from(pose));
+        let kept = |t: f64| below.is_none_or(|plane| plane.height(from + t * along) <= 0.0);
+        if let Some((face, distance)) = nearest_triangle(&shape.mesh, from, along, kept)
             && nearest.is_none_or(|n| distance < n.distance)
         {
             nearest = Some(Pick {
                 part: index,
-                face,
+                face: Some(face),
                 point: origin + distance * direction,
                 distance,
             });
         }
     }
+    if let Some(hit) = cut.and_then(|shown| on_area(shown, hidden, origin, direction))
+        && nearest.is_none_or(|n| hit.distance < n.distance)
+    {
+        nearest = Some(hit);
+    }
     nearest
+}
+
+/// Where the ray meets an area of a section, those of hidden parts excluded.
+fn on_area(shown: Shown<'_>, hidden: &[bool], origin: DVec3, direction: DVec3) -> Option<Pick> {
+    let plane = shown.plane;
+    let distance = -plane.height(origin) / direction.dot(plane.normal);
+    // Not finite for a ray along the plane.
+    if !(distance > 0.0 && distance.is_finite()) {
+        return None;
+    }
+    let point = origin + distance * direction;
+    Some(Pick {
+        part: shown.cut?.part_at(plane.to_plane(point), hidden)?,
+        face: None,
+        point,
+        distance,
+    })
 }
 
 fn meets(extent: &Extent, from: DVec3, along: DVec3) -> bool {
@@ -66,7 +93,13 @@ fn meets(extent: &Extent, from: DVec3, along: DVec3) -> bool {
     nearest <= extent.radius * extent.radius
 }
 
-fn nearest_triangle(mesh: &Mesh, from: DVec3, along: DVec3) -> Option<(u32, f64)> {
+/// The nearest triangle that the ray meets at a distance which `kept` accepts.
+fn nearest_triangle(
+    mesh: &Mesh,
+    from: DVec3,
+    along: DVec3,
+    kept: impl Fn(f64) -> bool,
+) -> Option<(u32, f64)> {
     let mut nearest: Option<(u32, f64)> = None;
     for (corners, &face) in mesh.triangles.iter().zip(&mesh.triangle_face) {
         let at = |i: usize| mesh.vertices.get(corners[i] as usize).copied();
@@ -75,6 +108,7 @@ fn nearest_triangle(mesh: &Mesh, from: DVec3, along: DVec3) -> Option<(u32, f64)
         };
         if let Some(distance) = ray_triangle(from, along, a, b, c)
             && nearest.is_none_or(|(_, d)| distance < d)
+            && kept(distance)
         {
             nearest = Some((face, distance));
         }
@@ -137,11 +171,21 @@ mod tests {
         let model = model();
         let extents = [Extent::of_points(model.shapes[0].mesh.vertices.iter().copied())];
         let poses: Vec<_> = model.parts.iter().map(|p| p.placement).collect();
-        let down = |x: f64, y: f64| pick(&model, &extents, &poses, &[], DVec3::new(x, y, 10.0), -DVec3::Z);
+        let down = |x: f64, y: f64| {
+            pick(
+                &model,
+                &extents,
+                &poses,
+                &[],
+                None,
+                DVec3::new(x, y, 10.0),
+                -DVec3::Z,
+            )
+        };
         let hit = down(0.5, -0.5).expect("above both");
-        assert_eq!((hit.part, hit.face), (1, 0));
+        assert_eq!((hit.part, hit.face), (1, Some(0)));
         assert!((hit.distance - 5.0).abs() < 1e-12 && (hit.point.z - 5.0).abs() < 1e-12);
-        assert_eq!(down(-0.5, 0.5).map(|h| h.face), Some(1));
+        assert_eq!(down(-0.5, 0.5).map(|h| h.face), Some(Some(1)));
         assert_eq!(down(1.01, 0.0), None);
     }
 
@@ -156,7 +200,7 @@ mod tests {
             ([true, false], Some(1)),
             ([true, true], None),
         ] {
-            let hit = pick(&model, &extents, &poses, &hidden, from, -DVec3::Z);
+            let hit = pick(&model, &extents, &poses, &hidden, None, from, -DVec3::Z);
             assert_eq!(hit.map(|hit| hit.part), part);
         }
     }
@@ -172,10 +216,55 @@ mod tests {
                 &extents,
                 &poses,
                 &[],
+                None,
                 DVec3::new(0.1, 0.0, 10.0),
                 DVec3::Z
             ),
             None
+        );
+    }
+
+    #[test]
+    fn what_is_cut_away_is_not_picked_and_areas_are() {
+        use std::sync::Arc;
+
+        use mortise_inspect::CutPlane;
+
+        use crate::cut::areas::Cutter;
+        use crate::session::document::Document;
+
+        let document = Document::sample(1, &|_| std::ops::ControlFlow::Continue(())).expect("the sample");
+        let plane = CutPlane::new(DVec3::ZERO, -DVec3::Y).expect("a plane");
+        let cut = Arc::new(Cutter::default().cut(1, &document.model, &document.poses, plane, 1e-3));
+        let picked = |hidden: &[bool], x: f64, z: f64, shown: Option<Shown<'_>>| {
+            let from = DVec3::new(x, -200.0, z);
+            pick(
+                &document.model,
+                &document.extents,
+                &document.poses,
+                hidden,
+                shown,
+                from,
+                DVec3::Y,
+            )
+        };
+        let from_front = |x: f64, z: f64, shown: Option<Shown<'_>>| picked(&[], x, z, shown);
+        let shown = Some(Shown {
+            plane,
+            cut: Some(&cut),
+        });
+        // Beside the bore: the front of the block; where that is cut away, the area.
+        let front = from_front(20.0, -20.0, None).expect("the front");
+        assert!((front.point.y + 25.0).abs() < 1e-9 && front.face.is_some());
+        let area = from_front(20.0, -20.0, shown).expect("the area");
+        assert!(area.point.y.abs() < 1e-9 && area.face.is_none() && area.part == 0);
+        // The area of a hidden part is passed through.
+        assert_eq!(picked(&[true], 20.0, -20.0, shown), None);
+        // In the bore: its wall behind the plane.
+        let wall = from_front(0.0, -20.0, shown).expect("the bore's wall");
+        assert!(
+            (wall.point.y - 9.375).abs() < 0.1 && wall.face.is_some(),
+            "{wall:?}"
         );
     }
 }

@@ -1,8 +1,12 @@
 //! Contents of a picture as plain values: parts, poses, colours. Pure; the renderer draws it unchanged.
 
+use std::sync::Arc;
+
 use glam::{DAffine3, DVec3};
+use mortise_inspect::CutPlane;
 
 use super::camera::Camera;
+use crate::cut::Cut;
 use crate::display::extent::Extent;
 
 /// Largest number of highlighted faces of one part; the wire carries fewer pairs of one part that are worth distinguishing.
@@ -46,6 +50,42 @@ pub struct Arrow {
     pub color: [f32; 4],
 }
 
+/// The areas of a cut, shared with the renderer: equal where they are the same ones.
+#[derive(Clone, Debug)]
+pub struct Areas(pub Arc<Cut>);
+
+impl PartialEq for Areas {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// How an area is filled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fill {
+    /// Index of the area.
+    pub area: usize,
+    /// sRGB, 0..1.
+    pub color: [f32; 3],
+    /// Colour mixed in: sRGB and its weight.
+    pub tint: [f32; 4],
+    /// sRGB and opacity of the border.
+    pub line: [f32; 4],
+    /// Direction across the hatching in the plane, rad.
+    pub hatch: f32,
+}
+
+/// What is cut away, and the areas that show where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cutaway {
+    /// What lies above this plane is not drawn.
+    pub plane: CutPlane,
+    /// The areas, once computed.
+    pub areas: Option<Areas>,
+    /// Which of them are drawn.
+    pub fills: Vec<Fill>,
+}
+
 /// Background of the parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ground {
@@ -77,6 +117,8 @@ pub struct Picture {
     pub ground: Ground,
     /// Parts and ghosts.
     pub items: Vec<Item>,
+    /// The section, where there is one.
+    pub cut: Option<Cutaway>,
     /// Forces.
     pub arrows: Vec<Arrow>,
     /// Width of edges, pixels.

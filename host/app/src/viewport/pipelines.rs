@@ -19,6 +19,8 @@ pub struct Pipelines {
     pub sky: wgpu::RenderPipeline,
     /// Opaque parts.
     pub solid: wgpu::RenderPipeline,
+    /// Areas of a section.
+    pub area: wgpu::RenderPipeline,
     /// Transparent parts: blended, without hiding what is behind them.
     pub ghost: wgpu::RenderPipeline,
     /// Arrows, drawn over everything.
@@ -78,6 +80,15 @@ impl Pipelines {
                 label: "solid",
                 vertex: "solid_vertex",
                 fragment: "solid_fragment",
+                buffers: &solid,
+                cull: None,
+                write_depth: true,
+                compare: wgpu::CompareFunction::Less,
+            }),
+            area: make(Kind {
+                label: "area",
+                vertex: "solid_vertex",
+                fragment: "area_fragment",
                 buffers: &solid,
                 cull: None,
                 write_depth: true,

@@ -8,7 +8,8 @@ use eframe::wgpu;
 use glam::{DAffine3, DMat4, DVec3};
 use wgpu::util::DeviceExt as _;
 
-use super::picture::{Item, MAX_LIT, MAX_LIT_EDGES, Picture, arrow_poses};
+use super::camera::FIELD_OF_VIEW;
+use super::picture::{Areas, Cutaway, Fill, Item, MAX_LIT, MAX_LIT_EDGES, Picture, arrow_poses};
 use super::pipelines::{COLOR, DEPTH, Pipelines, SAMPLES};
 use super::solids;
 use crate::display::mesh::ShapeMesh;
@@ -43,7 +44,17 @@ struct Draw {
     lit: [u32; MAX_LIT],
     mates: [u32; MAX_LIT],
     lit_edges: [[u32; 2]; MAX_LIT_EDGES],
+    cut: [f32; 4],
+    hatch: [f32; 4],
 }
+
+/// Distance below the plane of a section from which faces are cut away, in radii of the scene: a face in the plane would flicker through the area there.
+/// Edges are drawn up to as much above the plane.
+const CUT_SLACK: f64 = 2e-6;
+/// A plane above which nothing lies.
+const UNCUT: [f32; 4] = [0.0, 0.0, 0.0, -1.0];
+/// Least distance of two lines of a hatching, in widths of an edge.
+const HATCH_WIDTHS: f64 = 8.0;
 
 /// A shape on the graphics card.
 struct Loaded {
@@ -73,6 +84,8 @@ pub struct Renderer {
     draws_group: wgpu::BindGroup,
     shapes: Vec<Loaded>,
     arrow: [Loaded; 2],
+    /// Areas of the section drawn last.
+    areas: Option<(Areas, Vec<Loaded>)>,
     targets: Option<Targets>,
 }
 
@@ -99,6 +112,7 @@ impl Renderer {
             draws_group,
             shapes: Vec::new(),
             arrow,
+            areas: None,
             targets: None,
         }
     }
@@ -129,6 +143,7 @@ impl Renderer {
         let Some(size) = self.targets.as_ref().map(|t| t.size) else {
             return;
         };
+        self.load_areas(picture);
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let to_clip = picture.camera.view_projection(aspect, picture.extent);
         self.queue
@@ -152,10 +167,18 @@ impl Renderer {
             .filter_map(|arrow| Some((arrow_poses(arrow)?, arrow.color)))
             .collect();
 
+        let areas: &[Loaded] = self.areas.as_ref().map_or(&[], |(_, areas)| areas);
+        let fills: Vec<(&Cutaway, &Fill)> = (picture.cut.iter())
+            .flat_map(|cut| cut.fills.iter().map(move |fill| (cut, fill)))
+            .filter(|(_, fill)| fill.area < areas.len())
+            .collect();
+        let spacing = hatch_spacing(picture, size);
+
+        // Areas follow opaque parts; transparent ones are blended over both.
         let mut draws: Vec<Draw> = Vec::new();
-        for item in solid.iter().chain(&seen_through) {
-            draws.push(draw_of(item, to_clip));
-        }
+        draws.extend(solid.iter().map(|item| draw_of(item, to_clip, picture)));
+        draws.extend((fills.iter()).map(|(cut, fill)| fill_draw(fill, cut, spacing, to_clip)));
+        draws.extend(seen_through.iter().map(|item| draw_of(item, to_clip, picture)));
         for (poses, color) in &pieces {
             draws.extend(poses.iter().map(|pose| arrow_draw(pose, *color, to_clip)));
         }
@@ -178,14 +201,21 @@ impl Renderer {
                 let shape = &self.shapes[item.shape];
                 self.select(&mut pass, at);
                 solid_of(&mut pass, &self.pipelines.solid, shape);
-                lines_of(&mut pass, &self.pipelines.lines, shape, item);
+                lines_of(&mut pass, &self.pipelines.lines, shape, item.line);
+                at += 1;
+            }
+            for (_, fill) in &fills {
+                let Some((_, areas)) = &self.areas else { break };
+                self.select(&mut pass, at);
+                solid_of(&mut pass, &self.pipelines.area, &areas[fill.area]);
+                lines_of(&mut pass, &self.pipelines.lines, &areas[fill.area], fill.line);
                 at += 1;
             }
             for item in &seen_through {
                 let shape = &self.shapes[item.shape];
                 self.select(&mut pass, at);
                 solid_of(&mut pass, &self.pipelines.ghost, shape);
-                lines_of(&mut pass, &self.pipelines.lines, shape, item);
+                lines_of(&mut pass, &self.pipelines.lines, shape, item.line);
                 at += 1;
             }
             for _ in &pieces {
@@ -197,6 +227,19 @@ impl Renderer {
             }
         }
         self.queue.submit([encoder.finish()]);
+    }
+
+    /// Brings the areas of the picture's section onto the graphics card, unless they are there.
+    fn load_areas(&mut self, picture: &Picture) {
+        let wanted = picture.cut.as_ref().and_then(|cut| cut.areas.clone());
+        if self.areas.as_ref().map(|(known, _)| known) != wanted.as_ref() {
+            self.areas = wanted.map(|areas| {
+                let loaded = (areas.0.areas.iter())
+                    .map(|area| load(&self.device, &area.mesh))
+                    .collect();
+                (areas, loaded)
+            });
+        }
     }
 
     fn select(&self, pass: &mut wgpu::RenderPass<'_>, index: u32) {
@@ -237,18 +280,67 @@ fn matrix(m: DMat4) -> [f32; 16] {
     m.as_mat4().to_cols_array()
 }
 
-fn draw_of(item: &Item, to_clip: DMat4) -> Draw {
-    let world = DMat4::from(item.pose);
-    let [r, g, b] = item.color;
+/// Distance of two lines of a hatching, mm: constant while the camera moves a little, for it is a power of two.
+fn hatch_spacing(picture: &Picture, size: [u32; 2]) -> f64 {
+    let pixel = 2.0 * picture.camera.distance * (0.5 * FIELD_OF_VIEW).tan() / f64::from(size[1]);
+    (HATCH_WIDTHS * f64::from(picture.line_width) * pixel)
+        .log2()
+        .ceil()
+        .exp2()
+}
+
+/// Plane of the section in the frame of `pose`, lower than it is by `slack`, mm.
+fn cut_of(cut: Option<&Cutaway>, pose: &DAffine3, slack: f64) -> [f32; 4] {
+    cut.map_or(UNCUT, |cut| {
+        let plane = cut.plane.seen_from(pose);
+        let offset = slack - plane.normal.dot(plane.origin);
+        plane.normal.extend(offset).as_vec4().to_array()
+    })
+}
+
+fn fill_draw(fill: &Fill, cut: &Cutaway, spacing: f64, to_clip: DMat4) -> Draw {
+    let world = DMat4::from(crate::cut::areas::pose(&cut.plane));
+    let [r, g, b] = fill.color;
+    let (sin, cos) = fill.hatch.sin_cos();
+    Draw {
+        color: [r, g, b, 1.0],
+        tint: fill.tint,
+        line: fill.line,
+        hatch: [cos, sin, spacing as f32, 0.0],
+        ..plain(world, to_clip)
+    }
+}
+
+/// Values of an item without colour, uncut.
+fn plain(world: DMat4, to_clip: DMat4) -> Draw {
     Draw {
         to_clip: matrix(to_clip * world),
         to_world: matrix(world),
+        color: [0.0; 4],
+        tint: [0.0; 4],
+        line: [0.0; 4],
+        lit: slots(&[], u32::MAX),
+        mates: slots(&[], u32::MAX),
+        lit_edges: slots(&[], NO_EDGE),
+        cut: UNCUT,
+        hatch: [0.0, 0.0, 1.0, 0.0],
+    }
+}
+
+fn draw_of(item: &Item, to_clip: DMat4, picture: &Picture) -> Draw {
+    let slack = CUT_SLACK * picture.extent.radius;
+    let world = DMat4::from(item.pose);
+    let [r, g, b] = item.color;
+    Draw {
         color: [r, g, b, item.opacity],
         tint: item.tint,
         line: item.line,
         lit: slots(&item.lit, u32::MAX),
         mates: slots(&item.mates, u32::MAX),
         lit_edges: slots(&item.lit_edges, NO_EDGE),
+        cut: cut_of(picture.cut.as_ref(), &item.pose, slack),
+        hatch: [0.0, 0.0, 1.0, 2.0 * slack as f32],
+        ..plain(world, to_clip)
     }
 }
 
@@ -258,16 +350,9 @@ fn slots<T: Copy, const N: usize>(all: &[T], none: T) -> [T; N] {
 }
 
 fn arrow_draw(pose: &DAffine3, color: [f32; 4], to_clip: DMat4) -> Draw {
-    let world = DMat4::from(*pose);
     Draw {
-        to_clip: matrix(to_clip * world),
-        to_world: matrix(world),
         color,
-        tint: [0.0; 4],
-        line: [0.0; 4],
-        lit: slots(&[], u32::MAX),
-        mates: slots(&[], u32::MAX),
-        lit_edges: slots(&[], NO_EDGE),
+        ..plain(DMat4::from(*pose), to_clip)
     }
 }
 
@@ -380,8 +465,13 @@ fn solid_of(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, sh
     }
 }
 
-fn lines_of(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, shape: &Loaded, item: &Item) {
-    if shape.segment_count > 0 && item.line[3] > 0.0 {
+fn lines_of(
+    pass: &mut wgpu::RenderPass<'_>,
+    pipeline: &wgpu::RenderPipeline,
+    shape: &Loaded,
+    line: [f32; 4],
+) {
+    if shape.segment_count > 0 && line[3] > 0.0 {
         pass.set_pipeline(pipeline);
         pass.set_vertex_buffer(0, shape.segments.slice(..));
         pass.draw(0..6, 0..shape.segment_count);

@@ -29,6 +29,10 @@ struct Draw {
     mates_b: vec4<u32>,
     // Edges lit up: two in each, by the faces that meet there, smaller id first; unused ones are no edge's.
     lit_edges: array<vec4<u32>, 4>,
+    // Plane of the section in the shape's frame: normal and offset. What is above is not drawn.
+    cut: vec4<f32>,
+    // Of areas: unit vector across the hatching (x, y), its spacing, mm (z). Of lines: height up to which they are drawn (w).
+    hatch: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> globals: Globals;
@@ -74,6 +78,10 @@ struct Solid {
     @location(0) normal: vec3<f32>,
     @location(1) color: vec4<f32>,
     @location(2) @interpolate(flat) face: u32,
+    // Height above the plane of the section, mm.
+    @location(3) height: f32,
+    // Position in the shape's frame.
+    @location(4) place: vec3<f32>,
 }
 
 @vertex
@@ -88,11 +96,16 @@ fn solid_vertex(
     out.normal = (draw.to_world * vec4<f32>(normal, 0.0)).xyz;
     out.color = color;
     out.face = face;
+    out.height = dot(draw.cut.xyz, position) + draw.cut.w;
+    out.place = position;
     return out;
 }
 
 @fragment
 fn solid_fragment(in: Solid) -> @location(0) vec4<f32> {
+    if in.height > 0.0 {
+        discard;
+    }
     var n = normalize(in.normal);
     // Shells may be open: the back of a face is lit like its front.
     if dot(n, globals.viewer.xyz) < 0.0 {
@@ -125,6 +138,16 @@ fn solid_fragment(in: Solid) -> @location(0) vec4<f32> {
     return vec4<f32>(encoded(light), alpha);
 }
 
+// Areas of a section: without scene light, as in a drawing, and hatched.
+@fragment
+fn area_fragment(in: Solid) -> @location(0) vec4<f32> {
+    var base = linear(draw.color.rgb);
+    base = mix(base, linear(draw.tint.rgb), draw.tint.a);
+    let stripe = fract(dot(in.place.xy, draw.hatch.xy) / draw.hatch.z);
+    let dark = abs(stripe - 0.5) < 0.11;
+    return vec4<f32>(encoded(base * select(0.92, 0.38, dark)), 1.0);
+}
+
 // Arrows: no scene light, so that they read the same from everywhere.
 @fragment
 fn arrow_fragment(in: Solid) -> @location(0) vec4<f32> {
@@ -142,6 +165,8 @@ const LIT_NEARER: f32 = 2.0;
 struct Line {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) color: vec4<f32>,
+    // Height above the plane of the section, mm.
+    @location(1) height: f32,
 }
 
 fn touches(faces: vec2<u32>) -> bool {
@@ -166,10 +191,15 @@ fn lines_vertex(
     var q = draw.to_clip * vec4<f32>(b, 1.0);
     // An end behind the eye is brought forward along the line.
     let nearest = 1e-4 * max(abs(p.w), abs(q.w));
+    var heights = vec2<f32>(dot(draw.cut.xyz, a), dot(draw.cut.xyz, b)) + draw.cut.w - draw.hatch.w;
     if p.w < nearest && q.w > nearest {
-        p = mix(p, q, (nearest - p.w) / (q.w - p.w));
+        let part = (nearest - p.w) / (q.w - p.w);
+        p = mix(p, q, part);
+        heights.x = mix(heights.x, heights.y, part);
     } else if q.w < nearest && p.w > nearest {
-        q = mix(q, p, (nearest - q.w) / (p.w - q.w));
+        let part = (nearest - q.w) / (p.w - q.w);
+        q = mix(q, p, part);
+        heights.y = mix(heights.y, heights.x, part);
     }
     // Half the width to each side, in pixels across the line.
     var across = vec2<f32>(0.0, 1.0);
@@ -180,8 +210,10 @@ fn lines_vertex(
     let far_end = i == 1u || i == 2u || i == 4u;
     let side = select(-1.0, 1.0, i == 2u || i == 4u || i == 5u);
     var end = p;
+    var height = heights.x;
     if far_end {
         end = q;
+        height = heights.y;
     }
     let width = globals.screen.z * select(1.0, LIT_WIDER, lit);
     let shift = side * across * width / globals.screen.xy;
@@ -189,10 +221,13 @@ fn lines_vertex(
     // screen.w holds e·B, which is negative.
     let nearer = globals.screen.w * select(1.0, LIT_NEARER, lit);
     let position = vec4<f32>(end.xy + shift * end.w, end.z + nearer, end.w);
-    return Line(position, select(draw.line, vec4<f32>(LIT_EDGE, 1.0), lit));
+    return Line(position, select(draw.line, vec4<f32>(LIT_EDGE, 1.0), lit), height);
 }
 
 @fragment
 fn lines_fragment(in: Line) -> @location(0) vec4<f32> {
+    if in.height > 0.0 {
+        discard;
+    }
     return in.color;
 }
