@@ -73,7 +73,7 @@ impl Session {
         }
         let changed = self.changed();
         let files = self.files(changed);
-        // Nobody is left to be told.
+        // Nobody is left to read an error.
         let _ = save(&files);
     }
 

@@ -127,7 +127,8 @@ fn size(
         100.0 * busy_s / seconds,
         "% of a core",
         SHARE,
-    ));
+    )
+    .varies());
     let lost = written.lost_ticks + written.lost_messages;
     out(Row::exactly(
         format!("{what}: ticks and messages lost"),
