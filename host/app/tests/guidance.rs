@@ -184,7 +184,16 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     }
     session.telemetry = Some(telemetry);
     let document = session.document.as_ref().expect("the sample");
-    let items = compose(session, document, Camera::default(), false, Ground::Dark, 1.0).items;
+    let items = compose(
+        session,
+        document,
+        Camera::default(),
+        false,
+        None,
+        Ground::Dark,
+        1.0,
+    )
+    .items;
     assert_eq!(items[1].lit_edges, [[0, 2]], "the touching edge of the held part");
     assert_eq!(items[0].lit_edges, [[3, 5]], "and that of the other");
     let mut odd = List {
@@ -224,7 +233,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     session.guidance = odd;
     let document = session.document.as_ref().expect("open");
     let camera = Camera::default();
-    let picture = compose(session, document, camera, true, Ground::Dark, 1.0);
+    let picture = compose(session, document, camera, true, None, Ground::Dark, 1.0);
     assert!(picture.items.iter().all(|item| item.mates.is_empty()));
     harness.step();
 
