@@ -33,6 +33,7 @@ fn drawn(harness: &Harness<'_, Window>) -> Vec<usize> {
         document,
         window.view.camera,
         false,
+        None,
         Ground::Dark,
         1.0,
     );
