@@ -26,7 +26,7 @@ fn a_session_is_recorded_and_replays_and_a_lost_link_ends_the_file() {
     harness.state_mut().session.recordings = Some(data.path().join("recordings"));
     open_sample(&mut harness);
     connect(&mut harness);
-    click(&mut harness, "● Record");
+    click(&mut harness, "Record");
     let recording = |session: &Session| session.recording.is_some();
     until(&mut harness, "the recording", recording);
     click(&mut harness, "Reset parts");
@@ -55,7 +55,7 @@ fn a_session_is_recorded_and_replays_and_a_lost_link_ends_the_file() {
     assert_eq!(replayed.difference, None, "{replayed:?}");
     assert!(replayed.compared > 1000, "{replayed:?}");
 
-    click(&mut harness, "● Record");
+    click(&mut harness, "Record");
     until(&mut harness, "another recording", recording);
     click(&mut harness, "Disconnect");
     until(&mut harness, "the rig is gone", |s| matches!(s.link, Link::None));

@@ -54,14 +54,14 @@ pub fn show(ui: &mut Ui, session: &Session, view: &mut View, wanted: &mut Vec<In
 fn record(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
     let (text, intent, hint) = match &session.recording {
         None => (
-            "● Record".to_owned(),
+            "Record".to_owned(),
             Intent::Record,
             "Record every message and the inputs of every tick to a new file, for `mortise replay` and Foxglove".to_owned(),
         ),
         Some(recording) => {
             let seconds = recording.since.elapsed().as_secs();
             (
-                format!("■ End recording {}:{:02}", seconds / 60, seconds % 60),
+                format!("End recording {}:{:02}", seconds / 60, seconds % 60),
                 Intent::EndRecording,
                 format!("End the recording {}", recording.path.display()),
             )
