@@ -55,7 +55,7 @@ impl StateFolder {
     }
 }
 
-/// Reads a file of at most [`MOST_BYTES`]; `None` if there is none.
+/// Reads a file; `None` if there is none. One that is larger than any this program writes is an error.
 ///
 /// # Errors
 /// One line: what, where, what to do.
