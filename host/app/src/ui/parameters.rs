@@ -63,7 +63,7 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             });
         if section.header_response.clicked() {
             wanted.push(Intent::Fold {
-                section: *heading,
+                section: heading,
                 open: !open,
             });
         }
