@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use libtest_mimic::{Arguments, Completion, Failed, Trial};
 use mortise_hil_tests::checks::{CHECKS, Check};
 use mortise_hil_tests::{PORT_VARIABLE, scenarios};
-use mortise_record::{Recorder, Recording, Replayed, replay};
+use mortise_record::{RecordError, Recorder, Recording, Replayed, replay};
 use mortise_rig::{Client, RigSpec, SERIAL_VARIABLE};
 use mortise_scenario::ScenarioError;
 use mortise_scenario::{Outcome, PreparedScene, Scenario, connect, run_on};
@@ -182,26 +182,34 @@ impl Bench {
         self.scenes.get(key, || PreparedScene::of(scenario).map(Arc::new))
     }
 
-    fn measure(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError> {
+    /// Plays a scenario, and records it to `recording`.
+    fn measure(
+        &self,
+        scenario: &Scenario,
+        spec: &RigSpec,
+        recording: Option<&Path>,
+    ) -> Result<Outcome, ScenarioError> {
         let scene = self.scene(scenario)?;
         let client = connect(scenario, spec)?;
-        run_on(&client, scenario, &scene)
-    }
-
-    /// As [`Self::measure`], and records it.
-    fn record(&self, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, Failed> {
-        let scene = self.scene(scenario)?;
-        let client = connect(scenario, spec)?;
-        let recorder = Recorder::start(&client, &self.recordings.path(scenario, spec))?;
-        recorder.scene(&scene.image);
+        let failed = |error: RecordError| ScenarioError::Scenario {
+            name: scenario.name.clone(),
+            what: error.to_string(),
+        };
+        let start = |path| Recorder::start(&client, path).map_err(failed);
+        let recorder = recording.map(start).transpose()?;
         let outcome = run_on(&client, scenario, &scene)?;
-        recorder.finish(Some(&client))?;
+        if let Some(recorder) = recorder {
+            recorder.scene(&scene.image);
+            recorder.finish(Some(&client)).map_err(failed)?;
+        }
         Ok(outcome)
     }
 
-    fn outcome(&self, file: &Path, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, Failed> {
+    fn outcome(&self, file: &Path, scenario: &Scenario, spec: &RigSpec) -> Result<Outcome, ScenarioError> {
         let key = (file.to_owned(), spec.clone());
-        self.outcomes.get(key, || self.record(scenario, spec))
+        let recording = self.recordings.path(scenario, spec);
+        self.outcomes
+            .get(key, || self.measure(scenario, spec, Some(&recording)))
     }
 
     /// The recording of the run computes again to the same bits.
@@ -219,24 +227,17 @@ impl Bench {
 
     fn scenario(&self, file: &Path, spec: &RigSpec) -> Result<Completion, Failed> {
         let scenario = Scenario::load(file)?;
-        if matches!(spec, RigSpec::Serial { .. }) {
-            return Ok(match self.measure(&scenario, spec) {
-                Err(error @ ScenarioError::NeedsSimulatedHand { .. }) => {
-                    Completion::ignored_with(error.to_string())
-                }
-                outcome => return self.judged(&scenario, spec, outcome?),
-            });
-        }
-        let outcome = self.outcome(file, &scenario, spec)?;
+        let outcome = match self.outcome(file, &scenario, spec) {
+            Err(error @ ScenarioError::NeedsSimulatedHand { .. }) => {
+                return Ok(Completion::ignored_with(error.to_string()));
+            }
+            outcome => outcome?,
+        };
         let replayed = self.replayed(&scenario, spec)?;
         println!(
             "    {}: {} ticks replay to the bit",
             scenario.name, replayed.compared
         );
-        self.judged(&scenario, spec, outcome)
-    }
-
-    fn judged(&self, scenario: &Scenario, spec: &RigSpec, outcome: Outcome) -> Result<Completion, Failed> {
         let verdicts = outcome.verdicts(&scenario.holds);
         let lines: Vec<String> = verdicts.iter().map(|verdict| format!("    {verdict}")).collect();
         let text = format!(
@@ -262,7 +263,7 @@ impl Bench {
     fn equal(&self, file: &Path, sim: &RigSpec, emulated: &RigSpec) -> Result<(), Failed> {
         let scenario = Scenario::load(file)?;
         let here = self.outcome(file, &scenario, sim)?.state_hash;
-        let again = self.measure(&scenario, sim)?.state_hash;
+        let again = self.measure(&scenario, sim, None)?.state_hash;
         let there = self.outcome(file, &scenario, emulated)?.state_hash;
         println!(
             "{}: sim {here}, sim again {again}, emulated {there}",

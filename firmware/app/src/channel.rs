@@ -23,7 +23,7 @@ pub const COMMANDS: usize = 8;
 pub const EVENTS: usize = 32;
 /// Capacity of the telemetry queue.
 pub const SAMPLES: usize = 8;
-/// Capacity of the queue of recorded inputs: what a tick of the link plane that writes flash or sends a long message may delay, 32 ms.
+/// Capacity of the queue of recorded inputs: the link plane may be busy for 32 ms before a tick is lost.
 pub const RECORDED: usize = 32;
 /// Most events one command or one tick can cause: a command is taken, and a lockstep tick run, only when the event queue has that much space left.
 pub const EVENTS_AT_ONCE: usize = 8;

@@ -74,7 +74,7 @@ fn recent_files_open_from_the_empty_page_and_missing_ones_are_marked() {
     until(&mut harness, "open", |s| s.document.is_some());
     drop(harness);
     let kept = preferences(place.path()).expect("kept");
-    let paths: Vec<&Path> = kept.recent.iter().map(|file| file.path.as_path()).collect();
+    let paths: Vec<&Path> = kept.recent.iter().map(PathBuf::as_path).collect();
     assert_eq!(paths, [second.as_path()]);
 }
 

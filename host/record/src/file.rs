@@ -23,6 +23,9 @@ use crate::schema::json_schema;
 pub(crate) const FORMAT: &str = "1";
 /// Name of the metadata record, and of the profile.
 pub(crate) const METADATA: &str = "mortise";
+/// Name of the metadata record of what is missing, and of its one value.
+pub(crate) const LOST: &str = "lost";
+pub(crate) const LOST_MESSAGES: &str = "messages";
 /// Start of the name of an attached scene image.
 pub(crate) const SCENE: &str = "scene-";
 
@@ -169,17 +172,19 @@ impl RecordFile {
         self.done(Writer::flush)
     }
 
-    /// Writes index and summary.
-    pub fn finish(mut self, lost: u64) -> Result<(), RecordError> {
+    /// Writes index and summary, and how many messages are missing; returns the path.
+    pub fn finish(mut self, lost: u64) -> Result<PathBuf, RecordError> {
         if lost > 0 {
-            let lost = BTreeMap::from([("messages".to_owned(), lost.to_string())]);
-            let name = "lost".to_owned();
-            let metadata = Metadata { name, metadata: lost };
+            let metadata = Metadata {
+                name: LOST.to_owned(),
+                metadata: BTreeMap::from([(LOST_MESSAGES.to_owned(), lost.to_string())]),
+            };
             self.done(|writer| writer.write_metadata(&metadata))?;
         }
         self.done(|writer| writer.finish().map(|_| ()))?;
         let mut rest = self.writer.into_inner();
-        rest.flush().map_err(|error| write_error(&self.path, &error))
+        rest.flush().map_err(|error| write_error(&self.path, &error))?;
+        Ok(self.path)
     }
 
     fn line<M: Serialize>(

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use crate::columns::{Ticks, decode};
 use crate::error::RecordError;
-use crate::file::{FORMAT, Line, METADATA, SCENE, Topic, from_hex};
+use crate::file::{FORMAT, LOST, LOST_MESSAGES, Line, METADATA, SCENE, Topic, from_hex};
 use crate::records::Records;
 
 /// A recording in memory, as its file holds it.
@@ -19,6 +19,7 @@ pub struct Recording {
     rig: String,
     scenes: HashMap<u32, Vec<u8>>,
     complete: bool,
+    lost_messages: u64,
     duration_s: f64,
 }
 
@@ -64,6 +65,7 @@ impl Recording {
             rig: String::new(),
             scenes: HashMap::new(),
             complete: false,
+            lost_messages: 0,
             duration_s: 0.0,
         };
         let mut records = Records::new(&recording.bytes);
@@ -87,6 +89,10 @@ impl Recording {
                     }
                     recording.rig = value("rig");
                     ours = true;
+                }
+                Record::Metadata(metadata) if metadata.name == LOST => {
+                    let lost = metadata.metadata.get(LOST_MESSAGES);
+                    recording.lost_messages = lost.and_then(|lost| lost.parse().ok()).unwrap_or(0);
                 }
                 Record::Attachment { header, data, .. } => {
                     let crc = header
@@ -127,6 +133,11 @@ impl Recording {
     /// Whether the recording was ended; otherwise its program was killed, and the last part of a second may be missing.
     pub fn complete(&self) -> bool {
         self.complete
+    }
+
+    /// Messages missing because the computer that recorded was too slow. Without them a replay may differ.
+    pub fn lost_messages(&self) -> u64 {
+        self.lost_messages
     }
 
     /// Time between the first and the last content, s.

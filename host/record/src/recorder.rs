@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -19,11 +19,10 @@ use crate::file::RecordFile;
 const FLUSH: Duration = Duration::from_millis(200);
 /// Ticks after which a chunk ends, and most in a message: those of [`FLUSH`], also where a board in lockstep runs ahead of the clock.
 const TICKS: usize = 200;
-/// Most messages that wait for the thread: about two seconds of all that a board sends.
+/// Most messages of the board in the queue: about two seconds of all that it sends.
 const WAITING: usize = 4096;
-
-/// Longest time that a message waits for a place in the queue; then it is lost and counted. A board in lockstep sends faster than a disk may take it,
-/// and waits; one that does not wait has seconds of space before.
+/// Longest time that a message of the board waits for a place in the queue; then it is lost and counted. In lockstep the board sends faster than a disk
+/// may take it, and waits; in real time the queue holds seconds.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 enum Item {
@@ -48,41 +47,53 @@ pub struct Written {
 
 /// A recording in progress. Dropped, it ends like by [`Self::finish`].
 pub struct Recorder {
-    items: SyncSender<Item>,
+    path: PathBuf,
+    items: Sender<Item>,
     thread: Option<JoinHandle<Result<Written, RecordError>>>,
 }
 
-struct Tap {
-    items: SyncSender<Item>,
-    lost: Arc<AtomicU64>,
+/// Counts of the queue between the link and the recording's thread.
+#[derive(Default)]
+struct Counts {
+    /// Messages of the board in the queue.
+    waiting: AtomicUsize,
+    /// Messages of the board for which it had no place.
+    lost: AtomicU64,
+    /// The thread has ended and takes nothing more.
+    ended: AtomicBool,
 }
 
-impl Tap {
-    fn offer(&self, mut item: Item) {
-        let begun = Instant::now();
-        while let Err(TrySendError::Full(back)) = self.items.try_send(item) {
-            if begun.elapsed() > PATIENCE {
-                self.lost.fetch_add(1, Ordering::Relaxed);
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-            item = back;
-        }
-    }
+struct Tap {
+    items: Sender<Item>,
+    counts: Arc<Counts>,
 }
 
 impl Observer for Tap {
+    /// Never waits, however slow the disk is: STOP passes here.
     fn sent(&self, sequence: u16, message: &ToDevice) {
         // Scenes are attached whole, and heartbeats say nothing.
         if !matches!(message, ToDevice::SceneChunk { .. } | ToDevice::Heartbeat) {
-            self.offer(Item::Sent(now_ns(), sequence, message.clone()));
+            // A thread that has ended with an error reports it in `finish`.
+            let _ = self.items.send(Item::Sent(now_ns(), sequence, message.clone()));
         }
     }
 
     fn received(&self, sequence: u16, message: &FromDevice) {
-        if !matches!(message, FromDevice::Log(_)) {
-            self.offer(Item::Received(now_ns(), sequence, message.clone()));
+        if matches!(message, FromDevice::Log(_)) {
+            return;
         }
+        let begun = Instant::now();
+        while self.counts.waiting.load(Ordering::Acquire) >= WAITING {
+            if self.counts.ended.load(Ordering::Acquire) || begun.elapsed() > PATIENCE {
+                self.counts.lost.fetch_add(1, Ordering::Relaxed);
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.counts.waiting.fetch_add(1, Ordering::AcqRel);
+        let _ = self
+            .items
+            .send(Item::Received(now_ns(), sequence, message.clone()));
     }
 }
 
@@ -94,31 +105,37 @@ impl Recorder {
     /// `Write` when the file cannot be made or exists; `Rig` when the board does not answer.
     pub fn start(client: &Client, path: &Path) -> Result<Self, RecordError> {
         let file = RecordFile::create(path, client.name())?;
-        let (items, waiting) = sync_channel(WAITING);
-        let lost = Arc::new(AtomicU64::new(0));
+        let (items, queue) = channel();
+        let counts = Arc::new(Counts::default());
         let thread = std::thread::Builder::new()
             .name("mortise-record".into())
             .spawn({
-                let (path, lost) = (path.to_owned(), lost.clone());
-                move || write(file, path, &waiting, &lost)
+                let counts = counts.clone();
+                move || {
+                    let written = write(file, &queue, &counts);
+                    counts.ended.store(true, Ordering::Release);
+                    written
+                }
             })
             .map_err(|error| RecordError::Rig(RigError::Thread(error)))?;
         let recorder = Self {
+            path: path.to_owned(),
             items: items.clone(),
             thread: Some(thread),
         };
-        client.observe(Some(Arc::new(Tap { items, lost })));
-        let introduced = introduce(client);
-        if introduced.is_err() {
+        client.observe(Some(Arc::new(Tap { items, counts })));
+        if let Err(error) = introduce(client) {
             client.observe(None);
+            drop(recorder);
+            // Nothing was recorded; the error says why.
+            let _ = std::fs::remove_file(path);
+            return Err(error.into());
         }
-        introduced?;
         Ok(recorder)
     }
 
     /// Attaches the image of a scene that the board uses: a replay needs it. Attached once, however often it is given.
     pub fn scene(&self, image: &[u8]) {
-        // Waits for a place: scenes come rarely, and none may be missing.
         let _ = self.items.send(Item::Scene(image.to_owned()));
     }
 
@@ -137,13 +154,12 @@ impl Recorder {
 
     fn end(&mut self) -> Result<Written, RecordError> {
         let _ = self.items.send(Item::End);
-        match self.thread.take().map(JoinHandle::join) {
-            Some(Ok(result)) => result,
-            _ => Err(RecordError::Write {
-                path: PathBuf::new(),
-                why: "the recording's thread has failed".into(),
-            }),
-        }
+        let failed = || RecordError::Write {
+            path: self.path.clone(),
+            why: "its thread has failed".into(),
+        };
+        let thread = self.thread.take().ok_or_else(failed)?;
+        thread.join().map_err(|_| failed())?
     }
 }
 
@@ -172,16 +188,16 @@ fn now_ns() -> u64 {
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
-fn write(
-    mut file: RecordFile,
-    path: PathBuf,
-    items: &Receiver<Item>,
-    lost: &AtomicU64,
-) -> Result<Written, RecordError> {
+/// Writes items until the end, or until all senders are gone.
+fn write(mut file: RecordFile, queue: &Receiver<Item>, counts: &Counts) -> Result<Written, RecordError> {
     let mut pending = Pending::default();
     let mut flushed = Instant::now();
     loop {
-        match items.recv_timeout(FLUSH.saturating_sub(flushed.elapsed())) {
+        let item = queue.recv_timeout(FLUSH.saturating_sub(flushed.elapsed()));
+        if matches!(item, Ok(Item::Received(..))) {
+            counts.waiting.fetch_sub(1, Ordering::AcqRel);
+        }
+        match item {
             Ok(Item::Sent(at, sequence, message)) => file.sent(at, sequence, &message)?,
             Ok(Item::Received(at, _, FromDevice::Inputs(inputs))) => pending.add(at, &inputs, &mut file)?,
             Ok(Item::Received(at, sequence, message)) => file.received(at, sequence, &message)?,
@@ -196,8 +212,8 @@ fn write(
         }
     }
     pending.write(&mut file)?;
-    let lost_messages = lost.load(Ordering::Relaxed);
-    file.finish(lost_messages)?;
+    let lost_messages = counts.lost.load(Ordering::Relaxed);
+    let path = file.finish(lost_messages)?;
     Ok(Written {
         path,
         ticks: pending.written,
@@ -249,5 +265,34 @@ impl Pending {
             file.inputs(self.at_ns, &ticks)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disk that takes nothing must not delay a stop.
+    #[test]
+    fn a_message_to_the_board_never_waits_for_a_place() {
+        let (items, queue) = channel();
+        let counts = Arc::new(Counts::default());
+        counts.waiting.store(WAITING, Ordering::Release);
+        let tap = Tap {
+            items,
+            counts: counts.clone(),
+        };
+        let begun = Instant::now();
+        tap.sent(1, &ToDevice::Stop);
+        assert!(begun.elapsed() < PATIENCE);
+        assert!(matches!(queue.try_recv(), Ok(Item::Sent(_, 1, ToDevice::Stop))));
+        tap.received(1, &FromDevice::Ack { seq: 1 });
+        assert!(begun.elapsed() >= PATIENCE && queue.try_recv().is_err());
+        assert_eq!(counts.lost.load(Ordering::Relaxed), 1);
+        // A thread that has failed delays nothing.
+        counts.ended.store(true, Ordering::Release);
+        let begun = Instant::now();
+        tap.received(2, &FromDevice::Ack { seq: 2 });
+        assert!(begun.elapsed() < PATIENCE);
     }
 }

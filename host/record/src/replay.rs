@@ -5,13 +5,13 @@
 //! the link, and at a fault that follows from time rather than from readings (a silent host, an overrun tick), and begins again at the next reset.
 //! Cost: about 20 µs a tick.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{HashSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mortise_protocol::message::{Fault, FromDevice, TickInput, ToDevice};
 use mortise_protocol::parameter::ParameterId;
 use mortise_protocol::rig::Rig;
-use mortise_rig::{Client, Observer, Patience, Readings, RigError, simulate_readings};
+use mortise_rig::{Client, Observer, Patience, Readings, RigError, Words as _, simulate_readings};
 
 use crate::error::RecordError;
 use crate::reading::{EntryKind, Recording};
@@ -45,7 +45,7 @@ pub struct Difference {
     pub after: String,
 }
 
-/// A recorded tick, and what it needs.
+/// A recorded tick.
 struct Tick {
     number: u32,
     count: [f32; 2],
@@ -61,58 +61,54 @@ struct Order {
     done: Option<bool>,
 }
 
-/// What a recording tells, in order.
+/// The ticks and messages of a recording, each in their order, and what the board said of itself.
 #[derive(Default)]
-struct Story {
+struct Session {
     ticks: Vec<Tick>,
     orders: VecDeque<Order>,
     parameters: Vec<(ParameterId, f32)>,
     rig: Option<Rig>,
     simulated: bool,
-    /// Ticks of faults that follow from time.
-    untimely: HashMap<u32, String>,
-    crc: Option<u32>,
+    /// Numbers of the ticks in which a fault occurred that follows from time.
+    timed_out: HashSet<u32>,
+    /// Checksum of the scene in use when the recording began.
+    scene: Option<u32>,
 }
 
 /// Computes the recording again. `changes`: parameters that have other values than in the recording, to see what they would have changed; empty for a
 /// check.
 ///
 /// # Errors
-/// `NothingToReplay` when it holds no reset of the scene, no inputs, or not the scene's image; `Rig` when the simulation ends.
+/// `NothingToReplay` when it holds no inputs, or no reset or upload of a scene whose image is attached; `Rig` when the simulation ends.
 pub fn replay(recording: &Recording, changes: &[(ParameterId, f32)]) -> Result<Replayed, RecordError> {
     let nothing = |why: &str| RecordError::NothingToReplay {
         path: recording.path().to_owned(),
         why: why.to_owned(),
     };
-    let story = Story::of(recording);
-    if story.ticks.is_empty() {
+    let session = Session::of(recording);
+    if session.ticks.is_empty() {
         return Err(nothing("it holds no inputs of ticks"));
     }
-    let image = (story.crc).ok_or_else(|| nothing("it names no collision model"))?;
-    let image =
-        (recording.scene(image)).ok_or_else(|| nothing("it does not hold the board's collision model"))?;
-    let mut player = Player::new(recording, &story, changes)?;
-    player.client.upload(image, &mut |_| {})?;
-    let recorded = story.ticks.len() as u64;
-    player.play(story)?;
+    let mut player = Player::new(recording, &session, changes)?;
+    let recorded = session.ticks.len() as u64;
+    player.play(session)?;
     let result = player.result;
-    if result.compared == 0 && result.left_out.is_empty() {
+    if result.compared == 0 {
         return Err(nothing(
-            "the scene was never reset while it was recorded, so that its state is unknown",
+            "the scene was never reset or uploaded while it was recorded, or its image is not attached, so that its state is unknown",
         ));
     }
     Ok(Replayed { recorded, ..result })
 }
 
-impl Story {
+impl Session {
     fn of(recording: &Recording) -> Self {
-        let mut story = Self::default();
-        let mut begun: Option<u32> = None;
+        let mut session = Self::default();
         for entry in recording.entries() {
             match entry.kind {
                 EntryKind::Inputs(ticks) => {
                     for (at, input) in ticks.inputs.into_iter().enumerate() {
-                        story.ticks.push(Tick {
+                        session.ticks.push(Tick {
                             number: ticks.first_tick.wrapping_add(at as u32),
                             count: ticks.count,
                             lost: ticks.lost,
@@ -121,24 +117,21 @@ impl Story {
                     }
                 }
                 EntryKind::Sent(sequence, message) => {
-                    if let ToDevice::SceneBegin { crc, .. } = message {
-                        begun = Some(crc);
-                    }
                     let done = None;
-                    story.orders.push_back(Order {
+                    session.orders.push_back(Order {
                         sequence,
                         message,
                         done,
                     });
                 }
-                EntryKind::Received(message) => story.received(message, begun),
+                EntryKind::Received(message) => session.received(message),
                 EntryKind::Telemetry(_) => {}
             }
         }
-        story
+        session
     }
 
-    fn received(&mut self, message: FromDevice, begun: Option<u32>) {
+    fn received(&mut self, message: FromDevice) {
         match message {
             FromDevice::Ack { seq } => self.answered(seq, true),
             FromDevice::Refused { seq, .. } => self.answered(seq, false),
@@ -146,20 +139,20 @@ impl Story {
             FromDevice::Rig { rig, in_use } => self.rig = rig.filter(|_| in_use),
             FromDevice::Capabilities(capabilities) => {
                 self.simulated = capabilities.simulated;
-                // Of a scene that is uploaded while recording, at its beginning nothing is known.
-                self.crc = self.crc.or(capabilities.scene).or(begun);
+                // Uploads that follow are among the messages.
+                if self.ticks.is_empty() {
+                    self.scene = capabilities.scene;
+                }
             }
             FromDevice::Fault {
                 tick,
                 fault: Fault::HostSilent { .. } | Fault::TickOverrun | Fault::SceneDamaged,
             } => {
-                let why = "a fault that no reading explains";
-                // Counted before the tick's own count.
-                self.untimely.insert(tick.wrapping_add(1), why.to_owned());
+                // The report counts the ticks before the one that failed.
+                self.timed_out.insert(tick.wrapping_add(1));
             }
             _ => {}
         }
-        self.crc = self.crc.or(begun);
     }
 
     fn answered(&mut self, seq: u16, done: bool) {
@@ -197,6 +190,8 @@ struct Player<'r> {
     /// The state is that of the recording: since a reset, without a gap.
     known: bool,
     since_reset: u64,
+    /// The simulation has the scene that the board had.
+    has_scene: bool,
     uploading: Option<u32>,
     last: String,
     result: Replayed,
@@ -205,18 +200,22 @@ struct Player<'r> {
 impl<'r> Player<'r> {
     fn new(
         recording: &'r Recording,
-        story: &Story,
+        session: &Session,
         changes: &[(ParameterId, f32)],
     ) -> Result<Self, RigError> {
-        let readings = Readings::new(story.rig.clone(), story.simulated);
+        let readings = Readings::new(session.rig.clone(), session.simulated);
         let transport = simulate_readings(&readings)?;
         let client = Client::over(transport, "replay", Patience::long(), None)?;
         client.set_lockstep(true)?;
         let hashes = Arc::new(Hashes::default());
         client.observe(Some(hashes.clone()));
         client.request(ToDevice::RecordInputs(true))?;
-        set_all(&client, &story.parameters)?;
+        set_all(&client, &session.parameters)?;
         set_all(&client, changes)?;
+        let image = session.scene.and_then(|crc| recording.scene(crc));
+        if let Some(image) = image {
+            client.upload(image, &mut |_| {})?;
+        }
         Ok(Self {
             recording,
             client,
@@ -226,6 +225,7 @@ impl<'r> Player<'r> {
             waiting: Vec::new(),
             known: false,
             since_reset: 0,
+            has_scene: image.is_some(),
             uploading: None,
             last: "the beginning".into(),
             result: Replayed {
@@ -237,10 +237,11 @@ impl<'r> Player<'r> {
         })
     }
 
-    fn play(&mut self, mut story: Story) -> Result<(), RigError> {
+    fn play(&mut self, mut session: Session) -> Result<(), RigError> {
         let mut before: Option<Tick> = None;
-        for tick in story.ticks {
-            self.interrupt(before.as_ref(), &tick, &story.untimely)?;
+        for tick in session.ticks {
+            let timed_out = session.timed_out.contains(&tick.number);
+            self.interrupt(before.as_ref(), &tick, timed_out)?;
             let stopped = before
                 .as_ref()
                 .is_some_and(|before| before.input.stops != tick.input.stops);
@@ -248,9 +249,8 @@ impl<'r> Player<'r> {
                 self.run()?;
                 self.perform(&ToDevice::Stop)?;
             }
-            while let Some(order) = due(&mut story.orders, tick.input.carried_out) {
-                // Before any tick is recorded the state is unknown, and a reset does not need it.
-                self.order(&order, before.as_ref())?;
+            while let Some(order) = due(&mut session.orders, tick.input.carried_out) {
+                self.order(&order, before.as_ref(), tick.number)?;
             }
             if self.known {
                 self.readings.push(&tick.input, tick.count);
@@ -270,45 +270,67 @@ impl<'r> Player<'r> {
     }
 
     /// Ends the comparison where the recording does not determine the next tick.
-    fn interrupt(
-        &mut self,
-        before: Option<&Tick>,
-        tick: &Tick,
-        untimely: &HashMap<u32, String>,
-    ) -> Result<(), RigError> {
+    fn interrupt(&mut self, before: Option<&Tick>, tick: &Tick, timed_out: bool) -> Result<(), RigError> {
         let gap = before
             .is_some_and(|before| before.number.wrapping_add(1) != tick.number || before.lost != tick.lost);
-        let why = match untimely.get(&tick.number) {
-            Some(why) => Some(why.clone()),
-            None => gap.then(|| "ticks before it were lost on the link".to_owned()),
-        };
-        if let Some(why) = why.filter(|_| self.known) {
+        if timed_out {
+            self.leave_out(tick.number, "a fault that follows from time")
+        } else if gap {
+            self.leave_out(tick.number, "ticks before it were lost on the link")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Compares what is known so far, and no more until the next reset.
+    fn leave_out(&mut self, tick: u32, why: &str) -> Result<(), RigError> {
+        if self.known {
             self.run()?;
             self.known = false;
-            self.result.left_out.push((tick.number, why));
+            self.result.left_out.push((tick, why.to_owned()));
         }
         Ok(())
     }
 
-    /// Carries out a message that the board has carried out.
-    fn order(&mut self, order: &Order, before: Option<&Tick>) -> Result<(), RigError> {
-        let resets = matches!(order.message, ToDevice::ResetScene | ToDevice::SceneCommit);
+    /// Carries out a message that the board has carried out before `tick`; `before`: the tick before that.
+    fn order(&mut self, order: &Order, before: Option<&Tick>, tick: u32) -> Result<(), RigError> {
         if let ToDevice::SceneBegin { crc, .. } = order.message {
             self.uploading = Some(crc);
         }
-        if order.done != Some(true)
-            || !(self.known || resets || matches!(order.message, ToDevice::SetParameter { .. }))
-        {
+        if order.done != Some(true) {
             return Ok(());
         }
+        if order.message == ToDevice::SceneCommit {
+            let recording = self.recording;
+            let Some(image) = self.uploading.take().and_then(|crc| recording.scene(crc)) else {
+                self.has_scene = false;
+                return self.leave_out(
+                    tick,
+                    "a collision model was uploaded that the recording does not hold",
+                );
+            };
+            self.reset(before)?;
+            self.has_scene = true;
+            self.last = order.message.words();
+            return self.client.upload(image, &mut |_| {});
+        }
+        if order.message == ToDevice::ResetScene && self.has_scene {
+            self.reset(before)?;
+        }
+        if self.known || matches!(order.message, ToDevice::SetParameter { .. }) {
+            self.run()?;
+            self.perform(&order.message)?;
+        }
+        Ok(())
+    }
+
+    /// Prepares for a reset of the scene, after which the state is known.
+    fn reset(&mut self, before: Option<&Tick>) -> Result<(), RigError> {
         self.run()?;
-        if resets && !self.known {
+        if !self.known {
             self.begin(before)?;
         }
-        self.perform(&order.message)?;
-        if resets {
-            self.since_reset = 0;
-        }
+        self.since_reset = 0;
         Ok(())
     }
 
@@ -330,12 +352,6 @@ impl<'r> Player<'r> {
     fn perform(&mut self, message: &ToDevice) -> Result<(), RigError> {
         let result = match message {
             ToDevice::SetParameter { id, .. } if self.changed.contains(id) => return Ok(()),
-            ToDevice::SceneCommit => {
-                let Some(image) = self.uploading.take().and_then(|crc| self.recording.scene(crc)) else {
-                    return Ok(());
-                };
-                self.client.upload(image, &mut |_| {})
-            }
             ToDevice::Stop
             | ToDevice::Arm
             | ToDevice::Disarm
@@ -349,7 +365,7 @@ impl<'r> Player<'r> {
             | ToDevice::ClearTarget { .. } => self.client.request(message.clone()),
             _ => return Ok(()),
         };
-        self.last = words(message);
+        self.last = message.words();
         match result {
             // The board did carry it out: the difference shows in the next tick.
             Err(RigError::Refused { .. }) => Ok(()),
@@ -371,13 +387,29 @@ impl<'r> Player<'r> {
                     tick,
                     since_reset,
                     hashes: [recorded, found],
-                    after: self.last.clone(),
+                    after: self.after(),
                 });
                 break;
             }
         }
+        if let Some(&(tick, ..)) = self.waiting.get(computed.len()) {
+            self.known = false;
+            let why = "the simulation did not report every tick".to_owned();
+            self.result.left_out.push((tick, why));
+        }
         self.waiting.clear();
         Ok(())
+    }
+
+    /// The last message in words, and what may be missing after it.
+    fn after(&self) -> String {
+        match self.recording.lost_messages() {
+            0 => self.last.clone(),
+            lost => format!(
+                "{} (of the board's messages the recording lacks {lost})",
+                self.last
+            ),
+        }
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, VecDeque<u32>> {
@@ -418,9 +450,4 @@ fn set_all(client: &Client, parameters: &[(ParameterId, f32)]) -> Result<(), Rig
         }
         left = refused;
     }
-}
-
-fn words(message: &ToDevice) -> String {
-    use mortise_rig::Words;
-    message.words()
 }

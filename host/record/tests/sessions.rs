@@ -14,8 +14,9 @@ use mortise_scenario::{PreparedScene, Scenario, run_on};
 
 /// Names the file to record to in the program that is killed.
 const VICTIM: &str = "MORTISE_RECORD_TO";
-/// Programs killed, see [`killed`].
-const KILLED: usize = 20;
+/// Programs killed, see [`killed`], and how many run at a time.
+const KILLED: usize = 100;
+const AT_A_TIME: usize = 5;
 /// Largest loss, s.
 const LOSS_S: f64 = 0.5;
 
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Trial::test("another_parameter_differs_where_two_runs_do", other_parameter),
         Trial::test("a_session_in_real_time_replays_to_the_bit", real_time),
         Trial::test("a_killed_program_loses_half_a_second_at_most", killed),
+        Trial::test("an_upload_makes_the_state_known", upload),
         Trial::test("what_is_no_recording_is_refused_in_words", refused),
     ];
     libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
@@ -169,6 +171,36 @@ fn real_time() -> Result<(), Failed> {
     Ok(())
 }
 
+/// What happens in a scene that the recording does not hold is left out; an upload of one that it holds begins the replay.
+fn upload() -> Result<(), Failed> {
+    let (scenario, scene) = scenario("press_wall_1n")?;
+    let other = Scenario {
+        scene: mortise_scenario::Scene {
+            cell_mm: Some(1.0),
+            ..scenario.scene.clone()
+        },
+        ..scenario.clone()
+    };
+    let other_scene = PreparedScene::of(&other)?;
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("two.mcap");
+    let client = Client::connect(&RigSpec::Simulated { realtime: false })?;
+    client.upload(&other_scene.image, &mut |_| {})?;
+    let recorder = Recorder::start(&client, &path)?;
+    recorder.scene(&scene.image);
+    run_on(&client, &other, &other_scene)?;
+    let unknown = client.run(0)?.tick;
+    run_on(&client, &scenario, &scene)?;
+    let last = client.run(0)?.tick;
+    recorder.finish(Some(&client))?;
+    let replayed = replay(&Recording::open(&path)?, &[])?;
+    println!("    {replayed:?}");
+    assert_eq!(replayed.difference, None);
+    assert_eq!(replayed.compared, u64::from(last - unknown));
+    assert!(replayed.compared < replayed.recorded);
+    Ok(())
+}
+
 fn pause(ms: u64) {
     std::thread::sleep(Duration::from_millis(ms));
 }
@@ -229,8 +261,22 @@ fn killed() -> Result<(), Failed> {
     let mut random = fastrand::Rng::with_seed(11);
     let begun = Instant::now();
     let mut losses = Vec::new();
-    for number in 0..KILLED {
-        losses.push(Victim::start(folder.path(), number, &mut random)?.kill()?);
+    for batch in 0..KILLED / AT_A_TIME {
+        let mut victims = Vec::new();
+        for number in 0..AT_A_TIME {
+            victims.push(Victim::start(
+                folder.path(),
+                batch * AT_A_TIME + number,
+                &mut random,
+            )?);
+        }
+        // All wait at once: each is killed at its own time.
+        let killed: Vec<_> = (victims.into_iter())
+            .map(|victim| std::thread::spawn(move || victim.kill().map_err(|why| format!("{why:?}"))))
+            .collect();
+        for thread in killed {
+            losses.push(thread.join().map_err(|_| "a thread failed")??);
+        }
     }
     let worst = losses.iter().copied().fold(0.0, f64::max);
     println!(

@@ -6,4 +6,4 @@ mod recent;
 
 pub use self::folder::{StateFolder, read};
 pub use self::preferences::Preferences;
-pub use self::recent::{MOST_RECENT, Recent, RecentFile};
+pub use self::recent::{MOST_RECENT, Recent};

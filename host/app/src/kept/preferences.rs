@@ -82,7 +82,7 @@ mod tests {
             open: BTreeMap::from([("Contact".into(), false)]),
             ..Preferences::default()
         };
-        some.recent.opened(Path::new("/a b.step"), "12ab");
+        some.recent.opened(Path::new("/a b.step"));
         some
     }
 

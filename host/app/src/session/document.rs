@@ -8,7 +8,6 @@ use anyhow::Context as _;
 use glam::DAffine3;
 use mortise_bake::Baked;
 use mortise_brep::{CadModel, LoadOptions, load_step_while};
-use sha2::{Digest as _, Sha256};
 
 use super::insertion::{self, Insertion};
 use super::tree::{Branch, tree};
@@ -49,8 +48,6 @@ pub struct Document {
     pub extent: Extent,
     /// sRGB of each part.
     pub colors: Vec<[u8; 3]>,
-    /// SHA-256 of the files that were read, in hexadecimal digits; empty when it is unknown.
-    pub sha256: String,
     /// Whether each part is hidden.
     pub hidden: Vec<bool>,
     /// Present pose of each part, mm.
@@ -78,11 +75,7 @@ impl Document {
             || path.display().to_string(),
             |n| n.to_string_lossy().into_owned(),
         );
-        let sha256 = sha256_of(&model.files);
-        Ok(Self {
-            sha256,
-            ..Self::of(model, Some(path.to_owned()), title, generation)
-        })
+        Ok(Self::of(model, Some(path.to_owned()), title, generation))
     }
 
     /// Reads the sample that is built into the program.
@@ -93,10 +86,7 @@ impl Document {
         let file = mortise_scenario::sample::File::write().context("the sample could not be unpacked")?;
         let model = load_step_while(file.path(), &LoadOptions::default(), progress)?;
         let title = mortise_scenario::sample::NAME.to_owned();
-        Ok(Self {
-            sha256: digits(Sha256::new_with_prefix(mortise_scenario::sample::STEP)),
-            ..Self::of(model, None, title, generation)
-        })
+        Ok(Self::of(model, None, title, generation))
     }
 
     /// The document of a model.
@@ -116,7 +106,6 @@ impl Document {
             extents,
             extent,
             colors: colors(&model),
-            sha256: String::new(),
             hidden: vec![false; poses.len()],
             poses,
             insertion,
@@ -161,22 +150,6 @@ impl Document {
         let reports = &self.baked.as_ref()?.report.parts;
         reports.get(usize::from(scene_part)).map(|r| r.model_part)
     }
-}
-
-/// SHA-256 of the contents of files, one after the other; empty when one cannot be read any more.
-fn sha256_of(files: &[PathBuf]) -> String {
-    let mut sum = Sha256::new();
-    for path in files {
-        let Ok(bytes) = std::fs::read(path) else {
-            return String::new();
-        };
-        sum.update(bytes);
-    }
-    digits(sum)
-}
-
-fn digits(sum: Sha256) -> String {
-    sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Bounding sphere of all parts at their present poses.

@@ -48,19 +48,18 @@ impl Session {
     pub fn keep(&mut self) -> Option<Duration> {
         self.keeper.folder.as_ref()?;
         self.end_saving();
-        let changed = self.changed();
-        if changed.is_empty() {
+        if self.preferences == self.keeper.preferences {
             return None;
         }
         let since = self.keeper.last.map_or(EVERY, |last| last.elapsed());
         if self.keeper.saving.is_some() || since < EVERY {
             return Some(EVERY.saturating_sub(since).max(Duration::from_millis(50)));
         }
-        let files = self.files(changed);
+        let write = self.write_preferences()?;
         let (done, saving) = channel();
         spawn("mortise-keep", move || {
             // The session may have ended.
-            let _ = done.send(save(&files));
+            let _ = done.send(write());
         });
         self.keeper.saving = Some(saving);
         Some(EVERY)
@@ -71,34 +70,23 @@ impl Session {
         if let Some(saving) = self.keeper.saving.take() {
             let _ = saving.recv_timeout(LAST_WAIT);
         }
-        let changed = self.changed();
-        let files = self.files(changed);
-        // Nobody is left to read an error.
-        let _ = save(&files);
-    }
-
-    /// What is not on the disk as it is.
-    fn changed(&self) -> Changed {
-        Changed {
-            preferences: (self.preferences != self.keeper.preferences).then(|| self.preferences.clone()),
+        if self.preferences != self.keeper.preferences
+            && let Some(write) = self.write_preferences()
+        {
+            // Nobody is left to read an error.
+            let _ = write();
         }
     }
 
-    /// Files to be written; from now on what they contain counts as saved.
-    fn files(&mut self, changed: Changed) -> Vec<Kept> {
-        let Some(folder) = self.keeper.folder.clone() else {
-            return Vec::new();
-        };
-        let mut files = Vec::new();
-        if let Some(preferences) = changed.preferences {
-            files.push(Kept {
-                path: folder.preferences(),
-                text: preferences.to_json(),
-                folder,
-            });
-            self.keeper.preferences = preferences;
-        }
-        files
+    /// What writes the preferences, for any thread; from now on they count as saved. `None`: nothing is kept.
+    fn write_preferences(&mut self) -> Option<impl FnOnce() -> Result<(), String> + Send + use<>> {
+        let folder = self.keeper.folder.clone()?;
+        self.keeper.preferences = self.preferences.clone();
+        let text = self.preferences.to_json();
+        Some(move || {
+            let written = folder.write(&folder.preferences(), &text);
+            written.map_err(|error| format!("{error:#}"))
+        })
     }
 
     fn end_saving(&mut self) {
@@ -124,7 +112,7 @@ impl Session {
         if let Some(document) = &self.document
             && let Some(Ok(path)) = document.path.as_ref().map(std::path::absolute)
         {
-            self.preferences.recent.opened(&path, &document.sha256);
+            self.preferences.recent.opened(&path);
         }
         self.check_recent();
     }
@@ -132,8 +120,7 @@ impl Session {
     /// Finds out, on a thread of its own, which of the recent files are missing.
     pub(super) fn check_recent(&self) {
         let outbox = self.outbox.clone();
-        let recent = self.preferences.recent.iter();
-        let paths: Vec<PathBuf> = recent.map(|file| file.path.clone()).collect();
+        let paths: Vec<PathBuf> = self.preferences.recent.iter().cloned().collect();
         if paths.is_empty() {
             return;
         }
@@ -142,32 +129,6 @@ impl Session {
             outbox.send(Update::Missing(missing));
         });
     }
-}
-
-/// What is not on the disk as it is.
-struct Changed {
-    preferences: Option<Preferences>,
-}
-
-impl Changed {
-    fn is_empty(&self) -> bool {
-        self.preferences.is_none()
-    }
-}
-
-/// A file to be written.
-struct Kept {
-    folder: StateFolder,
-    path: PathBuf,
-    text: String,
-}
-
-fn save(files: &[Kept]) -> Result<(), String> {
-    for file in files {
-        let written = file.folder.write(&file.path, &file.text);
-        written.map_err(|error| format!("{error:#}"))?;
-    }
-    Ok(())
 }
 
 /// Keeps a file that cannot be used under another name, so that nothing is lost; says what was done.

@@ -20,7 +20,7 @@ use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 use super::document::Document;
 use super::guidance;
 use super::outbox::{LinkUpdate, Outbox, Update};
-use super::recording::{Recorded, Scene};
+use super::recording::Recorded;
 use super::tap::Tap;
 use super::threads::{Cancel, spawn};
 
@@ -57,7 +57,7 @@ pub enum Command {
         /// Folder of the new file.
         folder: PathBuf,
         /// The collision model on the board, if it is the document's.
-        scene: Scene,
+        scene: Option<Arc<Baked>>,
     },
     /// End the recording.
     EndRecording,

@@ -1,7 +1,6 @@
 //! Recording of the connected rig, on the link's thread.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use mortise_bake::Baked;
@@ -76,6 +75,3 @@ fn free_name(folder: &Path) -> Result<PathBuf, String> {
         .find(|path| !path.exists())
         .ok_or_else(|| format!("{} is full: remove old recordings", folder.display()))
 }
-
-/// Scene of a command, shared with the document.
-pub(super) type Scene = Option<Arc<Baked>>;

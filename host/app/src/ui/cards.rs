@@ -26,7 +26,8 @@ pub fn show(ui: &Ui, rect: Rect, session: &Session, wanted: &mut Vec<Intent>) {
         });
     }
     if let Some(verdict) = &session.verdict {
-        let at = rect.center_top() + Vec2::new(0.0, 84.0);
+        // Below the bars and the held part's card.
+        let at = rect.center_top() + Vec2::new(0.0, 116.0);
         card(ui, rect, "verdict", Align2::CENTER_TOP, at, |ui| {
             let ink = theme::of(ui);
             let color = match verdict.severity() {

@@ -7,7 +7,6 @@ use egui::text::LayoutJob;
 use egui::{Align, Button, FontId, Layout, Rect, RichText, TextFormat, Ui, UiBuilder, Vec2};
 
 use super::{control, theme};
-use crate::kept::RecentFile;
 use crate::session::{Intent, Session};
 
 /// Height of a line, points.
@@ -54,18 +53,18 @@ pub fn in_menu(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
 }
 
 /// One file: its name and its folder. A missing one says so, and can be taken out of the list; it may also be opened, as it can be back.
-fn line(ui: &mut Ui, session: &Session, file: &RecentFile, wanted: &mut Vec<Intent>) {
-    let missing = session.missing.contains(&file.path);
+fn line(ui: &mut Ui, session: &Session, file: &Path, wanted: &mut Vec<Intent>) {
+    let missing = session.missing.iter().any(|missing| missing == file);
     let text =
         |part: Option<&OsStr>| part.map_or_else(String::new, |part| part.to_string_lossy().into_owned());
-    let name = text(file.path.file_name());
+    let name = text(file.file_name());
     let ink = theme::of(ui);
     let (strong, weak, note) = match missing {
         true => (ink.text_weak, ink.warning, "missing".to_owned()),
         false => (
             ink.text_strong,
             ink.text_weak,
-            text(file.path.parent().map(Path::as_os_str)),
+            text(file.parent().map(Path::as_os_str)),
         ),
     };
     let format = |size, color| TextFormat::simple(FontId::proportional(size), color);
@@ -79,15 +78,15 @@ fn line(ui: &mut Ui, session: &Session, file: &RecentFile, wanted: &mut Vec<Inte
             if missing {
                 let forget = ui.add(Button::new("×").frame(false));
                 if forget.clicked() {
-                    wanted.push(Intent::ForgetRecent(file.path.clone()));
+                    wanted.push(Intent::ForgetRecent(file.to_owned()));
                 }
                 forget
                     .accessible_name(format!("Forget {name}"))
                     .on_hover_text("Take it out of the list");
             }
-            let open = Intent::Open(file.path.clone());
+            let open = Intent::Open(file.to_owned());
             let button = Button::new(job).frame(false).truncate();
-            let path = file.path.display();
+            let path = file.display();
             let hint = match missing {
                 true => format!("{path} was not there when the list was checked"),
                 false => path.to_string(),

@@ -72,7 +72,7 @@ pub(super) fn measure(plan: &Plan<'_>, out: &mut dyn FnMut(Row)) -> Result<(), L
     let mut named = 0;
     for _ in 0..changed {
         wander(&mut scenario, &mut random);
-        named += usize::from(sessions.first_named(&mut scenario, &scene)?);
+        named += usize::from(sessions.first_named(&scenario, &scene)?);
     }
     out(Row::exactly(
         format!(
@@ -148,7 +148,7 @@ fn wander(scenario: &mut Scenario, random: &mut fastrand::Rng) {
     scenario.hand.tremor_mm = between(0.0, 0.3);
     scenario.hand.tremor_hz = between(4.0, 12.0) as f32;
     scenario.run.guidance = random.bool();
-    // A bound is for scenarios that are judged.
+    // Messages between ticks.
     scenario.run.parameter_every_ticks = random.bool().then_some(10);
 }
 
@@ -189,10 +189,8 @@ impl Sessions {
     }
 
     /// Whether a replay with another constant names the tick in which two boards that differ in it differ first.
-    fn first_named(&mut self, scenario: &mut Scenario, scene: &PreparedScene) -> Result<bool, LabError> {
+    fn first_named(&mut self, scenario: &Scenario, scene: &PreparedScene) -> Result<bool, LabError> {
         let spec = RigSpec::Simulated { realtime: false };
-        // Constants changed by a message meanwhile would end the difference.
-        scenario.run.parameter_every_ticks = None;
         let (path, ..) = self.record(scenario, scene, &spec)?;
         let other = 1.5e5;
         let mut changed = scenario.clone();
