@@ -44,6 +44,7 @@ mod image;
 mod levels;
 mod local_patch;
 mod made;
+mod meetings;
 mod mix;
 mod nearby;
 mod occupancy;

@@ -7,8 +7,9 @@
 //!
 //! A rule is tested against the exact distance at the corners and half-way between them, and at places on and beside every face, edge and corner in the
 //! cell ([`crate::cell_features`]). Where the surface crosses the cell it is then verified on another lattice, and where one of its surfaces appears to
-//! be the boundary; a place at which it fails joins the tests of the next attempt. All this extends a little beyond the cell: a bound that is zero on
-//! the cell's border, clear of the surface, would be felt there. Cells without a rule are interpolated.
+//! be the boundary, and in any cell where surfaces of the rule meet ([`crate::meetings`]); a place at which it fails joins the tests of the next attempt.
+//! All this extends a little beyond the cell: a bound that is zero on the cell's border, clear of the surface, would be felt there. Cells without a rule
+//! are interpolated.
 
 use glam::DVec3;
 use mortise_protocol::image::{BRICK_CELLS, BRICK_SAMPLES, Group, NO_FACE, Nearby};
@@ -18,6 +19,7 @@ use crate::cell_samples::{ExactSample, Place, about, corner_places};
 use crate::cell_surfaces::CellSurfaces;
 use crate::cover::LocalPatches;
 use crate::distance::{ExactSurface, Scratch};
+use crate::meetings::{Extent, bends, lattice, meetings};
 use crate::rule::{SAME_MM, Test, find_rule, holds, value};
 
 /// Half steps of samples along a brick's edge.
@@ -34,6 +36,9 @@ const VERIFIED: usize = 4;
 const BEYOND: f64 = 0.01;
 /// Most feet of verified points on surfaces of a rule that are tested.
 const MOST_FEET: usize = 24;
+/// Points along a cell's edge at which a rule with sides of edges is compared with the near faces, and most of them that are tested.
+const SUSPECTED: usize = 9;
+const MOST_SUSPECT: usize = 32;
 /// Most patches tried for a free-form face beside the best one.
 const MOST_OTHERS: usize = 4;
 
@@ -257,11 +262,14 @@ impl<'a> CellNearby<'a> {
         };
         for _ in 0..attempts {
             let rule = find_rule(&trial.tests, &trial.surfaces, trial.faces, trial.nearest)?;
-            let failed = if crossed {
+            let mut failed = if crossed {
                 self.failures(at, rule, trial)
             } else {
                 Vec::new()
             };
+            if failed.is_empty() {
+                failed = self.failures_at_meetings(at, rule, trial);
+            }
             if failed.is_empty() {
                 return Some(rule);
             }
@@ -372,6 +380,65 @@ impl<'a> CellNearby<'a> {
         (self.lattice.iter().copied().chain(feet))
             .filter(|place| !holds(rule, &self.test(trial, place), &trial.surfaces))
             .collect()
+    }
+
+    /// Places at which `rule` fails where its surfaces meet, if it leaves out another one or sides take part: beyond the cell too where it is zero, and in
+    /// the cell where it changes from one to another and a face may be nearer.
+    fn failures_at_meetings(&mut self, at: [usize; 3], rule: Nearby, trial: &Trial) -> Vec<Place> {
+        let (Nearby::Convex(group) | Nearby::Reentrant(group)) = rule else {
+            return Vec::new();
+        };
+        let surfaces = self.brick.surfaces;
+        let is_named = |surface: &u16| group.faces().any(|(named, _)| named == *surface);
+        let near = &trial.surfaces[..trial.faces];
+        let (named, omitted): (Vec<u16>, Vec<u16>) = near.iter().partition(|&surface| is_named(surface));
+        // Across sides of edges the rule jumps (or it has a face twice).
+        let has_sides = group.faces().count() > named.len();
+        if omitted.is_empty() && !has_sides {
+            return Vec::new();
+        }
+        let to: Vec<_> = (named.iter())
+            .map(|&surface| move |p: DVec3| surfaces.distance(surface, p))
+            .collect();
+        let to: Vec<&dyn Fn(DVec3) -> f64> = to.iter().map(|to| to as _).collect();
+        let found = |p: DVec3| value(rule, |surface| surfaces.distance(surface, p));
+        let is_zero = |p: &DVec3| found(*p).is_some_and(|found| found.abs() <= SAME_MM);
+        // No point of a face is nearer than its unbounded surface.
+        let may_exceed = |p: &DVec3, faces: &[u16]| {
+            found(*p).is_some_and(|found| {
+                let clear = |surface: &u16| surfaces.distance(*surface, *p).abs() >= found.abs() - SAME_MM;
+                !faces.iter().all(clear)
+            })
+        };
+        let is_bend = |p: &DVec3| {
+            let equal = |found: f64| to.iter().filter(|to| (to(*p) - found).abs() <= SAME_MM).count();
+            found(*p).is_some_and(|found| equal(found) > 1)
+        };
+        let low = self.brick.position(at);
+        let extent = |beyond: f64| Extent {
+            low: low - beyond * self.brick.cell,
+            high: low + (1.0 + beyond) * self.brick.cell,
+        };
+        let mut places: Vec<DVec3> = meetings(extent(BEYOND), &to)
+            .into_iter()
+            .filter(is_zero)
+            .collect();
+        places
+            .extend((bends(extent(0.0), &to).into_iter()).filter(|p| is_bend(p) && may_exceed(p, &omitted)));
+        if has_sides {
+            let suspect = lattice(extent(0.0), SUSPECTED).filter(|p| may_exceed(p, near));
+            let suspect: Vec<DVec3> = suspect.collect();
+            let step = suspect.len().div_ceil(MOST_SUSPECT).max(1);
+            places.extend(suspect.into_iter().step_by(step));
+        }
+        let places: Vec<Place> = (places.into_iter())
+            .map(|p| Place {
+                at: p,
+                exact: self.exact(at, p),
+            })
+            .collect();
+        let fails = |place: &Place| !holds(rule, &self.test(trial, place), &trial.surfaces);
+        places.into_iter().filter(fails).collect()
     }
 
     /// Feet of the lattice in the cell on surfaces of `rule` where the rule is zero: there the boundary must be.
