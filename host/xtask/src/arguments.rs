@@ -27,6 +27,8 @@ pub enum Command {
     Fuzz(Fuzz),
     /// Build the firmware of every board, or of BOARD, and print its flash and RAM use
     Firmware(Firmware),
+    /// Make a Debian package and an archive of the program in target/package
+    Package(Package),
     /// Check that docs name what exists, that files are short, that layers hold and that no modules need each other
     Tidy,
 }
@@ -141,6 +143,13 @@ pub struct Firmware {
     /// One board, or several [default: all of them]
     #[arg(value_name = "BOARD")]
     pub boards: Vec<String>,
+}
+
+/// Arguments of `package`.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct Package {
+    #[command(flatten)]
+    pub installing: Installing,
 }
 
 /// Help of `cargo xtask`, or of its command `name`; `None` if there is no such command.

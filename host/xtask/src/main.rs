@@ -1,4 +1,4 @@
-//! `cargo xtask …`: set-up, demo, tests, figures, firmware and the tidy check.
+//! `cargo xtask …`: set-up, demo, tests, figures, firmware, packages and the tidy check.
 //!
 //! Needs nothing but cargo. Every command starts from the repository's root, whatever the current
 //! directory, and speaks on standard error, so that standard output carries only what a program
@@ -12,6 +12,7 @@ mod firmware;
 mod fuzz;
 mod memory_map;
 mod modules;
+mod package;
 mod peers;
 mod program;
 mod rust_source;
@@ -46,6 +47,7 @@ fn run(command: &Command) -> Result<ExitCode> {
         Command::Peers(arguments) => peers::command(arguments),
         Command::Fuzz(arguments) => fuzz::command(arguments),
         Command::Firmware(arguments) => firmware::command(arguments),
+        Command::Package(arguments) => package::command(arguments),
         Command::Tidy => tidy::command(),
     }
 }

@@ -12,6 +12,7 @@ mod demo;
 mod fit;
 mod inspect;
 mod lab;
+mod manual;
 mod mistyped;
 mod ports;
 mod probe;
@@ -80,6 +81,8 @@ enum Command {
     Rig(rig::Args),
     /// Take an assembly apart and together by instructions in plain words
     Task(task::Args),
+    /// Write manual pages, and completions for bash, fish and zsh, to a folder
+    Manual(manual::Args),
     /// Open the window
     Open(window::Open),
 }
@@ -127,6 +130,7 @@ pub fn main() -> ExitCode {
             Command::Ports(args) => ports::run(&args),
             Command::Rig(args) => rig::run(&args),
             Command::Task(args) => task::run(&args),
+            Command::Manual(args) => manual::run(&args, &Cli::command()),
         },
     };
     program::end(NAME, result)

@@ -78,6 +78,12 @@ impl Missing {
     }
 }
 
+/// Names for apt of a group's packages.
+pub fn apt_names(group: Group) -> Vec<&'static str> {
+    let own = packages::PACKAGES.iter().filter(|package| package.group == group);
+    own.map(|package| package.apt).collect()
+}
+
 /// `cargo xtask setup`: everything that any command needs.
 pub fn command(installing: Installing) -> Result<ExitCode> {
     let done = ensure(&Group::ALL, installing.into())?;

@@ -13,15 +13,24 @@ pub enum Group {
     Window,
     /// Opening a window without a display, and capturing it.
     Screen,
+    /// Making packages of the program.
+    Package,
 }
 
 impl Group {
     /// Every group, in the order of reports.
-    pub const ALL: [Self; 5] = [Self::Build, Self::Checks, Self::Board, Self::Window, Self::Screen];
+    pub const ALL: [Self; 6] = [
+        Self::Build,
+        Self::Checks,
+        Self::Board,
+        Self::Window,
+        Self::Screen,
+        Self::Package,
+    ];
 
-    /// True if this system needs the group: only Linux installs window libraries separately.
+    /// True if this system needs the group: only Linux installs window libraries separately, and packages are made there alone.
     pub fn applies(self) -> bool {
-        cfg!(target_os = "linux") || !matches!(self, Self::Window | Self::Screen)
+        cfg!(target_os = "linux") || !matches!(self, Self::Window | Self::Screen | Self::Package)
     }
 
     /// Purpose in one line, for the user.
@@ -31,6 +40,7 @@ impl Group {
             Self::Checks => "to check sources and dependencies: rustfmt, clippy and cargo-deny",
             Self::Board => "for the emulated board: QEMU, and Rust's target for the microcontroller",
             Self::Window => "to open a window: graphics drivers and input libraries",
+            Self::Package => "to make packages of the program: patchelf and dpkg-dev",
             Self::Screen => {
                 "to test the window without a display: Xvfb, xdotool, ImageMagick, a message bus, a Japanese font"
             }
@@ -119,4 +129,6 @@ pub const PACKAGES: &[Package] = &[
     package(Group::Screen, "xdotool", Sign::Program("xdotool"), "xdotool", "xdotool"),
     package(Group::Screen, "imagemagick", Sign::Program("import"), "ImageMagick", "imagemagick"),
     package(Group::Screen, "fonts-droid-fallback", Sign::Font(JAPANESE), "google-droid-sans-fonts", "noto-fonts-cjk"),
+    package(Group::Package, "patchelf", Sign::Program("patchelf"), "patchelf", "patchelf"),
+    package(Group::Package, "dpkg-dev", Sign::Program("dpkg-shlibdeps"), "dpkg-dev", "dpkg"),
 ];

@@ -45,6 +45,7 @@ const STEPS: &[Step] = &[
     Step { name: "docs", what: "every public item's documentation builds; commands named in pages exist", run: steps::docs },
     Step { name: "figures", what: "figures, the quick form: bounds hold, README and docs say what is measured", run: steps::figures },
     Step { name: "window", what: "the sample insertion moves in the program's window, on a virtual screen", run: window::run },
+    Step { name: "package", what: "packages of the program; the archive runs with its own libraries", run: steps::package },
 ];
 
 /// Runs the steps.
@@ -135,7 +136,10 @@ mod tests {
             names(&["unit", "format", "unit"], None).unwrap(),
             ["format", "unit"]
         );
-        assert_eq!(names(&[], Some("figures")).unwrap(), ["figures", "window"]);
+        assert_eq!(
+            names(&[], Some("figures")).unwrap(),
+            ["figures", "window", "package"]
+        );
         let unknown = names(&["units"], None).unwrap_err().to_string();
         assert!(unknown.contains("there are: format"), "{unknown}");
     }

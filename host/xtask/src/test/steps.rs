@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 
 use super::bench::Bench;
 use super::binaries;
-use crate::{figures, firmware as boards, fuzz, setup, shell, tidy};
+use crate::{figures, firmware as boards, fuzz, package, setup, shell, tidy};
 
 const HIL_TESTS: &str = "mortise-hil-tests";
 const HIL_BENCH: &str = "bench";
@@ -217,6 +217,11 @@ pub fn docs(bench: &mut Bench) -> Result<String> {
 pub fn figures(bench: &mut Bench) -> Result<String> {
     let lab = bench.programs()?.lab;
     figures::step(&bench.root, &lab)
+}
+
+pub fn package(bench: &mut Bench) -> Result<String> {
+    let program = bench.programs()?.mortise;
+    package::step(&bench.root, &program)
 }
 
 /// The system tests run on. Asked for, because a board's own configuration may name another.
