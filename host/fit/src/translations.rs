@@ -8,7 +8,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 use mortise_brep::Surface;
 
-use crate::rotations::{PARALLEL_RAD, axis, shaft_in_bore};
+use crate::rotations::{MOST_PLAY, PARALLEL_RAD, axis, shaft_in_bore};
 use crate::solid::{Solid, Wall};
 
 /// Directions of planes that are combined, clusters of each, and points of each kind returned for a rotation.
@@ -37,6 +37,8 @@ struct Group {
 #[derive(Clone, Copy)]
 struct Cluster {
     value: f64,
+    /// Clearance to either side there, mm.
+    gap: f64,
     rating: f64,
 }
 
@@ -68,7 +70,7 @@ pub(crate) fn translations(moving: &Solid, fixed: &Solid, rotation: DMat3, windo
                 for group in groups.iter().filter(|group| group.m.dot(along).abs() > 0.3) {
                     for cluster in &group.clusters {
                         let by = (cluster.value - tie.at.dot(group.m)) / along.dot(group.m);
-                        points.push((tie.at + by * along, tie.gap));
+                        points.push((tie.at + by * along, tie.gap.max(cluster.gap)));
                     }
                 }
             }
@@ -89,7 +91,8 @@ pub(crate) fn translations(moving: &Solid, fixed: &Solid, rotation: DMat3, windo
                 for x in a.clusters.iter().take(MOST_CLUSTERS) {
                     for y in b.clusters.iter().take(MOST_CLUSTERS) {
                         for z in c.clusters.iter().take(MOST_CLUSTERS) {
-                            points.push((inverse * DVec3::new(x.value, y.value, z.value), 0.0));
+                            let gap = x.gap.max(y.gap).max(z.gap);
+                            points.push((inverse * DVec3::new(x.value, y.value, z.value), gap));
                         }
                     }
                 }
@@ -101,7 +104,7 @@ pub(crate) fn translations(moving: &Solid, fixed: &Solid, rotation: DMat3, windo
             let middle = along.dot(fixed.middle() - rotation * moving.middle());
             for x in a.clusters.iter().take(MOST_CLUSTERS) {
                 for y in b.clusters.iter().take(MOST_CLUSTERS) {
-                    slides.push((inverse * DVec3::new(x.value, y.value, middle), 0.0));
+                    slides.push((inverse * DVec3::new(x.value, y.value, middle), x.gap.max(y.gap)));
                 }
             }
         }
@@ -190,6 +193,7 @@ fn groups(moving: &Solid, fixed: &Solid, rotation: DMat3, window: f64) -> Vec<Gr
             let m = raw[index].0;
             raw[index].1.push(Opposite {
                 value: m.dot(g.origin - rotation * f.origin),
+                own: m.dot(rotation * f.origin),
                 rating: a.area.min(b.area).sqrt(),
                 up: m.dot(g.z) > 0.0,
             });
@@ -204,8 +208,11 @@ fn groups(moving: &Solid, fixed: &Solid, rotation: DMat3, window: f64) -> Vec<Gr
 }
 
 /// Two planes that face each other: the translation along the group's direction at which they touch.
+#[derive(Clone, Copy)]
 struct Opposite {
     value: f64,
+    /// Place of the moving plane along that direction, before the translation.
+    own: f64,
     rating: f64,
     /// Whether the fixed one's outward normal is along the group's direction.
     up: bool,
@@ -237,15 +244,42 @@ fn group(m: DVec3, mut values: Vec<Opposite>, window: f64) -> Group {
         } else {
             ((up_sum + down_sum) / (up + down), up + down)
         };
-        clusters.push(Cluster { value, rating });
+        clusters.push(Cluster {
+            value,
+            gap: 0.0,
+            rating,
+        });
         start = end;
     }
+    clusters.extend(between(&values, window));
     clusters.sort_by(|a, b| b.rating.total_cmp(&a.rating));
     Group {
         m,
         total: clusters.iter().take(3).map(|cluster| cluster.rating).sum(),
         clusters,
     }
+}
+
+/// Values half-way between two planes of the fixed solid that hold two of the moving one from both sides with more play than `window`, as a key has in its
+/// slot: at most [`MOST_PLAY`] of its width.
+fn between(values: &[Opposite], window: f64) -> impl Iterator<Item = Cluster> {
+    let pairs = (values.iter().enumerate()).flat_map(|(i, low)| {
+        // From the lower value a plane keeps the part from going lower, from the higher one from going higher.
+        values[i + 1..].iter().map(move |high| (low, high))
+    });
+    pairs.filter_map(move |(low, high)| {
+        let play = high.value - low.value;
+        let held = low.up && !high.up && play >= window;
+        (held && play < MOST_PLAY * (high.own - low.own).abs()).then(|| {
+            let gap = play / 2.0;
+            Cluster {
+                value: low.value + gap,
+                gap,
+                // A looser fit counts less.
+                rating: 2.0 * (low.rating + high.rating) / (1.0 + gap),
+            }
+        })
+    })
 }
 
 fn ties(moving: &Solid, fixed: &Solid, rotation: DMat3) -> Vec<Tie> {
