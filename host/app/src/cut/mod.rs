@@ -48,6 +48,15 @@ impl SectionView {
         }
     }
 
+    /// Switches it on with a plane for a document, or off.
+    pub fn restore(&mut self, document: &Document, setting: Option<Setting>) {
+        self.on = setting.is_some();
+        if let Some(setting) = setting {
+            self.generation = Some(document.generation);
+            self.setting = setting;
+        }
+    }
+
     /// Lays the plane anew: across an axis through the middle, along a face in it.
     pub fn lay(&mut self, across: Across, extent: Extent, viewer: DVec3) {
         self.setting = Setting::of(across, extent, viewer);

@@ -2,18 +2,24 @@
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use anyhow::{Context as _, ensure};
 use etcetera::BaseStrategy as _;
 use mortise_output::{Existing, Output};
 
-/// Largest file that is read, bytes.
+/// Largest file that is read, bytes: a project of a hundred thousand parts has less.
 pub const MOST_BYTES: u64 = 64 << 20;
+/// Largest number of projects kept; the ones written longest ago go first.
+const MOST_PROJECTS: usize = 200;
+/// Most files of one name that are set aside; the last one is replaced then.
+const MOST_ASIDE: usize = 100;
 /// Ending of a file that is being written.
 const UNFINISHED: &str = "part";
 /// Age from which a file that an interrupted program left is removed.
 const LEFT_OVER: Duration = Duration::from_secs(24 * 3600);
+/// Ending of projects.
+pub const ENDING: &str = "mortise";
 
 /// A folder of files with what is kept.
 #[derive(Clone, Debug)]
@@ -37,6 +43,22 @@ impl StateFolder {
         self.0.join("preferences.json")
     }
 
+    /// The file of the project that is saved by itself for a model with this hash.
+    pub fn project(&self, sha256: &str) -> PathBuf {
+        // A damaged name must not lead out of the folder.
+        let name: String = sha256
+            .chars()
+            .filter(char::is_ascii_alphanumeric)
+            .take(64)
+            .collect();
+        self.0.join("projects").join(name).with_extension(ENDING)
+    }
+
+    /// The folder of the marks of running windows.
+    pub(super) fn marks(&self) -> PathBuf {
+        self.0.join("running")
+    }
+
     /// Writes a file of this folder, all or nothing.
     ///
     /// # Errors
@@ -49,8 +71,11 @@ impl StateFolder {
                 folder.display()
             )
         })?;
+        let is_new = !path.exists();
         Output::new(path, Existing::Replace, &[] as &[PathBuf])?.write(text.as_bytes())?;
-        shrink(folder);
+        if is_new {
+            shrink(folder);
+        }
         Ok(())
     }
 }
@@ -89,33 +114,61 @@ pub fn read(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-/// Removes what interrupted programs left.
+/// Keeps a file that cannot be used under another name, so that nothing is lost; says what was done.
+pub fn set_aside(path: &Path) -> String {
+    let named = |number: usize| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(match number {
+            1 => ".damaged".to_owned(),
+            _ => format!(".damaged-{number}"),
+        });
+        PathBuf::from(name)
+    };
+    let free = (1..MOST_ASIDE).map(named).find(|name| !name.exists());
+    let name = free.unwrap_or_else(|| named(MOST_ASIDE));
+    match std::fs::rename(path, &name) {
+        Ok(()) => format!("the file is kept as {}", name.display()),
+        Err(_) => "the file will be replaced".to_owned(),
+    }
+}
+
+/// Removes the projects written longest ago beyond the most that are kept, and what interrupted programs left.
 fn shrink(folder: &Path) {
     let Ok(files) = std::fs::read_dir(folder) else {
         return;
     };
+    let mut projects: Vec<(SystemTime, PathBuf)> = Vec::new();
     for file in files.flatten() {
         let path = file.path();
-        let written = file.metadata().and_then(|data| data.modified());
-        let is_old = written.is_ok_and(|written| written.elapsed().is_ok_and(|age| age > LEFT_OVER));
-        if is_old && path.extension().is_some_and(|ending| ending == UNFINISHED) {
+        let Ok(written) = file.metadata().and_then(|data| data.modified()) else {
+            continue;
+        };
+        if path.extension().is_some_and(|ending| ending == ENDING) {
+            projects.push((written, path));
+        } else if path.extension().is_some_and(|ending| ending == UNFINISHED)
+            && written.elapsed().is_ok_and(|age| age > LEFT_OVER)
+        {
             // Another window may have removed it.
             let _ = std::fs::remove_file(path);
         }
+    }
+    projects.sort();
+    let beyond = projects.len().saturating_sub(MOST_PROJECTS);
+    for (_, path) in projects.into_iter().take(beyond) {
+        let _ = std::fs::remove_file(path);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::SystemTime;
-
     use super::*;
 
     #[test]
-    fn a_file_comes_back() {
+    fn a_file_comes_back_and_a_project_stays_in_the_folder() {
         let place = tempfile::tempdir().expect("folder");
         let folder = StateFolder::at(place.path().join("state"));
-        let path = folder.preferences();
+        let path = folder.project("../../ab12");
+        assert!(path.starts_with(place.path().join("state/projects")), "{path:?}");
         assert_eq!(read(&path).expect("none yet"), None);
         folder.write(&path, "one").expect("written");
         folder.write(&path, "two").expect("replaced");
@@ -123,16 +176,39 @@ mod tests {
     }
 
     #[test]
+    fn the_projects_written_longest_ago_go_first() {
+        let place = tempfile::tempdir().expect("folder");
+        let folder = StateFolder::at(place.path().to_owned());
+        let name = |n: usize| folder.project(&format!("{n:04}"));
+        for n in 0..MOST_PROJECTS + 5 {
+            folder.write(&name(n), "p").expect("written");
+            let age = Duration::from_secs(10 * (1_000 - n as u64));
+            let file = std::fs::File::options().write(true).open(name(n)).expect("there");
+            file.set_modified(SystemTime::now() - age)
+                .expect("times of files");
+        }
+        let kept = (0..MOST_PROJECTS + 5).filter(|&n| name(n).exists());
+        assert!(kept.eq(5..MOST_PROJECTS + 5));
+    }
+
+    #[test]
     fn what_an_interrupted_program_left_goes_after_a_day() {
         let place = tempfile::tempdir().expect("folder");
         let folder = StateFolder::at(place.path().to_owned());
-        let [old, new] = ["old", "new"].map(|name| place.path().join(name).with_extension(UNFINISHED));
+        folder.write(&folder.project("a"), "p").expect("written");
+        let [old, new] = ["old", "new"].map(|name| {
+            place
+                .path()
+                .join("projects")
+                .join(name)
+                .with_extension(UNFINISHED)
+        });
         for (path, age) in [(&old, 2 * LEFT_OVER), (&new, LEFT_OVER / 2)] {
             let file = std::fs::File::create(path).expect("written");
             file.set_modified(SystemTime::now() - age)
                 .expect("times of files");
         }
-        folder.write(&folder.preferences(), "p").expect("written");
+        folder.write(&folder.project("b"), "p").expect("written");
         assert!(!old.exists() && new.exists());
     }
 

@@ -78,7 +78,14 @@ fn step(session: &mut Session, tour: &Tour) -> Option<Option<Tour>> {
                 ask(session, ToDevice::Disarm);
                 return None;
             }
-            (session.device() == Some(DeviceState::Idle)).then(|| Some(Tour::at(Step::Arm)))
+            if session.device() != Some(DeviceState::Idle) {
+                return None;
+            }
+            if session.document.as_ref()?.is_placed() {
+                // The insertion begins where the file has the parts; a scene with them there is uploaded.
+                session.put_back();
+            }
+            session.scene_is_on_board().then(|| Some(Tour::at(Step::Arm)))
         }
         Step::Arm => {
             if session.device() == Some(DeviceState::Idle) {

@@ -16,6 +16,7 @@ use super::threads::spawn;
 pub fn answer(purpose: Purpose, path: PathBuf, replace: bool) -> Intent {
     match purpose {
         Purpose::OpenModel => Intent::Open(path),
+        Purpose::SaveProject => Intent::WriteProject { path, replace },
         Purpose::SaveTraces => Intent::SaveTraces { path, replace },
     }
 }

@@ -8,12 +8,15 @@ use anyhow::Context as _;
 use glam::DAffine3;
 use mortise_bake::Baked;
 use mortise_brep::{CadModel, LoadOptions, load_step_while};
+use sha2::{Digest as _, Sha256};
 
 use super::insertion::{self, Insertion};
+use super::placed_scene::with_placements;
 use super::tree::{Branch, tree};
 use super::verdict::Watch;
 use crate::display::extent::Extent;
 use crate::display::mesh::{ShapeMesh, shown};
+use crate::kept::project::{PartName, part_names};
 
 /// Colours of parts that have none, sRGB: muted, distinguishable on a dark ground, none of them red (stop) or orange (held part).
 const PALETTE: [[u8; 3]; 8] = [
@@ -48,6 +51,12 @@ pub struct Document {
     pub extent: Extent,
     /// sRGB of each part.
     pub colors: Vec<[u8; 3]>,
+    /// SHA-256 of the files that were read, in hexadecimal digits; empty when it is unknown.
+    pub sha256: String,
+    /// Name of each part in project files.
+    pub names: Vec<PartName>,
+    /// Pose of each part in the scene that is sent to a board, mm: the file's, or where a project puts it.
+    pub placed: Vec<DAffine3>,
     /// Whether each part is hidden.
     pub hidden: Vec<bool>,
     /// Present pose of each part, mm.
@@ -75,7 +84,11 @@ impl Document {
             || path.display().to_string(),
             |n| n.to_string_lossy().into_owned(),
         );
-        Ok(Self::of(model, Some(path.to_owned()), title, generation))
+        let sha256 = sha256_of(&model.files);
+        Ok(Self {
+            sha256,
+            ..Self::of(model, Some(path.to_owned()), title, generation)
+        })
     }
 
     /// Reads the sample that is built into the program.
@@ -86,7 +99,10 @@ impl Document {
         let file = mortise_scenario::sample::File::write().context("the sample could not be unpacked")?;
         let model = load_step_while(file.path(), &LoadOptions::default(), progress)?;
         let title = mortise_scenario::sample::NAME.to_owned();
-        Ok(Self::of(model, None, title, generation))
+        Ok(Self {
+            sha256: digits(Sha256::new_with_prefix(mortise_scenario::sample::STEP)),
+            ..Self::of(model, None, title, generation)
+        })
     }
 
     /// The document of a model.
@@ -106,6 +122,9 @@ impl Document {
             extents,
             extent,
             colors: colors(&model),
+            sha256: String::new(),
+            names: part_names(&model),
+            placed: poses.clone(),
             hidden: vec![false; poses.len()],
             poses,
             insertion,
@@ -115,11 +134,42 @@ impl Document {
         }
     }
 
-    /// Moves every part back to its position in the file.
+    /// Moves every part to where the scene on a board has it.
     pub fn reset_poses(&mut self) {
-        for (pose, part) in self.poses.iter_mut().zip(&self.model.parts) {
-            *pose = part.placement;
+        self.poses.clone_from(&self.placed);
+    }
+
+    /// Puts every part at a pose, mm, also in the scene that is sent to a board.
+    pub fn place(&mut self, poses: Vec<DAffine3>) {
+        if poses.len() == self.placed.len() && poses.iter().all(|pose| pose.is_finite()) {
+            self.extent = extent_of(&self.model, &poses);
+            self.poses.clone_from(&poses);
+            self.placed = poses;
         }
+    }
+
+    /// Poses of the parts in the file, mm.
+    pub fn file_poses(&self) -> Vec<DAffine3> {
+        self.model.parts.iter().map(|part| part.placement).collect()
+    }
+
+    /// Whether the scene that is sent to a board has a part elsewhere than the file.
+    pub fn is_placed(&self) -> bool {
+        let placements = self.model.parts.iter().map(|part| &part.placement);
+        !placements.eq(&self.placed)
+    }
+
+    /// The scene to send to a board, once baked: with the parts where they are placed.
+    pub fn scene(&self) -> Option<Arc<Baked>> {
+        let baked = self.baked.as_ref()?;
+        if !self.is_placed() {
+            return Some(Arc::clone(baked));
+        }
+        let parts = baked.report.parts.iter();
+        let poses = parts.map(|part| self.placed.get(part.model_part).copied());
+        let image = with_placements(&baked.image, &poses.collect::<Option<Vec<_>>>()?)?;
+        let report = baked.report.clone();
+        Some(Arc::new(Baked { image, report }))
     }
 
     /// Name of a part.
@@ -150,6 +200,22 @@ impl Document {
         let reports = &self.baked.as_ref()?.report.parts;
         reports.get(usize::from(scene_part)).map(|r| r.model_part)
     }
+}
+
+/// SHA-256 of the contents of files, one after the other; empty when one cannot be read any more.
+fn sha256_of(files: &[PathBuf]) -> String {
+    let mut sum = Sha256::new();
+    for path in files {
+        let Ok(bytes) = std::fs::read(path) else {
+            return String::new();
+        };
+        sum.update(bytes);
+    }
+    digits(sum)
+}
+
+fn digits(sum: Sha256) -> String {
+    sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Bounding sphere of all parts at their present poses.

@@ -3,38 +3,69 @@
 //! The thread takes the board's samples directly from the link, so that the window's frame rate causes no delay. When it is behind, it
 //! skips all samples but the newest.
 
+use std::collections::BTreeMap;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Weak};
 
+use glam::DAffine3;
 use mortise_brep::CadModel;
 use mortise_guide::{Guide, GuideSettings, List};
+use mortise_mating::recognise::TargetId;
 use mortise_protocol::message::ToDevice;
 use mortise_rig::Client;
 
+use super::fits::FitChoice;
 use super::outbox::{Outbox, Update};
 use super::tap::{GuidanceCommand, Item, Tap};
 use super::threads::spawn;
 
-/// Starts a thread for the scene that is now on the board, with `tap` as its input; the previous thread ends. `parts` maps each part of the scene to a
-/// part of the model. The thread does not keep the connection open: once `client` is gone, its messages are dropped.
-pub fn start(
-    tap: &Tap,
-    model: Arc<CadModel>,
-    parts: Vec<usize>,
-    settings: GuideSettings,
-    client: Weak<Client>,
-    outbox: Outbox,
-    link: u64,
-) {
+/// What guidance starts with.
+pub struct Start {
+    /// The model.
+    pub model: Arc<CadModel>,
+    /// Pose of each part of the model in the scene, mm, if one is not the file's.
+    pub placed: Option<Vec<DAffine3>>,
+    /// For each part of the scene, the part of the model.
+    pub parts: Vec<usize>,
+    /// The user's choices so far.
+    pub fits: BTreeMap<TargetId, FitChoice>,
+    /// How targets are found and sent.
+    pub settings: GuideSettings,
+}
+
+impl Start {
+    /// The model with its parts where the scene has them.
+    fn model(&self) -> Arc<CadModel> {
+        let mut model = Arc::clone(&self.model);
+        if let Some(placed) = &self.placed {
+            let parts = Arc::make_mut(&mut model).parts.iter_mut();
+            for (part, pose) in parts.zip(placed) {
+                part.placement = *pose;
+            }
+        }
+        model
+    }
+}
+
+/// Starts a thread for the scene that is now on the board, with `tap` as its input; the previous thread ends. The thread does not keep the connection open: once `client` is gone, its messages are dropped.
+pub fn start(tap: &Tap, start: Start, client: Weak<Client>, outbox: Outbox, link: u64) {
     let items = tap.open();
     spawn("mortise-guide", move || {
-        let guide = Guide::new(&model, parts, settings);
-        run(guide, &items, &client, &outbox, link);
+        let model = start.model();
+        let guide = Guide::new(&model, start.parts, start.settings);
+        run(guide, start.fits, &items, &client, &outbox, link);
     });
 }
 
 /// Runs until the sender or the window's receiver is dropped.
-fn run(mut guide: Guide<'_>, items: &Receiver<Item>, client: &Weak<Client>, outbox: &Outbox, link: u64) {
+fn run(
+    mut guide: Guide<'_>,
+    mut fits: BTreeMap<TargetId, FitChoice>,
+    items: &Receiver<Item>,
+    client: &Weak<Client>,
+    outbox: &Outbox,
+    link: u64,
+) {
     let mut last = List::default();
     while let Ok(first) = items.recv() {
         let mut newest = None;
@@ -45,7 +76,10 @@ fn run(mut guide: Guide<'_>, items: &Receiver<Item>, client: &Weak<Client>, outb
             }
         }
         let Some(sample) = newest else { continue };
-        for message in guide.hear(&sample) {
+        let messages = guide.hear(&sample);
+        // An earlier choice applies as soon as its target is in the list; from then on the guide knows it.
+        fits.retain(|id, choice| !choose(&mut guide, *id, *choice));
+        for message in messages {
             send(&mut guide, client, message);
         }
         let list = guide.list();
@@ -60,6 +94,12 @@ fn run(mut guide: Guide<'_>, items: &Receiver<Item>, client: &Weak<Client>, outb
             last = list;
         }
     }
+}
+
+/// Applies a choice; `false` while there is no such target.
+fn choose(guide: &mut Guide<'_>, id: TargetId, choice: FitChoice) -> bool {
+    let recogniser = guide.recogniser();
+    recogniser.pin(id, choice.pinned) && recogniser.switch_off(id, choice.off)
 }
 
 fn apply(guide: &mut Guide<'_>, command: GuidanceCommand) {

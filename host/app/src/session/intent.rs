@@ -80,6 +80,15 @@ pub enum Intent {
     GuideWhen(When),
     /// Set the largest guidance force, N.
     GuideCap(f32),
+    /// Ask where to write the project.
+    SaveProject,
+    /// Write the project.
+    WriteProject {
+        /// File to write.
+        path: PathBuf,
+        /// Whether an existing file may be replaced.
+        replace: bool,
+    },
     /// Take a file out of the list of recent ones.
     ForgetRecent(PathBuf),
     /// Keep whether a section of the window is open.
@@ -124,6 +133,8 @@ impl Intent {
                 | Self::SwitchTargetOff(..)
                 | Self::GuideWhen(_)
                 | Self::GuideCap(_)
+                | Self::SaveProject
+                | Self::WriteProject { .. }
                 | Self::ForgetRecent(_)
                 | Self::Fold { .. }
                 | Self::ExportTraces(_)
@@ -223,6 +234,14 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             Some(_) => no("No part is held"),
         },
         Intent::ResetScene => match session.device() {
+            // Without a board the parts are where the window has them.
+            None if session
+                .document
+                .as_ref()
+                .is_some_and(|d| d.poses != d.file_poses()) =>
+            {
+                None
+            }
             None => no(NO_RIG),
             Some(_) if armed => no("Only while the motors are off: disarm first"),
             Some(_) if !session.scene_is_on_board() => no("The collision model is not on the board"),
@@ -238,6 +257,9 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
                 Some(_) if !listed => no("This target is no longer in the list"),
                 Some(_) => None,
             }
+        }
+        Intent::SaveProject | Intent::WriteProject { .. } => {
+            session.document.is_none().then(|| NO_FILE.to_owned())
         }
         Intent::ExportTraces(traces) if traces.keys.is_empty() => no("No signal is chosen"),
         Intent::ExportTraces(_) => session

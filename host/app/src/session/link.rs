@@ -3,6 +3,7 @@
 //! One thread connects and then executes commands one after another; another forwards the board's events. STOP bypasses both: the caller of
 //! [`Connection::stop`] writes it, even during an upload.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,11 +14,13 @@ use std::time::{Duration, Instant};
 
 use mortise_bake::Baked;
 use mortise_guide::GuideSettings;
+use mortise_mating::recognise::TargetId;
 use mortise_protocol::message::{Capabilities, DeviceState, HandScript, Statistics, ToDevice};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{Client, Event, RigError, RigSpec, UploadProgress};
 
 use super::document::Document;
+use super::fits::FitChoice;
 use super::guidance;
 use super::outbox::{LinkUpdate, Outbox, Update};
 use super::recording::Recorded;
@@ -390,14 +393,24 @@ impl Connection {
     }
 
     /// Starts guidance in the scene that is now on the board.
-    pub fn guide(&self, document: &Document, settings: GuideSettings, outbox: &Outbox) {
+    pub fn guide(
+        &self,
+        document: &Document,
+        settings: GuideSettings,
+        fits: &BTreeMap<TargetId, FitChoice>,
+        outbox: &Outbox,
+    ) {
         let Some(baked) = &document.baked else { return };
         let parts = baked.report.parts.iter().map(|part| part.model_part).collect();
         guidance::start(
             &self.tap,
-            Arc::clone(&document.model),
-            parts,
-            settings,
+            guidance::Start {
+                model: Arc::clone(&document.model),
+                placed: document.is_placed().then(|| document.placed.clone()),
+                parts,
+                fits: fits.clone(),
+                settings,
+            },
             Arc::downgrade(&self.client),
             outbox.clone(),
             self.id,

@@ -13,7 +13,10 @@ use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 use super::document::Document;
 use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
+use super::saved::Saved;
 use super::tap::Tap;
+use crate::kept::Mark;
+use crate::kept::project::Project;
 
 /// Capacity of the window's queue; a sender blocks when it is full.
 const MAX_WAITING: usize = 1024;
@@ -25,7 +28,7 @@ pub enum Update {
         /// Id of the file.
         generation: u64,
         /// The document, or one line with the reason of the failure.
-        result: Result<Box<Document>, String>,
+        result: Result<Box<Imported>, String>,
     },
     /// Progress of reading or baking.
     Working {
@@ -65,8 +68,38 @@ pub enum Update {
     NoDialog(Purpose),
     /// Recent files that are missing.
     Missing(Vec<PathBuf>),
+    /// Looking for the marks of other windows ended.
+    Marked {
+        /// Models that were open in programs that were ended by force.
+        models: Vec<PathBuf>,
+        /// The mark of this window.
+        mark: Option<Mark>,
+    },
+    /// Reading a project file ended.
+    ProjectRead {
+        /// The file.
+        path: PathBuf,
+        /// The project, or one line with the reason of the failure.
+        result: Result<ProjectFile, String>,
+    },
     /// A file was written, or one line with the reason why not.
     Written(Result<String, String>),
+}
+
+/// A project that was read.
+pub struct ProjectFile {
+    /// Its contents.
+    pub project: Box<Project>,
+    /// STEP file of its model; `None`: the sample.
+    pub model: Option<PathBuf>,
+}
+
+/// A file that was read.
+pub struct Imported {
+    /// The document.
+    pub document: Document,
+    /// What saved itself for it.
+    pub saved: Saved,
 }
 
 /// A baked model.

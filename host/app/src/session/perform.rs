@@ -13,6 +13,7 @@ use mortise_rig::{EmulatedMode, RigSpec};
 use super::intent::Intent;
 use super::link::{self, Link};
 use super::notes::Severity;
+use super::project_file::is_project;
 use super::purpose::Purpose;
 use super::state::{GUIDE_CAP_N, Job, Session};
 use super::tap::GuidanceCommand;
@@ -26,6 +27,7 @@ impl Session {
     pub(super) fn perform(&mut self, intent: Intent) {
         match intent {
             Intent::Browse => self.ask_for_path(Purpose::OpenModel),
+            Intent::Open(path) if is_project(&path) => self.read_project(path),
             Intent::Open(path) => self.open(Some(path)),
             Intent::OpenSample => self.open(None),
             Intent::Bake => self.bake(),
@@ -68,7 +70,7 @@ impl Session {
             Intent::ShowAll => self.show_all(),
             Intent::Grab(part) => self.grab(part),
             Intent::Release => self.request(ToDevice::Release),
-            Intent::ResetScene => self.request(ToDevice::ResetScene),
+            Intent::ResetScene => self.put_back(),
             Intent::SetParameter(id, value) => self.set_parameter(id, value),
             Intent::ResetParameters => {
                 for row in PARAMETERS {
@@ -77,8 +79,14 @@ impl Session {
                     }
                 }
             }
-            Intent::PinTarget(id, pinned) => self.command_guidance(GuidanceCommand::Pin(id, pinned)),
-            Intent::SwitchTargetOff(id, off) => self.command_guidance(GuidanceCommand::SwitchOff(id, off)),
+            Intent::PinTarget(id, pinned) => {
+                self.fits.entry(id).or_default().pinned = pinned;
+                self.command_guidance(GuidanceCommand::Pin(id, pinned));
+            }
+            Intent::SwitchTargetOff(id, off) => {
+                self.fits.entry(id).or_default().off = off;
+                self.command_guidance(GuidanceCommand::SwitchOff(id, off));
+            }
             Intent::GuideWhen(when) => {
                 self.guide.when = when;
                 self.command_guidance(GuidanceCommand::Set(self.guide));
@@ -89,6 +97,8 @@ impl Session {
                     self.command_guidance(GuidanceCommand::Set(self.guide));
                 }
             }
+            Intent::SaveProject => self.ask_for_path(Purpose::SaveProject),
+            Intent::WriteProject { path, replace } => self.write_project(path, replace),
             Intent::ForgetRecent(path) => self.preferences.recent.forget(&path),
             Intent::Fold { section, open } => _ = self.preferences.open.insert(section.to_owned(), open),
             Intent::ExportTraces(traces) => self.export(&traces),
@@ -100,7 +110,7 @@ impl Session {
         }
     }
 
-    fn open(&mut self, path: Option<PathBuf>) {
+    pub(super) fn open(&mut self, path: Option<PathBuf>) {
         self.generation += 1;
         let name = path
             .as_ref()
@@ -108,7 +118,8 @@ impl Session {
             .map_or_else(|| "the sample".to_owned(), |n| n.to_string_lossy().into_owned());
         let limit = Duration::from_secs(mortise_brep::LoadOptions::default().time_limit_s);
         let cancel = self.start_job(format!("Reading {name}"), self.generation, Some(limit));
-        work::import(&self.outbox, path, self.generation, cancel);
+        let folder = self.keeper.folder.clone();
+        work::import(&self.outbox, path, self.generation, folder, cancel);
     }
 
     pub(super) fn bake(&mut self) {
@@ -209,7 +220,7 @@ impl Session {
         self.guidance = List::default();
         self.guide.sending = self.guides();
         if let (Some(connection), Some(document)) = (self.connection(), &self.document) {
-            connection.guide(document, self.guide, &self.outbox);
+            connection.guide(document, self.guide, &self.fits, &self.outbox);
         }
     }
 
@@ -222,11 +233,11 @@ impl Session {
 
     pub(super) fn upload(&mut self) {
         let Some(document) = &self.document else { return };
-        let (Some(baked), generation) = (document.baked.clone(), document.generation) else {
+        let (Some(scene), generation) = (document.scene(), document.generation) else {
             return;
         };
         if let Some(connection) = self.connection_mut() {
-            connection.send_scene(baked, generation);
+            connection.send_scene(scene, generation);
         }
     }
 
@@ -255,7 +266,7 @@ impl Session {
         self.request(ToDevice::Grab { part: scene_part });
     }
 
-    fn set_parameter(&mut self, id: ParameterId, value: f32) {
+    pub(super) fn set_parameter(&mut self, id: ParameterId, value: f32) {
         let row = id.row();
         let value = if value.is_finite() {
             value.clamp(row.min, row.max)
@@ -265,12 +276,33 @@ impl Session {
         if let Some(known) = self.parameters.get_mut(id as usize) {
             *known = value;
         }
+        self.own_parameters.insert(id as usize, value);
         if let Some(connection) = self.connection_mut() {
             connection.set_parameter(id, value);
         }
         if id == ParameterId::Guidance {
             self.guide.sending = self.guides();
             self.command_guidance(GuidanceCommand::Set(self.guide));
+        }
+    }
+
+    /// Sends the parameters that the user has set to a board that has others, and says which.
+    pub(super) fn send_own_parameters(&mut self) {
+        let differs = |id: ParameterId| {
+            let own = self.own_parameters.get(&(id as usize)).copied();
+            own.filter(|own| self.parameters[id as usize] != *own)
+        };
+        let sent: Vec<(&str, ParameterId, f32)> = (PARAMETERS.iter())
+            .filter_map(|row| Some((row.name, row.id, differs(row.id)?)))
+            .collect();
+        if sent.is_empty() {
+            return;
+        }
+        let names: Vec<&str> = sent.iter().map(|(name, ..)| *name).collect();
+        let text = format!("Set on the board as before: {}", names.join(", "));
+        self.notes.add(Severity::Info, text);
+        for (_, id, value) in sent {
+            self.set_parameter(id, value);
         }
     }
 

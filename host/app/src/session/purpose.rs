@@ -3,24 +3,27 @@
 /// What a path is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// A STEP file to open.
+    /// A STEP file or a project to open.
     OpenModel,
     /// The file for a table of traces.
     SaveTraces,
+    /// The file for a project.
+    SaveProject,
 }
 
 impl Purpose {
     /// Title of the question.
     pub fn title(self) -> &'static str {
         match self {
-            Self::OpenModel => "Open STEP file",
+            Self::OpenModel => "Open STEP file or project",
+            Self::SaveProject => "Save project as",
             Self::SaveTraces => "Export traces as CSV",
         }
     }
 
     /// Whether the file is written.
     pub fn is_saved(self) -> bool {
-        matches!(self, Self::SaveTraces)
+        !matches!(self, Self::OpenModel)
     }
 
     /// An example of a path.
@@ -28,6 +31,7 @@ impl Purpose {
         match self {
             Self::OpenModel => "/folder/assembly.step",
             Self::SaveTraces => "/folder/traces.csv",
+            Self::SaveProject => "/folder/assembly.mortise",
         }
     }
 
@@ -36,14 +40,19 @@ impl Purpose {
         match self {
             Self::OpenModel => "",
             Self::SaveTraces => "traces.csv",
+            Self::SaveProject => "assembly.mortise",
         }
     }
 
     /// Name and endings of the files.
     pub fn filter(self) -> (&'static str, &'static [&'static str]) {
         match self {
-            Self::OpenModel => ("STEP", &["step", "stp", "STEP", "STP", "p21"]),
+            Self::OpenModel => (
+                "STEP files and projects",
+                &["step", "stp", "STEP", "STP", "p21", "mortise"],
+            ),
             Self::SaveTraces => ("CSV", &["csv"]),
+            Self::SaveProject => ("Mortise projects", &["mortise"]),
         }
     }
 }

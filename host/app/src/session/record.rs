@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use etcetera::BaseStrategy as _;
 
+use super::document::Document;
 use super::link::Command;
 use super::notes::Severity;
 use super::recording::{Recording, RecordingUpdate};
@@ -24,7 +25,7 @@ impl Session {
             Err(why) => return self.notes.add(Severity::Error, why),
         };
         let on_board = self.scene_is_on_board();
-        let scene = (self.document.as_ref().filter(|_| on_board)).and_then(|document| document.baked.clone());
+        let scene = (self.document.as_ref().filter(|_| on_board)).and_then(Document::scene);
         if let Some(connection) = self.connection() {
             connection.command(Command::Record { folder, scene });
         }

@@ -1,5 +1,6 @@
 //! The window's state, and what follows from it without a change.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,11 +10,13 @@ use std::time::{Duration, Instant};
 use glam::DAffine3;
 use mortise_bake::Method;
 use mortise_guide::{GuideSettings, List};
+use mortise_mating::recognise::TargetId;
 use mortise_protocol::message::{DeviceState, Telemetry};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{RigEntry, RigSpec};
 
 use super::document::Document;
+use super::fits::FitChoice;
 use super::history::History;
 use super::keeper::Keeper;
 use super::link::{Connection, Link};
@@ -27,6 +30,8 @@ use super::verdict::Verdict;
 use super::{pose, work};
 use crate::folder_cache::FolderCache;
 use crate::kept::Preferences;
+use crate::kept::project::Project;
+use crate::kept::view::KeptView;
 
 /// Range of the guidance force limit, N: from barely perceptible to well below the coupling's limit.
 pub const GUIDE_CAP_N: RangeInclusive<f32> = 0.2..=8.0;
@@ -44,6 +49,15 @@ pub struct Job {
     pub limit: Option<Duration>,
     pub(super) generation: u64,
     pub(super) cancel: Cancel,
+}
+
+/// What a project has the window show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Looks {
+    /// Keys of the signals in the plots; `None`: as they are.
+    pub signals: Option<Vec<String>>,
+    /// Camera and section; `None`: as after opening.
+    pub view: Option<KeptView>,
 }
 
 /// A link that was lost.
@@ -101,7 +115,17 @@ pub struct Session {
     pub preferences: Preferences,
     /// Recent files that are missing.
     pub missing: Vec<PathBuf>,
+    /// How the window shows the open document; the window writes it.
+    pub view: Option<KeptView>,
+    /// What the window is to show, by a project that was applied; the window takes it.
+    pub looks: Option<Looks>,
+    /// The user's choices of fits.
+    pub fits: BTreeMap<TargetId, FitChoice>,
+    /// Parameters that the user has set, by their place in [`PARAMETERS`]: every board gets them.
+    pub(super) own_parameters: BTreeMap<usize, f32>,
     pub(super) keeper: Keeper,
+    /// The project that the user opened, and its file: for the document of this number.
+    pub(super) pending_project: Option<(u64, Box<Project>, PathBuf)>,
     pub(super) tour: Option<Tour>,
     /// Held part, and its pose in the handle's frame when it was grabbed.
     pub(super) held: Option<(usize, DAffine3)>,
@@ -140,7 +164,12 @@ impl Session {
             cache: None,
             preferences: Preferences::default(),
             missing: Vec::new(),
+            view: None,
+            looks: None,
+            fits: BTreeMap::new(),
+            own_parameters: BTreeMap::new(),
             keeper: Keeper::default(),
+            pending_project: None,
             tour: None,
             held: None,
             outbox,

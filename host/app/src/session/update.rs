@@ -14,7 +14,7 @@ use super::insertion::Wall;
 use super::intent::Intent;
 use super::link::{Command, Connection, Link};
 use super::notes::Severity;
-use super::outbox::{CollisionModel, LinkUpdate, Update};
+use super::outbox::{CollisionModel, Imported, LinkUpdate, Update};
 use super::pose;
 use super::state::{Lost, Session};
 use super::tap::{GuidanceCommand, Tap};
@@ -30,9 +30,10 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         Update::Imported { generation, result } if is_awaited(session, generation) => {
             session.job = None;
             match result {
-                Ok(document) => opened(session, *document),
+                Ok(imported) => opened(session, *imported),
                 Err(why) => {
                     session.tour = None;
+                    session.pending_project = None;
                     session.check_recent();
                     session.notes.add(Severity::Error, why);
                 }
@@ -82,6 +83,8 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
         Update::Chosen(purpose, path) => return Some(answer(purpose, path, true)),
         Update::NoDialog(purpose) => session.wants_path = Some(purpose),
         Update::Missing(missing) => session.missing = missing,
+        Update::Marked { models, mark } => session.marked(models, mark),
+        Update::ProjectRead { path, result } => session.project_read(path, result),
         Update::Written(Ok(done)) => session.notes.add(Severity::Good, done),
         Update::Written(Err(why)) => session.notes.add(Severity::Error, why),
     }
@@ -95,7 +98,8 @@ fn is_awaited(session: &Session, generation: u64) -> bool {
         .is_some_and(|job| job.generation == generation)
 }
 
-fn opened(session: &mut Session, document: Document) {
+fn opened(session: &mut Session, Imported { document, saved }: Imported) {
+    session.note_project();
     let parts = document.model.parts.len();
     session.notes.add(
         Severity::Good,
@@ -112,8 +116,9 @@ fn opened(session: &mut Session, document: Document) {
     session.selected = None;
     session.verdict = None;
     session.document = Some(document);
+    session.view = None;
     session.clear_board();
-    session.remember_file();
+    session.restore(saved);
     session.bake();
 }
 
@@ -207,6 +212,7 @@ fn connected(session: &mut Session, client: Arc<Client>, parameters: Vec<(Parame
     }
     let capacity = u64::from(connection.capabilities.scene_capacity);
     session.link = Link::Connected(Box::new(connection));
+    session.send_own_parameters();
     session.history.interrupt();
     let too_large = (session.document.as_ref())
         .and_then(|d| d.baked.as_ref())

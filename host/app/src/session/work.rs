@@ -12,9 +12,11 @@ use mortise_bake::{
 use mortise_brep::CadModel;
 
 use super::document::Document;
-use super::outbox::{CollisionModel, Outbox, Update};
+use super::outbox::{CollisionModel, Imported, Outbox, Update};
+use super::saved::Saved;
 use super::threads::{Cancel, spawn};
 use crate::folder_cache::FolderCache;
+use crate::kept::StateFolder;
 
 /// What a bake is to give.
 #[derive(Clone, Debug)]
@@ -64,8 +66,14 @@ impl<'a> Reports<'a> {
     }
 }
 
-/// Reads a file (`None`: the sample). When cancelled, the reading process ends without a report.
-pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64, cancel: Cancel) {
+/// Reads a file (`None`: the sample), and what saved itself for it in `folder`. When cancelled, the reading process ends without a report.
+pub fn import(
+    outbox: &Outbox,
+    path: Option<PathBuf>,
+    generation: u64,
+    folder: Option<StateFolder>,
+    cancel: Cancel,
+) {
     let outbox = outbox.clone();
     spawn("mortise-import", move || {
         let reports = Reports::new(&outbox, generation, &cancel);
@@ -77,7 +85,12 @@ pub fn import(outbox: &Outbox, path: Option<PathBuf>, generation: u64, cancel: C
         if cancel.is_set() {
             return;
         }
-        let result = read.map(Box::new).map_err(|error| format!("{error:#}"));
+        let imported = read.map(|document| {
+            let saved = folder.as_ref().map(|folder| Saved::of(folder, &document));
+            let saved = saved.unwrap_or(Saved::None);
+            Box::new(Imported { document, saved })
+        });
+        let result = imported.map_err(|error| format!("{error:#}"));
         outbox.send(Update::Imported { generation, result });
     });
 }

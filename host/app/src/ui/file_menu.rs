@@ -1,8 +1,8 @@
-//! The menu beside *Open…*: the files opened last.
+//! The menu beside *Open…*: the project, and the files opened last.
 
 use egui::{Button, Shape, Stroke, Ui, Vec2};
 
-use super::{recent, theme};
+use super::{control, recent, theme};
 use crate::session::{Intent, Session};
 
 /// Draws the button that opens the menu.
@@ -11,6 +11,12 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f3
     let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
         ui.set_min_width(240.0);
         ui.set_max_width(460.0);
+        let save = Button::new("Save project as…").frame(false);
+        let hint = "Write placements, hidden parts, choices of fits, settings, signals and the rig to a file. They also save themselves, and come back when the model is opened again";
+        if control::intent_button(ui, session, wanted, save, Intent::SaveProject, hint).clicked() {
+            ui.close();
+        }
+        control::divider(ui);
         recent::in_menu(ui, session, wanted);
     });
     // An arrow that points down; the fonts have none.

@@ -97,7 +97,7 @@ fn file(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>, height: f32) {
         ui.add_space(4.0);
     }
     let open = egui::Button::new("Open…").min_size(Vec2::new(72.0, height));
-    let hint = "Open a STEP file (Ctrl+O)";
+    let hint = "Open a STEP file or a project (Ctrl+O)";
     control::intent_button(ui, session, wanted, open, Intent::Browse, hint);
     if ui.available_width() > 40.0 {
         file_menu::show(ui, session, wanted, height);

@@ -105,6 +105,18 @@ impl Window {
 
     /// Keeps what has changed for the next start.
     fn keep(&mut self, ctx: &egui::Context) {
+        let session = &mut self.session;
+        if let (Some(looks), Some(document)) = (session.looks.take(), &session.document) {
+            if let Some(signals) = looks.signals {
+                self.plots.choose(signals);
+            }
+            if let Some(view) = &looks.view {
+                self.view.restore(view, document);
+            }
+        }
+        if let Some(document) = &session.document {
+            session.view = self.view.kept(document).or(session.view.take());
+        }
         let keys = self.plots.keys();
         let preferences = &mut self.session.preferences;
         let changed = match &preferences.signals {

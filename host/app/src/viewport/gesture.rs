@@ -42,9 +42,10 @@ pub struct Viewpoint {
     pub section: SectionView,
     /// What was clicked last, in the open document.
     pub picked: Option<Pick>,
-    goal: Option<Camera>,
+    pub(super) goal: Option<Camera>,
     drag: Option<Drag>,
-    seen: Option<u64>,
+    /// Document at which the camera looks.
+    pub(super) seen: Option<u64>,
 }
 
 fn ndc(rect: Rect, at: Pos2) -> DVec2 {

@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod compose;
 pub mod gesture;
+mod kept;
 pub mod pick;
 pub mod picture;
 mod pipelines;

@@ -1,0 +1,40 @@
+//! Parts put to poses by the window: in the document, and in the scene that a board has.
+
+use glam::DAffine3;
+use mortise_protocol::message::ToDevice;
+
+use super::state::Session;
+
+impl Session {
+    /// Puts every part of the document at a pose, mm. A board gets the scene anew, with its parts there; its motors must be off.
+    pub(super) fn place(&mut self, poses: Vec<DAffine3>) {
+        let Some(document) = &mut self.document else {
+            return;
+        };
+        let before = document.placed.clone();
+        document.place(poses);
+        if document.placed == before {
+            return;
+        }
+        self.verdict = None;
+        if let Some(connection) = self.connection_mut() {
+            connection.scene_of = None;
+            connection.refused_scene_of = None;
+        }
+    }
+
+    /// Moves every part back to its position in the file.
+    pub(super) fn put_back(&mut self) {
+        let Some(document) = &mut self.document else {
+            return;
+        };
+        if document.is_placed() {
+            let poses = document.file_poses();
+            self.place(poses);
+        } else if let Some(connection) = self.connection() {
+            connection.request(ToDevice::ResetScene);
+        } else if let Some(document) = &mut self.document {
+            document.reset_poses();
+        }
+    }
+}
