@@ -6,6 +6,7 @@
 mod act;
 mod advance;
 pub mod ask;
+pub mod clearances;
 pub mod document;
 pub mod guidance;
 pub mod history;

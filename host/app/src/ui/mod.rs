@@ -5,6 +5,7 @@ pub mod app;
 mod appearance;
 mod arrange;
 mod cards;
+mod clearances;
 mod control;
 mod drop;
 mod eye;
@@ -58,6 +59,7 @@ pub struct Window {
     search: String,
     /// What the plots show.
     pub plots: plots::View,
+    clearances: clearances::Clearances,
 }
 
 impl Window {
@@ -74,12 +76,14 @@ impl Window {
             tab: arrange::Tab::default(),
             search: String::new(),
             plots,
+            clearances: clearances::Clearances::default(),
         }
     }
 
     /// Draws one frame. `surface` draws the 3D view where there is a graphics device.
     pub fn show(&mut self, ui: &mut Ui, surface: Option<&mut Surface>) {
         self.session.poll();
+        self.clearances.poll();
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
         shortcuts(ui, &self.session, &mut wanted);
@@ -147,7 +151,14 @@ impl Window {
             .default_size(248.0)
             .size_range(180.0..=420.0)
             .frame(theme::panel(theme::of(ui)))
-            .show(ui, |ui| parts::show(ui, session, &mut self.search, wanted));
+            .show(ui, |ui| {
+                below(ui, &mut self.clearances, session, &mut self.view);
+                egui::CentralPanel::default()
+                    .frame(egui::Frame::NONE)
+                    .show(ui, |ui| {
+                        parts::show(ui, session, &self.view.marked.parts, &mut self.search, wanted)
+                    });
+            });
         egui::Panel::right("rig")
             .exact_size(336.0)
             .resizable(false)
@@ -197,7 +208,10 @@ impl Window {
         match self.tab {
             arrange::Tab::View => {}
             arrange::Tab::Rig => rig::show(ui, session, wanted),
-            arrange::Tab::Parts => parts::show(ui, session, &mut self.search, wanted),
+            arrange::Tab::Parts => {
+                below(ui, &mut self.clearances, session, &mut self.view);
+                parts::show(ui, session, &self.view.marked.parts, &mut self.search, wanted);
+            }
             arrange::Tab::Messages => messages::show(ui, session),
             arrange::Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),
         }
@@ -215,6 +229,14 @@ impl Window {
                 cards::show(ui, rect, session, wanted);
             });
     }
+}
+
+/// Draws the list of clearances at the lower end of the panel of parts.
+fn below(ui: &mut Ui, list: &mut clearances::Clearances, session: &Session, view: &mut Viewpoint) {
+    egui::Panel::bottom("clearances")
+        .resizable(false)
+        .frame(egui::Frame::NONE)
+        .show(ui, |ui| list.show(ui, session, view));
 }
 
 fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {
