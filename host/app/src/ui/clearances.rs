@@ -21,6 +21,8 @@ pub struct Clearances {
     search: Search,
     /// Largest gap searched for, µm.
     within_um: f64,
+    /// Height of the list in the last frame, points.
+    pub height: f32,
 }
 
 impl Default for Clearances {
@@ -28,6 +30,7 @@ impl Default for Clearances {
         Self {
             search: Search::default(),
             within_um: 1000.0,
+            height: 0.0,
         }
     }
 }
@@ -71,6 +74,7 @@ impl Clearances {
             .id_salt("clearances")
             .auto_shrink([false, true])
             .max_height(LIST_HEIGHT)
+            .min_scrolled_height(LIST_HEIGHT)
             .show(ui, |ui| {
                 ui.spacing_mut().item_spacing.y = 2.0;
                 for pair in &pairs {

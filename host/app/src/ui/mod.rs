@@ -11,6 +11,7 @@ mod drop;
 mod eye;
 mod file_menu;
 pub mod fonts;
+mod gaps;
 mod guidance;
 mod header;
 mod messages;
@@ -233,10 +234,11 @@ impl Window {
 
 /// Draws the list of clearances at the lower end of the panel of parts.
 fn below(ui: &mut Ui, list: &mut clearances::Clearances, session: &Session, view: &mut Viewpoint) {
-    egui::Panel::bottom("clearances")
+    let drawn = egui::Panel::bottom("clearances")
         .resizable(false)
         .frame(egui::Frame::NONE)
         .show(ui, |ui| list.show(ui, session, view));
+    control::settle(ui, drawn.response.rect.height(), &mut list.height);
 }
 
 fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {

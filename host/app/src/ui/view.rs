@@ -7,7 +7,7 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, section, theme};
+use super::{control, gaps, section, theme};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
@@ -63,6 +63,7 @@ pub fn show(
         }
     }
     touching(ui, rect, session, view);
+    gaps::show(ui, rect, document, view);
     marked(ui, rect, view);
     triad(ui, rect, view);
     let below = toolbar(ui, rect, session, view);
