@@ -44,7 +44,7 @@ pub struct Document {
     pub meshes: Arc<Vec<ShapeMesh>>,
     /// A bounding sphere of each shape, in the shape's frame.
     pub extents: Vec<Extent>,
-    /// Bounding sphere of all parts as opened.
+    /// Bounding sphere of all parts as opened, or as the last instruction placed them.
     pub extent: Extent,
     /// sRGB of each part.
     pub colors: Vec<[u8; 3]>,
@@ -120,6 +120,12 @@ impl Document {
         for (pose, part) in self.poses.iter_mut().zip(&self.model.parts) {
             *pose = part.placement;
         }
+    }
+
+    /// Places every part, and makes the bounding sphere that of all parts there.
+    pub fn place(&mut self, poses: Vec<DAffine3>) {
+        self.poses = poses;
+        self.extent = extent_of(&self.model, &self.poses);
     }
 
     /// Name of a part.

@@ -11,6 +11,8 @@ pub mod document;
 pub mod guidance;
 pub mod history;
 pub mod insertion;
+mod instruct;
+pub mod instructions;
 pub mod intent;
 mod keeper;
 mod keeping;

@@ -15,6 +15,7 @@ use mortise_rig::{RigEntry, RigSpec};
 
 use super::document::Document;
 use super::history::History;
+use super::instructions::Instructions;
 use super::keeper::Keeper;
 use super::link::{Connection, Link};
 use super::notes::Notes;
@@ -101,6 +102,8 @@ pub struct Session {
     pub preferences: Preferences,
     /// Recent files that are missing.
     pub missing: Vec<PathBuf>,
+    /// Instructions in plain words.
+    pub instructions: Instructions,
     pub(super) keeper: Keeper,
     pub(super) tour: Option<Tour>,
     /// Held part, and its pose in the handle's frame when it was grabbed.
@@ -140,6 +143,7 @@ impl Session {
             cache: None,
             preferences: Preferences::default(),
             missing: Vec::new(),
+            instructions: Instructions::default(),
             keeper: Keeper::default(),
             tour: None,
             held: None,

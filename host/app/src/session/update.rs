@@ -111,6 +111,7 @@ fn opened(session: &mut Session, document: Document) {
     }
     session.selected = None;
     session.verdict = None;
+    session.instructions.end();
     session.document = Some(document);
     session.clear_board();
     session.remember_file();

@@ -6,6 +6,7 @@ mod appearance;
 mod arrange;
 mod cards;
 mod clearances;
+mod command;
 mod control;
 mod drop;
 mod eye;
@@ -61,6 +62,7 @@ pub struct Window {
     /// What the plots show.
     pub plots: plots::View,
     clearances: clearances::Clearances,
+    command: command::CommandLine,
 }
 
 impl Window {
@@ -78,6 +80,7 @@ impl Window {
             search: String::new(),
             plots,
             clearances: clearances::Clearances::default(),
+            command: command::CommandLine::default(),
         }
     }
 
@@ -87,15 +90,19 @@ impl Window {
         self.clearances.poll();
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
+        self.command.keys(ui);
         shortcuts(ui, &self.session, &mut wanted);
         let size = ui.max_rect().size();
         header::show(ui, &self.session, &mut wanted);
+        self.command.show(ui, &self.session, &mut wanted);
         match Arrangement::of(size) {
             Arrangement::Wide => self.wide(ui, surface, &mut wanted),
             other => self.compact(ui, other, surface, &mut wanted),
         }
         drop::show(ui, &mut self.session, &mut wanted);
         self.path.show(ui, &mut self.session, &mut wanted);
+        self.command
+            .finish(ui, &self.session, &mut self.view, &mut wanted);
         // STOP is handled before the other intents of the same frame.
         wanted.sort_by_key(|intent| *intent != Intent::Stop);
         for intent in wanted {
