@@ -12,9 +12,7 @@ use glam::DVec3;
 use mortise::session::notes::Severity;
 use mortise::session::{Intent, Session, obstacle};
 use mortise::ui::Window;
-use mortise::viewport::camera::Camera;
-use mortise::viewport::compose::compose;
-use mortise::viewport::picture::Ground;
+use mortise::viewport::compose::{Look, compose};
 use mortise_guide::{GuideSettings, List, Row, Standing, When};
 use mortise_mating::Axis;
 use mortise_mating::recognise::{AlignmentError, Freedom, Target, TargetId};
@@ -184,16 +182,7 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     }
     session.telemetry = Some(telemetry);
     let document = session.document.as_ref().expect("the sample");
-    let items = compose(
-        session,
-        document,
-        Camera::default(),
-        false,
-        None,
-        Ground::Dark,
-        1.0,
-    )
-    .items;
+    let items = compose(session, document, &Look::default()).items;
     assert_eq!(items[1].lit_edges, [[0, 2]], "the touching edge of the held part");
     assert_eq!(items[0].lit_edges, [[3, 5]], "and that of the other");
     let mut odd = List {
@@ -232,8 +221,11 @@ fn without_telemetry_or_with_parts_that_are_not_there_nothing_breaks() {
     }
     session.guidance = odd;
     let document = session.document.as_ref().expect("open");
-    let camera = Camera::default();
-    let picture = compose(session, document, camera, true, None, Ground::Dark, 1.0);
+    let look = Look {
+        see_through: true,
+        ..Look::default()
+    };
+    let picture = compose(session, document, &look);
     assert!(picture.items.iter().all(|item| item.mates.is_empty()));
     harness.step();
 

@@ -79,3 +79,55 @@ fn the_section_is_switched_and_laid_by_key_and_buttons() {
     harness.step();
     assert!(harness.query_by_label("Across x").is_none());
 }
+
+#[test]
+fn gaps_are_shown_once_nothing_moves() {
+    let mut harness = harness();
+    open_sample(&mut harness);
+    let document = harness.state_mut().session.document.as_mut().expect("open");
+    document.poses[1].translation.z -= 55.0;
+    harness.key_press(Key::X);
+    harness.step();
+    until_cut(&mut harness);
+    let bands = |harness: &Harness<'_, Window>| {
+        let (session, view) = (&harness.state().session, &harness.state().view);
+        let document = session.document.as_ref().expect("open");
+        let cut = view.section.shown(document).and_then(|shown| shown.cut);
+        cut.and_then(|cut| cut.gaps.clone())
+    };
+    assert_eq!(bands(&harness), None, "only on request");
+    click(&mut harness, "Gaps");
+    let until_shown = |harness: &mut Harness<'_, Window>, range_mm: f64| {
+        for _ in 0..2000 {
+            harness.step();
+            if let Some(gaps) = bands(harness)
+                && gaps.range_mm == range_mm
+            {
+                return gaps;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        panic!("no gaps");
+    };
+    assert_eq!(harness.state().view.section.gaps_up_to_um, 500.0);
+    harness.state_mut().view.section.gaps_up_to_um = 600.0;
+    let gaps = until_shown(&mut harness, 0.6);
+    let least = gaps.bands.iter().map(|band| band.distances_mm[0]);
+    assert!((least.fold(f64::INFINITY, f64::min) - 0.5).abs() < 1e-6);
+
+    // A larger range follows more, and the plane that moves is cut before the gaps are followed.
+    harness.state_mut().view.section.gaps_up_to_um = 3000.0;
+    assert!(until_shown(&mut harness, 3.0).bands.len() > gaps.bands.len());
+    harness.state_mut().view.section.setting.offset_mm = 1.0;
+    until_cut(&mut harness);
+    assert!(!until_shown(&mut harness, 3.0).bands.is_empty());
+    click(&mut harness, "Gaps");
+    for _ in 0..400 {
+        harness.step();
+        if bands(&harness).is_none() {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    panic!("still shown");
+}

@@ -8,9 +8,8 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use glam::DVec3;
 use mortise::ui::Window;
-use mortise::viewport::compose::compose;
+use mortise::viewport::compose::{Look, compose};
 use mortise::viewport::gesture::on_screen;
-use mortise::viewport::picture::Ground;
 
 fn sample() -> Harness<'static, Window> {
     let mut harness = harness();
@@ -28,15 +27,11 @@ fn hidden(harness: &Harness<'_, Window>) -> Vec<bool> {
 fn drawn(harness: &Harness<'_, Window>) -> Vec<usize> {
     let window = harness.state();
     let document = window.session.document.as_ref().expect("open");
-    let picture = compose(
-        &window.session,
-        document,
-        window.view.camera,
-        false,
-        None,
-        Ground::Dark,
-        1.0,
-    );
+    let look = Look {
+        camera: window.view.camera,
+        ..Look::default()
+    };
+    let picture = compose(&window.session, document, &look);
     picture.items.iter().map(|item| item.shape).collect()
 }
 

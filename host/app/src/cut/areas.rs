@@ -7,6 +7,8 @@ use glam::{DAffine3, DMat3, DVec2};
 use mortise_brep::CadModel;
 use mortise_inspect::{CutPlane, Fineness, Loop, Section, Solid, section};
 
+use super::gaps::{self, Following, Gaps, Placed};
+use crate::display::extent::Extent;
 use crate::display::mesh::{Segment, ShapeMesh, Vertex};
 
 /// The area in which a plane cuts one part.
@@ -31,6 +33,8 @@ pub struct Cut {
     pub plane: CutPlane,
     /// One area for each part that is cut, in the order of the parts.
     pub areas: Vec<Arc<Area>>,
+    /// The gaps along their borders, once they are computed.
+    pub gaps: Option<Gaps>,
 }
 
 impl Cut {
@@ -133,6 +137,38 @@ impl Cutter {
             generation,
             plane,
             areas,
+            gaps: None,
+        }
+    }
+
+    /// The gaps along the borders of `cut`, which this has made of `model` at `poses`. Open shells, which have no inside, are left out.
+    pub fn gaps(&self, cut: &Cut, model: &CadModel, poses: &[DAffine3], how: Following) -> Gaps {
+        let placed: Vec<Placed<'_>> = (model.parts.iter().zip(poses).enumerate())
+            .filter_map(|(part, (of, pose))| {
+                let shape = model.shapes.get(of.shape).filter(|shape| shape.closed)?;
+                let Extent { center, radius } = Extent::of_points(shape.mesh.vertices.iter().copied());
+                Some(Placed {
+                    part,
+                    solid: self.solids.get(&of.shape)?,
+                    pose: *pose,
+                    ball: (pose.transform_point3(center), radius),
+                })
+            })
+            .collect();
+        let mut bands = Vec::new();
+        for area in &cut.areas {
+            let Some(own) = placed.iter().find(|placed| placed.part == area.part) else {
+                continue;
+            };
+            for side in &area.mesh.segments {
+                let ends = [side.a, side.b]
+                    .map(|[x, y, _]| cut.plane.from_plane(DVec2::new(f64::from(x), f64::from(y))));
+                gaps::along(ends, *own, &placed, cut.plane, how, &mut bands);
+            }
+        }
+        Gaps {
+            range_mm: how.range_mm,
+            bands,
         }
     }
 }
@@ -221,5 +257,70 @@ mod tests {
         assert!(!Arc::ptr_eq(&first.areas[1], &second.areas[1]));
         poses[1].translation.y += 100.0;
         assert_eq!(cutter.cut(1, &document.model, &poses, plane, 1e-3).areas.len(), 1);
+    }
+
+    /// Sag of the borders, mm: far more than the error allowed.
+    const SAG_MM: f64 = 0.02;
+
+    /// The sample with its peg of 17.75 mm in the bore of 18.75 mm, moved aside, cut at `origin` across `normal`, and the gaps there.
+    fn cut_gaps(aside: f64, origin: DVec3, normal: DVec3) -> (Cut, Gaps) {
+        let mut document = Document::sample(2, &|_| ControlFlow::Continue(())).expect("the sample");
+        document.poses[1].translation += DVec3::new(aside, 0.0, -55.0);
+        let plane = CutPlane::new(origin, normal).expect("a plane");
+        let mut cutter = Cutter::default();
+        let cut = cutter.cut(2, &document.model, &document.poses, plane, SAG_MM);
+        let how = Following {
+            range_mm: 1.5,
+            longest_mm: 0.4,
+        };
+        let gaps = cutter.gaps(&cut, &document.model, &document.poses, how);
+        (cut, gaps)
+    }
+
+    /// Ends of bands in the world, with part and distance, well inside the bore.
+    fn ends(cut: &Cut, gaps: &Gaps) -> Vec<(usize, DVec3, f64)> {
+        (gaps.bands.iter())
+            .flat_map(|band| [0, 1].map(|i| (band, i)))
+            .map(|(band, i)| {
+                let at = cut.plane.from_plane(band.ends[i]);
+                (band.parts[0], at, band.distances_mm[i])
+            })
+            .filter(|(_, at, _)| (-30.0..=-2.0).contains(&at.z))
+            .collect()
+    }
+
+    #[test]
+    fn around_a_peg_the_gap_is_exact_where_the_border_is_a_polygon() {
+        let (cut, gaps) = cut_gaps(0.0, DVec3::new(0.0, 0.0, -10.0), DVec3::Z);
+        let ends = ends(&cut, &gaps);
+        for part in [0, 1] {
+            let own: Vec<_> = ends.iter().filter(|end| end.0 == part).collect();
+            assert!(own.len() > 100, "{}", own.len());
+            let worst = own.iter().map(|end| (end.2 - 0.5).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-6, "part {part}: {worst} mm");
+        }
+        assert!(gaps.bands.iter().all(|b| b.parts == [0, 1] || b.parts == [1, 0]));
+        let longest = (gaps.bands.iter()).map(|b| b.ends[0].distance(b.ends[1]));
+        assert!(longest.fold(0.0, f64::max) <= 0.4);
+    }
+
+    #[test]
+    fn a_peg_aside_overlaps_on_one_side_by_what_it_leaves_less_on_the_other() {
+        let (cut, gaps) = cut_gaps(0.75, DVec3::ZERO, DVec3::Y);
+        let peg: Vec<_> = (ends(&cut, &gaps).into_iter()).filter(|end| end.0 == 1).collect();
+        for (x, want) in [(9.625, -0.25), (-8.125, 1.25)] {
+            let side: Vec<_> = peg.iter().filter(|end| (end.1.x - x).abs() < 1e-6).collect();
+            assert!(side.len() > 40, "{x}: {}", side.len());
+            assert!(
+                side.iter().all(|end| (end.2 - want).abs() < 1e-6),
+                "{x}: {side:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn nothing_far_is_followed() {
+        let (_, gaps) = cut_gaps(60.0, DVec3::ZERO, DVec3::Y);
+        assert_eq!(gaps.bands, []);
     }
 }

@@ -1,10 +1,12 @@
 //! The section view's state without its drawing: where the plane lies, and the areas in which it cuts the parts, computed beside the window's thread.
 
 pub mod areas;
+pub mod gaps;
 pub mod setting;
 pub mod slicer;
 
 pub use self::areas::{Area, Cut};
+pub use self::gaps::{Band, Following, Gaps};
 pub use self::setting::{Across, Setting};
 pub use self::slicer::{Slicer, Wanted};
 
@@ -27,15 +29,31 @@ pub struct Shown<'a> {
 }
 
 /// The section view of a window.
-#[derive(Default)]
 pub struct SectionView {
     /// Whether it is on.
     pub on: bool,
     /// Where the plane lies.
     pub setting: Setting,
+    /// Whether the gaps between parts are shown along the borders of the cut.
+    pub shows_gaps: bool,
+    /// Largest gap shown, µm.
+    pub gaps_up_to_um: f64,
     slicer: Slicer,
     /// Document for which the setting was made.
     generation: Option<u64>,
+}
+
+impl Default for SectionView {
+    fn default() -> Self {
+        Self {
+            on: false,
+            setting: Setting::default(),
+            shows_gaps: false,
+            gaps_up_to_um: 500.0,
+            slicer: Slicer::default(),
+            generation: None,
+        }
+    }
 }
 
 impl SectionView {
@@ -77,6 +95,10 @@ impl SectionView {
             poses: document.poses.clone(),
             plane,
             sag_mm: (SAG_RADII * document.extent.radius).max(LEAST_SAG_MM),
+            gaps: self.shows_gaps.then_some(Following {
+                range_mm: 1e-3 * self.gaps_up_to_um,
+                longest_mm: LONGEST_RADII * document.extent.radius,
+            }),
         });
         self.slicer.follow(wanted, wake)
     }
@@ -107,5 +129,7 @@ impl SectionView {
 
 /// Largest distance of an area's border from the exact curve, in radii of the scene: a tenth of a pixel where the scene fills the picture.
 const SAG_RADII: f64 = 1e-4;
+/// Longest piece of a border with gaps at its ends, in radii of the scene.
+const LONGEST_RADII: f64 = 0.01;
 /// Smallest such distance asked for, mm.
 const LEAST_SAG_MM: f64 = 1e-3;

@@ -90,6 +90,11 @@ impl Setting {
         }
     }
 
+    /// Moves the plane along its normal until it contains `place`.
+    pub fn pass_through(&mut self, place: DVec3) {
+        self.offset_mm = (place - self.across.start()).dot(self.across.normal());
+    }
+
     /// Offsets at which the plane meets `extent`, mm.
     pub fn range(&self, extent: Extent) -> RangeInclusive<f64> {
         let middle = (extent.center - self.across.start()).dot(self.across.normal());

@@ -10,6 +10,7 @@ use mortise_brep::CadModel;
 use mortise_inspect::CutPlane;
 
 use super::areas::{Cut, Cutter};
+use super::gaps::Following;
 
 /// Least time between the starts of two cuts: parts in motion are cut ten times a second.
 const EVERY: Duration = Duration::from_millis(100);
@@ -27,6 +28,8 @@ pub struct Wanted {
     pub plane: CutPlane,
     /// Largest distance of an area's border from the exact curve, mm.
     pub sag_mm: f64,
+    /// How gaps are to be followed along the borders, once nothing moves.
+    pub gaps: Option<Following>,
 }
 
 impl Wanted {
@@ -74,14 +77,22 @@ impl Slicer {
         if self.failed || self.busy {
             return None;
         }
+        let mut wanted = wanted;
         if let Some((asked, at)) = &self.asked {
-            if asked.is(&wanted) {
+            let at_rest = asked.is(&wanted);
+            if at_rest && asked.gaps == wanted.gaps {
                 return None;
+            }
+            if !at_rest {
+                wanted.gaps = None;
             }
             let left = EVERY.saturating_sub(at.elapsed());
             if !left.is_zero() {
                 return Some(left);
             }
+        }
+        if self.asked.is_none() {
+            wanted.gaps = None;
         }
         if self.link.is_none() {
             self.link = start(wake());
@@ -133,8 +144,10 @@ fn start(wake: Arc<dyn Fn() + Send + Sync>) -> Option<Link> {
                 poses,
                 plane,
                 sag_mm,
+                gaps,
             } = wanted;
-            let cut = cutter.cut(generation, &model, &poses, plane, sag_mm);
+            let mut cut = cutter.cut(generation, &model, &poses, plane, sag_mm);
+            cut.gaps = gaps.map(|how| cutter.gaps(&cut, &model, &poses, how));
             if outbox.send(Arc::new(cut)).is_err() {
                 return;
             }
@@ -166,6 +179,7 @@ mod tests {
                 poses: document.poses.clone(),
                 plane: CutPlane::new(DVec3::Y * y, DVec3::Y).expect("a plane"),
                 sag_mm: 0.01,
+                gaps: None,
             })
         };
         let mut slicer = Slicer::default();

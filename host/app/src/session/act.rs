@@ -29,6 +29,7 @@ impl Session {
                 self.act(intent);
             }
         }
+        self.poll_instruction();
         self.follow();
     }
 

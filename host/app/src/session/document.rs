@@ -47,7 +47,7 @@ pub struct Document {
     pub meshes: Arc<Vec<ShapeMesh>>,
     /// A bounding sphere of each shape, in the shape's frame.
     pub extents: Vec<Extent>,
-    /// Bounding sphere of all parts as opened.
+    /// Bounding sphere of all parts as opened, or as the last instruction placed them.
     pub extent: Extent,
     /// sRGB of each part.
     pub colors: Vec<[u8; 3]>,

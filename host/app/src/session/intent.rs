@@ -107,6 +107,10 @@ pub enum Intent {
         /// Whether an existing file may be replaced.
         replace: bool,
     },
+    /// Carry out an instruction in plain words.
+    Instruct(String),
+    /// Cancel the instruction under way.
+    CancelInstruction,
     /// Record everything that crosses the link, to a new file.
     Record,
     /// End the recording.
@@ -139,6 +143,7 @@ impl Intent {
                 | Self::Fold { .. }
                 | Self::ExportTraces(_)
                 | Self::SaveTraces { .. }
+                | Self::CancelInstruction
                 | Self::Record
                 | Self::EndRecording
                 | Self::Demo(_)
@@ -270,6 +275,10 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
             .table
             .is_none()
             .then(|| "No traces are to be written".to_owned()),
+        Intent::Instruct(text) => instruct(session, text),
+        Intent::CancelInstruction => {
+            (session.instructions.under_way().is_none()).then(|| "No instruction is under way".to_owned())
+        }
         Intent::Record | Intent::EndRecording => record(session, intent),
         Intent::PlayInsertion => play(session),
     }
@@ -364,6 +373,22 @@ fn play(session: &Session) -> Option<String> {
         _ if !session.scene_is_on_board() => no("The collision model is not on the board yet"),
         _ => None,
     }
+}
+
+/// Why no instruction can be carried out now.
+fn instruct(session: &Session, text: &str) -> Option<String> {
+    let reason = if session.document.is_none() {
+        NO_FILE
+    } else if text.trim().is_empty() {
+        "Write an instruction first"
+    } else if session.instructions.under_way().is_some() {
+        "An instruction is under way"
+    } else if !matches!(session.link, Link::None) {
+        "A rig is connected, and its board knows the parts only where they are now: disconnect it first"
+    } else {
+        return None;
+    };
+    Some(reason.to_owned())
 }
 
 /// Why a recording cannot begin or end now.

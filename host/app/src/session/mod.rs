@@ -6,11 +6,14 @@
 mod act;
 mod advance;
 pub mod ask;
+pub mod clearances;
 pub mod document;
 pub mod fits;
 pub mod guidance;
 pub mod history;
 pub mod insertion;
+mod instruct;
+pub mod instructions;
 pub mod intent;
 mod keeper;
 mod keeping;

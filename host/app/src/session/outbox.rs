@@ -171,6 +171,11 @@ impl Outbox {
         sent
     }
 
+    /// Wakes the window.
+    pub fn waker(&self) -> Arc<dyn Fn() + Send + Sync> {
+        Arc::clone(&self.wake)
+    }
+
     /// Sends a message without waking the window, which takes it in at its next wake-up. `false` when the receiver is gone.
     pub fn send_quietly(&self, update: Update) -> bool {
         match self.sender.try_send(update) {

@@ -103,6 +103,8 @@ impl Session {
             Intent::Fold { section, open } => _ = self.preferences.open.insert(section.to_owned(), open),
             Intent::ExportTraces(traces) => self.export(&traces),
             Intent::SaveTraces { path, replace } => self.save_traces(path, replace),
+            Intent::Instruct(text) => self.instruct(&text),
+            Intent::CancelInstruction => self.cancel_instruction(),
             Intent::Record => self.begin_recording(),
             Intent::EndRecording => self.end_recording(),
             Intent::PlayInsertion => self.tour = Some(Tour::from_the_rig()),

@@ -18,6 +18,7 @@ use mortise_rig::{RigEntry, RigSpec};
 use super::document::Document;
 use super::fits::FitChoice;
 use super::history::History;
+use super::instructions::Instructions;
 use super::keeper::Keeper;
 use super::link::{Connection, Link};
 use super::notes::Notes;
@@ -123,6 +124,8 @@ pub struct Session {
     pub fits: BTreeMap<TargetId, FitChoice>,
     /// Parameters that the user has set, by their place in [`PARAMETERS`]: every board gets them.
     pub(super) own_parameters: BTreeMap<usize, f32>,
+    /// Instructions in plain words.
+    pub instructions: Instructions,
     pub(super) keeper: Keeper,
     /// The project that the user opened, and its file: for the document of this number.
     pub(super) pending_project: Option<(u64, Box<Project>, PathBuf)>,
@@ -168,6 +171,7 @@ impl Session {
             looks: None,
             fits: BTreeMap::new(),
             own_parameters: BTreeMap::new(),
+            instructions: Instructions::default(),
             keeper: Keeper::default(),
             pending_project: None,
             tour: None,

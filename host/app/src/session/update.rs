@@ -115,6 +115,7 @@ fn opened(session: &mut Session, Imported { document, saved }: Imported) {
     }
     session.selected = None;
     session.verdict = None;
+    session.instructions.end();
     session.document = Some(document);
     session.view = None;
     session.clear_board();

@@ -30,6 +30,26 @@ pub fn intent_button(
     }
 }
 
+/// Draws another frame when a panel's height is no longer `last`: the panel has the size of its contents a frame later.
+pub fn settle(ui: &Ui, height: f32, last: &mut f32) {
+    if (std::mem::replace(last, height) - height).abs() > 0.5 {
+        ui.ctx().request_repaint();
+    }
+}
+
+/// A small button over the view, in the accent colour while it is on.
+pub fn flat<'a>(ui: &Ui, text: &'a str, chosen: bool) -> Button<'a> {
+    let ink = theme::of(ui);
+    let fill = if chosen {
+        ink.accent_dim
+    } else {
+        ink.control.gamma_multiply(0.85)
+    };
+    Button::new(RichText::new(text).size(12.5))
+        .selected(chosen)
+        .fill(fill)
+}
+
 /// A button in the accent colour: the suggested next action.
 pub fn primary<'a>(ui: &Ui, text: &'a str) -> Button<'a> {
     let ink = theme::of(ui);

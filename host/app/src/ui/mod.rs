@@ -5,11 +5,14 @@ pub mod app;
 mod appearance;
 mod arrange;
 mod cards;
+mod clearances;
+mod command;
 mod control;
 mod drop;
 mod eye;
 mod file_menu;
 pub mod fonts;
+mod gaps;
 mod guidance;
 mod header;
 mod messages;
@@ -58,6 +61,8 @@ pub struct Window {
     search: String,
     /// What the plots show.
     pub plots: plots::View,
+    clearances: clearances::Clearances,
+    command: command::CommandLine,
 }
 
 impl Window {
@@ -74,23 +79,30 @@ impl Window {
             tab: arrange::Tab::default(),
             search: String::new(),
             plots,
+            clearances: clearances::Clearances::default(),
+            command: command::CommandLine::default(),
         }
     }
 
     /// Draws one frame. `surface` draws the 3D view where there is a graphics device.
     pub fn show(&mut self, ui: &mut Ui, surface: Option<&mut Surface>) {
         self.session.poll();
+        self.clearances.poll();
         let mut wanted = Vec::new();
         stop::keys(ui.ctx(), &self.session, &mut wanted);
+        self.command.keys(ui);
         shortcuts(ui, &self.session, &mut wanted);
         let size = ui.max_rect().size();
         header::show(ui, &self.session, &mut wanted);
+        self.command.show(ui, &self.session, &mut wanted);
         match Arrangement::of(size) {
             Arrangement::Wide => self.wide(ui, surface, &mut wanted),
             other => self.compact(ui, other, surface, &mut wanted),
         }
         drop::show(ui, &mut self.session, &mut wanted);
         self.path.show(ui, &mut self.session, &mut wanted);
+        self.command
+            .finish(ui, &self.session, &mut self.view, &mut wanted);
         // STOP is handled before the other intents of the same frame.
         wanted.sort_by_key(|intent| *intent != Intent::Stop);
         for intent in wanted {
@@ -159,7 +171,14 @@ impl Window {
             .default_size(248.0)
             .size_range(180.0..=420.0)
             .frame(theme::panel(theme::of(ui)))
-            .show(ui, |ui| parts::show(ui, session, &mut self.search, wanted));
+            .show(ui, |ui| {
+                below(ui, &mut self.clearances, session, &mut self.view);
+                egui::CentralPanel::default()
+                    .frame(egui::Frame::NONE)
+                    .show(ui, |ui| {
+                        parts::show(ui, session, &self.view.marked.parts, &mut self.search, wanted)
+                    });
+            });
         egui::Panel::right("rig")
             .exact_size(336.0)
             .resizable(false)
@@ -209,7 +228,10 @@ impl Window {
         match self.tab {
             arrange::Tab::View => {}
             arrange::Tab::Rig => rig::show(ui, session, wanted),
-            arrange::Tab::Parts => parts::show(ui, session, &mut self.search, wanted),
+            arrange::Tab::Parts => {
+                below(ui, &mut self.clearances, session, &mut self.view);
+                parts::show(ui, session, &self.view.marked.parts, &mut self.search, wanted);
+            }
             arrange::Tab::Messages => messages::show(ui, session),
             arrange::Tab::Plots => plots::show(ui, session, &mut self.plots, wanted),
         }
@@ -227,6 +249,15 @@ impl Window {
                 cards::show(ui, rect, session, wanted);
             });
     }
+}
+
+/// Draws the list of clearances at the lower end of the panel of parts.
+fn below(ui: &mut Ui, list: &mut clearances::Clearances, session: &Session, view: &mut Viewpoint) {
+    let drawn = egui::Panel::bottom("clearances")
+        .resizable(false)
+        .frame(egui::Frame::NONE)
+        .show(ui, |ui| list.show(ui, session, view));
+    control::settle(ui, drawn.response.rect.height(), &mut list.height);
 }
 
 fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {

@@ -13,7 +13,7 @@ use crate::session::tree::{self, Branch};
 use crate::session::{Intent, Session, obstacle};
 
 /// Draws the list.
-pub fn show(ui: &mut Ui, session: &Session, search: &mut String, wanted: &mut Vec<Intent>) {
+pub fn show(ui: &mut Ui, session: &Session, marked: &[usize], search: &mut String, wanted: &mut Vec<Intent>) {
     ui.take_available_width();
     heading(ui, session, wanted);
     ui.add_space(4.0);
@@ -22,6 +22,11 @@ pub fn show(ui: &mut Ui, session: &Session, search: &mut String, wanted: &mut Ve
         return;
     };
     field(ui, search);
+    let listed = Listed {
+        session,
+        document,
+        marked,
+    };
     let found = (!search.trim().is_empty()).then(|| tree::found(&document.tree, &document.model, search));
     let details = session.selected.filter(|&p| p < document.model.parts.len());
     let room = if details.is_some() { 188.0 } else { 0.0 };
@@ -32,12 +37,12 @@ pub fn show(ui: &mut Ui, session: &Session, search: &mut String, wanted: &mut Ve
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 2.0;
             match &found {
-                None => branches(ui, session, document, wanted, &document.tree, Id::unique("parts")),
+                None => branches(ui, listed, wanted, &document.tree, Id::unique("parts")),
                 Some(found) if found.is_empty() => {
                     ui.label(RichText::new("No part has this name").color(theme::of(ui).text_weak));
                 }
                 // Subassemblies are open, whichever are folded in the whole tree.
-                Some(found) => branches(ui, session, document, wanted, found, Id::unique("found parts")),
+                Some(found) => branches(ui, listed, wanted, found, Id::unique("found parts")),
             }
         });
     if let Some(part) = details {
@@ -86,17 +91,19 @@ fn field(ui: &mut Ui, search: &mut String) {
     ui.add_space(4.0);
 }
 
-fn branches(
-    ui: &mut Ui,
-    session: &Session,
-    document: &Document,
-    wanted: &mut Vec<Intent>,
-    branches: &[Branch],
-    id: Id,
-) {
+/// What lines are drawn of.
+#[derive(Clone, Copy)]
+struct Listed<'a> {
+    session: &'a Session,
+    document: &'a Document,
+    /// Parts that are pointed out.
+    marked: &'a [usize],
+}
+
+fn branches(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, branches: &[Branch], id: Id) {
     for (index, branch) in branches.iter().enumerate() {
         match branch {
-            Branch::Part(part) => line(ui, session, document, wanted, *part),
+            Branch::Part(part) => line(ui, listed, wanted, *part),
             Branch::Assembly { name, children } => {
                 let id = id.with((index, name));
                 CollapsingState::load_with_default_open(ui.ctx(), id, true)
@@ -105,13 +112,18 @@ fn branches(
                             egui::Label::new(RichText::new(name).color(theme::of(ui).text_weak)).truncate(),
                         );
                     })
-                    .body(|ui| self::branches(ui, session, document, wanted, children, id));
+                    .body(|ui| self::branches(ui, listed, wanted, children, id));
             }
         }
     }
 }
 
-fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<Intent>, part: usize) {
+fn line(ui: &mut Ui, listed: Listed<'_>, wanted: &mut Vec<Intent>, part: usize) {
+    let Listed {
+        session,
+        document,
+        marked,
+    } = listed;
     let (name, color) = (document.part_name(part), document.colors[part]);
     let (selected, held) = (session.selected == Some(part), session.grabbed() == Some(part));
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 28.0), Sense::click());
@@ -120,6 +132,7 @@ fn line(ui: &mut Ui, session: &Session, document: &Document, wanted: &mut Vec<In
     let fill = match (held, selected, response.hovered()) {
         (true, ..) => theme::of(ui).held.gamma_multiply(0.22),
         (_, true, _) => theme::of(ui).accent_dim.gamma_multiply(0.8),
+        _ if marked.contains(&part) => theme::of(ui).accent_dim.gamma_multiply(0.5),
         (_, _, true) => theme::of(ui).card,
         _ => Color32::TRANSPARENT,
     };

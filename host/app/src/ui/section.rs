@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use egui::{Button, Pos2, Rect, RichText, Slider, Ui, UiBuilder, Vec2};
+use egui::{Pos2, Rect, RichText, Slider, Ui, UiBuilder, Vec2};
 
-use super::theme;
+use super::{control, gaps, theme};
 use crate::cut::Across;
 use crate::session::Session;
 use crate::session::document::Document;
@@ -24,21 +24,9 @@ pub fn follow(ui: &Ui, document: &Document, view: &mut Viewpoint) {
     }
 }
 
-fn flat<'a>(ui: &Ui, text: &'a str, chosen: bool) -> Button<'a> {
-    let ink = theme::of(ui);
-    let fill = if chosen {
-        ink.accent_dim
-    } else {
-        ink.control.gamma_multiply(0.85)
-    };
-    Button::new(RichText::new(text).size(12.5))
-        .selected(chosen)
-        .fill(fill)
-}
-
 /// Draws the button that switches the section on and off.
 pub fn toggle(ui: &mut Ui, document: &Document, view: &mut Viewpoint) {
-    let button = flat(ui, "Section", view.section.on);
+    let button = control::flat(ui, "Section", view.section.on);
     let hint = "Cut the parts by a plane to see inside (X)";
     if ui.add(button).on_hover_text(hint).clicked() {
         view.section.toggle(document, view.camera.backward());
@@ -53,7 +41,7 @@ pub fn show(ui: &mut Ui, rect: Rect, top: f32, session: &Session, view: &mut Vie
     let place = Rect::from_min_max(
         Pos2::new(rect.left() + 12.0, top + 4.0),
         Pos2::new(
-            (rect.left() + 572.0).min(rect.right() - 12.0),
+            (rect.left() + 690.0).min(rect.right() - 12.0),
             rect.bottom().max(top + 4.0),
         ),
     );
@@ -64,6 +52,7 @@ pub fn show(ui: &mut Ui, rect: Rect, top: f32, session: &Session, view: &mut Vie
             directions(ui, document, view);
             ui.add_space(6.0);
             offset(ui, document, view);
+            gaps::controls(ui, view);
         });
         for line in remarks(document, view) {
             let weak = theme::of(ui).warning;
@@ -78,7 +67,7 @@ fn directions(ui: &mut Ui, document: &Document, view: &mut Viewpoint) {
     for (across, text) in [(Across::X, "x"), (Across::Y, "y"), (Across::Z, "z")] {
         let chosen = view.section.setting.across == across;
         let response = ui
-            .add(flat(ui, text, chosen))
+            .add(control::flat(ui, text, chosen))
             .accessible_name(format!("Across {text}"))
             .on_hover_text(format!("Plane across the {text} axis"));
         if response.clicked() {
@@ -90,7 +79,7 @@ fn directions(ui: &mut Ui, document: &Document, view: &mut Viewpoint) {
         .and_then(|(part, face)| Across::along(document, part, face));
     let chosen = matches!(view.section.setting.across, Across::Face { .. });
     let response = ui
-        .add_enabled(face.is_some(), flat(ui, "Face", chosen))
+        .add_enabled(face.is_some(), control::flat(ui, "Face", chosen))
         .accessible_name("Along the face")
         .on_hover_text("Plane along the flat face clicked last")
         .on_disabled_hover_text("Click a flat face first");
@@ -98,7 +87,7 @@ fn directions(ui: &mut Ui, document: &Document, view: &mut Viewpoint) {
         view.section.lay(across, document.extent, viewer);
     }
     if ui
-        .add(flat(ui, "Flip", view.section.setting.flipped))
+        .add(control::flat(ui, "Flip", view.section.setting.flipped))
         .on_hover_text("Cut away the other side")
         .clicked()
     {

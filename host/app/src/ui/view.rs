@@ -7,12 +7,12 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, section, theme};
+use super::{control, gaps, section, theme};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
 use crate::viewport::camera::View;
-use crate::viewport::compose::{compose, touching_points};
+use crate::viewport::compose::{Look, compose, touching_points};
 use crate::viewport::gesture::{Viewpoint, on_screen};
 use crate::viewport::picture::Ground;
 use crate::viewport::surface::Surface;
@@ -48,21 +48,23 @@ pub fn show(
             Ground::Light
         };
         let cut = view.section.shown(document);
-        let picture = compose(
-            session,
-            document,
-            view.camera,
-            view.see_through,
+        let look = Look {
+            camera: view.camera,
+            see_through: view.see_through,
             cut,
+            marked: &view.marked.parts,
             ground,
             scale,
-        );
+        };
+        let picture = compose(session, document, &look);
         if let Some(texture) = surface.show(&document.meshes, picture, size) {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(texture, rect, whole, Color32::WHITE);
         }
     }
     touching(ui, rect, session, view);
+    gaps::show(ui, rect, document, view);
+    marked(ui, rect, view);
     triad(ui, rect, view);
     let below = toolbar(ui, rect, session, view);
     let below = section::show(ui, rect, below, session, view);
@@ -151,6 +153,16 @@ fn touching(ui: &Ui, rect: Rect, session: &Session, view: &Viewpoint) {
         if let Some(at) = on_screen(&view.camera, rect, point) {
             painter.circle(at, 3.5, theme::of(ui).contact, Stroke::new(1.0, Color32::WHITE));
         }
+    }
+}
+
+/// Draws a ring around the marked place.
+fn marked(ui: &Ui, rect: Rect, view: &Viewpoint) {
+    let place = (view.marked.place).and_then(|place| on_screen(&view.camera, rect, place));
+    if let Some(at) = place {
+        let painter = ui.painter_at(rect);
+        painter.circle_stroke(at, 11.0, Stroke::new(3.5, theme::of(ui).ground));
+        painter.circle_stroke(at, 11.0, Stroke::new(2.0, theme::of(ui).accent));
     }
 }
 

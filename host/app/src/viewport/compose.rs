@@ -28,6 +28,8 @@ const EDGE_MARKED_LIGHT: [f32; 4] = [0.05, 0.32, 0.72, 1.0];
 const EDGE_HELD_LIGHT: [f32; 4] = [0.55, 0.28, 0.0, 1.0];
 /// Colour mixed into the held part, and its weight.
 const TINT_HELD: [f32; 4] = [0.96, 0.65, 0.26, 0.55];
+/// Colour mixed into parts that are pointed out, and its weight.
+const TINT_MARKED: [f32; 4] = [0.45, 0.72, 1.0, 0.35];
 /// Colour of the ghost, which shows the pose that the handle commands for the held part.
 const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
 /// Directions across the hatching of sections, degrees, by part.
@@ -41,17 +43,26 @@ const GHOST_FROM: f64 = 5e-4;
 const LONGEST_RADII: f64 = 0.9;
 const ARROW_FORCE: f64 = 2.5;
 
+/// How a document is looked at.
+#[derive(Clone, Copy, Default)]
+pub struct Look<'a> {
+    /// Camera.
+    pub camera: Camera,
+    /// Whether fixed parts are drawn as glass.
+    pub see_through: bool,
+    /// The section, where there is one.
+    pub cut: Option<Shown<'a>>,
+    /// Parts that are pointed out.
+    pub marked: &'a [usize],
+    /// Background.
+    pub ground: Ground,
+    /// Pixels per point; 0: edges have no width.
+    pub scale: f32,
+}
+
 /// The picture of `document` in the state of `session`.
-pub fn compose(
-    session: &Session,
-    document: &Document,
-    camera: Camera,
-    see_through: bool,
-    cut: Option<Shown<'_>>,
-    ground: Ground,
-    scale: f32,
-) -> Picture {
-    let [marked_line, held_line, glass_line] = match ground {
+pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Picture {
+    let [marked_line, held_line, glass_line] = match look.ground {
         Ground::Dark => [EDGE_MARKED, EDGE_HELD, EDGE_GLASS],
         Ground::Light => [EDGE_MARKED_LIGHT, EDGE_HELD_LIGHT, EDGE_GLASS_LIGHT],
     };
@@ -61,14 +72,14 @@ pub fn compose(
         .filter(|&(index, _)| !document.is_hidden(index) || held == Some(index))
         .map(|(index, part)| {
             let in_hand = held == Some(index);
-            let marked = session.selected == Some(index);
-            let glass = see_through && !in_hand && is_fixed(document, index);
+            let marked = session.selected == Some(index) || look.marked.contains(&index);
+            let glass = look.see_through && !in_hand && is_fixed(document, index);
             Item {
                 shape: part.shape,
                 pose: document.poses[index],
                 color: document.colors[index].map(|c| f32::from(c) / 255.0),
                 opacity: if glass { SEEN_THROUGH } else { 1.0 },
-                tint: if in_hand { TINT_HELD } else { [0.0; 4] },
+                tint: tint(index, held, look),
                 line: match (in_hand, marked) {
                     (true, _) => held_line,
                     (_, true) => marked_line,
@@ -96,24 +107,35 @@ pub fn compose(
             mates: Vec::new(),
         });
     }
-    let cut = cut.map(|shown| Cutaway {
+    let cut = look.cut.map(|shown| Cutaway {
         plane: shown.plane,
         areas: shown.cut.map(|cut| Areas(cut.clone())),
-        fills: fills(document, shown, held),
+        fills: fills(document, shown, held, look),
     });
     Picture {
-        camera,
+        camera: look.camera,
         extent: document.extent,
-        ground,
+        ground: look.ground,
         items,
         cut,
         arrows: touching.map_or_else(Vec::new, |t| arrows(document, t)),
-        line_width: 1.25 * scale,
+        line_width: 1.25 * look.scale,
+    }
+}
+
+/// Colour mixed into a part, and its weight.
+fn tint(part: usize, held: Option<usize>, look: &Look<'_>) -> [f32; 4] {
+    if held == Some(part) {
+        TINT_HELD
+    } else if look.marked.contains(&part) {
+        TINT_MARKED
+    } else {
+        [0.0; 4]
     }
 }
 
 /// The areas of a section, each in its part's colour and hatched in a direction of its own.
-fn fills(document: &Document, shown: Shown<'_>, held: Option<usize>) -> Vec<Fill> {
+fn fills(document: &Document, shown: Shown<'_>, held: Option<usize>, look: &Look<'_>) -> Vec<Fill> {
     let areas = shown.cut.map_or(&[][..], |cut| cut.areas.as_slice());
     (areas.iter().enumerate())
         .filter(|(_, area)| !document.is_hidden(area.part) || held == Some(area.part))
@@ -122,11 +144,7 @@ fn fills(document: &Document, shown: Shown<'_>, held: Option<usize>) -> Vec<Fill
             Some(Fill {
                 area: index,
                 color: color.map(|c| f32::from(c) / 255.0),
-                tint: if held == Some(area.part) {
-                    TINT_HELD
-                } else {
-                    [0.0; 4]
-                },
+                tint: tint(area.part, held, look),
                 line: EDGE,
                 hatch: HATCHES[area.part % HATCHES.len()].to_radians(),
             })

@@ -14,6 +14,8 @@ use crate::session::{Intent, Session};
 
 /// Rotation of the hand for a drag over the full height, rad.
 const HAND_TURN: f64 = 1.5;
+/// Distance from which a place is shown, in radii of the scene: a quarter of the one from which all of it is.
+const FRAMED_RADII: f64 = 0.9;
 /// Zoom per point of wheel travel.
 const ZOOM_PER_POINT: f64 = 0.004;
 
@@ -31,6 +33,15 @@ enum Drag {
     },
 }
 
+/// What is pointed out in the view and in the list of parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Marked {
+    /// A place, mm, which is ringed.
+    pub place: Option<DVec3>,
+    /// Parts, which are outlined.
+    pub parts: Vec<usize>,
+}
+
 /// State of the view.
 #[derive(Default)]
 pub struct Viewpoint {
@@ -40,6 +51,8 @@ pub struct Viewpoint {
     pub see_through: bool,
     /// The section view.
     pub section: SectionView,
+    /// What is marked, until the next click.
+    pub marked: Marked,
     /// What was clicked last, in the open document.
     pub picked: Option<Pick>,
     pub(super) goal: Option<Camera>,
@@ -73,6 +86,18 @@ impl Viewpoint {
         self.goal = Some(goal);
     }
 
+    /// Marks parts and a place, moves smoothly until the place is in the middle, near enough to see its surroundings, and lays the section through it.
+    pub fn frame(&mut self, marked: Marked, extent: Extent) {
+        if let Some(place) = marked.place {
+            let mut goal = self.goal.unwrap_or(self.camera);
+            goal.target = place;
+            goal.distance = FRAMED_RADII * extent.radius;
+            self.goal = Some(goal);
+            self.section.setting.pass_through(place);
+        }
+        self.marked = marked;
+    }
+
     /// Rotates smoothly to a named direction, and fits.
     pub fn look(&mut self, view: View, extent: Extent, rect: Rect) {
         let mut goal = self.camera;
@@ -91,7 +116,7 @@ impl Viewpoint {
             self.camera.look(View::Iso);
             self.camera.fit(extent, aspect(rect));
             self.goal = None;
-            self.picked = None;
+            (self.picked, self.marked) = (None, Marked::default());
         }
         let typing = ui.ctx().text_edit_focused();
         if !typing && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F)) {
@@ -102,7 +127,7 @@ impl Viewpoint {
         }
         if response.clicked() {
             let hit = self.pick(document, rect, response.interact_pointer_pos());
-            self.picked = hit;
+            (self.picked, self.marked) = (hit, Marked::default());
             wanted.push(Intent::Select(hit.map(|h| h.part)));
         }
         if response.double_clicked()

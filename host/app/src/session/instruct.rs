@@ -1,0 +1,98 @@
+//! How an instruction in plain words begins and ends.
+
+use std::sync::Arc;
+use std::sync::mpsc::{TryRecvError, sync_channel};
+
+use mortise_words::Outcome;
+
+use super::instructions::{Answer, Running, Said, answer, carry_out};
+use super::link::Link;
+use super::state::Session;
+use super::threads::spawn;
+
+impl Session {
+    /// Starts an instruction, which must be possible.
+    pub(super) fn instruct(&mut self, text: &str) {
+        let Some(document) = &self.document else { return };
+        let (outbox, said) = sync_channel(1);
+        let (model, generation) = (Arc::clone(&document.model), document.generation);
+        let poses = document.poses.clone();
+        let wake = self.outbox.waker();
+        let instructions = &mut self.instructions;
+        instructions.remember(text);
+        instructions.answer = None;
+        instructions.running = Some(Running {
+            text: text.to_owned(),
+            generation,
+            poses: poses.clone(),
+            said,
+        });
+        let talk = (instructions.talk.take()).filter(|talk| talk.generation == generation);
+        let text = text.to_owned();
+        spawn("mortise-instruction", move || {
+            let turn = carry_out(talk, &model, generation, &poses, &text);
+            // The window may have been closed, or the instruction cancelled.
+            _ = outbox.send(Said { turn });
+            wake();
+        });
+    }
+
+    /// Forgets the instruction under way: its thread ends by itself, and moves nothing.
+    pub(super) fn cancel_instruction(&mut self) {
+        self.instructions.running = None;
+    }
+
+    /// Takes in the end of an instruction.
+    pub(super) fn poll_instruction(&mut self) {
+        let Some(running) = &self.instructions.running else {
+            return;
+        };
+        let said = match running.said.try_recv() {
+            Ok(said) => said,
+            Err(TryRecvError::Empty) => return,
+            Err(TryRecvError::Disconnected) => Said {
+                turn: Err("its computation ended without a result".to_owned()),
+            },
+        };
+        let Some(running) = self.instructions.running.take() else {
+            return;
+        };
+        let answer = self.answered(&running, said);
+        self.instructions.answer = Some(answer);
+    }
+
+    fn answered(&mut self, running: &Running, said: Said) -> Answer {
+        let refused = |words: &str| Answer {
+            text: running.text.clone(),
+            outcome: Outcome::Refuse,
+            words: words.to_owned(),
+            parts: Vec::new(),
+        };
+        let (talk, turn, poses) = match said.turn {
+            Ok(said) => said,
+            Err(why) => return refused(&why),
+        };
+        let stays = matches!(self.link, Link::None);
+        let Some(document) = &self.document else {
+            return refused("no file is open");
+        };
+        if !turn.moved.is_empty() {
+            if document.generation != running.generation || document.poses != running.poses {
+                return refused(
+                    "the parts were moved meanwhile, so nothing was done; give the instruction again",
+                );
+            }
+            if !stays {
+                return refused("a rig was connected meanwhile, so nothing was done; disconnect it first");
+            }
+            // A board that is connected later gets the scene with the parts here.
+            self.place(poses);
+        }
+        let Some(document) = &self.document else {
+            return refused("no file is open");
+        };
+        let answer = answer(document, &running.text, &turn);
+        self.instructions.talk = Some(talk);
+        answer
+    }
+}

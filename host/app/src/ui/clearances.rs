@@ -1,0 +1,157 @@
+//! The list of gaps and clashes under the parts, folded until it is opened: searched on request; a click shows the place and marks both parts.
+
+use std::sync::Arc;
+
+use egui::{
+    Button, CollapsingHeader, Color32, CornerRadius, DragValue, RichText, Role, ScrollArea, Sense, Ui, Vec2,
+    WidgetInfo,
+};
+
+use super::theme;
+use crate::session::Session;
+use crate::session::clearances::{Near, Search};
+use crate::session::document::Document;
+use crate::viewport::gesture::{Marked, Viewpoint};
+
+/// Largest height of the list, points.
+const LIST_HEIGHT: f32 = 130.0;
+
+/// State of the list.
+pub struct Clearances {
+    search: Search,
+    /// Largest gap searched for, µm.
+    within_um: f64,
+    /// Height of the list in the last frame, points.
+    pub height: f32,
+}
+
+impl Default for Clearances {
+    fn default() -> Self {
+        Self {
+            search: Search::default(),
+            within_um: 1000.0,
+            height: 0.0,
+        }
+    }
+}
+
+impl Clearances {
+    /// Takes in a finished search.
+    pub fn poll(&mut self) {
+        self.search.poll();
+    }
+
+    /// Draws the list.
+    pub fn show(&mut self, ui: &mut Ui, session: &Session, view: &mut Viewpoint) {
+        ui.take_available_width();
+        let Some(document) = &session.document else { return };
+        let heading = RichText::new("Clearances")
+            .size(12.5)
+            .color(theme::of(ui).text_weak);
+        CollapsingHeader::new(heading)
+            .default_open(false)
+            .show(ui, |ui| self.list(ui, document, view));
+    }
+
+    fn list(&mut self, ui: &mut Ui, document: &Document, view: &mut Viewpoint) {
+        self.request(ui, document);
+        let weak_ink = theme::of(ui).text_weak;
+        let weak = |text: &str| RichText::new(text).size(12.0).color(weak_ink);
+        if self.search.has_failed() {
+            ui.label(RichText::new("The search ended without a result").color(theme::of(ui).fault_text));
+        }
+        let Some(found) = self.search.found(document) else {
+            return;
+        };
+        if self.search.is_outdated(document) {
+            ui.label(weak("Parts have moved since: search again"));
+        }
+        if found.pairs.is_empty() {
+            ui.label(weak("No two parts are this near"));
+        }
+        let pairs = found.pairs.clone();
+        ScrollArea::vertical()
+            .id_salt("clearances")
+            .auto_shrink([false, true])
+            .max_height(LIST_HEIGHT)
+            .min_scrolled_height(LIST_HEIGHT)
+            .show(ui, |ui| {
+                ui.spacing_mut().item_spacing.y = 2.0;
+                for pair in &pairs {
+                    let marked = Marked {
+                        place: Some(pair.place),
+                        parts: pair.parts.to_vec(),
+                    };
+                    if line(ui, document, pair, view.marked == marked) {
+                        view.frame(marked, document.extent);
+                    }
+                }
+            });
+    }
+
+    fn request(&mut self, ui: &mut Ui, document: &Document) {
+        ui.horizontal(|ui| {
+            let button = Button::new(RichText::new("Search").size(12.5));
+            let response = ui
+                .add_enabled(!self.search.is_busy(), button)
+                .accessible_name("Search clearances")
+                .on_hover_text("List the pairs of parts that overlap or are this near, by exact distances");
+            if response.clicked() {
+                let ctx = ui.ctx().clone();
+                let wake = Arc::new(move || ctx.request_repaint());
+                self.search.start(document, 1e-3 * self.within_um, wake);
+            }
+            ui.label(RichText::new("gaps up to").size(12.5));
+            ui.add(
+                DragValue::new(&mut self.within_um)
+                    .range(1.0..=20_000.0)
+                    .speed(5.0)
+                    .max_decimals(1)
+                    .suffix(" µm"),
+            );
+            if self.search.is_busy() {
+                ui.add(egui::Spinner::new().size(14.0));
+            }
+        });
+    }
+}
+
+/// Draws one pair; returns whether it was clicked.
+fn line(ui: &mut Ui, document: &Document, pair: &Near, chosen: bool) -> bool {
+    let [a, b] = pair.parts.map(|part| document.part_name(part));
+    let words = pair.words();
+    let text = format!("{a} – {b}");
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
+    let named = format!("{text}: {words}");
+    response.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, chosen, &named));
+    let ink = theme::of(ui);
+    let painter = ui.painter_at(rect);
+    let fill = match (chosen, response.hovered()) {
+        (true, _) => ink.accent_dim.gamma_multiply(0.8),
+        (_, true) => ink.card,
+        _ => Color32::TRANSPARENT,
+    };
+    painter.rect_filled(rect, CornerRadius::same(6), fill);
+    let color = if pair.clashes() { ink.contact } else { ink.text };
+    let value = painter.text(
+        rect.right_center() - Vec2::new(6.0, 0.0),
+        egui::Align2::RIGHT_CENTER,
+        words,
+        egui::FontId::proportional(12.5),
+        color,
+    );
+    let mut job = egui::text::LayoutJob::single_section(
+        text,
+        egui::TextFormat::simple(egui::FontId::proportional(12.5), ink.text_strong),
+    );
+    job.wrap = egui::text::TextWrapping::truncate_at_width((value.left() - rect.left() - 14.0).max(10.0));
+    let galley = painter.layout_job(job);
+    let at = egui::Pos2::new(rect.left() + 6.0, rect.center().y - 0.5 * galley.size().y);
+    painter.galley(at, galley, ink.text_strong);
+    let [x, y, z] = pair.place.to_array();
+    let clicked = response.clicked();
+    response.on_hover_text(format!(
+        "{named}, at {x:.3}, {y:.3}, {z:.3} mm; a click shows it and marks both parts"
+    ));
+    clicked
+}
