@@ -34,7 +34,10 @@ fn is_on_this_system(name: &str) -> bool {
     let built_in = egui::Context::default();
     let mut own = false;
     // The first pass loads the built-in fonts.
-    let _ = built_in.run_ui(egui::RawInput::default(), |_| {});
+    built_in
+        .run_ui(egui::RawInput::default(), |_| {})
+        .textures_delta
+        .clear();
     built_in.fonts_mut(|fonts| own = fonts.has_glyphs(&FontId::proportional(13.5), name));
     own || name.chars().all(|c| {
         let request = FallbackRequest {

@@ -12,6 +12,7 @@ use mortise_protocol::message::DeviceState;
 use mortise_protocol::parameter::ParameterId;
 use mortise_rig::RigSpec;
 
+use super::finding::NO_FIT;
 use super::link::Link;
 use super::state::Session;
 
@@ -80,6 +81,22 @@ pub enum Intent {
     GuideWhen(When),
     /// Set the largest guidance force, N.
     GuideCap(f32),
+    /// Find fits with a part, or with the nearest ones.
+    FitWith(Option<usize>),
+    /// Find the fits of the held or selected part.
+    FindFits,
+    /// End the search for fits; what was found stays.
+    CancelFits,
+    /// Show the fit of this number.
+    ChooseFit(usize),
+    /// Show the next fit.
+    NextFit,
+    /// Show the fit in which the part goes in the other way round.
+    TurnOver,
+    /// Put the part into the fit that is shown.
+    PlaceFit,
+    /// Show no fits any more.
+    DropFits,
     /// Ask where to write the project.
     SaveProject,
     /// Write the project.
@@ -137,6 +154,13 @@ impl Intent {
                 | Self::SwitchTargetOff(..)
                 | Self::GuideWhen(_)
                 | Self::GuideCap(_)
+                | Self::FitWith(_)
+                | Self::FindFits
+                | Self::CancelFits
+                | Self::ChooseFit(_)
+                | Self::NextFit
+                | Self::TurnOver
+                | Self::DropFits
                 | Self::SaveProject
                 | Self::WriteProject { .. }
                 | Self::ForgetRecent(_)
@@ -173,6 +197,8 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         | Intent::Select(_)
         | Intent::GuideWhen(_)
         | Intent::GuideCap(_)
+        | Intent::FitWith(_)
+        | Intent::DropFits
         | Intent::ForgetRecent(_)
         | Intent::Fold { .. } => None,
         Intent::Browse | Intent::Open(_) | Intent::OpenSample => {
@@ -263,6 +289,12 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
                 Some(_) => None,
             }
         }
+        Intent::FindFits
+        | Intent::CancelFits
+        | Intent::ChooseFit(_)
+        | Intent::NextFit
+        | Intent::TurnOver
+        | Intent::PlaceFit => fits(session, intent),
         Intent::SaveProject | Intent::WriteProject { .. } => {
             session.document.is_none().then(|| NO_FILE.to_owned())
         }
@@ -281,6 +313,28 @@ pub fn obstacle(session: &Session, intent: &Intent) -> Option<String> {
         }
         Intent::Record | Intent::EndRecording => record(session, intent),
         Intent::PlayInsertion => play(session),
+    }
+}
+
+fn fits(session: &Session, intent: &Intent) -> Option<String> {
+    let no = |reason: &str| Some(reason.to_owned());
+    let fitting = session.fitting.as_ref();
+    let shown = fitting.filter(|fitting| fitting.offer().is_some());
+    match intent {
+        Intent::FindFits => session.no_search(),
+        Intent::PlaceFit => session.no_placing(),
+        Intent::CancelFits => match fitting.and_then(|fitting| fitting.search.as_ref()) {
+            None => no("No search for fits is under way"),
+            Some(_) => None,
+        },
+        Intent::TurnOver => match shown.zip(session.document.as_ref()) {
+            None => no(NO_FIT),
+            Some((fitting, document)) if fitting.turned_over(document).is_none() => {
+                no("In no fit that was found the part goes in the other way round")
+            }
+            Some(_) => None,
+        },
+        _ => shown.is_none().then(|| NO_FIT.to_owned()),
     }
 }
 

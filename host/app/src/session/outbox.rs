@@ -11,6 +11,7 @@ use mortise_protocol::parameter::ParameterId;
 use mortise_rig::{Client, Event, RigEntry, UploadProgress};
 
 use super::document::Document;
+use super::fitting::FitsFound;
 use super::purpose::Purpose;
 use super::recording::RecordingUpdate;
 use super::saved::Saved;
@@ -62,6 +63,8 @@ pub enum Update {
         /// The targets.
         list: List,
     },
+    /// Fits with one part were searched.
+    Fits(FitsFound),
     /// A file was chosen in a dialog.
     Chosen(Purpose, PathBuf),
     /// No file dialog is available: the window must ask for a path.

@@ -10,6 +10,7 @@ use mortise_protocol::message::{DeviceState, HandScript, ToDevice};
 use mortise_protocol::parameter::{PARAMETERS, ParameterId};
 use mortise_rig::{EmulatedMode, RigSpec};
 
+use super::fitting::Fitting;
 use super::intent::Intent;
 use super::link::{self, Link};
 use super::notes::Severity;
@@ -97,6 +98,14 @@ impl Session {
                     self.command_guidance(GuidanceCommand::Set(self.guide));
                 }
             }
+            Intent::FitWith(part) => self.partner = part,
+            Intent::FindFits => self.find_fits(),
+            Intent::CancelFits => self.cancel_fits(),
+            Intent::ChooseFit(number) => self.show_fit(|fitting, _| fitting.choose(number)),
+            Intent::NextFit => self.show_fit(|fitting, _| fitting.choose_next()),
+            Intent::TurnOver => self.show_fit(Fitting::turn_over),
+            Intent::PlaceFit => self.place_fit(),
+            Intent::DropFits => self.drop_fits(),
             Intent::SaveProject => self.ask_for_path(Purpose::SaveProject),
             Intent::WriteProject { path, replace } => self.write_project(path, replace),
             Intent::ForgetRecent(path) => self.preferences.recent.forget(&path),

@@ -17,6 +17,7 @@ use mortise_rig::{RigEntry, RigSpec};
 
 use super::document::Document;
 use super::fits::FitChoice;
+use super::fitting::Fitting;
 use super::history::History;
 use super::instructions::Instructions;
 use super::keeper::Keeper;
@@ -98,6 +99,10 @@ pub struct Session {
     pub guide: GuideSettings,
     /// Candidate and active targets.
     pub guidance: List,
+    /// Fits of a part, found on request.
+    pub fitting: Option<Fitting>,
+    /// The part with which fits are found; `None`: the nearest ones.
+    pub partner: Option<usize>,
     /// Messages.
     pub notes: Notes,
     /// Contact method of the next bake.
@@ -135,6 +140,7 @@ pub struct Session {
     pub(super) outbox: Outbox,
     pub(super) inbox: Receiver<Update>,
     pub(super) generation: u64,
+    pub(super) fit_searches: u64,
     pub(super) link_id: u64,
     pub(super) samples_since_statistics: u32,
 }
@@ -158,6 +164,8 @@ impl Session {
             parameters: PARAMETERS.iter().map(|row| row.default).collect(),
             guide: GuideSettings::default(),
             guidance: List::default(),
+            fitting: None,
+            partner: None,
             notes: Notes::default(),
             method: Method::default(),
             recording: None,
@@ -179,6 +187,7 @@ impl Session {
             outbox,
             inbox,
             generation: 0,
+            fit_searches: 0,
             link_id: 0,
             samples_since_statistics: 0,
         }
@@ -285,6 +294,7 @@ impl Drop for Session {
         if let Some(job) = &self.job {
             job.cancel.set();
         }
+        self.drop_fits();
         // Closes the queue: threads blocked on it must not delay the end.
         self.inbox = std::sync::mpsc::sync_channel(1).1;
         // Motors off and emulator ended before the program ends.

@@ -80,6 +80,7 @@ pub fn take(session: &mut Session, update: Update) -> Option<Intent> {
                 session.guidance = list;
             }
         }
+        Update::Fits(found) => session.fits_found(found),
         Update::Chosen(purpose, path) => return Some(answer(purpose, path, true)),
         Update::NoDialog(purpose) => session.wants_path = Some(purpose),
         Update::Missing(missing) => session.missing = missing,
@@ -114,6 +115,8 @@ fn opened(session: &mut Session, Imported { document, saved }: Imported) {
         session.notes.add(Severity::Warning, warning.clone());
     }
     session.selected = None;
+    session.drop_fits();
+    session.partner = None;
     session.verdict = None;
     session.instructions.end();
     session.document = Some(document);

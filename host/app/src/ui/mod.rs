@@ -11,6 +11,7 @@ mod control;
 mod drop;
 mod eye;
 mod file_menu;
+mod fits;
 pub mod fonts;
 mod gaps;
 mod guidance;
@@ -279,6 +280,21 @@ fn shortcuts(ui: &Ui, session: &Session, wanted: &mut Vec<Intent>) {
             }
             if input.consume_key(Modifiers::NONE, Key::I) {
                 wanted.push(Intent::Isolate(part));
+            }
+        }
+        if session.fit_subject().is_some() && input.consume_key(Modifiers::NONE, Key::M) {
+            wanted.push(Intent::FindFits);
+        }
+        if session.fitting.is_some() {
+            let keys = [
+                (Key::N, Intent::NextFit),
+                (Key::T, Intent::TurnOver),
+                (Key::P, Intent::PlaceFit),
+            ];
+            for (key, intent) in keys {
+                if input.consume_key(Modifiers::NONE, key) {
+                    wanted.push(intent);
+                }
             }
         }
     });

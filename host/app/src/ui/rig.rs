@@ -5,7 +5,7 @@ use egui::{FontId, Response, RichText, ScrollArea, TextFormat, Ui, Vec2};
 use mortise_protocol::message::{Capabilities, CostUnit};
 use mortise_rig::{EmulatedMode, RigEntry, RigSpec};
 
-use super::{control, guidance, parameters, theme};
+use super::{control, fits, guidance, parameters, theme};
 use crate::session::link::{Connection, Link};
 use crate::session::{Intent, Session, obstacle, remaining};
 
@@ -31,6 +31,8 @@ pub fn show(ui: &mut Ui, session: &Session, wanted: &mut Vec<Intent>) {
             control::section(ui, "Hand");
             ui.add_space(2.0);
             hand(ui, session, wanted);
+            control::divider(ui);
+            fits::show(ui, session, wanted);
             control::divider(ui);
             guidance::show(ui, session, wanted);
             control::divider(ui);

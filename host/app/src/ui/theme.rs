@@ -239,7 +239,7 @@ mod tests {
                 system_theme,
                 ..Default::default()
             };
-            let _ = ctx.run_ui(input, |_| {});
+            ctx.run_ui(input, |_| {}).textures_delta.clear();
             ctx.theme()
         };
         assert_eq!(shown(None), Theme::Dark);

@@ -7,7 +7,7 @@ use egui::{
 use glam::DVec3;
 use mortise_rig::describe_flags;
 
-use super::{control, gaps, section, theme};
+use super::{control, fits, gaps, section, theme};
 use crate::session::pose::point_from_wire;
 use crate::session::touch::Touch;
 use crate::session::{Intent, Session};
@@ -68,6 +68,7 @@ pub fn show(
     triad(ui, rect, view);
     let below = toolbar(ui, rect, session, view);
     let below = section::show(ui, rect, below, session, view);
+    let below = fits::over_view(ui, rect, below, session, view);
     legend(ui, rect, below, session);
     readout(ui, rect, session);
     let hint = if view.drags_hand() {

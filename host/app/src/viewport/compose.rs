@@ -12,6 +12,7 @@ use crate::display::extent::Extent;
 use crate::display::mesh::meeting;
 use crate::session::Session;
 use crate::session::document::Document;
+use crate::session::fitting::Offer;
 use crate::session::pose::point_from_wire;
 
 /// Edges of parts, sRGB and opacity.
@@ -32,6 +33,8 @@ const TINT_HELD: [f32; 4] = [0.96, 0.65, 0.26, 0.55];
 const TINT_MARKED: [f32; 4] = [0.45, 0.72, 1.0, 0.35];
 /// Colour of the ghost, which shows the pose that the handle commands for the held part.
 const GHOST: [f32; 3] = [0.45, 0.72, 1.0];
+/// Colour of the ghost of a part in a fit.
+const GHOST_FIT: [f32; 3] = [0.40, 0.82, 0.58];
 /// Directions across the hatching of sections, degrees, by part.
 const HATCHES: [f32; 4] = [45.0, 135.0, 20.0, 110.0];
 /// Opacity of fixed parts drawn as glass.
@@ -67,6 +70,10 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
         Ground::Light => [EDGE_MARKED_LIGHT, EDGE_HELD_LIGHT, EDGE_GLASS_LIGHT],
     };
     let held = session.grabbed();
+    let fit = session
+        .fitting
+        .as_ref()
+        .and_then(|fitting| Some((fitting.moving, fitting.offer()?)));
     let touching = session.telemetry.as_deref().filter(|_| held.is_some());
     let mut items: Vec<Item> = (document.model.parts.iter().enumerate())
         .filter(|&(index, _)| !document.is_hidden(index) || held == Some(index))
@@ -88,7 +95,7 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
                 },
                 lit: touching.map_or_else(Vec::new, |t| lit(document, t, index, in_hand)),
                 lit_edges: touching.map_or_else(Vec::new, |t| lit_edges(document, t, index, in_hand)),
-                mates: mates(session, index),
+                mates: mates(session, index, fit),
             }
         })
         .collect();
@@ -107,6 +114,7 @@ pub fn compose(session: &Session, document: &Document, look: &Look<'_>) -> Pictu
             mates: Vec::new(),
         });
     }
+    items.extend(fit.and_then(|(part, offer)| fit_ghost(document, part, offer)));
     let cut = look.cut.map(|shown| Cutaway {
         plane: shown.plane,
         areas: shown.cut.map(|cut| Areas(cut.clone())),
@@ -193,11 +201,42 @@ fn lit_edges(document: &Document, telemetry: &Telemetry, part: usize, in_hand: b
     edges
 }
 
-/// Faces of a part that fit another part's and are held there: guided, or held by contact.
-fn mates(session: &Session, part: usize) -> Vec<u32> {
+/// The ghost of a part in a fit, its mating faces marked; `None` where the part is there.
+fn fit_ghost(document: &Document, part: usize, offer: &Offer) -> Option<Item> {
+    let (pose, here) = (offer.pose(document)?, document.poses.get(part)?);
+    if apart(&pose, here, document, part) <= GHOST_FROM * document.extent.radius {
+        return None;
+    }
+    Some(Item {
+        shape: document.model.parts[part].shape,
+        pose,
+        color: GHOST_FIT,
+        opacity: 0.34,
+        tint: [0.0; 4],
+        line: [GHOST_FIT[0], GHOST_FIT[1], GHOST_FIT[2], 0.9],
+        lit: Vec::new(),
+        lit_edges: Vec::new(),
+        mates: of_fit(offer, 0),
+    })
+}
+
+/// Mating faces of a fit: of the moving part, or of the other.
+fn of_fit(offer: &Offer, side: usize) -> Vec<u32> {
+    let mut faces: Vec<u32> = offer.fit.faces.iter().map(|pair| pair[side]).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    faces.truncate(MAX_LIT);
+    faces
+}
+
+/// Faces of a part that fit another part's: those of the fit that is shown, and those that are held there, guided or by contact.
+fn mates(session: &Session, part: usize, fit: Option<(usize, &Offer)>) -> Vec<u32> {
     let held = session.grabbed();
     let list = (held.is_some() && session.guidance.held == held).then_some(&session.guidance);
-    let mut faces: Vec<u32> = Vec::new();
+    let mut faces = match fit {
+        Some((_, offer)) if offer.against == part => of_fit(offer, 1),
+        _ => Vec::new(),
+    };
     for row in list.into_iter().flat_map(|list| &list.rows) {
         let target = &row.target;
         let own = match &row.standing {

@@ -1,0 +1,153 @@
+//! Finding fits on request, beside the window's thread, and placing a part in the one that the operator accepts.
+
+use std::sync::Arc;
+
+use super::document::Document;
+use super::fitting::{FitsFound, Fitting, is_closed, nearest};
+use super::notes::Severity;
+use super::outbox::Update;
+use super::state::Session;
+use super::threads::{Cancel, spawn};
+
+/// Why no fit can be shown.
+pub(super) const NO_FIT: &str = "No fit is shown: find fits first";
+
+impl Session {
+    /// The part whose fits are found: the held one, or the selected one.
+    pub fn fit_subject(&self) -> Option<usize> {
+        let part = self.grabbed().or(self.selected)?;
+        let parts = &self.document.as_ref()?.model.parts;
+        (part < parts.len()).then_some(part)
+    }
+
+    /// Searches the fits with the chosen part, or with the nearest ones.
+    pub(super) fn find_fits(&mut self) {
+        self.drop_fits();
+        let (Some(moving), Some(document)) = (self.fit_subject(), &self.document) else {
+            return;
+        };
+        let partners = self
+            .partner
+            .map_or_else(|| nearest(document, moving), |part| vec![part]);
+        self.fit_searches += 1;
+        let (id, model) = (self.fit_searches, Arc::clone(&document.model));
+        let (outbox, cancel) = (self.outbox.clone(), Cancel::default());
+        self.fitting = Some(Fitting::new(id, moving, partners.len(), cancel.clone()));
+        spawn("mortise-fits", move || {
+            for (number, &against) in partners.iter().enumerate() {
+                if cancel.is_set() {
+                    return;
+                }
+                let found = mortise_fit::find(&model, moving, against, &mortise_fit::FitOptions::default());
+                let found = FitsFound {
+                    id,
+                    against,
+                    result: found.map(|found| found.fits).map_err(|error| error.to_string()),
+                    left: partners.len() - number - 1,
+                };
+                if !outbox.send(Update::Fits(found)) {
+                    return;
+                }
+            }
+        });
+    }
+
+    /// Shows another of the fits that were found.
+    pub(super) fn show_fit(&mut self, choose: impl FnOnce(&mut Fitting, &Document)) {
+        if let (Some(fitting), Some(document)) = (&mut self.fitting, &self.document) {
+            choose(fitting, document);
+        }
+    }
+
+    /// Takes in what a search found; what is no longer wanted is dropped.
+    pub(super) fn fits_found(&mut self, found: FitsFound) {
+        let wanted = |fitting: &&mut Fitting| fitting.id == found.id && fitting.search.is_some();
+        let Some(fitting) = self.fitting.as_mut().filter(wanted) else {
+            return;
+        };
+        match found.result {
+            Ok(fits) => fitting.add(found.against, fits),
+            Err(why) => fitting.failures.push(why),
+        }
+        if let Some(search) = &mut fitting.search {
+            search.left = found.left;
+        }
+        if found.left == 0 {
+            fitting.search = None;
+        }
+    }
+
+    /// Ends a search; what it has found stays.
+    pub(super) fn cancel_fits(&mut self) {
+        let Some(fitting) = &mut self.fitting else { return };
+        if let Some(search) = fitting.search.take() {
+            search.cancel.set();
+        }
+        if fitting.offers.is_empty() {
+            self.fitting = None;
+        }
+    }
+
+    /// Shows no fits any more.
+    pub(super) fn drop_fits(&mut self) {
+        self.cancel_fits();
+        self.fitting = None;
+    }
+
+    /// Why no fits can be searched now, as a sentence.
+    pub(super) fn no_search(&self) -> Option<String> {
+        let no = |reason: &str| Some(reason.to_owned());
+        let Some(document) = &self.document else {
+            return no("No file is open");
+        };
+        let Some(part) = self.fit_subject() else {
+            return no("Select a part first");
+        };
+        if !is_closed(&document.model, part) {
+            let name = document.part_name(part);
+            return Some(format!("{name} has no closed surface: choose another part"));
+        }
+        match self.partner {
+            Some(other) if other == part => {
+                no("A part does not fit itself: choose another one to fit it with")
+            }
+            None if nearest(document, part).is_empty() => no("No other part has a closed surface"),
+            _ => None,
+        }
+    }
+
+    /// Why the part cannot be put into the fit that is shown, as a sentence.
+    pub(super) fn no_placing(&self) -> Option<String> {
+        let no = |reason: &str| Some(reason.to_owned());
+        if self.fitting.as_ref().and_then(Fitting::offer).is_none() {
+            return no(NO_FIT);
+        }
+        if self.is_armed() {
+            return no("Only while the motors are off: disarm first");
+        }
+        match self.connection() {
+            Some(connection) if connection.upload.is_some() => {
+                no("Wait until the collision model is on the board")
+            }
+            _ => None,
+        }
+    }
+
+    /// Puts the part into the fit that is shown.
+    pub(super) fn place_fit(&mut self) {
+        let (Some(fitting), Some(document)) = (&self.fitting, &self.document) else {
+            return;
+        };
+        let Some(offer) = fitting.offer() else { return };
+        let (moving, mut poses) = (fitting.moving, document.poses.clone());
+        let (Some(pose), Some(place)) = (offer.pose(document), poses.get_mut(moving)) else {
+            return;
+        };
+        *place = pose;
+        let (part, other) = (document.part_name(moving), document.part_name(offer.against));
+        let text = format!("Placed {part} in its fit with {other}; Reset parts puts every part back");
+        self.place(poses);
+        self.notes.add(Severity::Good, text);
+        self.drop_fits();
+    }
+}
