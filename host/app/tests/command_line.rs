@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{click, connect, harness, open_sample, until};
+use common::{arm, click, connect, harness, open_sample, until};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
@@ -126,21 +126,34 @@ fn a_cancelled_instruction_moves_nothing() {
 }
 
 #[test]
-fn while_a_rig_is_connected_no_instruction_moves_parts() {
+fn a_board_gets_the_parts_where_they_are_put_and_only_while_its_motors_are_off() {
     let mut harness = harness();
     open_sample(&mut harness);
     connect(&mut harness);
-    let intent = Intent::Instruct("insert the peg".to_owned());
-    let why = obstacle(&harness.state().session, &intent).expect("refused");
-    assert!(why.contains("disconnect"), "{why}");
     let before = poses(&harness);
     open_line(&mut harness);
-    write(&mut harness, "insert the peg");
+    assert_eq!(say(&mut harness, "insert the peg into the block"), Outcome::Done);
+    let inserted = poses(&harness);
+    assert_ne!(inserted, before);
+    until(
+        &mut harness,
+        "the scene is on the board anew",
+        mortise::session::Session::scene_is_on_board,
+    );
+    assert_eq!(poses(&harness), inserted);
+
+    arm(&mut harness);
+    let intent = Intent::Instruct("insert the peg".to_owned());
+    let why = obstacle(&harness.state().session, &intent).expect("refused");
+    assert!(why.contains("disarm"), "{why}");
+    write(&mut harness, "remove the peg");
     press(&mut harness, Key::Enter);
     harness.run_steps(5);
-    assert_eq!(poses(&harness), before);
+    assert_eq!(poses(&harness), inserted);
     assert!(harness.state().session.instructions.under_way().is_none());
-    assert!(harness.query_by_label_contains("disconnect").is_some());
+    let said =
+        |notes: &mortise::session::notes::Notes| notes.iter().any(|note| note.text.contains("disarm first"));
+    assert!(said(&harness.state().session.notes));
 }
 
 /// The motor has parts that only their place tells apart.

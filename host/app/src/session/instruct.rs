@@ -6,7 +6,6 @@ use std::sync::mpsc::{TryRecvError, sync_channel};
 use mortise_words::Outcome;
 
 use super::instructions::{Answer, Running, Said, answer, carry_out};
-use super::link::Link;
 use super::state::Session;
 use super::threads::spawn;
 
@@ -72,7 +71,10 @@ impl Session {
             Ok(said) => said,
             Err(why) => return refused(&why),
         };
-        let stays = matches!(self.link, Link::None);
+        let (armed, uploading) = (
+            self.is_armed(),
+            self.connection().is_some_and(|c| c.upload.is_some()),
+        );
         let Some(document) = &self.document else {
             return refused("no file is open");
         };
@@ -82,10 +84,15 @@ impl Session {
                     "the parts were moved meanwhile, so nothing was done; give the instruction again",
                 );
             }
-            if !stays {
-                return refused("a rig was connected meanwhile, so nothing was done; disconnect it first");
+            if armed || uploading {
+                return refused(match armed {
+                    true => "the motors were switched on meanwhile, so nothing was done; disarm first",
+                    false => {
+                        "the collision model is being uploaded, so nothing was done; give the instruction again"
+                    }
+                });
             }
-            // A board that is connected later gets the scene with the parts here.
+            // A board gets the scene with the parts here.
             self.place(poses);
         }
         let Some(document) = &self.document else {

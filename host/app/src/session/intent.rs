@@ -437,8 +437,10 @@ fn instruct(session: &Session, text: &str) -> Option<String> {
         "Write an instruction first"
     } else if session.instructions.under_way().is_some() {
         "An instruction is under way"
-    } else if !matches!(session.link, Link::None) {
-        "A rig is connected, and its board knows the parts only where they are now: disconnect it first"
+    } else if session.is_armed() {
+        "Only while the motors are off: disarm first"
+    } else if session.connection().is_some_and(|c| c.upload.is_some()) {
+        "The collision model is being uploaded"
     } else {
         return None;
     };
